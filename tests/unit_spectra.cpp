@@ -1,0 +1,376 @@
+// Spectra and colour: the measured tables by checksum and by smoothness, published reference values, and the RGB fit.
+#include "error.h"
+#include "spectra.h"
+#include "spectra_data.h"
+
+#include <catch2/catch.hpp>
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <span>
+#include <tuple>
+
+using namespace crt;
+
+namespace {
+
+double at(const Spectrum& s, int nm) { return s[static_cast<std::size_t>(nm - kWavelengthMin_nm)]; }
+
+/// A table's digits, folded into 64 bits (FNV-1a over the bytes of the doubles): a changed digit is a changed sum.
+std::uint64_t checksum(std::span<const double> table) {
+    std::uint64_t hash = 0xcbf29ce484222325u;
+    for (const double value : table) {
+        unsigned char bytes[sizeof value];
+        std::memcpy(bytes, &value, sizeof value);
+        for (const unsigned char b : bytes) hash = (hash ^ b) * 0x100000001b3u;
+    }
+    return hash;
+}
+
+/// Largest distance between a value and the cubic through its four neighbours, relative to the table's maximum.
+double roughness(std::span<const double> v) {
+    double worst = 0, top = 0;
+    for (const double x : v) top = std::max(top, x);
+    for (std::size_t i = 2; i + 2 < v.size(); ++i)
+        worst = std::max(worst, std::abs((-v[i - 2] + 4 * v[i - 1] + 4 * v[i + 1] - v[i + 2]) / 6 - v[i]));
+    return worst / top;
+}
+
+/// Linear sRGB of a reflectance lit by D65.
+Vec3d underD65(Spectrum reflectance) {
+    const Spectrum d65 = *illuminantSpectrum("D65");
+    for (std::size_t i = 0; i < reflectance.values.size(); ++i) reflectance[i] *= d65[i];
+    return multiply(xyzToRgb(ColorSpace::LinearSrgb), spectrumToXyz(reflectance));
+}
+
+/// A file in the temporary directory that goes away with the test.
+class TemporaryFile {
+public:
+    explicit TemporaryFile(const std::string& text)
+        : path_((std::filesystem::temp_directory_path() / ("crt_unit_spectra_" + std::to_string(::getpid()) + ".spd")).string()) {
+        std::ofstream(path_, std::ios::binary) << text;
+    }
+    ~TemporaryFile() {
+        std::error_code ignored;
+        std::filesystem::remove(path_, ignored);
+    }
+    const std::string& path() const { return path_; }
+
+private:
+    std::string path_;
+};
+
+/// Sentence of the scene error that reading `text` as a spectrum file gives, and the line it points to.
+std::pair<std::string, int> fileError(const std::string& text, Outside outside = Outside::Clamp) {
+    const TemporaryFile file(text);
+    try {
+        readSpectrumFile(file.path(), outside);
+    } catch (const Error& e) {
+        CHECK(e.kind() == ErrorKind::Scene);
+        CHECK(e.place().file == file.path());
+        return {e.what(), e.place().line};
+    }
+    return {"no error", -1};
+}
+
+}  // namespace
+
+TEST_CASE("the measured tables are the published ones", "[spectra]") {
+    // Sums anyone can redo from the publications, then the digits as a whole.
+    double x = 0, y = 0, z = 0;
+    for (int i = 0; i < data::kObserverSize; ++i) x += data::kCieX[i], y += data::kCieY[i], z += data::kCieZ[i];
+    CHECK(x == Approx(106.8654695).epsilon(1e-9));
+    CHECK(y == Approx(106.8569171).epsilon(1e-9));
+    CHECK(z == Approx(106.8922513).epsilon(1e-9));
+    CHECK(cieYIntegral() == y);
+
+    CHECK(checksum(data::kCieX) == 0xb09dbe4ae4065464u);
+    CHECK(checksum(data::kCieY) == 0xaa5d2f74fa9f284au);
+    CHECK(checksum(data::kCieZ) == 0x28f303545754c1beu);
+    const std::uint64_t illuminants[] = {0xe2046d4a0f5e421eu, 0xbe621c333dff1e32u, 0x4cb4a59c27aa9394u,
+                                         0x9cb2e94d4e80b46eu, 0x96b59a7e032b4d45u, 0x4ea56ccf3c5b7e93u};
+    for (std::size_t i = 0; i < data::kIlluminants.size(); ++i) {
+        CAPTURE(data::kIlluminants[i].name);
+        CHECK(checksum(data::kIlluminants[i].power) == illuminants[i]);
+    }
+    const std::uint64_t metals[][2] = {{0xb269a0f4e82fbcccu, 0x15a4b670697585edu},
+                                       {0x1e04a0e36cad2633u, 0xa20bcfae54d1e587u},
+                                       {0x504f3bd51d48dbfau, 0x7a3bac4be3f7c35au},
+                                       {0x2e2b316edb0a13e2u, 0x9fd4111f4c44afc1u}};
+    for (std::size_t i = 0; i < data::kMetals.size(); ++i) {
+        CAPTURE(data::kMetals[i].name);
+        CHECK(checksum(data::kMetals[i].n) == metals[i][0]);
+        CHECK(checksum(data::kMetals[i].k) == metals[i][1]);
+    }
+}
+
+TEST_CASE("no digit of the observer stands out of its curve", "[spectra]") {
+    // A well-known slip, 0.9874812 for 0.9874182 at 547 nm, is a kink fifteen times the bound.
+    CHECK(roughness(data::kCieX) < 1e-4);
+    CHECK(roughness(data::kCieY) < 4e-5);
+    CHECK(roughness(data::kCieZ) < 2.1e-4);
+    const auto& y = data::kCieY;
+    const int i = 547 - kWavelengthMin_nm;
+    CHECK(std::abs((-y[i - 2] + 4 * y[i - 1] + 4 * y[i + 1] - y[i + 2]) / 6 - y[i]) < 4e-6);
+    CHECK(at(cieObserver()[1], 555) == 1.0);
+}
+
+TEST_CASE("whites and single lines fall where colorimetry puts them", "[spectra]") {
+    for (const std::string& name : illuminantNames()) {
+        CAPTURE(name);
+        CHECK(spectrumToXyz(*illuminantSpectrum(name))[1] == Approx(1).epsilon(1e-12));
+    }
+    const auto chromaticity = [](const Vec3d& xyz) {
+        const double sum = xyz[0] + xyz[1] + xyz[2];
+        return std::pair{xyz[0] / sum, xyz[1] / sum};
+    };
+    const std::pair<const char*, std::pair<double, double>> whites[] = {
+        {"A", {.44757, .40745}}, {"D50", {.34567, .35850}}, {"D65", {.31272, .32903}},
+        {"F2", {.3721, .3751}},  {"F7", {.3129, .3292}},    {"F11", {.3805, .3769}}};  // CIE 15, 1931 observer
+    for (const auto& [name, expected] : whites) {
+        CAPTURE(name);
+        const auto [x, y] = chromaticity(spectrumToXyz(*illuminantSpectrum(name)));
+        const double margin = name[0] == 'F' ? 3e-4 : 2e-5;  // Lamps with lines: the CIE sums them at 5 nm, crt at 1 nm.
+        CHECK(x == Approx(expected.first).margin(margin));
+        CHECK(y == Approx(expected.second).margin(margin));
+    }
+    CHECK_FALSE(illuminantSpectrum("D66"));
+
+    const Vec3d equal_energy = spectrumToXyz(constantSpectrum(1));
+    CHECK(equal_energy[0] == Approx(1).margin(4e-4));
+    CHECK(equal_energy[1] == Approx(1).epsilon(1e-14));
+    CHECK(equal_energy[2] == Approx(1).margin(4e-4));
+
+    Spectrum sodium;
+    sodium[589 - kWavelengthMin_nm] = 1;
+    const auto [x, y] = chromaticity(spectrumToXyz(sodium));
+    CHECK(x == Approx(.5690).margin(5e-4));
+    CHECK(y == Approx(.4303).margin(5e-4));
+}
+
+TEST_CASE("fluorescent lamps are dark where they were not measured", "[spectra]") {
+    const Spectrum f11 = *illuminantSpectrum("F11");
+    CHECK(at(f11, 379) == 0.0);
+    CHECK(at(f11, 380) > 0.0);
+    CHECK(at(f11, 781) == 0.0);
+}
+
+TEST_CASE("glass indices agree with the catalogue", "[spectra]") {
+    // SCHOTT data sheet N-BK7 gives 1.52238, 1.51680, 1.51432; eight digits from the same formula.
+    const data::Glass& bk7 = data::kGlasses[0];
+    CHECK(bk7.name == "N-BK7");
+    const auto index = [&](double um) {
+        double n2 = 1;
+        for (int i = 0; i < 3; ++i) n2 += bk7.B[i] * um * um / (um * um - bk7.C_um2[i]);
+        return std::sqrt(n2);
+    };
+    CHECK(index(.4861327) == Approx(1.52237627).margin(6e-9));
+    CHECK(index(.5875618) == Approx(1.51680003).margin(6e-9));
+    CHECK(index(.6562725) == Approx(1.51432233).margin(6e-9));
+    const Spectrum grid = *glassIndex("N-BK7");
+    CHECK(at(grid, 588) == Approx(index(.588)).epsilon(1e-14));
+
+    const std::tuple<const char*, double, double> catalogue[] = {{"N-BK7", 1.51680, 64.17}, {"SF10", 1.72825, 28.41},
+        {"SF11", 1.78472, 25.76}, {"N-SF10", 1.72828, 28.53}, {"N-SF11", 1.78472, 25.68}, {"fused_silica", 1.45846, 67.82}};
+    for (const auto& [name, nd, abbe] : catalogue) {
+        CAPTURE(name);
+        const Spectrum n = *glassIndex(name);
+        const auto line = [&n](double nm) {  // The lines lie between two wavelengths of the grid.
+            const int below = static_cast<int>(nm);
+            return at(n, below) + (nm - below) * (at(n, below + 1) - at(n, below));
+        };
+        CHECK(line(587.5618) == Approx(nd).margin(6e-6));
+        CHECK((line(587.5618) - 1) / (line(486.1327) - line(656.2725)) == Approx(abbe).margin(.01));
+    }
+    CHECK(at(*glassIndex("diamond"), 589) == Approx(2.4173).margin(1e-3));
+    CHECK_FALSE(glassIndex("BK8"));
+    for (const std::string& name : glassNames()) {
+        const Spectrum n = *glassIndex(name);
+        for (std::size_t i = 1; i < n.values.size(); ++i) REQUIRE(n[i] < n[i - 1]);  // Normal dispersion.
+    }
+
+    CHECK(at(cauchyIndex({1.5046, .0042}), 500) == Approx(1.5046 + .0042 / .25).epsilon(1e-14));
+    CHECK(cauchyIndex({1.5}).isConstant());
+    CHECK_THROWS_AS(cauchyIndex({}), Error);
+    CHECK_THROWS_AS(cauchyIndex({-1}), Error);
+    CHECK_THROWS_AS(sellmeierIndex({1, 0, 0}, {.25, 0, 0}), Error);  // A resonance at 500 nm.
+}
+
+TEST_CASE("metals answer to symbol and name", "[spectra]") {
+    for (const auto& [symbol, name] : {std::pair{"Ag", "silver"}, {"Al", "aluminium"}, {"Au", "gold"}, {"Cu", "copper"}}) {
+        REQUIRE(metalIndex(symbol));
+        CHECK(*metalIndex(symbol) == *metalIndex(name));
+    }
+    CHECK_FALSE(metalIndex("Fe"));
+    CHECK(metalNames().size() == 8);
+    // Normal-incidence reflectance: silver is bright and flat, gold dark in the blue and bright in the red.
+    const auto reflectance = [](const char* metal, int nm) {
+        const auto [n, k] = *metalIndex(metal);
+        const double a = at(n, nm), b = at(k, nm);
+        return ((a - 1) * (a - 1) + b * b) / ((a + 1) * (a + 1) + b * b);
+    };
+    CHECK(reflectance("Ag", 550) > .95);
+    CHECK(reflectance("Al", 550) == Approx(.92).margin(.01));
+    CHECK(reflectance("Au", 450) == Approx(.39).margin(.02));
+    CHECK(reflectance("Au", 650) > .94);
+    CHECK(reflectance("Cu", 450) < reflectance("Cu", 650) - .3);
+}
+
+TEST_CASE("black bodies follow Planck", "[spectra]") {
+    const Spectrum sun = blackbodySpectrum(5778, false);  // Per nanometre; the references are per metre.
+    CHECK(at(sun, 400) == Approx(2.3062239e4).epsilon(1e-7));
+    CHECK(at(sun, 550) == Approx(2.5857643e4).epsilon(1e-7));
+    CHECK(at(sun, 700) == Approx(2.0801530e4).epsilon(1e-7));
+    const Spectrum lamp = blackbodySpectrum(2856, false);
+    CHECK(at(lamp, 400) == Approx(39.443784).epsilon(1e-7));
+    CHECK(at(lamp, 700) == Approx(531.18786).epsilon(1e-7));
+
+    for (const double kelvin : {1.0, 300.0, 2856.0, 5778.0, 1e5, 1e9}) {
+        const Spectrum s = blackbodySpectrum(kelvin, true);
+        CAPTURE(kelvin);
+        CHECK(s.max() == 1.0);  // Also where the radiance itself underflows.
+        CHECK(s.min() >= 0.0);
+    }
+    CHECK(at(blackbodySpectrum(5778, true), 501) == Approx(1).margin(1e-5));  // Wien: 501.518 nm.
+    CHECK_THROWS_AS(blackbodySpectrum(0, true), Error);
+    CHECK_THROWS_AS(blackbodySpectrum(-5, false), Error);
+    CHECK_THROWS_AS(blackbodySpectrum(std::numeric_limits<double>::infinity(), false), Error);
+}
+
+TEST_CASE("tables are linear inside and explicit outside", "[spectra]") {
+    const Spectrum clamp = tableSpectrum({400, 500, 600}, {1, 3, 2}, Outside::Clamp);
+    CHECK(at(clamp, 360) == 1);
+    CHECK(at(clamp, 400) == 1);
+    CHECK(at(clamp, 450) == Approx(2));
+    CHECK(at(clamp, 500) == 3);
+    CHECK(at(clamp, 525) == Approx(2.75));
+    CHECK(at(clamp, 830) == 2);
+
+    const Spectrum zero = tableSpectrum({400, 500, 600}, {1, 3, 2}, Outside::Zero);
+    CHECK(at(zero, 399) == 0);
+    CHECK(at(zero, 400) == 1);
+    CHECK(at(zero, 600) == 2);
+    CHECK(at(zero, 601) == 0);
+
+    CHECK_THROWS_AS(tableSpectrum({400, 500}, {1, 3}, Outside::Error), Error);
+    CHECK_THROWS_AS(tableSpectrum({360, 829}, {1, 3}, Outside::Error), Error);
+    CHECK(at(tableSpectrum({300, 900}, {1, 1}, Outside::Error), 360) == 1);
+    CHECK(tableSpectrum({500}, {.25}, Outside::Clamp) == constantSpectrum(.25));
+    CHECK(at(tableSpectrum({500.25, 500.75}, {1, 1}, Outside::Zero), 500) == 0);  // Between the grid's wavelengths.
+
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    CHECK_THROWS_AS(tableSpectrum({}, {}, Outside::Clamp), Error);
+    CHECK_THROWS_AS(tableSpectrum({400, 500}, {1}, Outside::Clamp), Error);
+    CHECK_THROWS_AS(tableSpectrum({500, 400}, {1, 1}, Outside::Clamp), Error);
+    CHECK_THROWS_AS(tableSpectrum({400, 400}, {1, 1}, Outside::Clamp), Error);
+    CHECK_THROWS_AS(tableSpectrum({400, 500}, {1, nan}, Outside::Clamp), Error);
+    CHECK_THROWS_AS(tableSpectrum({400, nan}, {1, 1}, Outside::Clamp), Error);
+}
+
+TEST_CASE("spectrum files are read as people write them", "[spectra]") {
+    const Spectrum expected = tableSpectrum({400, 500.5, 700}, {.1, .2, .3}, Outside::Clamp);
+    for (const char* text : {"400 0.1\n500.5 0.2\n700 0.3\n", "wavelength_nm,value\n400,0.1\n500.5,.2\n700,3e-1",
+                             "# measured\r\n400\t0.1\r\n\r\n500.5 \t 0.2 # middle\r\n700 +0.3\r\n",
+                             "\xEF\xBB\xBFnm;value\n400;0.1\n 500.5 ; 0.2\n700; 0.3"}) {
+        CAPTURE(text);
+        const TemporaryFile file(text);
+        CHECK(readSpectrumFile(file.path(), Outside::Clamp) == expected);
+    }
+}
+
+TEST_CASE("bad spectrum files say where", "[spectra]") {
+    using Catch::Contains;
+    const auto check = [](const char* text, int line, const char* words, Outside outside = Outside::Clamp) {
+        const auto [sentence, at_line] = fileError(text, outside);
+        CAPTURE(text);
+        CHECK_THAT(sentence, Contains(words));
+        CHECK(at_line == line);
+    };
+    check("400 1\nfive 2\n", 2, "'five'");
+    check("400 1\n500 many\n", 2, "'many'");
+    check("400 1\n500\n", 2, "found one");
+    check("400 1 2\n", 1, "found 3 fields");
+    check("# a\n500 1\n\n400 1\n", 4, "must increase");
+    check("400 1\n500 nan\n", 2, "finite");
+    check("400 1\n500 1e999\n", 2, "1e999");
+    check("nm value\nnm value\n400 1\n", 2, "'nm'");
+    check("", 0, "no numbers");
+    check("# only a comment\n", 0, "no numbers");
+    check("400 1\n700 1\n", 0, "not all of 360 to 830", Outside::Error);
+    CHECK_THROWS_AS(readSpectrumFile("/nonexistent/x.spd", Outside::Clamp), Error);
+    CHECK_THROWS_WITH(readSpectrumFile("/", Outside::Clamp), Contains("directory"));
+}
+
+TEST_CASE("RGB reflectances give back their colour under D65", "[spectra][rgb]") {
+    const double steps[] = {0, .001, .02, .1, .3, .5, .8, .97, 1};
+    for (const double r : steps)
+        for (const double g : steps)
+            for (const double b : steps) {
+                const Spectrum s = rgbReflectance({r, g, b});
+                const Vec3d back = underD65(s);
+                CAPTURE(r, g, b, back[0], back[1], back[2]);
+                REQUIRE(std::abs(back[0] - r) < 1e-3);
+                REQUIRE(std::abs(back[1] - g) < 1e-3);
+                REQUIRE(std::abs(back[2] - b) < 1e-3);
+                REQUIRE(s.min() >= 0);
+                REQUIRE(s.max() <= 1);
+                if (r == g && g == b) REQUIRE(s == constantSpectrum(r));
+            }
+    // Next to grey is next to constant: no jump where the exact case takes over.
+    const Spectrum near_grey = rgbReflectance({.5, .5, .5 + 1e-9});
+    CHECK(near_grey.max() - near_grey.min() < 1e-7);
+
+    CHECK_THROWS_AS(rgbReflectance({-.01, 0, 0}), Error);
+    CHECK_THROWS_AS(rgbReflectance({0, 1.01, 0}), Error);
+    CHECK_THROWS_AS(rgbReflectance({0, 0, std::numeric_limits<double>::quiet_NaN()}), Error);
+}
+
+TEST_CASE("RGB emissions keep colour and strength", "[spectra][rgb]") {
+    for (const Vec3d& rgb : {Vec3d{1, 1, 1}, {17, 12, 4}, {0, 0, 3}, {1e-6, 2e-6, 1e-6}, {1e6, 0, 0}}) {
+        const Vec3d back = multiply(xyzToRgb(ColorSpace::LinearSrgb), spectrumToXyz(rgbEmission(rgb)));
+        const double top = std::max({rgb[0], rgb[1], rgb[2]});
+        CAPTURE(rgb[0], rgb[1], rgb[2]);
+        for (int i = 0; i < 3; ++i) CHECK(std::abs(back[i] - rgb[i]) < 1e-3 * top);
+    }
+    const Spectrum white = rgbEmission({1, 1, 1}), d65 = *illuminantSpectrum("D65");
+    for (std::size_t i = 0; i < white.values.size(); ++i) REQUIRE(white[i] == Approx(d65[i]).epsilon(1e-12));
+    CHECK(rgbEmission({0, 0, 0}) == constantSpectrum(0));
+    CHECK_THROWS_AS(rgbEmission({-1, 0, 0}), Error);
+    CHECK_THROWS_AS(rgbEmission({std::numeric_limits<double>::infinity(), 0, 0}), Error);
+}
+
+TEST_CASE("the sRGB transfer function is its own inverse", "[spectra][rgb]") {
+    for (int i = 0; i <= 255; ++i) CHECK(linearToSrgb(srgbToLinear(i / 255.0)) == Approx(i / 255.0).margin(1e-7));
+    CHECK(srgbToLinear(1) == Approx(1).epsilon(1e-15));
+    CHECK(srgbToLinear(.5) == Approx(.21404114).margin(1e-8));
+}
+
+TEST_CASE("colour spaces have the published matrices and map white to white", "[spectra]") {
+    // IEC 61966-2-1 prints four digits.
+    const double iec[3][3] = {{3.2406, -1.5372, -.4986}, {-.9689, 1.8758, .0415}, {.0557, -.2040, 1.0570}};
+    const Matrix3d srgb = xyzToRgb(ColorSpace::LinearSrgb);
+    for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) CHECK(srgb[r][c] == Approx(iec[r][c]).margin(5e-4));
+    for (const ColorSpace space : {ColorSpace::LinearSrgb, ColorSpace::AcesCg}) {
+        const Vec3d white = multiply(xyzToRgb(space), d65WhiteXyz());
+        for (const double v : white) CHECK(v == Approx(1).epsilon(1e-12));
+    }
+    const Vec3d v{.2, .3, .4};
+    CHECK(multiply(xyzToRgb(ColorSpace::Xyz), v) == v);
+
+    // Adaptation takes one white to the other and back.
+    const Vec3d d50{.96422, 1, .82521};
+    const Matrix3d there = bradfordAdaptation(d65WhiteXyz(), d50), back = bradfordAdaptation(d50, d65WhiteXyz());
+    const Vec3d mapped = multiply(there, d65WhiteXyz());
+    const Matrix3d both = multiply(back, there);
+    for (int i = 0; i < 3; ++i) {
+        CHECK(mapped[i] == Approx(d50[i]).epsilon(1e-12));
+        for (int j = 0; j < 3; ++j) CHECK(both[i][j] == Approx(i == j ? 1 : 0).margin(1e-12));
+    }
+    CHECK(there[0][0] == Approx(1.0478112).margin(1e-3));  // Lindbloom's D65 → D50.
+}
