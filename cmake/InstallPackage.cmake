@@ -1,0 +1,33 @@
+# The installed tree, which runs from any folder it is moved to:
+#   bin/crt                      the program; looks for backends in ../lib/crt (installed by core/CMakeLists.txt)
+#   lib/crt/                     backends (each installs itself, see CrtBackend.cmake)
+#   lib/cmake/crt/, include/crt/ what find_package(crt) and crt_add_backend need to build further ones: installed here
+
+include(CMakePackageConfigHelpers)
+
+set(CRT_INSTALL_CMAKE_DIR lib/cmake/crt)
+
+install(TARGETS crt_backend_headers crt_kernel_cache EXPORT crtTargets ARCHIVE DESTINATION lib)
+install(EXPORT crtTargets NAMESPACE crt:: DESTINATION ${CRT_INSTALL_CMAKE_DIR})
+
+install(FILES
+  ${PROJECT_SOURCE_DIR}/core/backend/crt_backend.h
+  ${PROJECT_SOURCE_DIR}/core/backend/plugin_guard.h
+  ${PROJECT_SOURCE_DIR}/core/backend/kernel_cache.h
+  ${PROJECT_BINARY_DIR}/generated/backend/crt_layout_hash.h
+  DESTINATION include/crt/backend)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/kernel/ DESTINATION include/crt/kernel FILES_MATCHING PATTERN "*.h")
+
+configure_package_config_file(
+  ${PROJECT_SOURCE_DIR}/cmake/crtConfig.cmake.in ${PROJECT_BINARY_DIR}/generated/crtConfig.cmake
+  INSTALL_DESTINATION ${CRT_INSTALL_CMAKE_DIR}
+  NO_SET_AND_CHECK_MACRO)
+# A backend is compiled against the exact structs of the scene blob, which any release may change before 1.0; after that the loader's
+# layout hash still has the last word.
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/generated/crtConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES
+  ${PROJECT_BINARY_DIR}/generated/crtConfig.cmake
+  ${PROJECT_BINARY_DIR}/generated/crtConfigVersion.cmake
+  ${PROJECT_SOURCE_DIR}/cmake/CrtBackend.cmake
+  ${PROJECT_SOURCE_DIR}/cmake/crt_backend.map
+  DESTINATION ${CRT_INSTALL_CMAKE_DIR})

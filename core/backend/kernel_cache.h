@@ -1,0 +1,47 @@
+/// Disk cache of compiled kernels, for backends that compile while they run. Content-addressed: the key is a hash of everything that
+/// decides the binary, so an entry is never stale and nothing has to be invalidated.
+///
+/// A cache must never make anything fail: a damaged, foreign or unreadable entry is an absent one, and an entry that cannot be written is
+/// not written. Any number of processes and threads may share one directory. Uses nothing of the core but this header.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace crt::plugin {
+
+class KernelCache {
+public:
+    using Key = std::array<unsigned char, 16>;
+
+    static constexpr std::uint64_t kDefaultMaxBytes = std::uint64_t{256} << 20;
+
+    /// `directory` as the host gives it: existing and writable, or null for a cache that holds nothing.
+    explicit KernelCache(const char* directory, std::uint64_t max_bytes = kDefaultMaxBytes);
+
+    /// Key of a binary that depends on exactly these texts, in this order: kernel text, options, device, compiler, driver.
+    static Key makeKey(const std::vector<std::string_view>& parts);
+
+    /// The binary stored under `key`, and marks it as used now. [any thread]
+    std::optional<std::vector<unsigned char>> load(const Key& key) const;
+
+    /// Stores a binary, then removes what was used longest ago until all entries fit into max_bytes. Returns whether it is stored.
+    /// [any thread]
+    bool store(const Key& key, const void* data, std::size_t size) const;
+
+    /// Where an entry lies. Empty when the cache is off.
+    std::string path(const Key& key) const;
+
+private:
+    void evict() const;
+
+    std::string directory_;
+    std::uint64_t max_bytes_;
+};
+
+}  // namespace crt::plugin
