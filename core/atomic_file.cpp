@@ -1,0 +1,108 @@
+#include "atomic_file.h"
+
+#include "error.h"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <sys/stat.h>
+#include <system_error>
+#include <unistd.h>
+
+namespace crt {
+namespace fs = std::filesystem;
+namespace {
+
+std::string directoryOf(const std::string& path) {
+    const std::string parent = fs::path(path).parent_path().string();
+    return parent.empty() ? "." : parent;
+}
+
+[[noreturn]] void refuse(const std::string& path, const std::string& why) {
+    throw Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, why), {path});
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
+    if (path.empty()) throw Error(ErrorKind::Output, "cannot write an output without a file name");
+    std::error_code ignored;
+    if (fs::is_symlink(path, ignored)) {
+        const fs::path target = fs::weakly_canonical(path, ignored);
+        if (!ignored && !target.empty()) final_ = target.string();
+    }
+    // Renaming over these would replace a device node or fail at the very end of a render.
+    if (fs::is_directory(final_, ignored)) refuse(path_, "it is a directory");
+    if (fs::exists(final_, ignored) && !fs::is_regular_file(final_, ignored)) refuse(path_, "it is not a regular file");
+    // open() rather than mkstemp() so that the file gets the permissions that the user's umask says. The process id alone does not make the
+    // name unique: in a container every program may be process 1, and an earlier one may have died here.
+    for (int attempt = 0; descriptor_ < 0; ++attempt) {
+        temporary_ = fmt::format("{}.{}-{}.tmp", final_, ::getpid(), attempt);
+        descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        const int error_number = errno;
+        if (descriptor_ >= 0 || error_number == EINTR || (error_number == EEXIST && attempt < 1000)) continue;
+        if (error_number == ENOENT)
+            refuse(path_, fmt::format("the directory '{}' does not exist", directoryOf(final_)));
+        fail("cannot write", error_number);
+    }
+}
+
+AtomicFile::~AtomicFile() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+    if (!committed_ && !temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::fail(const char* what, int error_number) const {
+    throw Error(ErrorKind::Output, fmt::format("{} '{}': {}", what, path_, std::strerror(error_number)), {path_});
+}
+
+void AtomicFile::write(const void* bytes, std::size_t size) {
+    auto* next = static_cast<const unsigned char*>(bytes);
+    while (size > 0) {
+        const ssize_t written = ::write(descriptor_, next, size);
+        if (written < 0) {
+            if (errno == EINTR) continue;
+            fail("cannot write", errno);
+        }
+        next += written;
+        size -= static_cast<std::size_t>(written);
+    }
+}
+
+void AtomicFile::commit() {
+    // Without the sync a power cut after the rename can leave the final name on an empty file.
+    while (::fsync(descriptor_) != 0)
+        if (errno != EINTR) fail("cannot finish", errno);
+    const int descriptor = descriptor_;
+    descriptor_ = -1;
+    if (::close(descriptor) != 0 && errno != EINTR) fail("cannot finish", errno);
+    if (::rename(temporary_.c_str(), final_.c_str()) != 0) fail("cannot finish", errno);
+    committed_ = true;
+    // The directory entry too; some file systems cannot sync a directory, and the file is good without it.
+    const int directory = ::open(directoryOf(final_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (directory >= 0) {
+        ::fsync(directory);
+        ::close(directory);
+    }
+}
+
+void checkWritable(const std::string& path) {
+    const std::string directory = directoryOf(path);
+    std::error_code error;
+    if (!fs::exists(directory, error)) {
+        // One level only: a typing mistake at the root of a long path should not grow a tree.
+        const std::string above = directoryOf(fs::path(directory).lexically_normal().string());
+        if (!fs::is_directory(above, error))
+            refuse(path, fmt::format("neither the directory '{}' nor '{}' exists", directory, above));
+        if (!fs::create_directory(directory, error) && error)
+            refuse(path, fmt::format("the directory '{}' cannot be created: {}", directory, error.message()));
+    } else if (!fs::is_directory(directory, error)) {
+        refuse(path, fmt::format("'{}' is not a directory", directory));
+    }
+    const AtomicFile probe(path);  // Removed again by its destructor.
+}
+
+}  // namespace crt

@@ -1,0 +1,43 @@
+/// Files that are either whole or not there: written under a temporary name in the same directory, synced, renamed.
+/// Whoever reads the final name, or looks at it after a crash, sees the old file or the new one, never half of either.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace crt {
+
+/// One file on its way to its final name. Every failure is a crt::Error(Output) naming the final file. [one thread]
+class AtomicFile {
+public:
+    /// Opens the temporary. A symbolic link is followed, so that the link stays and its target is replaced.
+    explicit AtomicFile(const std::string& path);
+    /// Removes the temporary unless commit() succeeded.
+    ~AtomicFile();
+    AtomicFile(const AtomicFile&) = delete;
+    AtomicFile& operator=(const AtomicFile&) = delete;
+
+    /// Appends `size` bytes.
+    void write(const void* bytes, std::size_t size);
+    /// Where the bytes lie until commit(): for libraries that write to a name rather than through write().
+    const std::string& temporaryPath() const { return temporary_; }
+    /// Waits until the bytes are on the disk, then gives the file its final name.
+    void commit();
+
+private:
+    [[noreturn]] void fail(const char* what, int error_number) const;
+
+    std::string path_;       ///< As the caller named it, for messages.
+    std::string final_;      ///< With symbolic links followed.
+    std::string temporary_;
+    int descriptor_ = -1;
+    bool committed_ = false;
+};
+
+/// Finds out before a render, rather than after it, that `path` cannot be written: creates its directory when only the last level is
+/// missing (so that "out/image.exr" works in a fresh checkout), and creates and removes a temporary file there. Throws crt::Error(Output)
+/// with one sentence. What can still go wrong later is a full disk.
+void checkWritable(const std::string& path);
+
+}  // namespace crt

@@ -1,0 +1,257 @@
+#include "checkpoint.h"
+
+#include "atomic_file.h"
+#include "log.h"
+
+#include <fmt/format.h>
+
+// In the header's inline form, so that nothing has to be linked or found at run time.
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+
+namespace crt {
+namespace {
+
+// Sections are written as they lie in memory; a big-endian port would swap here and nowhere else.
+static_assert(std::endian::native == std::endian::little, "checkpoints are little-endian");
+
+constexpr std::array<unsigned char, 8> kMagic{0x89, 'C', 'R', 'T', 'F', 0x0d, 0x0a, 0x1a};
+constexpr std::size_t kHashDigits = 32;
+constexpr std::size_t kVersionBytesMax = 255;
+constexpr std::uint32_t kRangesMax = 1u << 20;
+
+/// The part of fixed size.
+struct Header {
+    std::array<unsigned char, 8> magic;
+    std::uint32_t format_version;
+    std::uint32_t header_bytes;
+    std::uint64_t file_bytes;
+    std::uint64_t checksum;
+    std::uint32_t width, height, channels, aovs;
+    std::array<char, kHashDigits> scene_hash;
+    std::uint32_t version_bytes;
+    std::uint32_t range_count;
+};
+static_assert(sizeof(Header) == 88 && offsetof(Header, checksum) == 24 && offsetof(Header, scene_hash) == 48);
+constexpr std::size_t kBeforeChecksum = offsetof(Header, checksum);
+constexpr std::size_t kAfterChecksum = kBeforeChecksum + sizeof(std::uint64_t);
+
+std::uint64_t roundUp8(std::uint64_t bytes) { return (bytes + 7) & ~std::uint64_t{7}; }
+
+class Checksum {
+public:
+    Checksum() : state_(XXH3_createState()) {
+        if (!state_) throw std::bad_alloc();
+        XXH3_64bits_reset(state_.get());
+    }
+    void update(const void* bytes, std::size_t size) { XXH3_64bits_update(state_.get(), bytes, size); }
+    /// The fixed header without the checksum itself.
+    void update(const Header& header) {
+        const auto* bytes = reinterpret_cast<const unsigned char*>(&header);
+        update(bytes, kBeforeChecksum);
+        update(bytes + kAfterChecksum, sizeof(Header) - kAfterChecksum);
+    }
+    std::uint64_t value() const { return XXH3_64bits_digest(state_.get()); }
+
+private:
+    struct Free {
+        void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
+    };
+    std::unique_ptr<XXH3_state_t, Free> state_;
+};
+
+/// Sample ranges and version text: the part of the header whose size varies.
+std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identity) {
+    const auto& ranges = film.samples.ranges();
+    const std::size_t range_bytes = ranges.size() * 16;
+    std::vector<unsigned char> bytes(range_bytes + roundUp8(identity.version.size()), 0);
+    for (std::size_t i = 0; i < ranges.size(); ++i) {
+        std::memcpy(&bytes[i * 16], &ranges[i].first, 8);
+        std::memcpy(&bytes[i * 16 + 8], &ranges[i].second, 8);
+    }
+    if (!identity.version.empty()) std::memcpy(&bytes[range_bytes], identity.version.data(), identity.version.size());
+    return bytes;
+}
+
+[[noreturn]] void refuse(const std::string& path, const std::string& why) {
+    throw Error(ErrorKind::Usage, fmt::format("'{}' {}", path, why), {path});
+}
+
+struct CloseFile {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+};
+
+void readExactly(std::FILE* file, const std::string& path, void* bytes, std::size_t size) {
+    if (size == 0 || std::fread(bytes, 1, size, file) == size) return;
+    if (std::ferror(file)) refuse(path, fmt::format("cannot be read: {}", std::strerror(errno)));
+    refuse(path, "became shorter while it was read");
+}
+
+bool isHexHash(const char* digits, std::size_t size) {
+    return size == kHashDigits && std::all_of(digits, digits + size, [](char c) {
+               return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
+           });
+}
+
+/// Size of the file that a header describes; 0 when that does not fit in 63 bits (then the header is not one of ours).
+std::uint64_t describedBytes(const Header& h) {
+    using Wide = unsigned __int128;
+    const Wide pixels = Wide{h.width} * h.height;
+    Wide bytes = sizeof(Header) + Wide{h.range_count} * 16 + roundUp8(h.version_bytes);
+    bytes += pixels * h.channels * 16 + pixels * 8;
+    if (h.aovs & kAovPrimitive) bytes += (pixels * 4 + 7) / 8 * 8;
+    return bytes >> 63 ? 0 : static_cast<std::uint64_t>(bytes);
+}
+
+}  // namespace
+
+void writeCheckpoint(const std::string& path, const Film& film, const FilmIdentity& identity) {
+    if (!isHexHash(identity.scene_hash.data(), identity.scene_hash.size()))
+        throw Error(ErrorKind::Internal, fmt::format("'{}' is not a scene hash of 32 hex digits", identity.scene_hash));
+    if (identity.version.size() > kVersionBytesMax || film.samples.ranges().size() > kRangesMax)
+        throw Error(ErrorKind::Internal, "the film has too many sample ranges, or crt too long a version, for a checkpoint");
+
+    const std::vector<unsigned char> tail = packTail(film, identity);
+    Header header{};
+    header.magic = kMagic;
+    header.format_version = kCheckpointVersion;
+    header.header_bytes = static_cast<std::uint32_t>(sizeof(Header) + tail.size());
+    header.width = film.shape().width;
+    header.height = film.shape().height;
+    header.channels = film.shape().channels;
+    header.aovs = film.shape().aovs;
+    std::copy_n(identity.scene_hash.data(), kHashDigits, header.scene_hash.begin());
+    header.version_bytes = static_cast<std::uint32_t>(identity.version.size());
+    header.range_count = static_cast<std::uint32_t>(film.samples.ranges().size());
+    header.file_bytes = describedBytes(header);
+
+    // Hashed first and written second, straight from the film: a gigabyte of sums is not copied to be saved.
+    const std::size_t primitive_bytes = film.primitives.size() * sizeof(std::uint32_t);
+    const std::uint64_t zero = 0;
+    const struct {
+        const void* bytes;
+        std::size_t size;
+    } sections[] = {{tail.data(), tail.size()},
+                    {film.sums.data(), film.sums.size() * sizeof(double)},
+                    {film.counts.data(), film.counts.size() * sizeof(std::uint64_t)},
+                    {film.primitives.data(), primitive_bytes},
+                    {&zero, roundUp8(primitive_bytes) - primitive_bytes}};
+    Checksum checksum;
+    checksum.update(header);
+    for (const auto& section : sections) checksum.update(section.bytes, section.size);
+    header.checksum = checksum.value();
+
+    AtomicFile file(path);
+    file.write(&header, sizeof header);
+    for (const auto& section : sections) file.write(section.bytes, section.size);
+    file.commit();
+}
+
+std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
+    const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rbe"));
+    if (!file) refuse(path, fmt::format("cannot be opened: {}", std::strerror(errno)));
+    std::error_code size_error;
+    const std::uint64_t actual_bytes = std::filesystem::file_size(path, size_error);
+    if (size_error) refuse(path, fmt::format("cannot be read: {}", size_error.message()));
+    if (actual_bytes == 0) refuse(path, "is empty, not a crt film");
+
+    Header header{};
+    readExactly(file.get(), path, &header, std::min<std::uint64_t>(actual_bytes, sizeof header));
+    if (std::memcmp(header.magic.data(), kMagic.data(), std::min<std::uint64_t>(actual_bytes, kMagic.size())) != 0)
+        refuse(path, "is not a crt film: it does not begin with the mark of one");
+    if (actual_bytes >= 12 && header.format_version != kCheckpointVersion)
+        refuse(path, fmt::format("is a crt film of format {}; this crt reads format {}", header.format_version, kCheckpointVersion));
+    if (actual_bytes < sizeof header)
+        refuse(path, fmt::format("is truncated: it has {} bytes and its header alone takes {}", actual_bytes, sizeof header));
+    // Sizes before anything is allocated: a damaged width must not ask for a terabyte.
+    if (actual_bytes < header.file_bytes)
+        refuse(path, fmt::format("is truncated: it has {} of {} bytes", actual_bytes, header.file_bytes));
+    if (actual_bytes > header.file_bytes || header.file_bytes != describedBytes(header) || header.version_bytes > kVersionBytesMax ||
+        header.range_count > kRangesMax ||
+        header.header_bytes != sizeof(Header) + header.range_count * std::uint64_t{16} + roundUp8(header.version_bytes))
+        refuse(path, "is damaged: its header contradicts its size");
+
+    const char* const kBadChecksum = "is damaged: its checksum does not match its content";
+    Checksum checksum;
+    checksum.update(header);
+    std::vector<unsigned char> tail(header.header_bytes - sizeof(Header));
+    readExactly(file.get(), path, tail.data(), tail.size());
+    checksum.update(tail.data(), tail.size());
+
+    // The shape is used before the checksum is known; Film refuses one that cannot be.
+    const auto make_film = [&] {
+        try {
+            return Film({header.width, header.height, header.channels, header.aovs});
+        } catch (const Error&) {
+            refuse(path, kBadChecksum);
+        }
+    };
+    Film film = make_film();
+    const auto read_section = [&](auto& values) {
+        const std::size_t bytes = values.size() * sizeof(values[0]);
+        readExactly(file.get(), path, values.data(), bytes);
+        checksum.update(values.data(), bytes);
+        return bytes;
+    };
+    read_section(film.sums);
+    read_section(film.counts);
+    const std::size_t primitive_bytes = read_section(film.primitives);
+    std::vector<unsigned char> padding(roundUp8(primitive_bytes) - primitive_bytes);
+    read_section(padding);
+    if (checksum.value() != header.checksum) refuse(path, kBadChecksum);
+
+    // From here on the file is what a crt wrote; what is checked still is what could only be a bug of that crt.
+    FilmIdentity identity{std::string(header.scene_hash.data(), kHashDigits),
+                          std::string(reinterpret_cast<const char*>(tail.data()) + header.range_count * std::size_t{16}, header.version_bytes)};
+    if (!isHexHash(identity.scene_hash.data(), identity.scene_hash.size())) refuse(path, "holds a scene hash that is not one");
+    try {
+        for (std::uint32_t i = 0; i < header.range_count; ++i) {
+            SampleRange range;
+            std::memcpy(&range.first, &tail[i * std::size_t{16}], 8);
+            std::memcpy(&range.second, &tail[i * std::size_t{16} + 8], 8);
+            film.samples.add(range);
+        }
+    } catch (const Error& error) {
+        refuse(path, fmt::format("holds impossible sample ranges: {}", error.what()));
+    }
+    return {std::move(film), std::move(identity)};
+}
+
+void requireSameScene(const std::string& path, const FilmIdentity& found, const FilmIdentity& expected) {
+    if (found.scene_hash != expected.scene_hash)
+        refuse(path, fmt::format("is of another scene, seed or film: its hash is {}, expected is {}", found.scene_hash,
+                                 expected.scene_hash));
+    if (found.version != expected.version)
+        logWarning("'{}' was rendered by crt {}, this is {}: samples may differ between versions", path, found.version, expected.version);
+}
+
+std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& paths) {
+    if (paths.empty()) throw Error(ErrorKind::Usage, "nothing to merge: name at least one .crtfilm file");
+    std::pair<Film, FilmIdentity> merged = readCheckpoint(paths.front());
+    for (std::size_t i = 1; i < paths.size(); ++i) {
+        const auto [film, identity] = readCheckpoint(paths[i]);
+        if (identity.scene_hash != merged.second.scene_hash)
+            throw Error(ErrorKind::Usage,
+                        fmt::format("'{}' and '{}' are of different scenes, seeds or films: their hashes are {} and {}", paths.front(), paths[i],
+                                    merged.second.scene_hash, identity.scene_hash),
+                        {paths[i]});
+        requireSameScene(paths[i], identity, merged.second);
+        try {
+            merged.first.add(film);
+        } catch (const Error& error) {
+            refuse(paths[i], fmt::format("cannot be merged with the files before it: {}", error.what()));
+        }
+    }
+    return merged;
+}
+
+}  // namespace crt

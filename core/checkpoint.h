@@ -1,0 +1,41 @@
+/// What surrounds the checkpoint files of film.h (writeCheckpoint, readCheckpoint): refusing films of another scene, and merging.
+///
+/// A .crtfilm file, little-endian, every section a multiple of 8 bytes:
+///
+///     0   magic          89 "CRTF" 0D 0A 1A    (8 bytes; damaged by any transfer that is not binary)
+///     8   u32            format version, kCheckpointVersion
+///     12  u32            header size in bytes: where the sums begin
+///     16  u64            file size in bytes
+///     24  u64            XXH3-64 of the whole file without these 8 bytes
+///     32  u32 × 4        width, height, channels, AOV mask
+///     48  char[32]       scene hash, hex digits
+///     80  u32            bytes of the crt version text
+///     84  u32            number of sample ranges
+///     88  u64 × 2 each   sample ranges, first and end
+///         char[]         crt version, zero-padded to 8
+///         f64 × 2 each   sums, hi and lo, [height][width][channels]
+///         u64 each       counts, [height][width]
+///         u32 each       primitive ids, [height][width], zero-padded to 8; only when the AOV mask has them
+#pragma once
+
+#include "film.h"
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace crt {
+
+inline constexpr std::uint32_t kCheckpointVersion = 1;
+inline constexpr const char* kCheckpointExtension = ".crtfilm";
+
+/// Refuses to go on from `path` when it holds another scene than `expected`: crt::Error(Usage) naming both hashes. Warns when another version of
+/// crt wrote it, because samples of one image are promised to agree only within a version.
+void requireSameScene(const std::string& path, const FilmIdentity& found, const FilmIdentity& expected);
+
+/// Adds partial films of one scene; the result does not depend on the order of `paths`. Throws crt::Error(Usage) naming the files when there is
+/// none, one is damaged, scenes or shapes differ, or two hold the same samples.
+std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& paths);
+
+}  // namespace crt

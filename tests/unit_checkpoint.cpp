@@ -1,0 +1,237 @@
+// Checkpoint files: bit for bit there and back, and every kind of damage its own sentence.
+#include "checkpoint.h"
+#include "log.h"
+
+#include <catch2/catch.hpp>
+
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <unistd.h>
+
+using namespace crt;
+using Catch::Matchers::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+const FilmIdentity kIdentity{"0123456789abcdef0123456789abcdef", "0.1.0"};
+
+struct TemporaryDirectory {
+    fs::path path;
+    TemporaryDirectory() : path(fs::temp_directory_path() / ("crt_checkpoint_" + std::to_string(::getpid()))) {
+        fs::remove_all(path);
+        fs::create_directories(path);
+    }
+    ~TemporaryDirectory() {
+        std::error_code ignored;
+        fs::remove_all(path, ignored);
+    }
+    std::string operator/(const char* name) const { return (path / name).string(); }
+    std::size_t fileCount() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), fs::directory_iterator())); }
+};
+
+Film randomFilm(FilmShape shape, SampleRange range, std::uint32_t seed) {
+    Film film(shape);
+    std::mt19937_64 generator(seed);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (std::size_t i = 0; i < film.sums.size(); i += 2) {
+        film.sums[i] = uniform(generator);
+        film.sums[i + 1] = uniform(generator) * 1e-18;
+    }
+    for (auto& n : film.counts) n = range.second - range.first;
+    for (auto& id : film.primitives) id = static_cast<std::uint32_t>(generator());
+    film.samples.add(range);
+    return film;
+}
+
+std::string slurp(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+void spit(const std::string& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
+
+bool sameBits(const std::vector<double>& a, const std::vector<double>& b) {
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+}
+
+// 3 × 5 pixels: an odd number of ids, so that the padding is there.
+constexpr FilmShape kShape{3, 5, 8, kAovNormal | kAovDepth | kAovPrimitive};
+
+}  // namespace
+
+TEST_CASE("a checkpoint comes back bit for bit", "[checkpoint]") {
+    const TemporaryDirectory directory;
+    Film film = randomFilm(kShape, {100, 164}, 1);
+    film.samples.add({1024, 2048});
+    film.sums[0] = -0.0;
+    film.sums[1] = 4.9e-324;
+    const std::string path = directory / "part.crtfilm";
+    writeCheckpoint(path, film, kIdentity);
+    const auto [back, identity] = readCheckpoint(path);
+    CHECK(back.shape() == film.shape());
+    CHECK(sameBits(back.sums, film.sums));
+    CHECK(back.counts == film.counts);
+    CHECK(back.primitives == film.primitives);
+    CHECK(back.samples.text() == "100-164;1024-2048");
+    CHECK(identity.scene_hash == kIdentity.scene_hash);
+    CHECK(identity.version == kIdentity.version);
+    CHECK(directory.fileCount() == 1);  // No temporary is left.
+
+    // The same film is the same file: nothing in it depends on when or where it was written.
+    const std::string first = slurp(path);
+    writeCheckpoint(path, back, identity);
+    CHECK(slurp(path) == first);
+}
+
+TEST_CASE("films without samples, ids or pixels are checkpoints too", "[checkpoint]") {
+    const TemporaryDirectory directory;
+    const std::string path = directory / "part.crtfilm";
+    for (const FilmShape shape : {FilmShape{4, 4, 4, 0}, FilmShape{0, 7, 4, 0}}) {
+        writeCheckpoint(path, Film(shape), {kIdentity.scene_hash, ""});
+        const auto [back, identity] = readCheckpoint(path);
+        CHECK(back.shape() == shape);
+        CHECK(back.samples.count() == 0);
+        CHECK(identity.version.empty());
+    }
+}
+
+TEST_CASE("the format is what checkpoint.h says", "[checkpoint]") {
+    const TemporaryDirectory directory;
+    const std::string path = directory / "part.crtfilm";
+    Film film({1, 1, 4, 0});
+    film.sums[0] = 1.5;
+    film.counts[0] = 2;
+    film.samples.add({3, 5});
+    writeCheckpoint(path, film, kIdentity);
+    const std::string bytes = slurp(path);
+    const auto u32 = [&](std::size_t at) { std::uint32_t v; std::memcpy(&v, &bytes[at], 4); return v; };
+    const auto u64 = [&](std::size_t at) { std::uint64_t v; std::memcpy(&v, &bytes[at], 8); return v; };
+    REQUIRE(bytes.size() == 88 + 16 + 8 + 4 * 16 + 8);
+    CHECK(bytes.substr(0, 8) == "\x89" "CRTF\r\n\x1a");
+    CHECK(u32(8) == kCheckpointVersion);
+    CHECK(u32(12) == 88 + 16 + 8);
+    CHECK(u64(16) == bytes.size());
+    CHECK(u32(32) == 1);
+    CHECK(u32(40) == 4);
+    CHECK(bytes.substr(48, 32) == kIdentity.scene_hash);
+    CHECK(u64(88) == 3);
+    CHECK(u64(96) == 5);
+    CHECK(bytes.substr(104, 8) == std::string("0.1.0\0\0\0", 8));
+    CHECK(u64(112) == 0x3ff8000000000000u);
+    CHECK(u64(176) == 2);
+}
+
+TEST_CASE("a truncated checkpoint is refused wherever it ends", "[checkpoint]") {
+    const TemporaryDirectory directory;
+    const std::string path = directory / "part.crtfilm";
+    writeCheckpoint(path, randomFilm(kShape, {0, 64}, 2), kIdentity);
+    const std::string whole = slurp(path);
+    const std::string cut = directory / "cut.crtfilm";
+    for (std::size_t size = 1; size < whole.size(); ++size) {
+        spit(cut, whole.substr(0, size));
+        INFO(size << " of " << whole.size());
+        CHECK_THROWS_WITH(readCheckpoint(cut), Contains("cut.crtfilm") && Contains("truncated"));
+    }
+    spit(cut, "");
+    CHECK_THROWS_WITH(readCheckpoint(cut), Contains("empty"));
+    spit(cut, whole + '\0');
+    CHECK_THROWS_WITH(readCheckpoint(cut), Contains("damaged"));
+}
+
+TEST_CASE("a checkpoint with any byte changed is refused", "[checkpoint]") {
+    const TemporaryDirectory directory;
+    const std::string path = directory / "part.crtfilm";
+    writeCheckpoint(path, randomFilm(kShape, {0, 64}, 3), kIdentity);
+    const std::string whole = slurp(path);
+    const std::string bad = directory / "bad.crtfilm";
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+        std::string bytes = whole;
+        bytes[i] = static_cast<char>(bytes[i] ^ (1 << (i % 8)));
+        spit(bad, bytes);
+        INFO("byte " << i);
+        try {
+            readCheckpoint(bad);
+            FAIL_CHECK("accepted");
+        } catch (const Error& error) {
+            CHECK(error.kind() == ErrorKind::Usage);
+            CHECK(error.place().file == bad);
+        }
+    }
+}
+
+TEST_CASE("what is wrong with a checkpoint is said", "[checkpoint]") {
+    const TemporaryDirectory directory;
+    const std::string path = directory / "part.crtfilm";
+    writeCheckpoint(path, randomFilm(kShape, {0, 64}, 4), kIdentity);
+    const std::string whole = slurp(path);
+    const auto with = [&](std::size_t at, char value) {
+        std::string bytes = whole;
+        bytes[at] = value;
+        spit(path, bytes);
+        return path;
+    };
+    CHECK_THROWS_WITH(readCheckpoint(with(8, 9)), Contains("format 9") && Contains("format 1"));
+    CHECK_THROWS_WITH(readCheckpoint(with(0, 'x')), Contains("not a crt film"));
+    CHECK_THROWS_WITH(readCheckpoint(with(35, 0x7f)), Contains("damaged: its header"));  // Two thousand million pixels wide.
+    CHECK_THROWS_WITH(readCheckpoint(with(whole.size() / 2, static_cast<char>(~whole[whole.size() / 2]))), Contains("checksum"));
+    CHECK_THROWS_WITH(readCheckpoint(directory / "absent.crtfilm"), Contains("absent.crtfilm") && Contains("No such file"));
+    CHECK_THROWS_AS(readCheckpoint(directory.path.string()), Error);
+}
+
+TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpoint]") {
+    const FilmIdentity other{"ffffffffffffffffffffffffffffffff", "0.1.0"};
+    CHECK_NOTHROW(requireSameScene("a.crtfilm", kIdentity, kIdentity));
+    CHECK_THROWS_WITH(requireSameScene("a.crtfilm", kIdentity, other),
+                      Contains("a.crtfilm") && Contains(kIdentity.scene_hash) && Contains(other.scene_hash));
+    setLogLevel(LogLevel::Off);
+    const int warnings = warningCount();
+    requireSameScene("a.crtfilm", {kIdentity.scene_hash, "0.0.9"}, kIdentity);
+    CHECK(warningCount() == warnings + 1);
+    setLogLevel(LogLevel::Info);
+    const TemporaryDirectory directory;
+    CHECK_THROWS_AS(writeCheckpoint(directory / "x.crtfilm", Film({1, 1, 4, 0}), {"no hash", "0.1.0"}), Error);
+}
+
+TEST_CASE("a checkpoint that cannot be written is an output error and leaves the old one", "[checkpoint]") {
+    const TemporaryDirectory directory;
+    const Film film = randomFilm(kShape, {0, 8}, 5);
+    try {
+        writeCheckpoint(directory / "no/such/part.crtfilm", film, kIdentity);
+        FAIL("written");
+    } catch (const Error& error) {
+        CHECK(error.kind() == ErrorKind::Output);
+        CHECK_THAT(error.what(), Contains("does not exist"));
+    }
+    CHECK_THROWS_WITH(writeCheckpoint(directory.path.string(), film, kIdentity), Contains("is a directory"));
+    CHECK_THROWS_WITH(writeCheckpoint("/dev/full", film, kIdentity), Contains("not a regular file"));
+
+    // Through a symbolic link the target is replaced and the link stays.
+    writeCheckpoint(directory / "real.crtfilm", film, kIdentity);
+    fs::create_symlink("real.crtfilm", directory.path / "link.crtfilm");
+    writeCheckpoint(directory / "link.crtfilm", randomFilm(kShape, {0, 16}, 6), kIdentity);
+    CHECK(fs::is_symlink(directory.path / "link.crtfilm"));
+    CHECK(readCheckpoint(directory / "real.crtfilm").first.samples.count() == 16);
+}
+
+TEST_CASE("merging partial films gives one film whatever the order", "[checkpoint]") {
+    const TemporaryDirectory directory;
+    const std::string a = directory / "a.crtfilm", b = directory / "b.crtfilm", c = directory / "c.crtfilm";
+    writeCheckpoint(a, randomFilm(kShape, {0, 64}, 7), kIdentity);
+    writeCheckpoint(b, randomFilm(kShape, {64, 128}, 8), kIdentity);
+    writeCheckpoint(c, randomFilm(kShape, {256, 300}, 9), kIdentity);
+    const Film abc = mergeCheckpoints({a, b, c}).first;
+    const Film cba = mergeCheckpoints({c, b, a}).first;
+    CHECK(abc.samples.text() == "0-128;256-300");
+    CHECK(abc.counts == cba.counts);
+    CHECK(abc.primitives == cba.primitives);
+    for (std::uint32_t channel = 0; channel < kShape.channels; ++channel)
+        CHECK(abc.sum(2, 4, channel) == cba.sum(2, 4, channel));
+
+    CHECK_THROWS_WITH(mergeCheckpoints({a, b, a}), Contains("a.crtfilm") && Contains("0-64"));
+    CHECK_THROWS_WITH(mergeCheckpoints({}), Contains("nothing to merge"));
+    writeCheckpoint(c, randomFilm(kShape, {256, 300}, 9), {"ffffffffffffffffffffffffffffffff", "0.1.0"});
+    CHECK_THROWS_WITH(mergeCheckpoints({a, c}), Contains("a.crtfilm") && Contains("c.crtfilm") && Contains("ffffffffffffffffffffffffffffffff"));
+}
