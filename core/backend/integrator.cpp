@@ -1,0 +1,330 @@
+#include "backend/integrator.h"
+
+#include "error.h"
+#include "kernel/layout.h"
+#include "log.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <exception>
+#include <limits>
+#include <mutex>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace crt {
+namespace {
+
+ErrorKind kindOf(CrtStatus status) {
+    switch (status) {
+        case CRT_NO_DEVICE:
+        case CRT_UNSUPPORTED: return ErrorKind::Backend;
+        case CRT_OUT_OF_MEMORY:
+        case CRT_DEVICE_FAILED: return ErrorKind::Device;
+        default: return ErrorKind::Internal;
+    }
+}
+
+/// For a plugin that says nothing itself.
+const char* statusText(CrtStatus status) {
+    switch (status) {
+        case CRT_CANCELLED: return "cancelled";
+        case CRT_INVALID_ARGUMENT: return "refused an argument";
+        case CRT_NO_DEVICE: return "no usable device";
+        case CRT_OUT_OF_MEMORY: return "out of memory";
+        case CRT_DEVICE_FAILED: return "the device failed";
+        case CRT_UNSUPPORTED: return "the scene is not supported";
+        case CRT_INTERNAL: return "internal error";
+        default: return "unknown status";
+    }
+}
+
+using Rectangle = std::array<std::uint32_t, 4>;
+
+std::uint64_t areaOf(const Rectangle& r) { return std::uint64_t{r[2] - r[0]} * (r[3] - r[1]); }
+
+bool overlap(const Rectangle& a, const Rectangle& b) { return a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]; }
+
+/// Which samples the backend's film holds. A film knows ranges of samples that every pixel has; ranges rendered rectangle by rectangle
+/// are held back here until their rectangles cover the window.
+class Coverage {
+public:
+    Coverage() = default;
+    Coverage(std::uint32_t width, std::uint32_t height) : window_area_(std::uint64_t{width} * height) {}
+
+    /// Throws crt::Error(Usage) when a pixel would get a sample twice.
+    void add(SampleRange samples, const Rectangle& rectangle) {
+        if (areaOf(rectangle) == window_area_) {
+            for (const Part& part : parts_) {
+                if (part.samples.first < samples.second && samples.first < part.samples.second) twice(samples);
+            }
+            whole_.add(samples);
+            return;
+        }
+        // Refuses samples that are already there for all pixels.
+        SampleRanges(whole_).add(samples);
+        const auto same = std::find_if(parts_.begin(), parts_.end(), [&](const Part& part) { return part.samples == samples; });
+        for (const Part& part : parts_) {
+            if (part.samples.first >= samples.second || samples.first >= part.samples.second) continue;
+            for (const Rectangle& other : part.rectangles) {
+                if (overlap(other, rectangle)) twice(samples);
+            }
+        }
+        Part& part = same != parts_.end() ? *same : parts_.emplace_back(Part{samples, {}, 0});
+        part.rectangles.push_back(rectangle);
+        part.area += areaOf(rectangle);
+        if (part.area == window_area_) {
+            // The rectangles do not overlap, so their areas tell.
+            whole_.add(samples);
+            parts_.erase(parts_.begin() + (&part - parts_.data()));
+        }
+    }
+
+    bool isWhole() const { return parts_.empty(); }
+    const SampleRanges& ranges() const { return whole_; }
+
+private:
+    struct Part {
+        SampleRange samples;
+        std::vector<Rectangle> rectangles;
+        std::uint64_t area;
+    };
+
+    [[noreturn]] static void twice(SampleRange samples) {
+        throw Error(ErrorKind::Usage, fmt::format("samples {}-{} would be rendered twice in some pixels", samples.first, samples.second));
+    }
+
+    std::uint64_t window_area_ = 0;
+    SampleRanges whole_;
+    std::vector<Part> parts_;
+};
+
+}  // namespace
+
+/// Lives on the heap and never moves: the plugin keeps the address of the host table.
+struct Integrator::Impl {
+    LoadedBackend backend;
+    CrtHost host{};
+    CrtIntegrator table{};
+    bool created = false;
+
+    bool has_scene = false;
+    std::uint32_t width = 0, height = 0, channels = 0;
+    bool has_primitives = false;
+    Coverage coverage;
+    /// A cancelled or failed render leaves part of a range in the backend's film: nothing can be read until the next setScene.
+    bool film_is_whole = true;
+
+    // Of the render in progress. Plugins may report from any of their threads; the caller's function sees one at a time.
+    std::mutex progress_mutex;
+    const std::function<bool(double)>* progress = nullptr;
+    bool cancelled = false;
+    std::exception_ptr progress_error;
+
+    Impl(const LoadedBackend& loaded, const IntegratorOptions& options) : backend(loaded), host(makeHost(options.use_cache)) {
+        host.user = this;
+        host.progress = onProgress;
+
+        CrtCreateInfo info{};
+        info.struct_size = sizeof(info);
+        info.threads = options.threads;
+        info.device = options.device.c_str();
+        info.kernel = options.kernel;
+        info.tile_size = options.tile_size;
+
+        // Says how much room there is; the plugin fills in its own verbs and leaves the rest alone.
+        table.struct_size = sizeof(table);
+        char reason[1024] = "";
+        const CrtStatus status = call("create", [&] { return backend.table->create(&host, &info, &table, reason, sizeof(reason)); });
+        reason[sizeof(reason) - 1] = '\0';
+        if (status != CRT_OK) {
+            throw Error(kindOf(status), fmt::format("backend '{}' cannot be used: {}", backend.name, *reason != '\0' ? reason : statusText(status)));
+        }
+        created = true;
+        constexpr std::size_t first_size = offsetof(CrtIntegrator, destroy) + sizeof(CrtIntegrator::destroy);
+        if (table.struct_size < first_size || !table.set_scene || !table.render || !table.read_film || !table.get_report || !table.last_error ||
+            !table.destroy) {
+            destroy();  // a constructor that throws gets no destructor call
+            throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: its integrator lacks verbs", backend.name));
+        }
+    }
+
+    ~Impl() { destroy(); }
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+
+    void destroy() noexcept {
+        if (!std::exchange(created, false) || table.destroy == nullptr) return;
+        try {
+            table.destroy(table.state);
+        } catch (...) {
+            try {
+                logWarning("backend '{}' broke the contract: an exception crossed the border from destroy", backend.name);
+            } catch (...) {
+                // Not even that can be said; a destructor may not throw.
+            }
+        }
+    }
+
+    /// Calls into the plugin; what is thrown there is a bug there.
+    template <class Call>
+    CrtStatus call(const char* verb, Call&& body) {
+        try {
+            return body();
+        } catch (const std::exception& error) {
+            film_is_whole = false;
+            throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: an exception crossed the border from {} ({})",
+                                                         backend.name, verb, error.what()));
+        } catch (...) {
+            film_is_whole = false;
+            throw Error(ErrorKind::Internal,
+                        fmt::format("backend '{}' broke the contract: an exception crossed the border from {}", backend.name, verb));
+        }
+    }
+
+    /// Throws unless the verb succeeded, with the plugin's sentence.
+    void check(CrtStatus status) {
+        if (status == CRT_OK) return;
+        const char* sentence = nullptr;
+        call("last_error", [&] {
+            sentence = table.last_error(table.state);
+            return CrtStatus{CRT_OK};
+        });
+        throw Error(kindOf(status), fmt::format("backend '{}': {}", backend.name,
+                                                sentence != nullptr && *sentence != '\0' ? sentence : statusText(status)));
+    }
+
+    static std::int32_t onProgress(void* user, double done) noexcept {
+        Impl& self = *static_cast<Impl*>(user);
+        const std::lock_guard lock(self.progress_mutex);
+        // Once cancelled it stays so: a plugin's other threads must hear it too.
+        if (self.progress == nullptr || self.cancelled) return self.cancelled ? 1 : 0;
+        try {
+            self.cancelled = *self.progress && (*self.progress)(std::clamp(done, 0.0, 1.0));
+        } catch (...) {
+            // Must not pass through the plugin: it waits here until render is back.
+            self.progress_error = std::current_exception();
+            self.cancelled = true;
+        }
+        return self.cancelled ? 1 : 0;
+    }
+};
+
+Integrator::Integrator(const LoadedBackend& backend, const IntegratorOptions& options) : impl_(std::make_unique<Impl>(backend, options)) {}
+Integrator::~Integrator() = default;
+Integrator::Integrator(Integrator&&) noexcept = default;
+Integrator& Integrator::operator=(Integrator&&) noexcept = default;
+
+void Integrator::setScene(const CompiledScene& scene) {
+    Impl& self = *impl_;
+    const std::uint64_t lacking = scene.features & ~self.backend.table->features;
+    if (lacking != 0) {
+        throw Error(ErrorKind::Backend, fmt::format("backend '{}' cannot render this scene: it lacks {}", self.backend.name, featureNames(lacking)));
+    }
+    CrtSceneBlob blob{};
+    blob.struct_size = sizeof(blob);
+    blob.data = scene.data();
+    blob.size_bytes = scene.size_bytes;
+
+    self.has_scene = false;
+    self.check(self.call("set_scene", [&] { return self.table.set_scene(self.table.state, &blob); }));
+    self.width = scene.width;
+    self.height = scene.height;
+    self.channels = scene.channels;
+    self.has_primitives = (scene.aovs & kAovPrimitive) != 0;
+    self.coverage = Coverage(scene.width, scene.height);
+    self.film_is_whole = true;
+    self.has_scene = true;
+}
+
+bool Integrator::render(const RenderRange& range, const std::function<bool(double)>& progress) {
+    Impl& self = *impl_;
+    if (!self.has_scene) throw Error(ErrorKind::Internal, "render was called before setScene");
+    if (!self.film_is_whole) throw Error(ErrorKind::Internal, "render was called after a cancelled or failed one without setScene between");
+    Rectangle r = range.rectangle;
+    if (r == Rectangle{0, 0, 0, 0}) r = {0, 0, self.width, self.height};
+    if (r[0] >= r[2] || r[1] >= r[3] || r[2] > self.width || r[3] > self.height) {
+        throw Error(ErrorKind::Internal,
+                    fmt::format("rectangle {},{} {},{} is empty or leaves the film of {}×{}", r[0], r[1], r[2], r[3], self.width, self.height));
+    }
+    if (range.sample_count > std::numeric_limits<std::uint64_t>::max() - range.first_sample) {
+        throw Error(ErrorKind::Usage, fmt::format("{} samples from sample {} on exceed 64 bits", range.sample_count, range.first_sample));
+    }
+    if (range.sample_count == 0) return true;
+    Coverage coverage = self.coverage;
+    coverage.add({range.first_sample, range.first_sample + range.sample_count}, r);
+
+    CrtRenderRange request{};
+    request.struct_size = sizeof(request);
+    request.x0 = r[0];
+    request.y0 = r[1];
+    request.x1 = r[2];
+    request.y1 = r[3];
+    request.first_sample = range.first_sample;
+    request.sample_count = range.sample_count;
+
+    const auto listen = [&](const std::function<bool(double)>* listener) {
+        const std::lock_guard lock(self.progress_mutex);
+        self.progress = listener;
+        if (listener != nullptr) {
+            self.cancelled = false;
+            self.progress_error = nullptr;
+        }
+    };
+    listen(&progress);
+    self.film_is_whole = false;  // until the range is in it as a whole
+    CrtStatus status = CRT_INTERNAL;
+    try {
+        status = self.call("render", [&] { return self.table.render(self.table.state, &request); });
+    } catch (...) {
+        listen(nullptr);
+        throw;
+    }
+    listen(nullptr);
+    if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
+    if (status == CRT_CANCELLED && self.cancelled) return false;
+    self.check(status);
+    self.coverage = std::move(coverage);
+    self.film_is_whole = true;
+    // Asked to stop just as the last sample was done: the range is complete and counts.
+    return true;
+}
+
+void Integrator::readFilm(Film& film) {
+    Impl& self = *impl_;
+    if (!self.has_scene) throw Error(ErrorKind::Internal, "readFilm was called before setScene");
+    if (!self.film_is_whole) throw Error(ErrorKind::Internal, "the film holds part of a cancelled or failed range and cannot be read");
+    if (!self.coverage.isWhole()) throw Error(ErrorKind::Internal, "the film cannot be read: the rectangles rendered do not cover it yet");
+    const FilmShape& shape = film.shape();
+    if (shape.width != self.width || shape.height != self.height || shape.channels != self.channels ||
+        ((shape.aovs & kAovPrimitive) != 0) != self.has_primitives) {
+        throw Error(ErrorKind::Internal, "readFilm was given a film of another shape than the scene's");
+    }
+
+    Film part(shape);
+    CrtFilmView view{};
+    view.struct_size = sizeof(view);
+    view.width = self.width;
+    view.height = self.height;
+    view.channels = self.channels;
+    view.sums = part.sums.data();
+    view.counts = part.counts.data();
+    view.primitives = part.primitives.empty() ? nullptr : part.primitives.data();
+    self.check(self.call("read_film", [&] { return self.table.read_film(self.table.state, &view); }));
+    part.samples = self.coverage.ranges();
+    film.add(part);
+}
+
+CrtBackendReport Integrator::report() {
+    Impl& self = *impl_;
+    CrtBackendReport report{};
+    report.struct_size = sizeof(report);
+    self.check(self.call("get_report", [&] { return self.table.get_report(self.table.state, &report); }));
+    report.device[sizeof(report.device) - 1] = '\0';
+    report.kernel[sizeof(report.kernel) - 1] = '\0';
+    return report;
+}
+
+}  // namespace crt

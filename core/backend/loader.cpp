@@ -1,0 +1,317 @@
+#include "backend/loader.h"
+
+#include "backend/crt_layout_hash.h"
+#include "backend/kernel_source.h"
+#include "error.h"
+#include "log.h"
+#include "yaml_reader.h"
+
+#include <dlfcn.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string_view>
+#include <system_error>
+
+namespace crt {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFilePrefix = "crt_backend_";
+constexpr const char* kFileSuffix = ".so";
+
+/// In the order in which `auto` prefers them.
+constexpr const char* kKnownBackends[] = {"cuda", "embree", "opencl"};
+
+#if defined(__clang__)
+constexpr const char* kHostBuild = "crt " CRT_HEADERS_VERSION ", " __VERSION__;
+#else
+constexpr const char* kHostBuild = "crt " CRT_HEADERS_VERSION ", g++ " __VERSION__;
+#endif
+
+[[noreturn]] void refuse(const std::string& sentence) { throw Error(ErrorKind::Backend, sentence); }
+
+/// Calls into a plugin. An exception that comes out of one is a bug there, to be named and survived.
+template <class Call>
+auto acrossBorder(const std::string& name, const char* function, Call&& call) {
+    try {
+        return call();
+    } catch (const std::exception& error) {
+        refuse(fmt::format("backend '{}' broke the contract: an exception crossed the border from {} ({})", name, function, error.what()));
+    } catch (...) {
+        refuse(fmt::format("backend '{}' broke the contract: an exception crossed the border from {}", name, function));
+    }
+}
+
+const char* orUnknown(const char* text) { return text != nullptr && *text != '\0' ? text : "unknown"; }
+
+/// Names that have a plugin file in any of the directories, sorted.
+std::set<std::string> installedBackends() {
+    std::set<std::string> names;
+    for (const std::string& directory : backendDirectories()) {
+        std::error_code unreadable;  // an absent directory holds no plugins
+        for (const fs::directory_entry& file : fs::directory_iterator(directory, unreadable)) {
+            const std::string stem = file.path().stem().string();
+            if (file.path().extension() == kFileSuffix && stem.rfind(kFilePrefix, 0) == 0) names.insert(stem.substr(std::string_view(kFilePrefix).size()));
+        }
+    }
+    return names;
+}
+
+/// The first directory that has the plugin wins, as in $PATH.
+std::optional<std::string> findPlugin(const std::string& name) {
+    for (const std::string& directory : backendDirectories()) {
+        const fs::path path = fs::path(directory) / (kFilePrefix + name + kFileSuffix);
+        std::error_code unreadable;
+        // A link to nowhere exists too: dlopen then says what is wrong with it.
+        if (fs::exists(path, unreadable) || fs::is_symlink(path, unreadable)) return path.string();
+    }
+    return std::nullopt;
+}
+
+[[noreturn]] void refuseAbsent(const std::string& name) {
+    std::string searched;
+    for (const std::string& directory : backendDirectories()) searched += (searched.empty() ? "" : ", ") + directory;
+
+    std::set<std::string> candidates = installedBackends();
+    const bool known = std::find(std::begin(kKnownBackends), std::end(kKnownBackends), name) != std::end(kKnownBackends);
+    candidates.insert(std::begin(kKnownBackends), std::end(kKnownBackends));
+    const std::string hint = known ? "" : didYouMean(name, {candidates.begin(), candidates.end()});
+    refuse(fmt::format("backend '{}' is {}: no {}{}{} in {}{}", name, known ? "not installed" : "unknown", kFilePrefix, name, kFileSuffix,
+                       searched, hint.empty() ? "" : "; " + hint));
+}
+
+/// The checks between dlsym and the first use of the table. `name` is what the user asked for.
+void checkTable(const std::string& name, const std::string& path, const CrtBackend* table) {
+    if (table == nullptr) refuse(fmt::format("backend '{}' ({}) broke the contract: {} returned no table", name, path, CRT_BACKEND_ENTRY_NAME));
+
+    // The first eight bytes are the same in every version; nothing beyond may be read before the sizes are known to agree.
+    constexpr std::size_t version_size = offsetof(CrtBackend, abi_minor) + sizeof(CrtBackend::abi_minor);
+    constexpr std::size_t first_size = offsetof(CrtBackend, create) + sizeof(CrtBackend::create);
+    if (table->struct_size >= version_size && table->abi_major != CRT_ABI_MAJOR) {
+        refuse(fmt::format("backend '{}' ({}) speaks version {}.{} of the plugin interface and this crt speaks {}.{}: rebuild the plugin", name,
+                           path, table->abi_major, table->abi_minor, CRT_ABI_MAJOR, CRT_ABI_MINOR));
+    }
+    if (table->struct_size < first_size) {
+        refuse(fmt::format("backend '{}' ({}) broke the contract: its table has {} bytes where version {} needs {}", name, path, table->struct_size,
+                           CRT_ABI_MAJOR, first_size));
+    }
+    if (table->layout_hash != CRT_LAYOUT_HASH) {
+        refuse(fmt::format("backend '{}' ({}) was built for another scene layout, {:016x} ({}), and this crt has {:016x} ({}): rebuild the plugin",
+                           name, path, table->layout_hash, orUnknown(table->build), std::uint64_t{CRT_LAYOUT_HASH}, kHostBuild));
+    }
+    if (table->name == nullptr || table->probe == nullptr || table->create == nullptr) {
+        refuse(fmt::format("backend '{}' ({}) broke the contract: its table lacks {}", name, path,
+                           table->name == nullptr ? "a name" : table->probe == nullptr ? "probe" : "create"));
+    }
+}
+
+/// Existing and usable, made if need be; empty with a debug message otherwise.
+std::string cacheDirectory() {
+    const auto variable = [](const char* name) -> std::string {
+        const char* value = std::getenv(name);
+        return value != nullptr ? value : "";
+    };
+    std::string directory = variable("CRT_CACHE_DIR");
+    if (directory.empty()) {
+        // The XDG standard has relative paths ignored.
+        const std::string base = variable("XDG_CACHE_HOME");
+        if (!base.empty() && base.front() == '/') directory = base + "/crt";
+    }
+    if (directory.empty()) {
+        const std::string home = variable("HOME");
+        if (!home.empty()) directory = home + "/.cache/crt";
+    }
+    if (directory.empty()) {
+        logDebug("no kernel cache: none of CRT_CACHE_DIR, XDG_CACHE_HOME and HOME is set");
+        return {};
+    }
+    std::error_code failed;
+    if (fs::create_directories(directory, failed)) {
+        // What is cached is run, so nobody else may write there.
+        fs::permissions(directory, fs::perms::owner_all, failed);
+    }
+    if (::access(directory.c_str(), R_OK | W_OK | X_OK) != 0 || !fs::is_directory(directory, failed)) {
+        logDebug("no kernel cache: {} is not a directory that can be written to", directory);
+        return {};
+    }
+    return directory;
+}
+
+/// The text at an address that stays valid: a host table may be copied and outlive whoever made it.
+const char* keep(const std::string& text) {
+    static std::mutex mutex;
+    static auto* const texts = new std::set<std::string>;
+    const std::lock_guard lock(mutex);
+    return texts->insert(text).first->c_str();
+}
+
+// The host's side of the border: nothing may be thrown into a plugin, which may be written in C.
+
+void hostLog(void*, CrtLogLevel level, const char* message) noexcept {
+    try {
+        const auto known = static_cast<CrtLogLevel>(std::clamp<CrtLogLevel>(level, CRT_LOG_DEBUG, CRT_LOG_ERROR));
+        logMessage(static_cast<LogLevel>(known), message != nullptr ? message : "(null)");
+    } catch (...) {
+        // A message that cannot be written is lost; there is no further place to say so.
+    }
+}
+
+std::int32_t hostProgress(void*, double) noexcept { return 0; }
+
+const char* hostKernelSource(void*, const char* name) noexcept {
+    try {
+        return name != nullptr ? kernelSource(name) : nullptr;
+    } catch (const std::exception& error) {
+        hostLog(nullptr, CRT_LOG_ERROR, error.what());
+        return nullptr;
+    }
+}
+
+static_assert(static_cast<int>(LogLevel::Debug) == CRT_LOG_DEBUG && static_cast<int>(LogLevel::Info) == CRT_LOG_INFO &&
+              static_cast<int>(LogLevel::Warning) == CRT_LOG_WARNING && static_cast<int>(LogLevel::Error) == CRT_LOG_ERROR);
+
+}  // namespace
+
+std::vector<std::string> backendDirectories() {
+    std::vector<std::string> directories;
+    if (const char* value = std::getenv("CRT_BACKEND_PATH")) {
+        for (std::string_view rest = value; !rest.empty();) {
+            const std::size_t length = std::min(rest.find(':'), rest.size());
+            if (length > 0) directories.emplace_back(rest.substr(0, length));
+            rest.remove_prefix(std::min(length + 1, rest.size()));
+        }
+    }
+    std::error_code unreadable;
+    const fs::path program = fs::read_symlink("/proc/self/exe", unreadable);
+    if (!unreadable) directories.push_back((program.parent_path().parent_path() / "lib" / "crt").string());
+    return directories;
+}
+
+LoadedBackend loadBackend(const std::string& name) {
+    if (name.empty()) refuse("the backend has no name");
+    std::string path = name;
+    if (name.find('/') == std::string::npos) {
+        const std::optional<std::string> found = findPlugin(name);
+        if (!found) refuseAbsent(name);
+        path = *found;
+    } else if (std::error_code unreadable; !fs::exists(name, unreadable)) {
+        refuse(fmt::format("there is no backend file {}", name));
+    }
+
+    // dlopen searches the system's directories for a name without '/'.
+    const std::string file = fs::absolute(path).string();
+    // NOW: a missing symbol is told here and not in the middle of a render. LOCAL: the libraries of one plugin are not those of another.
+    void* library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (library == nullptr) {
+        const char* reason = ::dlerror();
+        refuse(fmt::format("backend '{}' ({}) cannot be opened: {}", name, path, orUnknown(reason)));
+    }
+    // Never closed, not even when it is refused: its static objects may have started threads.
+    void* const symbol = ::dlsym(library, CRT_BACKEND_ENTRY_NAME);
+    if (symbol == nullptr) {
+        const char* reason = ::dlerror();
+        refuse(fmt::format("backend '{}' ({}) is not a crt backend, or built for another major version: {}", name, path, orUnknown(reason)));
+    }
+    const auto entry = reinterpret_cast<CrtBackendEntry>(symbol);
+    const CrtBackend* table = acrossBorder(name, CRT_BACKEND_ENTRY_NAME, [&] { return entry(); });
+    checkTable(name, path, table);
+    logDebug("opened backend '{}' {} ({}), built with {}", table->name, orUnknown(table->version), path, orUnknown(table->build));
+    return {table->name, path, table};
+}
+
+std::vector<CrtDevice> probeDevices(const LoadedBackend& backend) {
+    const CrtHost host = makeHost(false);
+    std::vector<CrtDevice> devices(16);
+    for (;;) {
+        for (CrtDevice& device : devices) {
+            device = CrtDevice{};
+            device.struct_size = sizeof(CrtDevice);
+        }
+        std::uint32_t count = 0;
+        char reason[512] = "";
+        const CrtStatus status = acrossBorder(backend.name, "probe", [&] {
+            return backend.table->probe(&host, devices.data(), static_cast<std::uint32_t>(devices.size()), &count, reason, sizeof(reason));
+        });
+        reason[sizeof(reason) - 1] = '\0';
+        if (status != CRT_OK || count == 0) {
+            refuse(fmt::format("backend '{}' has no usable device: {}", backend.name, *reason != '\0' ? reason : "it gives no reason"));
+        }
+        if (count <= devices.size()) {
+            devices.resize(count);
+            break;
+        }
+        if (count > 4096) refuse(fmt::format("backend '{}' broke the contract: it claims {} devices", backend.name, count));
+        devices.resize(count);  // more than there was room for: ask again
+    }
+    for (CrtDevice& device : devices) {
+        device.name[sizeof(device.name) - 1] = '\0';
+        device.driver[sizeof(device.driver) - 1] = '\0';
+    }
+    std::stable_sort(devices.begin(), devices.end(), [](const CrtDevice& a, const CrtDevice& b) { return a.score > b.score; });
+    return devices;
+}
+
+std::vector<BackendStatus> listBackends() {
+    // Known ones first, in the order of preference, then whatever else lies in the directories.
+    std::vector<std::string> names(std::begin(kKnownBackends), std::end(kKnownBackends));
+    for (const std::string& name : installedBackends()) {
+        if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+    std::vector<BackendStatus> list;
+    for (const std::string& name : names) {
+        BackendStatus status;
+        status.name = name;
+        status.path = findPlugin(name).value_or("");
+        try {
+            const LoadedBackend backend = loadBackend(name);
+            status.version = orUnknown(backend.table->version);
+            status.build = orUnknown(backend.table->build);
+            status.devices = probeDevices(backend);
+        } catch (const Error& error) {
+            status.reason = error.what();
+        }
+        list.push_back(std::move(status));
+    }
+    return list;
+}
+
+LoadedBackend chooseBackend(std::vector<std::string>& reasons) {
+    for (const char* name : kKnownBackends) {
+        try {
+            LoadedBackend backend = loadBackend(name);
+            probeDevices(backend);
+            return backend;
+        } catch (const Error& error) {
+            reasons.emplace_back(error.what());
+        }
+    }
+    std::string all;
+    for (const std::string& reason : reasons) all += "\n  " + reason;
+    refuse("no backend can run here:" + all);
+}
+
+CrtHost makeHost(bool use_cache) {
+    CrtHost host{};
+    host.struct_size = sizeof(CrtHost);
+    host.abi_major = CRT_ABI_MAJOR;
+    host.abi_minor = CRT_ABI_MINOR;
+    host.log = hostLog;
+    host.progress = hostProgress;
+    host.kernel_source = hostKernelSource;
+    if (use_cache) {
+        const std::string directory = cacheDirectory();
+        if (!directory.empty()) host.cache_directory = keep(directory);
+    }
+    return host;
+}
+
+}  // namespace crt
