@@ -1,0 +1,80 @@
+/// OpenCL devices: listing, judging and choosing them, and the vocabulary every other file here uses (handles, checked calls).
+#pragma once
+
+#include "backend/crt_backend.h"
+
+#define CL_TARGET_OPENCL_VERSION 120
+#include <CL/cl.h>
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace crt::opencl {
+
+/// "CL_BUILD_PROGRAM_FAILURE" for −11, and so on.
+std::string errorName(cl_int error);
+
+/// Throws unless `result` is CL_SUCCESS: one sentence that begins with `what` and names the error. Lack of memory gets a status of its own.
+void check(cl_int result, const std::string& what);
+
+/// Owns one OpenCL object.
+template <class Object, cl_int (*Release)(Object)>
+class Handle {
+public:
+    Handle() = default;
+    explicit Handle(Object object) : object_(object) {}
+    Handle(Handle&& other) noexcept : object_(std::exchange(other.object_, nullptr)) {}
+    Handle& operator=(Handle&& other) noexcept {
+        std::swap(object_, other.object_);
+        return *this;
+    }
+    ~Handle() {
+        if (object_ != nullptr) Release(object_);
+    }
+    Object get() const { return object_; }
+    explicit operator bool() const { return object_ != nullptr; }
+
+private:
+    Object object_ = nullptr;
+};
+
+using Context = Handle<cl_context, clReleaseContext>;
+using Queue = Handle<cl_command_queue, clReleaseCommandQueue>;
+using Buffer = Handle<cl_mem, clReleaseMemObject>;
+using Event = Handle<cl_event, clReleaseEvent>;
+using ProgramHandle = Handle<cl_program, clReleaseProgram>;
+using Kernel = Handle<cl_kernel, clReleaseKernel>;
+using SubDevice = Handle<cl_device_id, clReleaseDevice>;
+
+/// One device of one platform, usable or not.
+struct Device {
+    cl_device_id id = nullptr;
+    std::uint32_t index = 0;  ///< Among all devices of all platforms, in the order the ICD loader lists them.
+    std::string name;
+    std::string driver;    ///< Driver version and platform version.
+    bool is_cpu = false;
+    bool has_correct_division_option = false;  ///< Takes -cl-fp32-correctly-rounded-divide-sqrt.
+    std::uint32_t compute_units = 0;
+    std::uint64_t memory_bytes = 0;
+    std::uint64_t largest_buffer_bytes = 0;
+    std::string unusable;  ///< Why it cannot give the same bits as the others; empty when it can.
+
+    double score() const;
+    CrtDevice describe() const;
+};
+
+/// Every device of every platform, the unusable too. Throws when there is not one.
+std::vector<Device> listDevices();
+
+/// Those that can be used. Throws PluginError(CRT_NO_DEVICE) that says of each why not when there is none.
+std::vector<Device> usableDevices();
+
+/// The device that --device means (crt::plugin::chooseDevice). Throws when there is none, and then also says what is wrong with the others.
+Device chooseDevice(const char* wanted);
+
+/// `count` compute units of a CPU device. Empty when the device has no more than that, or 0 is asked for, and all of it is to be used.
+SubDevice takeComputeUnits(const Device& device, std::uint32_t count);
+
+}  // namespace crt::opencl

@@ -1,0 +1,51 @@
+/// The OpenCL integrator: uploads a scene, launches the kernel over a range of samples, reads the film back.
+#pragma once
+
+#include "opencl_device.h"
+#include "opencl_program.h"
+
+#include "backend/crt_backend.h"
+#include "backend/launch_pacer.h"
+#include "backend/plugin_guard.h"
+
+#include <cstdint>
+
+namespace crt::opencl {
+
+/// One device with one scene. Film and scene live on the device between calls. Failures are thrown as PluginError.
+class OpenClIntegrator {
+public:
+    OpenClIntegrator(const plugin::Host& host, const CrtCreateInfo& info);
+    OpenClIntegrator(const OpenClIntegrator&) = delete;  // the context's callback knows where it lies
+    OpenClIntegrator& operator=(const OpenClIntegrator&) = delete;
+
+    void setScene(const CrtSceneBlob& scene);
+    bool render(const CrtRenderRange& range);
+    void readFilm(const CrtFilmView& film);
+    void report(CrtBackendReport& report);
+
+private:
+    /// A buffer of `bytes`, refused with a sentence about `what` when the device cannot hold it.
+    Buffer allocate(cl_mem_flags flags, std::uint64_t bytes, const void* content, const char* what);
+    void fill(const Buffer& buffer, std::uint64_t bytes, cl_uint pattern);
+    double launch(const Launch& launch);
+
+    plugin::Host host_;
+    Device device_;
+    std::uint32_t compute_units_;  ///< In use.
+    SubDevice part_;               ///< Those, where they are not all of the device.
+    Context context_;
+    Queue queue_;
+    CrtKernelChoice kernel_choice_;
+    std::uint32_t tile_size_;
+    LaunchPacer pacer_;
+
+    Program program_;
+    Buffer scene_, sums_, counts_, primitives_, rays_;
+    std::uint32_t width_ = 0, height_ = 0, channels_ = 0;
+    std::uint64_t allocated_bytes_ = 0, peak_bytes_ = 0;
+    double upload_seconds_ = 0, render_seconds_ = 0;
+    std::uint64_t paths_ = 0;
+};
+
+}  // namespace crt::opencl

@@ -1,0 +1,38 @@
+/// From a feature mask to a kernel that can be launched: text, options, compiler, disk cache.
+#pragma once
+
+#include "opencl_device.h"
+
+#include "backend/plugin_guard.h"
+
+#include <cstdint>
+#include <string>
+
+namespace crt::opencl {
+
+/// Sides of a work-group, in pixels.
+struct GroupSize {
+    std::uint32_t x = 1, y = 1;
+};
+
+/// One pixel a group on a CPU: there is nothing to share between work-items, and a loop over them inside the kernel is what PoCL tries to
+/// vectorise, at the price of seconds of compiling. A GPU gets the square that two warps or one wavefront fill.
+GroupSize groupSize(const Device& device);
+
+/// A built kernel and what it cost to get it.
+struct Program {
+    ProgramHandle program;
+    Kernel render;
+    std::uint32_t features = 0;
+    bool from_cache = false;
+    double compile_seconds = 0;
+    double cache_seconds = 0;
+};
+
+/// Options that a mask and a device are compiled with. No option that relaxes arithmetic: OpenCL's defaults keep IEEE rounding.
+std::string buildOptions(const Device& device, std::uint32_t features);
+
+/// Compiles the kernel for `features`, or takes it from the host's cache. `target` is the device of `context`: `device.id` or a part of it.
+Program buildProgram(const plugin::Host& host, cl_context context, cl_device_id target, const Device& device, std::uint32_t features);
+
+}  // namespace crt::opencl
