@@ -1,0 +1,55 @@
+/// The C++ face of a backend's integrator: owns it, turns a status into crt::Error.
+#pragma once
+
+#include "backend/crt_backend.h"
+#include "backend/loader.h"
+#include "compile.h"
+#include "film.h"
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace crt {
+
+struct IntegratorOptions {
+    std::string device;           ///< "" for the best; an index or a part of a device name.
+    unsigned threads = 0;         ///< 0: all.
+    CrtKernelChoice kernel = CRT_KERNEL_LEAN;
+    unsigned tile_size = 0;       ///< 0: the backend's own.
+    bool use_cache = true;
+};
+
+struct RenderRange {
+    std::array<std::uint32_t, 4> rectangle{0, 0, 0, 0};  ///< x0, y0, x1, y1 within the crop window; all zero: all of it.
+    std::uint64_t first_sample = 0;
+    std::uint64_t sample_count = 0;
+};
+
+/// Move-only. Errors: Backend (no device, unsupported scene), Device (failed, out of memory), Internal (contract broken).
+class Integrator {
+public:
+    /// Opens a device of a loaded backend.
+    Integrator(const LoadedBackend& backend, const IntegratorOptions& options);
+    ~Integrator();
+    Integrator(Integrator&&) noexcept;
+    Integrator& operator=(Integrator&&) noexcept;
+
+    /// The scene must outlive nothing: what is needed is copied. Clears the film.
+    void setScene(const CompiledScene& scene);
+
+    /// Adds a range to the backend's film. `progress` gets [0,1] and returns true to cancel. Returns false when cancelled.
+    bool render(const RenderRange& range, const std::function<bool(double)>& progress = {});
+
+    /// Adds what the backend's film holds to `film` (which has this scene's shape).
+    void readFilm(Film& film);
+
+    CrtBackendReport report();
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace crt

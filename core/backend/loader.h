@@ -1,0 +1,49 @@
+/// Finds, opens and checks backend plugins. Every refusal is its own sentence.
+#pragma once
+
+#include "backend/crt_backend.h"
+
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// A plugin that passed every check. The library stays open for the life of the process: its threads and atexit handlers may outlive any
+/// integrator, and unloading buys nothing.
+struct LoadedBackend {
+    std::string name;
+    std::string path;
+    const CrtBackend* table = nullptr;
+};
+
+/// Directories searched, in order: each of CRT_BACKEND_PATH (colon-separated), then lib/crt beside the program's bin/.
+std::vector<std::string> backendDirectories();
+
+/// Opens exactly crt_backend_<name>.so, or `name` itself when it holds a '/'. Throws crt::Error(Backend) with one sentence: absent (where it
+/// was looked for), cannot be opened (dlerror()), not a crt backend, table too small, ABI or layout differs (both builds named).
+LoadedBackend loadBackend(const std::string& name);
+
+/// Devices of a backend, best score first. Throws crt::Error(Backend) with the plugin's reason when there is none.
+std::vector<CrtDevice> probeDevices(const LoadedBackend& backend);
+
+/// One line of `crt plugins`.
+struct BackendStatus {
+    std::string name;
+    std::string path;
+    std::string version;
+    std::string build;
+    std::vector<CrtDevice> devices;
+    std::string reason;  ///< Why it cannot run; empty when it can.
+};
+
+/// Every backend known (cuda, embree, opencl) or found in the directories, usable or not. Opens each.
+std::vector<BackendStatus> listBackends();
+
+/// Picks a backend for `auto`: cuda, embree, opencl in that order, the first with a device. `reasons` gets a line for each one passed over.
+LoadedBackend chooseBackend(std::vector<std::string>& reasons);
+
+/// The host table given to every plugin: log, kernel sources, cache directory ($CRT_CACHE_DIR, $XDG_CACHE_HOME/crt, ~/.cache/crt).
+/// `use_cache` false leaves cache_directory null.
+CrtHost makeHost(bool use_cache);
+
+}  // namespace crt

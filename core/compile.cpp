@@ -1,0 +1,582 @@
+#include "compile.h"
+
+#include "bvh_build.h"
+#include "distributions.h"
+#include "kernel/features.h"
+#include "kernel/layout.h"
+#include "log.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <span>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace crt {
+namespace {
+
+using kernel::CrtSpan;
+
+/// Up to this many triangles the brute-force loop beats the BVH: measured by bench/accelerators, docs/results/accelerators.md.
+constexpr std::size_t kBruteForceTriangles = 64;
+
+/// Around boxes, in lengths after normalisation (coordinates within ±1): the triangle test accepts hits whose offset from the ray
+/// is rounding, a few 2^-24; what is culled must not be what it would accept.
+constexpr float kBoxPadding = 5e-7f;
+
+Vec3d operator-(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Vec3d operator*(const Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
+Vec3d cross(const Vec3d& a, const Vec3d& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3d normalise(const Vec3d& v) { return v * (1.0 / std::sqrt(dot(v, v))); }
+
+Vec3d transformPoint(const Matrix4d& m, const Vec3d& p) {
+    return {m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
+            m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]};
+}
+
+/// Rows of the cofactor matrix of the linear part: transforms normals, and its sign is that of the determinant.
+Matrix3d cofactors(const Matrix4d& m) {
+    const Vec3d a{m[0], m[1], m[2]}, b{m[4], m[5], m[6]}, c{m[8], m[9], m[10]};
+    return {cross(b, c), cross(c, a), cross(a, b)};
+}
+
+/// One placed triangle, world space, author's units.
+struct FlatTriangle {
+    std::array<Vec3d, 3> positions;
+    std::array<Vec3d, 3> normals{};
+    bool smooth = false;
+    std::int32_t material = -1;
+    std::int32_t emission = -1;
+    std::uint32_t object = 0;
+};
+
+/// The blob while it grows: arrays are appended, each on a 64-byte boundary.
+class BlobWriter {
+public:
+    BlobWriter() : bytes_(sizeof(kernel::CrtScene)) {}
+
+    template <class T>
+    CrtSpan append(std::span<const T> items) {
+        if (items.empty()) return {0, 0};
+        bytes_.resize((bytes_.size() + 63) / 64 * 64);
+        const std::size_t offset = bytes_.size();
+        // 64 GiB is what offsets of 16 bytes in 32 bits reach.
+        if ((offset + items.size_bytes()) / 16 > std::numeric_limits<std::uint32_t>::max())
+            throw Error(ErrorKind::Scene, "the scene is too large: its compiled form exceeds 64 GiB");
+        bytes_.resize(offset + items.size_bytes());
+        std::memcpy(bytes_.data() + offset, items.data(), items.size_bytes());
+        return {static_cast<std::uint32_t>(offset / 16), static_cast<std::uint32_t>(items.size())};
+    }
+
+    template <class T>
+    CrtSpan append(const std::vector<T>& items) {
+        return append(std::span<const T>(items));
+    }
+
+    std::vector<unsigned char> finish(const kernel::CrtScene& header) {
+        std::memcpy(bytes_.data(), &header, sizeof(header));
+        bytes_.resize((bytes_.size() + 63) / 64 * 64);
+        return std::move(bytes_);
+    }
+
+private:
+    std::vector<unsigned char> bytes_;
+};
+
+/// Spectra by value: equal ones share a table.
+class SpectrumTable {
+public:
+    std::uint32_t add(const Spectrum& spectrum) {
+        const auto [where, is_new] = index_.try_emplace(spectrum.values, static_cast<std::uint32_t>(index_.size()));
+        if (is_new) {
+            for (const double v : spectrum.values) floats_.push_back(static_cast<float>(v));
+            floats_.push_back(floats_.back());
+        }
+        return where->second;
+    }
+    const std::vector<float>& floats() const { return floats_; }
+    std::uint32_t count() const { return static_cast<std::uint32_t>(index_.size()); }
+
+private:
+    std::map<std::array<double, kSpectrumSize>, std::uint32_t> index_;
+    std::vector<float> floats_;
+};
+
+/// Everything between Scene and blob, step by step in the order of the calls in compileScene.
+class Compiler {
+public:
+    Compiler(const Scene& scene, std::uint32_t aovs) : scene_(scene) {
+        header_.magic = CRT_SCENE_MAGIC;
+        out_.aovs = aovs & (kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive);
+    }
+
+    CompiledScene run() {
+        const auto start = std::chrono::steady_clock::now();
+        flatten();
+        normaliseLengths();
+        chooseAccelerator();
+        writeGeometry();
+        writeEmitters();
+        writeMaterials();
+        writeTables();
+        writeFilm();
+        writeCamera();
+        writeSettings();
+        decideFeatures();
+        explainLeftOut();
+        finish();
+        out_.compile_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() - out_.build_seconds;
+        return std::move(out_);
+    }
+
+private:
+    bool isPath() const { return scene_.integrator.type == IntegratorType::Path; }
+    /// Whether light is ever scattered; if not, materials, light sampling and roulette have nothing to do.
+    bool scatters() const { return isPath() && scene_.integrator.max_depth > 0; }
+
+    void flatten() {
+        for (std::size_t o = 0; o < scene_.objects.size(); ++o) {
+            const Object& object = scene_.objects[o];
+            const Mesh& mesh = scene_.meshes[object.mesh];
+            for (const Matrix4d& transform : object.transforms) flattenPlacement(object, mesh, transform);
+        }
+        if (triangles_.size() >= (1u << 28))
+            throw Error(ErrorKind::Scene, "the scene is too large: more than 268 million triangles");
+        for (const FlatTriangle& t : triangles_)
+            for (const Vec3d& p : t.positions)
+                for (const double x : p)
+                    if (!std::isfinite(x)) throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity", scene_.objects[t.object].place);
+    }
+
+    void flattenPlacement(const Object& object, const Mesh& mesh, const Matrix4d& transform) {
+        const Matrix3d normal_matrix = cofactors(transform);
+        const Vec3d first_row{transform[0], transform[1], transform[2]};
+        // A mirroring transform turns the order of vertices round; turning it back keeps the outside outside.
+        const bool mirrored = dot(first_row, normal_matrix[0]) < 0;
+        for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+            FlatTriangle t;
+            t.object = placements_;
+            t.material = !mesh.material.empty() && mesh.material[i] >= 0 ? mesh.material[i] : object.material;
+            t.emission = !mesh.emission.empty() && mesh.emission[i] >= 0 ? mesh.emission[i] : object.emission;
+            t.smooth = !mesh.normal_index.empty() &&
+                       std::all_of(mesh.normal_index[i].begin(), mesh.normal_index[i].end(), [](std::uint32_t n) { return n != kNoNormal; });
+            for (std::size_t k = 0; k < 3; ++k) {
+                const std::size_t from = mirrored && k > 0 ? 3 - k : k;
+                t.positions[k] = transformPoint(transform, mesh.positions[mesh.triangles[i][from]]);
+                if (t.smooth) {
+                    const Vec3d n = multiply(normal_matrix, mesh.normals[mesh.normal_index[i][from]]);
+                    const double length = std::sqrt(dot(n, n));
+                    if (length > 0 && std::isfinite(length))
+                        t.normals[k] = n * ((mirrored ? -1.0 : 1.0) / length);
+                    else
+                        t.smooth = false;
+                }
+            }
+            triangles_.push_back(t);
+        }
+        ++placements_;
+    }
+
+    /// Centre and power-of-two scale in double, so that far-away and huge or tiny scenes lose nothing in float, and moving or scaling
+    /// a scene by representable amounts gives the same bits.
+    void normaliseLengths() {
+        constexpr double inf = std::numeric_limits<double>::infinity();
+        Vec3d lower{inf, inf, inf}, upper{-inf, -inf, -inf};
+        for (const FlatTriangle& t : triangles_)
+            for (const Vec3d& p : t.positions)
+                for (std::size_t k = 0; k < 3; ++k) {
+                    lower[k] = std::min(lower[k], p[k]);
+                    upper[k] = std::max(upper[k], p[k]);
+                }
+        double half_extent = 0;
+        if (!triangles_.empty())
+            for (std::size_t k = 0; k < 3; ++k) {
+                out_.centre[k] = lower[k] + (upper[k] - lower[k]) / 2;
+                half_extent = std::max(half_extent, (upper[k] - lower[k]) / 2);
+            }
+        if (half_extent > 0) {
+            int exponent = 0;
+            std::frexp(half_extent, &exponent);
+            out_.scale_exponent = -exponent;  // half_extent · 2^-exponent is in [½, 1)
+        }
+        scale_ = std::ldexp(1.0, out_.scale_exponent);
+        positions_.resize(triangles_.size());
+        for (std::size_t i = 0; i < triangles_.size(); ++i)
+            for (std::size_t v = 0; v < 3; ++v)
+                for (std::size_t k = 0; k < 3; ++k)
+                    positions_[i][3 * k + v] = static_cast<float>((triangles_[i].positions[v][k] - out_.centre[k]) * scale_);
+    }
+
+    void chooseAccelerator() {
+        switch (scene_.integrator.accelerator) {
+            case Accelerator::Bvh: header_.accelerator = CRT_ACCELERATOR_BVH; break;
+            case Accelerator::Aabb: header_.accelerator = CRT_ACCELERATOR_AABB; break;
+            case Accelerator::None: header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE; break;
+            case Accelerator::Auto:
+                header_.accelerator = triangles_.size() <= kBruteForceTriangles ? CRT_ACCELERATOR_BRUTE_FORCE : CRT_ACCELERATOR_BVH;
+        }
+        if (triangles_.empty()) header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;
+    }
+
+    TriangleBounds boundsOf(std::size_t i) const {
+        TriangleBounds b{};
+        for (std::size_t k = 0; k < 3; ++k) {
+            const float* p = &positions_[i][3 * k];
+            b.lower[k] = std::min({p[0], p[1], p[2]});
+            b.upper[k] = std::max({p[0], p[1], p[2]});
+        }
+        return b;
+    }
+
+    void writeGeometry() {
+        const std::size_t count = triangles_.size();
+        std::vector<std::uint32_t> order(count);
+        for (std::size_t i = 0; i < count; ++i) order[i] = static_cast<std::uint32_t>(i);
+        if (header_.accelerator == CRT_ACCELERATOR_BVH) {
+            const auto start = std::chrono::steady_clock::now();
+            std::vector<TriangleBounds> bounds(count);
+            for (std::size_t i = 0; i < count; ++i) bounds[i] = boundsOf(i);
+            Bvh bvh = buildBvh(bounds, kBoxPadding);
+            order = std::move(bvh.order);
+            header_.nodes = blob_.append(bvh.nodes);
+            out_.nodes = bvh.nodes.size();
+            out_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        }
+        slot_of_.resize(count);
+        std::vector<kernel::CrtTriangle> slots(count);
+        for (std::size_t slot = 0; slot < count; ++slot) {
+            const std::uint32_t id = order[slot];
+            slot_of_[id] = static_cast<std::uint32_t>(slot);
+            std::copy(positions_[id].begin(), positions_[id].end(), slots[slot].p);
+            slots[slot].id = id;
+        }
+        header_.triangles = blob_.append(slots);
+        header_.triangle_count = static_cast<std::uint32_t>(count);
+        if (header_.accelerator == CRT_ACCELERATOR_BRUTE_FORCE) {
+            std::vector<kernel::CrtTriangle8> blocks((count + 7) / 8);
+            for (std::size_t slot = 0; slot < count; ++slot)
+                for (std::size_t k = 0; k < 9; ++k) blocks[slot / 8].p[k][slot % 8] = slots[slot].p[k];
+            header_.triangles8 = blob_.append(blocks);
+        }
+        writeObjects();
+    }
+
+    /// Boxes of the objects, for the paper's culling and for the bounding-box view; triangles of an object are adjacent unless a BVH moved them.
+    void writeObjects() {
+        out_.objects = placements_;
+        const bool needed = header_.accelerator == CRT_ACCELERATOR_AABB || scene_.integrator.type == IntegratorType::Aabb;
+        if (!needed) return;
+        std::vector<kernel::CrtObject> objects;
+        for (std::size_t i = 0; i < triangles_.size(); ++i) {
+            const TriangleBounds b = boundsOf(i);
+            if (i == 0 || triangles_[i].object != triangles_[i - 1].object) {
+                kernel::CrtObject object{};
+                for (std::size_t k = 0; k < 3; ++k) {
+                    object.lower[k] = std::numeric_limits<float>::infinity();
+                    object.upper[k] = -std::numeric_limits<float>::infinity();
+                }
+                object.first = static_cast<std::uint32_t>(i);
+                objects.push_back(object);
+            }
+            kernel::CrtObject& object = objects.back();
+            ++object.count;
+            for (std::size_t k = 0; k < 3; ++k) {
+                object.lower[k] = std::min(object.lower[k], b.lower[k] - kBoxPadding);
+                object.upper[k] = std::max(object.upper[k], b.upper[k] + kBoxPadding);
+            }
+        }
+        header_.objects = blob_.append(objects);
+    }
+
+    double areaOf(std::size_t i) const {
+        const auto& p = positions_[i];
+        const Vec3d a{p[0], p[3], p[6]}, b{p[1], p[4], p[7]}, c{p[2], p[5], p[8]};
+        const Vec3d n = cross(b - a, c - a);
+        return 0.5 * std::sqrt(dot(n, n));
+    }
+
+    void writeEmitters() {
+        emitter_of_.assign(triangles_.size(), CRT_NONE);
+        if (!isPath()) return;
+        std::vector<kernel::CrtEmitter> emitters;
+        std::vector<double> power;
+        std::uint64_t degenerate = 0;
+        for (std::size_t i = 0; i < triangles_.size(); ++i) {
+            if (triangles_[i].emission < 0) continue;
+            const Emission& emission = scene_.emissions[static_cast<std::size_t>(triangles_[i].emission)];
+            if (!(emission.radiance.max() > 0)) continue;
+            const double area = areaOf(i);
+            if (!(area > 0)) {
+                ++degenerate;
+                continue;
+            }
+            kernel::CrtEmitter emitter{};
+            emitter.slot = slot_of_[i];
+            emitter.spectrum = spectra_.add(emission.radiance);
+            emitter.flags = emission.two_sided ? CRT_EMITTER_TWO_SIDED : 0;
+            emitter.area = static_cast<float>(area);
+            emitter_of_[i] = static_cast<std::uint32_t>(emitters.size());
+            emitters.push_back(emitter);
+            // By luminance, but never zero for a lamp that the eye hardly sees: the film keeps all of XYZ.
+            const Vec3d xyz = spectrumToXyz(emission.radiance);
+            power.push_back(area * (xyz[0] + xyz[1] + xyz[2] + 1e-6 * emission.radiance.max()) * (emission.two_sided ? 2 : 1));
+        }
+        if (degenerate > 0) logWarning("{} emissive triangles have no area and were left out of the lights", degenerate);
+        const std::vector<std::uint64_t> first = choiceTable(power);
+        for (std::size_t i = 0; i < emitters.size(); ++i) {
+            emitters[i].choice = static_cast<std::uint32_t>(first[i]);
+            emitters[i].choice_probability = static_cast<float>(std::ldexp(static_cast<double>(first[i + 1] - first[i]), -32));
+        }
+        header_.emitters = blob_.append(emitters);
+        out_.emitters = emitters.size();
+        if (out_.emitters == 0 && !scene_.environment)
+            logWarning("the scene has no light: the image will be black (add emission to an object, or an environment)");
+    }
+
+    void writeMaterials() {
+        std::vector<kernel::CrtPrimitive> primitives(triangles_.size());
+        std::vector<kernel::CrtNormals> normals;
+        std::vector<bool> used(scene_.materials.size(), false);
+        bool fallback_used = false;
+        for (std::size_t i = 0; i < triangles_.size(); ++i) {
+            const FlatTriangle& t = triangles_[i];
+            kernel::CrtPrimitive& p = primitives[i];
+            const bool known = t.material >= 0 && static_cast<std::size_t>(t.material) < scene_.materials.size();
+            if (known)
+                used[static_cast<std::size_t>(t.material)] = true;
+            else
+                fallback_used = true;
+            p.material = known ? static_cast<std::uint32_t>(t.material) : static_cast<std::uint32_t>(scene_.materials.size());
+            p.emitter = emitter_of_[i];
+            p.object = t.object;
+            p.normals = CRT_NONE;
+            if (t.smooth) {
+                p.normals = static_cast<std::uint32_t>(normals.size());
+                kernel::CrtNormals n{};
+                for (std::size_t v = 0; v < 3; ++v)
+                    for (std::size_t k = 0; k < 3; ++k) n.n[3 * k + v] = static_cast<float>(t.normals[v][k]);
+                normals.push_back(n);
+            }
+        }
+        header_.primitives = blob_.append(primitives);
+        header_.normals = blob_.append(normals);
+
+        std::vector<kernel::CrtMaterial> materials;
+        for (std::size_t i = 0; i < scene_.materials.size(); ++i)
+            materials.push_back(used[i] && isPath() ? writeMaterial(scene_.materials[i]) : kernel::CrtMaterial{});
+        if (fallback_used || materials.empty()) {
+            Material grey;  // faces that name no material
+            grey.reflectance = constantSpectrum(0.5);
+            materials.push_back(isPath() ? writeMaterial(grey) : kernel::CrtMaterial{});
+        }
+        header_.materials = blob_.append(materials);
+        header_.environment = CRT_NONE;
+        if (scene_.environment && isPath()) header_.environment = spectra_.add(scene_.environment->radiance);
+    }
+
+    kernel::CrtMaterial writeMaterial(const Material& material) {
+        kernel::CrtMaterial m{};
+        switch (material.type) {
+            case MaterialType::Diffuse:
+                m.type = CRT_MATERIAL_DIFFUSE;
+                m.a = spectra_.add(material.reflectance);
+                has_diffuse_ = true;
+                break;
+            case MaterialType::Mirror:
+                m.type = CRT_MATERIAL_MIRROR;
+                m.a = spectra_.add(material.reflectance);
+                has_conductor_ = true;
+                break;
+            case MaterialType::Conductor:
+                m.type = CRT_MATERIAL_CONDUCTOR;
+                m.a = spectra_.add(material.eta);
+                m.b = spectra_.add(material.k);
+                has_conductor_ = true;
+                break;
+            case MaterialType::Dielectric:
+                m.type = CRT_MATERIAL_DIELECTRIC;
+                m.a = spectra_.add(material.eta);
+                has_dielectric_ = true;
+                if (!material.eta.isConstant()) {
+                    m.flags = CRT_MATERIAL_DISPERSIVE;
+                    has_dispersion_ = true;
+                }
+        }
+        return m;
+    }
+
+    void writeTables() {
+        header_.spectra = blob_.append(spectra_.floats());
+        header_.spectra.count = spectra_.count();
+        std::vector<float> observer;
+        const auto& cie = cieObserver();
+        for (std::size_t i = 0; i < CRT_SPECTRUM_STRIDE; ++i) {
+            const std::size_t nm = std::min<std::size_t>(i, kSpectrumSize - 1);
+            for (const Spectrum& s : cie) observer.push_back(static_cast<float>(s[nm] / cieYIntegral()));
+            observer.push_back(0.0f);
+        }
+        header_.observer = blob_.append(observer);
+        header_.wavelengths = blob_.append(wavelengthTable(CRT_WAVELENGTH_TABLE));
+        header_.filter = blob_.append(filterTable(scene_.film, CRT_FILTER_TABLE));
+    }
+
+    void writeFilm() {
+        const Film& film = scene_.film;
+        header_.film_width = static_cast<std::uint32_t>(film.width);
+        header_.film_height = static_cast<std::uint32_t>(film.height);
+        const bool cropped = film.crop != std::array<int, 4>{0, 0, 0, 0};
+        header_.crop_x = cropped ? static_cast<std::uint32_t>(film.crop[0]) : 0;
+        header_.crop_y = cropped ? static_cast<std::uint32_t>(film.crop[1]) : 0;
+        header_.width = cropped ? static_cast<std::uint32_t>(film.crop[2] - film.crop[0]) : header_.film_width;
+        header_.height = cropped ? static_cast<std::uint32_t>(film.crop[3] - film.crop[1]) : header_.film_height;
+        header_.aovs = out_.aovs;
+        header_.channels = CRT_CHANNELS_BASE;
+        const auto take = [&](std::uint32_t aov, std::uint32_t& first, std::uint32_t channels) {
+            if (!(out_.aovs & aov)) return;
+            first = header_.channels;
+            header_.channels += channels;
+        };
+        take(kAovAlbedo, header_.albedo_channel, 3);
+        take(kAovNormal, header_.normal_channel, 3);
+        take(kAovDepth, header_.depth_channel, 1);
+        header_.depth_scale = static_cast<float>(std::ldexp(1.0, -out_.scale_exponent));
+        out_.width = header_.width;
+        out_.height = header_.height;
+        out_.channels = header_.channels;
+    }
+
+    void writeCamera() {
+        const Camera& camera = scene_.camera;
+        const Vec3d view = normalise(camera.target - camera.position);
+        const Vec3d right = normalise(cross(view, camera.up));
+        const Vec3d up = cross(right, view);
+        kernel::CrtCamera& c = header_.camera;
+        for (std::size_t k = 0; k < 3; ++k) {
+            c.origin[k] = static_cast<float>((camera.position[k] - out_.centre[k]) * scale_);
+            c.corner[k] = static_cast<float>(view[k] - right[k] * camera.tan_half_width + up[k] * camera.tan_half_height);
+            c.step_x[k] = static_cast<float>(right[k] * 2 * camera.tan_half_width / scene_.film.width);
+            c.step_y[k] = static_cast<float>(-up[k] * 2 * camera.tan_half_height / scene_.film.height);
+            c.lens_x[k] = static_cast<float>(right[k]);
+            c.lens_y[k] = static_cast<float>(up[k]);
+            if (!std::isfinite(c.origin[k]))
+                throw Error(ErrorKind::Scene, "the camera is too far from the scene for single precision", camera.place);
+        }
+        const Vec3d to_target = camera.target - camera.position;
+        const double focus = camera.focus_distance > 0 ? camera.focus_distance : std::sqrt(dot(to_target, to_target));
+        c.lens_radius = static_cast<float>(camera.aperture_radius * scale_);
+        c.focus_distance = static_cast<float>(focus * scale_);
+    }
+
+    void writeSettings() {
+        switch (scene_.integrator.type) {
+            case IntegratorType::Path: header_.view = CRT_VIEW_PATH; break;
+            case IntegratorType::Normals: header_.view = CRT_VIEW_NORMALS; break;
+            case IntegratorType::Aabb: header_.view = CRT_VIEW_AABB; break;
+        }
+        switch (scene_.sampler.type) {
+            case SamplerType::Sobol: header_.sampler = CRT_SAMPLER_SOBOL; break;
+            case SamplerType::Independent: header_.sampler = CRT_SAMPLER_INDEPENDENT; break;
+            case SamplerType::XorShift: header_.sampler = CRT_SAMPLER_XORSHIFT; break;
+        }
+        header_.seed_low = static_cast<std::uint32_t>(scene_.sampler.seed);
+        header_.seed_high = static_cast<std::uint32_t>(scene_.sampler.seed >> 32);
+        header_.max_depth = static_cast<std::uint32_t>(scene_.integrator.max_depth);
+        header_.roulette_depth = scene_.integrator.roulette ? static_cast<std::uint32_t>(scene_.integrator.roulette_depth) : CRT_NONE;
+        header_.nee = scene_.integrator.nee ? 1 : 0;
+    }
+
+    void decideFeatures() {
+        std::uint32_t f = 0;
+        const auto need = [&](bool condition, std::uint32_t feature) { f |= condition ? feature : 0u; };
+        need(header_.sampler == CRT_SAMPLER_SOBOL, CRT_FEATURE_SOBOL);
+        need(header_.sampler == CRT_SAMPLER_INDEPENDENT, CRT_FEATURE_INDEPENDENT);
+        need(header_.sampler == CRT_SAMPLER_XORSHIFT, CRT_FEATURE_XORSHIFT);
+        const bool traces = scene_.integrator.type != IntegratorType::Aabb;
+        need(traces && header_.accelerator == CRT_ACCELERATOR_BVH, CRT_FEATURE_BVH);
+        need(traces && header_.accelerator == CRT_ACCELERATOR_BRUTE_FORCE, CRT_FEATURE_BRUTE_FORCE);
+        need(traces && header_.accelerator == CRT_ACCELERATOR_AABB, CRT_FEATURE_AABB);
+        need(scatters() && has_diffuse_, CRT_FEATURE_DIFFUSE);
+        need(scatters() && has_conductor_, CRT_FEATURE_CONDUCTOR);
+        need(scatters() && has_dielectric_, CRT_FEATURE_DIELECTRIC);
+        need(scatters() && has_dispersion_, CRT_FEATURE_DISPERSION);
+        need(traces && header_.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
+        need(out_.emitters > 0, CRT_FEATURE_AREA_LIGHT);
+        need(scatters() && out_.emitters > 0 && header_.nee && has_diffuse_, CRT_FEATURE_NEE);
+        need(header_.environment != CRT_NONE, CRT_FEATURE_ENVIRONMENT);
+        need(header_.camera.lens_radius > 0, CRT_FEATURE_LENS);
+        need(header_.filter.count > 0, CRT_FEATURE_FILTER);
+        need(!isPath(), CRT_FEATURE_VIEW);
+        need(out_.aovs != 0, CRT_FEATURE_AOV);
+        header_.features = f;
+        out_.features = f;
+    }
+
+    void explainLeftOut() {
+        const auto left_out = [&](const char* what, const std::string& why) { out_.left_out.emplace_back(what, why); };
+        const auto has = [&](std::uint32_t feature) { return (out_.features & feature) != 0; };
+        if (header_.accelerator != CRT_ACCELERATOR_BVH)
+            left_out("BVH", scene_.integrator.accelerator == Accelerator::Auto
+                                ? fmt::format("{} triangles: testing all of them is faster (up to {})", triangles_.size(), kBruteForceTriangles)
+                                : std::string("integrator.accelerator asks for another"));
+        if (!has(CRT_FEATURE_CONDUCTOR)) left_out("mirror and conductor", "no surface uses them");
+        if (!has(CRT_FEATURE_DIELECTRIC)) left_out("dielectric", "no surface uses it");
+        if (!has(CRT_FEATURE_DISPERSION)) left_out("hero wavelength selection", "no index of refraction depends on wavelength");
+        if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
+        if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
+        if (!has(CRT_FEATURE_NEE))
+            left_out("light sampling and shadow rays", !header_.nee ? "integrator.nee is false" : "no diffuse surface can be lit by an emitter");
+        if (!has(CRT_FEATURE_ENVIRONMENT)) left_out("environment", "there is none");
+        if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
+        if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
+        if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");
+        if (!has(CRT_FEATURE_VIEW)) left_out("normals and bounding-box views", "integrator.type is path");
+        for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"}, std::pair{CRT_FEATURE_INDEPENDENT, "independent sampler"},
+                                            std::pair{CRT_FEATURE_XORSHIFT, "xorshift sampler"}})
+            if (!has(feature)) left_out(name, "sampler.type is another");
+    }
+
+    void finish() {
+        const std::vector<unsigned char> bytes = blob_.finish(header_);
+        out_.size_bytes = bytes.size();
+        out_.triangles = triangles_.size();
+        out_.blob.resize(bytes.size() / sizeof(CompiledScene::Line));
+        std::memcpy(out_.blob.data(), bytes.data(), bytes.size());
+        const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+        out_.hash = fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+    }
+
+    const Scene& scene_;
+    CompiledScene out_;
+    kernel::CrtScene header_{};
+    BlobWriter blob_;
+    SpectrumTable spectra_;
+    std::vector<FlatTriangle> triangles_;
+    std::vector<std::array<float, 9>> positions_;  ///< x of three vertices, y, z; normalised.
+    std::vector<std::uint32_t> slot_of_;           ///< By primitive id.
+    std::vector<std::uint32_t> emitter_of_;
+    std::uint32_t placements_ = 0;
+    double scale_ = 1;
+    bool has_diffuse_ = false, has_conductor_ = false, has_dielectric_ = false, has_dispersion_ = false;
+};
+
+}  // namespace
+
+CompiledScene compileScene(const Scene& scene, std::uint32_t aovs) { return Compiler(scene, aovs).run(); }
+
+std::string featureNames(std::uint64_t mask) {
+    std::string names;
+#define CRT_FEATURE_NAME(bit, name, text) \
+    if (mask & (1u << bit)) names += (names.empty() ? "" : ", ") + std::string(#name);
+    CRT_FEATURE_LIST(CRT_FEATURE_NAME)
+#undef CRT_FEATURE_NAME
+    std::transform(names.begin(), names.end(), names.begin(), [](char c) { return c == '_' ? '-' : static_cast<char>(std::tolower(c)); });
+    return names;
+}
+
+}  // namespace crt

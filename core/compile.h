@@ -1,0 +1,41 @@
+/// Scene → CompiledScene: one flat, pointer-free blob (kernel/layout.h) and the feature mask that says what it needs.
+#pragma once
+
+#include "scene.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+struct CompiledScene {
+    struct alignas(64) Line {
+        unsigned char bytes[64];
+    };
+    std::vector<Line> blob;           ///< Read it through data(): 64-byte aligned.
+    std::size_t size_bytes = 0;
+    std::uint32_t features = 0;       ///< kernel/features.h
+    std::uint32_t width = 0, height = 0;  ///< Of the crop window.
+    std::uint32_t channels = 0;       ///< Film channels.
+    std::uint32_t aovs = 0;
+    std::uint64_t triangles = 0, emitters = 0, objects = 0, nodes = 0;
+    int scale_exponent = 0;           ///< World lengths were multiplied by 2^scale_exponent after centring.
+    Vec3d centre{};                   ///< In the author's units.
+    std::string hash;                 ///< 32 hex digits, XXH3-128 of the blob.
+    double build_seconds = 0;         ///< BVH.
+    double compile_seconds = 0;
+    std::vector<std::pair<std::string, std::string>> left_out;  ///< What this scene does not need, and why.
+
+    const unsigned char* data() const { return reinterpret_cast<const unsigned char*>(blob.data()); }
+};
+
+/// `aovs` are the bits of Aov that outputs ask for. Warns about a scene without light. Throws crt::Error(Scene) for scenes that cannot be
+/// flattened (coordinates too large, more than 2^31 triangles).
+CompiledScene compileScene(const Scene& scene, std::uint32_t aovs);
+
+/// "bvh, diffuse, nee": the names of a mask.
+std::string featureNames(std::uint64_t mask);
+
+}  // namespace crt

@@ -1,0 +1,95 @@
+#include "distributions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <numeric>
+
+namespace crt {
+namespace {
+
+/// Nodes of the inverse of the distribution with this density on [lower, upper], by trapezoids on `steps` intervals.
+std::vector<double> inverseDistribution(const std::function<double(double)>& density, double lower, double upper, std::size_t steps,
+                                        std::size_t cells) {
+    const double width = (upper - lower) / static_cast<double>(steps);
+    std::vector<double> cumulative(steps + 1, 0.0);
+    for (std::size_t i = 0; i < steps; ++i) {
+        const double x = lower + width * static_cast<double>(i);
+        cumulative[i + 1] = cumulative[i] + 0.5 * (density(x) + density(x + width)) * width;
+    }
+    std::vector<double> nodes(cells + 1);
+    for (std::size_t k = 0; k <= cells; ++k) {
+        const double wanted = cumulative.back() * static_cast<double>(k) / static_cast<double>(cells);
+        const auto above = std::upper_bound(cumulative.begin(), cumulative.end(), wanted);
+        const auto i = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(above - cumulative.begin() - 1, 0, static_cast<std::ptrdiff_t>(steps) - 1));
+        const double span = cumulative[i + 1] - cumulative[i];
+        nodes[k] = lower + width * (static_cast<double>(i) + (span > 0 ? std::min(1.0, (wanted - cumulative[i]) / span) : 0.0));
+    }
+    nodes.front() = lower;
+    nodes.back() = upper;
+    return nodes;
+}
+
+std::vector<float> toFloat(const std::vector<double>& values) { return {values.begin(), values.end()}; }
+
+double gaussian(double x, double sigma) { return std::exp(-x * x / (2 * sigma * sigma)); }
+
+/// Four-term Blackman–Harris window over [−radius, radius] (Harris 1978, minimum 4-term).
+double blackmanHarris(double x, double radius) {
+    const double t = std::numbers::pi * (x / radius + 1);
+    return 0.35875 - 0.48829 * std::cos(t) + 0.14128 * std::cos(2 * t) - 0.01168 * std::cos(3 * t);
+}
+
+}  // namespace
+
+std::vector<float> wavelengthTable(std::size_t cells) {
+    const auto& cie = cieObserver();
+    const auto density = [&](double wavelength_nm) {
+        const double position = std::clamp(wavelength_nm - kWavelengthMin_nm, 0.0, static_cast<double>(kSpectrumSize - 1));
+        const auto i = std::min(static_cast<std::size_t>(position), static_cast<std::size_t>(kSpectrumSize - 2));
+        const double f = position - static_cast<double>(i);
+        double sum = 1e-3;  // against a density of about 2 at the peak
+        for (const Spectrum& s : cie) sum += s[i] + f * (s[i + 1] - s[i]);
+        return sum;
+    };
+    return toFloat(inverseDistribution(density, kWavelengthMin_nm, kWavelengthMax_nm, 4 * (kSpectrumSize - 1), cells));
+}
+
+std::vector<float> filterTable(const Film& film, std::size_t cells) {
+    const double radius = film.filter_radius;
+    switch (film.filter) {
+        case PixelFilter::Box:
+            if (radius == 0.5) return {};
+            return toFloat(inverseDistribution([](double) { return 1.0; }, -radius, radius, cells, cells));
+        case PixelFilter::Gaussian: {
+            const double edge = gaussian(radius, film.filter_sigma);
+            return toFloat(inverseDistribution([&](double x) { return std::max(0.0, gaussian(x, film.filter_sigma) - edge); }, -radius, radius,
+                                               64 * cells, cells));
+        }
+        case PixelFilter::BlackmanHarris:
+            return toFloat(inverseDistribution([&](double x) { return blackmanHarris(x, radius); }, -radius, radius, 64 * cells, cells));
+    }
+    return {};
+}
+
+std::vector<std::uint64_t> choiceTable(const std::vector<double>& weights) {
+    std::vector<std::uint64_t> first{0};
+    if (weights.empty()) return first;
+    constexpr std::uint64_t kAll = std::uint64_t{1} << 32;
+    const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
+    std::vector<std::uint64_t> shares;
+    std::uint64_t given = 0;
+    for (const double w : weights) {
+        const double share = std::floor(std::ldexp(w / total, 32));
+        shares.push_back(share >= 1 ? static_cast<std::uint64_t>(share) : 1);
+        given += shares.back();
+    }
+    // What rounding left over, or took too much, is settled with the largest: it hardly notices.
+    auto largest = std::max_element(shares.begin(), shares.end());
+    *largest += kAll - given;
+    for (const std::uint64_t s : shares) first.push_back(first.back() + s);
+    return first;
+}
+
+}  // namespace crt

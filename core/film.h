@@ -1,0 +1,100 @@
+/// The film on the host: sums of samples, their algebra (add, merge, checkpoint) and what they resolve to.
+///
+/// Every sum is an unevaluated pair hi + lo of doubles, so that the order of additions shows only some 2^-100 below the value:
+/// any split over threads, tiles, chunks, machines or resumes resolves to the same float image.
+#pragma once
+
+#include "compile.h"
+#include "error.h"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace crt {
+
+/// Half-open range of sample indices.
+using SampleRange = std::pair<std::uint64_t, std::uint64_t>;
+
+/// Sorted, disjoint, merged ranges of sample indices.
+class SampleRanges {
+public:
+    SampleRanges() = default;
+    explicit SampleRanges(std::vector<SampleRange> ranges);
+    /// Throws crt::Error(Usage) when `range` overlaps what is there.
+    void add(SampleRange range);
+    std::uint64_t count() const;
+    const std::vector<SampleRange>& ranges() const { return ranges_; }
+    /// "0-1024;2048-3072"
+    std::string text() const;
+
+private:
+    std::vector<SampleRange> ranges_;
+};
+
+struct FilmShape {
+    std::uint32_t width = 0, height = 0;
+    std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, Y², then AOV channels.
+    std::uint32_t aovs = 0;       ///< Bits of Aov that need film channels or the primitive plane.
+    bool operator==(const FilmShape&) const = default;
+};
+
+class Film {
+public:
+    explicit Film(FilmShape shape);
+    const FilmShape& shape() const { return shape_; }
+
+    std::vector<double> sums;              ///< [height][width][channels][2]
+    std::vector<std::uint64_t> counts;     ///< [height][width]
+    std::vector<std::uint32_t> primitives; ///< [height][width] or empty
+    SampleRanges samples;                  ///< Ranges asked for (every pixel has the same).
+
+    /// Adds another film of disjoint sample ranges. Primitive ids are taken from the film with the lower first sample.
+    /// Throws crt::Error(Usage) when shapes differ or ranges overlap.
+    void add(const Film& other);
+
+    /// hi + lo rounded to double.
+    double sum(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
+    /// Mean of a channel; 0 when the pixel has no valid sample.
+    double mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
+    /// Variance of the pixel mean of luminance Y, from the second moment: (E[Y²] − E[Y]²)/(n − 1). For a quasi-Monte Carlo sampler this is an
+    /// upper estimate.
+    double luminanceVariance(std::uint32_t x, std::uint32_t y) const;
+    /// Samples that were NaN or infinite and were dropped.
+    std::uint64_t invalidSamples() const;
+    /// Root mean square of the pixels' standard errors over the image mean of Y: the error estimate on the progress line.
+    double relativeError() const;
+
+private:
+    FilmShape shape_;
+};
+
+/// An image plane set: named float channels, row-major, top row first. What image_io writes and compare reads.
+struct Image {
+    std::uint32_t width = 0, height = 0;
+    std::vector<std::string> channels;      ///< "R","G","B","Albedo.R",…,"sampleCount","id.primitive"
+    std::vector<float> pixels;              ///< [height][width][channels]
+    std::vector<std::uint32_t> integers;    ///< [height][width][integer_channels]
+    std::vector<std::string> integer_channels;
+    std::vector<std::pair<std::string, std::string>> metadata;  ///< crt/backend, crt/seed, …
+    std::optional<std::array<double, 8>> chromaticities;
+};
+
+/// XYZ sums → colour image: white balance, exposure and colour space of the scene's film; AOVs as asked.
+Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs);
+
+/// Identity of what was rendered; a checkpoint of another scene, seed or film is refused.
+struct FilmIdentity {
+    std::string scene_hash;   ///< 32 hex digits: XXH3-128 of the compiled scene blob (which holds seed, film and integrator).
+    std::string version;      ///< Of crt.
+};
+
+/// Checkpoint = partial = resume file. Written to a temporary name, synced and renamed.
+void writeCheckpoint(const std::string& path, const Film& film, const FilmIdentity& identity);
+/// Throws crt::Error(Usage) on a damaged or truncated file (checksum), naming it.
+std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path);
+
+}  // namespace crt

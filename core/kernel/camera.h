@@ -1,0 +1,70 @@
+/*
+ * camera.h: film point → ray. Perspective, pinhole or thin lens; pixel filters by importance sampling (Ernst et al. 2006), so a sample belongs to
+ * one pixel and has weight 1.
+ */
+#ifndef CRT_CAMERA_H
+#define CRT_CAMERA_H
+
+#include "spectrum.h"
+
+CRT_KERNEL_BEGIN
+
+/* `reach` is how far the segment goes, in lengths of d: infinity, or 1 for a shadow ray that ends at o + d. */
+typedef struct CrtRay {
+    vec3 o, d;
+    f32 reach;
+} CrtRay;
+
+CRT_FN vec3 crt_load3(CRT_GLOBAL const f32 *p) { return make_vec3(p[0], p[1], p[2]); }
+
+CRT_FN f32 crt_filter_offset(const CrtContext *ctx, f32 u) {
+    CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, ctx->scene->filter);
+    const f32 x = u * (f32)CRT_FILTER_TABLE;
+    const u32 cell = (u32)x;
+    return table[cell] + (x - (f32)cell) * (table[cell + 1u] - table[cell]);
+}
+
+/* A uniform point on the unit disk; the square's strata stay connected (Shirley and Chiu 1997). */
+CRT_FN CrtRandom2 crt_concentric_disk(CrtRandom2 u) {
+    CrtRandom2 p;
+    const f32 a = 2.0f * u.x - 1.0f;
+    const f32 b = 2.0f * u.y - 1.0f;
+    const int wide = crt_abs(a) > crt_abs(b);
+    const f32 r = wide ? a : b;
+    const f32 other = wide ? b : a;
+    const f32 angle = r != 0.0f ? 0.78539816339744830962f * (other / r) : 0.0f;
+    const f32 s = r * crt_sin_quarter(angle);
+    const f32 c = r * crt_cos_quarter(angle);
+    p.x = wide ? c : s;
+    p.y = wide ? s : c;
+    return p;
+}
+
+/* Ray of a pixel in whole-film coordinates; unit direction. */
+CRT_FN CrtRay crt_camera_ray(const CrtContext *ctx, CrtSampler *sampler, u32 pixel_x, u32 pixel_y) {
+    CRT_GLOBAL const CrtCamera *camera = &ctx->scene->camera;
+    const CrtRandom2 u = crt_sample_2d(sampler, CRT_DIM_FILM);
+    f32 dx = u.x;
+    f32 dy = u.y;
+    if (CRT_HAS(FILTER) && ctx->scene->filter.count != 0u) {
+        dx = 0.5f + crt_filter_offset(ctx, u.x);
+        dy = 0.5f + crt_filter_offset(ctx, u.y);
+    }
+    CrtRay ray;
+    ray.o = crt_load3(camera->origin);
+    ray.d = crt_load3(camera->corner) + crt_load3(camera->step_x) * ((f32)pixel_x + dx) +
+            crt_load3(camera->step_y) * ((f32)pixel_y + dy);
+    if (CRT_HAS(LENS) && camera->lens_radius > 0.0f) {
+        const CrtRandom2 lens = crt_concentric_disk(crt_sample_2d(sampler, CRT_DIM_LENS));
+        const vec3 shift = (crt_load3(camera->lens_x) * lens.x + crt_load3(camera->lens_y) * lens.y) * camera->lens_radius;
+        ray.d = ray.d * camera->focus_distance - shift;
+        ray.o = ray.o + shift;
+    }
+    ray.d = normalize3(ray.d);
+    ray.reach = CRT_INFINITY;
+    return ray;
+}
+
+CRT_KERNEL_END
+
+#endif

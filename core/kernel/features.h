@@ -1,0 +1,44 @@
+/*
+ * features.h: what a scene can need, one bit a kind. compile.cpp derives the mask from the scene; a kernel compiled with
+ * CRT_FEATURES = mask leaves the rest out. Bits name kinds, never values, so moving the camera never recompiles.
+ * Test with `if (CRT_HAS(X))`: every compiler still parses what it leaves out. A kernel with more bits than the scene needs gives
+ * the same bits in the image, only slower.
+ *
+ * CRT_FEATURE_LIST(F) calls F(bit, NAME, "what leaves the kernel without it").
+ */
+#ifndef CRT_FEATURES_H
+#define CRT_FEATURES_H
+
+#define CRT_FEATURE_LIST(F)                                                                  \
+    F(0, SOBOL, "Owen-scrambled Sobol sampler")                                              \
+    F(1, INDEPENDENT, "counter-based independent sampler (Philox)")                          \
+    F(2, XORSHIFT, "xorshift sampler")                                                       \
+    F(3, BVH, "BVH traversal and its stack")                                                 \
+    F(4, BRUTE_FORCE, "loop over all triangles")                                             \
+    F(5, AABB, "per-object bounding box culling")                                            \
+    F(6, DIFFUSE, "Lambertian reflection")                                                   \
+    F(7, CONDUCTOR, "mirror and smooth conductor")                                           \
+    F(8, DIELECTRIC, "smooth dielectric, total internal reflection")                         \
+    F(9, DISPERSION, "wavelength-dependent refraction: hero wavelength selection")           \
+    F(10, SMOOTH_NORMALS, "interpolated shading normals")                                    \
+    F(11, AREA_LIGHT, "emission from surfaces")                                              \
+    F(12, NEE, "light sampling, shadow rays and MIS")                                        \
+    F(13, ENVIRONMENT, "constant environment")                                               \
+    F(14, LENS, "thin lens")                                                                 \
+    F(15, FILTER, "pixel filter other than the box")                                         \
+    F(16, VIEW, "normals and bounding-box views")                                            \
+    F(17, AOV, "albedo, normal, depth and primitive outputs")
+
+#define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,
+enum CrtFeature { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) CRT_FEATURE_END };
+
+#define CRT_FEATURES_ALL 0x3ffffu
+
+/* The mask that this kernel is compiled for; everything when the build says nothing. */
+#ifndef CRT_FEATURES
+#define CRT_FEATURES CRT_FEATURES_ALL
+#endif
+
+#define CRT_HAS(name) (((CRT_FEATURES) & (unsigned)CRT_FEATURE_##name) != 0u)
+
+#endif

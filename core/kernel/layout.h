@@ -1,0 +1,192 @@
+/*
+ * layout.h: the compiled scene as bytes. One pointer-free blob: a CrtScene header, then arrays that its spans point to. Written by
+ * core/compile.cpp, read as it lies by every kernel. Fixed-width members, every struct a multiple of 16 bytes, sizes asserted.
+ * A change here changes CRT_LAYOUT_HASH, and plugins built with another hash are refused.
+ *
+ * Units: the scene is moved to its centre and scaled by a power of two at load (lengths here are in these units); radiance in
+ * W·m⁻²·sr⁻¹·nm⁻¹; wavelengths in nm.
+ */
+#ifndef CRT_LAYOUT_H
+#define CRT_LAYOUT_H
+
+#include "dialect.h"
+
+CRT_KERNEL_BEGIN
+
+#define CRT_SCENE_MAGIC 0x53545243u /* "CRTS" */
+#define CRT_NONE 0xffffffffu
+
+#define CRT_WAVELENGTH_MIN_NM 360.0f
+#define CRT_WAVELENGTH_COUNT 471u     /* 360, 361, … 830 nm */
+#define CRT_SPECTRUM_STRIDE 472u      /* floats from one spectrum to the next; the last repeats 830 nm */
+#define CRT_WAVELENGTH_TABLE 1024u    /* cells of the inverse distribution of wavelengths: TABLE + 1 nodes */
+#define CRT_FILTER_TABLE 256u         /* cells of the inverse distribution of the pixel filter: TABLE + 1 nodes */
+
+/* An array in the blob: `offset` in units of 16 bytes from its start. */
+typedef struct CrtSpan {
+    u32 offset, count;
+} CrtSpan;
+
+#define CRT_ARRAY(type, blob, span) ((CRT_GLOBAL const type *)((blob) + (u64)(span).offset * 16u))
+
+/* Geometry of one triangle: x of its three vertices, then y, then z. */
+typedef struct CrtTriangle {
+    f32 p[9];
+    u32 id;        /* primitive id: position in the author's order, decides ties */
+    u32 reserved0, reserved1;
+} CrtTriangle;
+CRT_ASSERT_SIZE(CrtTriangle, 48);
+
+/* Eight triangles side by side, for the brute-force loop: slots 8b … 8b+7 of the triangle array. Unused lanes are all zero. */
+typedef struct CrtTriangle8 {
+    f32 p[9][8];
+    f32 reserved[8];
+} CrtTriangle8;
+CRT_ASSERT_SIZE(CrtTriangle8, 320);
+
+/* What a triangle is made of, by primitive id. */
+typedef struct CrtPrimitive {
+    u32 material;
+    u32 emitter;  /* index of its CrtEmitter, or CRT_NONE */
+    u32 normals;  /* index of its CrtNormals, or CRT_NONE: flat */
+    u32 object;
+} CrtPrimitive;
+CRT_ASSERT_SIZE(CrtPrimitive, 16);
+
+/* Unit shading normals at the three vertices: x of all, y of all, z of all. */
+typedef struct CrtNormals {
+    f32 n[9];
+    f32 reserved[3];
+} CrtNormals;
+CRT_ASSERT_SIZE(CrtNormals, 48);
+
+/* Four children: bounds[2·axis + 0/1][child] is the lower/upper plane. child = index << 4 | count: count > 0 is a leaf of the triangle
+   slots index … index + count − 1, count = 0 an inner node. An unused child has lower = +inf, upper = −inf, so no ray enters it. */
+typedef struct CrtNode4 {
+    f32 bounds[6][4];
+    u32 child[4];
+    u32 reserved[4];
+} CrtNode4;
+CRT_ASSERT_SIZE(CrtNode4, 128);
+
+/* Bounding box of one object's triangles; they lie together in the triangle array when the accelerator is AABB. */
+typedef struct CrtObject {
+    f32 lower[3];
+    u32 first;
+    f32 upper[3];
+    u32 count;
+} CrtObject;
+CRT_ASSERT_SIZE(CrtObject, 32);
+
+#define CRT_MATERIAL_DIFFUSE 0u
+#define CRT_MATERIAL_MIRROR 1u
+#define CRT_MATERIAL_CONDUCTOR 2u
+#define CRT_MATERIAL_DIELECTRIC 3u
+
+#define CRT_MATERIAL_DISPERSIVE 1u
+
+/* Spectra by index. Diffuse and mirror: a = reflectance. Conductor: a = n, b = k. Dielectric: a = index inside / outside. */
+typedef struct CrtMaterial {
+    u32 type;
+    u32 a, b;
+    u32 flags;
+} CrtMaterial;
+CRT_ASSERT_SIZE(CrtMaterial, 16);
+
+#define CRT_EMITTER_TWO_SIDED 1u
+
+/* One emissive triangle. */
+typedef struct CrtEmitter {
+    u32 slot;        /* in the triangle array */
+    u32 spectrum;    /* radiance */
+    u32 flags;
+    u32 choice;      /* a 32-bit number u chooses the last emitter with choice ≤ u */
+    f32 choice_probability; /* exactly the share of 2³² that chooses it */
+    f32 area;
+    f32 reserved0, reserved1;
+} CrtEmitter;
+CRT_ASSERT_SIZE(CrtEmitter, 32);
+
+/* A film point (px, py), in pixels from the top left, looks along corner + px·step_x + py·step_y (not normalised; its component along the view
+   axis is 1). */
+typedef struct CrtCamera {
+    f32 origin[3];
+    f32 lens_radius;
+    f32 corner[3];
+    f32 focus_distance;
+    f32 step_x[3];
+    f32 reserved0;
+    f32 step_y[3];
+    f32 reserved1;
+    f32 lens_x[3]; /* unit, image right */
+    f32 reserved2;
+    f32 lens_y[3]; /* unit, image up */
+    f32 reserved3;
+} CrtCamera;
+CRT_ASSERT_SIZE(CrtCamera, 96);
+
+#define CRT_SAMPLER_SOBOL 0u
+#define CRT_SAMPLER_INDEPENDENT 1u
+#define CRT_SAMPLER_XORSHIFT 2u
+
+#define CRT_VIEW_PATH 0u
+#define CRT_VIEW_NORMALS 1u
+#define CRT_VIEW_AABB 2u
+
+#define CRT_ACCELERATOR_BRUTE_FORCE 0u
+#define CRT_ACCELERATOR_BVH 1u
+#define CRT_ACCELERATOR_AABB 2u
+
+/* Film channels: X, Y, Z and Y² of each sample; AOV channels follow where the scene asks for them. */
+#define CRT_CHANNELS_BASE 4u
+#define CRT_CHANNELS_MAX 11u
+#define CRT_AOV_ALBEDO 1u
+#define CRT_AOV_NORMAL 2u
+#define CRT_AOV_DEPTH 4u
+#define CRT_AOV_PRIMITIVE 8u
+
+typedef struct CrtScene {
+    u32 magic;
+    u32 features; /* of the scene; the kernel has at least these */
+    u32 view;
+    u32 accelerator;
+
+    u32 width, height;           /* of the crop window: what the film holds */
+    u32 crop_x, crop_y;          /* its top left pixel */
+
+    u32 film_width, film_height; /* of the whole film */
+    u32 channels;
+    u32 aovs;
+
+    u32 albedo_channel, normal_channel, depth_channel; /* first channel of each; 0 when not asked for */
+    f32 depth_scale;             /* scene units per length here: a power of two */
+
+    u32 sampler;
+    u32 seed_low, seed_high;
+    u32 max_depth;               /* scattering events */
+
+    u32 roulette_depth;          /* CRT_NONE: never */
+    u32 nee;
+    u32 environment;             /* spectrum, or CRT_NONE */
+    u32 triangle_count;
+
+    CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
+    CrtSpan triangles8;          /* CrtTriangle8, only for brute force */
+    CrtSpan primitives;          /* CrtPrimitive, by id */
+    CrtSpan normals;             /* CrtNormals */
+    CrtSpan nodes;               /* CrtNode4, root first; only for BVH */
+    CrtSpan objects;             /* CrtObject */
+    CrtSpan materials;           /* CrtMaterial */
+    CrtSpan emitters;            /* CrtEmitter */
+    CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
+    CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
+    CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */
+    CrtSpan filter;              /* CRT_FILTER_TABLE + 1 nodes of the offset from the pixel centre, pixels */
+
+    CrtCamera camera;
+} CrtScene;
+CRT_ASSERT_SIZE(CrtScene, 288);
+
+CRT_KERNEL_END
+
+#endif

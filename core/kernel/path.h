@@ -1,0 +1,304 @@
+/*
+ * path.h: one sample of one pixel. The value of sample s of pixel p depends on (scene, seed, p, s) alone.
+ *
+ * A path is advanced vertex by vertex, so that a backend may schedule vertices as it likes; crt_render_pixel is the plain schedule: one loop over
+ * the vertices of one sample after another.
+ */
+#ifndef CRT_PATH_H
+#define CRT_PATH_H
+
+#include "light.h"
+
+CRT_KERNEL_BEGIN
+
+typedef struct CrtRayCount {
+    u32 closest, shadow;
+} CrtRayCount;
+
+/* First-hit quantities. */
+typedef struct CrtFirstHit {
+    vec4 albedo; /* at the path's wavelengths */
+    vec3 normal;
+    f32 depth;   /* along the ray, scene units; 0 where nothing is hit */
+    u32 primitive;
+} CrtFirstHit;
+
+typedef struct CrtPath {
+    CrtRay ray;
+    CrtSampler sampler;
+    CrtWavelengths wavelengths;
+    vec4 hero;        /* 1 in the lane of the hero wavelength, 0 elsewhere */
+    vec4 throughput;
+    vec4 radiance;
+    f32 scatter_pdf;  /* of the direction that led here; 0: camera or delta, no light sampling competes */
+    f32 eta_square;   /* product of squared relative indices crossed: roulette must not see the n² of being inside glass */
+    u32 depth;        /* scattering events so far */
+    int alone;        /* only the hero wavelength is alive */
+    CrtFirstHit first;
+} CrtPath;
+
+CRT_FN CrtPath crt_path_begin(const CrtContext *ctx, u32 x, u32 y, u64 sample) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    const u32 pixel_x = scene->crop_x + x;
+    const u32 pixel_y = scene->crop_y + y;
+    CrtPath path;
+    path.sampler = crt_sampler_begin(scene->sampler, scene->seed_low, scene->seed_high, pixel_y * scene->film_width + pixel_x, sample);
+    path.ray = crt_camera_ray(ctx, &path.sampler, pixel_x, pixel_y);
+    path.wavelengths = crt_sample_wavelengths(ctx, crt_sample_1d(&path.sampler, CRT_DIM_WAVELENGTH));
+    path.hero = make_vec4(1.0f, 0.0f, 0.0f, 0.0f);
+    if (CRT_HAS(DISPERSION) && (scene->features & (u32)CRT_FEATURE_DISPERSION) != 0u) {
+        const u32 lane = crt_sample_bits(&path.sampler, CRT_DIM_HERO) >> 30;
+        path.hero = make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f, lane == 3u ? 1.0f : 0.0f);
+    }
+    path.throughput = splat4(1.0f);
+    path.radiance = splat4(0.0f);
+    path.scatter_pdf = 0.0f;
+    path.eta_square = 1.0f;
+    path.depth = 0u;
+    path.alone = 0;
+    path.first.albedo = splat4(0.0f);
+    path.first.normal = make_vec3(0.0f, 0.0f, 0.0f);
+    path.first.depth = 0.0f;
+    path.first.primitive = CRT_NONE;
+    return path;
+}
+
+/* Emission met by the ray, weighted against the chance that light sampling had found it. */
+CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, CrtSurface surface, f32 t) {
+    CRT_GLOBAL const CrtEmitter *emitter = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + surface.emitter;
+    const int front = dot3(surface.ng, path->ray.d) < 0.0f;
+    if (!front && (emitter->flags & CRT_EMITTER_TWO_SIDED) == 0u) return;
+    f32 weight = 1.0f;
+    if (CRT_HAS(NEE) && ctx->scene->nee != 0u && path->scatter_pdf > 0.0f)
+        weight = crt_power_heuristic(path->scatter_pdf, crt_light_pdf(ctx, surface.emitter, path->ray.o, path->ray.d, t));
+    path->radiance = path->radiance + path->throughput * crt_spectrum(ctx, emitter->spectrum, path->wavelengths.position) * weight;
+}
+
+/* Next event estimation at a Lambertian vertex; ns and ng are on the side of w_o. */
+CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurface surface, vec3 ns, vec3 ng, vec4 reflectance, u32 dimension,
+                                 CrtRayCount *rays) {
+    const CrtLightSample light = crt_sample_light(ctx, &path->sampler, dimension, surface.p);
+    const f32 cosine = dot3(light.wi, ns);
+    if (!(light.pdf > 0.0f) || !(cosine > 0.0f) || !(dot3(light.wi, ng) > 0.0f)) return;
+    CrtRay shadow;
+    shadow.o = crt_offset_origin(surface.p, surface.error, ng, light.wi);
+    shadow.d = light.point - shadow.o;
+    shadow.reach = 1.0f;
+    rays->shadow += 1u;
+    if (crt_trace_any(ctx, shadow)) return;
+    const f32 scatter = crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction */
+    const f32 weight = crt_power_heuristic(light.pdf, scatter) * (scatter / light.pdf);
+    path->radiance =
+        path->radiance + path->throughput * reflectance * crt_spectrum(ctx, light.spectrum, path->wavelengths.position) * weight;
+}
+
+/* Traces the path's ray to its next vertex and scatters there. Returns 0 when the path has ended. */
+CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    rays->closest += 1u;
+    const CrtHit hit = crt_trace_closest(ctx, path->ray);
+    if (hit.slot == CRT_NONE) {
+        if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE)
+            path->radiance = path->radiance + path->throughput * crt_spectrum(ctx, scene->environment, path->wavelengths.position);
+        return 0;
+    }
+    const CrtSurface surface = crt_surface(ctx, hit);
+    if (CRT_HAS(AREA_LIGHT) && surface.emitter != CRT_NONE) crt_add_emission(ctx, path, surface, hit.t);
+
+    const CrtMaterial material = CRT_ARRAY(CrtMaterial, ctx->blob, scene->materials)[surface.material];
+    const vec3 wo = -path->ray.d;
+    /* Normals on the viewer's side; a shading normal that turns away from the viewer would reflect light from behind the surface. */
+    const int outside = dot3(wo, surface.ng) > 0.0f;
+    const vec3 ng = outside ? surface.ng : -surface.ng;
+    vec3 ns = outside ? surface.ns : -surface.ns;
+    if (CRT_HAS(SMOOTH_NORMALS) && !(dot3(wo, ns) > 0.0f)) ns = ng;
+
+    if (CRT_HAS(AOV) && path->depth == 0u) {
+        path->first.normal = ns;
+        path->first.depth = hit.t * scene->depth_scale;
+        path->first.primitive = hit.id;
+        path->first.albedo = splat4(1.0f);
+        if (material.type == CRT_MATERIAL_DIFFUSE || material.type == CRT_MATERIAL_MIRROR)
+            path->first.albedo = crt_spectrum(ctx, material.a, path->wavelengths.position);
+        if (material.type == CRT_MATERIAL_CONDUCTOR)
+            path->first.albedo = crt_fresnel_conductor(1.0f, crt_spectrum(ctx, material.a, path->wavelengths.position),
+                                                       crt_spectrum(ctx, material.b, path->wavelengths.position));
+    }
+    if (path->depth >= scene->max_depth) return 0;
+
+    const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
+    const vec4 a = crt_spectrum(ctx, material.a, path->wavelengths.position);
+    CrtScatter scatter;
+    scatter.valid = 0;
+    switch (material.type) {
+        case CRT_MATERIAL_DIFFUSE:
+            if (CRT_HAS(DIFFUSE)) {
+                if (CRT_HAS(NEE) && scene->nee != 0u && scene->emitters.count != 0u)
+                    crt_add_direct_light(ctx, path, surface, ns, ng, a, dimension, rays);
+                scatter = crt_sample_diffuse(a, ns, ng, crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF));
+            }
+            break;
+        case CRT_MATERIAL_MIRROR:
+            if (CRT_HAS(CONDUCTOR)) scatter = crt_sample_mirror(a, wo, ns, ng);
+            break;
+        case CRT_MATERIAL_CONDUCTOR:
+            if (CRT_HAS(CONDUCTOR))
+                scatter = crt_sample_mirror(
+                    crt_fresnel_conductor(crt_min(dot3(wo, ns), 1.0f), a, crt_spectrum(ctx, material.b, path->wavelengths.position)), wo, ns, ng);
+            break;
+        default:
+            if (CRT_HAS(DIELECTRIC))
+                scatter = crt_sample_dielectric(outside ? a : splat4(1.0f) / a, wo, ns, ng, path->hero,
+                                                (material.flags & CRT_MATERIAL_DISPERSIVE) != 0u, path->alone,
+                                                crt_sample_1d(&path->sampler, dimension + CRT_DIM_BSDF));
+            break;
+    }
+    if (!scatter.valid) return 0;
+
+    path->throughput = path->throughput * scatter.weight;
+    if (CRT_HAS(DISPERSION) && scatter.hero_only) {
+        path->throughput = path->throughput * path->hero * 4.0f;
+        path->alone = 1;
+    }
+    path->eta_square = path->eta_square * scatter.eta_square;
+    path->scatter_pdf = scatter.pdf;
+    path->ray.o = crt_offset_origin(surface.p, surface.error, surface.ng, scatter.wi);
+    path->ray.d = scatter.wi;
+    path->ray.reach = CRT_INFINITY;
+    path->depth += 1u;
+
+    /* Roulette on the spectral maximum. A path that carries nothing has ended in any case. */
+    const f32 carried = max4(path->throughput) * path->eta_square;
+    if (!(carried > 0.0f)) return 0;
+    if (path->depth >= scene->roulette_depth && carried < 1.0f) {
+        const f32 survive = crt_max(carried, 0.05f);
+        if (!(crt_sample_1d(&path->sampler, dimension + CRT_DIM_ROULETTE) < survive)) return 0;
+        path->throughput = path->throughput / survive;
+    }
+    return 1;
+}
+
+/* XYZ of linear sRGB (IEC 61966-2-1), for views that are colours and not light. */
+CRT_FN vec4 crt_srgb_to_xyz(f32 r, f32 g, f32 b) {
+    return make_vec4(0.41239080f * r + 0.35758434f * g + 0.18048079f * b, 0.21263901f * r + 0.71516868f * g + 0.07219232f * b,
+                     0.01933082f * r + 0.11919478f * g + 0.95053215f * b, 0.0f);
+}
+
+/* Figure 1 of the paper that crt grew out of: shading normals as colour, or the objects' bounding boxes. */
+CRT_FN vec4 crt_view(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+    rays->closest += 1u;
+    if (ctx->scene->view == CRT_VIEW_NORMALS) {
+        const CrtHit hit = crt_trace_closest(ctx, path->ray);
+        if (hit.slot == CRT_NONE) return splat4(0.0f);
+        const CrtSurface surface = crt_surface(ctx, hit);
+        const vec3 n = dot3(path->ray.d, surface.ng) > 0.0f ? -surface.ns : surface.ns;
+        path->first.normal = n;
+        path->first.depth = hit.t * ctx->scene->depth_scale;
+        path->first.primitive = hit.id;
+        path->first.albedo = splat4(1.0f);
+        return crt_srgb_to_xyz(0.5f * (V3X(n) + 1.0f), 0.5f * (V3Y(n) + 1.0f), 0.5f * (V3Z(n) + 1.0f));
+    }
+    CRT_GLOBAL const CrtObject *objects = CRT_ARRAY(CrtObject, ctx->blob, ctx->scene->objects);
+    const CrtSlab slab = crt_slab(path->ray);
+    f32 nearest = CRT_INFINITY;
+    u32 which = CRT_NONE;
+    for (u32 k = 0u; k < ctx->scene->objects.count; ++k) {
+        const f32 t = crt_box(objects[k].lower, objects[k].upper, path->ray, slab, CRT_INFINITY);
+        if (t > 0.0f && t < nearest) {
+            nearest = t;
+            which = k;
+        }
+    }
+    if (which == CRT_NONE) return splat4(0.0f);
+    /* A colour an object, shaded by the distance that the ray spends inside, as if the boxes were fog. */
+    const u32 h = crt_hash(which + 1u);
+    const vec3 c = abs3((path->ray.o + path->ray.d * nearest) - (crt_load3(objects[which].lower) + crt_load3(objects[which].upper)) * 0.5f);
+    const vec3 extent = (crt_load3(objects[which].upper) - crt_load3(objects[which].lower)) * 0.5f;
+    const f32 fx = V3X(extent) - V3X(c), fy = V3Y(extent) - V3Y(c), fz = V3Z(extent) - V3Z(c);
+    const f32 shade = fx < fy ? (fx < fz ? 0.6f : 0.8f) : (fy < fz ? 1.0f : 0.8f);
+    return crt_srgb_to_xyz(shade * (0.25f + 0.75f * crt_unit(h)), shade * (0.25f + 0.75f * crt_unit(h << 8)),
+                           shade * (0.25f + 0.75f * crt_unit(h << 16)));
+}
+
+CRT_FN void crt_film_add(CRT_GLOBAL f64 *pair, f64 value) {
+    CrtSum sum;
+    sum.hi = pair[0];
+    sum.lo = pair[1];
+    sum = crt_sum_add(sum, value);
+    pair[0] = sum.hi;
+    pair[1] = sum.lo;
+}
+
+/* AOV channels of one sample, into the pixel's channel pairs. */
+CRT_FN void crt_add_aovs(const CrtContext *ctx, const CrtPath *path, CRT_GLOBAL f64 *pixel) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    if (scene->albedo_channel != 0u) {
+        const vec4 xyz = crt_to_xyz(ctx, path->wavelengths, path->first.albedo);
+        crt_film_add(pixel + 2u * scene->albedo_channel, (f64)V4X(xyz));
+        crt_film_add(pixel + 2u * scene->albedo_channel + 2u, (f64)V4Y(xyz));
+        crt_film_add(pixel + 2u * scene->albedo_channel + 4u, (f64)V4Z(xyz));
+    }
+    if (scene->normal_channel != 0u) {
+        crt_film_add(pixel + 2u * scene->normal_channel, (f64)V3X(path->first.normal));
+        crt_film_add(pixel + 2u * scene->normal_channel + 2u, (f64)V3Y(path->first.normal));
+        crt_film_add(pixel + 2u * scene->normal_channel + 4u, (f64)V3Z(path->first.normal));
+    }
+    if (scene->depth_channel != 0u) crt_film_add(pixel + 2u * scene->depth_channel, (f64)path->first.depth);
+}
+
+/*
+ * ADDS samples [first_sample, first_sample + sample_count) of pixel (x, y) of the crop window to the film: `sums`, `counts` and `primitives` as in
+ * CrtFilmView, for the whole film; `primitives` may be null. Adds to *rays.
+ */
+CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count, CRT_GLOBAL f64 *sums,
+                             CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives, CrtRayCount *rays) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    const u64 pixel = (u64)y * scene->width + x;
+    CRT_GLOBAL f64 *pairs = sums + pixel * scene->channels * 2u;
+    CrtSum sum_x, sum_y, sum_z, sum_yy;
+    sum_x.hi = sum_x.lo = sum_y.hi = sum_y.lo = sum_z.hi = sum_z.lo = sum_yy.hi = sum_yy.lo = 0.0;
+    u32 valid = 0u;
+    u32 done = 0u;
+    int alive = 0;
+    CrtPath path;
+    while (done < sample_count) {
+        /* One flat loop, so that on a GPU a lane whose path has ended begins its next sample while others go on bouncing. */
+        if (!alive) path = crt_path_begin(ctx, x, y, first_sample + done);
+        vec4 xyz = splat4(0.0f);
+        if (CRT_HAS(VIEW) && scene->view != CRT_VIEW_PATH) {
+            xyz = crt_view(ctx, &path, rays);
+            alive = 0;
+        } else {
+            alive = crt_path_vertex(ctx, &path, rays);
+            if (!alive) xyz = crt_to_xyz(ctx, path.wavelengths, path.radiance);
+        }
+        if (!alive) {
+            if (crt_is_finite(V4X(xyz)) && crt_is_finite(V4Y(xyz)) && crt_is_finite(V4Z(xyz))) {
+                const f64 luminance = (f64)V4Y(xyz);
+                sum_x = crt_sum_add(sum_x, (f64)V4X(xyz));
+                sum_y = crt_sum_add(sum_y, luminance);
+                sum_z = crt_sum_add(sum_z, (f64)V4Z(xyz));
+                sum_yy = crt_sum_add(sum_yy, luminance * luminance);
+                if (CRT_HAS(AOV)) {
+                    if (scene->channels > CRT_CHANNELS_BASE) crt_add_aovs(ctx, &path, pairs);
+                    if (primitives != 0 && valid == 0u && counts[pixel] == 0u) primitives[pixel] = path.first.primitive;
+                }
+                valid += 1u;
+            }
+            done += 1u;
+        }
+    }
+    crt_film_add(pairs + 0, sum_x.hi);
+    crt_film_add(pairs + 0, sum_x.lo);
+    crt_film_add(pairs + 2, sum_y.hi);
+    crt_film_add(pairs + 2, sum_y.lo);
+    crt_film_add(pairs + 4, sum_z.hi);
+    crt_film_add(pairs + 4, sum_z.lo);
+    crt_film_add(pairs + 6, sum_yy.hi);
+    crt_film_add(pairs + 6, sum_yy.lo);
+    counts[pixel] += valid;
+}
+
+CRT_KERNEL_END
+
+#endif

@@ -1,0 +1,82 @@
+/*
+ * spectrum.h: four wavelengths per path (hero wavelength sampling, Wilkie et al. 2014), spectra at them, and what the observer sees.
+ */
+#ifndef CRT_SPECTRUM_H
+#define CRT_SPECTRUM_H
+
+#include "sampler.h"
+
+CRT_KERNEL_BEGIN
+
+/* The scene as a kernel sees it: the blob and its header. A backend may carry its own handle along (CRT_CONTEXT_EXTRA). */
+#ifndef CRT_CONTEXT_EXTRA
+#define CRT_CONTEXT_EXTRA
+#endif
+typedef struct CrtContext {
+    CRT_GLOBAL const CRT_BYTE *blob;
+    CRT_GLOBAL const CrtScene *scene;
+    CRT_CONTEXT_EXTRA
+} CrtContext;
+
+typedef struct CrtWavelengths {
+    vec4 position; /* λ − 360 nm, in [0, 470] */
+    vec4 weight;   /* 1 / (4 pdf(λ)), nm; zero for wavelengths that have been given up */
+} CrtWavelengths;
+
+/* Wavelength and 1/pdf at u ∈ [0,1): the tabulated inverse distribution, linear between nodes, so the density is constant in each cell and exactly
+   1/(N·Δλ). */
+CRT_FN f32 crt_wavelength(const CrtContext *ctx, f32 u, f32 *inverse_pdf) {
+    CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, ctx->scene->wavelengths);
+    const f32 x = u * (f32)CRT_WAVELENGTH_TABLE;
+    const u32 cell = (u32)x;
+    const f32 lower = table[cell];
+    const f32 step = table[cell + 1u] - lower;
+    *inverse_pdf = step * (f32)CRT_WAVELENGTH_TABLE;
+    return lower + (x - (f32)cell) * step - CRT_WAVELENGTH_MIN_NM;
+}
+
+/* One stratified number places all four, (u + i)/4: each in its own quarter of the distribution. */
+CRT_FN CrtWavelengths crt_sample_wavelengths(const CrtContext *ctx, f32 u) {
+    CrtWavelengths w;
+    f32 w0, w1, w2, w3;
+    const f32 l0 = crt_wavelength(ctx, u * 0.25f, &w0);
+    const f32 l1 = crt_wavelength(ctx, u * 0.25f + 0.25f, &w1);
+    const f32 l2 = crt_wavelength(ctx, u * 0.25f + 0.5f, &w2);
+    const f32 l3 = crt_wavelength(ctx, crt_min(u * 0.25f + 0.75f, 1.0f - CRT_EPSILON), &w3);
+    w.position = make_vec4(l0, l1, l2, l3);
+    w.weight = make_vec4(w0, w1, w2, w3) * 0.25f;
+    return w;
+}
+
+CRT_FN f32 crt_lookup(CRT_GLOBAL const f32 *table, f32 position) {
+    const u32 i = (u32)position;
+    const f32 a = table[i];
+    return a + (position - (f32)i) * (table[i + 1u] - a);
+}
+
+/* A spectrum of the scene at the path's wavelengths, linear between nanometres. */
+CRT_FN vec4 crt_spectrum(const CrtContext *ctx, u32 index, vec4 position) {
+    CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) + index * CRT_SPECTRUM_STRIDE;
+    return make_vec4(crt_lookup(table, V4X(position)), crt_lookup(table, V4Y(position)), crt_lookup(table, V4Z(position)),
+                     crt_lookup(table, V4W(position)));
+}
+
+/* (x̄, ȳ, z̄, 0) / ∫ȳ at one wavelength. */
+CRT_FN vec4 crt_observer(const CrtContext *ctx, f32 position) {
+    CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, ctx->scene->observer);
+    const u32 i = (u32)position;
+    const vec4 a = crt_load4(table + 4u * i);
+    const vec4 b = crt_load4(table + 4u * i + 4u);
+    return a + (b - a) * (position - (f32)i);
+}
+
+/* XYZ (and 0) of the radiance carried by the four wavelengths. */
+CRT_FN vec4 crt_to_xyz(const CrtContext *ctx, CrtWavelengths w, vec4 radiance) {
+    const vec4 r = radiance * w.weight;
+    return (crt_observer(ctx, V4X(w.position)) * V4X(r) + crt_observer(ctx, V4Y(w.position)) * V4Y(r)) +
+           (crt_observer(ctx, V4Z(w.position)) * V4Z(r) + crt_observer(ctx, V4W(w.position)) * V4W(r));
+}
+
+CRT_KERNEL_END
+
+#endif

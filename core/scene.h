@@ -1,0 +1,144 @@
+/// The host Scene: what the YAML says, resolved (files read, names looked up, spectra sampled) but still in the author's
+/// units and in double. Plain data without behaviour; scene_yaml.cpp fills it, compile.cpp flattens it.
+#pragma once
+
+#include "error.h"
+#include "spectra.h"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// Row-major 4×4 affine transform, points as columns.
+using Matrix4d = std::array<double, 16>;
+inline constexpr Matrix4d kIdentity4d{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+
+/// Perspective camera, right-handed world; image right = normalise(target − position) × up.
+struct Camera {
+    Vec3d position{0, 0, 0};
+    Vec3d target{0, 0, 1};
+    Vec3d up{0, 1, 0};
+    /// Half the image plane's extent at unit distance: tan(fov/2) on the shorter side, or sensor/(2·focal_length).
+    double tan_half_width = 0.5;
+    double tan_half_height = 0.5;
+    double aperture_radius = 0;  ///< Scene units; 0 is a pinhole.
+    double focus_distance = 0;   ///< Scene units along the view axis; 0 means distance to target. Only used with an aperture.
+    SourcePlace place;
+};
+
+enum class PixelFilter { Box, Gaussian, BlackmanHarris };
+
+struct Film {
+    int width = 512;
+    int height = 512;
+    std::array<int, 4> crop{0, 0, 0, 0};  ///< x0, y0, x1, y1, half open, in pixels; all zero means the whole film.
+    PixelFilter filter = PixelFilter::Box;
+    double filter_radius = 0.5;  ///< Pixels. Box .5, gaussian 1.5 and Blackman–Harris 1.5 by default.
+    double filter_sigma = 0.5;   ///< Pixels, gaussian only.
+    ColorSpace color_space = ColorSpace::LinearSrgb;
+    std::optional<Spectrum> white_balance;  ///< Adapt from this illuminant's white to the colour space's.
+    double exposure_ev = 0;                 ///< The image is multiplied by 2^ev.
+};
+
+enum class IntegratorType { Path, Normals, Aabb };
+enum class Accelerator { Auto, Bvh, Aabb, None };
+
+struct IntegratorSettings {
+    IntegratorType type = IntegratorType::Path;
+    int max_depth = 16;       ///< Scattering events; 0 shows emitters only.
+    int roulette_depth = 4;   ///< First scattering event after which Russian roulette may end a path.
+    bool roulette = true;
+    bool nee = true;          ///< Next event estimation with MIS; false is the paper's indirect-only estimator.
+    Accelerator accelerator = Accelerator::Auto;
+};
+
+enum class SamplerType { Sobol, Independent, XorShift };
+
+struct SamplerSettings {
+    SamplerType type = SamplerType::Sobol;
+    std::uint64_t seed = 0;
+    std::uint64_t samples = 64;  ///< Samples per pixel when neither --spp nor --time says otherwise.
+};
+
+enum class MaterialType { Diffuse, Mirror, Conductor, Dielectric };
+
+struct Material {
+    std::string name;
+    MaterialType type = MaterialType::Diffuse;
+    Spectrum reflectance;  ///< Diffuse and Mirror. In [0,1].
+    Spectrum eta;          ///< Conductor: real index n. Dielectric: index of the inside relative to the outside.
+    Spectrum k;            ///< Conductor: extinction.
+    SourcePlace place;
+};
+
+/// A triangle mesh in object space. Polygons are already triangulated.
+struct Mesh {
+    std::vector<Vec3d> positions;
+    std::vector<Vec3d> normals;                           ///< Empty, or referenced by `normal_index`.
+    std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Indices into positions.
+    std::vector<std::array<std::uint32_t, 3>> normal_index;  ///< Empty, or one per triangle; kNoNormal = flat.
+    std::vector<std::int32_t> material;                   ///< Empty, or one index into Scene::materials per triangle.
+    std::vector<std::int32_t> emission;                   ///< Empty, or one index into Scene::emissions per triangle, −1 none.
+};
+inline constexpr std::uint32_t kNoNormal = 0xffffffffu;
+
+struct Emission {
+    Spectrum radiance;  ///< W·m⁻²·sr⁻¹·nm⁻¹
+    bool two_sided = false;
+};
+
+/// A mesh, placed once per transform.
+struct Object {
+    std::string name;
+    std::uint32_t mesh = 0;                    ///< Index into Scene::meshes.
+    std::vector<Matrix4d> transforms{kIdentity4d};
+    std::int32_t material = -1;                ///< Index into Scene::materials; used where the mesh has no material of its own.
+    std::int32_t emission = -1;                ///< Index into Scene::emissions, −1 none; used where the mesh has none of its own.
+    SourcePlace place;
+};
+
+struct Environment {
+    Spectrum radiance;  ///< The same in every direction.
+};
+
+enum class OutputFormat { Exr, Png, Ppm, Pfm };
+
+/// AOVs a scene may ask for. Values are bits of an AOV mask.
+enum Aov : std::uint32_t {
+    kAovAlbedo = 1u << 0,
+    kAovNormal = 1u << 1,
+    kAovDepth = 1u << 2,
+    kAovPrimitive = 1u << 3,
+    kAovVariance = 1u << 4,
+    kAovSamples = 1u << 5,
+};
+
+struct Output {
+    std::string file;  ///< As resolved: absolute or relative to the working directory.
+    OutputFormat format = OutputFormat::Exr;
+    std::uint32_t aovs = 0;  ///< Bits of Aov; EXR only.
+    SourcePlace place;
+};
+
+struct Scene {
+    std::string file;   ///< Path of the YAML, or a name for scenes made in memory.
+    std::string title;
+    Camera camera;
+    Film film;
+    IntegratorSettings integrator;
+    SamplerSettings sampler;
+    std::vector<Material> materials;
+    std::vector<Emission> emissions;
+    std::vector<Mesh> meshes;
+    std::vector<Object> objects;
+    std::optional<Environment> environment;
+    std::vector<Output> outputs;
+    std::vector<std::string> files_read;  ///< Every file that went into the scene, the YAML first.
+    double parse_seconds = 0;
+};
+
+}  // namespace crt
