@@ -144,7 +144,7 @@ std::optional<std::vector<unsigned char>> KernelCache::load(const Key& key) cons
 }
 
 bool KernelCache::store(const Key& key, const void* data, std::size_t size) const {
-    if (directory_.empty() || size > max_bytes_) return false;
+    if (directory_.empty() || sizeof(Header) + size > max_bytes_) return false;
 
     Header header{};
     std::memcpy(header.magic, kMagic, sizeof(kMagic));

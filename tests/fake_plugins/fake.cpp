@@ -1,0 +1,115 @@
+// The test double: a backend that keeps every promise of crt_backend.h and renders fake_pattern.h instead of a scene, so that job, film,
+// checkpoints and resume can be tested in microseconds.
+//
+// CRT_FAKE_FAULT makes the next render calls go wrong:
+//   oom     out of device memory, half-way through the range
+//   device  the device fails, half-way through the range
+//   nan     every seventh sample is not a number
+//   slow    2 ms a row, with a look at cancel after each
+#include "backend/plugin_guard.h"
+
+#include "fake_pattern.h"
+#include "kernel/features.h"
+#include "kernel/layout.h"
+
+#include <chrono>
+#include <cstdlib>
+#include <thread>
+
+namespace {
+
+using crt::plugin::PluginError;
+
+std::vector<CrtDevice> listDevices(const crt::plugin::Host&) {
+    return {crt::plugin::makeDevice(0, "pattern", "none", 0, 1.0), crt::plugin::makeDevice(1, "second pattern", "none", 0, 0.5)};
+}
+
+/// Adds `value` to an unevaluated pair hi + lo without losing a bit that the pair can hold (Knuth's two-sum).
+void addTo(double* pair, double value) {
+    const double sum = pair[0] + value;
+    const double part = sum - pair[0];
+    pair[1] += (pair[0] - (sum - part)) + (value - part);
+    pair[0] = sum;
+}
+
+class FakeIntegrator {
+public:
+    FakeIntegrator(const crt::plugin::Host& host, const CrtCreateInfo& info)
+        : host_(host), device_(crt::plugin::chooseDevice(listDevices(host), info.device)) {}
+
+    void setScene(const CrtSceneBlob& blob) {
+        if (blob.size_bytes < sizeof(crt::kernel::CrtScene)) throw PluginError(CRT_INVALID_ARGUMENT, "the scene is too small to be one");
+        std::memcpy(&scene_, blob.data, sizeof(scene_));
+        if (scene_.magic != CRT_SCENE_MAGIC) throw PluginError(CRT_INVALID_ARGUMENT, "the scene does not begin with its magic number");
+        const std::size_t pixels = std::size_t{scene_.width} * scene_.height;
+        sums_.assign(pixels * scene_.channels * 2, 0.0);
+        counts_.assign(pixels, 0);
+        primitives_.assign(pixels, CRT_NONE);
+    }
+
+    bool render(const CrtRenderRange& range) {
+        const char* value = std::getenv("CRT_FAKE_FAULT");
+        const std::string fault = value != nullptr ? value : "";
+        if (range.x1 > scene_.width || range.y1 > scene_.height) throw PluginError(CRT_INVALID_ARGUMENT, "the rectangle leaves the film");
+
+        const auto start = std::chrono::steady_clock::now();
+        const std::uint64_t seed = (std::uint64_t{scene_.seed_high} << 32) | scene_.seed_low;
+        for (std::uint32_t y = range.y0; y < range.y1; ++y) {
+            const double done = double(y - range.y0) / (range.y1 - range.y0);
+            if (done >= 0.5 && fault == "oom") throw PluginError(CRT_OUT_OF_MEMORY, "the device has no memory left for 12 more rows");
+            if (done >= 0.5 && fault == "device") throw PluginError(CRT_DEVICE_FAILED, "the device fell off the bus");
+            if (fault == "slow") std::this_thread::sleep_for(std::chrono::milliseconds(2));
+            if (host_.cancelled(done)) return false;
+            for (std::uint32_t x = range.x0; x < range.x1; ++x) renderPixel(range, seed, x, y, fault == "nan");
+        }
+        host_.cancelled(1.0);
+        seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        return true;
+    }
+
+    void readFilm(const CrtFilmView& film) {
+        if (film.width != scene_.width || film.height != scene_.height || film.channels != scene_.channels) {
+            throw PluginError(CRT_INVALID_ARGUMENT, "the film view has another shape than the scene");
+        }
+        std::copy(sums_.begin(), sums_.end(), film.sums);
+        std::copy(counts_.begin(), counts_.end(), film.counts);
+        if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);
+    }
+
+    void report(CrtBackendReport& report) {
+        crt::plugin::writeText(report.device, std::string(device_.name));
+        crt::plugin::writeText(report.kernel, std::string("pattern"));
+        report.kernel_features = CRT_FEATURES_ALL;
+        report.render_seconds = seconds_;
+        report.paths = report.closest_rays = paths_;
+    }
+
+private:
+    void renderPixel(const CrtRenderRange& range, std::uint64_t seed, std::uint32_t x, std::uint32_t y, bool with_invalid) {
+        const std::uint32_t film_x = scene_.crop_x + x, film_y = scene_.crop_y + y;
+        const std::size_t pixel = std::size_t{y} * scene_.width + x;
+        primitives_[pixel] = crt::fake::primitiveAt(film_x, film_y);
+        for (std::uint64_t i = 0; i < range.sample_count; ++i) {
+            const std::uint64_t sample = range.first_sample + i;
+            ++paths_;
+            if (with_invalid && crt::fake::isInvalid(film_x, film_y, sample)) continue;
+            ++counts_[pixel];
+            for (std::uint32_t c = 0; c < scene_.channels; ++c) {
+                addTo(&sums_[(pixel * scene_.channels + c) * 2], crt::fake::sampleValue(seed, film_x, film_y, sample, c));
+            }
+        }
+    }
+
+    crt::plugin::Host host_;
+    CrtDevice device_;
+    crt::kernel::CrtScene scene_{};
+    std::vector<double> sums_;
+    std::vector<std::uint64_t> counts_;
+    std::vector<std::uint32_t> primitives_;
+    std::uint64_t paths_ = 0;
+    double seconds_ = 0;
+};
+
+}  // namespace
+
+CRT_DEFINE_BACKEND(FakeIntegrator, listDevices, "fake", CRT_HEADERS_VERSION, CRT_FEATURES_ALL)
