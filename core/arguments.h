@@ -1,0 +1,33 @@
+/// Words of the command line → values, with messages that say what was expected.
+#pragma once
+
+#include "film.h"
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// A whole number of at least `least`; 1e3 is one. `option` stands in the message of the crt::Error(Usage), here and below.
+std::uint64_t parseCount(const std::string& text, const std::string& option, std::uint64_t least);
+
+/// "90", "90s", "1.5m", "2h", "1h30m", "250ms" in seconds; above zero.
+double parseDuration(const std::string& text, const std::string& option);
+
+/// "0:512": first sample, and one past the last.
+SampleRange parseSampleRange(const std::string& text, const std::string& option);
+
+/// "x0,y0,x1,y1".
+std::array<int, 4> parseRectangle(const std::string& text, const std::string& option);
+
+/// What the program's arguments (without its name) mean once abbreviations are written out: a first word that is none of `commands` is
+/// preceded by "render"; "--resume FILE.crtfilm" becomes "--resume=FILE.crtfilm" and "--resume" before anything else "--resume=auto", so that it
+/// never swallows the scene. Throws crt::Error(Usage) for a first word that is a command misspelt.
+std::vector<std::string> writtenOut(std::vector<std::string> arguments, const std::vector<std::string>& commands);
+
+/// The arguments as one line that a POSIX shell reads back as them.
+std::string shellLine(const std::vector<std::string>& words);
+
+}  // namespace crt

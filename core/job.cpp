@@ -1,0 +1,304 @@
+#include "job.h"
+
+#include "atomic_file.h"
+#include "backend/loader.h"
+#include "checkpoint.h"
+#include "compile.h"
+#include "interrupt.h"
+#include "log.h"
+#include "outputs.h"
+#include "report.h"
+#include "sampling.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <set>
+
+namespace crt {
+namespace {
+
+class Stopwatch {
+public:
+    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+private:
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// The files that this job writes or may have to write.
+struct Files {
+    OutputPlan outputs;
+    std::string checkpoint;          ///< Where a checkpoint goes if one is written.
+    bool checkpoint_wanted = false;  ///< Also when nothing stops the render short.
+    std::string resume;              ///< Empty: start from nothing.
+    std::string report;              ///< Empty: none.
+};
+
+/// Names them, and finds out now what cannot be written: nobody should learn after an hour that a directory is missing.
+Files planFiles(const Job& job, const Scene& scene) {
+    Files files;
+    files.outputs = planOutputs(job.outputs, scene);
+    files.checkpoint = !job.checkpoint_file.empty() ? job.checkpoint_file
+                       : !job.resume_file.empty()   ? job.resume_file
+                                                    : besideOutput(files.outputs.first, kCheckpointExtension);
+    files.checkpoint_wanted = job.resume || !job.checkpoint_file.empty();  // Who resumes once will want to resume again.
+    if (job.resume) {
+        files.resume = !job.resume_file.empty() ? job.resume_file : files.checkpoint;
+        if (!std::filesystem::exists(files.resume)) {
+            if (!job.resume_file.empty())
+                throw Error(ErrorKind::Usage, fmt::format("there is no checkpoint '{}' to resume", files.resume));
+            // A batch job that is started again and again with one command line begins somewhere.
+            logInfo("no checkpoint '{}' yet: starting from the first sample", files.resume);
+            files.resume.clear();
+        }
+    }
+    files.report = job.report_file ? *job.report_file : besideOutput(files.outputs.first, ".report.json");
+
+    for (const Output& image : files.outputs.images) checkWritable(image.file);
+    for (const std::string& film : files.outputs.films) checkWritable(film);
+    checkWritable(files.checkpoint);
+    if (!files.report.empty()) checkWritable(files.report);
+    return files;
+}
+
+/// An empty film, or what an earlier run of the same scene left.
+Film openFilm(const Files& files, const CompiledScene& compiled, const FilmIdentity& identity) {
+    Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+    if (files.resume.empty()) return film;
+    const auto [earlier, found] = readCheckpoint(files.resume);
+    requireSameScene(files.resume, found, identity);
+    film.add(earlier);
+    logInfo("resuming '{}' after {} samples per pixel", files.resume, film.samples.count());
+    return film;
+}
+
+/// Which of the samples asked for the film lacks, and when to stop before they are all there.
+SamplingPlan planSamples(const Job& job, const Scene& scene, const Film& film, const Files& files) {
+    SamplingPlan plan;
+    plan.time_limit_seconds = job.time_limit_seconds;
+    plan.chunk = job.chunk;
+    if (files.checkpoint_wanted) plan.checkpoint_interval_seconds = job.checkpoint_interval_seconds;
+    if (job.samples) {
+        // An exact range says exactly which samples are new; those that the checkpoint has already would count twice.
+        SampleRanges together = film.samples;
+        together.add(*job.samples);
+        plan.ranges = {*job.samples};
+        plan.target = together.count();
+        return plan;
+    }
+    const bool endless = !job.spp && job.time_limit_seconds > 0;
+    plan.ranges = missingSamples({0, endless ? kEndlessSamples : job.spp.value_or(scene.sampler.samples)}, film.samples);
+    if (endless) return plan;
+    plan.target = film.samples.count();
+    for (const auto& [first, end] : plan.ranges) plan.target += end - first;
+    return plan;
+}
+
+LoadedBackend openBackend(const std::string& name) {
+    if (name != "auto") return loadBackend(name);
+    std::vector<std::string> passed_over;
+    LoadedBackend backend = chooseBackend(passed_over);
+    for (const std::string& reason : passed_over) logInfo("{}", reason);
+    return backend;
+}
+
+template <std::size_t N>
+std::string arrayText(const char (&text)[N]) {
+    return {text, strnlen(text, N)};
+}
+
+/// A plugin may leave out what is only for humans.
+std::string textOrEmpty(const char* text) { return text != nullptr ? text : ""; }
+
+/// The driver behind a device, which only the list of devices tells. Asking again is quick: the driver is awake by now.
+std::string driverOf(const LoadedBackend& backend, const std::string& device_name) {
+    for (const CrtDevice& device : probeDevices(backend))
+        if (arrayText(device.name) == device_name) return arrayText(device.driver);
+    return {};
+}
+
+/// CompiledScene → Film, by a backend. Returns what failed while sampling, if anything did; the film holds what there is.
+std::optional<Error> renderSamples(const Job& job, const CompiledScene& compiled, const SamplingPlan& plan, Film& film,
+                                   const std::function<void()>& save_checkpoint, RunFacts& facts) {
+    const Stopwatch opening;
+    const LoadedBackend backend = openBackend(job.backend);
+    Integrator integrator(backend, job.integrator);
+    facts.open_seconds = opening.seconds();
+    facts.backend_name = backend.name;
+    facts.backend_path = backend.path;
+    facts.backend_version = textOrEmpty(backend.table->version);
+    facts.backend_build = textOrEmpty(backend.table->build);
+
+    const Stopwatch preparing;
+    integrator.setScene(compiled);
+    facts.prepare_seconds = preparing.seconds();
+    facts.backend = integrator.report();
+    facts.driver = driverOf(backend, arrayText(facts.backend.device));
+    logInfo("{} on {}", backend.name, arrayText(facts.backend.device));
+
+    SamplingResult result;
+    {
+        Progress progress(job.progress);
+        result = sampleFilm(integrator, film, plan, progress, save_checkpoint);
+    }
+    // A device that failed is not asked again; what it said before the first sample stands.
+    if (result.stop != StopReason::Failed) facts.backend = integrator.report();
+    facts.stop = result.stop;
+    facts.signal = result.signal;
+    facts.rendered_samples = result.rendered;
+    facts.chunks = result.chunks;
+    facts.sampling_seconds = result.seconds;
+    return result.failure;
+}
+
+/// What went wrong while writing, the first of it: one output that fails must not keep the others from being written.
+class FirstFailure {
+public:
+    explicit FirstFailure(std::optional<Error> earlier) : first_(std::move(earlier)) {}
+
+    template <class Write>
+    void attempt(const Write& write) {
+        try {
+            write();
+        } catch (const Error& error) {
+            // The first is reported by whoever catches it in the end; the others have only this line.
+            if (first_) {
+                logMessage(LogLevel::Error, error.what());
+            } else {
+                first_ = error;
+            }
+        }
+    }
+    const std::optional<Error>& get() const { return first_; }
+
+private:
+    std::optional<Error> first_;
+};
+
+/// Film → images and checkpoints; their names go to facts.outputs.
+void writeFiles(const Files& files, const Scene& scene, const Film& film, const FilmIdentity& identity, RunFacts& facts,
+                FirstFailure& failure) {
+    const Stopwatch writing;
+    Metadata metadata{{"Software", "crt " CRT_VERSION},
+                      {"crt/version", CRT_VERSION},
+                      {"crt/sceneHash", identity.scene_hash},
+                      {"crt/complete", facts.stop == StopReason::Samples ? "1" : "0"}};
+    // A film that was complete before this run is written without any backend.
+    if (!facts.backend_name.empty()) {
+        metadata.emplace_back("crt/backend", facts.backend_name + " " + facts.backend_version);
+        metadata.emplace_back("crt/device", arrayText(facts.backend.device));
+    }
+
+    std::set<std::string> films(files.outputs.films.begin(), files.outputs.films.end());
+    const bool stopped_short = facts.stop == StopReason::Interrupted || facts.stop == StopReason::Failed;
+    if (files.checkpoint_wanted || stopped_short) films.insert(files.checkpoint);
+    const auto writeFilm = [&](const std::string& name) {
+        failure.attempt([&] {
+            writeCheckpoint(name, film, identity);
+            facts.outputs.push_back(name);
+        });
+    };
+    for (const std::string& name : films) writeFilm(name);  // First: everything else can be made from a film.
+    for (const Output& output : files.outputs.images)
+        failure.attempt([&] {
+            writeOutput(output, film, scene, metadata);
+            facts.outputs.push_back(output.file);
+        });
+    // Hours of work must not be lost because one image could not be written.
+    const bool image_failed = failure.get() && failure.get()->kind() == ErrorKind::Output;
+    if (image_failed && films.count(files.checkpoint) == 0) writeFilm(files.checkpoint);
+    facts.write_seconds = writing.seconds();
+}
+
+void writeReport(const std::string& path, const std::string& text) {
+    AtomicFile file(path);
+    file.write(text.data(), text.size());
+    file.commit();
+}
+
+std::string summary(const RunFacts& facts, const Film& film) {
+    std::string text = fmt::format("{} samples per pixel", facts.samples.count());
+    if (facts.resumed_samples > 0) text += fmt::format(", {} of them resumed", facts.resumed_samples);
+    if (facts.rendered_samples > 0 && facts.sampling_seconds > 0) {
+        const double paths = static_cast<double>(facts.rendered_samples) * static_cast<double>(film.counts.size());
+        text += fmt::format(", {}, {}", durationText(facts.sampling_seconds), rateText(paths / facts.sampling_seconds, "paths/s"));
+    }
+    if (facts.relative_error >= 0) text += ", error " + percentText(facts.relative_error);
+    return text;
+}
+
+}  // namespace
+
+Scene loadScene(const SceneRequest& request) {
+    Scene scene = loadScene(request.file, request.overrides);
+    if (request.seed) scene.sampler.seed = *request.seed;
+    if (request.crop) {
+        const auto& [x0, y0, x1, y1] = *request.crop;
+        if (x0 < 0 || y0 < 0 || x0 >= x1 || y0 >= y1 || x1 > scene.film.width || y1 > scene.film.height)
+            throw Error(ErrorKind::Usage, fmt::format("--crop {},{},{},{} is no rectangle within the film of {} x {} pixels", x0, y0, x1,
+                                                      y1, scene.film.width, scene.film.height));
+        scene.film.crop = *request.crop;
+    }
+    return scene;
+}
+
+int runJob(const Job& job) {
+    const Stopwatch total;
+    RunFacts facts;
+    facts.command = job.command;
+
+    // What is to be seen, and where it is to be written.
+    const Scene scene = loadScene(job.scene);
+    const Files files = planFiles(job, scene);
+
+    // What it takes to see it: one flat blob, and the mask of what it needs.
+    const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
+    const FilmIdentity identity{compiled.hash, CRT_VERSION};
+    logDebug("scene {} needs {}", compiled.hash, featureNames(compiled.features));
+
+    // What is there already, and what is missing.
+    Film film = openFilm(files, compiled, identity);
+    facts.resumed_samples = film.samples.count();
+    const SamplingPlan plan = planSamples(job, scene, film, files);
+    facts.target_samples = plan.target;
+
+    // From here on there is something to lose, so a signal no longer just ends the process.
+    const InterruptGuard interrupt;
+    const auto saveCheckpoint = [&] {
+        try {
+            writeCheckpoint(files.checkpoint, film, identity);
+        } catch (const Error& error) {
+            logWarning("{}; rendering goes on, and so do the attempts", error.what());
+        }
+    };
+
+    // Samples, from a backend into the film. None is opened when none is missing.
+    FirstFailure failure(plan.ranges.empty() ? std::nullopt : renderSamples(job, compiled, plan, film, saveCheckpoint, facts));
+    facts.samples = film.samples;
+    facts.invalid_samples = film.invalidSamples();
+    if (const double error = film.relativeError(); std::isfinite(error)) facts.relative_error = error;
+    if (facts.invalid_samples > 0) logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
+
+    // Images, and the report of how they came about.
+    if (film.samples.count() > 0) writeFiles(files, scene, film, identity, facts, failure);
+    facts.warnings = warningCount();
+    facts.total_seconds = total.seconds();
+    facts.failure = failure.get() ? failure.get()->what() : "";
+    facts.exit_code = failure.get()                             ? failure.get()->exitCode()
+                      : facts.stop == StopReason::Interrupted ? signalExitCode(facts.signal)
+                                                              : 0;
+    if (!files.report.empty()) failure.attempt([&] { writeReport(files.report, reportJson(scene, compiled, facts)); });
+
+    logInfo("{}", summary(facts, film));
+    if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
+    if (failure.get()) throw *failure.get();
+    if (facts.stop == StopReason::Interrupted)
+        logInfo("stopped by {}; the same command with --resume {} goes on from here", signalName(facts.signal), files.checkpoint);
+    return facts.exit_code;
+}
+
+}  // namespace crt

@@ -1,0 +1,55 @@
+/// One render from scene file to images: the whole way through crt, on one page (job.cpp).
+#pragma once
+
+#include "backend/integrator.h"
+#include "film.h"
+#include "progress.h"
+#include "scene_yaml.h"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// A scene file, and what the command line changes in it.
+struct SceneRequest {
+    std::string file;
+    std::vector<SceneOverride> overrides;
+    std::optional<std::uint64_t> seed;       ///< Instead of the scene's.
+    std::optional<std::array<int, 4>> crop;  ///< Instead of the scene's; x0, y0, x1, y1, half open.
+};
+
+/// Reads it. Throws crt::Error.
+Scene loadScene(const SceneRequest& request);
+
+/// What the command line asks for, checked as far as that goes without the scene.
+struct Job {
+    SceneRequest scene;
+
+    std::string backend = "auto";            ///< A name, a path of a plugin, or "auto".
+    IntegratorOptions integrator;
+
+    std::optional<std::uint64_t> spp;        ///< Render until every pixel has the samples [0, spp).
+    std::optional<SampleRange> samples;      ///< Exactly these instead.
+    double time_limit_seconds = 0;           ///< 0: none. Alone it replaces the scene's number of samples.
+    std::uint64_t chunk = 0;                 ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
+
+    bool resume = false;
+    std::string resume_file;                 ///< Empty: the checkpoint of this job.
+    std::string checkpoint_file;             ///< Empty: beside the first output, and only when resuming or when stopped short.
+    double checkpoint_interval_seconds = 600;
+
+    std::vector<std::string> outputs;        ///< Instead of the scene's.
+    std::optional<std::string> report_file;  ///< Unset: beside the first output. Empty: none.
+    ProgressMode progress = ProgressMode::Auto;
+    std::string command;                     ///< As typed, for the report.
+};
+
+/// Runs the job and returns the exit code: 0, or 128 + signal when a signal ended the sampling early. Throws crt::Error for everything that
+/// goes wrong; when the device fails while rendering, after what there was has been saved.
+int runJob(const Job& job);
+
+}  // namespace crt

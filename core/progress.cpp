@@ -1,0 +1,175 @@
+#include "progress.h"
+
+#include "log.h"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <string_view>
+
+namespace crt {
+namespace {
+
+constexpr std::chrono::milliseconds kBarInterval{100};  // A person reads no faster, and a slow ssh keeps up.
+constexpr std::chrono::seconds kLineInterval{10};
+
+bool terminalCanDraw() {
+    const char* term = std::getenv("TERM");
+    return isatty(STDERR_FILENO) != 0 && term != nullptr && *term != '\0' && std::string_view(term) != "dumb";
+}
+
+int terminalColumns() {
+    winsize size{};
+    // Some terminals (serial lines, emacs) answer zero columns; they get the width of a classical one.
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+void writeStderr(std::string_view text) {
+    while (!text.empty()) {
+        const ssize_t written = write(STDERR_FILENO, text.data(), text.size());
+        if (written <= 0) return;  // A bar that cannot be drawn is no reason to stop a render.
+        text.remove_prefix(static_cast<std::size_t>(written));
+    }
+}
+
+}  // namespace
+
+double ProgressState::pathsPerSecond() const {
+    return elapsed_seconds > 0 ? (samples - start_samples) * static_cast<double>(pixels) / elapsed_seconds : 0;
+}
+
+double ProgressState::fraction() const {
+    double part = 0;
+    if (target > 0) part = samples / static_cast<double>(target);
+    if (time_limit_seconds > 0) part = std::max(part, elapsed_seconds / time_limit_seconds);
+    return std::clamp(part, 0.0, 1.0);
+}
+
+double ProgressState::secondsLeft() const {
+    double left = -1;
+    const double here = samples - start_samples;
+    if (target > 0 && here > 0) left = std::max(0.0, (static_cast<double>(target) - samples) * elapsed_seconds / here);
+    if (time_limit_seconds > 0) {
+        const double until_limit = std::max(0.0, time_limit_seconds - elapsed_seconds);
+        left = left < 0 ? until_limit : std::min(left, until_limit);
+    }
+    return left;
+}
+
+std::string clockText(double seconds) {
+    const auto s = static_cast<std::uint64_t>(std::llround(std::clamp(seconds, 0.0, 1e9)));
+    if (s >= 3600) return fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
+    return fmt::format("{}:{:02}", s / 60, s % 60);
+}
+
+std::string durationText(double seconds) {
+    if (seconds < 0.9995) return fmt::format("{:.0f} ms", seconds * 1e3);
+    if (seconds < 99.95) return fmt::format("{:.1f} s", seconds);
+    const auto s = static_cast<std::uint64_t>(std::llround(seconds));
+    if (s < 3600) return fmt::format("{} min {} s", s / 60, s % 60);
+    return fmt::format("{} h {} min", s / 3600, s / 60 % 60);
+}
+
+std::string rateText(double per_second, const char* unit) {
+    // Three significant digits whatever the prefix, so that the field keeps its width.
+    struct Prefix {
+        double scale;
+        const char* letter;
+    };
+    for (const Prefix prefix : {Prefix{1e9, "G"}, Prefix{1e6, "M"}, Prefix{1e3, "k"}}) {
+        const double value = per_second / prefix.scale;
+        if (value >= 1) return fmt::format("{:.{}f} {}{}", value, value < 9.995 ? 2 : value < 99.95 ? 1 : 0, prefix.letter, unit);
+    }
+    return fmt::format("{:.0f} {}", per_second, unit);
+}
+
+std::string percentText(double fraction) {
+    const double percent = fraction * 100;
+    return fmt::format("{:.{}f} %", percent, percent < 0.0995 ? 3 : percent < 0.995 ? 2 : percent < 99.5 ? 1 : 0);
+}
+
+std::string bytesText(double bytes) {
+    for (const auto& [scale, unit] : {std::pair{1e9, "GB"}, {1e6, "MB"}, {1e3, "kB"}}) {
+        const double value = bytes / scale;
+        if (value >= 1) return fmt::format("{:.{}f} {}", value, value < 9.95 ? 1 : 0, unit);
+    }
+    return fmt::format("{:.0f} B", bytes);
+}
+
+std::string progressText(const ProgressState& state) {
+    std::string text = fmt::format("{:3.0f} %  {:.0f}", std::floor(state.fraction() * 100), std::floor(state.samples));
+    text += state.target > 0 ? fmt::format("/{} spp", state.target) : std::string(" spp");
+    if (state.pathsPerSecond() > 0) text += "  " + rateText(state.pathsPerSecond(), "paths/s");
+    if (state.relative_error >= 0) text += "  error " + percentText(state.relative_error);
+    if (state.secondsLeft() >= 0) text += "  " + clockText(state.secondsLeft()) + " left";
+    return text;
+}
+
+std::string progressBar(const ProgressState& state, int columns) {
+    const std::string text = progressText(state);
+    // One column stays free: a character in the last one makes some terminals wrap, and the line could not be cleared.
+    const int room = columns - 1 - static_cast<int>(text.size());
+    if (room < 0) return text.substr(0, static_cast<std::size_t>(std::max(0, columns - 1)));
+    const int cells = std::min(room - 3, 40);  // Two brackets and a space.
+    if (cells < 6) return text;
+    const auto full = static_cast<std::size_t>(std::floor(state.fraction() * cells));
+    std::string bar(static_cast<std::size_t>(cells), ' ');
+    std::fill_n(bar.begin(), full, '=');
+    if (full < bar.size()) bar[full] = '>';
+    return "[" + bar + "] " + text;
+}
+
+Progress::Progress(ProgressMode mode) : mode_(mode), shown_at_(Clock::now()) {
+    if (mode_ == ProgressMode::Auto) mode_ = terminalCanDraw() ? ProgressMode::Bar : ProgressMode::Lines;
+    if (mode_ == ProgressMode::Bar) setLogHook(aroundMessage, this);
+}
+
+Progress::~Progress() {
+    if (mode_ != ProgressMode::Bar) return;
+    setLogHook(nullptr, nullptr);
+    clear();  // What comes next, the summary, says more than the last state of the bar.
+}
+
+void Progress::update(const ProgressState& state) {
+    if (mode_ == ProgressMode::None) return;
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock) return;  // Another thread is showing something newer than the eye can tell from this.
+    const Clock::time_point now = Clock::now();
+    if (mode_ == ProgressMode::Lines) {
+        if (now - shown_at_ < kLineInterval) return;
+        shown_at_ = now;
+        std::string text = progressText(state);
+        text.erase(0, text.find_first_not_of(' '));  // The bar's alignment has no place in a log.
+        logInfo("{}", text);
+        return;
+    }
+    if (!text_.empty() && now - shown_at_ < kBarInterval) return;
+    shown_at_ = now;
+    text_ = progressBar(state, terminalColumns());
+    draw();
+}
+
+void Progress::aroundMessage(bool before_message, void* user) {
+    auto& self = *static_cast<Progress*>(user);
+    const std::lock_guard lock(self.mutex_);
+    if (before_message) {
+        self.clear();
+    } else {
+        self.draw();
+    }
+}
+
+void Progress::draw() {
+    // One write, so that no other output can fall between clearing and drawing.
+    if (!text_.empty()) writeStderr("\r\x1b[K" + text_);
+}
+
+void Progress::clear() {
+    if (!text_.empty()) writeStderr("\r\x1b[K");
+}
+
+}  // namespace crt

@@ -1,0 +1,177 @@
+#include "report.h"
+
+#include "interrupt.h"
+#include "kernel/features.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <sys/utsname.h>
+
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <fstream>
+#include <string_view>
+#include <thread>
+
+namespace crt {
+namespace {
+
+using Json = nlohmann::ordered_json;  // In the order written here: the report is read by people too.
+
+/// The value of "key<spaces><separator> value" in a text file of such lines; empty when it is not there.
+std::string valueInFile(const char* path, std::string_view key, char separator) {
+    std::ifstream file(path);
+    for (std::string line; std::getline(file, line);) {
+        if (line.rfind(key, 0) != 0) continue;
+        const std::size_t at = line.find(separator);
+        if (at == std::string::npos) continue;
+        std::size_t first = at + 1, last = line.size();
+        const auto trimmed = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0 || c == '"'; };
+        while (first < last && trimmed(line[first])) ++first;
+        while (last > first && trimmed(line[last - 1])) --last;
+        return line.substr(first, last - first);
+    }
+    return {};
+}
+
+std::string operatingSystem() {
+    const std::string name = valueInFile("/etc/os-release", "PRETTY_NAME=", '=');
+    utsname system{};
+    if (uname(&system) != 0) return name;
+    const std::string kernel = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
+    return name.empty() ? kernel : fmt::format("{} ({})", name, kernel);
+}
+
+std::string utcNow() {
+    const std::time_t now = std::time(nullptr);
+    std::tm utc{};
+    gmtime_r(&now, &utc);
+    char text[sizeof "2000-01-01T00:00:00Z"];
+    return {text, std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc)};
+}
+
+/// JSON has no infinity and no NaN; what is unknown is null.
+Json knownOrNull(double value) { return std::isfinite(value) && value >= 0 ? Json(value) : Json(nullptr); }
+
+Json perSecond(double count, double seconds) { return seconds > 0 ? Json(count / seconds) : Json(nullptr); }
+
+const char* stopName(StopReason reason) {
+    switch (reason) {
+        case StopReason::Samples: return "samples";
+        case StopReason::Time: return "time";
+        case StopReason::Interrupted: return "interrupted";
+        case StopReason::Failed: break;
+    }
+    return "failed";
+}
+
+/// A plugin fills fixed arrays, not necessarily up to a terminator.
+template <std::size_t N>
+std::string arrayText(const char (&text)[N]) {
+    return {text, strnlen(text, N)};
+}
+
+}  // namespace
+
+std::vector<std::string> featureList(std::uint64_t mask) {
+    std::vector<std::string> names;
+#define CRT_REPORT_FEATURE(bit, name, text) \
+    if (mask & (std::uint64_t{1} << bit)) names.emplace_back(#name);
+    CRT_FEATURE_LIST(CRT_REPORT_FEATURE)
+#undef CRT_REPORT_FEATURE
+    for (std::string& name : names)
+        for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return names;
+}
+
+std::uint64_t peakHostMemory() {
+    const std::string text = valueInFile("/proc/self/status", "VmHWM:", ':');  // "12345 kB"
+    std::uint64_t kilobytes = 0;
+    std::from_chars(text.data(), text.data() + text.size(), kilobytes);
+    return kilobytes * 1024;
+}
+
+std::string reportJson(const Scene& scene, const CompiledScene& compiled, const RunFacts& facts) {
+    const CrtBackendReport& b = facts.backend;
+    const double rays = static_cast<double>(b.closest_rays) + static_cast<double>(b.shadow_rays);
+    // A device that can time itself says what the kernel cost; the wall clock has the launches and the reading on top.
+    const double render_seconds = b.render_seconds > 0 ? b.render_seconds : facts.sampling_seconds;
+
+    Json report;
+    report["crt"] = {{"version", CRT_VERSION}, {"command", facts.command}, {"finished", utcNow()}};
+    report["host"] = {{"cpu", valueInFile("/proc/cpuinfo", "model name", ':')},
+                      {"os", operatingSystem()},
+                      {"threads", std::thread::hardware_concurrency()}};
+    report["backend"] = {{"name", facts.backend_name},       {"version", facts.backend_version},
+                         {"build", facts.backend_build},     {"path", facts.backend_path},
+                         {"device", arrayText(b.device)},    {"driver", facts.driver},
+                         {"kernel", arrayText(b.kernel)},    {"kernel_features", featureList(b.kernel_features)},
+                         {"kernel_from_cache", b.kernel_from_cache != 0},
+                         {"registers", b.registers},         {"spill_bytes", b.spill_bytes}};
+
+    Json files = Json::array();
+    for (const std::string& file : scene.files_read) files.push_back(file);
+    report["scene"] = {{"file", scene.file},
+                       {"title", scene.title},
+                       {"hash", compiled.hash},
+                       {"files_read", std::move(files)},
+                       {"width", compiled.width},
+                       {"height", compiled.height},
+                       {"objects", compiled.objects},
+                       {"triangles", compiled.triangles},
+                       {"emitters", compiled.emitters},
+                       {"nodes", compiled.nodes},
+                       {"seed", scene.sampler.seed}};
+
+    Json left_out = Json::array();
+    for (const auto& [what, why] : compiled.left_out) left_out.push_back({{"what", what}, {"why", why}});
+    report["features"] = {{"mask", fmt::format("{:#x}", compiled.features)},
+                          {"kept", featureList(compiled.features)},
+                          {"left_out", std::move(left_out)}};
+
+    report["seconds"] = {{"parse", scene.parse_seconds},
+                         {"build", compiled.build_seconds + b.build_seconds},
+                         {"compile", compiled.compile_seconds},
+                         {"open", facts.open_seconds},
+                         {"prepare", facts.prepare_seconds},
+                         {"kernel_compile", b.compile_seconds},
+                         {"cache", b.cache_seconds},
+                         {"upload", b.upload_seconds},
+                         {"render", render_seconds},
+                         {"sampling", facts.sampling_seconds},
+                         {"write", facts.write_seconds},
+                         {"total", facts.total_seconds}};
+
+    Json ranges = Json::array();
+    for (const auto& [first, end] : facts.samples.ranges()) ranges.push_back({first, end});
+    report["samples"] = {{"target", facts.target_samples > 0 ? Json(facts.target_samples) : Json(nullptr)},
+                         {"per_pixel", facts.samples.count()},
+                         {"resumed", facts.resumed_samples},
+                         {"rendered", facts.rendered_samples},
+                         {"ranges", std::move(ranges)},
+                         {"chunks", facts.chunks},
+                         {"invalid", facts.invalid_samples}};
+    report["rays"] = {{"paths", b.paths}, {"closest", b.closest_rays}, {"shadow", b.shadow_rays}};
+    report["speed"] = {{"mpaths_per_second", perSecond(static_cast<double>(b.paths) * 1e-6, render_seconds)},
+                       {"mrays_per_second", perSecond(rays * 1e-6, render_seconds)}};
+    report["memory"] = {{"scene_bytes", compiled.size_bytes},
+                        {"host_peak_bytes", peakHostMemory()},
+                        {"device_peak_bytes", b.peak_memory_bytes}};
+    report["error"] = {{"relative", knownOrNull(facts.relative_error)}};
+    report["warnings"] = facts.warnings;
+
+    Json outputs = Json::array();
+    for (const std::string& file : facts.outputs) outputs.push_back(file);
+    report["outputs"] = std::move(outputs);
+    report["stop"] = {{"reason", stopName(facts.stop)},
+                      {"signal", facts.signal != 0 ? Json(signalName(facts.signal)) : Json(nullptr)},
+                      {"failure", facts.failure.empty() ? Json(nullptr) : Json(facts.failure)},
+                      {"exit_code", facts.exit_code}};
+    // File names and command lines are bytes, not necessarily UTF-8; a report with a replacement character beats none.
+    return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace crt

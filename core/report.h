@@ -1,0 +1,62 @@
+/// What a run did, as JSON: enough to repeat it, to compare two machines, and to see what was left out and what it cost.
+#pragma once
+
+#include "backend/crt_backend.h"
+#include "compile.h"
+#include "film.h"
+#include "scene.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// Why sampling ended.
+enum class StopReason {
+    Samples,      ///< Every sample asked for is there.
+    Time,         ///< --time is up.
+    Interrupted,  ///< A signal.
+    Failed,       ///< The backend failed; the images hold what was rendered before.
+};
+
+/// Everything the report says that is not in Scene or CompiledScene. Times in seconds on the wall clock.
+struct RunFacts {
+    std::string command;  ///< As typed, quoted for a shell.
+
+    std::string backend_name, backend_path, backend_version, backend_build;
+    std::string driver;
+    CrtBackendReport backend{};
+
+    double open_seconds = 0;      ///< Loading the plugin and opening its device.
+    double prepare_seconds = 0;   ///< set_scene: upload, acceleration structure and kernel as the backend reports them.
+    double sampling_seconds = 0;  ///< From the first chunk to the last, reading the film included.
+    double write_seconds = 0;     ///< Images and checkpoints.
+    double total_seconds = 0;     ///< From the command line to this report.
+
+    std::uint64_t target_samples = 0;   ///< Per pixel; 0 means as many as the time allowed.
+    std::uint64_t resumed_samples = 0;  ///< Per pixel, from the checkpoint.
+    std::uint64_t rendered_samples = 0; ///< Per pixel, by this run.
+    SampleRanges samples;               ///< All that are in the film.
+    std::uint64_t chunks = 0;
+    std::uint64_t invalid_samples = 0;
+    double relative_error = -1;         ///< Film::relativeError(), negative when unknown.
+
+    StopReason stop = StopReason::Samples;
+    int signal = 0;       ///< With StopReason::Interrupted.
+    std::string failure;  ///< The sentence, when something failed.
+    int exit_code = 0;
+    int warnings = 0;
+    std::vector<std::string> outputs;  ///< Files written.
+};
+
+/// The report as JSON text.
+std::string reportJson(const Scene& scene, const CompiledScene& compiled, const RunFacts& facts);
+
+/// Names of the bits of a feature mask, in the order of features.h.
+std::vector<std::string> featureList(std::uint64_t mask);
+
+/// The most memory this process ever held, in bytes (VmHWM); 0 when the system does not tell.
+std::uint64_t peakHostMemory();
+
+}  // namespace crt

@@ -1,0 +1,172 @@
+#include "sampling.h"
+
+#include "interrupt.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+namespace crt {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+constexpr double kChunkSeconds = 0.4;       // Aimed at, so that the promised half second holds when a chunk is dearer than the last.
+constexpr std::uint64_t kChunkGrowth = 8;   // The first chunk may hold a kernel's warm-up; it says little about the next.
+constexpr double kReadShare = 0.02;         // Of the time may go into reading the film back for safety and for the error estimate.
+constexpr double kReadBytesPerSecond = 2e9; // First guess of what reading costs; measured from then on.
+
+/// How many samples the next chunk should have.
+class ChunkSizer {
+public:
+    explicit ChunkSizer(std::uint64_t fixed) : fixed_(fixed) {}
+
+    std::uint64_t next(double seconds_left) const {
+        if (fixed_ > 0) return fixed_;
+        if (last_count_ == 0) return 1;
+        const double per_sample = std::max(last_seconds_, 1e-7) / static_cast<double>(last_count_);
+        const double affordable = std::min(std::min(kChunkSeconds, seconds_left) / per_sample, 1e15);
+        return std::clamp<std::uint64_t>(static_cast<std::uint64_t>(affordable), 1, last_count_ * kChunkGrowth);
+    }
+
+    void finished(std::uint64_t count, double seconds) {
+        last_count_ = count;
+        last_seconds_ = seconds;
+    }
+
+private:
+    std::uint64_t fixed_;
+    std::uint64_t last_count_ = 0;
+    double last_seconds_ = 0;
+};
+
+/// The film on the host, kept close behind the one on the device.
+class FilmReader {
+public:
+    FilmReader(Integrator& integrator, Film& film)
+        : integrator_(integrator), film_(film), read_seconds_(static_cast<double>(film.sums.size() * sizeof(double)) / kReadBytesPerSecond) {
+        // A film that begins empty need not be kept twice.
+        if (film.samples.count() > 0) before_ = film;
+    }
+
+    /// film = what was there before + what the device has by now.
+    void read() {
+        const Clock::time_point start = Clock::now();
+        Film fresh = before_ ? *before_ : Film(film_.shape());
+        integrator_.readFilm(fresh);
+        film_ = std::move(fresh);
+        const double error = film_.relativeError();
+        relative_error_ = std::isfinite(error) ? error : -1;
+        read_seconds_ = secondsSince(start);
+        read_at_ = Clock::now();
+        current_ = true;
+    }
+
+    void deviceAdvanced() { current_ = false; }
+    /// Is it time to read again, within the share of time that reading may take?
+    bool due() const { return !current_ && secondsSince(read_at_) >= read_seconds_ / kReadShare; }
+    bool current() const { return current_; }
+    double relativeError() const { return relative_error_; }
+
+private:
+    Integrator& integrator_;
+    Film& film_;
+    std::optional<Film> before_;
+    double read_seconds_;
+    double relative_error_ = -1;
+    Clock::time_point read_at_ = Clock::now();
+    bool current_ = true;  // The device's film begins empty.
+};
+
+}  // namespace
+
+std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& there) {
+    std::vector<SampleRange> missing;
+    std::uint64_t next = wanted.first;
+    for (const auto& [first, end] : there.ranges()) {
+        if (first >= wanted.second) break;
+        if (first > next) missing.emplace_back(next, first);
+        next = std::max(next, end);
+    }
+    if (next < wanted.second) missing.emplace_back(next, wanted.second);
+    return missing;
+}
+
+SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan& plan, Progress& progress,
+                          const std::function<void()>& checkpoint) {
+    const Clock::time_point start = Clock::now();
+    Clock::time_point checkpoint_at = start;
+    SamplingResult result;
+    ChunkSizer sizer(plan.chunk);
+    FilmReader reader(integrator, film);
+
+    ProgressState state;
+    const std::uint64_t resumed = film.samples.count();
+    state.samples = state.start_samples = static_cast<double>(resumed);
+    state.target = plan.target;
+    state.time_limit_seconds = plan.time_limit_seconds;
+    state.pixels = film.counts.size();
+
+    // Why to stop before the samples are there; nothing while there is no reason.
+    const auto reasonToStop = [&]() -> std::optional<StopReason> {
+        if (InterruptGuard::signalReceived() != 0) return StopReason::Interrupted;
+        if (plan.time_limit_seconds > 0 && secondsSince(start) >= plan.time_limit_seconds) return StopReason::Time;
+        return std::nullopt;
+    };
+
+    const auto renderChunk = [&](std::uint64_t first, std::uint64_t count) {
+        const Clock::time_point chunk_start = Clock::now();
+        // Called from the plugin's threads: works on its own copy of the state.
+        const auto show = [&progress, start, count, before = state](double done) {
+            ProgressState now = before;
+            now.samples += std::clamp(done, 0.0, 1.0) * static_cast<double>(count);
+            now.elapsed_seconds = secondsSince(start);
+            progress.update(now);
+            return false;  // A chunk is always finished: cancelling would spoil the film on the device.
+        };
+        show(0);
+        integrator.render({.first_sample = first, .sample_count = count}, show);
+        sizer.finished(count, secondsSince(chunk_start));
+        result.rendered += count;
+        ++result.chunks;
+        reader.deviceAdvanced();
+        if (reader.due()) reader.read();
+        if (plan.checkpoint_interval_seconds > 0 &&
+            std::chrono::duration<double>(Clock::now() - checkpoint_at).count() >= plan.checkpoint_interval_seconds) {
+            if (!reader.current()) reader.read();
+            checkpoint();
+            checkpoint_at = Clock::now();
+        }
+        state.samples = state.start_samples + static_cast<double>(result.rendered);
+        state.relative_error = reader.relativeError();
+    };
+
+    const auto renderAll = [&]() -> StopReason {
+        for (const auto& [first, end] : plan.ranges)
+            for (std::uint64_t next = first; next < end;) {
+                if (const auto reason = reasonToStop()) return *reason;
+                const double left = plan.time_limit_seconds > 0 ? plan.time_limit_seconds - secondsSince(start) : kChunkSeconds;
+                const std::uint64_t count = std::min(sizer.next(left), end - next);
+                renderChunk(next, count);
+                next += count;
+            }
+        return StopReason::Samples;
+    };
+
+    try {
+        result.stop = renderAll();
+        if (!reader.current()) reader.read();
+    } catch (const Error& error) {
+        result.stop = StopReason::Failed;
+        result.failure = error;
+        result.rendered = film.samples.count() - resumed;  // What was rendered but not read is lost.
+    }
+    if (result.stop == StopReason::Interrupted) result.signal = InterruptGuard::signalReceived();
+    result.seconds = secondsSince(start);
+    return result;
+}
+
+}  // namespace crt

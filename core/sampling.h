@@ -1,0 +1,47 @@
+/// The loop at the heart of a render: sample ranges in chunks, until the samples are there, the time is up, a signal comes or the
+/// device fails. Because a sample's value depends on nothing but scene, seed, pixel and index, where it stops never shows in the image.
+#pragma once
+
+#include "backend/integrator.h"
+#include "error.h"
+#include "film.h"
+#include "progress.h"
+#include "report.h"
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+namespace crt {
+
+/// A sample index no render reaches: the end of "as many as the time allows".
+inline constexpr std::uint64_t kEndlessSamples = std::uint64_t{1} << 53;
+
+/// The part of `wanted` that `there` lacks, in order.
+std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& there);
+
+struct SamplingPlan {
+    std::vector<SampleRange> ranges;     ///< To render, in order.
+    std::uint64_t target = 0;            ///< Samples per pixel in the film when all ranges are there; 0: endless.
+    double time_limit_seconds = 0;       ///< 0: none. Looked at between chunks.
+    std::uint64_t chunk = 0;             ///< Samples per chunk; 0: adaptive, at most half a second.
+    double checkpoint_interval_seconds = 0;  ///< 0: never call `checkpoint`.
+};
+
+struct SamplingResult {
+    StopReason stop = StopReason::Samples;
+    int signal = 0;                 ///< With StopReason::Interrupted.
+    std::optional<Error> failure;   ///< With StopReason::Failed.
+    std::uint64_t rendered = 0;     ///< Samples per pixel added to the film.
+    std::uint64_t chunks = 0;
+    double seconds = 0;
+};
+
+/// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at most a small part of the run
+/// behind: a backend that failed cannot be asked for its film any more. The caller holds the InterruptGuard.
+/// `checkpoint` may save the film, which is up to date when it is called.
+SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan& plan, Progress& progress,
+                          const std::function<void()>& checkpoint);
+
+}  // namespace crt
