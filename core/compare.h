@@ -1,0 +1,72 @@
+/// Image against image: are they the same bits, and if not, where and by how much.
+#pragma once
+
+#include "film.h"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+struct CompareOptions {
+    /// 0: the images are the same only when every compared value has the same bits (so −0 differs from +0, and a NaN equals itself). Above 0:
+    /// when the root mean square difference is at most this share of the second image's mean value, and all values are finite.
+    double tolerance = 0;
+    /// Compare every channel, the integer ones too, instead of R, G and B. Metrics stay those of the colour.
+    bool all_channels = false;
+};
+
+/// Where two images first differ, in reading order.
+struct Difference {
+    std::uint32_t x = 0, y = 0;
+    std::string channel;
+    double first = 0, second = 0;
+};
+
+/// The second image is the reference. Metrics run over the colour values: R, G and B of every pixel, or every float channel when the images
+/// have no R, G and B.
+struct CompareResult {
+    bool same = false;
+    double tolerance = 0;
+    /// Why the images cannot be compared (other size, other channels); empty when they can. Then everything below is zero.
+    std::string mismatch;
+    std::uint32_t width = 0, height = 0;
+    std::vector<std::string> channels;        ///< Compared bit by bit.
+
+    std::uint64_t differing_pixels = 0;       ///< With any bit of a compared channel different.
+    std::optional<Difference> first_difference;
+    std::array<std::uint64_t, 2> not_finite{0, 0};  ///< Colour values of each image that are NaN or infinite.
+
+    bool metrics_valid = false;               ///< False when a colour value is NaN or infinite: no average means anything then.
+    double max_absolute = 0;                  ///< max |a − b|
+    std::uint64_t max_ulp = 0;                ///< Most floats between two values.
+    double rmse = 0;                          ///< √ mean (a − b)²
+    double relative_rmse = 0;                 ///< rmse / mean b; infinite when b is black and a is not.
+    double relmse = 0;                        ///< mean (a − b)² / (b² + ε²), ε = mean(b)/100
+    double mae = 0;                           ///< mean |a − b|
+    double smape = 0;                         ///< mean 2|a − b| / (|a| + |b|), in [0,2]
+    std::array<double, 2> mean{0, 0};
+    double mean_ratio = 1;                    ///< mean a / mean b; NaN when both are black, infinite when only b is.
+    std::vector<std::string> other_channels;  ///< In one image only; they do not matter unless all_channels.
+};
+
+CompareResult compareImages(const Image& a, const Image& b, const CompareOptions& options = {});
+
+/// A few lines for people, without a final newline.
+std::string compareText(const CompareResult& result);
+/// One JSON object; what is not a number is null.
+std::string compareJson(const CompareResult& result);
+
+/// a − b of R, G and B.
+Image differenceImage(const Image& a, const Image& b);
+/// The same to look at: black where all bits agree, else from blue (10⁻⁷ of the mean of b, about one rounding) over green (10⁻⁴) to red (10⁻¹ and
+/// more) by the largest difference of the pixel; magenta where a value is not finite. Linear sRGB.
+Image falseColorDifference(const Image& a, const Image& b);
+/// Writes the difference: as values to .exr and .pfm, in false colour to .png and .ppm. Throws crt::Error(Usage) for another extension or images
+/// that do not match, crt::Error(Output) when it cannot be written.
+void writeDifference(const std::string& path, const Image& a, const Image& b);
+
+}  // namespace crt

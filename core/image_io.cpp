@@ -1,0 +1,413 @@
+#include "image_io.h"
+
+#include "backend/loader.h"
+#include "error.h"
+#include "image_module.h"
+#include "log.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cctype>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <dlfcn.h>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace crt {
+namespace {
+
+[[noreturn]] void refuseToWrite(const std::string& path, const std::string& why) {
+    throw Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, why), {path});
+}
+[[noreturn]] void refuseToRead(const std::string& path, const std::string& why) {
+    throw Error(ErrorKind::Usage, fmt::format("cannot read the image '{}': {}", path, why), {path});
+}
+
+/// Where R, G and B lie among the float channels: by name, because files and libraries reorder them.
+std::array<std::size_t, 3> colorChannels(const Image& image) {
+    std::array<std::size_t, 3> index{};
+    constexpr const char* kNames[] = {"R", "G", "B"};
+    for (std::size_t c = 0; c < 3; ++c) {
+        const auto found = std::find(image.channels.begin(), image.channels.end(), kNames[c]);
+        if (found == image.channels.end()) throw Error(ErrorKind::Output, fmt::format("the image has no channel '{}'", kNames[c]));
+        index[c] = static_cast<std::size_t>(found - image.channels.begin());
+    }
+    return index;
+}
+
+Matrix3d inverse(const Matrix3d& m) {
+    Matrix3d r{};
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            const int a = (j + 1) % 3, b = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
+            r[i][j] = m[a][c] * m[b][d] - m[a][d] * m[b][c];
+        }
+    const double determinant = m[0][0] * r[0][0] + m[0][1] * r[1][0] + m[0][2] * r[2][0];
+    for (Vec3d& row : r)
+        for (double& entry : row) entry /= determinant;
+    return r;
+}
+
+/// From the image's colour space to linear sRGB; empty when it is sRGB already, which an image without chromaticities is taken for.
+std::optional<Matrix3d> toLinearSrgb(const Image& image) {
+    if (!image.chromaticities) return std::nullopt;
+    const auto is = [&](ColorSpace space) {
+        const std::array<double, 8> known = chromaticities(space);
+        // A file holds them as float.
+        return std::equal(known.begin(), known.end(), image.chromaticities->begin(), [](double a, double b) { return std::abs(a - b) < 1e-6; });
+    };
+    if (is(ColorSpace::LinearSrgb)) return std::nullopt;
+    for (const ColorSpace space : {ColorSpace::AcesCg, ColorSpace::Xyz})
+        if (is(space)) return multiply(xyzToRgb(ColorSpace::LinearSrgb), inverse(xyzToRgb(space)));
+    throw Error(ErrorKind::Output, "the image's primaries are neither those of sRGB, of ACEScg nor of XYZ, so it cannot become 8-bit sRGB");
+}
+
+// ---------------------------------------------------------------------------------------------------------------- PFM, PPM
+
+/// "PF", size, −1 for little-endian, then rows from the bottom up (Debevec's Portable FloatMap).
+void writePfm(const std::string& path, const Image& image) {
+    static_assert(std::endian::native == std::endian::little);
+    const std::array<std::size_t, 3> color = colorChannels(image);
+    AtomicFile file(path);
+    const std::string header = fmt::format("PF\n{} {}\n-1.0\n", image.width, image.height);
+    file.write(header.data(), header.size());
+    std::vector<float> row(std::size_t{3} * image.width);
+    for (std::uint32_t y = image.height; y-- > 0;) {
+        const float* pixel = image.pixels.data() + std::size_t{y} * image.width * image.channels.size();
+        for (std::uint32_t x = 0; x < image.width; ++x, pixel += image.channels.size())
+            for (std::size_t c = 0; c < 3; ++c) row[3 * x + c] = pixel[color[c]];
+        file.write(row.data(), row.size() * sizeof(float));
+    }
+    file.commit();
+}
+
+void writePpm(const std::string& path, const Image& image, const EncodedImage& encoded) {
+    AtomicFile file(path);
+    const std::string header = fmt::format("P6\n{} {}\n255\n", image.width, image.height);
+    file.write(header.data(), header.size());
+    file.write(encoded.rgb.data(), encoded.rgb.size());
+    file.commit();
+}
+
+/// Words of a PNM or PFM header: separated by white space, '#' begins a comment.
+class HeaderReader {
+public:
+    HeaderReader(const std::string& path, std::string_view bytes) : path_(path), bytes_(bytes) {}
+
+    std::string_view word() {
+        while (at_ < bytes_.size() && (isSpace(bytes_[at_]) || bytes_[at_] == '#')) {
+            if (bytes_[at_] == '#')
+                while (at_ < bytes_.size() && bytes_[at_] != '\n') ++at_;
+            else
+                ++at_;
+        }
+        const std::size_t first = at_;
+        while (at_ < bytes_.size() && !isSpace(bytes_[at_])) ++at_;
+        return bytes_.substr(first, at_ - first);
+    }
+    std::uint32_t size(const char* what) {
+        const std::string text(word());
+        char* end = nullptr;
+        const unsigned long long value = std::strtoull(text.c_str(), &end, 10);
+        if (text.empty() || *end != '\0' || text[0] == '-' || value == 0 || value > 0x7fffffffull)
+            refuseToRead(path_, fmt::format("its header has '{}' for the {}", text, what));
+        return static_cast<std::uint32_t>(value);
+    }
+    double number(const char* what) {
+        const std::string text(word());
+        char* end = nullptr;
+        const double value = std::strtod(text.c_str(), &end);
+        if (text.empty() || *end != '\0' || !std::isfinite(value) || value == 0)
+            refuseToRead(path_, fmt::format("its header has '{}' for the {}", text, what));
+        return value;
+    }
+    /// Pixels begin one white space after the last word.
+    std::string_view pixels(std::size_t expected_bytes) {
+        const std::size_t first = at_ + 1;
+        const std::size_t there = first < bytes_.size() ? bytes_.size() - first : 0;
+        if (there < expected_bytes) refuseToRead(path_, fmt::format("it is truncated: it has {} of {} bytes of pixels", there, expected_bytes));
+        return bytes_.substr(first, expected_bytes);
+    }
+
+private:
+    static bool isSpace(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+    const std::string& path_;
+    std::string_view bytes_;
+    std::size_t at_ = 2;  ///< After the mark.
+};
+
+Image emptyRgb(std::uint32_t width, std::uint32_t height) {
+    Image image;
+    image.width = width;
+    image.height = height;
+    image.channels = {"R", "G", "B"};
+    return image;
+}
+
+/// Bytes of an image, or 0 when they are more than any file here has.
+std::size_t pixelBytes(std::uint32_t width, std::uint32_t height, std::size_t bytes_a_pixel, const std::string& path) {
+    const unsigned __int128 bytes = static_cast<unsigned __int128>(width) * height * bytes_a_pixel;
+    if (bytes >> 48) refuseToRead(path, fmt::format("its header says {} × {} pixels", width, height));
+    return static_cast<std::size_t>(bytes);
+}
+
+Image readPfm(const std::string& path, std::string_view bytes) {
+    const std::size_t channels = bytes[1] == 'F' ? 3 : 1;
+    HeaderReader header(path, bytes);
+    const std::uint32_t width = header.size("width");
+    const std::uint32_t height = header.size("height");
+    // Its sign is the byte order; its size a unit that nobody agrees on, and that readers leave alone.
+    const bool little_endian = header.number("scale") < 0;
+    const std::string_view pixels = header.pixels(pixelBytes(width, height, channels * 4, path));
+    Image image = emptyRgb(width, height);
+    image.pixels.resize(std::size_t{width} * height * 3);
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::size_t i = 0; i < std::size_t{width} * 3; ++i) {
+            const std::size_t source = channels == 3 ? i : i / 3;
+            std::uint32_t bits;
+            std::memcpy(&bits, &pixels[((std::size_t{height} - 1 - y) * width * channels + source) * 4], 4);
+            if (!little_endian) bits = __builtin_bswap32(bits);
+            image.pixels[std::size_t{y} * width * 3 + i] = std::bit_cast<float>(bits);
+        }
+    return image;
+}
+
+Image readPpm(const std::string& path, std::string_view bytes) {
+    HeaderReader header(path, bytes);
+    const std::uint32_t width = header.size("width");
+    const std::uint32_t height = header.size("height");
+    const std::uint32_t maximum = header.size("maximum");
+    if (maximum > 65535) refuseToRead(path, fmt::format("its maximum is {}, beyond 65535", maximum));
+    const std::size_t bytes_a_value = maximum > 255 ? 2 : 1;
+    const std::string_view pixels = header.pixels(pixelBytes(width, height, 3 * bytes_a_value, path));
+    Image image = emptyRgb(width, height);
+    image.chromaticities = chromaticities(ColorSpace::LinearSrgb);
+    image.pixels.resize(std::size_t{width} * height * 3);
+    const auto* code = reinterpret_cast<const unsigned char*>(pixels.data());
+    for (float& value : image.pixels) {
+        // 16-bit values are big-endian.
+        const unsigned encoded = bytes_a_value == 2 ? code[0] * 256u + code[1] : code[0];
+        code += bytes_a_value;
+        value = static_cast<float>(srgbToLinear(static_cast<double>(encoded) / maximum));
+    }
+    return image;
+}
+
+// ------------------------------------------------------------------------------------------------------------ EXR, PNG, …
+
+/// Opens the codec module on first use and keeps it: OpenImageIO's threads outlive any one image.
+const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {
+    struct Opened {
+        const CrtImageModule* table = nullptr;
+        std::string reason;
+    };
+    static const Opened opened = [] {
+        Opened o;
+        const std::vector<std::string> directories = backendDirectories();
+        for (const std::string& directory : directories) {
+            const std::string file = directory + "/" CRT_IMAGE_MODULE_FILE;
+            std::error_code ignored;
+            if (!std::filesystem::exists(file, ignored)) continue;
+            void* const library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+            if (library == nullptr) {
+                o.reason = fmt::format("the image module cannot be opened ({})", ::dlerror());
+                return o;
+            }
+            const auto entry = reinterpret_cast<CrtImageModuleEntry>(::dlsym(library, CRT_IMAGE_MODULE_ENTRY_NAME));
+            const CrtImageModule* const table = entry != nullptr ? entry() : nullptr;
+            if (table == nullptr || table->struct_size < sizeof(CrtImageModule)) {
+                o.reason = fmt::format("'{}' is not the image module of this version of crt", file);
+                return o;
+            }
+            logDebug("image module: {} ({})", file, table->build);
+            o.table = table;
+            return o;
+        }
+        o.reason = fmt::format("the image module " CRT_IMAGE_MODULE_FILE " is not in {}", fmt::join(directories, ", "));
+        return o;
+    }();
+    if (opened.table == nullptr)
+        throw Error(kind, fmt::format("cannot {} '{}': {}; .pfm and .ppm work without it", kind == ErrorKind::Output ? "write" : "read", path,
+                                      opened.reason),
+                    {path});
+    return *opened.table;
+}
+
+std::vector<CrtImageText> texts(const Image& image) {
+    std::vector<CrtImageText> list;
+    for (const auto& [name, value] : image.metadata) list.push_back({name.c_str(), value.c_str()});
+    return list;
+}
+
+std::vector<const char*> pointers(const std::vector<std::string>& names) {
+    std::vector<const char*> list;
+    for (const std::string& name : names) list.push_back(name.c_str());
+    return list;
+}
+
+using Reason = std::array<char, 512>;
+
+void writeExr(const std::string& path, const Image& image) {
+    colorChannels(image);
+    const CrtImageModule& module = imageModule(path, ErrorKind::Output);
+    const std::vector<const char*> float_names = pointers(image.channels), integer_names = pointers(image.integer_channels);
+    const std::vector<CrtImageText> metadata = texts(image);
+    std::array<float, 8> primaries{};
+    if (image.chromaticities)
+        std::transform(image.chromaticities->begin(), image.chromaticities->end(), primaries.begin(), [](double v) { return static_cast<float>(v); });
+
+    CrtImagePlanes planes{};
+    planes.width = image.width;
+    planes.height = image.height;
+    planes.float_channel_count = static_cast<std::uint32_t>(float_names.size());
+    planes.integer_channel_count = static_cast<std::uint32_t>(integer_names.size());
+    planes.float_channels = float_names.data();
+    planes.integer_channels = integer_names.data();
+    planes.floats = image.pixels.data();
+    planes.integers = image.integers.data();
+    planes.metadata = metadata.data();
+    planes.metadata_count = static_cast<std::uint32_t>(metadata.size());
+    planes.chromaticities = image.chromaticities ? primaries.data() : nullptr;
+
+    AtomicFile file(path);
+    Reason reason{};
+    if (module.write_exr(file.temporaryPath().c_str(), &planes, reason.data(), reason.size()) != 0) refuseToWrite(path, reason.data());
+    file.commit();
+}
+
+void writePng(const std::string& path, const Image& image, const EncodedImage& encoded) {
+    const CrtImageModule& module = imageModule(path, ErrorKind::Output);
+    const std::vector<CrtImageText> metadata = texts(image);
+    AtomicFile file(path);
+    Reason reason{};
+    if (module.write_png(file.temporaryPath().c_str(), image.width, image.height, encoded.rgb.data(), metadata.data(),
+                         static_cast<std::uint32_t>(metadata.size()), reason.data(), reason.size()) != 0)
+        refuseToWrite(path, reason.data());
+    file.commit();
+}
+
+Image readWithModule(const std::string& path) {
+    const CrtImageModule& module = imageModule(path, ErrorKind::Usage);
+    const CrtImagePlanes* planes = nullptr;
+    Reason reason{};
+    if (module.read(path.c_str(), &planes, reason.data(), reason.size()) != 0) refuseToRead(path, reason.data());
+    const std::unique_ptr<const CrtImagePlanes, void (*)(const CrtImagePlanes*)> guard(planes, module.free_image);
+
+    Image image;
+    image.width = planes->width;
+    image.height = planes->height;
+    const std::size_t pixels = std::size_t{image.width} * image.height;
+    image.channels.assign(planes->float_channels, planes->float_channels + planes->float_channel_count);
+    image.integer_channels.assign(planes->integer_channels, planes->integer_channels + planes->integer_channel_count);
+    image.pixels.assign(planes->floats, planes->floats + pixels * planes->float_channel_count);
+    image.integers.assign(planes->integers, planes->integers + pixels * planes->integer_channel_count);
+    for (std::uint32_t i = 0; i < planes->metadata_count; ++i) image.metadata.emplace_back(planes->metadata[i].name, planes->metadata[i].value);
+    if (planes->chromaticities != nullptr) {
+        image.chromaticities.emplace();
+        std::copy_n(planes->chromaticities, 8, image.chromaticities->begin());
+    }
+    if (!planes->srgb_encoded) return image;
+
+    image.chromaticities = chromaticities(ColorSpace::LinearSrgb);
+    const std::size_t channels = image.channels.size();
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+        if (image.channels[i % channels] != "A") image.pixels[i] = static_cast<float>(srgbToLinear(image.pixels[i]));
+    if (channels <= 2) {  // Grey, or grey with alpha.
+        Image color = emptyRgb(image.width, image.height);
+        color.metadata = std::move(image.metadata);
+        color.chromaticities = image.chromaticities;
+        for (std::size_t p = 0; p < pixels; ++p) color.pixels.insert(color.pixels.end(), 3, image.pixels[p * channels]);
+        return color;
+    }
+    return image;
+}
+
+}  // namespace
+
+std::optional<OutputFormat> formatOfFile(const std::string& path) {
+    std::string extension = std::filesystem::path(path).extension().string();
+    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (extension == ".exr") return OutputFormat::Exr;
+    if (extension == ".png") return OutputFormat::Png;
+    if (extension == ".ppm") return OutputFormat::Ppm;
+    if (extension == ".pfm") return OutputFormat::Pfm;
+    return std::nullopt;
+}
+
+EncodedImage encodeSrgb8(const Image& image) {
+    const std::array<std::size_t, 3> color = colorChannels(image);
+    const std::optional<Matrix3d> to_srgb = toLinearSrgb(image);
+    const std::size_t pixels = std::size_t{image.width} * image.height;
+    EncodedImage encoded;
+    encoded.rgb.resize(3 * pixels);
+    for (std::size_t p = 0; p < pixels; ++p) {
+        const float* const pixel = image.pixels.data() + p * image.channels.size();
+        Vec3d rgb{pixel[color[0]], pixel[color[1]], pixel[color[2]]};
+        if (to_srgb) rgb = multiply(*to_srgb, rgb);
+        for (std::size_t c = 0; c < 3; ++c) {
+            // Written so that NaN is outside.
+            const bool inside = rgb[c] >= 0.0 && rgb[c] <= 1.0;
+            const double value = inside ? rgb[c] : rgb[c] > 1.0 ? 1.0 : 0.0;
+            // One rounding of float in the conversion from another space is no clipping worth a word.
+            const bool worth_counting = !(rgb[c] >= -1e-6 && rgb[c] <= 1.0 + 1e-6);
+            encoded.clipped_values += worth_counting;
+            encoded.rgb[3 * p + c] = static_cast<std::uint8_t>(std::floor(linearToSrgb(value) * 255.0 + 0.5));
+        }
+    }
+    return encoded;
+}
+
+void writeImage(const std::string& path, OutputFormat format, const Image& image) {
+    if (image.width == 0 || image.height == 0) refuseToWrite(path, "the image has no pixels");
+    if (image.pixels.size() != std::size_t{image.width} * image.height * image.channels.size() ||
+        image.integers.size() != std::size_t{image.width} * image.height * image.integer_channels.size())
+        throw Error(ErrorKind::Internal, fmt::format("the image for '{}' does not have the pixels that its size and channels say", path));
+    switch (format) {
+        case OutputFormat::Exr: return writeExr(path, image);
+        case OutputFormat::Pfm: return writePfm(path, image);
+        case OutputFormat::Png:
+        case OutputFormat::Ppm: break;
+    }
+    const EncodedImage encoded = encodeSrgb8(image);
+    if (format == OutputFormat::Png) {
+        writePng(path, image, encoded);
+    } else {
+        writePpm(path, image, encoded);
+    }
+    if (encoded.clipped_values > 0)
+        logInfo("'{}': {:.2g} % of the colour values lie outside what 8 bits can show and were clipped", path,
+                100.0 * static_cast<double>(encoded.clipped_values) / static_cast<double>(encoded.rgb.size()));
+}
+
+Image readImage(const std::string& path) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) refuseToRead(path, "it is a directory");
+    std::ifstream file(path, std::ios::binary);
+    if (!file) refuseToRead(path, std::strerror(errno));
+    char mark[2] = {};
+    file.read(mark, 2);
+    if (!file) refuseToRead(path, "it is empty");
+    const bool pfm = mark[0] == 'P' && (mark[1] == 'F' || mark[1] == 'f');
+    const bool ppm = mark[0] == 'P' && mark[1] == '6';
+    if (!pfm && !ppm) return readWithModule(path);
+    file.seekg(0);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    return pfm ? readPfm(path, bytes) : readPpm(path, bytes);
+}
+
+std::string metadataValue(const Image& image, const std::string& key) {
+    for (const auto& [name, value] : image.metadata)
+        if (name == key) return value;
+    return {};
+}
+
+}  // namespace crt

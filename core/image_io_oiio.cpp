@@ -1,0 +1,235 @@
+// The image codec module: EXR and PNG through OpenImageIO, behind image_module.h. Built as a library of its own; nothing else in crt
+// includes OpenImageIO.
+#include "image_module.h"
+
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace {
+
+using OIIO::ImageInput;
+using OIIO::ImageOutput;
+using OIIO::ImageSpec;
+using OIIO::TypeDesc;
+
+/// Metadata that readers expect as a number; everything else is text.
+constexpr const char* kFloatAttributes[] = {"renderTimeSeconds"};
+constexpr const char* kIntAttributes[] = {"samplesPerPixel"};
+
+template <class Names>
+bool contains(const Names& names, const char* name) {
+    return std::any_of(std::begin(names), std::end(names), [name](const char* n) { return std::strcmp(n, name) == 0; });
+}
+
+/// What the functions below throw on the way to guarded(), which never lets it out.
+struct Failure {
+    std::string reason;
+};
+
+/// OpenImageIO's own words, or ours when it has none.
+std::string wordsOr(std::string words, const char* otherwise) {
+    while (!words.empty() && (words.back() == '\n' || words.back() == ' ')) words.pop_back();
+    return words.empty() ? otherwise : words;
+}
+
+/// Runs `body`; no exception leaves this file.
+template <class Body>
+std::int32_t guarded(char* reason, std::uint32_t reason_size, Body&& body) noexcept {
+    const auto say = [&](const char* text) {
+        if (reason != nullptr && reason_size > 0) std::snprintf(reason, reason_size, "%s", text);
+        return 1;
+    };
+    try {
+        body();
+        return 0;
+    } catch (const Failure& failure) {
+        return say(failure.reason.c_str());
+    } catch (const std::exception& exception) {
+        return say(exception.what());
+    } catch (...) {
+        return say("OpenImageIO failed in an unknown way");
+    }
+}
+
+void addMetadata(ImageSpec& spec, const CrtImageText* metadata, std::uint32_t count) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const char* name = metadata[i].name;
+        const char* value = metadata[i].value;
+        if (contains(kFloatAttributes, name)) {
+            spec.attribute(name, std::strtof(value, nullptr));
+        } else if (contains(kIntAttributes, name)) {
+            spec.attribute(name, static_cast<int>(std::min<long long>(std::strtoll(value, nullptr, 10), 0x7fffffff)));
+        } else {
+            spec.attribute(name, value);
+        }
+    }
+}
+
+void writeWith(const char* format, const char* path, const ImageSpec& spec, TypeDesc type, const void* pixels) {
+    const std::unique_ptr<ImageOutput> output = ImageOutput::create(format);
+    if (!output) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
+    if (!output->open(path, spec)) throw Failure{wordsOr(output->geterror(), "the file cannot be opened")};
+    // Both calls report: a full disk often shows only when the last buffer is flushed.
+    if (!output->write_image(type, pixels)) throw Failure{wordsOr(output->geterror(), "the pixels cannot be written")};
+    if (!output->close()) throw Failure{wordsOr(output->geterror(), "the file cannot be completed")};
+}
+
+std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reason, std::uint32_t reason_size) {
+    return guarded(reason, reason_size, [&] {
+        const std::uint32_t floats = image->float_channel_count, integers = image->integer_channel_count;
+        ImageSpec spec(static_cast<int>(image->width), static_cast<int>(image->height), static_cast<int>(floats + integers), TypeDesc::FLOAT);
+        spec.channelnames.clear();
+        spec.channelformats.clear();
+        for (std::uint32_t c = 0; c < floats; ++c) {
+            spec.channelnames.emplace_back(image->float_channels[c]);
+            spec.channelformats.emplace_back(TypeDesc::FLOAT);
+        }
+        for (std::uint32_t c = 0; c < integers; ++c) {
+            spec.channelnames.emplace_back(image->integer_channels[c]);
+            spec.channelformats.emplace_back(TypeDesc::UINT32);
+        }
+        if (integers == 0) spec.channelformats.clear();
+        for (std::size_t c = 0; c < spec.channelnames.size(); ++c) {
+            if (spec.channelnames[c] == "Z") spec.z_channel = static_cast<int>(c);
+            if (spec.channelnames[c] == "A") spec.alpha_channel = static_cast<int>(c);
+        }
+        spec.attribute("compression", "zip");
+        if (image->chromaticities != nullptr) spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), image->chromaticities);
+        // Left to itself the library stamps the present time on every EXR, and the same image would never be the same file.
+        spec.attribute("DateTime", "");
+        addMetadata(spec, image->metadata, image->metadata_count);
+
+        // "Native" pixels, float and integer side by side: handing OpenImageIO floats for a uint32 channel would scale them by 2^32.
+        const std::size_t pixels = std::size_t{image->width} * image->height;
+        std::vector<unsigned char> packed(pixels * (floats + integers) * 4);
+        unsigned char* next = packed.data();
+        for (std::size_t p = 0; p < pixels; ++p) {
+            if (floats > 0) std::memcpy(next, image->floats + p * floats, floats * 4);
+            next += floats * 4;
+            if (integers > 0) std::memcpy(next, image->integers + p * integers, integers * 4);
+            next += integers * 4;
+        }
+        writeWith("exr", path, spec, integers == 0 ? TypeDesc(TypeDesc::FLOAT) : TypeDesc(TypeDesc::UNKNOWN), packed.data());
+    });
+}
+
+std::int32_t writePng(const char* path, std::uint32_t width, std::uint32_t height, const std::uint8_t* rgb, const CrtImageText* metadata,
+                      std::uint32_t metadata_count, char* reason, std::uint32_t reason_size) {
+    return guarded(reason, reason_size, [&] {
+        ImageSpec spec(static_cast<int>(width), static_cast<int>(height), 3, TypeDesc::UINT8);
+        spec.attribute("oiio:ColorSpace", "sRGB");
+        addMetadata(spec, metadata, metadata_count);
+        writeWith("png", path, spec, TypeDesc::UINT8, rgb);
+    });
+}
+
+/// What read() hands out, with what it points to.
+struct OwnedImage : CrtImagePlanes {
+    OwnedImage() : CrtImagePlanes{} {}
+    std::vector<std::string> float_names, integer_names, metadata_text;
+    std::vector<const char*> float_pointers, integer_pointers;
+    std::vector<CrtImageText> texts;
+    std::vector<float> float_values;
+    std::vector<std::uint32_t> integer_values;
+    std::array<float, 8> primaries{};
+};
+
+bool isInteger(const ImageSpec& spec, int channel) {
+    // 8- and 16-bit integers are codes of a fraction; 32-bit ones are counts and ids.
+    const TypeDesc type = spec.channelformat(channel);
+    return type.basetype == TypeDesc::UINT32 || type.basetype == TypeDesc::INT32;
+}
+
+std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* reason, std::uint32_t reason_size) {
+    return guarded(reason, reason_size, [&] {
+        const std::unique_ptr<ImageInput> input = ImageInput::open(path);
+        if (!input) throw Failure{wordsOr(OIIO::geterror(), "it is not an image that OpenImageIO knows")};
+        const ImageSpec spec = input->spec();
+        if (spec.deep) throw Failure{"it is a deep image"};
+        if (spec.depth > 1) throw Failure{"it is a volume"};
+
+        auto owned = std::make_unique<OwnedImage>();
+        // The names of a format without named channels follow from their number.
+        for (int c = 0; c < spec.nchannels; ++c)
+            (isInteger(spec, c) ? owned->integer_names : owned->float_names).push_back(spec.channel_name(c));
+        const std::size_t pixels = std::size_t(spec.width) * std::size_t(spec.height);
+        owned->float_values.resize(pixels * owned->float_names.size());
+        owned->integer_values.resize(pixels * owned->integer_names.size());
+
+        // Runs of one kind at a time: one call for all would convert counts to fractions of 2^32.
+        std::size_t float_channel = 0, integer_channel = 0;
+        for (int first = 0; first < spec.nchannels;) {
+            const bool integer = isInteger(spec, first);
+            int end = first + 1;
+            while (end < spec.nchannels && isInteger(spec, end) == integer) ++end;
+            const std::size_t stride = 4 * (integer ? owned->integer_names.size() : owned->float_names.size());
+            void* target = integer ? static_cast<void*>(owned->integer_values.data() + integer_channel)
+                                   : static_cast<void*>(owned->float_values.data() + float_channel);
+            const TypeDesc type = integer ? TypeDesc(spec.channelformat(first).basetype == TypeDesc::INT32 ? TypeDesc::INT32 : TypeDesc::UINT32)
+                                          : TypeDesc(TypeDesc::FLOAT);
+            if (pixels > 0 && !input->read_image(0, 0, first, end, type, target, static_cast<OIIO::stride_t>(stride)))
+                throw Failure{wordsOr(input->geterror(), "its pixels cannot be read")};
+            (integer ? integer_channel : float_channel) += static_cast<std::size_t>(end - first);
+            first = end;
+        }
+
+        // Reserved at once, because the C view points into the strings.
+        owned->metadata_text.reserve(2 * spec.extra_attribs.size());
+        for (const OIIO::ParamValue& attribute : spec.extra_attribs) {
+            const std::string name = attribute.name().string();
+            const TypeDesc type = attribute.type();
+            if (name == "chromaticities" && type.basetype == TypeDesc::FLOAT && type.basevalues() == 8) {
+                std::memcpy(owned->primaries.data(), attribute.data(), sizeof owned->primaries);
+                owned->chromaticities = owned->primaries.data();
+                continue;
+            }
+            // What OpenImageIO says of its own is not in the file.
+            const bool scalar = type == TypeDesc::STRING || type == TypeDesc::INT || type == TypeDesc::FLOAT;
+            std::string value = scalar ? attribute.get_string() : std::string();
+            if (value.empty() || name.rfind("oiio:", 0) == 0) continue;
+            owned->metadata_text.push_back(name);
+            owned->metadata_text.push_back(std::move(value));
+        }
+        for (std::size_t i = 0; i < owned->metadata_text.size(); i += 2)
+            owned->texts.push_back({owned->metadata_text[i].c_str(), owned->metadata_text[i + 1].c_str()});
+        for (const std::string& name : owned->float_names) owned->float_pointers.push_back(name.c_str());
+        for (const std::string& name : owned->integer_names) owned->integer_pointers.push_back(name.c_str());
+
+        CrtImagePlanes& view = *owned;
+        view.width = static_cast<std::uint32_t>(spec.width);
+        view.height = static_cast<std::uint32_t>(spec.height);
+        view.float_channel_count = static_cast<std::uint32_t>(owned->float_names.size());
+        view.integer_channel_count = static_cast<std::uint32_t>(owned->integer_names.size());
+        view.float_channels = owned->float_pointers.data();
+        view.integer_channels = owned->integer_pointers.data();
+        view.floats = owned->float_values.data();
+        view.integers = owned->integer_values.data();
+        view.metadata = owned->texts.data();
+        view.metadata_count = static_cast<std::uint32_t>(owned->texts.size());
+        view.srgb_encoded = spec.format.basetype == TypeDesc::UINT8 || spec.format.basetype == TypeDesc::UINT16;
+        *image = owned.release();
+    });
+}
+
+void freeImage(const CrtImagePlanes* image) {
+    delete static_cast<const OwnedImage*>(image);
+}
+
+}  // namespace
+
+extern "C" __attribute__((visibility("default"))) const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void);
+
+extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
+    static const CrtImageModule table{sizeof(CrtImageModule), 0, "OpenImageIO " OIIO_VERSION_STRING, writeExr, writePng, readImage, freeImage};
+    return &table;
+}

@@ -1,0 +1,61 @@
+/*
+ * image_module.h: the border between crt and its image codec module, lib/crt/crt_image_oiio.so. C99. OpenImageIO and the thirty
+ * libraries it brings are behind it, so that only a job that reads or writes EXR or PNG pays for them.
+ *
+ * The module exports one symbol, which returns a table. No C++ type and no exception crosses; what the module allocates the module frees.
+ * Functions return 0, or non-zero with one sentence in `reason` (NUL-terminated, cut to reason_size). [any thread]
+ */
+#ifndef CRT_IMAGE_MODULE_H
+#define CRT_IMAGE_MODULE_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define CRT_IMAGE_MODULE_FILE "crt_image_oiio.so"
+/* The symbol carries the version: a module of another version does not have it. */
+#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v1
+#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v1"
+
+typedef struct CrtImageText {
+    const char *name;
+    const char *value;
+} CrtImageText;
+
+/* Pixels row-major, top row first. */
+typedef struct CrtImagePlanes {
+    uint32_t width, height;
+    uint32_t float_channel_count, integer_channel_count;
+    const char *const *float_channels; /* names */
+    const char *const *integer_channels;
+    const float *floats;               /* [height][width][float_channel_count] */
+    const uint32_t *integers;          /* [height][width][integer_channel_count] */
+    const CrtImageText *metadata;
+    uint32_t metadata_count;
+    uint32_t srgb_encoded;             /* read only: 1 when R, G and B are 8- or 16-bit sRGB codes scaled to [0,1], 0 when they are linear */
+    const float *chromaticities;       /* {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy}, or null */
+} CrtImagePlanes;
+
+typedef struct CrtImageModule {
+    uint32_t struct_size;
+    uint32_t reserved;
+    /* What is behind it, e.g. "OpenImageIO 2.4.7". */
+    const char *build;
+    /* Every float channel as float, every integer channel as uint32, zip compressed. The file name need not end in .exr. */
+    int32_t (*write_exr)(const char *path, const CrtImagePlanes *image, char *reason, uint32_t reason_size);
+    /* 8-bit RGB, sRGB-encoded, interleaved. */
+    int32_t (*write_png)(const char *path, uint32_t width, uint32_t height, const uint8_t *rgb, const CrtImageText *metadata,
+                         uint32_t metadata_count, char *reason, uint32_t reason_size);
+    /* Any format that the module knows, by content; the first image of a file that holds several. *image stays valid until freed. */
+    int32_t (*read)(const char *path, const CrtImagePlanes **image, char *reason, uint32_t reason_size);
+    void (*free_image)(const CrtImagePlanes *image);
+} CrtImageModule;
+
+typedef const CrtImageModule *(*CrtImageModuleEntry)(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
