@@ -1,0 +1,307 @@
+/// The schema told to people (docs/scene.md) and to editors (JSON Schema). Nothing here knows a key: it all comes from the table.
+#include "scene_schema.h"
+#include "scene_yaml.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <set>
+
+namespace crt {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+bool isFamily(std::string_view family) { return schemaVariants(family).size() > 1; }
+std::string familyOf(const SectionSchema& section) { return section.name.substr(0, section.name.find('/')); }
+
+// ---- JSON Schema -----------------------------------------------------------------------------------------------------
+
+/// Definitions are named without '/', which JSON pointers would have to escape.
+std::string definitionName(const SectionSchema& section) {
+    std::string name = section.name;
+    for (char& c : name)
+        if (c == '/') c = '-';
+    return name;
+}
+
+Json reference(const std::string& definition) { return {{"$ref", "#/definitions/" + definition}}; }
+
+/// Whole bounds are written without a decimal point.
+Json jsonNumber(double value) {
+    constexpr double kExact = 9007199254740992.0;
+    if (value == std::floor(value) && std::abs(value) <= kExact) return static_cast<std::int64_t>(value);
+    return value;
+}
+
+void addRange(Json& schema, const ValueRange& range) {
+    if (std::isfinite(range.min)) schema[range.min_open ? "exclusiveMinimum" : "minimum"] = jsonNumber(range.min);
+    if (std::isfinite(range.max)) schema[range.max_open ? "exclusiveMaximum" : "maximum"] = jsonNumber(range.max);
+}
+
+Json familySchema(const std::string& family) {
+    Json any = Json::array();
+    for (const SectionSchema* variant : schemaVariants(family)) any.push_back(reference(definitionName(*variant)));
+    if (any.size() == 1) return any.front();
+    return {{"oneOf", std::move(any)}};
+}
+
+/// One value, without regard to its shape.
+Json valueSchema(const KeySchema& key) {
+    Json schema;
+    switch (key.kind) {
+        case ValueKind::Integer:
+        case ValueKind::Number:
+            schema["type"] = key.kind == ValueKind::Integer ? "integer" : "number";
+            addRange(schema, key.range);
+            return schema;
+        case ValueKind::Boolean: return {{"type", "boolean"}};
+        case ValueKind::Text: return {{"type", "string"}, {"minLength", 1}};
+        case ValueKind::Choice:
+            schema["enum"] = key.choices;
+            if (!key.section.empty()) return {{"anyOf", Json::array({std::move(schema), familySchema(key.section)})}};
+            return schema;
+        case ValueKind::Spectrum:
+            schema["type"] = "number";
+            addRange(schema, key.range);
+            return {{"anyOf", Json::array({std::move(schema), reference("spectrum")})}};
+        case ValueKind::Section: return familySchema(key.section);
+    }
+    return schema;
+}
+
+Json listSchema(Json items, int count_min, int count_max) {
+    Json schema{{"type", "array"}, {"items", std::move(items)}};
+    if (count_min > 0) schema["minItems"] = count_min;
+    if (count_max != kUnbounded) schema["maxItems"] = count_max;
+    return schema;
+}
+
+Json shapedSchema(const KeySchema& key) {
+    Json one = valueSchema(key);
+    switch (key.shape) {
+        case ValueShape::One: return one;
+        case ValueShape::List: return listSchema(std::move(one), key.count_min, key.count_max);
+        case ValueShape::OneOrList: {
+            Json list = listSchema(one, key.count_min, key.count_max);
+            return {{"anyOf", Json::array({std::move(one), std::move(list)})}};
+        }
+        case ValueShape::Lists: return listSchema(listSchema(std::move(one), key.count_min, key.count_max), 1, kUnbounded);
+        case ValueShape::Map: {
+            Json schema{{"type", "object"}, {"additionalProperties", std::move(one)}};
+            // A name that reads as a number would be one where it is used. Names in an MTL are never used that way.
+            if (key.kind != ValueKind::Text)
+                schema["propertyNames"] = {{"minLength", 1}, {"not", {{"pattern", R"(^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$)"}}}};
+            return schema;
+        }
+    }
+    return one;
+}
+
+Json keySchema(const KeySchema& key) {
+    Json schema = shapedSchema(key);
+    if (key.nullable) schema = {{"anyOf", Json::array({{{"type", "null"}}, std::move(schema)})}};
+    std::string description = key.doc;
+    if (!key.unit.empty()) description += fmt::format(" [{}]", key.unit);
+    // Draft-07 ignores everything beside a $ref, so the description needs a schema around it.
+    if (schema.contains("$ref")) schema = {{"allOf", Json::array({std::move(schema)})}};
+    schema["description"] = std::move(description);
+    if (!key.fallback.empty()) {
+        const Json value = Json::parse(key.fallback, nullptr, false);
+        schema["default"] = value.is_discarded() ? Json(key.fallback) : value;
+    }
+    return schema;
+}
+
+Json required(const std::string& key) { return {{"required", Json::array({key})}}; }
+
+Json ruleSchema(const KeyRule& rule) {
+    Json schema = Json::object();
+    switch (rule.kind) {
+        case KeyRule::Kind::ExactlyOne:
+            for (const std::string& key : rule.keys) schema["oneOf"].push_back(required(key));
+            break;
+        case KeyRule::Kind::AtMostOne: schema["not"] = {{"required", rule.keys}}; break;
+        case KeyRule::Kind::Together:
+            for (const std::string& key : rule.keys)
+                for (const std::string& other : rule.keys)
+                    if (other != key) schema["dependencies"][key].push_back(other);
+            break;
+    }
+    return schema;
+}
+
+Json sectionSchema(const SectionSchema& section) {
+    Json schema{{"type", "object"}};
+    if (!section.doc.empty()) schema["description"] = section.doc;
+    Json properties = Json::object(), needed = Json::array();
+    for (const KeySchema& key : section.keys) {
+        properties[key.name] = keySchema(key);
+        if (key.required) needed.push_back(key.name);
+    }
+    schema["properties"] = std::move(properties);
+    if (!needed.empty()) schema["required"] = std::move(needed);
+    schema["additionalProperties"] = false;
+    for (const KeyRule& rule : section.rules) schema["allOf"].push_back(ruleSchema(rule));
+    return schema;
+}
+
+// ---- Markdown --------------------------------------------------------------------------------------------------------
+
+/// What stands before the sections of the manual.
+constexpr std::string_view kIntroduction = R"(# Scene files
+
+<!-- Generated from the table in core/scene_schema.cpp. Change it there, then run
+     CRT_UPDATE_DOCS=1 unit_tests "docs/scene.md is what the schema says" -->
+
+A scene is one YAML file. The smallest says `crt: 1`; this one shows a floor under a lamp:
+
+```yaml
+crt: 1
+title: A lamp over a floor
+camera: {position: [0, 1, -4], target: [0, 0.5, 0], fov: 40}
+film: {resolution: [320, 240]}
+spectra:
+  paint: {rgb: [0.8, 0.7, 0.6]}
+materials:
+  floor: {type: diffuse, reflectance: paint}
+  black: {type: diffuse, reflectance: 0}
+objects:
+  - name: floor
+    mesh: {positions: [[-2, 0, -2], [-2, 0, 2], [2, 0, 2], [2, 0, -2]], faces: [[0, 1, 2, 3]]}
+    material: floor
+  - name: lamp
+    mesh: {positions: [[-1, 2, -1], [1, 2, -1], [1, 2, 1], [-1, 2, 1]], faces: [[0, 1, 2, 3]]}
+    material: black
+    emission: {radiance: {blackbody: 4000, scale: 5}}
+outputs:
+  - {file: lamp.exr, aovs: [normal, depth]}
+  - {file: lamp.png}
+```
+
+## Rules
+
+- `crt: 1` comes first. Keys that are not in this manual are errors, and so are keys given twice.
+- Numbers are decimal: `0.5`, `1e3`, `-2`. Whole numbers may be written `1e3` or `3.0`. Leading zeros, hexadecimal, NaN and infinity
+  are refused. The only booleans are `true` and `false`. Text that looks like a number needs quotes.
+- Anchors and aliases work. Merge keys (`<<`), tags (`!!float`), cycles and several documents in one file are refused.
+- Relative file names are looked up beside the scene, then in the directories of `CRT_MESH_PATH` (separated by `:`), or, where that is not
+  set, in the meshes installed with crt. Names of outputs are relative to the working directory.
+- All errors of a file are reported at once, each with its line, and crt ends with code 3. Spectra and materials that nothing uses are warnings.
+- `--set film.resolution=[128,128]` or `--set objects.0.material=red` changes a value before the scene is checked. Lists go by
+  index, from 0.
+- Editors that know JSON Schema check scenes while you type: save `crt schema` as `crt-scene-1.schema.json` and begin the scene with
+  `# yaml-language-server: $schema=crt-scene-1.schema.json`.
+)";
+
+/// What stands before the variants of a family.
+std::string_view familyIntroduction(std::string_view family) {
+    if (family == "spectrum")
+        return "A function of wavelength, from 360 to 830 nm. Wherever a key wants a spectrum it takes\n\n"
+               "- a number: the same at every wavelength;\n"
+               "- text: the name of an entry of `spectra` (for `white_balance` also of an illuminant);\n"
+               "- a map of one of the forms below.\n";
+    if (family == "material") return "What light does at a surface. `type` picks one of these.\n";
+    if (family == "transform")
+        return "A placement is a list of steps, each a map with one key, applied in order: `[{scale: 2}, {rotate: {axis: [0, 1, 0], "
+               "angle_deg: 90}}, {translate: [0, 1, 0]}]`.\n";
+    return {};
+}
+
+std::string headingOf(const SectionSchema& section) {
+    const std::string family = familyOf(section);
+    return section.name == family ? family : fmt::format("{}: {}", family, variantWord(section));
+}
+
+std::string linkTo(const std::string& family) { return fmt::format("[{0}](#{0})", family); }
+
+std::string kindText(const KeySchema& key) {
+    switch (key.kind) {
+        case ValueKind::Integer: return "whole number";
+        case ValueKind::Number: return "number";
+        case ValueKind::Boolean: return "true or false";
+        case ValueKind::Text: return "text";
+        case ValueKind::Choice: {
+            const std::string words = fmt::format("`{}`", fmt::join(key.choices, "`, `"));
+            return key.section.empty() ? words : fmt::format("{}, or a {} map", words, linkTo(key.section));
+        }
+        case ValueKind::Spectrum: return linkTo("spectrum");
+        case ValueKind::Section: return fmt::format("{} map", linkTo(key.section));
+    }
+    return {};
+}
+
+std::string countText(const KeySchema& key) {
+    if (key.count_max == kUnbounded) return key.count_min > 0 ? fmt::format("{} or more", key.count_min) : std::string();
+    return key.count_min == key.count_max ? fmt::format("{}", key.count_min) : fmt::format("{} to {}", key.count_min, key.count_max);
+}
+
+std::string typeText(const KeySchema& key) {
+    const std::string one = kindText(key), count = countText(key);
+    const std::string list = count.empty() ? fmt::format("list of: {}", one) : fmt::format("list of {}: {}", count, one);
+    switch (key.shape) {
+        case ValueShape::One: return one;
+        case ValueShape::List: return list;
+        case ValueShape::OneOrList: return fmt::format("{}, or {}", one, list);
+        case ValueShape::Lists: return fmt::format("list of: {}", list);
+        case ValueShape::Map: return fmt::format("map of names: {}", one);
+    }
+    return one;
+}
+
+std::string keyTable(const SectionSchema& section) {
+    std::string text = "| Key | Value | Unit | Range | Default | |\n|---|---|---|---|---|---|\n";
+    for (const KeySchema& key : section.keys) {
+        const std::string range = key.range.text();
+        const std::string fallback = key.required ? "required" : key.fallback.empty() ? "–" : fmt::format("`{}`", key.fallback);
+        text += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", key.name, typeText(key), key.unit, range == "any" ? "" : range, fallback,
+                            key.doc);
+    }
+    return text;
+}
+
+std::string ruleText(const KeyRule& rule) {
+    switch (rule.kind) {
+        case KeyRule::Kind::ExactlyOne: return fmt::format("Exactly one of `{}` is required.", fmt::join(rule.keys, "`, `"));
+        case KeyRule::Kind::AtMostOne: return fmt::format("`{}` exclude each other.", fmt::join(rule.keys, "` and `"));
+        case KeyRule::Kind::Together: return fmt::format("`{}` go together.", fmt::join(rule.keys, "` and `"));
+    }
+    return {};
+}
+
+}  // namespace
+
+std::string sceneJsonSchema() {
+    const std::vector<SectionSchema>& sections = sceneSchema();
+    Json root{{"$schema", "http://json-schema.org/draft-07/schema#"}, {"title", "crt scene, format 1"}};
+    root.update(sectionSchema(sections.front()));
+
+    Json definitions = Json::object();
+    Json spectrum = familySchema("spectrum");
+    spectrum["oneOf"].insert(spectrum["oneOf"].begin(), Json{{"type", "string"}, {"minLength", 1}});
+    spectrum["description"] = "The name of an entry of spectra, or one of the forms of a spectrum.";
+    definitions["spectrum"] = std::move(spectrum);
+    for (std::size_t i = 1; i < sections.size(); ++i) definitions[definitionName(sections[i])] = sectionSchema(sections[i]);
+    root["definitions"] = std::move(definitions);
+    return root.dump(2) + "\n";
+}
+
+std::string sceneReferenceMarkdown() {
+    std::string text(kIntroduction);
+    std::set<std::string> families_seen;
+    const SectionSchema& top = sceneSchema().front();
+    for (const SectionSchema& section : sceneSchema()) {
+        const std::string family = familyOf(section);
+        if (isFamily(family) && families_seen.insert(family).second) text += fmt::format("\n## {}\n\n{}", family, familyIntroduction(family));
+        const bool chapter = section.name.empty() || top.find(section.name) != nullptr || section.name == "object" || section.name == "output";
+        text += fmt::format("\n{} {}\n\n", chapter ? "##" : "###", section.name.empty() ? "Top level" : headingOf(section));
+        if (!section.doc.empty()) text += section.doc + "\n\n";
+        text += keyTable(section);
+        for (const KeyRule& rule : section.rules) text += fmt::format("\n{}\n", ruleText(rule));
+    }
+    return text;
+}
+
+}  // namespace crt

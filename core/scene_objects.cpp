@@ -1,0 +1,440 @@
+#include "scene_objects.h"
+
+#include "log.h"
+#include "mesh_io.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <set>
+
+namespace crt {
+namespace {
+
+Matrix4d multiply(const Matrix4d& a, const Matrix4d& b) {
+    Matrix4d m{};
+    for (std::size_t r = 0; r < 4; ++r)
+        for (std::size_t c = 0; c < 4; ++c)
+            for (std::size_t i = 0; i < 4; ++i) m[4 * r + c] += a[4 * r + i] * b[4 * i + c];
+    return m;
+}
+
+Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Vec3d cross(const Vec3d& a, const Vec3d& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+bool isZero(const Vec3d& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
+bool allFinite(const Matrix4d& m) { return std::all_of(m.begin(), m.end(), [](double v) { return std::isfinite(v); }); }
+
+/// Sine of an angle in degrees, exact at multiples of 90°: a box turned by a quarter stays a box.
+double sineOfDegrees(double degrees) {
+    const double turn = std::remainder(degrees, 360.0);  // −180 to 180, exact.
+    if (turn == 0 || std::abs(turn) == 180) return 0;
+    if (std::abs(turn) == 90) return std::copysign(1.0, turn);
+    return std::sin(turn * (std::numbers::pi / 180));
+}
+double cosineOfDegrees(double degrees) { return sineOfDegrees(90 - std::abs(std::remainder(degrees, 360.0))); }
+
+/// Rodrigues' rotation about a unit axis.
+Matrix4d rotation(const Vec3d& a, double degrees) {
+    const double s = sineOfDegrees(degrees), c = cosineOfDegrees(degrees), t = 1 - c;
+    return {t * a[0] * a[0] + c,        t * a[0] * a[1] - s * a[2], t * a[0] * a[2] + s * a[1], 0,
+            t * a[0] * a[1] + s * a[2], t * a[1] * a[1] + c,        t * a[1] * a[2] - s * a[0], 0,
+            t * a[0] * a[2] - s * a[1], t * a[1] * a[2] + s * a[0], t * a[2] * a[2] + c,        0,
+            0,                          0,                          0,                          1};
+}
+
+/// A unit vector, also from components whose squares overflow or vanish.
+Vec3d normalised(const Vec3d& v) {
+    const double largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
+    const Vec3d s{v[0] / largest, v[1] / largest, v[2] / largest};
+    const double length = std::sqrt(dot(s, s));
+    return {s[0] / length, s[1] / length, s[2] / length};
+}
+
+/// Determinant of the linear part over the product of its rows' lengths: 0 is flat, whatever the units.
+double relativeVolume(const Matrix4d& m) {
+    Vec3d rows[3];
+    for (std::size_t r = 0; r < 3; ++r) {
+        const Vec3d row{m[4 * r], m[4 * r + 1], m[4 * r + 2]};
+        if (isZero(row)) return 0;
+        rows[r] = normalised(row);
+    }
+    return dot(rows[0], cross(rows[1], rows[2]));
+}
+
+/// Triples in a list of lists.
+std::optional<std::vector<Vec3d>> readPoints(const SectionReader& mesh, std::string_view key, const char* one) {
+    const YamlNode* list = mesh.list(key);
+    if (list == nullptr) return std::nullopt;
+    const KeySchema& row = *mesh.schema().find(key);
+    std::vector<Vec3d> points;
+    points.reserve(list->items.size());
+    bool good = true;
+    std::vector<double> values;
+    for (std::size_t i = 0; i < list->items.size(); ++i) {
+        const YamlNode& item = *list->items[i];
+        good &= readNumbers(mesh.diagnostics(), item, item.place, row, fmt::format("{} {}", one, i), values);
+        if (good) points.push_back({values[0], values[1], values[2]});
+    }
+    if (!good) return std::nullopt;
+    return points;
+}
+
+}  // namespace
+
+ObjectReader::ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene)
+    : out_(out), files_(files), spectra_(spectra), scene_(scene) {}
+
+ObjectReader::~ObjectReader() = default;
+
+// ---- Materials -------------------------------------------------------------------------------------------------------
+
+void ObjectReader::readMaterials(const YamlNode& map) {
+    for (const YamlEntry& entry : map.entries) readMaterial(entry);
+}
+
+void ObjectReader::readMaterial(const YamlEntry& entry) {
+    NamedMaterial& named = materials_[entry.key];
+    named.place = entry.key_place;
+    material_names_.push_back(entry.key);
+    if (entry.key == "from_mtl" || entry.key.empty() || looksLikeNumber(entry.key)) {
+        out_.error(entry.key_place, fmt::format("'{}' cannot name a material: where it is used it would mean something else", entry.key));
+        return;
+    }
+    const std::optional<SectionReader> section =
+        openVariant(out_, *entry.value, entry.place, "material", fmt::format("material '{}'", entry.key));
+    if (!section) return;
+
+    Material material;
+    material.name = entry.key;
+    material.place = entry.key_place.resolved();
+    const auto take = [&](std::string_view key, SpectrumUse use, Spectrum& into) {
+        if (std::optional<Spectrum> s = spectra_.read(*section, key, use)) into = *std::move(s);
+    };
+    const std::string kind = variantWord(section->schema());
+    if (kind == "diffuse" || kind == "mirror") {
+        material.type = kind == "diffuse" ? MaterialType::Diffuse : MaterialType::Mirror;
+        take("reflectance", SpectrumUse::Reflectance, material.reflectance);
+    } else if (kind == "conductor") {
+        material.type = MaterialType::Conductor;
+        std::string metal;
+        if (section->readWord("metal", metal)) std::tie(material.eta, material.k) = metalIndex(metal).value();
+        take("eta", SpectrumUse::Index, material.eta);
+        take("k", SpectrumUse::Index, material.k);
+    } else {
+        material.type = MaterialType::Dielectric;
+        take("ior", SpectrumUse::Index, material.eta);
+    }
+    named.index = static_cast<std::int32_t>(scene_.materials.size());
+    scene_.materials.push_back(std::move(material));
+}
+
+std::optional<std::int32_t> ObjectReader::findMaterial(const std::string& name, const YamlPlace& place, bool from_mtl_possible) {
+    const auto found = materials_.find(name);
+    if (found != materials_.end()) {
+        found->second.used = true;
+        if (found->second.index < 0) return std::nullopt;
+        return found->second.index;
+    }
+    std::vector<std::string> known = material_names_;
+    if (from_mtl_possible) known.push_back("from_mtl");
+    out_.error(place, fmt::format("there is no material '{}'", name), didYouMean(name, known));
+    return std::nullopt;
+}
+
+void ObjectReader::finish() const {
+    for (const std::string& name : material_names_) {
+        const NamedMaterial& material = materials_.at(name);
+        const SourcePlace at = material.place.resolved();
+        if (!material.used) logWarning("{}:{}:{}: material '{}' is not used", at.file, at.line, at.column, name);
+    }
+}
+
+// ---- Placements ------------------------------------------------------------------------------------------------------
+
+std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const YamlPlace& place, const std::string& subject) {
+    if (list.kind != YamlKind::List) {
+        expected(out_, place, "a list of steps such as {translate: [0, 1, 0]}", subject, list);
+        return std::nullopt;
+    }
+    Matrix4d total = kIdentity4d;
+    bool good = true;
+    for (std::size_t i = 0; i < list.items.size(); ++i) {
+        const YamlNode& item = *list.items[i];
+        const std::size_t before = out_.count();
+        const std::optional<SectionReader> step = openVariant(out_, item, item.place, "transform", fmt::format("step {} of {}", i + 1, subject));
+        if (!step) {
+            good = false;
+            continue;
+        }
+        Matrix4d m = kIdentity4d;
+        const std::string kind = variantWord(step->schema());
+        if (kind == "translate") {
+            Vec3d by{};
+            step->read("translate", by);
+            m[3] = by[0], m[7] = by[1], m[11] = by[2];
+        } else if (kind == "scale") {
+            Vec3d by{1, 1, 1};
+            if (step->find("scale")->value->kind == YamlKind::List)
+                step->read("scale", by);
+            else if (double factor = 1; step->read("scale", factor))
+                by = {factor, factor, factor};
+            m[0] = by[0], m[5] = by[1], m[10] = by[2];
+            if (by[0] == 0 || by[1] == 0 || by[2] == 0) step->error("scale", "a scale of 0 flattens the object to nothing");
+        } else if (kind == "rotate") {
+            const std::optional<SectionReader> turn = step->section("rotate", "the rotation");
+            Vec3d axis{0, 0, 1};
+            double degrees = 0;
+            turn->read("axis", axis);
+            turn->read("angle_deg", degrees);
+            if (isZero(axis))
+                turn->error("axis", "an axis of length 0 has no direction");
+            else
+                m = rotation(normalised(axis), degrees);
+        } else {
+            std::vector<double> values(m.begin(), m.end());
+            step->read("matrix", values);
+            std::copy(values.begin(), values.end(), m.begin());
+            constexpr double kFlat = 1e-12;
+            if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
+                step->error("matrix", "the last row must be 0 0 0 1: points stay points");
+            else if (std::abs(relativeVolume(m)) < kFlat)
+                step->error("matrix", "this matrix cannot be inverted: it flattens the object");
+        }
+        good &= out_.count() == before;
+        total = multiply(m, total);
+    }
+    if (good && !allFinite(total)) {
+        out_.error(place, fmt::format("{} overflows: its steps multiply to numbers beyond a double", subject));
+        good = false;
+    }
+    if (!good) return std::nullopt;
+    return total;
+}
+
+std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) {
+    if (const YamlEntry* one = object.find("transform")) {
+        const std::optional<Matrix4d> m = readPlacement(*one->value, one->place, fmt::format("the transform of {}", object.subject()));
+        return {m.value_or(kIdentity4d)};
+    }
+    const YamlNode* list = object.list("transforms");
+    if (list == nullptr) return {kIdentity4d};
+    if (list->items.empty()) object.error("transforms", "an object with no placement is nowhere; leave 'transforms' out for one as it is");
+    std::vector<Matrix4d> placements;
+    placements.reserve(list->items.size());
+    for (std::size_t i = 0; i < list->items.size(); ++i) {
+        const YamlNode& item = *list->items[i];
+        const std::string subject = fmt::format("placement {} of {}", i, object.subject());
+        placements.push_back(readPlacement(item, item.place, subject).value_or(kIdentity4d));
+    }
+    return placements;
+}
+
+// ---- Geometry --------------------------------------------------------------------------------------------------------
+
+std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section) {
+    std::optional<std::vector<Vec3d>> positions = readPoints(section, "positions", "position");
+    std::optional<std::vector<Vec3d>> normals = readPoints(section, "normals", "normal");
+    const YamlNode* faces = section.list("faces");
+    if (!positions || faces == nullptr) return std::nullopt;
+
+    Mesh mesh;
+    mesh.positions = *std::move(positions);
+    const std::size_t errors_before = out_.count();
+    if (section.has("normals") && normals) {
+        if (normals->size() != mesh.positions.size())
+            section.error("normals", fmt::format("there are {} normals for {} positions", normals->size(), mesh.positions.size()));
+        for (std::size_t i = 0; i < normals->size(); ++i)
+            if (isZero((*normals)[i])) out_.error(section.list("normals")->items[i]->place, fmt::format("normal {} has length 0", i));
+        mesh.normals = *std::move(normals);
+    }
+    if (faces->items.empty()) section.error("faces", "a mesh without faces cannot be seen");
+
+    const KeySchema& row = *section.schema().find("faces");
+    std::uint64_t dropped = 0;
+    std::vector<std::uint32_t> polygon;
+    std::vector<Vec3d> areas;  // Twice the area of each triangle of the fan, along its normal.
+    for (std::size_t f = 0; f < faces->items.size(); ++f) {
+        const YamlNode& face = *faces->items[f];
+        if (face.kind != YamlKind::List || face.items.size() < 3) {
+            expected(out_, face.place, "a list of 3 or more indices", fmt::format("face {}", f), face);
+            continue;
+        }
+        polygon.clear();
+        for (const YamlNodePtr& item : face.items) {
+            std::int64_t index = 0;
+            if (!readScalar(out_, *item, item->place, row, fmt::format("an index of face {}", f), index)) continue;
+            if (static_cast<std::uint64_t>(index) < mesh.positions.size())
+                polygon.push_back(static_cast<std::uint32_t>(index));
+            else
+                out_.error(item->place, fmt::format("face {} names position {}, but there are only {} (counted from 0)", f, index,
+                                                    mesh.positions.size()));
+        }
+        if (polygon.size() != face.items.size()) continue;
+
+        // A fan from the first corner. A triangle that turns against the whole lies outside the polygon.
+        const Vec3d& apex = mesh.positions[polygon[0]];
+        areas.clear();
+        Vec3d sum{};
+        for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
+            areas.push_back(cross(minus(mesh.positions[polygon[i]], apex), minus(mesh.positions[polygon[i + 1]], apex)));
+            for (std::size_t c = 0; c < 3; ++c) sum[c] += areas.back()[c];
+        }
+        constexpr double kRounding = 1e-9;
+        for (std::size_t i = 0; i < areas.size(); ++i) {
+            if (isZero(areas[i])) {
+                ++dropped;
+                continue;
+            }
+            if (dot(areas[i], sum) < -kRounding * dot(sum, sum)) {
+                out_.error(face.place, fmt::format("face {} is not convex; split it into convex polygons", f));
+                break;
+            }
+            mesh.triangles.push_back({polygon[0], polygon[i + 1], polygon[i + 2]});
+        }
+    }
+    if (out_.count() != errors_before) return std::nullopt;
+    if (dropped > 0) {
+        const SourcePlace at = section.place("faces").resolved();
+        logWarning("{}:{}:{}: {} triangles of {} without area were left out", at.file, at.line, at.column, dropped, section.subject());
+    }
+    if (!mesh.normals.empty()) mesh.normal_index = mesh.triangles;
+    scene_.meshes.push_back(std::move(mesh));
+    return static_cast<std::uint32_t>(scene_.meshes.size() - 1);
+}
+
+ObjectReader::Overrides ObjectReader::readOverrides(const SectionReader& object) {
+    Overrides overrides;
+    const YamlNode* map = object.map("material_overrides");
+    if (map == nullptr) return overrides;
+    for (const YamlEntry& entry : map->entries) {
+        std::string name;
+        if (!readText(out_, *entry.value, entry.place, fmt::format("the material in place of '{}'", entry.key), name)) continue;
+        if (const std::optional<std::int32_t> index = findMaterial(name, entry.place, false)) overrides[entry.key] = *index;
+    }
+    return overrides;
+}
+
+std::optional<std::uint32_t> ObjectReader::readObj(const SectionReader& object, bool from_mtl, const Overrides& overrides) {
+    std::string name;
+    if (!object.read("obj", name)) return std::nullopt;
+    const std::optional<std::string> path = files_.locate(name, object.place("obj"), out_);
+    if (!path) return std::nullopt;
+
+    const auto [file, fresh] = loaded_.try_emplace({*path, from_mtl});
+    if (fresh) {
+        try {
+            file->second = std::make_unique<LoadedMesh>(loadObj(*path, from_mtl));
+            for (const std::string& read : file->second->files) files_.note(read);
+        } catch (const Error& e) {
+            if (e.kind() == ErrorKind::Internal) throw;
+            object.error("obj", sentenceWithPlace(e));
+        }
+    }
+    if (!file->second) return std::nullopt;
+    const LoadedMesh& loaded = *file->second;
+
+    for (const auto& [mtl_name, index] : overrides) {
+        std::vector<std::string> names;
+        for (const Material& m : loaded.materials) names.push_back(m.name);
+        if (std::find(names.begin(), names.end(), mtl_name) != names.end()) continue;
+        const YamlEntry* entry = object.map("material_overrides")->find(mtl_name);
+        out_.error(entry->key_place, fmt::format("no face of '{}' has a material '{}'", name, mtl_name), didYouMean(mtl_name, names));
+    }
+
+    // One mesh for all objects that ask for the same thing; an OBJ without materials is the same either way.
+    const bool own_materials = !loaded.materials.empty() || !loaded.emissions.empty();
+    const auto [known, first] = meshes_.try_emplace({*path, own_materials, overrides});
+    if (!first) return known->second;
+
+    Mesh mesh = loaded.mesh;
+    std::vector<std::int32_t> material_index;  // Index in `loaded` → index in the scene.
+    const std::string file_name = std::filesystem::path(*path).filename().string();
+    for (const Material& m : loaded.materials) {
+        if (const auto replaced = overrides.find(m.name); replaced != overrides.end()) {
+            material_index.push_back(replaced->second);
+            continue;
+        }
+        material_index.push_back(static_cast<std::int32_t>(scene_.materials.size()));
+        scene_.materials.push_back(m);
+        scene_.materials.back().name = fmt::format("{}:{}", file_name, m.name);
+    }
+    const auto emission_base = static_cast<std::int32_t>(scene_.emissions.size());
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const std::int32_t mtl = mesh.material.empty() ? -1 : mesh.material[t];
+        // A material that is replaced is replaced as a whole, so its glow (Ke) goes with it.
+        const bool replaced = mtl >= 0 && overrides.contains(loaded.materials[static_cast<std::size_t>(mtl)].name);
+        if (mtl >= 0) mesh.material[t] = material_index[static_cast<std::size_t>(mtl)];
+        if (!mesh.emission.empty() && mesh.emission[t] >= 0) mesh.emission[t] = replaced ? -1 : mesh.emission[t] + emission_base;
+    }
+    scene_.emissions.insert(scene_.emissions.end(), loaded.emissions.begin(), loaded.emissions.end());
+    scene_.meshes.push_back(std::move(mesh));
+    known->second = static_cast<std::uint32_t>(scene_.meshes.size() - 1);
+    return known->second;
+}
+
+// ---- Objects ---------------------------------------------------------------------------------------------------------
+
+void ObjectReader::readObjects(const YamlNode& list) {
+    for (std::size_t i = 0; i < list.items.size(); ++i) readObject(*list.items[i], list.items[i]->place, i);
+}
+
+void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std::size_t number) {
+    const YamlEntry* name = node.find("name");
+    const SectionReader section(out_, node, place, schemaSection("object"),
+                                name != nullptr && name->value->kind == YamlKind::Scalar ? fmt::format("object '{}'", name->value->text)
+                                                                                         : fmt::format("object {}", number));
+    Object object;
+    object.place = place.resolved();
+    object.name = fmt::format("object {}", number);
+    section.read("name", object.name);
+    object.transforms = readPlacements(section);
+
+    std::string material_name;
+    const bool material_given = section.read("material", material_name);
+    const bool named = material_given && material_name != "from_mtl";
+    if (named) object.material = findMaterial(material_name, section.place("material"), section.has("obj")).value_or(-1);
+    const Overrides overrides = readOverrides(section);
+
+    std::optional<std::uint32_t> mesh;
+    if (section.has("obj") && !section.has("mesh")) {
+        if (named && section.has("material_overrides"))
+            section.error("material_overrides",
+                          "a named material covers the whole object; overrides need 'material: from_mtl'");
+        mesh = readObj(section, !named, named ? Overrides{} : overrides);
+        if (mesh && !named) checkMtl(section, *mesh);
+    } else if (const std::optional<SectionReader> written = section.section("mesh", fmt::format("the mesh of {}", section.subject()))) {
+        mesh = readMesh(*written);
+        if (!section.has("material")) out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
+        if (material_given && !named) section.error("material", "only an OBJ has materials of its own");
+        if (section.has("material_overrides")) section.error("material_overrides", "only an OBJ has materials to override");
+    }
+
+    if (const std::optional<SectionReader> light = section.section("emission", fmt::format("the emission of {}", section.subject()))) {
+        Emission emission;
+        light->read("two_sided", emission.two_sided);
+        if (std::optional<Spectrum> radiance = spectra_.read(*light, "radiance", SpectrumUse::Emission)) emission.radiance = *std::move(radiance);
+        object.emission = static_cast<std::int32_t>(scene_.emissions.size());
+        scene_.emissions.push_back(std::move(emission));
+    }
+    object.mesh = mesh.value_or(0);
+    scene_.objects.push_back(std::move(object));
+}
+
+/// An object that relies on its MTL must have a material on every face.
+void ObjectReader::checkMtl(const SectionReader& object, std::uint32_t mesh_index) {
+    const Mesh& mesh = scene_.meshes[mesh_index];
+    const auto bare = mesh.material.empty() ? static_cast<std::ptrdiff_t>(mesh.triangles.size())
+                                            : std::count_if(mesh.material.begin(), mesh.material.end(), [](std::int32_t m) { return m < 0; });
+    if (bare == 0) return;
+    object.error(object.has("material") ? "material" : "obj",
+                 fmt::format("{} of {} triangles of {} have no material in the OBJ; name one with 'material:'", bare,
+                             mesh.triangles.size(), object.subject()));
+}
+
+}  // namespace crt

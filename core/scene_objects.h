@@ -1,0 +1,60 @@
+/// Materials and objects of a scene: meshes read and checked, names looked up, placements multiplied out.
+#pragma once
+
+#include "scene.h"
+#include "scene_spectra.h"
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+namespace crt {
+
+struct LoadedMesh;
+
+class ObjectReader {
+public:
+    ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene);
+
+    ~ObjectReader();
+
+    void readMaterials(const YamlNode& map);
+    void readObjects(const YamlNode& list);
+    /// Warns about materials that no object uses.
+    void finish() const;
+
+private:
+    using Overrides = std::map<std::string, std::int32_t>;  ///< Name in the MTL → index of our material.
+
+    void readMaterial(const YamlEntry& entry);
+    void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
+    std::optional<std::uint32_t> readObj(const SectionReader& object, bool from_mtl, const Overrides& overrides);
+    void checkMtl(const SectionReader& object, std::uint32_t mesh_index);
+    std::optional<std::uint32_t> readMesh(const SectionReader& mesh);
+    std::optional<std::int32_t> findMaterial(const std::string& name, const YamlPlace& place, bool from_mtl_possible);
+    Overrides readOverrides(const SectionReader& object);
+    std::optional<Matrix4d> readPlacement(const YamlNode& list, const YamlPlace& place, const std::string& subject);
+    std::vector<Matrix4d> readPlacements(const SectionReader& object);
+
+    struct NamedMaterial {
+        std::int32_t index = -1;  ///< −1: known, but wrong.
+        YamlPlace place;
+        bool used = false;
+    };
+
+    Diagnostics& out_;
+    SceneFiles& files_;
+    SpectrumReader& spectra_;
+    Scene& scene_;
+    std::map<std::string, NamedMaterial> materials_;
+    std::vector<std::string> material_names_;  ///< In the order of the file.
+    /// Meshes by file, with or without the materials of the MTL, and what replaces those.
+    std::map<std::tuple<std::string, bool, Overrides>, std::uint32_t> meshes_;
+    std::map<std::pair<std::string, bool>, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.
+};
+
+}  // namespace crt

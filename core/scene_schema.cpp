@@ -1,0 +1,367 @@
+#include "scene_schema.h"
+
+#include "error.h"
+#include "scene.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace crt {
+namespace {
+
+using Kind = ValueKind;
+using Shape = ValueShape;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr ValueRange kNotNegative{0, kInfinity, false, false};
+constexpr ValueRange kPositive{0, kInfinity, true, false};
+
+/// A default read off core/scene.h, so that the manual cannot disagree with the code.
+std::string yaml(double value) { return fmt::format("{}", value); }
+std::string yaml(bool value) { return value ? "true" : "false"; }
+std::string yaml(int value) { return fmt::format("{}", value); }
+std::string yaml(std::uint64_t value) { return fmt::format("{}", value); }
+std::string yaml(const Vec3d& v) { return fmt::format("[{}, {}, {}]", v[0], v[1], v[2]); }
+template <class Enum>
+std::string yaml(const std::vector<std::string>& choices, Enum value) {
+    return choices[static_cast<std::size_t>(value)];
+}
+
+std::string trimmed(double degrees) { return fmt::format("{:.13g}", degrees); }
+
+/// Keys that a spectrum may have whatever its form.
+KeySchema scaleKey() {
+    return {.name = "scale", .kind = Kind::Number, .range = kNotNegative, .fallback = "1",
+            .doc = "Factor on all values."};
+}
+
+KeySchema outsideKey() {
+    return {.name = "outside", .kind = Kind::Choice, .choices = {"clamp", "zero", "error"},
+            .doc = "Beyond the first and last wavelength: the end value, zero, or an error. Must be said unless the data cover "
+                   "360 to 830 nm."};
+}
+
+KeySchema typeKey(std::string word) {
+    return {.name = "type", .kind = Kind::Choice, .choices = {std::move(word)}, .required = true,
+            .doc = "Picks this kind of material."};
+}
+
+SectionSchema topLevel() {
+    return {"", "the scene", "A scene file is one YAML map. Every key but `crt` may be left out.",
+            {
+                {.name = "crt", .kind = Kind::Integer, .range = {1, 1, false, false}, .required = true,
+                 .doc = "Version of the scene format, 1. Must be the first key."},
+                {.name = "title", .doc = "What the scene shows; goes into image metadata and the report."},
+                {.name = "camera", .kind = Kind::Section, .section = "camera", .doc = "Where the picture is taken from."},
+                {.name = "film", .kind = Kind::Section, .section = "film", .doc = "What it is recorded on."},
+                {.name = "integrator", .kind = Kind::Section, .section = "integrator", .doc = "How light is computed."},
+                {.name = "sampler", .kind = Kind::Section, .section = "sampler", .doc = "Random numbers, and how many samples."},
+                {.name = "spectra", .kind = Kind::Spectrum, .shape = Shape::Map,
+                 .doc = "Named spectra. A name may be used wherever a spectrum is expected."},
+                {.name = "materials", .kind = Kind::Section, .shape = Shape::Map, .section = "material",
+                 .doc = "Named materials, used by objects."},
+                {.name = "objects", .kind = Kind::Section, .shape = Shape::List, .section = "object", .fallback = "[]",
+                 .doc = "The geometry."},
+                {.name = "environment", .kind = Kind::Section, .section = "environment", .fallback = "null", .nullable = true,
+                 .doc = "Light from infinitely far away; `null` is darkness."},
+                {.name = "outputs", .kind = Kind::Section, .shape = Shape::List, .section = "output", .fallback = "[]",
+                 .doc = "Files to write."},
+            }};
+}
+
+SectionSchema camera() {
+    const Camera d;
+    return {"camera", "camera",
+            "A perspective camera in a right-handed world: image right is (target − position) × up. Give `fov`, or `focal_length` "
+            "with `sensor`, not both.",
+            {
+                {.name = "position", .kind = Kind::Number, .shape = Shape::List, .count_min = 3, .count_max = 3,
+                 .unit = "scene units", .fallback = yaml(d.position), .doc = "Centre of the lens."},
+                {.name = "target", .kind = Kind::Number, .shape = Shape::List, .count_min = 3, .count_max = 3,
+                 .unit = "scene units", .fallback = yaml(d.target), .doc = "The point in the middle of the picture."},
+                {.name = "up", .kind = Kind::Number, .shape = Shape::List, .count_min = 3, .count_max = 3,
+                 .fallback = yaml(d.up), .doc = "Direction that is up in the picture; need not be perpendicular to the view."},
+                {.name = "fov", .kind = Kind::Number, .range = {0, 180, true, true}, .unit = "degrees",
+                 .fallback = trimmed(2 * std::atan(d.tan_half_height) * 180 / std::numbers::pi),
+                 .doc = "Full angle across the shorter side of the image."},
+                {.name = "focal_length", .kind = Kind::Number, .range = kPositive, .unit = "as sensor",
+                 .doc = "Distance from lens to sensor."},
+                {.name = "sensor", .kind = Kind::Number, .shape = Shape::List, .count_min = 2, .count_max = 2,
+                 .range = kPositive, .unit = "as focal_length", .doc = "Width and height of the sensor."},
+                {.name = "aperture_radius", .kind = Kind::Number, .range = kNotNegative, .unit = "scene units",
+                 .fallback = yaml(d.aperture_radius), .doc = "Radius of the thin lens; 0 is a pinhole."},
+                {.name = "focus_distance", .kind = Kind::Number, .range = kNotNegative, .unit = "scene units",
+                 .fallback = yaml(d.focus_distance),
+                 .doc = "Distance along the view axis at which a lens is sharp; 0 is the distance to `target`."},
+            },
+            {{KeyRule::Kind::AtMostOne, {"fov", "focal_length"}}, {KeyRule::Kind::Together, {"focal_length", "sensor"}}}};
+}
+
+const std::vector<std::string> kFilters{"box", "gaussian", "blackman-harris"};
+
+SectionSchema film() {
+    const Film d;
+    const std::vector<std::string> spaces{"srgb", "acescg", "xyz"};
+    return {"film", "film", "The image and how samples become its pixels.",
+            {
+                {.name = "resolution", .kind = Kind::Integer, .shape = Shape::List, .count_min = 2, .count_max = 2,
+                 .range = {1, 65535, false, false}, .unit = "pixels", .fallback = fmt::format("[{}, {}]", d.width, d.height),
+                 .doc = "Width and height; together at most 2^31 pixels."},
+                {.name = "crop", .kind = Kind::Integer, .shape = Shape::List, .count_min = 4, .count_max = 4,
+                 .range = {0, 65535, false, false}, .unit = "pixels", .fallback = "null", .nullable = true,
+                 .doc = "Render only [x0, y0, x1, y1), x to the right, y down; `null` is the whole film."},
+                {.name = "filter", .kind = Kind::Choice, .choices = kFilters, .section = "filter",
+                 .fallback = yaml(kFilters, d.filter), .doc = "Reconstruction filter, by name or with its parameters."},
+                {.name = "color_space", .kind = Kind::Choice, .choices = spaces, .fallback = yaml(spaces, d.color_space),
+                 .doc = "What the three channels mean: linear sRGB (Rec. 709), ACEScg (AP1), or CIE XYZ."},
+                {.name = "white_balance", .kind = Kind::Spectrum, .fallback = "null", .nullable = true,
+                 .doc = "Adapts this illuminant's white to the white of the colour space. The name of an illuminant or a spectrum."},
+                {.name = "exposure_ev", .kind = Kind::Number, .range = {-100, 100, false, false}, .unit = "stops",
+                 .fallback = yaml(d.exposure_ev), .doc = "The image is multiplied by 2 to this power."},
+            }};
+}
+
+SectionSchema filter() {
+    const Film d;
+    return {"filter", "a filter", "",
+            {
+                {.name = "type", .kind = Kind::Choice, .choices = kFilters, .required = true, .doc = "Shape of the filter."},
+                {.name = "radius", .kind = Kind::Number, .range = {0, 16, true, false}, .unit = "pixels",
+                 .doc = "Half its width. 0.5 for a box, 1.5 for the others when left out."},
+                {.name = "sigma", .kind = Kind::Number, .range = {0, 16, true, false}, .unit = "pixels",
+                 .fallback = yaml(d.filter_sigma), .doc = "Standard deviation; gaussian only."},
+            }};
+}
+
+SectionSchema integrator() {
+    const IntegratorSettings d;
+    const std::vector<std::string> types{"path", "normals", "aabb"};
+    const std::vector<std::string> accelerators{"auto", "bvh", "aabb", "none"};
+    return {"integrator", "integrator", "",
+            {
+                {.name = "type", .kind = Kind::Choice, .choices = types, .fallback = yaml(types, d.type),
+                 .doc = "Light transport by path tracing, or a picture of shading normals or of bounding boxes for debugging."},
+                {.name = "max_depth", .kind = Kind::Integer, .range = {0, 1e9, false, false}, .unit = "scattering events",
+                 .fallback = yaml(d.max_depth), .doc = "Longest path; 0 shows emitters only, 1 is direct light."},
+                {.name = "roulette_depth", .kind = Kind::Integer, .range = {0, 1e9, false, false}, .unit = "scattering events",
+                 .fallback = yaml(d.roulette_depth), .doc = "First event after which Russian roulette may end a path."},
+                {.name = "roulette", .kind = Kind::Boolean, .fallback = yaml(d.roulette),
+                 .doc = "Russian roulette: shorter paths, same mean, more noise per sample."},
+                {.name = "nee", .kind = Kind::Boolean, .fallback = yaml(d.nee),
+                 .doc = "Next event estimation with multiple importance sampling; off, light is only found by chance."},
+                {.name = "accelerator", .kind = Kind::Choice, .choices = accelerators, .fallback = yaml(accelerators, d.accelerator),
+                 .doc = "Hierarchy for tracing rays: chosen by scene size, a BVH, a box per object, or a plain loop."},
+            }};
+}
+
+SectionSchema sampler() {
+    const SamplerSettings d;
+    const std::vector<std::string> types{"sobol", "independent", "xorshift"};
+    return {"sampler", "sampler", "",
+            {
+                {.name = "type", .kind = Kind::Choice, .choices = types, .fallback = yaml(types, d.type),
+                 .doc = "Owen-scrambled Sobol points, independent random numbers, or a xorshift generator."},
+                {.name = "seed", .kind = Kind::Integer, .range = kNotNegative, .fallback = yaml(d.seed),
+                 .doc = "Another seed is another, equally good, noise."},
+                {.name = "samples", .kind = Kind::Integer, .range = {1, 9007199254740992.0, false, false}, .unit = "per pixel",
+                 .fallback = yaml(d.samples), .doc = "Used when neither --spp nor --time says otherwise."},
+            }};
+}
+
+void addSpectra(std::vector<SectionSchema>& all) {
+    all.push_back({"spectrum/table", "a tabulated spectrum", "Measured values, linear between.",
+                   {{.name = "table", .kind = Kind::Section, .section = "table", .required = true, .doc = "The two columns."},
+                    outsideKey(), scaleKey()}});
+    all.push_back({"table", "a table", "",
+                   {{.name = "nm", .kind = Kind::Number, .shape = Shape::List, .count_min = 1, .range = kPositive, .unit = "nm",
+                     .required = true, .doc = "Wavelengths, strictly increasing."},
+                    {.name = "value", .kind = Kind::Number, .shape = Shape::List, .count_min = 1, .required = true,
+                     .doc = "One value per wavelength."}}});
+    all.push_back({"spectrum/file", "a spectrum from a file", "",
+                   {{.name = "file", .required = true,
+                     .doc = "A .spd or .csv of two columns, wavelength in nm and value; looked up beside the scene, then in "
+                            "CRT_MESH_PATH."},
+                    outsideKey(), scaleKey()}});
+    all.push_back({"spectrum/rgb", "an rgb spectrum",
+                   "A smooth spectrum of the colour (Jakob and Hanika 2019): below 1 as a reflectance, times D65 as an emission. Not "
+                   "for refractive indices.",
+                   {{.name = "rgb", .kind = Kind::Number, .shape = Shape::List, .count_min = 3, .count_max = 3, .range = kNotNegative,
+                     .required = true, .doc = "Red, green and blue with sRGB primaries."},
+                    {.name = "space", .kind = Kind::Choice, .choices = {"srgb", "linear"}, .fallback = "srgb",
+                     .doc = "Are the components sRGB-encoded (as colour pickers show them, 0 to 1) or linear?"},
+                    scaleKey()}});
+    all.push_back({"spectrum/blackbody", "a black body", "Planck's law.",
+                   {{.name = "blackbody", .kind = Kind::Number, .range = {100, 1e7, false, false}, .unit = "K", .required = true,
+                     .doc = "Temperature."},
+                    {.name = "normalise", .kind = Kind::Boolean, .fallback = "true",
+                     .doc = "Scale the maximum within 360 to 830 nm to 1; false leaves W·m⁻²·sr⁻¹·nm⁻¹."},
+                    scaleKey()}});
+    all.push_back({"spectrum/illuminant", "an illuminant", "A CIE standard illuminant, scaled to luminance 1.",
+                   {{.name = "illuminant", .kind = Kind::Choice, .choices = illuminantNames(), .required = true, .doc = "Its name."},
+                    scaleKey()}});
+    all.push_back({"spectrum/sellmeier", "a Sellmeier index", "n² = 1 + Σ Bᵢλ² / (λ² − Cᵢ), λ in µm.",
+                   {{.name = "sellmeier", .kind = Kind::Section, .section = "sellmeier", .required = true, .doc = "The coefficients."},
+                    scaleKey()}});
+    all.push_back({"sellmeier", "Sellmeier coefficients", "",
+                   {{.name = "B", .kind = Kind::Number, .shape = Shape::List, .count_min = 3, .count_max = 3, .required = true,
+                     .doc = "B₁, B₂, B₃."},
+                    {.name = "C", .kind = Kind::Number, .shape = Shape::List, .count_min = 3, .count_max = 3, .unit = "µm²",
+                     .required = true, .doc = "C₁, C₂, C₃."}}});
+    all.push_back({"spectrum/cauchy", "a Cauchy index", "n = A + B/λ² + C/λ⁴ + …, λ in µm.",
+                   {{.name = "cauchy", .kind = Kind::Number, .shape = Shape::List, .count_min = 1, .count_max = 8, .unit = "1, µm², µm⁴, …",
+                     .required = true, .doc = "A, B, C, …"},
+                    scaleKey()}});
+    all.push_back({"spectrum/glass", "a glass", "Refractive index of a catalogue glass.",
+                   {{.name = "glass", .kind = Kind::Choice, .choices = glassNames(), .required = true, .doc = "Its name."}, scaleKey()}});
+    all.push_back({"spectrum/ref", "a reference", "A named spectrum; the form to use when it should be scaled.",
+                   {{.name = "ref", .required = true, .doc = "A name in `spectra`."}, scaleKey()}});
+}
+
+void addMaterials(std::vector<SectionSchema>& all) {
+    const KeySchema reflectance{.name = "reflectance", .kind = Kind::Spectrum, .range = {0, 1, false, false}, .required = true,
+                                .doc = "Fraction of light sent back, at every wavelength."};
+    all.push_back({"material/diffuse", "a diffuse material", "Lambert's law.", {typeKey("diffuse"), reflectance}});
+    all.push_back({"material/mirror", "a mirror material", "Perfect reflection.", {typeKey("mirror"), reflectance}});
+    all.push_back({"material/conductor", "a conductor material", "A smooth metal: Fresnel's equations with a complex index. Give "
+                   "`metal`, or `eta` with `k`.",
+                   {typeKey("conductor"),
+                    {.name = "metal", .kind = Kind::Choice, .choices = metalNames(), .doc = "A measured metal."},
+                    {.name = "eta", .kind = Kind::Spectrum, .range = kPositive, .doc = "Real part n of the refractive index."},
+                    {.name = "k", .kind = Kind::Spectrum, .range = kNotNegative, .doc = "Its imaginary part, the extinction."}},
+                   {{KeyRule::Kind::ExactlyOne, {"metal", "eta"}}, {KeyRule::Kind::Together, {"eta", "k"}}}});
+    all.push_back({"material/dielectric", "a dielectric material", "Smooth glass or water: reflects and refracts.",
+                   {typeKey("dielectric"),
+                    {.name = "ior", .kind = Kind::Spectrum, .range = kPositive, .required = true,
+                     .doc = "Refractive index of the inside relative to the outside; inside is where normals point away from."}}});
+}
+
+void addObjects(std::vector<SectionSchema>& all) {
+    all.push_back({"object", "an object", "A mesh, placed once or many times. Give `obj` or `mesh`; `transform` or `transforms`.",
+                   {
+                       {.name = "name", .doc = "For messages and reports."},
+                       {.name = "obj", .doc = "A Wavefront OBJ file, looked up beside the scene, then in CRT_MESH_PATH."},
+                       {.name = "mesh", .kind = Kind::Section, .section = "mesh", .doc = "Or the geometry written out."},
+                       {.name = "material",
+                        .doc = "A name in `materials`, for the whole object, or `from_mtl`: the materials of the OBJ. May be left out for an "
+                               "OBJ that has its own."},
+                       {.name = "material_overrides", .shape = Shape::Map,
+                        .doc = "With the materials of an OBJ: name in the MTL → name in `materials`, used in its place."},
+                       {.name = "transform", .kind = Kind::Section, .shape = Shape::List, .section = "transform", .fallback = "[]",
+                        .doc = "One placement: steps applied in order, the first one first."},
+                       {.name = "transforms", .kind = Kind::Section, .shape = Shape::Lists, .section = "transform",
+                        .doc = "Several placements; the mesh is stored once."},
+                       {.name = "emission", .kind = Kind::Section, .section = "emission", .doc = "Makes the surface a light."},
+                   },
+                   {{KeyRule::Kind::ExactlyOne, {"obj", "mesh"}}, {KeyRule::Kind::AtMostOne, {"transform", "transforms"}}}});
+    all.push_back({"mesh", "a mesh", "",
+                   {
+                       {.name = "positions", .kind = Kind::Number, .shape = Shape::Lists, .count_min = 3, .count_max = 3,
+                        .unit = "object units", .required = true, .doc = "Vertices [x, y, z]."},
+                       {.name = "faces", .kind = Kind::Integer, .shape = Shape::Lists, .count_min = 3, .range = {0, 4294967294.0, false, false},
+                        .required = true,
+                        .doc = "Convex polygons, as indices into `positions` from 0. Counter-clockwise seen from the front."},
+                       {.name = "normals", .kind = Kind::Number, .shape = Shape::Lists, .count_min = 3, .count_max = 3,
+                        .doc = "One per vertex, for smooth shading."},
+                   }});
+    all.push_back({"transform/translate", "a translation", "",
+                   {{.name = "translate", .kind = Kind::Number, .shape = Shape::List, .count_min = 3, .count_max = 3, .required = true,
+                     .doc = "Adds [x, y, z]."}}});
+    all.push_back({"transform/scale", "a scaling", "",
+                   {{.name = "scale", .kind = Kind::Number, .shape = Shape::OneOrList, .count_min = 3, .count_max = 3, .required = true,
+                     .doc = "One factor or [x, y, z]; none of them 0, negative mirrors."}}});
+    all.push_back({"transform/rotate", "a rotation", "",
+                   {{.name = "rotate", .kind = Kind::Section, .section = "rotate", .required = true,
+                     .doc = "Turns about an axis through the origin."}}});
+    all.push_back({"rotate", "a rotation", "",
+                   {{.name = "axis", .kind = Kind::Number, .shape = Shape::List, .count_min = 3, .count_max = 3, .required = true,
+                     .doc = "Any length but 0."},
+                    {.name = "angle_deg", .kind = Kind::Number, .unit = "degrees", .required = true,
+                     .doc = "Counter-clockwise when the axis points at the viewer."}}});
+    all.push_back({"transform/matrix", "a matrix", "",
+                   {{.name = "matrix", .kind = Kind::Number, .shape = Shape::List, .count_min = 16, .count_max = 16, .required = true,
+                     .doc = "Four rows of four, points as columns, last row 0 0 0 1; must be invertible."}}});
+    all.push_back({"emission", "an emission", "",
+                   {{.name = "radiance", .kind = Kind::Spectrum, .range = kNotNegative, .unit = "W·m⁻²·sr⁻¹·nm⁻¹", .required = true,
+                     .doc = "Emitted equally in all directions."},
+                    {.name = "two_sided", .kind = Kind::Boolean, .fallback = yaml(Emission{}.two_sided),
+                     .doc = "Shine on the back side too?"}}});
+}
+
+void addOutside(std::vector<SectionSchema>& all) {
+    all.push_back({"environment", "environment", "",
+                   {{.name = "radiance", .kind = Kind::Spectrum, .range = kNotNegative, .unit = "W·m⁻²·sr⁻¹·nm⁻¹", .required = true,
+                     .doc = "The same from every direction."}}});
+    all.push_back({"output", "an output", "",
+                   {{.name = "file", .required = true, .doc = "Its name, as given to the file system: relative to the working directory."},
+                    {.name = "format", .kind = Kind::Choice, .choices = {"exr", "png", "ppm", "pfm"},
+                     .doc = "By the extension of `file` when left out."},
+                    {.name = "aovs", .kind = Kind::Choice, .shape = Shape::List,
+                     .choices = {"albedo", "normal", "depth", "primitive", "variance", "samples"}, .fallback = "[]",
+                     .doc = "Further channels; exr only."}}});
+}
+
+}  // namespace
+
+std::string ValueRange::text() const {
+    const bool low = std::isfinite(min), high = std::isfinite(max);
+    if (!low && !high) return "any";
+    if (!high) return min_open ? fmt::format("above {}", min) : fmt::format("{} or more", min);
+    if (!low) return max_open ? fmt::format("below {}", max) : fmt::format("{} or less", max);
+    if (min == max) return fmt::format("{}", min);
+    if (min_open && max_open) return fmt::format("between {} and {}, both excluded", min, max);
+    if (min_open) return fmt::format("above {}, at most {}", min, max);
+    return fmt::format("{} to {}{}", min, max, max_open ? ", excluded" : "");
+}
+
+const KeySchema* SectionSchema::find(std::string_view key) const {
+    for (const KeySchema& k : keys)
+        if (k.name == key) return &k;
+    return nullptr;
+}
+
+std::vector<std::string> SectionSchema::keyNames() const {
+    std::vector<std::string> names;
+    for (const KeySchema& k : keys) names.push_back(k.name);
+    return names;
+}
+
+const std::vector<SectionSchema>& sceneSchema() {
+    static const std::vector<SectionSchema> schema = [] {
+        std::vector<SectionSchema> all{topLevel(), camera(), film(), filter(), integrator(), sampler()};
+        addSpectra(all);
+        addMaterials(all);
+        addObjects(all);
+        addOutside(all);
+        return all;
+    }();
+    return schema;
+}
+
+const SectionSchema& schemaSection(std::string_view name) {
+    for (const SectionSchema& section : sceneSchema())
+        if (section.name == name) return section;
+    throw Error(ErrorKind::Internal, fmt::format("the scene schema has no section '{}'", name));
+}
+
+std::vector<const SectionSchema*> schemaVariants(std::string_view family) {
+    std::vector<const SectionSchema*> variants;
+    const std::string prefix = fmt::format("{}/", family);
+    for (const SectionSchema& section : sceneSchema())
+        if (section.name == family || section.name.starts_with(prefix)) variants.push_back(&section);
+    return variants;
+}
+
+bool variantByType(const SectionSchema& variant) { return variant.find("type") != nullptr; }
+
+std::string variantWord(const SectionSchema& variant) { return variant.name.substr(variant.name.find('/') + 1); }
+
+std::vector<std::string> sectionsWithKey(std::string_view key, std::string_view not_here) {
+    std::vector<std::string> names;
+    for (const SectionSchema& section : sceneSchema())
+        if (section.name != not_here && section.find(key) != nullptr) names.push_back(section.title);
+    return names;
+}
+
+}  // namespace crt

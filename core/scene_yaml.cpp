@@ -1,0 +1,385 @@
+#include "scene_yaml.h"
+
+#include "log.h"
+#include "scene_objects.h"
+#include "scene_reader.h"
+#include "scene_schema.h"
+#include "scene_spectra.h"
+#include "yaml_reader.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <string_view>
+
+namespace crt {
+namespace {
+
+// ---- Overrides -------------------------------------------------------------------------------------------------------
+
+/// One `--set` argument on its way down the tree.
+class OverrideWalk {
+public:
+    OverrideWalk(const SceneOverride& change, const YamlSource& source, Diagnostics& out)
+        : path_(change.path), source_(source), out_(out) {}
+
+    /// Puts `value` where the path leads. Nodes on the way are copied first, because aliases share them. Maps that the
+    /// file leaves out are made; the check of the whole scene then finds keys that do not exist, with the place in the argument.
+    void apply(YamlNodePtr& slot, const YamlNodePtr& value, std::size_t at = 0) {
+        slot = std::make_shared<YamlNode>(*slot);
+        if (slot->kind == YamlKind::Null) slot->kind = YamlKind::Map;
+        switch (slot->kind) {
+            case YamlKind::Map: return applyToMap(*slot, value, at);
+            case YamlKind::List: return applyToList(*slot, value, at);
+            case YamlKind::Scalar:
+            case YamlKind::Null: break;
+        }
+        const std::string_view before = std::string_view(path_).substr(0, at > 0 ? at - 1 : 0);
+        out_.error(place(at, path_.size() - at), fmt::format("'{}' is {} here, so there is nothing inside it to set", before, describeNode(*slot)),
+                   fmt::format("set '{}' as a whole", before));
+    }
+
+private:
+    YamlPlace place(std::size_t at, std::size_t length) const {
+        return {&source_, 1, static_cast<int>(at) + 1, static_cast<int>(std::max<std::size_t>(length, 1))};
+    }
+
+    /// Length of the next part of the path. Names may hold dots ("Material.001"), so a key that is there wins over the first dot.
+    std::size_t partLength(const YamlNode& map, std::size_t at) const {
+        const std::string_view rest = std::string_view(path_).substr(at);
+        std::size_t longest = 0;
+        for (const YamlEntry& e : map.entries)
+            if (rest.starts_with(e.key) && (rest.size() == e.key.size() || rest[e.key.size()] == '.'))
+                longest = std::max(longest, e.key.size());
+        return longest > 0 ? longest : std::min(rest.find('.'), rest.size());
+    }
+
+    void applyToMap(YamlNode& map, const YamlNodePtr& value, std::size_t at) {
+        const std::size_t length = partLength(map, at);
+        const std::string key = path_.substr(at, length);
+        const bool last = at + length == path_.size();
+        const auto entry = std::find_if(map.entries.begin(), map.entries.end(), [&](const YamlEntry& e) { return e.key == key; });
+        if (entry != map.entries.end()) {
+            if (!last) return apply(entry->value, value, at + length + 1);
+            entry->key_place = place(at, length);
+            entry->place = value->place;
+            entry->value = value;
+            return;
+        }
+        if (!last && namesAreFree(at)) {
+            std::vector<std::string> names;
+            for (const YamlEntry& e : map.entries) names.push_back(e.key);
+            out_.error(place(at, length), fmt::format("there is no '{}' in '{}'", key, path_.substr(0, at - 1)), didYouMean(key, names));
+            return;
+        }
+        YamlNodePtr node = value;
+        if (!last) {
+            node = std::make_shared<YamlNode>();
+            node->place = place(at, length);
+            apply(node, value, at + length + 1);
+        }
+        map.entries.push_back({key, place(at, length), node->place, node});
+    }
+
+    /// Directly inside `materials` or `spectra`, where a misspelt name must not make a new entry.
+    bool namesAreFree(std::size_t at) const {
+        if (at == 0) return false;
+        const KeySchema* key = schemaSection("").find(std::string_view(path_).substr(0, at - 1));
+        return key != nullptr && key->shape == ValueShape::Map;
+    }
+
+    void applyToList(YamlNode& list, const YamlNodePtr& value, std::size_t at) {
+        const std::size_t length = std::min(path_.find('.', at), path_.size()) - at;
+        const Parsed<std::uint64_t> index = parseUnsigned(path_.substr(at, length));
+        if (!index.value || *index.value >= list.items.size()) {
+            const std::string list_name = path_.substr(0, at > 0 ? at - 1 : 0);
+            out_.error(place(at, length),
+                       list.items.empty() ? fmt::format("'{}' is an empty list", list_name)
+                                          : fmt::format("'{}' is a list; expected an index from 0 to {}, found '{}'", list_name,
+                                                        list.items.size() - 1, path_.substr(at, length)));
+            return;
+        }
+        YamlNodePtr& item = list.items[*index.value];
+        if (at + length == path_.size())
+            item = value;
+        else
+            apply(item, value, at + length + 1);
+    }
+
+    std::string path_;
+    const YamlSource& source_;
+    Diagnostics& out_;
+};
+
+void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrides, std::deque<YamlSource>& sources, Diagnostics& out) {
+    for (const SceneOverride& change : overrides) {
+        const YamlSource& source = sources.emplace_back(fmt::format("--set {}", change.path), change.path + "=" + change.value, true);
+        const std::size_t before = out.count();
+        const YamlNodePtr value = readYaml(source, change.value, out, static_cast<int>(change.path.size()) + 1);
+        if (value)
+            OverrideWalk(change, source, out).apply(root, value);
+        else if (out.count() == before)
+            out.error({&source, 1, static_cast<int>(change.path.size()) + 1, 1}, "there is no value after '='; null says none");
+    }
+}
+
+// ---- Sections --------------------------------------------------------------------------------------------------------
+
+void readFilm(const SectionReader& section, SpectrumReader& spectra, Film& film) {
+    constexpr std::int64_t kMaxPixels = std::int64_t{1} << 31;  // Pixels are numbered in 32 bits.
+    std::vector<int> size;
+    if (section.read("resolution", size)) {
+        const std::int64_t pixels = std::int64_t{size[0]} * size[1];
+        if (pixels > kMaxPixels)
+            section.error("resolution", fmt::format("{} x {} are {} pixels; a film has at most 2^31", size[0], size[1], pixels));
+        film.width = size[0];
+        film.height = size[1];
+    }
+    std::vector<int> crop;
+    if (section.read("crop", crop)) {
+        if (crop[0] >= crop[2] || crop[1] >= crop[3])
+            section.error("crop", "this window is empty; crop is [x0, y0, x1, y1) with x0 < x1 and y0 < y1");
+        else if (crop[2] > film.width || crop[3] > film.height)
+            section.error("crop", fmt::format("this window goes beyond the film of {} x {} pixels", film.width, film.height));
+        std::copy(crop.begin(), crop.end(), film.crop.begin());
+    }
+
+    double radius = 0;
+    bool radius_given = false;
+    if (const YamlEntry* filter = section.find("filter"); filter != nullptr && filter->value->kind == YamlKind::Map) {
+        const std::optional<SectionReader> details = section.section("filter", "the filter");
+        details->readEnum("type", film.filter);
+        radius_given = details->read("radius", radius);
+        details->read("sigma", film.filter_sigma);
+        if (details->has("sigma") && film.filter != PixelFilter::Gaussian) details->error("sigma", "only a gaussian filter has a sigma");
+    } else {
+        section.readEnum("filter", film.filter);
+    }
+    constexpr double kSmoothRadius = 1.5;  // Pixels; a narrower window cuts a bell off while it is still high.
+    film.filter_radius = radius_given ? radius : film.filter == PixelFilter::Box ? Film{}.filter_radius : kSmoothRadius;
+
+    section.readEnum("color_space", film.color_space);
+    film.white_balance = spectra.read(section, "white_balance", SpectrumUse::White);
+    if (film.white_balance && !(spectrumToXyz(*film.white_balance)[1] > 0))
+        section.error("white_balance", "this spectrum has no luminance, so it has no white");
+    section.read("exposure_ev", film.exposure_ev);
+}
+
+double length(const Vec3d& v) { return std::hypot(v[0], v[1], v[2]); }
+
+/// Finds what leaves the view without a direction or the picture without an up.
+void checkView(const SectionReader& section, const Camera& camera) {
+    constexpr double kParallel = 1e-9;  // Sine of the angle below which up × view is only rounding.
+    const Vec3d view{camera.target[0] - camera.position[0], camera.target[1] - camera.position[1], camera.target[2] - camera.position[2]};
+    const double view_length = length(view), up_length = length(camera.up);
+    const std::string_view aim = section.has("target") ? "target" : "position";
+    if (view_length == 0) return section.error(aim, "position and target are the same point, so the camera looks nowhere");
+    if (!std::isfinite(view_length)) return section.error(aim, "position and target are too far apart for a double");
+    if (up_length == 0) return section.error("up", "up has length 0");
+    if (!std::isfinite(up_length)) return section.error("up", "up is too long for a double");
+    Vec3d v = view, u = camera.up;
+    for (std::size_t i = 0; i < 3; ++i) v[i] /= view_length, u[i] /= up_length;
+    const Vec3d side{v[1] * u[2] - v[2] * u[1], v[2] * u[0] - v[0] * u[2], v[0] * u[1] - v[1] * u[0]};
+    if (length(side) < kParallel)
+        section.error(section.has("up") ? "up" : aim, "up is parallel to the view, so the picture could be turned any way",
+                      section.has("up") ? "" : "set 'up', which is [0, 1, 0] when left out");
+}
+
+/// The image plane from the angle across its shorter side.
+void setFieldOfView(Camera& camera, const Film& film, double tan_shorter) {
+    const double aspect = static_cast<double>(film.width) / film.height;
+    camera.tan_half_width = tan_shorter * std::max(aspect, 1.0);
+    camera.tan_half_height = tan_shorter * std::max(1 / aspect, 1.0);
+}
+
+void readCamera(const SectionReader& section, const Film& film, Camera& camera) {
+    camera.place = section.place().resolved();
+    const std::size_t before = section.diagnostics().count();
+    for (const auto& [key, value] : {std::pair{"position", &camera.position}, {"target", &camera.target}, {"up", &camera.up}})
+        section.read(key, *value);
+    if (section.diagnostics().count() == before) checkView(section, camera);
+
+    double fov = 0, focal_length = 0;
+    std::vector<double> sensor;
+    if (section.read("fov", fov)) setFieldOfView(camera, film, std::tan(fov * (std::numbers::pi / 360)));
+    const bool have_focal_length = section.read("focal_length", focal_length), have_sensor = section.read("sensor", sensor);
+    if (have_focal_length && have_sensor) {
+        camera.tan_half_width = sensor[0] / (2 * focal_length);
+        camera.tan_half_height = sensor[1] / (2 * focal_length);
+        if (!std::isfinite(camera.tan_half_width) || !std::isfinite(camera.tan_half_height) || camera.tan_half_width == 0 ||
+            camera.tan_half_height == 0)
+            section.error("sensor", "sensor and focal_length give no field of view");
+        constexpr double kSquareEnough = 1e-3;
+        const double pixel_aspect = sensor[0] / sensor[1] * film.height / film.width;
+        if (std::abs(pixel_aspect - 1) > kSquareEnough) {
+            const SourcePlace at = section.place("sensor").resolved();
+            logWarning("{}:{}:{}: sensor and resolution have different proportions: pixels are {:.4g} times as wide as high", at.file,
+                       at.line, at.column, pixel_aspect);
+        }
+    }
+    section.read("aperture_radius", camera.aperture_radius);
+    section.read("focus_distance", camera.focus_distance);
+}
+
+void readIntegrator(const SectionReader& section, IntegratorSettings& settings) {
+    section.readEnum("type", settings.type);
+    section.read("max_depth", settings.max_depth);
+    section.read("roulette_depth", settings.roulette_depth);
+    section.read("roulette", settings.roulette);
+    section.read("nee", settings.nee);
+    section.readEnum("accelerator", settings.accelerator);
+}
+
+void readSampler(const SectionReader& section, SamplerSettings& settings) {
+    section.readEnum("type", settings.type);
+    section.read("seed", settings.seed);
+    section.read("samples", settings.samples);
+}
+
+void readOutput(const SectionReader& section, std::vector<Output>& outputs) {
+    Output output;
+    output.place = section.place().resolved();
+    const bool named = section.read("file", output.file);
+    if (named && std::any_of(outputs.begin(), outputs.end(), [&](const Output& o) { return o.file == output.file; }))
+        section.error("file", fmt::format("'{}' is written twice", output.file));
+
+    bool format_known = section.readEnum("format", output.format);
+    if (named && !section.has("format")) {
+        const std::vector<std::string>& formats = section.schema().find("format")->choices;
+        std::string extension = std::filesystem::path(output.file).extension().string();
+        if (!extension.empty()) extension.erase(0, 1);
+        for (char& c : extension)
+            if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+        const auto found = std::find(formats.begin(), formats.end(), extension);
+        format_known = found != formats.end();
+        if (format_known)
+            output.format = static_cast<OutputFormat>(found - formats.begin());
+        else
+            section.error("file", fmt::format("'{}' does not end in one of .{}; add 'format'", output.file, fmt::join(formats, ", .")),
+                          didYouMean(extension, formats));
+    }
+
+    if (const YamlNode* list = section.list("aovs")) {
+        const KeySchema& key = *section.schema().find("aovs");
+        for (const YamlNodePtr& item : list->items) {
+            std::size_t bit = 0;
+            if (readChoice(section.diagnostics(), *item, item->place, key, "an item of 'aovs'", bit)) output.aovs |= 1u << bit;
+        }
+        if (!list->items.empty() && format_known && output.format != OutputFormat::Exr)
+            section.error("aovs", "only exr files hold more than the image");
+    }
+    outputs.push_back(std::move(output));
+}
+
+void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene& scene) {
+    const SectionReader top(out, root, root.place, schemaSection(""), "the scene");
+    if (root.kind != YamlKind::Map) return;
+    int version = 1;
+    top.read("crt", version);
+    top.read("title", scene.title);
+
+    SpectrumReader spectra(out, files, top.map("spectra"));
+    if (const auto section = top.section("film", "film")) readFilm(*section, spectra, scene.film);
+    const auto camera = top.section("camera", "camera");
+    setFieldOfView(scene.camera, scene.film, std::min(scene.camera.tan_half_width, scene.camera.tan_half_height));
+    if (camera) readCamera(*camera, scene.film, scene.camera);
+    if (const auto section = top.section("integrator", "integrator")) readIntegrator(*section, scene.integrator);
+    if (const auto section = top.section("sampler", "sampler")) readSampler(*section, scene.sampler);
+
+    ObjectReader objects(out, files, spectra, scene);
+    if (const YamlNode* map = top.map("materials")) objects.readMaterials(*map);
+    if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
+    if (const auto section = top.section("environment", "environment"))
+        if (std::optional<Spectrum> radiance = spectra.read(*section, "radiance", SpectrumUse::Emission))
+            scene.environment = Environment{*std::move(radiance)};
+    if (const YamlNode* list = top.list("outputs"))
+        for (std::size_t i = 0; i < list->items.size(); ++i)
+            readOutput(SectionReader(out, *list->items[i], list->items[i]->place, schemaSection("output"), fmt::format("output {}", i)),
+                       scene.outputs);
+
+    spectra.finish();
+    if (!out.failed()) objects.finish();
+}
+
+/// The version comes first so that a reader of another version can stop before it meets a key it does not know.
+void checkFirstKey(const YamlNode& root, Diagnostics& out) {
+    if (root.kind != YamlKind::Map) return;
+    const YamlEntry* version = root.find("crt");
+    if (version != nullptr && version != &root.entries.front())
+        out.error(version->key_place, "'crt' must be the first key of a scene");
+}
+
+Scene parse(const std::string& yaml, const std::string& name, const std::vector<SceneOverride>& overrides, SceneFiles files) {
+    const auto start = std::chrono::steady_clock::now();
+    Scene scene;
+    scene.file = name;
+    const YamlSource source(name, yaml);
+    std::deque<YamlSource> override_sources;  // Places point to them: they must not move.
+    Diagnostics out;
+    YamlNodePtr root = readYaml(source, yaml, out);
+    if (!root && !out.failed()) out.error({&source, 0, 0, 1}, "there is nothing in this file; a scene begins with 'crt: 1'");
+    if (root) {
+        checkFirstKey(*root, out);
+        applyOverrides(root, overrides, override_sources, out);
+        readScene(*root, out, files, scene);
+    }
+    out.throwIfFailed();
+    scene.files_read = files.read();
+    scene.parse_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return scene;
+}
+
+[[noreturn]] void cannotRead(const std::string& path, std::string_view why) {
+    throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", path, why), {path, 0, 0});
+}
+
+/// The whole scene file. A bound keeps a disk image or /dev/zero from filling the memory; meshes of that size belong in an OBJ.
+std::string readSceneText(const std::string& path) {
+    constexpr std::size_t kMaxBytes = std::size_t{256} << 20, kBlock = std::size_t{1} << 16;
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) cannotRead(path, "this is a directory, not a scene file");
+    errno = 0;
+    std::ifstream in(path, std::ios::binary);
+    if (!in) cannotRead(path, fmt::format("cannot be opened: {}", errno != 0 ? std::strerror(errno) : "unknown reason"));
+    std::string text;
+    while (in) {
+        const std::size_t size = text.size();
+        text.resize(size + kBlock);
+        in.read(text.data() + size, kBlock);
+        text.resize(size + static_cast<std::size_t>(in.gcount()));
+        if (text.size() > kMaxBytes) cannotRead(path, "more than 256 MiB; put large meshes into OBJ files");
+    }
+    if (in.bad()) cannotRead(path, "cannot be read to its end");
+    return text;
+}
+
+}  // namespace
+
+SceneOverride parseOverride(const std::string& text) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0)
+        throw Error(ErrorKind::Usage, fmt::format("--set {}: expected KEY.PATH=VALUE, such as film.resolution=[128,128]", text));
+    return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides) {
+    const std::string text = readSceneText(path);
+    SceneFiles files(std::filesystem::path(path).parent_path().string());
+    files.note(path);
+    return parse(text, path, overrides, std::move(files));
+}
+
+Scene parseScene(const std::string& yaml, const std::string& name, const std::string& directory, const std::vector<SceneOverride>& overrides) {
+    return parse(yaml, name, overrides, SceneFiles(directory));
+}
+
+}  // namespace crt

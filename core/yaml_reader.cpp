@@ -1,0 +1,507 @@
+#include "yaml_reader.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/parser.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <istream>
+#include <iterator>
+#include <streambuf>
+#include <tuple>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+
+namespace crt {
+namespace {
+
+constexpr std::size_t kMaxDepth = 64;           // A scene needs 8; the bound keeps every later recursion safe.
+constexpr std::uint64_t kMaxNodes = 1u << 27;   // With aliases written out: stops "billion laughs" before anything walks them.
+constexpr std::size_t kMaxErrorsShown = 50;
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+
+bool isContinuationByte(char c) { return (static_cast<unsigned char>(c) & 0xc0u) == 0x80u; }
+
+/// Number of characters (code points) in the first `bytes` bytes.
+std::size_t characters(std::string_view text, std::size_t bytes) {
+    text = text.substr(0, std::min(bytes, text.size()));
+    return text.size() - static_cast<std::size_t>(std::count_if(text.begin(), text.end(), isContinuationByte));
+}
+
+// ---- The text itself -------------------------------------------------------------------------------------------------
+
+/// Length of the valid UTF-8 sequence at the start of `s`, 0 when it is not one (overlong forms and surrogates included).
+std::size_t utf8Length(std::string_view s) {
+    const auto byte = [&](std::size_t i) { return i < s.size() ? static_cast<unsigned char>(s[i]) : 0u; };
+    const auto tail = [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i)
+            if ((byte(i) & 0xc0u) != 0x80u) return false;
+        return true;
+    };
+    const unsigned a = byte(0), b = byte(1);
+    if (a < 0x80u) return 1;
+    if (a >= 0xc2u && a <= 0xdfu) return tail(1, 2) ? 2 : 0;
+    if (a >= 0xe0u && a <= 0xefu) {
+        const bool odd = (a == 0xe0u && b < 0xa0u) || (a == 0xedu && b > 0x9fu);
+        return tail(1, 3) && !odd ? 3 : 0;
+    }
+    if (a >= 0xf0u && a <= 0xf4u) {
+        const bool odd = (a == 0xf0u && b < 0x90u) || (a == 0xf4u && b > 0x8fu);
+        return tail(1, 4) && !odd ? 4 : 0;
+    }
+    return 0;
+}
+
+/// Reports the first byte that cannot be in a text file. A picture or a mesh given by mistake ends here, with its reason.
+bool checkText(const YamlSource& source, std::string_view text, Diagnostics& out) {
+    int line = 1, column = 1;
+    for (std::size_t i = 0; i < text.size();) {
+        const auto c = static_cast<unsigned char>(text[i]);
+        const std::size_t length = utf8Length(text.substr(i));
+        if (c == 0x7fu || (c < 0x20u && c != '\t' && c != '\n' && c != '\r') || length == 0) {
+            out.error({&source, line, column, 1},
+                      fmt::format("byte 0x{:02x} at offset {} is not text: a scene is a YAML file in UTF-8", c, i));
+            return false;
+        }
+        column += static_cast<int>(length);
+        if (c == '\n') ++line, column = 1;
+        i += length;
+    }
+    return true;
+}
+
+/// A stream over memory that is already there; std::istringstream would copy a scene of hundreds of megabytes.
+class MemoryBuffer : public std::streambuf {
+public:
+    explicit MemoryBuffer(std::string_view text) {
+        char* begin = const_cast<char*>(text.data());  // The get area is declared mutable but only read.
+        setg(begin, begin, begin + text.size());
+    }
+};
+
+// ---- Events → tree ---------------------------------------------------------------------------------------------------
+
+/// yaml-cpp blames what follows a tab, not the tab.
+std::string tabHint(const YamlSource& source, int line) {
+    if (line < 1 || static_cast<std::size_t>(line) > source.lines.size()) return {};
+    const std::string& text = source.lines[static_cast<std::size_t>(line) - 1];
+    const std::size_t first = text.find_first_not_of(' ');
+    return first != std::string::npos && text[first] == '\t' ? "indent with blanks; YAML has no tabs there" : "";
+}
+
+/// Thrown out of yaml-cpp's parser when going on makes no sense; the error is already recorded.
+struct StopParsing {};
+
+class TreeBuilder final : public YAML::EventHandler {
+public:
+    TreeBuilder(const YamlSource& source, Diagnostics& out, int first_column)
+        : source_(source), out_(out), first_column_(first_column) {}
+
+    YamlNodePtr root() const { return root_; }
+
+    YamlPlace placeOf(const YAML::Mark& mark, std::size_t length = 1) const {
+        if (mark.is_null()) return {&source_, 0, 0, 1};
+        const int shift = mark.line == 0 ? first_column_ : 0;
+        return {&source_, mark.line + 1, mark.column + 1 + shift, static_cast<int>(std::max<std::size_t>(length, 1))};
+    }
+
+    void OnDocumentStart(const YAML::Mark& mark) override {
+        if (!root_) return;
+        out_.error(placeOf(mark), "a second YAML document begins here; a scene is one document");
+        throw StopParsing{};
+    }
+    void OnDocumentEnd() override {}
+
+    void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+        auto node = make(YamlKind::Null, placeOf(mark));
+        // An empty value has the mark of whatever comes next; its key is the better place.
+        if (!stack_.empty() && stack_.back().key_pending) node->place = stack_.back().key_place;
+        remember(anchor, node);
+        attach(std::move(node), "an empty key");
+    }
+
+    void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor, const std::string& value) override {
+        const bool quoted = tag == "!";
+        auto node = make(YamlKind::Scalar, placeOf(mark, value.substr(0, value.find('\n')).size() + (quoted ? 2 : 0)));
+        node->text = value;
+        node->quoted = quoted;
+        if (!quoted) refuseTag(tag, node->place);
+        remember(anchor, node);
+        attach(std::move(node), {});
+    }
+
+    void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+        const YamlPlace place = placeOf(mark);
+        const auto found = anchors_.find(anchor);
+        const bool cyclic = found != anchors_.end() && open_anchors_.contains(anchor);
+        if (cyclic) out_.error(place, "this alias is inside the value it stands for: a cycle has no end");
+        if (found == anchors_.end() || cyclic) {
+            auto node = make(YamlKind::Null, place);
+            node->reported = cyclic;
+            attach(std::move(node), "an alias as a key");
+            return;
+        }
+        attach(found->second, "an alias as a key", place);
+    }
+
+    void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                         YAML::EmitterStyle::value) override {
+        open(YamlKind::List, mark, tag, anchor);
+    }
+    void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                    YAML::EmitterStyle::value) override {
+        open(YamlKind::Map, mark, tag, anchor);
+    }
+    void OnSequenceEnd() override { close(); }
+    void OnMapEnd() override { close(); }
+
+private:
+    struct Frame {
+        YamlNodePtr node;
+        YAML::anchor_t anchor = 0;
+        bool is_key = false;       // A list or map where a key should stand: read, then dropped.
+        bool key_pending = false;  // Maps: the key is read, its value comes next.
+        std::string key;
+        YamlPlace key_place;
+        bool key_bad = false;
+        std::unordered_map<std::string, int> line_of_key;
+    };
+
+    YamlNodePtr make(YamlKind kind, const YamlPlace& place) const {
+        auto node = std::make_shared<YamlNode>();
+        node->kind = kind;
+        node->place = place;
+        return node;
+    }
+
+    void remember(YAML::anchor_t anchor, const YamlNodePtr& node) {
+        if (anchor != 0) anchors_[anchor] = node;
+    }
+
+    void refuseTag(const std::string& tag, const YamlPlace& place) {
+        if (tag.empty() || tag == "?" || tag == "!") return;
+        out_.error(place, fmt::format("the YAML tag '{}' means nothing in a scene; leave it out", tag));
+    }
+
+    bool expectsKey() const {
+        return !stack_.empty() && stack_.back().node->kind == YamlKind::Map && !stack_.back().key_pending;
+    }
+
+    void open(YamlKind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) {
+        const YamlPlace place = placeOf(mark);
+        if (stack_.size() >= kMaxDepth) {
+            out_.error(place, fmt::format("nested more than {} levels deep", kMaxDepth));
+            throw StopParsing{};
+        }
+        refuseTag(tag, place);
+        Frame frame;
+        frame.node = make(kind, place);
+        frame.anchor = anchor;
+        frame.is_key = expectsKey();
+        remember(anchor, frame.node);
+        if (anchor != 0) open_anchors_.insert(anchor);
+        stack_.push_back(std::move(frame));
+    }
+
+    void close() {
+        Frame frame = std::move(stack_.back());
+        stack_.pop_back();
+        if (frame.anchor != 0) open_anchors_.erase(frame.anchor);
+        const YamlNode& node = *frame.node;
+        attach(frame.node, node.kind == YamlKind::List ? "a list as a key" : "a map as a key");
+    }
+
+    /// Puts a finished value where it belongs. `not_a_key` says what it would be if it stood in the place of a key.
+    void attach(YamlNodePtr node, std::string_view not_a_key) {
+        const YamlPlace place = node->place;
+        attach(std::move(node), not_a_key, place);
+    }
+    void attach(YamlNodePtr node, std::string_view not_a_key, const YamlPlace& place) {
+        if (stack_.empty()) {
+            root_ = std::move(node);
+            return;
+        }
+        Frame& frame = stack_.back();
+        if (expectsKey()) {
+            frame.key_pending = true;
+            frame.key_place = place;
+            frame.key_bad = true;
+            if (!not_a_key.empty()) {
+                out_.error(place, fmt::format("{} is not possible here: keys are plain names", not_a_key));
+                return;
+            }
+            frame.key = node->text;
+            if (frame.key == "<<" && !node->quoted) {
+                out_.error(place, "merge keys ('<<') are not part of a scene; write the keys out");
+            } else if (const auto [it, fresh] = frame.line_of_key.emplace(frame.key, place.line); !fresh) {
+                out_.error(place, fmt::format("duplicate key '{}', already given in line {}", frame.key, it->second));
+            } else {
+                frame.key_bad = false;
+            }
+            return;
+        }
+        grow(*frame.node, node->size, place);
+        if (frame.node->kind == YamlKind::List) {
+            frame.node->items.push_back(std::move(node));
+            return;
+        }
+        frame.key_pending = false;
+        if (!frame.key_bad) frame.node->entries.push_back({std::move(frame.key), frame.key_place, place, std::move(node)});
+        frame.key.clear();
+    }
+
+    void grow(YamlNode& parent, std::uint64_t added, const YamlPlace& place) {
+        parent.size += added;
+        if (parent.size <= kMaxNodes) return;
+        out_.error(place, fmt::format("aliases written out, the scene has more than {} values", kMaxNodes));
+        throw StopParsing{};
+    }
+
+    const YamlSource& source_;
+    Diagnostics& out_;
+    int first_column_;
+    YamlNodePtr root_;
+    std::vector<Frame> stack_;
+    std::unordered_map<YAML::anchor_t, YamlNodePtr> anchors_;
+    std::unordered_set<YAML::anchor_t> open_anchors_;
+};
+
+// ---- Messages --------------------------------------------------------------------------------------------------------
+
+/// The line with the caret below it. Long lines (tables, meshes) are cut to a window around the place.
+std::string excerpt(const YamlPlace& place, const std::string& suggestion) {
+    constexpr std::size_t kWindow = 100, kBefore = 60;
+    const std::string& line = place.source->lines[static_cast<std::size_t>(place.line) - 1];
+    const auto at = std::min(static_cast<std::size_t>(place.column) - 1, line.size());
+    std::size_t begin = at > kBefore ? at - kBefore : 0;
+    while (begin > 0 && isContinuationByte(line[begin])) --begin;
+    std::size_t end = std::min(begin + kWindow, line.size());
+    while (end < line.size() && isContinuationByte(line[end])) ++end;
+
+    std::string shown = line.substr(begin, end - begin);
+    std::replace(shown.begin(), shown.end(), '\t', ' ');
+    const char* const before = begin > 0 ? "…" : "";
+    const std::size_t indent = characters(shown, at - begin) + (begin > 0 ? 1 : 0);
+    const std::size_t marked_end = std::min(at + static_cast<std::size_t>(place.length), end);
+    const std::size_t marked = marked_end > at ? characters(std::string_view(line).substr(at), marked_end - at) : 1;
+
+    const std::string number = place.source->command_line ? std::string() : std::to_string(place.line);
+    return fmt::format("\n{:>5} | {}{}{}\n      | {:{}}^{:~<{}}{}{}", number, before, shown, end < line.size() ? "…" : "", "",
+                       indent, "", marked > 0 ? marked - 1 : 0, suggestion.empty() ? "" : " ", suggestion);
+}
+
+std::string lowerCase(std::string_view text) {
+    std::string lower(text);
+    for (char& c : lower)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return lower;
+}
+
+/// Why `text` is no decimal number, or nothing.
+std::string notDecimal(const std::string& text) {
+    std::string_view body = text;
+    if (!body.empty() && (body.front() == '+' || body.front() == '-')) body.remove_prefix(1);
+    const std::string lower = lowerCase(body);
+    if (lower == "nan" || lower == ".nan" || lower == "inf" || lower == ".inf" || lower == "infinity")
+        return "NaN and infinity have no place in a scene";
+    if (lower.starts_with('+') || lower.starts_with('-')) return "it is not a number";
+    if (lower.starts_with("0x") || lower.starts_with("0o") || lower.starts_with("0b")) return "write it in decimal";
+    if (lower.size() > 1 && lower[0] == '0' && lower[1] >= '0' && lower[1] <= '9') {
+        const std::size_t first = std::min(lower.find_first_not_of('0'), lower.size() - 1);
+        return fmt::format("leading zeros mean octal to some YAML readers; write {}{}", text[0] == '-' ? "-" : "", lower.substr(first));
+    }
+    // from_chars would take "inf" and "nan" in more spellings, so let only what can be in a decimal number through.
+    if (lower.empty() || lower.find_first_not_of("0123456789.e+-") != std::string::npos ||
+        lower.find_first_of("0123456789") == std::string::npos)
+        return "it is not a number";
+    return {};
+}
+
+std::string_view withoutPlus(std::string_view text) {
+    if (text.starts_with('+')) text.remove_prefix(1);
+    return text;
+}
+
+template <class T>
+Parsed<T> parseWhole(const std::string& text) {
+    if (std::string problem = notDecimal(text); !problem.empty()) return {{}, std::move(problem)};
+    const std::string_view body = withoutPlus(text);
+    T value{};
+    if (const auto [end, ec] = std::from_chars(body.data(), body.data() + body.size(), value);
+        ec == std::errc{} && end == body.data() + body.size())
+        return {value, {}};
+    const Parsed<double> real = parseNumber(text);
+    if (!real.value) return {{}, real.problem};
+    if (*real.value != std::floor(*real.value)) return {{}, "it is not whole"};
+    // Beyond 2^53 a double no longer says which whole number was meant; digits alone were handled above.
+    if (*real.value < 0 && std::is_unsigned_v<T>) return {{}, "it is negative"};
+    if (std::abs(*real.value) > 9007199254740992.0) return {{}, "it is too large"};
+    return {static_cast<T>(*real.value), {}};
+}
+
+/// Damerau–Levenshtein distance with transpositions of neighbours (optimal string alignment).
+std::size_t editDistance(std::string_view a, std::string_view b) {
+    std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), now(b.size() + 1);
+    for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        now[0] = i;
+        for (std::size_t j = 1; j <= b.size(); ++j) {
+            now[j] = std::min({last[j] + 1, now[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) now[j] = std::min(now[j], before[j - 2] + 1);
+        }
+        before.swap(last);
+        last.swap(now);
+    }
+    return last[b.size()];
+}
+
+}  // namespace
+
+YamlSource::YamlSource(std::string name_, std::string_view text, bool command_line_)
+    : name(std::move(name_)), command_line(command_line_) {
+    if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+    while (true) {
+        const std::size_t end = text.find('\n');
+        std::string_view line = text.substr(0, end);
+        if (line.ends_with('\r')) line.remove_suffix(1);
+        lines.emplace_back(line);
+        if (end == std::string_view::npos) break;
+        text.remove_prefix(end + 1);
+    }
+}
+
+SourcePlace YamlPlace::resolved() const {
+    if (source == nullptr) return {};
+    if (source->command_line || line <= 0) return {source->name, 0, 0};
+    const auto row = static_cast<std::size_t>(line);
+    if (row > source->lines.size()) return {source->name, line, column};
+    return {source->name, line, static_cast<int>(characters(source->lines[row - 1], static_cast<std::size_t>(column) - 1)) + 1};
+}
+
+const YamlEntry* YamlNode::find(std::string_view key) const {
+    for (const YamlEntry& entry : entries)
+        if (entry.key == key) return &entry;
+    return nullptr;
+}
+
+void Diagnostics::error(const YamlPlace& place, std::string message, std::string suggestion, std::string note) {
+    // A named spectrum used twice is checked twice; say once what is wrong with it.
+    for (const Entry& e : errors_)
+        if (e.place.source == place.source && e.place.line == place.line && e.place.column == place.column &&
+            e.message == message)
+            return;
+    // A mesh of a million NaNs needs no million messages: beyond the bound they are only counted.
+    if (errors_.size() >= 4 * kMaxErrorsShown) {
+        ++not_kept_;
+        return;
+    }
+    errors_.push_back({place, std::move(message), std::move(suggestion), std::move(note)});
+}
+
+void Diagnostics::throwIfFailed() const {
+    if (errors_.empty()) return;
+    std::vector<const Entry*> order;
+    for (const Entry& e : errors_) order.push_back(&e);
+    std::stable_sort(order.begin(), order.end(), [](const Entry* a, const Entry* b) {
+        const auto key = [](const Entry* e) {
+            return std::tuple(e->place.source != nullptr && e->place.source->command_line, e->place.line, e->place.column);
+        };
+        return key(a) < key(b);
+    });
+    std::string text;
+    for (std::size_t i = 0; i < order.size() && i < kMaxErrorsShown; ++i) {
+        const Entry& e = *order[i];
+        const SourcePlace at = e.place.resolved();
+        if (i > 0) text += '\n';
+        text += at.file;
+        if (at.line > 0) text += fmt::format(":{}:{}", at.line, at.column);
+        text += fmt::format(": error: {}", e.message);
+        const bool has_line = e.place.source != nullptr && e.place.line > 0 && e.place.column > 0 &&
+                              static_cast<std::size_t>(e.place.line) <= e.place.source->lines.size();
+        if (has_line)
+            text += excerpt(e.place, e.suggestion);
+        else if (!e.suggestion.empty())
+            text += fmt::format(" ({})", e.suggestion);
+        if (!e.note.empty()) text += fmt::format("\n      = {}", e.note);
+    }
+    if (order.size() > kMaxErrorsShown) text += fmt::format("\n… and {} more errors", count() - kMaxErrorsShown);
+    throw Error(ErrorKind::Scene, text, order.front()->place.resolved());
+}
+
+YamlNodePtr readYaml(const YamlSource& source, std::string_view text, Diagnostics& out, int first_column) {
+    if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+    if (!checkText(source, text, out)) return nullptr;
+    MemoryBuffer buffer(text);
+    std::istream stream(&buffer);
+    TreeBuilder builder(source, out, first_column);
+    try {
+        YAML::Parser parser(stream);
+        while (parser.HandleNextDocument(builder)) {
+        }
+    } catch (const StopParsing&) {
+        return nullptr;
+    } catch (const YAML::Exception& e) {
+        const YamlPlace place = builder.placeOf(e.mark);
+        out.error(place, fmt::format("not valid YAML: {}", e.msg), tabHint(source, place.line));
+        return nullptr;
+    }
+    return builder.root();
+}
+
+std::string describeNode(const YamlNode& node) {
+    switch (node.kind) {
+        case YamlKind::Null: return "nothing";
+        case YamlKind::List: return fmt::format("a list of {}", node.items.size());
+        case YamlKind::Map: return "a map";
+        case YamlKind::Scalar: break;
+    }
+    constexpr std::size_t kLongest = 40;
+    const std::string text = node.text.size() > kLongest ? node.text.substr(0, kLongest) + "…" : node.text;
+    return node.quoted ? fmt::format("the text \"{}\"", text) : fmt::format("'{}'", text);
+}
+
+Parsed<double> parseNumber(const std::string& text) {
+    if (std::string problem = notDecimal(text); !problem.empty()) return {{}, std::move(problem)};
+    const std::string_view body = withoutPlus(text);
+    double value = 0;
+    const auto [end, ec] = std::from_chars(body.data(), body.data() + body.size(), value);
+    if (ec == std::errc::result_out_of_range) return {{}, "it is outside the range of a double"};
+    if (ec != std::errc{} || end != body.data() + body.size()) return {{}, "it is not a number"};
+    return {value, {}};
+}
+
+Parsed<std::int64_t> parseInteger(const std::string& text) { return parseWhole<std::int64_t>(text); }
+Parsed<std::uint64_t> parseUnsigned(const std::string& text) { return parseWhole<std::uint64_t>(text); }
+
+bool looksLikeNumber(std::string_view text) {
+    const Parsed<double> parsed = parseNumber(std::string(text));
+    return parsed.value || parsed.problem != "it is not a number";
+}
+
+std::optional<std::string> nearestWord(std::string_view word, const std::vector<std::string>& candidates) {
+    const std::string lower = lowerCase(word);
+    const std::size_t limit = word.size() <= 3 ? 1 : std::max<std::size_t>(2, word.size() / 3);
+    std::optional<std::string> best;
+    std::size_t best_distance = limit + 1;
+    for (const std::string& candidate : candidates) {
+        if (candidate == word) continue;
+        // Case counts less than any letter, so that 'gaussian' is found from 'Gaussian' and 'Au' from 'au'.
+        const std::size_t distance = editDistance(lower, lowerCase(candidate));
+        if (distance < best_distance && distance < std::max(word.size(), candidate.size())) {
+            best = candidate;
+            best_distance = distance;
+        }
+    }
+    return best;
+}
+
+std::string didYouMean(std::string_view word, const std::vector<std::string>& candidates) {
+    const std::optional<std::string> best = nearestWord(word, candidates);
+    return best ? fmt::format("did you mean '{}'?", *best) : std::string();
+}
+
+}  // namespace crt

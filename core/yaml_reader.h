@@ -1,0 +1,111 @@
+/// The safe walk of yaml-cpp: text → a tree of our own that keeps the place of every key and value, and the list of
+/// everything found wrong on the way.
+///
+/// yaml-cpp 0.7's Node silently keeps duplicate keys, reads 012 as ten, refuses 1e3 as an integer, calls `no` a boolean and
+/// lets an alias close a cycle. So only its events are used here; text becomes numbers in scalar functions below and nowhere else.
+#pragma once
+
+#include "error.h"
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace crt {
+
+/// A text that messages point into: a scene file, or one `--set` argument.
+struct YamlSource {
+    YamlSource(std::string name_, std::string_view text, bool command_line_ = false);
+
+    std::string name;  ///< Path of the file, or "--set film.resolution".
+    std::vector<std::string> lines;
+    bool command_line = false;  ///< One line, so messages leave line and column out.
+};
+
+/// A stretch of a source. Counts from 1, columns in bytes; line 0 means the source as a whole.
+struct YamlPlace {
+    const YamlSource* source = nullptr;
+    int line = 0;
+    int column = 0;
+    int length = 1;
+
+    /// The same with the column in characters, as editors count.
+    SourcePlace resolved() const;
+};
+
+enum class YamlKind { Null, Scalar, List, Map };
+
+struct YamlNode;
+using YamlNodePtr = std::shared_ptr<YamlNode>;
+
+struct YamlEntry {
+    std::string key;
+    YamlPlace key_place;
+    YamlPlace place;  ///< Of the value; kept here because an alias puts one node in several places.
+    YamlNodePtr value;
+};
+
+/// One value of the tree. Aliases share nodes, never in a cycle.
+struct YamlNode {
+    YamlKind kind = YamlKind::Null;
+    YamlPlace place;
+    std::string text;     ///< Scalars.
+    bool reported = false;  ///< A cycle stood here: an error already, so what is missing now is no second one.
+    bool quoted = false;  ///< Scalars written with quotes are text whatever they look like.
+    std::vector<YamlNodePtr> items;   ///< Lists.
+    std::vector<YamlEntry> entries;   ///< Maps, in the order of the file, without duplicates.
+    std::uint64_t size = 1;  ///< Nodes below and including this one with aliases written out.
+
+    const YamlEntry* find(std::string_view key) const;
+};
+
+/// Everything wrong with one scene. Reading goes on after an error so that one run shows them all.
+class Diagnostics {
+public:
+    /// `suggestion` ends the caret line ("did you mean 'reflectance'?"), `note` stands below it ("keys of …").
+    void error(const YamlPlace& place, std::string message, std::string suggestion = {}, std::string note = {});
+    bool failed() const { return !errors_.empty(); }
+    std::size_t count() const { return errors_.size() + not_kept_; }
+    /// Throws crt::Error(Scene) with all errors in the order of the text, if there are any.
+    void throwIfFailed() const;
+
+private:
+    struct Entry {
+        YamlPlace place;
+        std::string message, suggestion, note;
+    };
+    std::vector<Entry> errors_;
+    std::size_t not_kept_ = 0;
+};
+
+/// Parses one YAML document. Syntax errors, binary data, duplicate keys, merge keys, tags, cycles and depth go to `out`. Null when
+/// nothing usable is there. `text` begins at byte `first_column` (from 0) of the source's first line.
+YamlNodePtr readYaml(const YamlSource& source, std::string_view text, Diagnostics& out, int first_column = 0);
+
+/// "a number", "a list": what a node is, for "expected …, found …".
+std::string describeNode(const YamlNode& node);
+
+/// What became of a text that should be a number: the number, or why not.
+template <class T>
+struct Parsed {
+    std::optional<T> value;
+    std::string problem;  ///< Follows "expected a number, found '012': ".
+};
+
+/// Decimal numbers by std::from_chars: no octal or hexadecimal, no NaN, no infinity, no overflow.
+Parsed<double> parseNumber(const std::string& text);
+/// The same for whole numbers; 1e3 and 3.0 count as whole.
+Parsed<std::int64_t> parseInteger(const std::string& text);
+Parsed<std::uint64_t> parseUnsigned(const std::string& text);
+/// Does this plain scalar look like a number (and so cannot be a name)?
+bool looksLikeNumber(std::string_view text);
+
+/// The candidate nearest to `word` by Damerau–Levenshtein distance, if it is within 2 or a third of the length (1 for very short words).
+std::optional<std::string> nearestWord(std::string_view word, const std::vector<std::string>& candidates);
+/// "did you mean 'x'?" or nothing.
+std::string didYouMean(std::string_view word, const std::vector<std::string>& candidates);
+
+}  // namespace crt
