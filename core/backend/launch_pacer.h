@@ -61,7 +61,7 @@ public:
         finished_ += launch.paths();
         const double fitting = paths * target_seconds_ / std::max(seconds, 1e-6);
         // A launch much below the budget says little about larger ones: its fixed cost hides the rate.
-        if (paths < 0.5 * budget_ && seconds < target_seconds_) return;
+        if (paths < 0.4 * budget_ && seconds < target_seconds_) return;
         // Half-way, and at most four times as much: neighbouring parts of an image may differ much in cost.
         budget_ = std::clamp(0.5 * (budget_ + fitting), 0.25 * budget_, 4.0 * budget_);
     }

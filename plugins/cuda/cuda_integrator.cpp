@@ -1,0 +1,222 @@
+#include "cuda_integrator.h"
+
+#include "kernel/features.h"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <vector>
+
+namespace crt::cuda {
+
+using plugin::PluginError;
+
+namespace {
+
+constexpr double kLaunchSeconds = 0.03;
+constexpr std::uint64_t kFirstPaths = 1u << 18;
+/// Of the device's memory that films of slices may take, and of any device's.
+constexpr std::uint64_t kSliceShare = 16, kSliceBytes = std::uint64_t{512} << 20;
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+std::uint64_t divideUp(std::uint64_t a, std::uint64_t b) { return (a + b - 1) / b; }
+
+}  // namespace
+
+std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, std::uint32_t samples, std::uint64_t most) {
+    // So many times the device is filled anew that its idle end, half a filling on average, is a few percent.
+    constexpr std::uint64_t kFillings = 16;
+    // A thread's paths should outweigh its start and its share of crt_add_slices, unless that leaves the device empty.
+    const std::uint64_t least_samples = blocks < resident_blocks ? 1 : 8;
+    const std::uint64_t wanted = divideUp(kFillings * resident_blocks, std::max<std::uint64_t>(blocks, 1));
+    constexpr std::uint64_t kGridRows = 65535;
+    return static_cast<std::uint32_t>(
+        std::max<std::uint64_t>(1, std::min({wanted, samples / least_samples, most, kGridRows})));
+}
+
+CudaIntegrator::CudaIntegrator(const plugin::Host& host, const CrtCreateInfo& info)
+    : host_(host),
+      device_(chooseDevice(info.device)),
+      context_(device_),
+      kernel_choice_(info.kernel),
+      tile_size_(info.tile_size),
+      pacer_(kLaunchSeconds, kFirstPaths, kBlockHeight) {
+    if (info.threads != 0) host_.log(CRT_LOG_DEBUG, "cuda: the number of threads does not apply");
+    context_.makeCurrent();
+    const Driver& cuda = driver();
+    // Waiting asleep: the host's cores have a kernel to compile.
+    cuda.check(cuda.cuEventCreate(&start_, CU_EVENT_BLOCKING_SYNC), "creating an event");
+    const CUresult result = cuda.cuEventCreate(&end_, CU_EVENT_BLOCKING_SYNC);
+    if (result != CUDA_SUCCESS) cuda.cuEventDestroy(start_);
+    cuda.check(result, "creating an event");
+}
+
+CudaIntegrator::~CudaIntegrator() {
+    context_.tryMakeCurrent();  // for the members too, whose memory and modules are given back after this
+    driver().cuEventDestroy(start_);
+    driver().cuEventDestroy(end_);
+}
+
+CudaIntegrator::DeviceFilm CudaIntegrator::allocateFilm(std::uint64_t copies, const char* what) {
+    const std::uint64_t pixels = copies * scene_.width * scene_.height;
+    DeviceFilm film;
+    film.sums = Memory(pixels * scene_.channels * 2 * sizeof(double), device_, what);
+    film.counts = Memory(pixels * sizeof(std::uint64_t), device_, what);
+    film.sums.fill(0);
+    film.counts.fill(0);
+    if (scene_.aovs & CRT_AOV_PRIMITIVE) {
+        film.primitives = Memory(pixels * sizeof(std::uint32_t), device_, what);
+        film.primitives.fill(0xff);  // CRT_NONE
+    }
+    return film;
+}
+
+void CudaIntegrator::noteMemory() {
+    peak_bytes_ = std::max(peak_bytes_, blob_.bytes() + rays_.bytes() + film_.bytes() + slices_.bytes());
+}
+
+void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
+    context_.makeCurrent();
+    const auto& scene = *static_cast<const kernel::CrtScene*>(blob.data);
+    if (blob.size_bytes < sizeof scene || scene.magic != CRT_SCENE_MAGIC)
+        throw PluginError(CRT_INVALID_ARGUMENT, "the scene blob does not begin with a scene");
+
+    // The old film goes first: two need not fit side by side. Until all of the new one is there, there is no scene.
+    blob_ = Memory();
+    film_ = DeviceFilm();
+    slices_ = DeviceFilm();
+    slice_count_ = 0;
+    scene_ = scene;
+
+    const std::uint32_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
+    if (!program_ || program_->features() != features) {
+        if (program_) {
+            compile_seconds_ += program_->compileSeconds();
+            cache_seconds_ += program_->cacheSeconds();
+        }
+        program_ = std::make_unique<CudaProgram>(host_, device_, features, kernel_choice_);
+    }
+
+    const double start = now();
+    film_ = allocateFilm(1, "the film");
+    rays_ = Memory(kRayCounters * 2 * sizeof(std::uint64_t), device_, "the ray counters");
+    rays_.fill(0);
+    Memory uploaded(blob.size_bytes, device_, "the scene");
+    uploaded.upload(blob.data);
+    blob_ = std::move(uploaded);
+    upload_seconds_ += now() - start;
+    paths_ = 0;
+    noteMemory();
+}
+
+void CudaIntegrator::ensureSlices(std::uint32_t slices) {
+    if (slices <= slice_count_) return;
+    slices_ = DeviceFilm();
+    slice_count_ = 0;
+    slices_ = allocateFilm(slices, "the film's slices");
+    slice_count_ = slices;
+    noteMemory();
+}
+
+double CudaIntegrator::launch(const Launch& launch) {
+    const Driver& cuda = driver();
+    const Module& module = program_->current();
+
+    const std::uint64_t blocks = divideUp(launch.x1 - launch.x0, kBlockWidth) * divideUp(launch.y1 - launch.y0, kBlockHeight);
+    const std::uint64_t budget = std::min(kSliceBytes, device_.memory_bytes / kSliceShare);
+    std::uint32_t slices = chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors, launch.sample_count,
+                                        budget / std::max<std::uint64_t>(film_.bytes(), 1));
+    if (slices > 1) ensureSlices(slices);
+
+    DeviceFilm& target = slices > 1 ? slices_ : film_;
+    CUdeviceptr blob = blob_.address(), rays = rays_.address();
+    CUdeviceptr sums = target.sums.address(), counts = target.counts.address(), primitives = target.primitives.address();
+    Launch range = launch;
+    kernel::CrtScene scene = scene_;
+    void* render_arguments[] = {&scene,    &blob,         &range.x0, &range.y0,           &range.x1, &range.y1, &range.first_sample,
+                                &range.sample_count, &sums, &counts,   &primitives, &rays};
+
+    cuda.check(cuda.cuEventRecord(start_, nullptr), "recording an event");
+    cuda.check(cuda.cuLaunchKernel(module.render(), static_cast<unsigned>(blocks), slices, 1, kBlock, 1, 1, 0, nullptr, render_arguments, nullptr),
+               "launching the kernel");
+    if (slices > 1) {
+        CUdeviceptr film_sums = film_.sums.address(), film_counts = film_.counts.address(), film_primitives = film_.primitives.address();
+        void* add_arguments[] = {&range.x0, &range.y0,   &range.x1,        &range.y1, &scene.width, &scene.height, &scene.channels,
+                                 &slices,   &film_sums, &film_counts, &film_primitives, &sums, &counts, &primitives};
+        const std::uint64_t threads = launch.pixels() * scene_.channels;
+        cuda.check(cuda.cuLaunchKernel(module.addSlices(), static_cast<unsigned>(divideUp(threads, kBlock)), 1, 1, kBlock, 1, 1, 0, nullptr,
+                                       add_arguments, nullptr),
+                   "launching the sum of the slices");
+    }
+    cuda.check(cuda.cuEventRecord(end_, nullptr), "recording an event");
+    cuda.check(cuda.cuEventSynchronize(end_), "rendering on '" + device_.name + "'");
+
+    float milliseconds = 0;
+    cuda.check(cuda.cuEventElapsedTime(&milliseconds, start_, end_), "reading the kernel's time");
+    return milliseconds * 1e-3;
+}
+
+bool CudaIntegrator::render(const CrtRenderRange& range) {
+    if (blob_.bytes() == 0) throw PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
+    if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 > scene_.width || range.y1 > scene_.height)
+        throw PluginError(CRT_INVALID_ARGUMENT, "the range's rectangle is not within the film");
+
+    context_.makeCurrent();
+    pacer_.begin(range, tile_size_);
+    if (host_.cancelled(0.0)) return false;
+    for (Launch next; pacer_.next(next);) {
+        const double seconds = launch(next);
+        pacer_.finished(next, seconds);
+        render_seconds_ += seconds;
+        paths_ += next.paths();
+        if (host_.cancelled(pacer_.done())) return false;
+    }
+    return true;
+}
+
+void CudaIntegrator::readFilm(const CrtFilmView& film) {
+    if (blob_.bytes() == 0) throw PluginError(CRT_INVALID_ARGUMENT, "read_film was called before set_scene");
+    if (film.width != scene_.width || film.height != scene_.height || film.channels != scene_.channels)
+        throw PluginError(CRT_INVALID_ARGUMENT, "the film view is not of the scene's size");
+
+    context_.makeCurrent();
+    film_.sums.download(film.sums);
+    film_.counts.download(film.counts);
+    if (film.primitives == nullptr) return;
+    if (film_.primitives.bytes() != 0)
+        film_.primitives.download(film.primitives);
+    else
+        std::fill_n(film.primitives, std::size_t{film.width} * film.height, CRT_NONE);
+}
+
+void CudaIntegrator::report(CrtBackendReport& report) {
+    context_.makeCurrent();
+    plugin::writeText(report.device, device_.name);
+    report.compile_seconds = compile_seconds_;
+    report.cache_seconds = cache_seconds_;
+    if (program_) {
+        const Module& module = program_->current();
+        plugin::writeText(report.kernel, program_->description());
+        report.kernel_from_cache = program_->fromCache() ? 1 : 0;
+        report.kernel_features = module.features();
+        report.compile_seconds += program_->compileSeconds();
+        report.cache_seconds += program_->cacheSeconds();
+        report.registers = module.registers();
+        report.spill_bytes = module.spillBytes();
+    }
+    report.upload_seconds = upload_seconds_;
+    report.render_seconds = render_seconds_;
+    report.paths = paths_;
+    report.peak_memory_bytes = peak_bytes_;
+    if (rays_.bytes() != 0) {
+        std::vector<std::uint64_t> counts(kRayCounters * 2);
+        rays_.download(counts.data());
+        for (std::size_t i = 0; i < counts.size(); i += 2) {
+            report.closest_rays += counts[i];
+            report.shadow_rays += counts[i + 1];
+        }
+    }
+}
+
+}  // namespace crt::cuda

@@ -1,0 +1,87 @@
+/*
+ * kernels.cu: the CUDA entry points. nvcc compiles this file ahead of time with everything in; while the program runs, the host's text of
+ * kernel/path.h stands above it, and NVRTC compiles what one scene needs.
+ *
+ * A thread renders one pixel over a range of samples. Where the image is too small to fill the device, the range is split over `slices`
+ * rows of the grid: each adds to a film of its own, and crt_add_slices then adds those to the film in the order of the samples, so the result
+ * does not depend on which block ran first. No thread waits for another: tests run these very functions as plain loops.
+ */
+#ifndef CRT_PATH_H
+#include "kernel/path.h"
+#endif
+
+#define CRT_BLOCK 128u      /* threads: four warps of 8 × 4 pixels, side by side as 16 × 8 */
+#define CRT_BLOCK_WIDTH 16u
+#define CRT_BLOCK_HEIGHT 8u
+
+/* Ray counters are spread, so that threads of different blocks do not queue for one address; the host adds them up. */
+#define CRT_RAY_COUNTERS 1024u
+
+/* Four blocks on a multiprocessor leave a thread 128 registers: enough for every kernel not to spill. */
+#ifndef CRT_BLOCKS_PER_SM
+#define CRT_BLOCKS_PER_SM 4
+#endif
+
+/*
+ * Samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1). `scene` is the blob's header once more: as a kernel
+ * argument it lies in constant memory, where all threads read the same word at once. `sums`, `counts`, `primitives` are the film when the grid
+ * has one row, else one film after another, one for each row.
+ */
+extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
+crt_render(const __grid_constant__ CrtScene scene, const unsigned char *blob, u32 x0, u32 y0, u32 x1, u32 y1, u64 first_sample,
+           u32 sample_count, f64 *sums, u64 *counts, u32 *primitives, u64 *rays) {
+    const u32 blocks_across = (x1 - x0 + CRT_BLOCK_WIDTH - 1u) / CRT_BLOCK_WIDTH;
+    const u32 warp = threadIdx.x / 32u;
+    const u32 lane = threadIdx.x % 32u;
+    const u32 x = x0 + (blockIdx.x % blocks_across) * CRT_BLOCK_WIDTH + (warp % 2u) * 8u + lane % 8u;
+    const u32 y = y0 + (blockIdx.x / blocks_across) * CRT_BLOCK_HEIGHT + (warp / 2u) * 4u + lane / 8u;
+    if (x >= x1 || y >= y1) return;
+
+    const u32 slice = blockIdx.y;
+    const u32 first = (u32)((u64)sample_count * slice / gridDim.y);
+    const u32 last = (u32)((u64)sample_count * (slice + 1u) / gridDim.y);
+    const u64 film = (u64)slice * scene.width * scene.height;
+
+    CrtContext context;
+    context.blob = blob;
+    context.scene = &scene;
+    CrtRayCount traced;
+    traced.closest = 0u;
+    traced.shadow = 0u;
+    crt_render_pixel(&context, x, y, first_sample + first, last - first, sums + film * scene.channels * 2u, counts + film,
+                     primitives != 0 ? primitives + film : 0, &traced);
+
+    u64 *counter = rays + 2u * ((blockIdx.x + 37u * blockIdx.y) % CRT_RAY_COUNTERS);
+    atomicAdd(counter, (u64)traced.closest);
+    atomicAdd(counter + 1, (u64)traced.shadow);
+}
+
+/* Adds `slices` films, which lie one after another, to the film, in order, and clears them for the next launch. One thread a channel of a pixel of
+   [x0, x1) × [y0, y1). */
+extern "C" __global__ void __launch_bounds__(CRT_BLOCK)
+crt_add_slices(u32 x0, u32 y0, u32 x1, u32 y1, u32 width, u32 height, u32 channels, u32 slices, f64 *sums, u64 *counts, u32 *primitives,
+               f64 *slice_sums, u64 *slice_counts, u32 *slice_primitives) {
+    const u64 thread = (u64)blockIdx.x * CRT_BLOCK + threadIdx.x;
+    const u64 in_rectangle = thread / channels;
+    const u32 channel = (u32)(thread % channels);
+    const u32 y = y0 + (u32)(in_rectangle / (x1 - x0));
+    if (y >= y1) return;
+    const u64 pixel = (u64)y * width + x0 + (u32)(in_rectangle % (x1 - x0));
+    const u64 film = (u64)width * height;
+
+    f64 *pair = sums + (pixel * channels + channel) * 2u;
+    for (u32 slice = 0u; slice < slices; ++slice) {
+        f64 *part = slice_sums + ((slice * film + pixel) * channels + channel) * 2u;
+        crt_film_add(pair, part[0]);
+        crt_film_add(pair, part[1]);
+        part[0] = part[1] = 0.0;
+    }
+    if (channel != 0u) return;
+    for (u32 slice = 0u; slice < slices; ++slice) {
+        const u64 part = slice * film + pixel;
+        /* The primitive belongs to the first valid sample, as in crt_render_pixel. */
+        if (primitives != 0 && counts[pixel] == 0u && slice_counts[part] != 0u) primitives[pixel] = slice_primitives[part];
+        counts[pixel] += slice_counts[part];
+        slice_counts[part] = 0u;
+    }
+}
