@@ -427,7 +427,7 @@ private:
     }
 
     void writeFilm() {
-        const Film& film = scene_.film;
+        const FilmSettings& film = scene_.film;
         header_.film_width = static_cast<std::uint32_t>(film.width);
         header_.film_height = static_cast<std::uint32_t>(film.height);
         const bool cropped = film.crop != std::array<int, 4>{0, 0, 0, 0};

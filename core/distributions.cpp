@@ -56,7 +56,7 @@ std::vector<float> wavelengthTable(std::size_t cells) {
     return toFloat(inverseDistribution(density, kWavelengthMin_nm, kWavelengthMax_nm, 4 * (kSpectrumSize - 1), cells));
 }
 
-std::vector<float> filterTable(const Film& film, std::size_t cells) {
+std::vector<float> filterTable(const FilmSettings& film, std::size_t cells) {
     const double radius = film.filter_radius;
     switch (film.filter) {
         case PixelFilter::Box:

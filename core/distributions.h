@@ -14,7 +14,7 @@ std::vector<float> wavelengthTable(std::size_t cells);
 
 /// cells + 1 offsets from the pixel centre, in pixels: the inverse of the distribution proportional to the film's filter along one axis.
 /// Empty for the box of radius ½, which is uniform in the pixel.
-std::vector<float> filterTable(const Film& film, std::size_t cells);
+std::vector<float> filterTable(const FilmSettings& film, std::size_t cells);
 
 /// Shares of 2^32 proportional to `weights` (≥ 0, one of them > 0), at least 1 each: item i is chosen by the 32-bit numbers
 /// in [first[i], first[i+1]). Returns weights.size() + 1 boundaries, the last 2^32; {0} for no items.

@@ -32,7 +32,7 @@ struct Camera {
 
 enum class PixelFilter { Box, Gaussian, BlackmanHarris };
 
-struct Film {
+struct FilmSettings {
     int width = 512;
     int height = 512;
     std::array<int, 4> crop{0, 0, 0, 0};  ///< x0, y0, x1, y1, half open, in pixels; all zero means the whole film.
@@ -128,7 +128,7 @@ struct Scene {
     std::string file;   ///< Path of the YAML, or a name for scenes made in memory.
     std::string title;
     Camera camera;
-    Film film;
+    FilmSettings film;
     IntegratorSettings integrator;
     SamplerSettings sampler;
     std::vector<Material> materials;

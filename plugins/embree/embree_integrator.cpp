@@ -1,0 +1,158 @@
+#include "embree_integrator.h"
+
+#include "kernel/features.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <mutex>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+namespace crt::embree {
+namespace {
+
+using kernel::u64;  // CRT_ARRAY computes with it
+using Clock = std::chrono::steady_clock;
+
+double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// The model name that Linux gives the processor.
+std::string processorName() {
+    std::ifstream info("/proc/cpuinfo");
+    for (std::string line; std::getline(info, line);)
+        if (line.rfind("model name", 0) == 0 && line.find(':') != std::string::npos) return line.substr(line.find(':') + 2);
+    return "CPU";
+}
+
+/// The kernels are compiled for AVX2 and FMA (x86-64-v3).
+bool processorFits() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+
+}  // namespace
+
+std::vector<CrtDevice> probeDevices(const plugin::Host&) {
+    if (!processorFits())
+        throw plugin::PluginError(CRT_NO_DEVICE, "this processor has no AVX2 and FMA, which the Embree backend is compiled for; use the opencl backend");
+    const auto threads = static_cast<double>(tbb::this_task_arena::max_concurrency());
+    return {plugin::makeDevice(0, processorName(), "Embree " + Device::version(), 0, threads)};
+}
+
+EmbreeIntegrator::EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo& info)
+    : host_(host),
+      info_(info),
+      threads_(info.threads != 0 ? info.threads : static_cast<unsigned>(tbb::this_task_arena::max_concurrency())),
+      arena_(static_cast<int>(threads_)) {
+    plugin::chooseDevice(probeDevices(host), info.device);
+    info_.device = nullptr;  // the host's string is not ours to keep
+}
+
+void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
+    tracer_.reset();
+    blob_.resize((scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line));
+    std::memcpy(blob_.data(), scene_blob.data, scene_blob.size_bytes);
+    program_ = &chooseProgram(scene().features, info_.kernel);
+    build_seconds_ = render_seconds_ = 0;
+    paths_ = 0;
+    rays_ = {};
+
+    if ((scene().features & CRT_FEATURE_BVH) != 0) {
+        const auto start = Clock::now();
+        if (!device_) device_ = std::make_unique<Device>(threads_);
+        const auto* triangles = CRT_ARRAY(kernel::CrtTriangle, blob(), scene().triangles);
+        arena_.execute([&] { tracer_ = std::make_unique<Tracer>(*device_, triangles, scene().triangle_count); });
+        build_seconds_ = secondsSince(start);
+    }
+
+    const std::size_t pixels = static_cast<std::size_t>(scene().width) * scene().height;
+    sums_.assign(pixels * scene().channels * 2, 0.0);
+    counts_.assign(pixels, 0);
+    primitives_.assign((scene().aovs & CRT_AOV_PRIMITIVE) != 0 ? pixels : 0, CRT_NONE);
+}
+
+std::uint32_t EmbreeIntegrator::tileSize(const CrtRenderRange& range) const {
+    if (info_.tile_size != 0) return info_.tile_size;
+    // Large enough to stay in the cache's good books, small enough that every thread gets several.
+    std::uint32_t size = 16;
+    const auto tiles = [&] { return static_cast<std::uint64_t>((range.x1 - range.x0 + size - 1) / size) * ((range.y1 - range.y0 + size - 1) / size); };
+    while (size > 1 && tiles() < 8ull * threads_) size /= 2;
+    return size;
+}
+
+bool EmbreeIntegrator::render(const CrtRenderRange& range) {
+    if (program_ == nullptr) throw plugin::PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
+    if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 > scene().width || range.y1 > scene().height)
+        throw plugin::PluginError(CRT_INVALID_ARGUMENT, "the rectangle to render is not within the film");
+    const auto start = Clock::now();
+    const std::uint32_t size = tileSize(range);
+    const std::uint32_t columns = (range.x1 - range.x0 + size - 1) / size;
+    const std::uint32_t rows = (range.y1 - range.y0 + size - 1) / size;
+    // Samples of one job: a tile with more is done in several, so that progress moves and a cancel is obeyed.
+    constexpr std::uint64_t kSamplesPerJob = 64;
+
+    std::atomic<std::uint64_t> closest{0}, shadow{0}, done{0};
+    std::atomic<bool> cancelled{false};
+    std::mutex progress_mutex;
+    const double all = static_cast<double>(columns) * rows * static_cast<double>(std::max<std::uint64_t>(range.sample_count, 1));
+    arena_.execute([&] {
+        tbb::parallel_for(
+            tbb::blocked_range<std::uint32_t>(0, columns * rows, 1),
+            [&](const tbb::blocked_range<std::uint32_t>& tiles) {
+                for (std::uint32_t tile = tiles.begin(); tile != tiles.end(); ++tile) {
+                    TileJob job{};
+                    job.blob = blob();
+                    job.tracer = tracer_.get();
+                    job.x0 = range.x0 + tile % columns * size;
+                    job.y0 = range.y0 + tile / columns * size;
+                    job.x1 = std::min(job.x0 + size, range.x1);
+                    job.y1 = std::min(job.y0 + size, range.y1);
+                    job.sums = sums_.data();
+                    job.counts = counts_.data();
+                    job.primitives = primitives_.empty() ? nullptr : primitives_.data();
+                    for (std::uint64_t s = 0; s < range.sample_count && !cancelled.load(std::memory_order_relaxed); s += kSamplesPerJob) {
+                        job.first_sample = range.first_sample + s;
+                        job.sample_count = static_cast<std::uint32_t>(std::min(kSamplesPerJob, range.sample_count - s));
+                        const RayTotals rays = program_->render(job);
+                        closest += rays.closest;
+                        shadow += rays.shadow;
+                        done += job.sample_count;
+                        // One thread at a time tells the host; the others have better things to do than wait.
+                        const std::unique_lock lock(progress_mutex, std::try_to_lock);
+                        if (lock.owns_lock() && host_.cancelled(static_cast<double>(done.load()) / all)) cancelled = true;
+                    }
+                }
+            },
+            tbb::simple_partitioner());
+    });
+    render_seconds_ += secondsSince(start);
+    rays_.closest += closest;
+    rays_.shadow += shadow;
+    if (cancelled) return false;
+    paths_ += static_cast<std::uint64_t>(range.x1 - range.x0) * (range.y1 - range.y0) * range.sample_count;
+    return true;
+}
+
+void EmbreeIntegrator::readFilm(const CrtFilmView& film) {
+    if (program_ == nullptr || film.width != scene().width || film.height != scene().height || film.channels != scene().channels)
+        throw plugin::PluginError(CRT_INVALID_ARGUMENT, "the film view has another shape than the scene's film");
+    std::copy(sums_.begin(), sums_.end(), film.sums);
+    std::copy(counts_.begin(), counts_.end(), film.counts);
+    if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);
+}
+
+void EmbreeIntegrator::report(CrtBackendReport& report) {
+    plugin::writeText(report.device, processorName());
+    if (program_ != nullptr) {
+        plugin::writeText(report.kernel, std::string("precompiled, ") + program_->name);
+        report.kernel_features = program_->features;
+    }
+    report.build_seconds = build_seconds_;
+    report.render_seconds = render_seconds_;
+    report.paths = paths_;
+    report.closest_rays = rays_.closest;
+    report.shadow_rays = rays_.shadow;
+}
+
+}  // namespace crt::embree

@@ -1,0 +1,53 @@
+/// Renders on the CPU: TBB over tiles, Embree or the kernel's own loop for rays.
+#pragma once
+
+#include "embree_program.h"
+#include "embree_scene.h"
+
+#include "backend/crt_backend.h"
+#include "backend/plugin_guard.h"
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <tbb/task_arena.h>
+
+namespace crt::embree {
+
+std::vector<CrtDevice> probeDevices(const plugin::Host& host);
+
+class EmbreeIntegrator {
+public:
+    EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo& info);
+
+    void setScene(const CrtSceneBlob& scene);
+    bool render(const CrtRenderRange& range);
+    void readFilm(const CrtFilmView& film);
+    void report(CrtBackendReport& report);
+
+private:
+    struct alignas(64) Line {
+        unsigned char bytes[64];
+    };
+    const kernel::CrtScene& scene() const { return *reinterpret_cast<const kernel::CrtScene*>(blob_.data()); }
+    const unsigned char* blob() const { return reinterpret_cast<const unsigned char*>(blob_.data()); }
+    std::uint32_t tileSize(const CrtRenderRange& range) const;
+
+    plugin::Host host_;
+    CrtCreateInfo info_;
+    unsigned threads_;
+    tbb::task_arena arena_;
+    std::unique_ptr<Device> device_;  ///< Opened when a scene needs it.
+    std::unique_ptr<Tracer> tracer_;
+    const Program* program_ = nullptr;
+    std::vector<Line> blob_;
+    std::vector<double> sums_;
+    std::vector<kernel::u64> counts_;
+    std::vector<std::uint32_t> primitives_;
+    double build_seconds_ = 0, render_seconds_ = 0;
+    std::uint64_t paths_ = 0;
+    RayTotals rays_;
+};
+
+}  // namespace crt::embree

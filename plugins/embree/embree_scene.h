@@ -1,0 +1,52 @@
+/// The blob's triangles in an Embree scene. Embree finds candidates; the kernel's shared triangle test has the last word, so that hits are the same
+/// bits as on every other backend. The one file pair that knows Embree, and hides the difference between Embree 3 and 4.
+#pragma once
+
+namespace crt::embree {
+class Tracer;
+}
+// The kernels of this backend carry the tracer along, and trace with it (kernels.cpp).
+#define CRT_CONTEXT_EXTRA const crt::embree::Tracer* tracer;
+#define CRT_BACKEND_TRACE
+#include "kernel/intersect.h"
+
+#include <memory>
+#include <string>
+
+namespace crt::embree {
+
+/// One Embree device; its scenes must not outlive it.
+class Device {
+public:
+    /// Throws PluginError(CRT_NO_DEVICE) with Embree's reason.
+    explicit Device(unsigned threads);
+    ~Device();
+    Device(const Device&) = delete;
+    Device& operator=(const Device&) = delete;
+
+    /// "3.13.5"
+    static std::string version();
+
+private:
+    friend class Tracer;
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// An Embree BVH over the triangle slots of a blob, which must outlive it. Throws PluginError when Embree cannot build it.
+class Tracer {
+public:
+    Tracer(const Device& device, const kernel::CrtTriangle* triangles, std::uint32_t count);
+    ~Tracer();
+    Tracer(const Tracer&) = delete;
+    Tracer& operator=(const Tracer&) = delete;
+
+    kernel::CrtHit closest(const kernel::CrtRay& ray) const;
+    bool any(const kernel::CrtRay& ray) const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace crt::embree
