@@ -1,0 +1,41 @@
+# The road of somebody who writes a backend: install crt, move the tree to where he wants it, build docs/example_backend against it, and find
+# it usable. Nothing of the source or build tree of crt is used after the install.
+#
+#   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=… [-DCXX_FLAGS=…] -P out_of_tree.cmake
+
+function(run)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    string(JOIN " " command ${ARGV})
+    message(FATAL_ERROR "${command}\nended with ${result}:\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+# `crt plugins` gives each backend an unindented line with its name, then indented ones about it.
+function(expect_usable listing when)
+  if(NOT listing MATCHES "(^|\n)example 1\\.0\\.0\n(( [^\n]*\n)*)")
+    message(FATAL_ERROR "${when}: crt plugins does not list the example backend:\n${listing}")
+  endif()
+  set(about "${CMAKE_MATCH_2}")
+  if(about MATCHES "cannot run" OR NOT about MATCHES "portable C\\+\\+, one thread")
+    message(FATAL_ERROR "${when}: the example backend is not usable:\n${about}")
+  endif()
+endfunction()
+
+file(REMOVE_RECURSE ${WORK_DIR})
+run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/installed)
+file(RENAME ${WORK_DIR}/installed ${WORK_DIR}/moved)
+file(COPY ${SOURCE_DIR}/docs/example_backend DESTINATION ${WORK_DIR})
+
+run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${WORK_DIR}/example_backend -B ${WORK_DIR}/build
+    -DCMAKE_PREFIX_PATH=${WORK_DIR}/moved -DCMAKE_CXX_COMPILER=${CXX_COMPILER} "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}")
+run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
+run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${WORK_DIR}/moved/bin/crt plugins)
+expect_usable("${output}" "by CRT_BACKEND_PATH")
+
+run(${CMAKE_COMMAND} --install ${WORK_DIR}/build --prefix ${WORK_DIR}/moved)
+run(${CMAKE_COMMAND} -E env --unset=CRT_BACKEND_PATH ${WORK_DIR}/moved/bin/crt plugins)
+expect_usable("${output}" "installed beside the other backends")
+
+file(REMOVE_RECURSE ${WORK_DIR})
