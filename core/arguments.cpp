@@ -42,6 +42,12 @@ std::uint64_t parseCount(const std::string& text, const std::string& option, std
     return *number.value;
 }
 
+double parseTolerance(const std::string& text, const std::string& option) {
+    const Parsed<double> number = parseNumber(text);
+    if (!number.value || *number.value < 0) refuse(option, "a number of at least 0", text);
+    return *number.value;
+}
+
 double parseDuration(const std::string& text, const std::string& option) {
     constexpr const char* kExpected = "a duration such as 90s, 30m, 2h or 1h30m";
     double seconds = 0;

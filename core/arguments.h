@@ -13,6 +13,9 @@ namespace crt {
 /// A whole number of at least `least`; 1e3 is one. `option` stands in the message of the crt::Error(Usage), here and below.
 std::uint64_t parseCount(const std::string& text, const std::string& option, std::uint64_t least);
 
+/// A number of at least zero.
+double parseTolerance(const std::string& text, const std::string& option);
+
 /// "90", "90s", "1.5m", "2h", "1h30m", "250ms" in seconds; above zero.
 double parseDuration(const std::string& text, const std::string& option);
 

@@ -114,11 +114,20 @@ std::string arrayText(const char (&text)[N]) {
 /// A plugin may leave out what is only for humans.
 std::string textOrEmpty(const char* text) { return text != nullptr ? text : ""; }
 
-/// The driver behind a device, which only the list of devices tells. Asking again is quick: the driver is awake by now.
-std::string driverOf(const LoadedBackend& backend, const std::string& device_name) {
-    for (const CrtDevice& device : probeDevices(backend))
+/// The driver behind a device, which only the list of devices tells.
+std::string driverOf(const std::vector<CrtDevice>& devices, const std::string& device_name) {
+    for (const CrtDevice& device : devices)
         if (arrayText(device.name) == device_name) return arrayText(device.driver);
     return {};
+}
+
+/// Takes over what the backend says about itself. Being without it is a pity, but no reason to lose a render.
+void askForReport(Integrator& integrator, RunFacts& facts) {
+    try {
+        facts.backend = integrator.report();
+    } catch (const Error& error) {
+        logWarning("no report from the backend: {}", error.what());
+    }
 }
 
 /// CompiledScene → Film, by a backend. Returns what failed while sampling, if anything did; the film holds what there is.
@@ -126,6 +135,7 @@ std::optional<Error> renderSamples(const Job& job, const CompiledScene& compiled
                                    const std::function<void()>& save_checkpoint, RunFacts& facts) {
     const Stopwatch opening;
     const LoadedBackend backend = openBackend(job.backend);
+    const std::vector<CrtDevice> devices = probeDevices(backend);  // Says better than a failing create() why there is none.
     Integrator integrator(backend, job.integrator);
     facts.open_seconds = opening.seconds();
     facts.backend_name = backend.name;
@@ -136,8 +146,8 @@ std::optional<Error> renderSamples(const Job& job, const CompiledScene& compiled
     const Stopwatch preparing;
     integrator.setScene(compiled);
     facts.prepare_seconds = preparing.seconds();
-    facts.backend = integrator.report();
-    facts.driver = driverOf(backend, arrayText(facts.backend.device));
+    askForReport(integrator, facts);
+    facts.driver = driverOf(devices, arrayText(facts.backend.device));
     logInfo("{} on {}", backend.name, arrayText(facts.backend.device));
 
     SamplingResult result;
@@ -146,7 +156,7 @@ std::optional<Error> renderSamples(const Job& job, const CompiledScene& compiled
         result = sampleFilm(integrator, film, plan, progress, save_checkpoint);
     }
     // A device that failed is not asked again; what it said before the first sample stands.
-    if (result.stop != StopReason::Failed) facts.backend = integrator.report();
+    if (result.stop != StopReason::Failed) askForReport(integrator, facts);
     facts.stop = result.stop;
     facts.signal = result.signal;
     facts.rendered_samples = result.rendered;
@@ -187,6 +197,7 @@ void writeFiles(const Files& files, const Scene& scene, const Film& film, const 
                       {"crt/version", CRT_VERSION},
                       {"crt/sceneHash", identity.scene_hash},
                       {"crt/complete", facts.stop == StopReason::Samples ? "1" : "0"}};
+    if (!scene.title.empty()) metadata.emplace_back("ImageDescription", scene.title);
     // A film that was complete before this run is written without any backend.
     if (!facts.backend_name.empty()) {
         metadata.emplace_back("crt/backend", facts.backend_name + " " + facts.backend_version);

@@ -67,6 +67,7 @@ std::string clockText(double seconds) {
 }
 
 std::string durationText(double seconds) {
+    if (seconds < 0.00995) return fmt::format("{:.2f} ms", seconds * 1e3);
     if (seconds < 0.9995) return fmt::format("{:.0f} ms", seconds * 1e3);
     if (seconds < 99.95) return fmt::format("{:.1f} s", seconds);
     const auto s = static_cast<std::uint64_t>(std::llround(seconds));

@@ -1,12 +1,12 @@
 #include "report.h"
 
 #include "interrupt.h"
-#include "kernel/features.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <sys/utsname.h>
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
@@ -78,12 +78,12 @@ std::string arrayText(const char (&text)[N]) {
 
 std::vector<std::string> featureList(std::uint64_t mask) {
     std::vector<std::string> names;
-#define CRT_REPORT_FEATURE(bit, name, text) \
-    if (mask & (std::uint64_t{1} << bit)) names.emplace_back(#name);
-    CRT_FEATURE_LIST(CRT_REPORT_FEATURE)
-#undef CRT_REPORT_FEATURE
-    for (std::string& name : names)
-        for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    const std::string all = featureNames(mask);  // "bvh, diffuse"
+    for (std::size_t begin = 0; begin < all.size();) {
+        const std::size_t end = std::min(all.find(", ", begin), all.size());
+        names.push_back(all.substr(begin, end - begin));
+        begin = end + 2;
+    }
     return names;
 }
 

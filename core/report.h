@@ -53,7 +53,7 @@ struct RunFacts {
 /// The report as JSON text.
 std::string reportJson(const Scene& scene, const CompiledScene& compiled, const RunFacts& facts);
 
-/// Names of the bits of a feature mask, in the order of features.h.
+/// featureNames(), one by one.
 std::vector<std::string> featureList(std::uint64_t mask);
 
 /// The most memory this process ever held, in bytes (VmHWM); 0 when the system does not tell.

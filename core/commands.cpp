@@ -1,0 +1,219 @@
+#include "commands.h"
+
+#include "atomic_file.h"
+#include "backend/loader.h"
+#include "checkpoint.h"
+#include "compile.h"
+#include "image_io.h"
+#include "kernel/features.h"
+#include "log.h"
+#include "outputs.h"
+#include "progress.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+namespace crt {
+namespace {
+
+/// "name      value", one per line; further lines of a value stand under the first.
+void row(const char* name, const std::string& value) {
+    constexpr int kColumn = 14;
+    std::string indented;
+    for (const char c : value) {
+        indented += c;
+        if (c == '\n') indented.append(kColumn + 2, ' ');
+    }
+    fmt::print("  {:<{}} {}\n", name, kColumn - 1, indented);
+}
+
+std::string counted(std::uint64_t n, const char* one, const char* many) { return fmt::format("{} {}", n, n == 1 ? one : many); }
+
+const char* name(MaterialType type) {
+    switch (type) {
+        case MaterialType::Diffuse: return "diffuse";
+        case MaterialType::Mirror: return "mirror";
+        case MaterialType::Conductor: return "conductor";
+        case MaterialType::Dielectric: break;
+    }
+    return "dielectric";
+}
+
+const char* name(PixelFilter filter) {
+    switch (filter) {
+        case PixelFilter::Box: return "box";
+        case PixelFilter::Gaussian: return "gaussian";
+        case PixelFilter::BlackmanHarris: break;
+    }
+    return "Blackman-Harris";
+}
+
+const char* name(SamplerType type) {
+    switch (type) {
+        case SamplerType::Sobol: return "sobol";
+        case SamplerType::Independent: return "independent";
+        case SamplerType::XorShift: break;
+    }
+    return "xorshift";
+}
+
+std::string vectorText(const Vec3d& v) { return fmt::format("({:g}, {:g}, {:g})", v[0], v[1], v[2]); }
+
+std::string cameraText(const Camera& camera) {
+    const auto degrees = [](double tangent) { return 2 * std::atan(tangent) * 57.29577951308232; };
+    std::string text = fmt::format("at {} looking at {}, field of view {:.1f} x {:.1f} degrees", vectorText(camera.position),
+                                   vectorText(camera.target), degrees(camera.tan_half_width), degrees(camera.tan_half_height));
+    if (camera.aperture_radius > 0) text += fmt::format(", lens of radius {:g}", camera.aperture_radius);
+    return text;
+}
+
+std::string filmText(const Scene& scene) {
+    std::string text = fmt::format("{} x {} pixels, {} filter", scene.film.width, scene.film.height, name(scene.film.filter));
+    const auto& [x0, y0, x1, y1] = scene.film.crop;
+    if (x1 > x0) text += fmt::format(", cropped to [{}, {}) x [{}, {})", x0, x1, y0, y1);
+    return text;
+}
+
+std::string materialsText(const Scene& scene) {
+    std::string text;
+    for (const Material& material : scene.materials)
+        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", material.name, name(material.type));
+    return text.empty() ? "none" : text;
+}
+
+std::string lightsText(const Scene& scene, const CompiledScene& compiled) {
+    std::string text;
+    if (compiled.emitters > 0) text = counted(compiled.emitters, "emitting triangle", "emitting triangles");
+    if (scene.environment) text += text.empty() ? "constant environment" : ", constant environment";
+    return text.empty() ? "none: every image will be black" : text;
+}
+
+std::string acceleratorText(const CompiledScene& compiled) {
+    if (compiled.features & CRT_FEATURE_BVH) return fmt::format("BVH, {}", counted(compiled.nodes, "node of four", "nodes of four"));
+    if (compiled.features & CRT_FEATURE_AABB) return fmt::format("a box around each of {}", counted(compiled.objects, "object", "objects"));
+    return compiled.triangles == 0 ? "none: there is nothing to hit" : "a loop over all triangles";
+}
+
+void showScene(const SceneRequest& what) {
+    const Scene scene = loadScene(what);
+    const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
+    fmt::print("{}{}\n", what.file, scene.title.empty() ? "" : ": " + scene.title);
+    row("film", filmText(scene));
+    row("camera", cameraText(scene.camera));
+    row("geometry", counted(compiled.objects, "object", "objects") + ", " + counted(compiled.triangles, "triangle", "triangles"));
+    row("materials", materialsText(scene));
+    row("lights", lightsText(scene, compiled));
+    row("sampler", fmt::format("{}, seed {}, {} samples per pixel", name(scene.sampler.type), scene.sampler.seed, scene.sampler.samples));
+    row("accelerator", acceleratorText(compiled));
+    row("needs", featureNames(compiled.features));
+    std::string left_out;
+    for (const auto& [thing, why] : compiled.left_out) left_out += fmt::format("{}{}: {}", left_out.empty() ? "" : "\n", thing, why);
+    row("left out", left_out.empty() ? "nothing" : left_out);
+    row("scene blob", bytesText(static_cast<double>(compiled.size_bytes)));
+    row("scene hash", compiled.hash);
+    row("times", fmt::format("{} to read, {} to compile, {} of it for the accelerator", durationText(scene.parse_seconds),
+                             durationText(compiled.compile_seconds), durationText(compiled.build_seconds)));
+}
+
+std::string aovText(std::uint32_t aovs) {
+    std::string text;
+    for (const auto& [bit, title] : {std::pair{kAovAlbedo, "albedo"}, {kAovNormal, "normal"}, {kAovDepth, "depth"}, {kAovPrimitive, "primitive"}})
+        if (aovs & bit) text += fmt::format("{}{}", text.empty() ? "" : ", ", title);
+    return text.empty() ? "none" : text;
+}
+
+void showFilm(const std::string& file) {
+    const auto [film, identity] = readCheckpoint(file);
+    const double error = film.relativeError();
+    fmt::print("{}: partial render\n", file);
+    row("film", fmt::format("{} x {} pixels", film.shape().width, film.shape().height));
+    row("aovs", aovText(film.shape().aovs));
+    row("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
+    row("invalid", counted(film.invalidSamples(), "sample", "samples"));
+    row("error", std::isfinite(error) ? percentText(error) : "unknown");
+    row("scene hash", identity.scene_hash);
+    row("written by", "crt " + identity.version);
+}
+
+void showImage(const std::string& file) {
+    const Image image = readImage(file);
+    fmt::print("{}: image\n", file);
+    row("size", fmt::format("{} x {} pixels", image.width, image.height));
+    row("channels", fmt::format("{}", fmt::join(image.channels, ", ")));
+    if (!image.integer_channels.empty()) row("integers", fmt::format("{}", fmt::join(image.integer_channels, ", ")));
+    for (const auto& [key, value] : image.metadata) row(key.c_str(), value);
+}
+
+}  // namespace
+
+int showInfo(const SceneRequest& what) {
+    if (std::filesystem::path(what.file).extension() == kCheckpointExtension) {
+        showFilm(what.file);
+    } else if (formatOfFile(what.file)) {
+        showImage(what.file);
+    } else {
+        showScene(what);
+    }
+    return 0;
+}
+
+int compareFiles(const CompareArguments& arguments) {
+    constexpr int kDifferent = 7;
+    if (!arguments.difference_file.empty()) checkWritable(arguments.difference_file);
+    const Image first = readImage(arguments.first);
+    const Image second = readImage(arguments.second);
+    const CompareResult result = compareImages(first, second, arguments.options);
+    fmt::print("{}\n", arguments.json ? compareJson(result) : compareText(result));
+    if (!arguments.difference_file.empty() && result.mismatch.empty()) writeDifference(arguments.difference_file, first, second);
+    return result.same ? 0 : kDifferent;
+}
+
+int mergeFilms(const MergeArguments& arguments) {
+    // Everything that can be refused is refused before the parts, which may be large, are read.
+    Scene scene;
+    if (!arguments.scene.file.empty()) scene = loadScene(arguments.scene);
+    const OutputPlan plan = planOutputs(arguments.outputs, scene);
+    if (!plan.images.empty() && arguments.scene.file.empty())
+        throw Error(ErrorKind::Usage, fmt::format("'{}' needs --scene: colour space and exposure are in the scene, not in its films",
+                                                  plan.images.front().file));
+    for (const Output& image : plan.images) checkWritable(image.file);
+    for (const std::string& film : plan.films) checkWritable(film);
+
+    const auto [film, identity] = mergeCheckpoints(arguments.parts);
+    if (!arguments.scene.file.empty())
+        requireSameScene(arguments.parts.front(), identity, {compileScene(scene, requestedAovs(scene)).hash, CRT_VERSION});
+
+    const Metadata metadata{{"Software", "crt " CRT_VERSION}, {"crt/version", CRT_VERSION}, {"crt/sceneHash", identity.scene_hash}};
+    for (const std::string& name : plan.films) writeCheckpoint(name, film, identity);
+    for (const Output& output : plan.images) writeOutput(output, film, scene, metadata);
+    logInfo("{} samples per pixel from {} to {}", film.samples.count(), counted(arguments.parts.size(), "part", "parts"),
+            fmt::join(arguments.outputs, ", "));
+    return 0;
+}
+
+int listPlugins() {
+    for (const BackendStatus& status : listBackends()) {
+        fmt::print("{}{}\n", status.name, status.version.empty() ? "" : " " + status.version);
+        if (!status.path.empty()) row("file", status.path);
+        if (!status.build.empty()) row("built with", status.build);
+        for (const CrtDevice& device : status.devices) {
+            std::string text = fmt::format("{}: {}", device.index, device.name);
+            if (device.memory_bytes > 0) text += ", " + bytesText(static_cast<double>(device.memory_bytes));
+            if (*device.driver != '\0') text += fmt::format(", {}", device.driver);
+            row("device", text);
+        }
+        if (!status.reason.empty()) row("cannot run", status.reason);
+    }
+    return 0;
+}
+
+int printSchema(bool markdown) {
+    const std::string text = markdown ? sceneReferenceMarkdown() : sceneJsonSchema();
+    fmt::print("{}{}", text, !text.empty() && text.back() == '\n' ? "" : "\n");
+    return 0;
+}
+
+}  // namespace crt

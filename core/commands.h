@@ -1,0 +1,38 @@
+/// The subcommands of crt beside render (job.h): one function each, from checked arguments to an exit code. What they print goes to stdout.
+#pragma once
+
+#include "compare.h"
+#include "job.h"
+
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// `crt info`: what a scene needs, or what a film or an image holds, by the name's extension.
+int showInfo(const SceneRequest& what);
+
+/// `crt compare`: exit code 7 when the images differ (compare.h says what that means).
+struct CompareArguments {
+    std::string first, second;
+    CompareOptions options;
+    bool json = false;
+    std::string difference_file;  ///< Empty: none.
+};
+int compareFiles(const CompareArguments& arguments);
+
+/// `crt merge`: disjoint partial films into one film, or into the images of a scene.
+struct MergeArguments {
+    std::vector<std::string> parts;
+    std::vector<std::string> outputs;
+    SceneRequest scene;  ///< As rendered; an empty name means none, and then there are no images.
+};
+int mergeFilms(const MergeArguments& arguments);
+
+/// `crt plugins`: every backend, its devices, or the one reason why it cannot run.
+int listPlugins();
+
+/// `crt schema`: the keys of scene files, as JSON Schema or as the reference manual.
+int printSchema(bool markdown);
+
+}  // namespace crt

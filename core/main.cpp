@@ -1,0 +1,359 @@
+/// The command line: arguments → what one of job.h and commands.h takes → exit code. `--help` and `--version` open no backend and no library.
+#include "arguments.h"
+#include "commands.h"
+#include "error.h"
+#include "job.h"
+#include "log.h"
+#include "yaml_reader.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <new>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace {
+
+using namespace crt;
+
+constexpr const char* kExamples = R"(
+Examples:
+  crt configs/cornell_box.yaml                        with the best backend there is
+  crt --backend cuda configs/cornell_box.yaml         with this one; all give the same bits
+  crt scene.yaml --spp 1024 -o a.exr -o a.png         more samples, into these files
+  crt scene.yaml --time 30m                           as many samples as 30 minutes allow
+  crt scene.yaml --resume --spp 4096                  go on where Ctrl-C or a power cut stopped it
+  crt scene.yaml --set film.resolution=[256,256] --set integrator.max_depth=4
+  crt info scene.yaml                                 what a scene needs, and what is left out
+
+Half of the samples here and half on another machine, then both together:
+  crt scene.yaml --samples 0:512 -o a.crtfilm
+  crt scene.yaml --samples 512:1024 -o b.crtfilm
+  crt merge --scene scene.yaml -o scene.exr a.crtfilm b.crtfilm
+)";
+
+constexpr const char* kExitCodes = R"(
+Exit codes: 0 done, 1 internal error, 2 command line, 3 scene, 4 backend or device not available,
+5 device failed (what there was is saved), 6 output not written, 7 images differ,
+130 and 143 stopped by Ctrl-C or kill (image and checkpoint are saved).
+)";
+
+/// Usage lines as people write them, and on the top page the options of the command that needs no name.
+class HelpFormatter : public CLI::Formatter {
+public:
+    explicit HelpFormatter(const CLI::App* render) : render_(render) { column_width(28); }
+
+    std::string make_usage(const CLI::App* app, std::string) const override {
+        if (app->get_parent() == nullptr) return "Usage: crt [render] SCENE [options]\n       crt COMMAND --help\n";
+        std::string words;
+        for (const CLI::Option* option : app->get_options([](const CLI::Option* o) { return o->get_positional(); }))
+            words += " " + option->get_name(true) + (option->get_expected_max() > 1 ? "..." : "");
+        return fmt::format("Usage: crt {}{} [options]\n", app->get_name() == "render" ? "[render]" : app->get_name(), words);
+    }
+
+    std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
+        if (app->get_parent() != nullptr) {
+            return make_usage(app, name) + "\n" + make_description(app) + options(app, mode) + app->get_footer();
+        }
+        return make_description(app) + "\n" + make_usage(app, name) + make_subcommands(app, mode) + options(render_, mode) + app->get_footer();
+    }
+
+private:
+    /// CLI11 puts two empty lines between groups.
+    std::string options(const CLI::App* app, CLI::AppFormatMode mode) const {
+        return CLI::detail::find_and_replace(make_groups(app, mode), "\n\n\n", "\n\n");
+    }
+
+    const CLI::App* render_;
+};
+
+/// An option whose text is read by `read` once the whole command line is known to be well formed.
+class Reader {
+public:
+    CLI::Option* option(CLI::App& app, const std::string& names, const char* placeholder, const char* help,
+                        std::function<void(const std::string&)> read) {
+        CLI::Option* o = app.add_option_function<std::vector<std::string>>(names, [](const std::vector<std::string>&) {}, help)
+                             ->option_text(placeholder)
+                             ->expected(1)
+                             ->allow_extra_args(false)
+                             ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+        pending_.emplace_back(o, std::move(read));
+        return o;
+    }
+
+    /// The same, for one that may be given more than once.
+    CLI::Option* repeatable(CLI::App& app, const std::string& names, const char* placeholder, const char* help,
+                            std::function<void(const std::string&)> read) {
+        return option(app, names, placeholder, help, std::move(read))->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    }
+
+    /// Reads the values given, in the order of definition. Throws crt::Error(Usage).
+    void readAll() const {
+        for (const auto& [option, read] : pending_)
+            for (const std::string& value : option->results()) read(value);
+    }
+
+private:
+    std::vector<std::pair<CLI::Option*, std::function<void(const std::string&)>>> pending_;
+};
+
+class CommandLine {
+public:
+    CommandLine() {
+        app_.set_version_flag("--version", "crt " CRT_VERSION);
+        app_.require_subcommand(1);
+        CLI::App* render = addRender();
+        addInfo();
+        addCompare();
+        addMerge();
+        addPlugins();
+        addSchema();
+        app_.footer(std::string(kExamples) + kExitCodes);  // Now: commands inherit what is there when they are added.
+        const auto formatter = std::make_shared<HelpFormatter>(render);
+        app_.formatter(formatter);
+        for (CLI::App* command : app_.get_subcommands({})) command->formatter(formatter);
+    }
+
+    int run(const std::vector<std::string>& words) {
+        std::vector<std::string> commands;
+        for (const CLI::App* command : app_.get_subcommands({})) commands.push_back(command->get_name());
+        const std::vector<std::string> arguments = writtenOut({words.begin() + 1, words.end()}, commands);
+        if (arguments.empty())
+            throw Error(ErrorKind::Usage, "there is no scene to render; try 'crt configs/cornell_box.yaml', or 'crt --help'");
+        try {
+            app_.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back.
+        } catch (const CLI::CallForHelp&) {
+            fmt::print("{}", (app_.get_subcommands().empty() ? &app_ : app_.get_subcommands().front())->help());
+            return 0;
+        } catch (const CLI::CallForVersion& version) {
+            fmt::print("{}\n", version.what());
+            return 0;
+        } catch (const CLI::ParseError& error) {
+            refuse(error);
+        }
+        reader_.readAll();
+        job_.command = shellLine(words);
+        return action_();
+    }
+
+private:
+    /// CLI11 knows what is wrong, but not what was meant. Options come first: with one misspelt, the words after it are misread too.
+    [[noreturn]] void refuse(const CLI::ParseError& error) {
+        const CLI::App* command = app_.get_subcommands().empty() ? &app_ : app_.get_subcommands().front();
+        const std::string place = command == &app_ ? "crt" : "crt " + command->get_name();
+        const std::vector<std::string> left = app_.remaining(true);
+        for (const std::string& word : left) {
+            if (word.size() < 2 || word[0] != '-') continue;
+            const std::string flag = word.substr(0, word.find('='));
+            std::vector<std::string> names;
+            for (const CLI::Option* option : command->get_options()) {
+                for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+                for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+            }
+            const std::string hint = didYouMean(flag, names);
+            throw Error(ErrorKind::Usage, fmt::format("{} has no option '{}'{}", place, flag,
+                                                      hint.empty() ? "; see '" + place + " --help'" : "; " + hint));
+        }
+        if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr && !left.empty())
+            throw Error(ErrorKind::Usage, command->get_name() == "render"
+                                              ? fmt::format("one scene at a time: '{}' is one too many", left.front())
+                                              : fmt::format("{} does not know what to do with '{}'", place, left.front()));
+        if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+            const std::string text = error.what();  // "--spp: 1 required TEXT missing"
+            throw Error(ErrorKind::Usage, fmt::format("{} needs a value; see '{} --help'", text.substr(0, text.find(':')), place));
+        }
+        throw Error(ErrorKind::Usage, fmt::format("{}; see '{} --help'", error.what(), place));
+    }
+
+    CLI::App* addCommand(const char* name, const char* help, std::function<int()> action) {
+        CLI::App* command = app_.add_subcommand(name, help);
+        command->set_help_flag("-h,--help", "this page");
+        command->callback([this, action = std::move(action)] { action_ = action; });
+        return command;
+    }
+
+    void addSceneChanges(CLI::App& command, SceneRequest& scene, const char* group) {
+        reader_.repeatable(command, "--set", "KEY=VALUE", "change the scene, e.g. film.resolution=[256,256]; repeatable",
+                       [&scene](const std::string& text) { scene.overrides.push_back(parseOverride(text)); })
+            ->group(group);
+        reader_.option(command, "--seed", "N", "another seed: other, equally good, noise",
+                       [&scene](const std::string& text) { scene.seed = parseCount(text, "--seed", 0); })
+            ->group(group);
+        reader_.option(command, "--crop", "X0,Y0,X1,Y1", "only these pixels of the film, X1 and Y1 excluded",
+                       [&scene](const std::string& text) { scene.crop = parseRectangle(text, "--crop"); })
+            ->group(group);
+    }
+
+    CLI::App* addRender() {
+        CLI::App* render = addCommand("render", "render a scene; the word may be left out", [this] { return runJob(job_); });
+        render->add_option("SCENE", job_.scene.file, "scene file (YAML)")->required();
+
+        const char* group = "What is rendered";
+        CLI::Option* spp = reader_.option(*render, "--spp", "N", "samples per pixel, instead of the scene's",
+                                          [this](const std::string& text) { job_.spp = parseCount(text, "--spp", 1); });
+        spp->group(group);
+        reader_.option(*render, "--time", "DURATION", "stop after 90s, 30m, 2h, 1h30m; with --spp, whichever comes first",
+                       [this](const std::string& text) { job_.time_limit_seconds = parseDuration(text, "--time"); })
+            ->group(group);
+        reader_.option(*render, "--samples", "A:B", "exactly the samples A to B-1: a part to merge with others",
+                       [this](const std::string& text) { job_.samples = parseSampleRange(text, "--samples"); })
+            ->group(group)
+            ->excludes(spp);
+        addSceneChanges(*render, job_.scene, group);
+
+        group = "Where";
+        reader_.option(*render, "-b,--backend", "NAME", "cuda, embree, opencl, another, a path of one, or auto (CRT_BACKEND)",
+                       [this](const std::string& text) { job_.backend = text; })
+            ->envname("CRT_BACKEND")
+            ->group(group);
+        reader_.option(*render, "-d,--device", "NAME", "number or part of the name, as 'crt plugins' lists them (CRT_DEVICE)",
+                       [this](const std::string& text) { job_.integrator.device = text; })
+            ->envname("CRT_DEVICE")
+            ->group(group);
+        reader_.option(*render, "-t,--threads", "N", "threads of the processor; 0 for all",
+                       [this](const std::string& text) { job_.integrator.threads = smallCount(text, "--threads", 0); })
+            ->group(group);
+        reader_.option(*render, "--kernel", "lean|full", "lean leaves out what the scene does not need; same bits",
+                       [this](const std::string& text) { job_.integrator.kernel = text == "full" ? CRT_KERNEL_FULL : CRT_KERNEL_LEAN; })
+            ->check(oneOf({"lean", "full"}))
+            ->group(group);
+        reader_.option(*render, "--tile", "N", "pixels along the side of a tile; never changes the image",
+                       [this](const std::string& text) { job_.integrator.tile_size = smallCount(text, "--tile", 1); })
+            ->group(group);
+        reader_.option(*render, "--chunk", "N", "samples per pixel between two looks at clock and signals",
+                       [this](const std::string& text) { job_.chunk = parseCount(text, "--chunk", 1); })
+            ->group(group);
+        render->add_flag_callback("--no-cache", [this] { job_.integrator.use_cache = false; }, "keep no compiled kernels on disk")->group(group);
+
+        group = "Files";
+        reader_.repeatable(*render, "-o,--output", "FILE", ".exr .png .ppm .pfm or .crtfilm, instead of the scene's; repeatable",
+                       [this](const std::string& text) { job_.outputs.push_back(text); })
+            ->group(group);
+        reader_.option(*render, "--checkpoint", "FILE", "save the samples at the end and now and then, for --resume; or off",
+                       [this](const std::string& text) { job_.checkpoint_file = text == "off" ? "" : text; })
+            ->group(group);
+        reader_.option(*render, "--checkpoint-every", "DURATION", "how often (10m)",
+                       [this](const std::string& text) { job_.checkpoint_interval_seconds = parseDuration(text, "--checkpoint-every"); })
+            ->group(group);
+        reader_.option(*render, "--resume", "[FILE]", "go on from a checkpoint (FILE.crtfilm, or the first output's), and keep it",
+                       [this](const std::string& text) {
+                           job_.resume = true;
+                           job_.resume_file = text == "auto" ? "" : text;
+                       })
+            ->group(group);
+        reader_.option(*render, "--report", "FILE", "what the run did, as JSON (first output with .report.json); or none",
+                       [this](const std::string& text) { job_.report_file = text == "none" ? "" : text; })
+            ->group(group);
+
+        group = "Messages";
+        render->add_flag_callback("-v,--verbose", [] { setLogLevel(LogLevel::Debug); }, "say more")->group(group);
+        render->add_flag_callback("-q,--quiet", [this] { beQuiet(); }, "only warnings and errors, no progress")->group(group);
+        render->set_help_flag();  // Taken away and added again, so that it comes last.
+        render->set_help_flag("-h,--help", "this page")->group(group);
+        render->footer(kExamples);
+        return render;
+    }
+
+    void addInfo() {
+        CLI::App* info = addCommand("info", "say what a scene needs, or what a .crtfilm or an image holds", [this] { return showInfo(info_); });
+        info->add_option("FILE", info_.file, "scene, film or image")->required();
+        addSceneChanges(*info, info_, "Options");
+    }
+
+    void addCompare() {
+        CLI::App* compare = addCommand("compare", "compare two images; exit code 7 when they differ", [this] { return compareFiles(compare_); });
+        compare->footer("\nExamples:\n"
+                        "  crt compare cuda.exr embree.exr                    are they the same bits?\n"
+                        "  crt compare --tolerance 0.01 --diff d.png a.exr b.exr\n");
+        compare->add_option("A", compare_.first, "image")->required();
+        compare->add_option("B", compare_.second, "image")->required();
+        reader_.option(*compare, "--tolerance", "X", "RMS difference, as a share of B's mean, that counts as equal (0: same bits)",
+                       [this](const std::string& text) { compare_.options.tolerance = parseTolerance(text, "--tolerance"); });
+        compare->add_flag("--all-channels", compare_.options.all_channels, "compare every channel, not only R, G and B");
+        compare->add_flag("--json", compare_.json, "print the numbers as JSON");
+        reader_.option(*compare, "--diff", "FILE", "write the difference: values to .exr or .pfm, colours to .png or .ppm",
+                       [this](const std::string& text) { compare_.difference_file = text; });
+    }
+
+    void addMerge() {
+        CLI::App* merge = addCommand("merge", "add partial renders of disjoint samples", [this] { return mergeFilms(merge_); });
+        merge->footer("\nExamples:\n"
+                      "  crt merge -o all.crtfilm a.crtfilm b.crtfilm\n"
+                      "  crt merge --scene scene.yaml -o scene.exr -o scene.png a.crtfilm b.crtfilm\n");
+        merge->add_option("PART", merge_.parts, "films (.crtfilm) of one scene")->required();
+        reader_.repeatable(*merge, "-o,--output", "FILE", ".crtfilm, or with --scene an image; repeatable",
+                       [this](const std::string& text) { merge_.outputs.push_back(text); })
+            ->required();
+        reader_.option(*merge, "--scene", "SCENE", "the scene they are of: needed for images",
+                       [this](const std::string& text) { merge_.scene.file = text; });
+        addSceneChanges(*merge, merge_.scene, "The scene, changed as it was for rendering");
+        merge->add_flag_callback("-q,--quiet", [this] { beQuiet(); }, "only warnings and errors");
+    }
+
+    void addPlugins() {
+        addCommand("plugins", "list the backends, their devices, and why one cannot run", [] { return listPlugins(); });
+    }
+
+    void addSchema() {
+        CLI::App* schema = addCommand("schema", "print the JSON Schema of scene files", [this] { return printSchema(markdown_); });
+        schema->add_flag("--markdown", markdown_, "print the reference manual instead");
+    }
+
+    void beQuiet() {
+        setLogLevel(LogLevel::Warning);
+        job_.progress = ProgressMode::None;
+    }
+
+    static unsigned smallCount(const std::string& text, const char* option, std::uint64_t least) {
+        const std::uint64_t n = parseCount(text, option, least);
+        if (n > 65536) throw Error(ErrorKind::Usage, fmt::format("{} {} is beyond any use", option, text));
+        return static_cast<unsigned>(n);
+    }
+
+    static CLI::Validator oneOf(std::vector<std::string> words) {
+        return CLI::Validator(
+            [words](std::string& text) {
+                if (std::find(words.begin(), words.end(), text) != words.end()) return std::string();
+                const std::string hint = didYouMean(text, words);
+                return fmt::format("takes one of {}, not '{}'{}", fmt::join(words, ", "), text, hint.empty() ? "" : "; " + hint);
+            },
+            "");
+    }
+
+    CLI::App app_{"crt, a spectral path tracer. The same scene and seed give the same bits on every backend."};
+    Reader reader_;
+    std::function<int()> action_;
+    Job job_;
+    SceneRequest info_;
+    CompareArguments compare_;
+    MergeArguments merge_;
+    bool markdown_ = false;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    // One place turns everything that can be thrown into one line and an exit code.
+    try {
+        CommandLine command_line;
+        return command_line.run({argv, argv + argc});
+    } catch (const crt::Error& error) {
+        const std::string text = error.what();
+        // Errors in a scene come with places of their own, which editors find only at the start of a line.
+        const bool has_places = text.find(": error: ") != std::string::npos;
+        crt::logMessage(crt::LogLevel::Error, (has_places ? "the scene cannot be rendered as it is:\n" : "") + text);
+        return error.exitCode();
+    } catch (const std::bad_alloc&) {
+        crt::logMessage(crt::LogLevel::Error, "out of memory on the host");
+        return static_cast<int>(crt::ErrorKind::Device);
+    } catch (const std::exception& error) {
+        crt::logMessage(crt::LogLevel::Error, fmt::format("internal error: {}", error.what()));
+        return static_cast<int>(crt::ErrorKind::Internal);
+    }
+}

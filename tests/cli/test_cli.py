@@ -1,0 +1,640 @@
+#!/usr/bin/env python3
+"""The program from outside: what people type, what they see, which files and which exit code they get.
+
+    test_cli.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
+
+Where no light transport is needed the backend is `fake` (tests/fake_plugins), which renders a pattern that depends on seed, pixel and
+sample as a real one does, and goes wrong on demand (CRT_FAKE_FAULT). Tests that need light use the first real backend that can run
+here and are skipped when there is none. Python's standard library only.
+"""
+
+import json
+import os
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+CRT = CONFIG_DIR = FAKE_DIR = None  # From the command line.
+
+SCENE = """\
+crt: 1
+title: A lamp over a floor
+camera: {position: [0, 1, -4], target: [0, 0.5, 0], fov: 40}
+film: {resolution: [24, 16]}
+sampler: {samples: 16}
+materials:
+  floor: {type: diffuse, reflectance: 0.7}
+  black: {type: diffuse, reflectance: 0}
+objects:
+  - name: floor
+    mesh: {positions: [[-2, 0, -2], [-2, 0, 2], [2, 0, 2], [2, 0, -2]], faces: [[0, 1, 2, 3]]}
+    material: floor
+  - name: lamp
+    mesh: {positions: [[-1, 2, -1], [1, 2, -1], [1, 2, 1], [-1, 2, 1]], faces: [[0, 1, 2, 3]]}
+    material: black
+    emission: {radiance: {blackbody: 4000, scale: 5}}
+"""
+
+EMPTY = """\
+crt: 1
+film: {resolution: [8, 4], color_space: xyz}
+sampler: {samples: 4}
+environment: {radiance: 1}
+"""
+
+DARK = """\
+crt: 1
+film: {resolution: [8, 4]}
+sampler: {samples: 4}
+materials: {white: {type: diffuse, reflectance: 0.8}}
+objects:
+  - name: wall
+    mesh: {positions: [[-2, -2, 2], [2, -2, 2], [2, 2, 2], [-2, 2, 2]], faces: [[0, 1, 2, 3]]}
+    material: white
+"""
+
+
+def environment(**changes):
+    env = {k: v for k, v in os.environ.items() if not k.startswith("CRT_")}
+    env["CRT_BACKEND_PATH"] = FAKE_DIR
+    # Addresses compiled in by a sanitizer build need no help from here; a cache in the home of whoever runs the tests does no good.
+    env["CRT_CACHE_DIR"] = os.path.join(tempfile.gettempdir(), f"crt-test-cache-{os.getuid()}")
+    env.update(changes)
+    return env
+
+
+def default_signals():
+    """A test run in the background of a shell script has SIGINT ignored, and crt would rightly inherit that."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def read_pfm(path):
+    with open(path, "rb") as file:
+        kind, size, scale = file.readline().split(), file.readline().split(), float(file.readline())
+        width, height = map(int, size)
+        channels = 3 if kind == [b"PF"] else 1
+        values = struct.unpack(("<" if scale < 0 else ">") + f"{width * height * channels}f", file.read())
+    return width, height, values
+
+
+def read_bytes(path):
+    with open(path, "rb") as file:
+        return file.read()
+
+
+def first_real_backend():
+    """The first backend installed beside the program that has a device."""
+    name = None
+    listing = subprocess.run([CRT, "plugins"], env=environment(CRT_BACKEND_PATH=""), capture_output=True, text=True).stdout
+    for line in listing.splitlines():
+        if not line.startswith(" "):
+            name = line.split()[0]
+        elif line.split()[0] == "device":
+            return name
+    return None
+
+
+class CliTest(unittest.TestCase):
+    def setUp(self):
+        self.directory = tempfile.mkdtemp(prefix="crt-cli-")
+        self.addCleanup(shutil.rmtree, self.directory)
+        self.write("scene.yaml", SCENE)
+
+    def path(self, name):
+        return os.path.join(self.directory, name)
+
+    def write(self, name, text):
+        with open(self.path(name), "w", encoding="utf-8") as file:
+            file.write(text)
+
+    def crt(self, *arguments, expect=0, fault=None, **changes):
+        if fault:
+            changes["CRT_FAKE_FAULT"] = fault
+        run = subprocess.run([CRT, *arguments], cwd=self.directory, env=environment(**changes), stdin=subprocess.DEVNULL,
+                             capture_output=True, text=True, timeout=120)
+        self.assertEqual(run.returncode, expect, f"crt {' '.join(arguments)}\n{run.stdout}{run.stderr}")
+        return run
+
+    def start(self, *arguments, fault=None):
+        changes = {"CRT_FAKE_FAULT": fault} if fault else {}
+        process = subprocess.Popen([CRT, *arguments], cwd=self.directory, env=environment(**changes), stdin=subprocess.DEVNULL,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=default_signals)
+        self.addCleanup(process.stdout.close)
+        self.addCleanup(process.stderr.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def wait_for_rendering(self, process):
+        """The line that names the device is the last before the first sample."""
+        line = process.stderr.readline()
+        self.assertIn("fake on pattern", line)
+        time.sleep(0.15)
+        self.assertIsNone(process.poll(), "the render was over before the test could look at it")
+
+    def report(self, name):
+        with open(self.path(name), encoding="utf-8") as file:
+            return json.load(file)
+
+    def assert_one_error(self, run, *words):
+        errors = [line for line in run.stderr.splitlines() if line.startswith("crt: error:")]
+        self.assertEqual(len(errors), 1, run.stderr)
+        for word in words:
+            self.assertIn(word, run.stderr)
+
+
+class Help(CliTest):
+    def test_help_teaches(self):
+        text = self.crt("--help").stdout
+        for word in ("render", "compare", "merge", "info", "plugins", "schema", "--backend", "--resume", "Examples:", "Exit codes:"):
+            self.assertIn(word, text)
+        self.assertLess(max(map(len, text.splitlines())), 120)
+
+    def test_every_command_has_help(self):
+        for command in ("render", "compare", "merge", "info", "plugins", "schema"):
+            self.assertIn(f"{command}", self.crt(command, "--help").stdout.splitlines()[0])
+
+    def test_version(self):
+        self.assertRegex(self.crt("--version").stdout, r"^crt \d+\.\d+\.\d+\n$")
+
+    def test_help_and_version_open_no_library(self):
+        for flag in ("--help", "--version"):
+            run = self.crt(flag, LD_DEBUG="files", LC_ALL="C")
+            self.assertNotIn("crt_backend", run.stderr)
+            self.assertNotIn("OpenImageIO", run.stderr)
+
+    def test_no_arguments(self):
+        self.assert_one_error(self.crt(expect=2), "--help")
+
+    def test_schema(self):
+        self.assertEqual(json.loads(self.crt("schema").stdout)["$schema"], "http://json-schema.org/draft-07/schema#")
+        self.assertIn("## camera", self.crt("schema", "--markdown").stdout)
+
+
+class WrongCommandLine(CliTest):
+    def test_did_you_mean(self):
+        self.assert_one_error(self.crt("scene.yaml", "--bakend", "fake", expect=2), "'--bakend'", "did you mean '--backend'?")
+        self.assert_one_error(self.crt("--smaples", "0:4", "scene.yaml", expect=2), "did you mean '--samples'?")
+        self.assert_one_error(self.crt("comapre", "a.exr", "b.exr", expect=2), "did you mean 'compare'?")
+        self.assert_one_error(self.crt("compare", "a.exr", "b.exr", "--tolerence", "1", expect=2), "did you mean '--tolerance'?")
+        self.assert_one_error(self.crt("scene.yaml", "--kernel", "fulll", expect=2), "did you mean 'full'?")
+
+    def test_values_that_make_no_sense(self):
+        for option, value in (("--spp", "0"), ("--spp", "many"), ("--time", "soon"), ("--time", "1h30"), ("--samples", "5:5"),
+                              ("--samples", "5"), ("--crop", "1,2,3"), ("--crop", "0,0,1000,4"), ("--chunk", "-1"), ("--seed", "1.5"),
+                              ("--set", "film.resolution"), ("--checkpoint-every", "0s"), ("-o", "image.jpeg")):
+            with self.subTest(option=option, value=value):
+                run = self.crt("scene.yaml", "-b", "fake", f"{option}={value}" if option.startswith("--") else f"{option}{value}", expect=2)
+                self.assert_one_error(run, value)
+
+    def test_a_missing_value(self):
+        self.assert_one_error(self.crt("scene.yaml", "--spp", expect=2), "--spp needs a value")
+
+    def test_samples_and_spp_exclude_each_other(self):
+        self.assert_one_error(self.crt("scene.yaml", "--spp", "4", "--samples", "0:4", expect=2), "--samples")
+
+    def test_two_scenes(self):
+        self.assert_one_error(self.crt("scene.yaml", "other.yaml", expect=2), "'other.yaml'")
+
+    def test_the_same_output_twice(self):
+        self.assert_one_error(self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "-o", "./a.pfm", expect=2), "a.pfm")
+
+    def test_merge_into_an_image_needs_the_scene(self):
+        self.assert_one_error(self.crt("merge", "-o", "a.pfm", "a.crtfilm", expect=2), "--scene")
+
+
+class WrongScene(CliTest):
+    def test_absent(self):
+        self.assert_one_error(self.crt("nowhere.yaml", expect=3), "nowhere.yaml")
+
+    def test_unknown_key(self):
+        self.write("bad.yaml", SCENE.replace("reflectance: 0.7", "reflectence: 0.7"))
+        run = self.crt("bad.yaml", "-b", "fake", expect=3)
+        self.assert_one_error(run, "did you mean 'reflectance'?")
+        self.assertRegex(run.stderr, r"(?m)^bad\.yaml:7:\d+: error: ")
+
+    def test_wrong_override(self):
+        self.assert_one_error(self.crt("scene.yaml", "-b", "fake", "--set", "film.resolution=[0,4]", expect=3), "film.resolution")
+
+
+class Backends(CliTest):
+    def test_unknown(self):
+        self.assert_one_error(self.crt("scene.yaml", "-b", "cuta", expect=4), "'cuta'", "did you mean 'cuda'?", FAKE_DIR)
+
+    def test_broken_plugins(self):
+        for name, word in (("missing_library", "libcrt_absent.so.1"), ("no_symbol", "crt_backend_v1"), ("wrong_layout", "rebuild"),
+                           ("wrong_abi", "rebuild"), ("small_table", "bytes")):
+            with self.subTest(plugin=name):
+                self.assert_one_error(self.crt("scene.yaml", "-b", name, expect=4), name, word)
+
+    def test_no_device(self):
+        self.assert_one_error(self.crt("scene.yaml", "-b", "no_device", expect=4), "no_device", "driver")
+
+    def test_unknown_device(self):
+        self.assert_one_error(self.crt("scene.yaml", "-b", "fake", "-d", "quantum", expect=4), "quantum")
+
+    def test_a_path_is_a_backend(self):
+        self.crt("scene.yaml", "-b", os.path.join(FAKE_DIR, "crt_backend_fake.so"), "-o", "a.pfm")
+
+    def test_environment_variable_and_precedence(self):
+        self.crt("scene.yaml", "-o", "a.pfm", CRT_BACKEND="fake")
+        self.crt("scene.yaml", "-o", "a.pfm", "-b", "fake", CRT_BACKEND="nonsense")
+        self.assertEqual(self.report("a.report.json")["backend"]["name"], "fake")
+
+    def test_device_by_name(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "-d", "second")
+        self.assertEqual(self.report("a.report.json")["backend"]["device"], "second pattern")
+
+    def test_plugins_lists_all(self):
+        text = self.crt("plugins").stdout
+        for word in ("cuda", "embree", "opencl", "second pattern", "cannot run", "libcrt_absent.so.1"):
+            self.assertIn(word, text)
+
+    def test_exception_in_a_plugin_is_an_internal_error(self):
+        self.assert_one_error(self.crt("scene.yaml", "-b", "throws_in_render", "-o", "a.pfm", expect=1), "broke the contract")
+
+
+class Rendering(CliTest):
+    def test_the_word_render_is_implied(self):
+        self.crt("--backend", "fake", "scene.yaml", "-o", "a.pfm")
+        self.crt("render", "scene.yaml", "--backend", "fake", "-o", "b.pfm")
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("b.pfm")))
+
+    def test_default_outputs(self):
+        self.crt("scene.yaml", "-b", "fake")
+        for name in ("scene.exr", "scene.png", "scene.report.json"):
+            self.assertTrue(os.path.exists(self.path(name)), name)
+        self.assertFalse(os.path.exists(self.path("scene.crtfilm")))
+
+    def test_outputs_of_the_scene(self):
+        self.write("with.yaml", SCENE + "outputs:\n  - {file: beside.pfm}\n  - {file: beside.ppm}\n")
+        self.crt("with.yaml", "-b", "fake")
+        self.assertTrue(os.path.exists(self.path("beside.ppm")))
+        self.crt("with.yaml", "-b", "fake", "-o", "other.pfm", "--report", "none")
+        self.assertTrue(os.path.exists(self.path("other.pfm")))
+        self.assertFalse(os.path.exists(self.path("other.report.json")))
+
+    def test_how_it_is_cut_does_not_show(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
+        reference = read_bytes(self.path("a.pfm"))
+        for options in (["--chunk", "1"], ["--chunk", "7"], ["--tile", "3"], ["--kernel", "full"], ["-t", "1"], ["--no-cache"]):
+            with self.subTest(options=options):
+                self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", *options)
+                self.assertEqual(read_bytes(self.path("b.pfm")), reference)
+
+    def test_crop_cuts_a_window_out_of_the_same_image(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
+        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--crop", "4,2,10,5")
+        width, height, whole = read_pfm(self.path("a.pfm"))
+        crop_width, crop_height, part = read_pfm(self.path("b.pfm"))
+        self.assertEqual((crop_width, crop_height), (6, 3))
+        for y in range(2, 5):  # PFM rows go from the bottom up.
+            row = 3 * (width * (height - 1 - y) + 4)
+            crop_row = 3 * crop_width * (crop_height - 1 - (y - 2))
+            self.assertEqual(part[crop_row:crop_row + 18], whole[row:row + 18])
+
+    def test_seed_is_the_scenes_seed(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--seed", "7")
+        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--set", "sampler.seed=7")
+        self.crt("scene.yaml", "-b", "fake", "-o", "c.pfm")
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("b.pfm")))
+        self.assertNotEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("c.pfm")))
+
+    def test_time_alone_replaces_the_number_of_samples(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--time", "300ms")
+        report = self.report("a.report.json")
+        self.assertEqual(report["stop"]["reason"], "time")
+        self.assertGreater(report["samples"]["per_pixel"], 16)
+        self.assertLess(report["seconds"]["sampling"], 2)
+
+    def test_time_and_samples_whichever_comes_first(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--time", "1h", "--spp", "3")
+        self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 3)
+
+    def test_invalid_samples_are_counted_and_said(self):
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", fault="nan")
+        self.assertIn("warning", run.stderr)
+        report = self.report("a.report.json")
+        self.assertGreater(report["samples"]["invalid"], 0)
+        self.assertGreater(report["warnings"], 0)
+
+    def test_quiet_says_nothing(self):
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "-q")
+        self.assertEqual(run.stdout + run.stderr, "")
+
+    def test_report(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
+        report = self.report("a.report.json")
+        expected = {
+            "crt": ["version", "command", "finished"],
+            "host": ["cpu", "os", "threads"],
+            "backend": ["name", "version", "build", "path", "device", "driver", "kernel", "kernel_features", "kernel_from_cache", "registers",
+                        "spill_bytes"],
+            "scene": ["file", "title", "hash", "files_read", "width", "height", "objects", "triangles", "emitters", "nodes", "seed"],
+            "features": ["mask", "kept", "left_out"],
+            "seconds": ["parse", "build", "compile", "open", "prepare", "kernel_compile", "cache", "upload", "render", "sampling", "write",
+                        "total"],
+            "samples": ["target", "per_pixel", "resumed", "rendered", "ranges", "chunks", "invalid"],
+            "rays": ["paths", "closest", "shadow"],
+            "speed": ["mpaths_per_second", "mrays_per_second"],
+            "memory": ["scene_bytes", "host_peak_bytes", "device_peak_bytes"],
+            "error": ["relative"],
+            "stop": ["reason", "signal", "failure", "exit_code"],
+        }
+        for section, keys in expected.items():
+            self.assertEqual(list(report[section]), keys, section)
+        self.assertEqual(report["samples"]["ranges"], [[0, 16]])
+        self.assertEqual(report["rays"]["paths"], 16 * 24 * 16)
+        self.assertEqual(report["outputs"], ["a.pfm"])
+        self.assertEqual(report["stop"]["reason"], "samples")
+        self.assertRegex(report["scene"]["hash"], r"^[0-9a-f]{32}$")
+        self.assertIn("area-light", report["features"]["kept"])
+        self.assertTrue(all(entry["why"] for entry in report["features"]["left_out"]))
+        self.assertGreater(report["memory"]["host_peak_bytes"], 1 << 20)
+
+    def test_a_pfm_render_maps_no_image_library(self):
+        process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", "--chunk", "1", "--spp", "100", fault="slow")
+        self.wait_for_rendering(process)
+        with open(f"/proc/{process.pid}/maps", encoding="utf-8") as file:
+            maps = file.read()
+        self.assertIn("crt_backend_fake.so", maps)
+        for library in ("OpenImageIO", "OpenEXR", "libpng", "libembree", "libOpenCL", "libcuda"):
+            self.assertNotIn(library, maps)
+
+    def test_progress_on_a_pipe_is_a_line_in_ten_seconds(self):
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--time", "11s", fault="slow")
+        self.assertNotIn("\r", run.stderr)
+        self.assertNotIn("\x1b", run.stderr)
+        lines = [line for line in run.stderr.splitlines() if re.search(r"\d+ %.*spp.*paths/s.*left", line)]
+        self.assertEqual(len(lines), 1, run.stderr)
+
+
+class Outputs(CliTest):
+    def test_unwritable_is_found_before_anything_is_opened(self):
+        # A backend that does not exist would be exit code 4: the output is looked at earlier.
+        for arguments in (["-o", "/nowhere/at/all/a.pfm"], ["-o", "scene.yaml/a.pfm"], ["-o", "a.pfm", "--report", "/nowhere/at/all/r.json"],
+                          ["-o", "a.pfm", "--checkpoint", "/nowhere/at/all/c.crtfilm"]):
+            with self.subTest(arguments=arguments):
+                begin = time.monotonic()
+                self.assert_one_error(self.crt("scene.yaml", "-b", "nonsense", *arguments, expect=6))
+                self.assertLess(time.monotonic() - begin, 1)
+
+    def test_an_output_that_becomes_unwritable_costs_no_samples(self):
+        os.mkdir(self.path("out"))
+        process = self.start("scene.yaml", "-b", "fake", "-o", "kept.pfm", "-o", "out/a.pfm", "--chunk", "1", "--spp", "30", fault="slow")
+        self.wait_for_rendering(process)
+        shutil.rmtree(self.path("out"))
+        _, messages = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 6, messages)
+        self.assertTrue(os.path.exists(self.path("kept.pfm")))
+        self.crt("scene.yaml", "-b", "fake", "-o", "kept.pfm", "--spp", "30", "--resume", "--report", "r.json")
+        self.assertEqual(self.report("r.json")["samples"]["resumed"], 30)
+
+
+class StoppingAndGoingOn(CliTest):
+    def interrupt(self, number, code):
+        self.crt("scene.yaml", "-b", "fake", "--spp", "64", "-o", "whole.pfm")
+        process = self.start("scene.yaml", "-b", "fake", "--spp", "64", "-o", "part.pfm", "--chunk", "1", fault="slow")
+        self.wait_for_rendering(process)
+        process.send_signal(number)
+        _, messages = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, code, messages)
+        report = self.report("part.report.json")
+        self.assertEqual(report["stop"]["reason"], "interrupted")
+        self.assertEqual(report["stop"]["exit_code"], code)
+        self.assertTrue(0 < report["samples"]["per_pixel"] < 64, report["samples"])
+        self.assertTrue(os.path.exists(self.path("part.pfm")))
+        self.assertTrue(os.path.exists(self.path("part.crtfilm")))
+        self.assertIn("--resume", messages)
+        self.crt("scene.yaml", "-b", "fake", "--spp", "64", "-o", "part.pfm", "--resume")
+        self.assertEqual(self.report("part.report.json")["samples"]["resumed"], report["samples"]["per_pixel"])
+        self.assertEqual(read_bytes(self.path("part.pfm")), read_bytes(self.path("whole.pfm")))
+
+    def test_ctrl_c_then_resume_gives_the_same_bits(self):
+        self.interrupt(signal.SIGINT, 130)
+
+    def test_kill_then_resume_gives_the_same_bits(self):
+        self.interrupt(signal.SIGTERM, 143)
+
+    def test_a_signal_delivered_twice_at_once_is_one(self):
+        # timeout(1) signals its child and then the whole process group.
+        process = self.start("scene.yaml", "-b", "fake", "--spp", "64", "-o", "part.pfm", "--chunk", "1", fault="slow")
+        self.wait_for_rendering(process)
+        process.send_signal(signal.SIGTERM)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 143)
+        self.assertTrue(os.path.exists(self.path("part.crtfilm")))
+
+    def test_the_second_signal_leaves_at_once(self):
+        # 4000 rows of 2 ms: one chunk takes eight seconds.
+        process = self.start("scene.yaml", "-b", "fake", "--set", "film.resolution=[1,4000]", "-o", "part.pfm", fault="slow")
+        self.wait_for_rendering(process)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.5)
+        self.assertIsNone(process.poll())
+        begin = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130)
+        self.assertLess(time.monotonic() - begin, 2)
+        self.assertFalse(os.path.exists(self.path("part.pfm")))
+
+    def test_resume_raises_the_target(self):
+        self.crt("scene.yaml", "-b", "fake", "--spp", "40", "-o", "whole.pfm")
+        self.crt("scene.yaml", "-b", "fake", "--spp", "10", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
+        self.crt("scene.yaml", "-b", "fake", "--spp", "25", "-o", "a.pfm", "--resume", "c.crtfilm")  # Keeps c.crtfilm up to date.
+        self.crt("--resume", "c.crtfilm", "scene.yaml", "-b", "fake", "--spp", "40", "-o", "a.pfm")
+        self.assertEqual(self.report("a.report.json")["samples"]["resumed"], 25)
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("whole.pfm")))
+
+    def test_resume_does_not_swallow_the_scene(self):
+        self.crt("--resume", "scene.yaml", "-b", "fake", "-o", "a.pfm")
+        self.assertTrue(os.path.exists(self.path("a.crtfilm")))
+
+    def test_a_complete_checkpoint_needs_no_backend(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
+        self.crt("scene.yaml", "-b", "nonsense", "-o", "b.pfm", "--resume", "c.crtfilm")
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("b.pfm")))
+
+    def test_checkpoints_are_written_on_the_way(self):
+        process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", "--checkpoint", "c.crtfilm", "--checkpoint-every", "50ms", "--chunk", "1",
+                             "--spp", "100", fault="slow")
+        self.wait_for_rendering(process)
+        time.sleep(0.5)
+        process.kill()  # As a power cut would.
+        process.communicate()
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "100", "--resume", "c.crtfilm")
+        self.assertGreater(self.report("a.report.json")["samples"]["resumed"], 0)
+        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "100")
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("b.pfm")))
+
+    def test_a_checkpoint_of_another_scene_is_refused(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
+        for change in (["--seed", "1"], ["--set", "camera.fov=41"], ["--crop", "0,0,8,8"]):
+            with self.subTest(change=change):
+                run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--resume", "c.crtfilm", "--spp", "32", *change, expect=2)
+                self.assert_one_error(run, "c.crtfilm")
+        # The number of samples is not part of what is seen.
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--resume", "c.crtfilm", "--set", "sampler.samples=32")
+
+    def test_a_damaged_or_absent_checkpoint_is_refused(self):
+        self.assert_one_error(self.crt("scene.yaml", "-b", "fake", "--resume", "none.crtfilm", expect=2), "none.crtfilm")
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
+        with open(self.path("c.crtfilm"), "r+b") as file:
+            file.truncate(os.path.getsize(self.path("c.crtfilm")) // 2)
+        self.assert_one_error(self.crt("scene.yaml", "-b", "fake", "--resume", "c.crtfilm", expect=2), "c.crtfilm")
+
+    def test_samples_that_are_there_already_are_refused(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--samples", "0:8", "--checkpoint", "c.crtfilm")
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--samples", "4:12", "--resume", "c.crtfilm", expect=2)
+        self.assert_one_error(run, "overlap")
+
+    def test_gaps_are_filled(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "whole.pfm", "--spp", "24")
+        self.crt("scene.yaml", "-b", "fake", "-o", "c.crtfilm", "--samples", "8:16")
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--resume", "c.crtfilm", "--spp", "24")
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("whole.pfm")))
+
+
+class DeviceFailures(CliTest):
+    def test_out_of_memory_with_nothing_rendered(self):
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", fault="oom", expect=5)
+        self.assert_one_error(run, "memory")
+        self.assertFalse(os.path.exists(self.path("a.pfm")))
+        self.assertEqual(self.report("a.report.json")["stop"]["reason"], "failed")
+
+    def test_what_was_there_is_saved(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "whole.pfm", "--spp", "32")
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "a.crtfilm")
+        os.remove(self.path("a.pfm"))
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "32", "--resume", fault="device", expect=5)
+        self.assert_one_error(run, "fell off the bus")
+        report = self.report("a.report.json")
+        self.assertEqual((report["stop"]["reason"], report["stop"]["exit_code"]), ("failed", 5))
+        self.assertIn("fell off the bus", report["stop"]["failure"])
+        self.assertTrue(os.path.exists(self.path("a.pfm")))
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "32", "--resume")
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("whole.pfm")))
+
+
+class Merging(CliTest):
+    def test_two_halves_are_the_whole(self):
+        self.crt("scene.yaml", "-b", "fake", "--samples", "0:32", "-o", "a.crtfilm")
+        self.crt("scene.yaml", "-b", "fake", "--samples", "32:64", "-o", "b.crtfilm")
+        self.crt("scene.yaml", "-b", "fake", "--samples", "0:64", "-o", "whole.crtfilm", "-o", "whole.pfm")
+        self.crt("merge", "-o", "merged.crtfilm", "b.crtfilm", "a.crtfilm")
+        self.crt("merge", "--scene", "scene.yaml", "-o", "merged.pfm", "a.crtfilm", "b.crtfilm")
+        self.assertEqual(read_bytes(self.path("merged.pfm")), read_bytes(self.path("whole.pfm")))
+        self.assertIn("64 per pixel: 0-64", self.crt("info", "merged.crtfilm").stdout)
+        self.crt("compare", "merged.pfm", "whole.pfm")
+
+    def test_overlap_and_other_scenes_are_refused(self):
+        self.crt("scene.yaml", "-b", "fake", "--samples", "0:8", "-o", "a.crtfilm")
+        self.crt("scene.yaml", "-b", "fake", "--samples", "4:12", "-o", "b.crtfilm")
+        self.crt("scene.yaml", "-b", "fake", "--samples", "8:16", "--seed", "3", "-o", "c.crtfilm")
+        self.assert_one_error(self.crt("merge", "-o", "m.crtfilm", "a.crtfilm", "b.crtfilm", expect=2), "b.crtfilm")
+        self.assert_one_error(self.crt("merge", "-o", "m.crtfilm", "a.crtfilm", "c.crtfilm", expect=2), "c.crtfilm")
+        self.assert_one_error(self.crt("merge", "--scene", "scene.yaml", "-o", "m.pfm", "c.crtfilm", expect=2), "c.crtfilm")
+        self.crt("merge", "--scene", "scene.yaml", "--seed", "3", "-o", "m.pfm", "c.crtfilm")
+
+
+class Comparing(CliTest):
+    def test_same_and_different(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "-o", "b.pfm")
+        self.crt("scene.yaml", "-b", "fake", "--seed", "1", "-o", "c.pfm")
+        self.crt("compare", "a.pfm", "b.pfm")
+        self.crt("compare", "a.pfm", "c.pfm", expect=7)
+        self.crt("compare", "a.pfm", "c.pfm", "--tolerance", "10")
+        result = json.loads(self.crt("compare", "a.pfm", "c.pfm", "--json", "--diff", "d.pfm", expect=7).stdout)
+        self.assertFalse(result["same"])
+        self.assertTrue(os.path.exists(self.path("d.pfm")))
+
+    def test_other_size_and_absent(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
+        self.crt("scene.yaml", "-b", "fake", "--crop", "0,0,8,8", "-o", "b.pfm")
+        self.crt("compare", "a.pfm", "b.pfm", expect=7)
+        self.assert_one_error(self.crt("compare", "a.pfm", "nowhere.pfm", expect=2), "nowhere.pfm")
+
+
+class Info(CliTest):
+    def test_scene(self):
+        text = self.crt("info", "scene.yaml").stdout
+        for word in ("A lamp over a floor", "24 x 16", "2 objects, 4 triangles", "floor (diffuse)", "2 emitting triangles", "a loop over all",
+                     "area-light", "left out", "scene hash"):
+            self.assertIn(word, text)
+
+    def test_film_and_image(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.crtfilm", "-o", "a.exr")
+        self.assertIn("16 per pixel: 0-16", self.crt("info", "a.crtfilm").stdout)
+        text = self.crt("info", "a.exr").stdout
+        for word in ("24 x 16", "R, G, B", "crt/sceneHash", "fake"):
+            self.assertIn(word, text)
+
+    def test_the_hash_is_that_of_the_report(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
+        self.assertIn(self.report("a.report.json")["scene"]["hash"], self.crt("info", "scene.yaml").stdout)
+
+    def test_time(self):
+        def once():
+            begin = time.monotonic()
+            self.crt("info", "scene.yaml")
+            return time.monotonic() - begin
+        best = min(once() for _ in range(5))
+        print(f"crt info: {best * 1e3:.0f} ms", file=sys.stderr)
+        self.assertLess(best, 0.5)  # 60 ms is the aim; a busy machine must not fail the test.
+
+    def test_scenes_that_come_with_crt(self):
+        scene = os.path.join(CONFIG_DIR, "cornell_box.yaml")
+        if not os.path.exists(scene):
+            self.skipTest("no configs/cornell_box.yaml")
+        self.assertIn("emitting triangle", self.crt("info", scene).stdout)
+
+
+class Light(CliTest):
+    """With the first real backend."""
+
+    def setUp(self):
+        super().setUp()
+        self.backend = first_real_backend()
+        if self.backend is None:
+            self.skipTest("no real backend can run here")
+
+    def test_an_empty_scene_shows_the_background(self):
+        self.write("empty.yaml", EMPTY)
+        self.crt("empty.yaml", "-b", self.backend, "-o", "a.pfm")
+        _, _, values = read_pfm(self.path("a.pfm"))
+        luminance = values[1::3]
+        self.assertLess(max(abs(y - 1) for y in luminance), 0.2)  # XYZ of four wavelengths a sample varies from pixel to pixel.
+        self.assertLess(abs(sum(luminance) / len(luminance) - 1), 0.05)
+
+    def test_a_scene_without_light_warns_and_is_black(self):
+        self.write("dark.yaml", DARK)
+        run = self.crt("dark.yaml", "-b", self.backend, "-o", "a.pfm")
+        self.assertIn("crt: warning:", run.stderr)
+        _, _, values = read_pfm(self.path("a.pfm"))
+        self.assertEqual(set(values), {0.0})
+
+    def test_halves_kernels_and_chunks_give_the_same_bits(self):
+        self.crt("scene.yaml", "-b", self.backend, "-o", "whole.pfm")
+        reference = read_bytes(self.path("whole.pfm"))
+        self.crt("scene.yaml", "-b", self.backend, "-o", "full.pfm", "--kernel", "full", "--chunk", "3", "--tile", "8")
+        self.assertEqual(read_bytes(self.path("full.pfm")), reference)
+        self.crt("scene.yaml", "-b", self.backend, "--samples", "0:5", "-o", "a.crtfilm")
+        self.crt("scene.yaml", "-b", self.backend, "--samples", "5:16", "-o", "b.crtfilm")
+        self.crt("merge", "--scene", "scene.yaml", "-o", "merged.pfm", "a.crtfilm", "b.crtfilm")
+        self.assertEqual(read_bytes(self.path("merged.pfm")), reference)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 4:
+        sys.exit(__doc__)
+    CRT, CONFIG_DIR, FAKE_DIR = map(os.path.abspath, sys.argv[1:4])
+    unittest.main(argv=sys.argv[:1] + sys.argv[4:])
