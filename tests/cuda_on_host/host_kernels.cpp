@@ -1,0 +1,71 @@
+#include "host_kernels.h"
+
+#include <atomic>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+#include "cuda_shim.h"
+
+#include "../../plugins/cuda/kernels.cu"
+
+namespace crt::cuda_on_host {
+namespace {
+
+/// kernel<<<grid, CRT_BLOCK>>>: blocks are dealt to `host_threads` threads, in no order that could be relied on.
+template <class Kernel>
+void launchGrid(unsigned grid_x, unsigned grid_y, unsigned host_threads, const Kernel& kernel) {
+    std::atomic<std::uint64_t> next{0};
+    const auto work = [&] {
+        gridDim = {grid_x, grid_y, 1};
+        blockDim = {CRT_BLOCK, 1, 1};
+        for (std::uint64_t block; (block = next.fetch_add(1)) < std::uint64_t{grid_x} * grid_y;) {
+            blockIdx = {static_cast<unsigned>(block % grid_x), static_cast<unsigned>(block / grid_x), 0};
+            for (unsigned thread = 0; thread < CRT_BLOCK; ++thread) {
+                threadIdx = {thread, 0, 0};
+                kernel();
+            }
+        }
+    };
+    std::vector<std::thread> threads;
+    for (unsigned i = 1; i < host_threads; ++i) threads.emplace_back(work);
+    work();
+    for (std::thread& thread : threads) thread.join();
+}
+
+// CUDA's 64-bit integer is unsigned long long, the host's unsigned long: the same bits by another name.
+static_assert(sizeof(u64) == sizeof(std::uint64_t));
+u64* device(std::uint64_t* pointer) { return reinterpret_cast<u64*>(pointer); }
+
+CrtScene header(const void* blob) {
+    CrtScene scene;
+    std::memcpy(&scene, blob, sizeof scene);
+    return scene;
+}
+
+}  // namespace
+
+std::uint32_t rayCounterPairs() { return CRT_RAY_COUNTERS; }
+
+void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film, std::uint64_t* rays,
+                  unsigned host_threads) {
+    const CrtScene scene = header(scene_blob);
+    const unsigned across = (launch.x1 - launch.x0 + CRT_BLOCK_WIDTH - 1) / CRT_BLOCK_WIDTH;
+    const unsigned down = (launch.y1 - launch.y0 + CRT_BLOCK_HEIGHT - 1) / CRT_BLOCK_HEIGHT;
+    launchGrid(across * down, slices, host_threads, [&] {
+        crt_render(scene, static_cast<const unsigned char*>(scene_blob), launch.x0, launch.y0, launch.x1, launch.y1, launch.first_sample,
+                   launch.sample_count, film.sums, device(film.counts), film.primitives, device(rays));
+    });
+}
+
+void launchAddSlices(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film, const FilmPointers& parts,
+                     unsigned host_threads) {
+    const CrtScene scene = header(scene_blob);
+    const auto grid = static_cast<unsigned>((launch.pixels() * scene.channels + CRT_BLOCK - 1) / CRT_BLOCK);
+    launchGrid(grid, 1, host_threads, [&] {
+        crt_add_slices(launch.x0, launch.y0, launch.x1, launch.y1, scene.width, scene.height, scene.channels, slices, film.sums,
+                       device(film.counts), film.primitives, parts.sums, device(parts.counts), parts.primitives);
+    });
+}
+
+}  // namespace crt::cuda_on_host

@@ -1,0 +1,27 @@
+/// Launches of the CUDA kernels, run as loops over grid, block and thread. The kernels promise that no thread waits for another; so any order will do.
+#pragma once
+
+#include "backend/launch_pacer.h"
+
+#include <cstdint>
+
+namespace crt::cuda_on_host {
+
+/// Film arrays as the kernels take them.
+struct FilmPointers {
+    double* sums;
+    std::uint64_t* counts;
+    std::uint32_t* primitives;
+};
+
+std::uint32_t rayCounterPairs();
+
+/// crt_render over `launch`, in `slices` rows of the grid. `rays` has rayCounterPairs() pairs.
+void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film, std::uint64_t* rays,
+                  unsigned host_threads);
+
+/// crt_add_slices over the pixels of `launch`.
+void launchAddSlices(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film, const FilmPointers& parts,
+                     unsigned host_threads);
+
+}  // namespace crt::cuda_on_host

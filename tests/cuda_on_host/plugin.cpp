@@ -1,0 +1,133 @@
+// A backend for tests: the CUDA kernels on the host's processor, so that the conformance suite sees the very entry points that a GPU runs.
+#include "host_kernels.h"
+
+#include "backend/launch_pacer.h"
+#include "backend/plugin_guard.h"
+#include "kernel/features.h"
+#include "kernel/layout.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <memory>
+#include <thread>
+#include <vector>
+
+namespace crt::cuda_on_host {
+namespace {
+
+using plugin::PluginError;
+
+class HostIntegrator {
+public:
+    HostIntegrator(const plugin::Host& host, const CrtCreateInfo& info)
+        : host_(host),
+          tile_size_(info.tile_size),
+          threads_(info.threads != 0 ? info.threads : std::max(1u, std::thread::hardware_concurrency())) {}
+
+    void setScene(const CrtSceneBlob& blob) {
+        const auto& scene = *static_cast<const kernel::CrtScene*>(blob.data);
+        if (blob.size_bytes < sizeof scene || scene.magic != CRT_SCENE_MAGIC)
+            throw PluginError(CRT_INVALID_ARGUMENT, "the scene blob does not begin with a scene");
+        blob_.resize((blob.size_bytes + sizeof(Line) - 1) / sizeof(Line));
+        std::memcpy(blob_.data(), blob.data, blob.size_bytes);
+        width_ = scene.width;
+        height_ = scene.height;
+        channels_ = scene.channels;
+        film_ = HostFilm(1, scene);
+        slices_ = HostFilm(kSlices, scene);
+        rays_.assign(2 * rayCounterPairs(), 0);
+        paths_ = 0;
+    }
+
+    bool render(const CrtRenderRange& range) {
+        if (blob_.empty()) throw PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
+        if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 > width_ || range.y1 > height_)
+            throw PluginError(CRT_INVALID_ARGUMENT, "the range's rectangle is not within the film");
+        pacer_.begin(range, tile_size_);
+        if (host_.cancelled(0.0)) return false;
+        for (Launch launch; pacer_.next(launch);) {
+            const auto start = std::chrono::steady_clock::now();
+            // Slices where there are samples for them, and without where there are not: both ways of the real backend.
+            if (launch.sample_count >= kSlices) {
+                launchRender(blob_.data(), launch, kSlices, slices_.pointers(), rays_.data(), threads_);
+                launchAddSlices(blob_.data(), launch, kSlices, film_.pointers(), slices_.pointers(), threads_);
+            } else {
+                launchRender(blob_.data(), launch, 1, film_.pointers(), rays_.data(), threads_);
+            }
+            const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+            pacer_.finished(launch, seconds);
+            render_seconds_ += seconds;
+            paths_ += launch.paths();
+            if (host_.cancelled(pacer_.done())) return false;
+        }
+        return true;
+    }
+
+    void readFilm(const CrtFilmView& film) {
+        if (film.width != width_ || film.height != height_ || film.channels != channels_)
+            throw PluginError(CRT_INVALID_ARGUMENT, "the film view is not of the scene's size");
+        std::copy(film_.sums.begin(), film_.sums.end(), film.sums);
+        std::copy(film_.counts.begin(), film_.counts.end(), film.counts);
+        if (film.primitives == nullptr) return;
+        if (film_.primitives.empty())
+            std::fill_n(film.primitives, film_.counts.size(), CRT_NONE);
+        else
+            std::copy(film_.primitives.begin(), film_.primitives.end(), film.primitives);
+    }
+
+    void report(CrtBackendReport& report) {
+        plugin::writeText(report.device, "CUDA kernels on the host");
+        plugin::writeText(report.kernel, "precompiled, " + std::to_string(kSlices) + " slices");
+        report.kernel_features = CRT_FEATURES_ALL;
+        report.render_seconds = render_seconds_;
+        report.paths = paths_;
+        for (std::size_t i = 0; i < rays_.size(); i += 2) {
+            report.closest_rays += rays_[i];
+            report.shadow_rays += rays_[i + 1];
+        }
+    }
+
+private:
+    static constexpr std::uint32_t kSlices = 3;
+
+    struct alignas(64) Line {
+        unsigned char bytes[64];
+    };
+
+    struct HostFilm {
+        HostFilm() = default;
+        HostFilm(std::size_t copies, const kernel::CrtScene& scene) {
+            const std::size_t pixels = copies * scene.width * scene.height;
+            sums.resize(pixels * scene.channels * 2);
+            counts.resize(pixels);
+            if (scene.aovs & CRT_AOV_PRIMITIVE) primitives.assign(pixels, CRT_NONE);
+        }
+        FilmPointers pointers() { return {sums.data(), counts.data(), primitives.empty() ? nullptr : primitives.data()}; }
+
+        std::vector<double> sums;
+        std::vector<std::uint64_t> counts;
+        std::vector<std::uint32_t> primitives;
+    };
+
+    plugin::Host host_;
+    std::uint32_t tile_size_;
+    unsigned threads_;
+    LaunchPacer pacer_{0.05, 4096, 8};
+    std::vector<Line> blob_;
+    std::uint32_t width_ = 0, height_ = 0, channels_ = 0;
+    HostFilm film_, slices_;
+    std::vector<std::uint64_t> rays_;
+    double render_seconds_ = 0;
+    std::uint64_t paths_ = 0;
+};
+
+std::vector<CrtDevice> probeDevices(const plugin::Host&) {
+    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
+    return {plugin::makeDevice(0, "CUDA kernels on the host", "none", 0, threads)};
+}
+
+}  // namespace
+}  // namespace crt::cuda_on_host
+
+CRT_DEFINE_BACKEND(crt::cuda_on_host::HostIntegrator, crt::cuda_on_host::probeDevices, "cuda_on_host", CRT_HEADERS_VERSION, CRT_FEATURES_ALL)
