@@ -337,6 +337,11 @@ std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node,
     if (by_type) {
         const YamlEntry* type = node.find("type");
         if (type == nullptr) {
+            for (const YamlEntry& entry : node.entries)
+                if (nearestWord(entry.key, {"type"})) {
+                    out.error(entry.key_place, fmt::format("unknown key '{}' in {}", entry.key, subject), "did you mean 'type'?");
+                    return std::nullopt;
+                }
             out.error(place, fmt::format("'type' is missing in {}: one of {}", subject, fmt::join(words, ", ")));
             return std::nullopt;
         }

@@ -17,14 +17,19 @@
 namespace crt {
 
 /// Single values against their row of the table. `what` names the value in messages: "'fov'", "component 2 of 'up'".
-bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what, double& value);
-bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what, std::int64_t& value);
-bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what, std::uint64_t& value);
+bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                const std::string& what, double& value);
+bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                const std::string& what, std::int64_t& value);
+bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                const std::string& what, std::uint64_t& value);
 bool readText(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const std::string& what, std::string& value);
 /// Index into key.choices.
-bool readChoice(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what, std::size_t& value);
+bool readChoice(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                const std::string& what, std::size_t& value);
 /// A list of numbers with key.count_min to key.count_max members.
-bool readNumbers(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what, std::vector<double>& values);
+bool readNumbers(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                 const std::string& what, std::vector<double>& values);
 
 /// One map. Checks its keys when made; the read functions then leave their target alone unless the key is there and right.
 class SectionReader {

@@ -102,7 +102,7 @@ SectionSchema camera() {
 const std::vector<std::string> kFilters{"box", "gaussian", "blackman-harris"};
 
 SectionSchema film() {
-    const Film d;
+    const FilmSettings d;
     const std::vector<std::string> spaces{"srgb", "acescg", "xyz"};
     return {"film", "film", "The image and how samples become its pixels.",
             {
@@ -124,7 +124,7 @@ SectionSchema film() {
 }
 
 SectionSchema filter() {
-    const Film d;
+    const FilmSettings d;
     return {"filter", "a filter", "",
             {
                 {.name = "type", .kind = Kind::Choice, .choices = kFilters, .required = true, .doc = "Shape of the filter."},

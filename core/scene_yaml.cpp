@@ -134,7 +134,7 @@ void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrid
 
 // ---- Sections --------------------------------------------------------------------------------------------------------
 
-void readFilm(const SectionReader& section, SpectrumReader& spectra, Film& film) {
+void readFilm(const SectionReader& section, SpectrumReader& spectra, FilmSettings& film) {
     constexpr std::int64_t kMaxPixels = std::int64_t{1} << 31;  // Pixels are numbered in 32 bits.
     std::vector<int> size;
     if (section.read("resolution", size)) {
@@ -165,7 +165,7 @@ void readFilm(const SectionReader& section, SpectrumReader& spectra, Film& film)
         section.readEnum("filter", film.filter);
     }
     constexpr double kSmoothRadius = 1.5;  // Pixels; a narrower window cuts a bell off while it is still high.
-    film.filter_radius = radius_given ? radius : film.filter == PixelFilter::Box ? Film{}.filter_radius : kSmoothRadius;
+    film.filter_radius = radius_given ? radius : film.filter == PixelFilter::Box ? FilmSettings{}.filter_radius : kSmoothRadius;
 
     section.readEnum("color_space", film.color_space);
     film.white_balance = spectra.read(section, "white_balance", SpectrumUse::White);
@@ -195,18 +195,18 @@ void checkView(const SectionReader& section, const Camera& camera) {
 }
 
 /// The image plane from the angle across its shorter side.
-void setFieldOfView(Camera& camera, const Film& film, double tan_shorter) {
+void setFieldOfView(Camera& camera, const FilmSettings& film, double tan_shorter) {
     const double aspect = static_cast<double>(film.width) / film.height;
     camera.tan_half_width = tan_shorter * std::max(aspect, 1.0);
     camera.tan_half_height = tan_shorter * std::max(1 / aspect, 1.0);
 }
 
-void readCamera(const SectionReader& section, const Film& film, Camera& camera) {
+/// `errors_before` is the count before the section was opened: a misspelt position makes no second error of the view.
+void readCamera(const SectionReader& section, std::size_t errors_before, const FilmSettings& film, Camera& camera) {
     camera.place = section.place().resolved();
-    const std::size_t before = section.diagnostics().count();
     for (const auto& [key, value] : {std::pair{"position", &camera.position}, {"target", &camera.target}, {"up", &camera.up}})
         section.read(key, *value);
-    if (section.diagnostics().count() == before) checkView(section, camera);
+    if (section.diagnostics().count() == errors_before) checkView(section, camera);
 
     double fov = 0, focal_length = 0;
     std::vector<double> sensor;
@@ -289,9 +289,10 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
 
     SpectrumReader spectra(out, files, top.map("spectra"));
     if (const auto section = top.section("film", "film")) readFilm(*section, spectra, scene.film);
+    const std::size_t errors_before = out.count();
     const auto camera = top.section("camera", "camera");
     setFieldOfView(scene.camera, scene.film, std::min(scene.camera.tan_half_width, scene.camera.tan_half_height));
-    if (camera) readCamera(*camera, scene.film, scene.camera);
+    if (camera) readCamera(*camera, errors_before, scene.film, scene.camera);
     if (const auto section = top.section("integrator", "integrator")) readIntegrator(*section, scene.integrator);
     if (const auto section = top.section("sampler", "sampler")) readSampler(*section, scene.sampler);
 

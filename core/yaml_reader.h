@@ -103,7 +103,8 @@ Parsed<std::uint64_t> parseUnsigned(const std::string& text);
 /// Does this plain scalar look like a number (and so cannot be a name)?
 bool looksLikeNumber(std::string_view text);
 
-/// The candidate nearest to `word` by Damerau–Levenshtein distance, if it is within 2 or a third of the length (1 for very short words).
+/// The candidate nearest to `word` by Damerau–Levenshtein distance, if it is within 2 or a third of the length (1 for words
+/// of up to three letters).
 std::optional<std::string> nearestWord(std::string_view word, const std::vector<std::string>& candidates);
 /// "did you mean 'x'?" or nothing.
 std::string didYouMean(std::string_view word, const std::vector<std::string>& candidates);
