@@ -1,0 +1,118 @@
+// Compiles every kernel variant that matters for one GPU with NVRTC, through the code of the CUDA backend, and checks that none spills
+// registers. Needs no GPU. Prints registers and compile time of each variant.
+//
+//     nvrtc_variants [--arch 90] [SCENE.yaml …]
+//
+// The masks: everything, each sampler and accelerator, each kind of material, and those of the scenes given. Exit code 77, which ctest shows as
+// skipped, where NVRTC is missing.
+#include "cuda_nvrtc.h"
+#include "cuda_program.h"
+
+#include "backend/loader.h"
+#include "compile.h"
+#include "error.h"
+#include "kernel/features.h"
+#include "scene_yaml.h"
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+constexpr int kSkipped = 77;
+
+/// Masks as compileScene derives them, by name. One is compiled once however many names lead to it.
+std::map<std::uint32_t, std::string> representativeMasks() {
+    constexpr std::uint32_t lit = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
+    constexpr std::uint32_t box = lit | CRT_FEATURE_SOBOL | CRT_FEATURE_BRUTE_FORCE;
+    constexpr std::uint32_t mesh = lit | CRT_FEATURE_SOBOL | CRT_FEATURE_BVH;
+    constexpr std::uint32_t glass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION;
+    return {
+        {CRT_FEATURES_ALL, "everything"},
+        {box, "a box, Sobol, brute force"},
+        {(box & ~CRT_FEATURE_SOBOL) | CRT_FEATURE_INDEPENDENT, "a box, independent sampler"},
+        {(box & ~CRT_FEATURE_SOBOL) | CRT_FEATURE_XORSHIFT, "a box, xorshift sampler"},
+        {(box & ~CRT_FEATURE_BRUTE_FORCE) | CRT_FEATURE_AABB, "a box, object boxes"},
+        {box & ~CRT_FEATURE_NEE, "a box, no light sampling"},
+        {mesh, "a mesh, BVH"},
+        {mesh | CRT_FEATURE_SMOOTH_NORMALS, "a smooth mesh"},
+        {mesh | CRT_FEATURE_CONDUCTOR, "a mesh of metal"},
+        {mesh | CRT_FEATURE_DIELECTRIC, "a mesh of glass"},
+        {mesh | glass, "a mesh of dispersive glass"},
+        {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER, "a mesh, environment, lens and filter"},
+        {mesh | CRT_FEATURE_AOV, "a mesh with AOVs"},
+        {mesh | glass | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
+         "all materials, BVH"},
+        {CRT_FEATURE_SOBOL | CRT_FEATURE_BVH | CRT_FEATURE_VIEW, "a view of normals"},
+    };
+}
+
+int run(int argc, char** argv) {
+    int arch = 90;
+    std::map<std::uint32_t, std::string> masks = representativeMasks();
+    for (int i = 1; i < argc; ++i) {
+        if (std::strcmp(argv[i], "--arch") == 0 && i + 1 < argc) {
+            arch = std::atoi(argv[++i]);
+            continue;
+        }
+        const crt::CompiledScene scene = crt::compileScene(crt::loadScene(argv[i]), 0);
+        masks.emplace(scene.features, argv[i]);
+    }
+
+    const CrtHost host = crt::makeHost(false);
+    const char* path_text = host.kernel_source(host.user, "path.h");
+    if (path_text == nullptr) throw std::runtime_error("the program holds no kernel source path.h");
+    const std::string text = crt::cuda::kernelText(path_text);
+
+    std::vector<crt::cuda::Nvrtc> found;
+    try {
+        found.push_back(crt::cuda::Nvrtc::open(crt::cuda::nvrtcCandidates(std::getenv("CUDA_HOME"))));
+    } catch (const std::runtime_error& error) {
+        std::printf("SKIPPED: %s\n", error.what());
+        return kSkipped;
+    }
+    const crt::cuda::Nvrtc& nvrtc = found.front();
+    if (!nvrtc.supports(arch)) {
+        std::printf("SKIPPED: %s does not compile for sm_%d\n", nvrtc.name().c_str(), arch);
+        return kSkipped;
+    }
+
+    std::printf("%s, sm_%d, %zu variants\n%9s %6s %6s %8s %8s  %s\n", nvrtc.name().c_str(), arch, masks.size(), "registers", "stack", "spill",
+                "CUBIN kB", "ms", "variant");
+    int failures = 0;
+    for (const auto& [mask, name] : masks) {
+        const auto start = std::chrono::steady_clock::now();
+        const crt::cuda::Cubin cubin = crt::cuda::compileLean(nvrtc, text, arch, mask);
+        const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        const crt::cuda::ResourceUse use = crt::cuda::resourceUse(cubin.log, "crt_render");
+        std::printf("%9u %6u %6u %8.1f %8.0f  0x%05x %s\n", use.registers, use.stack_bytes, use.spill_bytes,
+                    static_cast<double>(cubin.bytes.size()) / 1e3, ms, mask, name.c_str());
+        std::fflush(stdout);
+        // An entry that is not in the log would pass for one that does not spill.
+        if (use.registers == 0) std::printf("FAILED: the assembler's log says nothing of crt_render:\n%s\n", cubin.log.c_str());
+        if (use.spill_bytes != 0) std::printf("FAILED: %u bytes are spilled\n", use.spill_bytes);
+        // The only array that a thread may keep in memory is the BVH's traversal stack.
+        const bool stack_expected = (mask & CRT_FEATURE_BVH) != 0;
+        if (!stack_expected && use.stack_bytes != 0) std::printf("FAILED: local memory without a traversal stack\n");
+        failures += use.registers == 0 || use.spill_bytes != 0 || (!stack_expected && use.stack_bytes != 0);
+    }
+    std::printf("%d of %zu variants failed\n", failures, masks.size());
+    return failures == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return run(argc, argv);
+    } catch (const std::exception& error) {
+        std::printf("FAILED: %s\n", error.what());
+        return 1;
+    }
+}

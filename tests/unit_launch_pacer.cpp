@@ -1,0 +1,95 @@
+// Launch pacing: whatever the budget does, every sample of every pixel is launched exactly once.
+#include "backend/launch_pacer.h"
+
+#include <catch2/catch.hpp>
+
+#include <random>
+#include <vector>
+
+using crt::Launch;
+using crt::LaunchPacer;
+
+namespace {
+
+CrtRenderRange range(std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::uint32_t y1, std::uint64_t first, std::uint64_t count) {
+    CrtRenderRange r{};
+    r.struct_size = sizeof r;
+    r.x0 = x0;
+    r.y0 = y0;
+    r.x1 = x1;
+    r.y1 = y1;
+    r.first_sample = first;
+    r.sample_count = count;
+    return r;
+}
+
+}  // namespace
+
+TEST_CASE("launches cover a range exactly once, with any tile, at any speed", "[launch_pacer]") {
+    std::mt19937 random(1);
+    const auto below = [&](std::uint32_t n) { return std::uniform_int_distribution<std::uint32_t>(0, n - 1)(random); };
+    for (int trial = 0; trial < 300; ++trial) {
+        const std::uint32_t width = 1 + below(40), height = 1 + below(40), x0 = below(5), y0 = below(5);
+        const std::uint64_t first = below(100), samples = 1 + below(70);
+        const std::uint32_t tile = below(2) ? 0 : 1 + below(50);
+        LaunchPacer pacer(0.01, 1 + below(5000), 1 + below(8));
+        // The same pacer twice: what it has learnt must not show.
+        for (int repeat = 0; repeat < 2; ++repeat) {
+            std::vector<std::vector<int>> seen(std::size_t{width} * height, std::vector<int>(samples));
+            pacer.begin(range(x0, y0, x0 + width, y0 + height, first, samples), tile);
+            CHECK(pacer.done() == 0);
+            double done = 0;
+            for (Launch launch; pacer.next(launch);) {
+                REQUIRE(launch.sample_count > 0);
+                REQUIRE(launch.pixels() > 0);
+                if (tile != 0) REQUIRE((launch.x1 - launch.x0 <= tile && launch.y1 - launch.y0 <= tile));
+                for (std::uint32_t y = launch.y0; y < launch.y1; ++y)
+                    for (std::uint32_t x = launch.x0; x < launch.x1; ++x)
+                        for (std::uint64_t s = 0; s < launch.sample_count; ++s)
+                            ++seen.at(std::size_t{y - y0} * width + (x - x0)).at(launch.first_sample - first + s);
+                pacer.finished(launch, 1e-6 * (1 + below(100000)));
+                REQUIRE(pacer.done() > done);
+                done = pacer.done();
+            }
+            CHECK(done == 1);
+            bool once = true;
+            for (const std::vector<int>& pixel : seen)
+                for (const int n : pixel) once = once && n == 1;
+            CHECK(once);
+        }
+    }
+}
+
+TEST_CASE("launches come to take the wanted time", "[launch_pacer]") {
+    LaunchPacer pacer(0.02, 1000);
+    const double paths_per_second = 3e6;
+    pacer.begin(range(0, 0, 400, 300, 0, 1000), 0);
+    std::vector<double> seconds;
+    for (Launch launch; seconds.size() < 60 && pacer.next(launch);) {
+        seconds.push_back(static_cast<double>(launch.paths()) / paths_per_second);
+        pacer.finished(launch, seconds.back());
+    }
+    REQUIRE(seconds.size() == 60);
+    CHECK(seconds.front() < 0.001);
+    for (std::size_t i = 20; i < 60; ++i) CHECK(seconds[i] == Approx(0.02).epsilon(0.6));
+}
+
+TEST_CASE("an empty range has no launches and is done", "[launch_pacer]") {
+    LaunchPacer pacer(0.02, 1000);
+    Launch launch;
+    for (const CrtRenderRange& empty : {range(0, 0, 10, 10, 5, 0), range(3, 3, 3, 9, 0, 4), range(0, 7, 9, 7, 0, 4)}) {
+        pacer.begin(empty, 0);
+        CHECK_FALSE(pacer.next(launch));
+        CHECK(pacer.done() == 1);
+    }
+}
+
+TEST_CASE("a huge range neither overflows nor is cut into nothing", "[launch_pacer]") {
+    LaunchPacer pacer(0.02, 1u << 20);
+    pacer.begin(range(0, 0, 65535, 32767, 0, std::uint64_t{1} << 53), 0);
+    Launch launch;
+    REQUIRE(pacer.next(launch));
+    CHECK(launch.x1 == 65535);
+    CHECK(launch.paths() <= (1u << 20));
+    CHECK(launch.sample_count >= 1);
+}
