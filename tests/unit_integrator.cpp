@@ -7,10 +7,14 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 using namespace crt;
 using Catch::Matchers::Contains;
@@ -39,10 +43,9 @@ CompiledScene makeScene(std::uint32_t width, std::uint32_t height, std::uint32_t
     header.seed_high = static_cast<std::uint32_t>(kSeed >> 32);
 
     CompiledScene scene;
-    scene.blob.resize(sizeof(header) + 64);
-    scene.padding = (64 - reinterpret_cast<std::uintptr_t>(scene.blob.data()) % 64) % 64;
+    scene.blob.resize((sizeof(header) + 63) / 64);
     scene.size_bytes = sizeof(header);
-    std::memcpy(scene.blob.data() + scene.padding, &header, sizeof(header));
+    std::memcpy(scene.blob.data(), &header, sizeof(header));
     scene.width = width;
     scene.height = height;
     scene.channels = channels;
@@ -50,7 +53,7 @@ CompiledScene makeScene(std::uint32_t width, std::uint32_t height, std::uint32_t
     return scene;
 }
 
-crt::Film filmOf(const CompiledScene& scene) { return crt::Film(FilmShape{scene.width, scene.height, scene.channels, scene.aovs}); }
+Film filmOf(const CompiledScene& scene) { return Film(FilmShape{scene.width, scene.height, scene.channels, scene.aovs}); }
 
 double expected(std::uint32_t x, std::uint32_t y, std::uint32_t channel, std::uint64_t first, std::uint64_t count) {
     double sum = 0;  // exact: multiples of 2^-24
@@ -77,7 +80,7 @@ TEST_CASE("what a backend renders arrives in the film", "[integrator]") {
     integrator.setScene(scene);
     CHECK(integrator.render({{}, 0, 16}));
     CHECK(integrator.render({{}, 32, 8}));
-    crt::Film film = filmOf(scene);
+    Film film = filmOf(scene);
     integrator.readFilm(film);
 
     CHECK(film.samples.text() == "0-16;32-40");
@@ -100,14 +103,14 @@ TEST_CASE("any split of ranges and rectangles gives the same film", "[integrator
     Integrator integrator(openFake("fake"), {});
     integrator.setScene(scene);
     integrator.render({{}, 0, 10});
-    crt::Film whole = filmOf(scene);
+    Film whole = filmOf(scene);
     integrator.readFilm(whole);
 
     integrator.setScene(scene);  // clears the film
     integrator.render({{0, 0, 8, 2}, 4, 6});
     integrator.render({{}, 0, 4});
     integrator.render({{3, 2, 8, 6}, 4, 6});
-    crt::Film split = filmOf(scene);
+    Film split = filmOf(scene);
     // A film knows ranges that every pixel has.
     CHECK(kindOfFailure([&] { integrator.readFilm(split); }, "do not cover it yet") == ErrorKind::Internal);
     CHECK(kindOfFailure([&] { integrator.render({{2, 1, 4, 3}, 4, 6}); }, "rendered twice") == ErrorKind::Usage);
@@ -125,7 +128,7 @@ TEST_CASE("readFilm adds", "[integrator]") {
     Integrator first(openFake("fake"), {});
     first.setScene(scene);
     first.render({{}, 0, 3});
-    crt::Film film = filmOf(scene);
+    Film film = filmOf(scene);
     first.readFilm(film);
 
     Integrator second(openFake("fake"), {});
@@ -136,7 +139,7 @@ TEST_CASE("readFilm adds", "[integrator]") {
     CHECK(film.sum(2, 1, fake::kY) == expected(2, 1, fake::kY, 0, 8));
 
     CHECK(kindOfFailure([&] { second.readFilm(film); }, "overlap") == ErrorKind::Usage);
-    crt::Film other = filmOf(makeScene(4, 5));
+    Film other = filmOf(makeScene(4, 5));
     CHECK(kindOfFailure([&] { first.readFilm(other); }, "another shape") == ErrorKind::Internal);
 }
 
@@ -152,7 +155,7 @@ TEST_CASE("a cancelled render leaves nothing that could be read", "[integrator]"
     CHECK(seen.back() == 0.5);
     CHECK(std::is_sorted(seen.begin(), seen.end()));
 
-    crt::Film film = filmOf(scene);
+    Film film = filmOf(scene);
     CHECK(kindOfFailure([&] { integrator.readFilm(film); }, "part of a cancelled or failed range") == ErrorKind::Internal);
     CHECK(kindOfFailure([&] { integrator.render({{}, 0, 4}); }, "without setScene") == ErrorKind::Internal);
     integrator.setScene(scene);
@@ -192,7 +195,7 @@ TEST_CASE("what goes wrong in a backend arrives as an error of its kind", "[inte
     CHECK(integrator.render({{}, 0, 1}));
 
     CompiledScene wrong = makeScene(4, 4);
-    wrong.blob[wrong.padding] ^= 1;
+    wrong.blob[0].bytes[0] ^= 1;
     CHECK(kindOfFailure([&] { integrator.setScene(wrong); }, "magic") == ErrorKind::Internal);
 }
 
@@ -202,7 +205,7 @@ TEST_CASE("samples that are not a number are dropped and counted", "[integrator]
     integrator.setScene(scene);
     const ScopedFault fault("nan");
     integrator.render({{}, 0, 14});
-    crt::Film film = filmOf(scene);
+    Film film = filmOf(scene);
     integrator.readFilm(film);
     CHECK(film.invalidSamples() == 2 * 15);
     CHECK(film.counts[0] == 12);

@@ -13,7 +13,7 @@ using crt::plugin::PluginError;
 // What `crt plugins` lists. A backend that finds nothing to run on throws PluginError(CRT_NO_DEVICE, "why").
 std::vector<CrtDevice> listDevices(const Host&) {
     // The score decides between devices and tells how much is to be expected: a CPU about its number of threads.
-    return {crt::plugin::makeDevice(0, "portable C++, one thread", "none", 0, 1.0)};
+    return {crt::plugin::makeDevice(0, "portable C++, one thread", "", 0, 1.0)};
 }
 
 class ExampleIntegrator {

@@ -21,7 +21,7 @@ namespace {
 using crt::plugin::PluginError;
 
 std::vector<CrtDevice> listDevices(const crt::plugin::Host&) {
-    return {crt::plugin::makeDevice(0, "pattern", "none", 0, 1.0), crt::plugin::makeDevice(1, "second pattern", "none", 0, 0.5)};
+    return {crt::plugin::makeDevice(0, "pattern", "", 0, 1.0), crt::plugin::makeDevice(1, "second pattern", "", 0, 0.5)};
 }
 
 /// Adds `value` to an unevaluated pair hi + lo without losing a bit that the pair can hold (Knuth's two-sum).
