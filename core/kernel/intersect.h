@@ -51,8 +51,8 @@ CRT_FN CrtShear crt_shear(CrtRay ray) {
     return s;
 }
 
-/* Does the ray hit the triangle at 0 < t < limit? Fills t, b1, b2. The error bound on t (PBRT 4e, 6.8.7) refuses hits that rounding alone could
-   have put in front of the origin. */
+/* Does the ray hit the triangle at 0 < t < limit? Fills t, b1, b2. There is no least t: a ray starts far enough off its surface (surface.h) that
+   the sign of t is right, and whatever is really in front, however near, must stop it, or light leaks through corners. */
 CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShear ray, f32 limit, CrtHit *hit) {
     CRT_GLOBAL const f32 *px = triangle->p + 3u * ray.kx;
     CRT_GLOBAL const f32 *py = triangle->p + 3u * ray.ky;
@@ -78,18 +78,6 @@ CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShe
     const f32 sc = ray.sz * cz;
     const f32 t = (u * sa + v * sb + w * sc) * inverse_det;
     if (!(t > 0.0f) || !(t < limit)) return 0;
-
-    const f32 max_z = crt_max(crt_abs(sa), crt_max(crt_abs(sb), crt_abs(sc)));
-    const f32 max_x = crt_max(crt_abs(ax), crt_max(crt_abs(bx), crt_abs(cx)));
-    const f32 max_y = crt_max(crt_abs(ay), crt_max(crt_abs(by), crt_abs(cy)));
-    const f32 delta_z = CRT_GAMMA(3.0f) * max_z;
-    const f32 delta_x = CRT_GAMMA(5.0f) * (max_x + max_z);
-    const f32 delta_y = CRT_GAMMA(5.0f) * (max_y + max_z);
-    const f32 delta_e = 2.0f * (CRT_GAMMA(2.0f) * max_x * max_y + delta_y * max_x + delta_x * max_y);
-    const f32 max_e = crt_max(crt_abs(u), crt_max(crt_abs(v), crt_abs(w)));
-    const f32 delta_t =
-        3.0f * (CRT_GAMMA(3.0f) * max_e * max_z + delta_e * max_z + delta_z * max_e) * crt_abs(inverse_det);
-    if (!(t > delta_t)) return 0;
 
     hit->t = t;
     hit->b1 = v * inverse_det;
@@ -124,8 +112,8 @@ CRT_FN CrtHit crt_no_hit(f32 reach) {
 }
 
 #if CRT_SIMD8
-/* Lanes of eight triangles that the ray may hit at 0 < t < limit: the arithmetic of crt_intersect_triangle, lane by lane, up to its error bound on t,
-   so it misses none that the scalar test accepts. */
+/* Lanes of eight triangles that the ray may hit at 0 < t < limit: the arithmetic of crt_intersect_triangle, lane by lane, so it finds
+   just those that the scalar test accepts. */
 CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtShear ray, f32 limit) {
     CRT_GLOBAL const f32 *px = &block->p[3u * ray.kx][0];
     CRT_GLOBAL const f32 *py = &block->p[3u * ray.ky][0];

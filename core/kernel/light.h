@@ -78,6 +78,7 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
     const vec3 p2 = crt_triangle_vertex(triangle, 2u);
     const vec3 normal = normalize3(cross3(p1 - p0, p2 - p0));
     const CrtRandom2 u = crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT);
+    const vec3 test_error = (abs3(p1 - p0) + abs3(p2 - p0)) * CRT_TEST_ERROR; /* the shadow ray must end before the emitter */
     CrtLightSample s;
     s.spectrum = emitter->spectrum;
     s.pdf = 0.0f;
@@ -91,7 +92,7 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
         const f32 cosine = dot3(normal, s.wi);
         const f32 t = dot3(normal, p0 - p) / cosine;
         point = p + s.wi * t;
-        error = (abs3(p) + abs3(point)) * CRT_GAMMA(9.0f);
+        error = (abs3(p) + abs3(point)) * CRT_GAMMA(9.0f) + test_error;
         const int lit = cosine < 0.0f || (emitter->flags & CRT_EMITTER_TWO_SIDED) != 0u;
         if (lit && t > 0.0f && omega > 0.0f) s.pdf = emitter->choice_probability / omega;
     } else {
@@ -103,7 +104,7 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
         const vec3 q1 = p1 * b1;
         const vec3 q2 = p2 * b2;
         point = q0 + q1 + q2;
-        error = (abs3(q0) + abs3(q1) + abs3(q2)) * CRT_GAMMA(9.0f);
+        error = (abs3(q0) + abs3(q1) + abs3(q2)) * CRT_GAMMA(9.0f) + test_error;
         const vec3 d = point - p;
         const f32 distance2 = dot3(d, d);
         s.wi = d / crt_sqrt(distance2);

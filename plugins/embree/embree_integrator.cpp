@@ -44,6 +44,7 @@ EmbreeIntegrator::EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo
     : host_(host),
       info_(info),
       threads_(info.threads != 0 ? info.threads : static_cast<unsigned>(tbb::this_task_arena::max_concurrency())),
+      parallelism_(tbb::global_control::max_allowed_parallelism, threads_),
       arena_(static_cast<int>(threads_)) {
     plugin::chooseDevice(probeDevices(host), info.device);
     info_.device = nullptr;  // the host's string is not ours to keep

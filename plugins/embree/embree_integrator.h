@@ -11,6 +11,7 @@
 #include <memory>
 #include <vector>
 
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 namespace crt::embree {
@@ -37,6 +38,7 @@ private:
     plugin::Host host_;
     CrtCreateInfo info_;
     unsigned threads_;
+    tbb::global_control parallelism_;  ///< Lets --threads exceed the number of processors.
     tbb::task_arena arena_;
     std::unique_ptr<Device> device_;  ///< Opened when a scene needs it.
     std::unique_ptr<Tracer> tracer_;

@@ -1,0 +1,109 @@
+// conformance --backend NAME [--against NAME] [Catch2 options]: one suite for every backend. Exit code 77 and one sentence when the backend cannot
+// run here, so that a machine without a GPU skips visibly.
+#define CATCH_CONFIG_RUNNER
+#include "conformance.h"
+
+#include "error.h"
+#include "log.h"
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <numeric>
+
+namespace conformance {
+namespace {
+
+std::string backend_name = "embree";
+std::string reference_name = "example";
+constexpr int kSkipped = 77;
+
+}  // namespace
+
+const crt::LoadedBackend& backend() {
+    static const crt::LoadedBackend loaded = crt::loadBackend(backend_name);
+    return loaded;
+}
+
+const crt::LoadedBackend& reference() {
+    static const crt::LoadedBackend loaded = crt::loadBackend(reference_name);
+    return loaded;
+}
+
+crt::Scene sceneFrom(const std::string& yaml, const std::vector<crt::SceneOverride>& overrides) {
+    return crt::parseScene(yaml, "conformance.yaml", ".", overrides);
+}
+
+crt::Film render(const crt::LoadedBackend& with, const crt::Scene& scene, const Run& run) {
+    const crt::CompiledScene compiled = crt::compileScene(scene, run.aovs);
+    crt::Integrator integrator(with, run.options);
+    integrator.setScene(compiled);
+    crt::RenderRange range;
+    range.first_sample = run.first_sample;
+    range.sample_count = run.samples;
+    REQUIRE(integrator.render(range));
+    crt::Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+    integrator.readFilm(film);
+    return film;
+}
+
+std::uint64_t differingPixels(const crt::Film& a, const crt::Film& b, bool all) {
+    REQUIRE(a.shape() == b.shape());
+    std::uint64_t differing = 0;
+    const std::uint32_t channels = all ? a.shape().channels : 3;
+    for (std::uint32_t y = 0; y < a.shape().height; ++y)
+        for (std::uint32_t x = 0; x < a.shape().width; ++x) {
+            const std::size_t pixel = static_cast<std::size_t>(y) * a.shape().width + x;
+            bool same = a.counts[pixel] == b.counts[pixel] && (a.primitives.empty() || a.primitives[pixel] == b.primitives[pixel]);
+            for (std::uint32_t c = 0; c < channels; ++c)
+                same = same && static_cast<float>(a.mean(x, y, c)) == static_cast<float>(b.mean(x, y, c));
+            differing += same ? 0 : 1;
+        }
+    return differing;
+}
+
+double imageMean(const crt::Film& film) {
+    double sum = 0;
+    for (std::uint32_t y = 0; y < film.shape().height; ++y)
+        for (std::uint32_t x = 0; x < film.shape().width; ++x) sum += film.mean(x, y, 1);
+    return sum / (static_cast<double>(film.shape().width) * film.shape().height);
+}
+
+Interval interval999(const std::vector<double>& sixteen) {
+    REQUIRE(sixteen.size() == 16);
+    const double mean = std::accumulate(sixteen.begin(), sixteen.end(), 0.0) / 16;
+    double squares = 0;
+    for (const double x : sixteen) squares += (x - mean) * (x - mean);
+    const double half = 4.0728 * std::sqrt(squares / 15 / 16);
+    return {mean - half, mean + half};
+}
+
+void requireMean(const std::string& yaml, double expected, double delta, std::uint64_t samples) {
+    std::vector<double> means;
+    for (int seed = 1; seed <= 16; ++seed) {
+        Run run;
+        run.samples = samples;
+        means.push_back(imageMean(render(backend(), sceneFrom(yaml, {{"sampler.seed", std::to_string(seed)}}), run)));
+    }
+    const Interval i = interval999(means);
+    INFO("99.9 % interval [" << i.lower << ", " << i.upper << "], expected " << expected << " within " << 100 * delta << " %");
+    CHECK(i.lower > expected * (1 - delta));
+    CHECK(i.upper < expected * (1 + delta));
+}
+
+}  // namespace conformance
+
+int main(int argc, char** argv) {
+    Catch::Session session;
+    session.cli(session.cli() | Catch::clara::Opt(conformance::backend_name, "name")["--backend"]("backend under test, or a path to its .so") |
+                Catch::clara::Opt(conformance::reference_name, "name")["--against"]("backend to compare bits with"));
+    if (const int code = session.applyCommandLine(argc, argv); code != 0) return code;
+    crt::setLogLevel(crt::LogLevel::Error);
+    try {
+        crt::probeDevices(conformance::backend());
+    } catch (const crt::Error& error) {
+        std::printf("SKIPPED: backend '%s' cannot run here: %s\n", conformance::backend_name.c_str(), error.what());
+        return conformance::kSkipped;
+    }
+    return session.run();
+}
