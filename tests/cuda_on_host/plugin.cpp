@@ -18,12 +18,19 @@ namespace {
 
 using plugin::PluginError;
 
+std::vector<CrtDevice> probeDevices(const plugin::Host&) {
+    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
+    return {plugin::makeDevice(0, "CUDA kernels on the host", "none", 0, threads)};
+}
+
 class HostIntegrator {
 public:
     HostIntegrator(const plugin::Host& host, const CrtCreateInfo& info)
         : host_(host),
           tile_size_(info.tile_size),
-          threads_(info.threads != 0 ? info.threads : std::max(1u, std::thread::hardware_concurrency())) {}
+          threads_(info.threads != 0 ? info.threads : std::max(1u, std::thread::hardware_concurrency())) {
+        plugin::chooseDevice(probeDevices(host), info.device);  // there is one, but another may have been asked for
+    }
 
     void setScene(const CrtSceneBlob& blob) {
         const auto& scene = *static_cast<const kernel::CrtScene*>(blob.data);
@@ -121,11 +128,6 @@ private:
     double render_seconds_ = 0;
     std::uint64_t paths_ = 0;
 };
-
-std::vector<CrtDevice> probeDevices(const plugin::Host&) {
-    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
-    return {plugin::makeDevice(0, "CUDA kernels on the host", "none", 0, threads)};
-}
 
 }  // namespace
 }  // namespace crt::cuda_on_host
