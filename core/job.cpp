@@ -193,10 +193,12 @@ private:
 void writeFiles(const Files& files, const Scene& scene, const Film& film, const FilmIdentity& identity, RunFacts& facts,
                 FirstFailure& failure) {
     const Stopwatch writing;
+    // With nothing but a time to go by, the end of the time is the end of the work.
+    const bool complete = facts.stop == StopReason::Samples || (facts.stop == StopReason::Time && facts.target_samples == 0);
     Metadata metadata{{"Software", "crt " CRT_VERSION},
                       {"crt/version", CRT_VERSION},
                       {"crt/sceneHash", identity.scene_hash},
-                      {"crt/complete", facts.stop == StopReason::Samples ? "1" : "0"}};
+                      {"crt/complete", complete ? "1" : "0"}};
     if (!scene.title.empty()) metadata.emplace_back("ImageDescription", scene.title);
     // A film that was complete before this run is written without any backend.
     if (!facts.backend_name.empty()) {
