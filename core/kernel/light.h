@@ -78,7 +78,7 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
     const vec3 p2 = crt_triangle_vertex(triangle, 2u);
     const vec3 normal = normalize3(cross3(p1 - p0, p2 - p0));
     const CrtRandom2 u = crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT);
-    const vec3 test_error = (abs3(p1 - p0) + abs3(p2 - p0)) * CRT_TEST_ERROR; /* the shadow ray must end before the emitter */
+    const vec3 test_error = crt_splat3(crt_largest3(abs3(p1 - p0) + abs3(p2 - p0)) * CRT_TEST_ERROR); /* the shadow ray must end before the emitter */
     CrtLightSample s;
     s.spectrum = emitter->spectrum;
     s.pdf = 0.0f;

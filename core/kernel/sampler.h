@@ -33,7 +33,7 @@ typedef struct CrtSampler {
 } CrtSampler;
 
 typedef struct CrtRandom2 {
-    f32 x, y; /* in [0, 1) */
+    f32 x, y; /* in (0, 1) */
 } CrtRandom2;
 
 /* A bijection on 32 bits with good avalanche (Wellons' hash prospector, "lowbias32"). */
@@ -46,8 +46,8 @@ CRT_FN u32 crt_hash(u32 x) {
     return x;
 }
 
-/* [0, 1) from the upper 24 bits: exact, never 1. */
-CRT_FN f32 crt_unit(u32 bits) { return (f32)(bits >> 8) * CRT_EPSILON; }
+/* The middle of one of 2^23 cells of (0, 1): exact, and never 0 or 1, where warps degenerate. */
+CRT_FN f32 crt_unit(u32 bits) { return (f32)(bits >> 9) * (2.0f * CRT_EPSILON) + CRT_EPSILON; }
 
 /* Owen scrambling of a bit-reversed number: each bit is flipped by a hash of the bits below it (Laine and Karras 2011, constants by Vegdahl
    2021, "Building a Better LK Hash"). */

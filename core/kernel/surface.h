@@ -28,6 +28,7 @@ CRT_FN vec3 crt_triangle_vertex(CRT_GLOBAL const CrtTriangle *triangle, u32 i) {
 #define CRT_EDGE_MARGIN 4e-6f
 #define CRT_EDGE_MARGIN_MAX 0.125f
 
+CRT_FN vec3 crt_splat3(f32 s) { return make_vec3(s, s, s); }
 CRT_FN f32 crt_largest3(vec3 v) { return crt_max(V3X(v), crt_max(V3Y(v), V3Z(v))); }
 
 CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
@@ -42,7 +43,8 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
 
     /* A path that starts in a corner within rounding of the other wall might start behind it, and leave a closed room. Such a start is drawn in
        from the edge: by a few ulp of the position against the triangle's height, at least a few ulp of its size. */
-    const f32 rounding = 16.0f * CRT_EPSILON * crt_largest3(abs3(p0) + extent) * crt_largest3(extent) / twice_area;
+    const f32 size = crt_largest3(extent);
+    const f32 rounding = 16.0f * CRT_EPSILON * crt_largest3(abs3(p0) + extent) * size / twice_area;
     const f32 margin = crt_min(CRT_EDGE_MARGIN + rounding, CRT_EDGE_MARGIN_MAX);
     const f32 c0 = crt_max(1.0f - hit.b1 - hit.b2, margin);
     const f32 c1 = crt_max(hit.b1, margin);
@@ -56,8 +58,9 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     const vec3 q2 = p2 * b2;
     CrtSurface s;
     s.p = q0 + q1 + q2;
-    /* Of the position: seven rounded operations a term (PBRT 4e, 6.8.5) and two for b0. Of the test that a new ray meets. */
-    s.error = (abs3(q0) + abs3(q1) + abs3(q2)) * CRT_GAMMA(9.0f) + extent * CRT_TEST_ERROR;
+    /* Of the position: seven rounded operations a term (PBRT 4e, 6.8.5) and two for b0. Of the test that a new ray meets: it shears the triangle along the
+       ray, so that its size in every axis counts in every axis. */
+    s.error = (abs3(q0) + abs3(q1) + abs3(q2)) * CRT_GAMMA(9.0f) + crt_splat3(size * CRT_TEST_ERROR);
     s.ng = normal / twice_area;
     s.ns = s.ng;
     s.material = primitive->material;
