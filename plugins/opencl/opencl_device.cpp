@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
+#include <mutex>
 
 namespace crt::opencl {
 
@@ -207,14 +209,34 @@ Device chooseDevice(const char* wanted) {
     }
 }
 
-SubDevice takeComputeUnits(const Device& device, std::uint32_t count) {
-    if (count == 0 || count >= device.compute_units) return {};
-    const cl_device_partition_property by_counts[] = {CL_DEVICE_PARTITION_BY_COUNTS, static_cast<cl_device_partition_property>(count),
-                                                      CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};
-    cl_device_id part = nullptr;
-    check(clCreateSubDevices(device.id, by_counts, 1, &part, nullptr),
-          "taking " + std::to_string(count) + " of the " + std::to_string(device.compute_units) + " compute units of '" + device.name + "'");
-    return SubDevice(part);
+const Session& openSession(const Device& device, std::uint32_t threads) {
+    const bool divided = device.is_cpu && threads != 0 && threads < device.compute_units;
+    const std::uint32_t compute_units = divided ? threads : device.compute_units;
+
+    // Not destroyed at exit either, when the driver may be gone before.
+    static std::mutex& mutex = *new std::mutex;
+    static auto& sessions = *new std::map<std::pair<cl_device_id, std::uint32_t>, Session>;
+    const std::lock_guard<std::mutex> lock(mutex);
+    const auto known = sessions.find({device.id, compute_units});
+    if (known != sessions.end()) return known->second;
+
+    Session session;
+    session.target = device.id;
+    session.compute_units = compute_units;
+    if (divided) {
+        const cl_device_partition_property by_counts[] = {CL_DEVICE_PARTITION_BY_COUNTS, static_cast<cl_device_partition_property>(compute_units),
+                                                          CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};
+        check(clCreateSubDevices(device.id, by_counts, 1, &session.target, nullptr),
+              "taking " + std::to_string(compute_units) + " of the " + std::to_string(device.compute_units) + " compute units of '" +
+                  device.name + "'");
+        session.part = SubDevice(session.target);
+    }
+    cl_int result = CL_SUCCESS;
+    session.context = Context(clCreateContext(nullptr, 1, &session.target, nullptr, nullptr, &result));
+    check(result, "opening '" + device.name + "'");
+    session.queue = Queue(clCreateCommandQueue(session.context.get(), session.target, CL_QUEUE_PROFILING_ENABLE, &result));
+    check(result, "creating a command queue on '" + device.name + "'");
+    return sessions.emplace(std::pair(device.id, compute_units), std::move(session)).first->second;
 }
 
 }  // namespace crt::opencl

@@ -74,7 +74,18 @@ std::vector<Device> usableDevices();
 /// The device that --device means (crt::plugin::chooseDevice). Throws when there is none, and then also says what is wrong with the others.
 Device chooseDevice(const char* wanted);
 
-/// `count` compute units of a CPU device. Empty when the device has no more than that, or 0 is asked for, and all of it is to be used.
-SubDevice takeComputeUnits(const Device& device, std::uint32_t count);
+/// A device, or some of a CPU's compute units, opened for work.
+struct Session {
+    SubDevice part;  ///< Empty where all of the device is in use.
+    Context context;
+    Queue queue;  ///< In order, with profiling.
+    cl_device_id target = nullptr;
+    std::uint32_t compute_units = 0;
+};
+
+/// The session with `threads` compute units (0, or more than there are: all; only a CPU can be divided), opened at the first call and shared from
+/// then on until the process ends. It is never closed: PoCL's workers (3.1) look at the queue and the device of a command for a moment after they have
+/// reported it complete, and crash when those are gone. [any thread]
+const Session& openSession(const Device& device, std::uint32_t threads);
 
 }  // namespace crt::opencl

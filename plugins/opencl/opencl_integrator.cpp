@@ -24,10 +24,6 @@ std::string megabytes(std::uint64_t bytes) {
     return text;
 }
 
-void CL_CALLBACK contextFailed(const char* message, const void*, std::size_t, void* host) {
-    static_cast<const plugin::Host*>(host)->log(CRT_LOG_DEBUG, std::string("opencl: ") + message);
-}
-
 template <class T>
 void setArgument(cl_kernel kernel, cl_uint index, const T& value) {
     check(clSetKernelArg(kernel, index, sizeof value, &value), "setting kernel argument " + std::to_string(index));
@@ -38,24 +34,13 @@ void setArgument(cl_kernel kernel, cl_uint index, const T& value) {
 OpenClIntegrator::OpenClIntegrator(const plugin::Host& host, const CrtCreateInfo& info)
     : host_(host),
       device_(chooseDevice(info.device)),
-      compute_units_(device_.compute_units),
+      session_(openSession(device_, info.threads)),
       kernel_choice_(info.kernel),
       tile_size_(info.tile_size),
       // Every device has traced these in far less than a second.
       pacer_(kLaunchSeconds, device_.is_cpu ? 4096 : 65536, groupSize(device_).y) {
-    if (device_.is_cpu) {
-        part_ = takeComputeUnits(device_, info.threads);
-        if (part_) compute_units_ = info.threads;
-    } else if (info.threads != 0) {
+    if (info.threads != 0 && !device_.is_cpu)
         host_.log(CRT_LOG_DEBUG, "opencl: '" + device_.name + "' is not a CPU: the number of threads does not apply");
-    }
-
-    const cl_device_id target = part_ ? part_.get() : device_.id;
-    cl_int result = CL_SUCCESS;
-    context_ = Context(clCreateContext(nullptr, 1, &target, contextFailed, &host_, &result));
-    check(result, "opening '" + device_.name + "'");
-    queue_ = Queue(clCreateCommandQueue(context_.get(), target, CL_QUEUE_PROFILING_ENABLE, &result));
-    check(result, "creating a command queue on '" + device_.name + "'");
 }
 
 Buffer OpenClIntegrator::allocate(cl_mem_flags flags, std::uint64_t bytes, const void* content, const char* what) {
@@ -67,7 +52,7 @@ Buffer OpenClIntegrator::allocate(cl_mem_flags flags, std::uint64_t bytes, const
                                                  megabytes(allocated_bytes_) + " in use, but '" + device_.name + "' has only " +
                                                  megabytes(device_.memory_bytes));
     cl_int result = CL_SUCCESS;
-    Buffer buffer(clCreateBuffer(context_.get(), flags | (content != nullptr ? CL_MEM_COPY_HOST_PTR : 0), bytes,
+    Buffer buffer(clCreateBuffer(session_.context.get(), flags | (content != nullptr ? CL_MEM_COPY_HOST_PTR : 0), bytes,
                                  const_cast<void*>(content), &result));
     check(result, "allocating " + megabytes(bytes) + " on '" + device_.name + "' for " + what);
     allocated_bytes_ += bytes;
@@ -76,7 +61,7 @@ Buffer OpenClIntegrator::allocate(cl_mem_flags flags, std::uint64_t bytes, const
 }
 
 void OpenClIntegrator::fill(const Buffer& buffer, std::uint64_t bytes, cl_uint pattern) {
-    check(clEnqueueFillBuffer(queue_.get(), buffer.get(), &pattern, sizeof pattern, 0, bytes, 0, nullptr, nullptr), "clearing the film");
+    check(clEnqueueFillBuffer(session_.queue.get(), buffer.get(), &pattern, sizeof pattern, 0, bytes, 0, nullptr, nullptr), "clearing the film");
 }
 
 void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
@@ -87,7 +72,7 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     const std::uint32_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
     if (!program_.render || program_.features != features) {
         const double compile_seconds = program_.compile_seconds, cache_seconds = program_.cache_seconds;
-        program_ = buildProgram(host_, context_.get(), part_ ? part_.get() : device_.id, device_, features);
+        program_ = buildProgram(host_, device_, session_, features);
         program_.compile_seconds += compile_seconds;
         program_.cache_seconds += cache_seconds;
     }
@@ -110,7 +95,7 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
         primitives_ = allocate(CL_MEM_READ_WRITE, pixels * sizeof(cl_uint), nullptr, "the film's primitives");
         fill(primitives_, pixels * sizeof(cl_uint), CRT_NONE);
     }
-    check(clFinish(queue_.get()), "uploading the scene");
+    check(clFinish(session_.queue.get()), "uploading the scene");
     upload_seconds_ += now() - start;
 
     setArgument(program_.render.get(), 0, scene_.get());
@@ -138,7 +123,7 @@ double OpenClIntegrator::launch(const Launch& launch) {
     const std::size_t global[2] = {(launch.x1 - launch.x0 + local[0] - 1) / local[0] * local[0],
                                    (launch.y1 - launch.y0 + local[1] - 1) / local[1] * local[1]};
     cl_event enqueued = nullptr;
-    check(clEnqueueNDRangeKernel(queue_.get(), kernel, 2, nullptr, global, local, 0, nullptr, &enqueued), "launching the kernel");
+    check(clEnqueueNDRangeKernel(session_.queue.get(), kernel, 2, nullptr, global, local, 0, nullptr, &enqueued), "launching the kernel");
     const Event event(enqueued);
     check(clWaitForEvents(1, &enqueued), "rendering on '" + device_.name + "'");
 
@@ -172,7 +157,7 @@ void OpenClIntegrator::readFilm(const CrtFilmView& film) {
 
     const std::size_t pixels = std::size_t{width_} * height_;
     const auto read = [&](const Buffer& buffer, std::size_t bytes, void* to) {
-        check(clEnqueueReadBuffer(queue_.get(), buffer.get(), CL_TRUE, 0, bytes, to, 0, nullptr, nullptr), "reading the film back");
+        check(clEnqueueReadBuffer(session_.queue.get(), buffer.get(), CL_TRUE, 0, bytes, to, 0, nullptr, nullptr), "reading the film back");
     };
     read(sums_, pixels * channels_ * 2 * sizeof(double), film.sums);
     read(counts_, pixels * sizeof(std::uint64_t), film.counts);
@@ -187,7 +172,7 @@ void OpenClIntegrator::readFilm(const CrtFilmView& film) {
 void OpenClIntegrator::report(CrtBackendReport& report) {
     plugin::writeText(report.device, device_.name);
     plugin::writeText(report.kernel, std::string(kernel_choice_ == CRT_KERNEL_FULL ? "full" : "lean") + " kernel, " +
-                                         std::to_string(compute_units_) + " of " + std::to_string(device_.compute_units) + " compute units");
+                                         std::to_string(session_.compute_units) + " of " + std::to_string(device_.compute_units) + " compute units");
     report.kernel_from_cache = program_.from_cache ? 1 : 0;
     report.kernel_features = program_.features;
     report.compile_seconds = program_.compile_seconds;
@@ -198,7 +183,7 @@ void OpenClIntegrator::report(CrtBackendReport& report) {
     report.peak_memory_bytes = device_.is_cpu ? 0 : peak_bytes_;
     if (rays_) {
         cl_uint counts[4] = {};
-        check(clEnqueueReadBuffer(queue_.get(), rays_.get(), CL_TRUE, 0, sizeof counts, counts, 0, nullptr, nullptr),
+        check(clEnqueueReadBuffer(session_.queue.get(), rays_.get(), CL_TRUE, 0, sizeof counts, counts, 0, nullptr, nullptr),
               "reading the ray counters");
         report.closest_rays = (std::uint64_t{counts[1]} << 32) | counts[0];
         report.shadow_rays = (std::uint64_t{counts[3]} << 32) | counts[2];

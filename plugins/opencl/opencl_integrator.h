@@ -16,8 +16,6 @@ namespace crt::opencl {
 class OpenClIntegrator {
 public:
     OpenClIntegrator(const plugin::Host& host, const CrtCreateInfo& info);
-    OpenClIntegrator(const OpenClIntegrator&) = delete;  // the context's callback knows where it lies
-    OpenClIntegrator& operator=(const OpenClIntegrator&) = delete;
 
     void setScene(const CrtSceneBlob& scene);
     bool render(const CrtRenderRange& range);
@@ -32,10 +30,7 @@ private:
 
     plugin::Host host_;
     Device device_;
-    std::uint32_t compute_units_;  ///< In use.
-    SubDevice part_;               ///< Those, where they are not all of the device.
-    Context context_;
-    Queue queue_;
+    const Session& session_;
     CrtKernelChoice kernel_choice_;
     std::uint32_t tile_size_;
     LaunchPacer pacer_;

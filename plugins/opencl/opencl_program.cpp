@@ -47,26 +47,26 @@ std::vector<unsigned char> programBinary(cl_program program) {
 }
 
 /// A program from a cached binary; empty when the driver does not take it, for whatever reason: then the text is compiled again.
-ProgramHandle fromBinary(cl_context context, cl_device_id target, const std::vector<unsigned char>& binary, const std::string& options) {
+ProgramHandle fromBinary(const Session& session, const std::vector<unsigned char>& binary, const std::string& options) {
     const unsigned char* pointer = binary.data();
     const std::size_t size = binary.size();
     cl_int status = CL_SUCCESS, result = CL_SUCCESS;
-    ProgramHandle program(clCreateProgramWithBinary(context, 1, &target, &size, &pointer, &status, &result));
+    ProgramHandle program(clCreateProgramWithBinary(session.context.get(), 1, &session.target, &size, &pointer, &status, &result));
     if (result != CL_SUCCESS || status != CL_SUCCESS) return {};
-    if (clBuildProgram(program.get(), 1, &target, options.c_str(), nullptr, nullptr) != CL_SUCCESS) return {};
+    if (clBuildProgram(program.get(), 1, &session.target, options.c_str(), nullptr, nullptr) != CL_SUCCESS) return {};
     return program;
 }
 
-ProgramHandle fromText(cl_context context, cl_device_id target, const Device& device, const std::string& text, const std::string& options) {
+ProgramHandle fromText(const Session& session, const Device& device, const std::string& text, const std::string& options) {
     const char* pointer = text.c_str();
     const std::size_t size = text.size();
     cl_int result = CL_SUCCESS;
-    ProgramHandle program(clCreateProgramWithSource(context, 1, &pointer, &size, &result));
+    ProgramHandle program(clCreateProgramWithSource(session.context.get(), 1, &pointer, &size, &result));
     check(result, "creating the OpenCL program");
-    result = clBuildProgram(program.get(), 1, &target, options.c_str(), nullptr, nullptr);
+    result = clBuildProgram(program.get(), 1, &session.target, options.c_str(), nullptr, nullptr);
     if (result != CL_SUCCESS)
         throw PluginError(CRT_DEVICE_FAILED, "'" + device.name + "' cannot compile the kernel (" + errorName(result) + ", options " + options +
-                                                 "):\n" + buildLog(program.get(), target, 20));
+                                                 "):\n" + buildLog(program.get(), session.target, 20));
     return program;
 }
 
@@ -83,7 +83,7 @@ std::string buildOptions(const Device& device, std::uint32_t features) {
     return options + std::string(device.has_correct_division_option ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
 }
 
-Program buildProgram(const plugin::Host& host, cl_context context, cl_device_id target, const Device& device, std::uint32_t features) {
+Program buildProgram(const plugin::Host& host, const Device& device, const Session& session, std::uint32_t features) {
     Program built;
     built.features = features;
     const std::string options = buildOptions(device, features);
@@ -93,7 +93,7 @@ Program buildProgram(const plugin::Host& host, cl_context context, cl_device_id 
     const KernelCache cache(host.cacheDirectory());
     const KernelCache::Key key = KernelCache::makeKey({"opencl", text, options, device.name, device.driver});
     if (const std::optional<std::vector<unsigned char>> binary = cache.load(key)) {
-        built.program = fromBinary(context, target, *binary, options);
+        built.program = fromBinary(session, *binary, options);
         built.from_cache = static_cast<bool>(built.program);
         if (!built.from_cache) host.log(CRT_LOG_DEBUG, "opencl: the driver refuses the cached kernel; compiling it again");
     }
@@ -101,7 +101,7 @@ Program buildProgram(const plugin::Host& host, cl_context context, cl_device_id 
 
     if (!built.program) {
         const Stopwatch compile_time;
-        built.program = fromText(context, target, device, text, options);
+        built.program = fromText(session, device, text, options);
         // Asking for the binary makes PoCL, which would wait for the first launch, generate the machine code now.
         const std::vector<unsigned char> binary = programBinary(built.program.get());
         built.compile_seconds = compile_time.seconds();

@@ -32,7 +32,7 @@ struct Program {
 /// Options that a mask and a device are compiled with. No option that relaxes arithmetic: OpenCL's defaults keep IEEE rounding.
 std::string buildOptions(const Device& device, std::uint32_t features);
 
-/// Compiles the kernel for `features`, or takes it from the host's cache. `target` is the device of `context`: `device.id` or a part of it.
-Program buildProgram(const plugin::Host& host, cl_context context, cl_device_id target, const Device& device, std::uint32_t features);
+/// Compiles the kernel for `features`, or takes it from the host's cache.
+Program buildProgram(const plugin::Host& host, const Device& device, const Session& session, std::uint32_t features);
 
 }  // namespace crt::opencl
