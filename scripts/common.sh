@@ -1,0 +1,35 @@
+# Sourced by the scripts beside it: where things are, how to say things, and which CUDA toolkit to build with.
+
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+BUILD_DIR=${CRT_BUILD_DIR:-build/release}
+CUDA_CACHE=.cache/cuda
+JOBS=${CRT_JOBS:-$(nproc)}
+
+say() { printf '== %s\n' "$*"; }
+fail() { printf '== error: %s\n' "$*" >&2; exit 1; }
+
+# Whether $1 is a CUDA toolkit new enough for us. Debian 12's own nvcc, 11.8, is not.
+cuda_is_usable() {
+    [ -x "$1/bin/nvcc" ] || return 1
+    local major
+    major=$("$1/bin/nvcc" --version 2>/dev/null | sed -n 's/.*release \([0-9]*\)\..*/\1/p')
+    [ "${major:-0}" -ge 12 ]
+}
+
+# Prints the root of the CUDA toolkit to build with: the system's, or the one that scripts/setup fetched. Fails when there is none.
+# CRT_IGNORE_SYSTEM_CUDA=1 leaves the system's aside, to try the other way on a machine that has one.
+find_cuda() {
+    local root nvcc
+    if [ "${CRT_IGNORE_SYSTEM_CUDA:-0}" != 1 ]; then
+        nvcc=$(command -v nvcc || true)
+        for root in "${CUDA_HOME:-}" "${CUDA_PATH:-}" "${nvcc:+$(dirname "$(dirname "$(readlink -f "$nvcc")")")}" /usr/local/cuda; do
+            if [ -n "$root" ] && cuda_is_usable "$root"; then
+                echo "$root"
+                return 0
+            fi
+        done
+    fi
+    cuda_is_usable "$CUDA_CACHE/toolkit" && readlink -f "$CUDA_CACHE/toolkit"
+}
