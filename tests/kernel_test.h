@@ -1,0 +1,117 @@
+/// What the kernel's unit tests share: the kernel as plain C++, scenes made in memory, seeded numbers, and chi-squared.
+#pragma once
+
+#include "compile.h"
+#include "kernel/path.h"
+
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <utility>
+#include <vector>
+
+namespace kernel_test {
+
+using namespace crt::kernel;
+
+/// Seeded by the test, so that a failure comes back. Not std::uniform_real_distribution, whose numbers depend on the library.
+class Random {
+public:
+    explicit Random(std::uint64_t seed) : engine_(seed) {}
+    std::uint64_t bits() { return engine_(); }
+    std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>(((engine_() >> 32) * n) >> 32); }
+    double uniform() { return (static_cast<double>(engine_() >> 11) + 0.5) * 0x1p-53; }
+    double uniform(double lower, double upper) { return lower + (upper - lower) * uniform(); }
+    CrtRandom2 pair() {
+        CrtRandom2 u;
+        u.x = crt_unit(static_cast<u32>(engine_() >> 32));
+        u.y = crt_unit(static_cast<u32>(engine_() >> 32));
+        return u;
+    }
+    /// Uniform on the unit sphere.
+    crt::Vec3d direction() {
+        const double z = uniform(-1, 1), phi = uniform(0, 2 * 3.14159265358979323846), r = std::sqrt(1 - z * z);
+        return {r * std::cos(phi), r * std::sin(phi), z};
+    }
+
+private:
+    std::mt19937_64 engine_;
+};
+
+inline vec3 toFloat(const crt::Vec3d& v) { return make_vec3(static_cast<f32>(v[0]), static_cast<f32>(v[1]), static_cast<f32>(v[2])); }
+inline crt::Vec3d toDouble(vec3 v) { return {v.x, v.y, v.z}; }
+inline crt::Vec3d minus(const crt::Vec3d& a, const crt::Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+inline crt::Vec3d plus(const crt::Vec3d& a, const crt::Vec3d& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+inline crt::Vec3d times(const crt::Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
+inline double dot(const crt::Vec3d& a, const crt::Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+inline double length(const crt::Vec3d& a) { return std::sqrt(dot(a, a)); }
+inline crt::Vec3d unit(const crt::Vec3d& a) { return times(a, 1 / length(a)); }
+inline crt::Vec3d cross(const crt::Vec3d& a, const crt::Vec3d& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+/// A unit vector in float, as near to v as rounding once allows.
+inline vec3 unitFloat(const crt::Vec3d& v) { return toFloat(unit(v)); }
+
+/// The scene as the kernel sees it. `compiled` must outlive it.
+inline CrtContext contextOf(const crt::CompiledScene& compiled) {
+    CrtContext ctx{};
+    ctx.blob = compiled.data();
+    ctx.scene = reinterpret_cast<const CrtScene*>(compiled.data());
+    return ctx;
+}
+
+template <class T>
+const T* arrayOf(const crt::CompiledScene& compiled, CrtSpan span) {
+    return CRT_ARRAY(T, compiled.data(), span);
+}
+
+/// One object, one mesh, nothing else; the camera looks at it from −z.
+inline crt::Scene sceneOf(crt::Mesh mesh, crt::Accelerator accelerator = crt::Accelerator::Auto) {
+    crt::Scene scene;
+    scene.camera.position = {0, 0, -3};
+    scene.camera.target = {0, 0, 0};
+    scene.film.width = scene.film.height = 16;
+    scene.integrator.accelerator = accelerator;
+    scene.environment = crt::Environment{crt::constantSpectrum(1)};
+    scene.meshes.push_back(std::move(mesh));
+    scene.objects.emplace_back();
+    return scene;
+}
+
+/// Standard normal deviate of a chi-squared statistic (Wilson and Hilferty): |z| < 4.4 but for one time in 100,000. Both tails: counts that
+/// fit too well are no random counts either.
+inline double chiSquaredDeviate(const std::vector<std::uint64_t>& observed, const std::vector<double>& expected) {
+    double sum = 0, chi2 = 0, total = 0;
+    for (const double e : expected) sum += e;
+    for (const std::uint64_t n : observed) total += static_cast<double>(n);
+    for (std::size_t i = 0; i < observed.size(); ++i) {
+        const double e = expected[i] * total / sum;
+        chi2 += (static_cast<double>(observed[i]) - e) * (static_cast<double>(observed[i]) - e) / e;
+    }
+    const double k = static_cast<double>(observed.size() - 1), v = 2 / (9 * k);
+    return (std::cbrt(chi2 / k) - (1 - v)) / std::sqrt(v);
+}
+inline double chiSquaredDeviate(const std::vector<std::uint64_t>& observed) {
+    return chiSquaredDeviate(observed, std::vector<double>(observed.size(), 1.0));
+}
+
+/// Mean of many values, and how far it is from `expected` in standard errors.
+struct Mean {
+    std::uint64_t n = 0;
+    double sum = 0, squares = 0;
+    void add(double x) {
+        ++n;
+        sum += x;
+        squares += x * x;
+    }
+    double mean() const { return sum / static_cast<double>(n); }
+    double standardError() const {
+        const double m = mean();
+        return std::sqrt(std::max(0.0, squares / static_cast<double>(n) - m * m) / static_cast<double>(n - 1));
+    }
+    double deviate(double expected) const { return (mean() - expected) / standardError(); }
+};
+
+}  // namespace kernel_test
