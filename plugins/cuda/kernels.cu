@@ -17,7 +17,7 @@
 /* Ray counters are spread, so that threads of different blocks do not queue for one address; the host adds them up. */
 #define CRT_RAY_COUNTERS 1024u
 
-/* Four blocks on a multiprocessor leave a thread 128 registers: enough for every kernel not to spill. */
+/* Blocks that a multiprocessor should hold at once: what whoever compiles this trades registers for (cuda_program.h). */
 #ifndef CRT_BLOCKS_PER_SM
 #define CRT_BLOCKS_PER_SM 4
 #endif

@@ -15,8 +15,8 @@ struct GroupSize {
     std::uint32_t x = 1, y = 1;
 };
 
-/// One pixel a group on a CPU: there is nothing to share between work-items, and a loop over them inside the kernel is what PoCL tries to
-/// vectorise, at the price of seconds of compiling. A GPU gets the square that two warps or one wavefront fill.
+/// One pixel a group on a CPU: paths part at once, so work-items side by side share nothing, and PoCL's loop over them costs a fifth to a third
+/// of the speed (measured with groups of 8 × 1 to 16 × 16). A GPU gets the square that two warps or one wavefront fill.
 GroupSize groupSize(const Device& device);
 
 /// A built kernel and what it cost to get it.

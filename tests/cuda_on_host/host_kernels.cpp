@@ -3,6 +3,8 @@
 #include <atomic>
 #include <cstring>
 #include <thread>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "cuda_shim.h"
@@ -43,7 +45,28 @@ CrtScene header(const void* blob) {
     return scene;
 }
 
+/// Calls `kernel` with what the pointers point to, read as the types that it declares.
+template <class... Parameters, std::size_t... I>
+void callWith(void (*kernel)(Parameters...), void** arguments, std::index_sequence<I...>) {
+    kernel(*static_cast<std::remove_const_t<Parameters>*>(arguments[I])...);
+}
+template <class... Parameters>
+void launchWith(void (*kernel)(Parameters...), unsigned grid_x, unsigned grid_y, void** arguments, unsigned host_threads) {
+    launchGrid(grid_x, grid_y, host_threads, [&] { callWith(kernel, arguments, std::index_sequence_for<Parameters...>{}); });
+}
+
 }  // namespace
+
+bool hasKernel(const char* name) { return std::strcmp(name, "crt_render") == 0 || std::strcmp(name, "crt_add_slices") == 0; }
+
+bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned block, void** arguments, unsigned host_threads) {
+    if (!hasKernel(name) || block != CRT_BLOCK) return false;
+    if (std::strcmp(name, "crt_render") == 0)
+        launchWith(crt_render, grid_x, grid_y, arguments, host_threads);
+    else
+        launchWith(crt_add_slices, grid_x, grid_y, arguments, host_threads);
+    return true;
+}
 
 std::uint32_t rayCounterPairs() { return CRT_RAY_COUNTERS; }
 

@@ -24,4 +24,8 @@ void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t sl
 void launchAddSlices(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film, const FilmPointers& parts,
                      unsigned host_threads);
 
+/// A kernel by its name, with arguments as cuLaunchKernel takes them: a pointer to each. False when there is none of that name.
+bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned block, void** arguments, unsigned host_threads);
+bool hasKernel(const char* name);
+
 }  // namespace crt::cuda_on_host

@@ -1,0 +1,246 @@
+// A libcuda.so.1 for tests: one device with 1 GB whose memory is the host's and whose kernels are those of host_kernels.cpp. With it the real CUDA
+// plugin runs on a machine without a GPU: opening the driver, allocating, choosing slices, passing arguments, going over from the
+// precompiled kernel to NVRTC's, running out of memory. It checks what a driver would check: sizes, handles, and that memory is given back.
+//
+// CRT_FAKE_CUDA says what is to go wrong: "no_device", "old" (a driver for CUDA 11) or "launch" (every launch fails).
+#include "host_kernels.h"
+
+#include <cuda.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+
+namespace {
+
+constexpr std::size_t kMemory = std::size_t{1} << 30;
+constexpr int kMultiprocessors = 8;
+
+std::mutex mutex;
+std::map<CUdeviceptr, std::size_t> allocations;
+std::size_t allocated = 0;
+
+bool goesWrong(const char* how) {
+    const char* wanted = std::getenv("CRT_FAKE_CUDA");
+    return wanted != nullptr && std::strcmp(wanted, how) == 0;
+}
+
+/// Whether [address, address + bytes) lies in one allocation.
+bool isAllocated(CUdeviceptr address, std::size_t bytes) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    auto next = allocations.upper_bound(address);
+    if (next == allocations.begin()) return false;
+    const auto& [start, size] = *--next;
+    return address + bytes <= start + size;
+}
+
+void* host(CUdeviceptr address) { return reinterpret_cast<void*>(address); }
+
+int modules_loaded = 0;
+double clockSeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+/// Looks for what was not given back when the process ends.
+struct LeakCheck {
+    ~LeakCheck() {
+        if (allocated == 0 && modules_loaded == 0) return;
+        std::fprintf(stderr, "fake CUDA driver: %zu bytes and %d modules were not given back\n", allocated, modules_loaded);
+        std::_Exit(99);
+    }
+} leak_check;
+
+}  // namespace
+
+// What cuda.h leaves open: an event is when it was recorded, a function its name.
+struct CUevent_st {
+    double seconds = 0;
+};
+struct CUfunc_st {
+    std::string name;
+};
+struct CUmod_st {
+    CUfunc_st render{"crt_render"}, add_slices{"crt_add_slices"};
+};
+struct CUctx_st {
+    int users = 0;
+};
+
+static CUctx_st context;
+static thread_local CUcontext current = nullptr;
+
+extern "C" {
+
+#define CRT_FAKE __attribute__((visibility("default"))) CUresult
+
+CRT_FAKE cuInit(unsigned) { return goesWrong("no_device") ? CUDA_ERROR_NO_DEVICE : CUDA_SUCCESS; }
+CRT_FAKE cuDriverGetVersion(int* version) {
+    *version = goesWrong("old") ? 11080 : CUDA_VERSION;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuGetErrorName(CUresult result, const char** name) {
+    *name = result == CUDA_ERROR_LAUNCH_FAILED ? "CUDA_ERROR_LAUNCH_FAILED" : "CUDA_ERROR_OTHER";
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuGetErrorString(CUresult, const char** text) {
+    *text = "told by the fake driver";
+    return CUDA_SUCCESS;
+}
+// NVRTC opens the driver too, and asks for its inner tables: a driver may have none.
+CRT_FAKE cuGetExportTable(const void** table, const CUuuid*) {
+    *table = nullptr;
+    return CUDA_ERROR_NOT_FOUND;
+}
+CRT_FAKE cuDeviceGetCount(int* count) {
+    *count = 1;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuDeviceGet(CUdevice* device, int index) {
+    *device = index;
+    return index == 0 ? CUDA_SUCCESS : CUDA_ERROR_INVALID_DEVICE;
+}
+CRT_FAKE cuDeviceGetName(char* name, int size, CUdevice) {
+    std::snprintf(name, static_cast<std::size_t>(size), "Fake GPU");
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuDeviceGetAttribute(int* value, CUdevice_attribute what, CUdevice) {
+    switch (what) {
+        case CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT: *value = kMultiprocessors; break;
+        case CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR: *value = 9; break;
+        case CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR: *value = 0; break;
+        case CU_DEVICE_ATTRIBUTE_COMPUTE_MODE: *value = CU_COMPUTEMODE_DEFAULT; break;
+        default: return CUDA_ERROR_INVALID_VALUE;
+    }
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuDeviceTotalMem(std::size_t* bytes, CUdevice) {
+    *bytes = kMemory;
+    return CUDA_SUCCESS;
+}
+
+CRT_FAKE cuDevicePrimaryCtxRetain(CUcontext* retained, CUdevice) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    ++context.users;
+    *retained = &context;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuDevicePrimaryCtxRelease(CUdevice) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    --context.users;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuCtxSetCurrent(CUcontext made_current) {
+    current = made_current;
+    return CUDA_SUCCESS;
+}
+
+CRT_FAKE cuModuleLoadData(CUmodule* module, const void* image) {
+    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    unsigned magic = 0;
+    std::memcpy(&magic, image, sizeof magic);
+    const bool elf = magic == 0x464c457fu, fat_binary = magic == 0xba55ed50u;
+    if (!elf && !fat_binary) return CUDA_ERROR_INVALID_IMAGE;
+    *module = new CUmod_st;
+    const std::lock_guard<std::mutex> lock(mutex);
+    ++modules_loaded;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuModuleUnload(CUmodule module) {
+    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    delete module;
+    const std::lock_guard<std::mutex> lock(mutex);
+    --modules_loaded;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuModuleGetFunction(CUfunction* function, CUmodule module, const char* name) {
+    if (!crt::cuda_on_host::hasKernel(name)) return CUDA_ERROR_NOT_FOUND;
+    *function = module->render.name == name ? &module->render : &module->add_slices;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuFuncGetAttribute(int* value, CUfunction_attribute what, CUfunction) {
+    *value = what == CU_FUNC_ATTRIBUTE_NUM_REGS ? 128 : 0;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuFuncSetCacheConfig(CUfunction, CUfunc_cache) { return CUDA_SUCCESS; }
+CRT_FAKE cuOccupancyMaxActiveBlocksPerMultiprocessor(int* blocks, CUfunction, int, std::size_t) {
+    *blocks = 4;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuLaunchKernel(CUfunction function, unsigned grid_x, unsigned grid_y, unsigned grid_z, unsigned block_x, unsigned block_y,
+                        unsigned block_z, unsigned shared_bytes, CUstream, void** arguments, void** extra) {
+    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    if (goesWrong("launch")) return CUDA_ERROR_LAUNCH_FAILED;
+    if (grid_x == 0 || grid_y == 0 || grid_y > 65535 || grid_z != 1 || block_y != 1 || block_z != 1 || shared_bytes != 0 || extra != nullptr)
+        return CUDA_ERROR_INVALID_VALUE;
+    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
+    return crt::cuda_on_host::launchByName(function->name.c_str(), grid_x, grid_y, block_x, arguments, threads) ? CUDA_SUCCESS
+                                                                                                                : CUDA_ERROR_INVALID_VALUE;
+}
+
+CRT_FAKE cuMemAlloc(CUdeviceptr* address, std::size_t bytes) {
+    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    if (bytes == 0) return CUDA_ERROR_INVALID_VALUE;
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (bytes > kMemory - allocated) return CUDA_ERROR_OUT_OF_MEMORY;
+    void* memory = std::aligned_alloc(256, (bytes + 255) / 256 * 256);
+    if (memory == nullptr) return CUDA_ERROR_OUT_OF_MEMORY;
+    std::memset(memory, 0xcd, bytes);  // whoever relies on cleared memory shall see it
+    *address = reinterpret_cast<CUdeviceptr>(memory);
+    allocations[*address] = bytes;
+    allocated += bytes;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuMemFree(CUdeviceptr address) {
+    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    const std::lock_guard<std::mutex> lock(mutex);
+    const auto found = allocations.find(address);
+    if (found == allocations.end()) return CUDA_ERROR_INVALID_VALUE;
+    allocated -= found->second;
+    allocations.erase(found);
+    std::free(host(address));
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuMemGetInfo(std::size_t* free_bytes, std::size_t* all_bytes) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    *free_bytes = kMemory - allocated;
+    *all_bytes = kMemory;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuMemcpyHtoD(CUdeviceptr to, const void* from, std::size_t bytes) {
+    if (!isAllocated(to, bytes)) return CUDA_ERROR_INVALID_VALUE;
+    std::memcpy(host(to), from, bytes);
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuMemcpyDtoH(void* to, CUdeviceptr from, std::size_t bytes) {
+    if (!isAllocated(from, bytes)) return CUDA_ERROR_INVALID_VALUE;
+    std::memcpy(to, host(from), bytes);
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuMemsetD8(CUdeviceptr to, unsigned char value, std::size_t bytes) {
+    if (!isAllocated(to, bytes)) return CUDA_ERROR_INVALID_VALUE;
+    std::memset(host(to), value, bytes);
+    return CUDA_SUCCESS;
+}
+
+CRT_FAKE cuEventCreate(CUevent* event, unsigned) {
+    *event = new CUevent_st;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuEventDestroy(CUevent event) {
+    delete event;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuEventRecord(CUevent event, CUstream) {
+    event->seconds = clockSeconds();
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuEventSynchronize(CUevent) { return CUDA_SUCCESS; }
+CRT_FAKE cuEventElapsedTime(float* milliseconds, CUevent start, CUevent end) {
+    *milliseconds = static_cast<float>((end->seconds - start->seconds) * 1e3);
+    return CUDA_SUCCESS;
+}
+
+}  // extern "C"
