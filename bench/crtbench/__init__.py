@@ -1,0 +1,1 @@
+"""Measurements of crt: one module per subcommand of bench/run, and what they share."""

@@ -1,0 +1,139 @@
+"""What leaving out saves: the kernel that has just what the scene needs against the one that has everything, and against the same kernel
+with one feature more, for every feature. The one feature more comes through CRT_KERNEL_DIR: a copy of the kernel texts in which every kernel
+has it."""
+import shutil
+
+from .nvrtc import variants
+from .program import Spread, feature_bits, significant
+from .results import Results
+
+SCENES = ["cornell_box", "cornell_dragon", "cornell_glass"]
+NO_AOVS = "outputs.0.aovs=[]"   # AOVs are a feature among others.
+
+
+def gain(more, lean):
+    """What `more` costs over `lean`, run by run."""
+    return Spread(m / l for m, l in zip(more, lean))
+
+
+def measure(program, arguments):
+    size = 32 if arguments.tiny else 400
+    spp = {"cornell_box": 16, "cornell_dragon": 8, "cornell_glass": 8}
+    runs = 2 if arguments.tiny else 5
+    scenes = [s for s in SCENES if not arguments.scenes or s in arguments.scenes]
+    settings = [f"film.resolution=[{size},{size}]", NO_AOVS]
+    usable, absent = program.backends(["cuda", "opencl", "embree"])
+    results = Results(program, arguments, "leave-out", "What leaving out saves")
+    data = {"scenes": {}}
+    masks = {scene: scene_mask(program, scene) for scene in scenes}
+
+    def render(scene, backend, kernel="lean", outputs=(), environment=None):
+        return program.render(scene, backend, ["--spp", spp[scene], "--kernel", kernel], outputs, settings, environment=environment)
+
+    # Lean against full.
+    rows = []
+    for scene in scenes:
+        data["scenes"][scene] = {"backends": {}}
+        for backend in usable:
+            images = {kernel: program.scratch / f"{scene}-{backend}-{kernel}.exr" for kernel in ("lean", "full")}
+            for kernel, image in images.items():
+                render(scene, backend, kernel, [image])
+            different = program.compare(images["lean"], images["full"])["differing_pixels"]
+            kept = program.interleaved({kernel: lambda kernel=kernel: render(scene, backend, kernel) for kernel in images}, runs)
+            seconds = {kernel: [r.value("seconds", "render") for r in done] for kernel, done in kept.items()}
+            memory = {kernel: Spread(r.value("memory", "host_peak_bytes") for r in done) for kernel, done in kept.items()}
+            ratio = gain(seconds["full"], seconds["lean"])
+            data["scenes"][scene]["backends"][backend] = {
+                "differing_pixels": different, "render_seconds": {k: Spread(s).json() for k, s in seconds.items()}, "full_over_lean": ratio.json(),
+                "host_peak_bytes": {k: m.json() for k, m in memory.items()},
+                "lean_kernel": kept["lean"][0].value("backend", "kernel"), "lean_features": kept["lean"][0].value("backend", "kernel_features")}
+            rows.append([scene, backend, "yes" if different == 0 else f"**no**: {different} pixels", Spread(seconds["lean"]).text(),
+                         Spread(seconds["full"]).text(), ratio.text(), *(significant(memory[k].median / 1e6) for k in ("lean", "full"))])
+            print(rows[-1], flush=True)
+    results.heading("Lean and full kernel")
+    results.paragraph(f"{size} × {size} pixels; {', '.join(f'{s} {spp[s]}' for s in scenes)} samples per pixel. Render seconds without start, median of {runs} "
+                      "interleaved runs, in brackets the least and the most; the ratio is taken run by run. Memory is the process's peak. Embree's lean kernel is the "
+                      "smallest of those it has compiled ahead that covers the scene.")
+    results.table(["scene", "backend", "same bits", "s, lean", "s, full", "full : lean", "MB, lean", "MB, full"], rows)
+
+    # Registers.
+    results.heading("CUDA kernels: registers and sizes")
+    compiler, base = variants(program, scenes)
+    if base is None:
+        results.paragraph(f"Not measured: {compiler}.")
+    else:
+        by_scene = {scene: next(v for v in base if int(v["mask"], 16) == masks[scene]) for scene in scenes}
+        full = next(v for v in base if v["name"] == "everything")
+        data["nvrtc"] = {"compiler": compiler, "full": full, "scenes": by_scene}
+        results.paragraph(f"{compiler}, `crt_render`, without AOVs.")
+        results.table(["kernel", "mask", "registers", "stack, bytes", "spilled, bytes", "CUBIN, kB", "ms to compile"],
+                      [[title, f"`{v['mask']}`", v["registers"], v["stack"], v["spill"], significant(v["cubin_kb"]), significant(v["ms"])]
+                       for title, v in [*by_scene.items(), ("everything", full)]])
+
+    # Bit by bit.
+    results.heading("Each feature alone")
+    results.paragraph("The scene's own kernel with one feature more that the scene does not use: what every feature would cost those who do not need it. OpenCL: render "
+                      f"seconds with the feature : without, median of {runs} interleaved runs, run by run, in brackets the least and the most; ms: what compiling cold "
+                      "takes longer. CUDA: registers, and kB of the CUBIN, more than without.")
+    bits = feature_bits(program.repository)
+    rows, data["features"] = [], {}
+    extra_variants = {}
+    for bit, name, what in bits:
+        entry = {"text": what, "scenes": {}}
+        environment = {"CRT_KERNEL_DIR": str(program.kernels_with(1 << bit))}
+        if base is not None:
+            extra_variants[bit] = {v["mask"]: v for v in variants(program, scenes, environment)[1]}
+        for scene in scenes:
+            found = {}
+            if masks[scene] & 1 << bit:
+                entry["scenes"][scene] = None  # The scene needs it.
+                continue
+            if "opencl" in usable:
+                kept = program.interleaved({"lean": lambda: render(scene, "opencl"), "more": lambda: render(scene, "opencl", environment=environment)}, runs)
+                ratio = gain(*([r.value("seconds", "render") for r in kept[k]] for k in ("more", "lean")))
+                cold = [compile_seconds(program, scene, e) for e in (environment, None)]
+                found = {"more_over_lean": ratio.json(), "compile_ms_more": (cold[0] - cold[1]) * 1e3}
+            if base is not None:
+                lean, more = by_scene[scene], extra_variants[bit][by_scene[scene]["mask"]]
+                found |= {"registers_more": more["registers"] - lean["registers"], "cubin_kb_more": more["cubin_kb"] - lean["cubin_kb"],
+                          "spill_more": more["spill"] - lean["spill"]}
+            entry["scenes"][scene] = found
+        data["features"][name] = entry
+        rows.append([f"`{name}`: {what}", *(feature_cell(entry["scenes"][scene]) for scene in scenes)])
+        print(rows[-1], flush=True)
+    results.table(["feature", *scenes], rows)
+    for backend, reason in absent.items():
+        results.paragraph(f"Not measured: `{backend}` ({reason}).")
+    for scene in scenes:
+        results.command(f"crt render configs/{scene}.yaml --backend BACKEND --kernel lean|full --spp {spp[scene]} " + " ".join(f"--set '{c}'" for c in settings) + " -o unseen.pfm")
+    results.data = data
+    results.write()
+
+
+def scene_mask(program, scene):
+    run = program.render(scene, "opencl", ["--spp", 1], settings=["film.resolution=[8,8]", NO_AOVS])
+    return int(run.value("features", "mask"), 16)
+
+
+def compile_seconds(program, scene, environment):
+    """Cold, least of three: a compiler never runs faster than it can."""
+    cache = program.scratch / "pocl-cold"
+    seconds = []
+    for _ in range(3):
+        shutil.rmtree(cache, ignore_errors=True)
+        run = program.render(scene, "opencl", ["--spp", 1, "--no-cache"], settings=["film.resolution=[8,8]", NO_AOVS],
+                             environment={**(environment or {}), "POCL_CACHE_DIR": str(cache)})
+        seconds.append(run.value("seconds", "kernel_compile"))
+    return min(seconds)
+
+
+def feature_cell(found):
+    if found is None:
+        return "needs it"
+    parts = []
+    if "more_over_lean" in found:
+        r = found["more_over_lean"]
+        parts.append(f"{r['median']:.3f} ({r['min']:.3f} – {r['max']:.3f}), {found['compile_ms_more']:+.0f} ms")
+    if "registers_more" in found:
+        parts.append(f"{found['registers_more']:+d} registers, {found['cubin_kb_more']:+.1f} kB")
+    return "; ".join(parts)

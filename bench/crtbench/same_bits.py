@@ -1,0 +1,195 @@
+"""Renders every scene in many ways and compares the images bit by bit, all channels. The reference is the OpenCL backend with its defaults;
+variations of Embree (threads, tiles, resumed, merged) are compared with Embree's own image.
+
+The images are half of it: the films, double sums of every pixel, are compared too. Where Embree's differ, both backends render every sample
+number alone and the samples that differ are counted. Times nothing, so it needs no quiet machine."""
+import signal
+import struct
+import subprocess
+import time
+
+from .program import Failure
+from .results import Results
+
+REFERENCE = "opencl"
+
+
+class Film:
+    """A .crtfilm: what is compared is the sums and counts, not the header."""
+
+    def __init__(self, path):
+        data = path.read_bytes()
+        header_bytes, = struct.unpack_from("<I", data, 12)
+        self.width, self.height, self.channels, _aovs = struct.unpack_from("<4I", data, 32)
+        self.body = memoryview(data)[header_bytes:]
+
+    def differing_pixels(self, other):
+        if self.body == other.body:
+            return 0
+        if len(self.body) != len(other.body):
+            raise Failure("two films of one scene have different sizes")
+        pixels, stride = self.width * self.height, self.channels * 16
+        return sum(self.body[p * stride:(p + 1) * stride] != other.body[p * stride:(p + 1) * stride] for p in range(pixels))
+
+
+class Images:
+    """The ways to render one scene, all with the same samples."""
+
+    def __init__(self, program, scene, size, spp):
+        self.program, self.scene, self.size, self.spp = program, scene, size, spp
+        self.folder = program.scratch / scene
+        self.folder.mkdir()
+
+    def arguments(self, backend, outputs, more):
+        command = ["render", self.program.scene_file(self.scene), "--backend", backend, "--quiet",
+                   "--set", f"film.resolution=[{self.size},{self.size}]", "--report", "none", *more]
+        for output in outputs:
+            command += ["-o", output]
+        return command
+
+    def render(self, name, backend, more=()):
+        self.program.start(self.arguments(backend, [self.folder / f"{name}.exr", self.folder / f"{name}.crtfilm"], ["--spp", self.spp, *more]))
+        return name
+
+    def merged(self, name, first_backend, second_backend):
+        half = self.spp // 2
+        parts = [self.folder / f"{name}-{i}.crtfilm" for i in (0, 1)]
+        for part, backend, samples in zip(parts, (first_backend, second_backend), (f"0:{half}", f"{half}:{self.spp}")):
+            self.program.start(self.arguments(backend, [part], ["--samples", samples]))
+        # Later part first: the order of merging must not show either.
+        self.program.start(["merge", "--quiet", "--scene", self.program.scene_file(self.scene), "-o", self.folder / f"{name}.exr",
+                            "-o", self.folder / f"{name}.crtfilm", *reversed(parts)] + self.merge_settings())
+        return name
+
+    def merge_settings(self):
+        return ["--set", f"film.resolution=[{self.size},{self.size}]"]
+
+    def resumed(self, name, backend):
+        """Ctrl-C in the middle, then --resume. Returns the name and how many samples there were when it stopped."""
+        stopped, resumed = self.folder / "stopped.pfm", self.folder / f"{name}.exr"  # A PFM opens no codecs, which would take most of the time.
+        checkpoint = self.folder / f"{name}.crtfilm"
+        more = ["--spp", self.spp, "--chunk", 1, "--checkpoint", checkpoint]
+        shortest, whole = (self.program.start(self.arguments(backend, [stopped], ["--spp", spp, "--chunk", 1])).seconds
+                           for spp in (1, self.spp))
+        for share in (0.5, 0.3, 0.7, 0.4, 0.6, 0.2, 0.8, 0.1) * 3:  # On a busy machine a signal may miss.
+            checkpoint.unlink(missing_ok=True)
+            process = subprocess.Popen([str(self.program.crt), *map(str, self.arguments(backend, [stopped], more))], cwd=self.program.repository,
+                                       env=self.program.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(shortest + share * (whole - shortest))
+            process.send_signal(signal.SIGINT)
+            code = process.wait()
+            if code != 130 or not checkpoint.exists():
+                continue
+            stopped_after = int(self.program.start(["info", checkpoint]).output.split("samples", 1)[1].split()[0])
+            if 0 < stopped_after < self.spp:
+                self.program.start(self.arguments(backend, [resumed], ["--spp", self.spp, f"--resume={checkpoint}"]))
+                return name, stopped_after
+        raise Failure(f"{self.scene} on {backend}: no signal met the middle of the render")
+
+    def compare(self, name, reference):
+        image = self.program.compare(self.folder / f"{name}.exr", self.folder / f"{reference}.exr")
+        film = Film(self.folder / f"{name}.crtfilm").differing_pixels(Film(self.folder / f"{reference}.crtfilm"))
+        return {"differing_pixels": image["differing_pixels"], "differing_film_pixels": film, "metrics": image["metrics"],
+                "channels": image["channels"], "pixels": self.size * self.size}
+
+    def differing_samples(self, backend, reference):
+        """Every sample number alone, counted where the sums of a pixel differ."""
+        differing = 0
+        one, two = self.folder / "one.crtfilm", self.folder / "two.crtfilm"
+        for s in range(self.spp):
+            for path, name in ((one, backend), (two, reference)):
+                self.program.start(self.arguments(name, [path], ["--samples", f"{s}:{s + 1}"]))
+            differing += Film(one).differing_pixels(Film(two))
+        return differing
+
+
+def measure(program, arguments):
+    size, spp = (64, 64) if arguments.tiny else (256, 64)
+    usable, absent = program.backends(["opencl", "embree", "cuda", "example", "cuda_on_host"])
+    if REFERENCE not in usable:
+        raise Failure(f"the reference backend '{REFERENCE}' cannot run: {absent[REFERENCE]}")
+
+    results = Results(program, arguments, "same-bits", "The same bits")
+    scenes = program.scenes(arguments.scenes)
+    table, data = {}, {}
+    failures = 0
+    for scene in scenes:
+        print(f"{scene} …", flush=True)
+        images = Images(program, scene, size, spp)
+        images.render("reference", REFERENCE)
+        column = {}
+
+        def check(label, name, reference="reference", column=column, images=images):
+            column[label] = images.compare(name, reference)
+            print(f"  {label}: {column[label]['differing_pixels']} pixels differ", flush=True)
+
+        for backend in usable:
+            if backend != REFERENCE:
+                check(f"{backend} : opencl", images.render(backend, backend))
+        for backend in [b for b in ("opencl", "embree") if b in usable]:
+            own = "reference" if backend == REFERENCE else backend
+            for threads in (1, 2, 7):
+                check(f"{backend}, {threads} thread{'s' if threads > 1 else ''}", images.render(f"{backend}-t{threads}", backend, ["--threads", threads]), own)
+            for tile in (8, 37, 128):
+                check(f"{backend}, tiles of {tile}", images.render(f"{backend}-tile{tile}", backend, ["--tile", tile]), own)
+            check(f"{backend}, 5 samples at a time", images.render(f"{backend}-chunk", backend, ["--chunk", 5]), own)
+            check(f"{backend}, full kernel", images.render(f"{backend}-full", backend, ["--kernel", "full"]), own)
+            check(f"{backend}, two halves merged", images.merged(f"{backend}-merged", backend, backend), own)
+            name, stopped_after = images.resumed(f"{backend}-resumed", backend)
+            check(f"{backend}, stopped and resumed", name, own)
+            column[f"{backend}, stopped and resumed"]["stopped_after_samples"] = stopped_after
+        if "example" in usable:
+            check("merged of opencl and example", images.merged("mixed", "opencl", "example"))
+
+        for label, result in column.items():
+            if result["differing_pixels"] == 0 and result["differing_film_pixels"] == 0:
+                result["differing_samples"] = 0
+            elif label == "embree : opencl":
+                result["differing_samples"] = images.differing_samples("embree", REFERENCE)
+                result["samples"] = size * size * spp
+        data[scene] = column
+        for label, result in column.items():
+            if label != "embree : opencl":
+                failures += result["differing_pixels"] > 0 or result["differing_film_pixels"] > 0
+            else:
+                failures += result["differing_samples"] > 1e-6 * size * size * spp
+            table.setdefault(label, {})[scene] = result
+
+    comparisons = sum(len(column) for column in data.values())
+    equal = sum(r["differing_pixels"] == 0 and r["differing_film_pixels"] == 0 for column in data.values() for r in column.values())
+    results.paragraph(
+        f"Every scene at {size} × {size} pixels and {spp} samples per pixel, rendered in every way there is here, and the images compared bit by "
+        f"bit in all their channels, AOVs included. **{equal} of {comparisons} comparisons: the same bits in every pixel.** A cell is the number "
+        f"of pixels, of {size * size}, in which any bit of any channel differs; in brackets the same for the film, the double sums that the image is "
+        "rounded from, where that number is another. `a : b` compares two backends; the other rows compare one backend with itself.")
+    rows = []
+    for label, by_scene in table.items():
+        cells = []
+        for scene in scenes:
+            result = by_scene[scene]
+            image, film = result["differing_pixels"], result["differing_film_pixels"]
+            cells.append(f"{image}" + (f" ({film})" if film != image else ""))
+        rows.append([label, *cells])
+    results.table(["", *scenes], rows)
+
+    if "embree" in usable:
+        counted = {scene: column["embree : opencl"]["differing_samples"] for scene, column in data.items()}
+        total = size * size * spp
+        results.paragraph(f"Samples in which Embree and OpenCL differ, of {total} in each scene: "
+                          + ", ".join(f"{scene} {n}" + (f" ({n / total:.1e})" if n else "") for scene, n in counted.items())
+                          + ". The bound that crt sets itself is 1e-6.")
+    stopped = "; ".join(f"{scene} " + ", ".join(f"{b} {column[f'{b}, stopped and resumed']['stopped_after_samples']}"
+                                                for b in ("opencl", "embree") if f"{b}, stopped and resumed" in column)
+                        for scene, column in data.items())
+    results.paragraph(f"Stopped by SIGINT after so many of {spp} samples per pixel, then resumed: {stopped}.")
+    results.paragraph("`example` is the kernel as portable C++, `cuda_on_host` the CUDA backend's entry points compiled for the host; both run "
+                      "on one thread.")
+    for name, reason in absent.items():
+        results.paragraph(f"Not compared: `{name}` ({reason}).")
+    results.command(f"crt render configs/SCENE.yaml --set 'film.resolution=[{size},{size}]' --spp {spp} --backend BACKEND -o a.exr -o a.crtfilm")
+    results.command("crt compare --all-channels --json a.exr b.exr")
+    results.data = {"size": size, "spp": spp, "reference": REFERENCE, "absent": absent, "scenes": data}
+    results.write()
+    if failures:
+        print(f"{failures} comparisons are beyond what is promised")
+    return 1 if failures else 0
