@@ -4,6 +4,7 @@
 #include "distributions.h"
 #include "kernel/features.h"
 #include "kernel/layout.h"
+#include "kernel/surface.h"
 #include "log.h"
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <optional>
 #include <span>
 
 #define XXH_INLINE_ALL
@@ -258,13 +260,63 @@ private:
         }
         header_.triangles = blob_.append(slots);
         header_.triangle_count = static_cast<std::uint32_t>(count);
+        std::vector<kernel::CrtFace> faces(count);
+        for (std::size_t i = 0; i < count; ++i) faces[slot_of_[i]] = faceOf(i);
+        header_.faces = blob_.append(faces);
         if (header_.accelerator == CRT_ACCELERATOR_BRUTE_FORCE) {
-            std::vector<kernel::CrtTriangle8> blocks((count + 7) / 8);
-            for (std::size_t slot = 0; slot < count; ++slot)
-                for (std::size_t k = 0; k < 9; ++k) blocks[slot / 8].p[k][slot % 8] = slots[slot].p[k];
-            header_.triangles8 = blob_.append(blocks);
+            std::vector<std::uint32_t> all(count), occluders;
+            for (std::uint32_t i = 0; i < count; ++i) {
+                all[i] = i;
+                if (canOcclude(i)) occluders.push_back(i);
+            }
+            header_.triangles8 = blob_.append(blocksOf(all));
+            header_.occluders8 = blob_.append(blocksOf(occluders));
+            occluders_ = occluders.size();
         }
         writeObjects();
+    }
+
+    std::vector<kernel::CrtTriangle8> blocksOf(const std::vector<std::uint32_t>& slots) const {
+        std::vector<kernel::CrtTriangle8> blocks((slots.size() + 7) / 8);
+        for (kernel::CrtTriangle8& block : blocks) std::fill(std::begin(block.slot), std::end(block.slot), CRT_NONE);
+        for (std::size_t i = 0; i < slots.size(); ++i) {
+            for (std::size_t k = 0; k < 9; ++k) blocks[i / 8].p[k][i % 8] = positions_[slots[i]][k];  // brute force keeps the author's order
+            blocks[i / 8].slot[i % 8] = slots[i];
+        }
+        return blocks;
+    }
+
+    Vec3d vertexOf(std::size_t i, std::size_t v) const { return {positions_[i][v], positions_[i][3 + v], positions_[i][6 + v]}; }
+
+    /// Whether triangle i can come between two points of the scene: not if the whole scene lies on one side of its plane, as it does for the walls of
+    /// a convex room.
+    bool canOcclude(std::size_t i) const {
+        const Vec3d o = vertexOf(i, 0);
+        const Vec3d n = cross(vertexOf(i, 1) - o, vertexOf(i, 2) - o);
+        bool above = false, below = false;
+        for (std::size_t j = 0; j < positions_.size() && !(above && below); ++j)
+            for (std::size_t v = 0; v < 3; ++v) {
+                const double d = dot(n, vertexOf(j, v) - o);
+                above = above || d > 0;
+                below = below || d < 0;
+            }
+        return above && below;
+    }
+
+    kernel::CrtFace faceOf(std::size_t i) const {
+        kernel::CrtFace face{};
+        const Vec3d o = vertexOf(i, 0), a = vertexOf(i, 1) - o, b = vertexOf(i, 2) - o;
+        const Vec3d n = cross(a, b);
+        const double twice_area = std::sqrt(dot(n, n));
+        double coordinate = 0, size = 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            coordinate = std::max({coordinate, std::abs(o[k]), std::abs(o[k] + a[k]), std::abs(o[k] + b[k])});
+            size = std::max(size, std::abs(a[k]) + std::abs(b[k]));
+            face.normal[k] = twice_area > 0 ? static_cast<float>(n[k] / twice_area) : 0.0f;
+        }
+        face.clearance = kernel::crt_clearance(static_cast<float>(coordinate), static_cast<float>(size));
+        face.margin = kernel::crt_edge_margin(static_cast<float>(coordinate), static_cast<float>(size), static_cast<float>(twice_area));
+        return face;
     }
 
     /// Boxes of the objects, for the paper's culling and for the bounding-box view; triangles of an object are adjacent unless a BVH moved them.
@@ -301,6 +353,24 @@ private:
         return 0.5 * std::sqrt(dot(n, n));
     }
 
+    /// If triangles i and i + 1 emit alike and make a parallelogram, as the halves of a quad do: the corner of triangle i across from their common edge.
+    std::optional<std::uint32_t> parallelogramCorner(std::size_t i) const {
+        if (i + 1 >= triangles_.size() || triangles_[i + 1].object != triangles_[i].object || triangles_[i + 1].emission != triangles_[i].emission)
+            return std::nullopt;
+        for (std::size_t corner = 0; corner < 3; ++corner) {
+            const Vec3d o = vertexOf(i, corner), a = vertexOf(i, (corner + 1) % 3), b = vertexOf(i, (corner + 2) % 3);
+            const Vec3d across{a[0] + b[0] - o[0], a[1] + b[1] - o[1], a[2] + b[2] - o[2]};
+            for (std::size_t v = 0; v < 3; ++v) {
+                // Turned the same way round: across, b, a.
+                const Vec3d gap = vertexOf(i + 1, v) - across;
+                const Vec3d edge = a - o;
+                if (vertexOf(i + 1, (v + 1) % 3) == b && vertexOf(i + 1, (v + 2) % 3) == a && dot(gap, gap) <= 1e-12 * dot(edge, edge))
+                    return static_cast<std::uint32_t>(corner);
+            }
+        }
+        return std::nullopt;
+    }
+
     void writeEmitters() {
         emitter_of_.assign(triangles_.size(), CRT_NONE);
         if (!isPath()) return;
@@ -311,7 +381,7 @@ private:
             if (triangles_[i].emission < 0) continue;
             const Emission& emission = scene_.emissions[static_cast<std::size_t>(triangles_[i].emission)];
             if (!(emission.radiance.max() > 0)) continue;
-            const double area = areaOf(i);
+            double area = areaOf(i);
             if (!(area > 0)) {
                 ++degenerate;
                 continue;
@@ -320,8 +390,15 @@ private:
             emitter.slot = slot_of_[i];
             emitter.spectrum = spectra_.add(emission.radiance);
             emitter.flags = emission.two_sided ? CRT_EMITTER_TWO_SIDED : 0;
-            emitter.area = static_cast<float>(area);
             emitter_of_[i] = static_cast<std::uint32_t>(emitters.size());
+            if (const auto corner = parallelogramCorner(i)) {
+                emitter.flags |= CRT_EMITTER_PARALLELOGRAM;
+                emitter.corner = *corner;
+                emitter_of_[i + 1] = emitter_of_[i];
+                area += areaOf(i + 1);
+                ++i;
+            }
+            emitter.area = static_cast<float>(area);
             emitters.push_back(emitter);
             // By luminance, but never zero for a lamp that the eye hardly sees: the film keeps all of XYZ.
             const Vec3d xyz = spectrumToXyz(emission.radiance);
@@ -524,6 +601,9 @@ private:
             left_out("BVH", scene_.integrator.accelerator == Accelerator::Auto
                                 ? fmt::format("{} triangles: testing all of them is faster (up to {})", triangles_.size(), kBruteForceTriangles)
                                 : std::string("integrator.accelerator asks for another"));
+        if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders_ < triangles_.size())
+            left_out("shadow tests", fmt::format("{} of {} triangles have the whole scene on one side and cannot come between", triangles_.size() - occluders_,
+                                                 triangles_.size()));
         if (!has(CRT_FEATURE_CONDUCTOR)) left_out("mirror and conductor", "no surface uses them");
         if (!has(CRT_FEATURE_DIELECTRIC)) left_out("dielectric", "no surface uses it");
         if (!has(CRT_FEATURE_DISPERSION)) left_out("hero wavelength selection", "no index of refraction depends on wavelength");
@@ -560,6 +640,7 @@ private:
     std::vector<std::array<float, 9>> positions_;  ///< x of three vertices, y, z; normalised.
     std::vector<std::uint32_t> slot_of_;           ///< By primitive id.
     std::vector<std::uint32_t> emitter_of_;
+    std::size_t occluders_ = 0;
     std::uint32_t placements_ = 0;
     double scale_ = 1;
     bool has_diffuse_ = false, has_conductor_ = false, has_dielectric_ = false, has_dispersion_ = false;

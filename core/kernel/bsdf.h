@@ -57,7 +57,7 @@ CRT_FN CrtScatter crt_sample_diffuse(vec4 reflectance, vec3 ns, vec3 ng, CrtRand
     CrtScatter s;
     const CrtRandom2 disk = crt_concentric_disk(u);
     const f32 z = crt_sqrt(crt_max(0.0f, 1.0f - disk.x * disk.x - disk.y * disk.y));
-    s.wi = normalize3(crt_to_world(crt_frame(ns), make_vec3(disk.x, disk.y, z)));
+    s.wi = crt_to_world(crt_frame(ns), make_vec3(disk.x, disk.y, z)); /* unit to 4 ulp */
     s.weight = reflectance;
     s.pdf = crt_lambert(crt_max(dot3(s.wi, ns), 0.0f));
     s.eta_square = 1.0f;

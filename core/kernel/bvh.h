@@ -57,7 +57,7 @@ CRT_FN CrtHit crt_brute_force_closest(const CrtContext *ctx, CrtRay ray) {
     for (u32 b = 0u; b < count; ++b) {
         u32 lanes = crt_candidates8(blocks + b, shear, crt_tie_limit(best.t));
         for (u32 lane = 0u; lanes != 0u; ++lane, lanes >>= 1)
-            if (lanes & 1u) crt_test_closest(triangles, 8u * b + lane, shear, &best);
+            if (lanes & 1u) crt_test_closest(triangles, blocks[b].slot[lane], shear, &best);
     }
 #else
     const u32 count = ctx->scene->triangle_count;
@@ -66,23 +66,23 @@ CRT_FN CrtHit crt_brute_force_closest(const CrtContext *ctx, CrtRay ray) {
     return best;
 }
 
+/* For a segment between two points of the scene: triangles that have the whole scene on one side cannot come between, and are not asked. */
 CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
+    CRT_GLOBAL const CrtTriangle8 *blocks = CRT_ARRAY(CrtTriangle8, ctx->blob, ctx->scene->occluders8);
+    const u32 count = ctx->scene->occluders8.count;
     const CrtShear shear = crt_shear(ray);
     CrtHit hit;
-#if CRT_SIMD8
-    CRT_GLOBAL const CrtTriangle8 *blocks = CRT_ARRAY(CrtTriangle8, ctx->blob, ctx->scene->triangles8);
-    const u32 count = ctx->scene->triangles8.count;
     for (u32 b = 0u; b < count; ++b) {
+#if CRT_SIMD8
         u32 lanes = crt_candidates8(blocks + b, shear, ray.reach);
         for (u32 lane = 0u; lanes != 0u; ++lane, lanes >>= 1)
-            if ((lanes & 1u) && crt_intersect_triangle(triangles + 8u * b + lane, shear, ray.reach, &hit)) return 1;
-    }
+            if ((lanes & 1u) && crt_intersect_triangle(triangles + blocks[b].slot[lane], shear, ray.reach, &hit)) return 1;
 #else
-    const u32 count = ctx->scene->triangle_count;
-    for (u32 slot = 0u; slot < count; ++slot)
-        if (crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit)) return 1;
+        for (u32 lane = 0u; lane < 8u && blocks[b].slot[lane] != CRT_NONE; ++lane)
+            if (crt_intersect_triangle(triangles + blocks[b].slot[lane], shear, ray.reach, &hit)) return 1;
 #endif
+    }
     return 0;
 }
 

@@ -37,12 +37,22 @@ typedef struct CrtTriangle {
 } CrtTriangle;
 CRT_ASSERT_SIZE(CrtTriangle, 48);
 
-/* Eight triangles side by side, for the brute-force loop: slots 8b … 8b+7 of the triangle array. Unused lanes are all zero. */
+/* Eight triangles side by side, for the brute-force loops. Unused lanes have slot CRT_NONE and are all zero. */
 typedef struct CrtTriangle8 {
     f32 p[9][8];
-    f32 reserved[8];
+    u32 slot[8]; /* in the triangle array */
 } CrtTriangle8;
 CRT_ASSERT_SIZE(CrtTriangle8, 320);
+
+/* The plane of a triangle, by slot; how far off it a ray must start to be sure of its side, and how far from its edges, in barycentrics, to be
+   sure of its neighbours' (surface.h). */
+typedef struct CrtFace {
+    f32 normal[3]; /* unit, by the order of the vertices */
+    f32 clearance;
+    f32 margin;
+    f32 reserved0, reserved1, reserved2;
+} CrtFace;
+CRT_ASSERT_SIZE(CrtFace, 32);
 
 /* What a triangle is made of, by primitive id. */
 typedef struct CrtPrimitive {
@@ -94,8 +104,9 @@ typedef struct CrtMaterial {
 CRT_ASSERT_SIZE(CrtMaterial, 16);
 
 #define CRT_EMITTER_TWO_SIDED 1u
+#define CRT_EMITTER_PARALLELOGRAM 2u
 
-/* One emissive triangle. */
+/* One emissive triangle, or two that make a parallelogram. */
 typedef struct CrtEmitter {
     u32 slot;        /* in the triangle array */
     u32 spectrum;    /* radiance */
@@ -103,7 +114,8 @@ typedef struct CrtEmitter {
     u32 choice;      /* a 32-bit number u chooses the last emitter with choice ≤ u */
     f32 choice_probability; /* exactly the share of 2³² that chooses it */
     f32 area;
-    f32 reserved0, reserved1;
+    u32 corner;      /* which vertex of the triangle the parallelogram's two edges leave from */
+    u32 reserved0;
 } CrtEmitter;
 CRT_ASSERT_SIZE(CrtEmitter, 32);
 
@@ -171,7 +183,9 @@ typedef struct CrtScene {
     u32 triangle_count;
 
     CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
+    CrtSpan faces;               /* CrtFace, by slot */
     CrtSpan triangles8;          /* CrtTriangle8, only for brute force */
+    CrtSpan occluders8;          /* CrtTriangle8: those of them that can come between two points of the scene */
     CrtSpan primitives;          /* CrtPrimitive, by id */
     CrtSpan normals;             /* CrtNormals */
     CrtSpan nodes;               /* CrtNode4, root first; only for BVH */
@@ -185,7 +199,7 @@ typedef struct CrtScene {
 
     CrtCamera camera;
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 288);
+CRT_ASSERT_SIZE(CrtScene, 304);
 
 CRT_KERNEL_END
 

@@ -1,6 +1,6 @@
 /*
- * light.h: sampling the emitters. One emissive triangle is one light, chosen by power; a point on it is chosen by solid angle where the triangle
- * is seen large, else by area.
+ * light.h: sampling the emitters. One emissive triangle, or two that make a parallelogram, is one light, chosen by power; a point on it is chosen
+ * by solid angle where it is seen large, else by area.
  */
 #ifndef CRT_LIGHT_H
 #define CRT_LIGHT_H
@@ -14,8 +14,9 @@ CRT_KERNEL_BEGIN
 #define CRT_SOLID_ANGLE_THRESHOLD 0.3f
 
 typedef struct CrtLightSample {
-    vec3 point;   /* on the emitter, moved off it towards the shaded point */
+    vec3 point;   /* on the emitter */
     vec3 wi;      /* unit, from the shaded point */
+    f32 reach;    /* share of the way to `point` that is sure to end before the emitter */
     f32 pdf;      /* per steradian, with the probability of choosing this emitter; 0: no light from here */
     u32 spectrum;
 } CrtLightSample;
@@ -26,9 +27,43 @@ CRT_FN f32 crt_solid_angle(vec3 a, vec3 b, vec3 c) {
     return 2.0f * crt_atan2(triple, 1.0f + dot3(a, b) + dot3(b, c) + dot3(c, a));
 }
 
-CRT_FN int crt_seen_large(vec3 p0, vec3 p1, vec3 p2, f32 area, vec3 p) {
-    const vec3 d = (p0 + p1 + p2) * (1.0f / 3.0f) - p;
+/* An emitter's shape: the triangle o, o + a, o + b, or the parallelogram of the edges a and b at o. */
+typedef struct CrtLightShape {
+    vec3 o, a, b;
+    int parallelogram;
+} CrtLightShape;
+
+CRT_FN CrtLightShape crt_light_shape(const CrtContext *ctx, CRT_GLOBAL const CrtEmitter *emitter) {
+    CRT_GLOBAL const CrtTriangle *triangle = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + emitter->slot;
+    const u32 corner = emitter->corner;
+    CrtLightShape s;
+    s.o = crt_triangle_vertex(triangle, corner);
+    s.a = crt_triangle_vertex(triangle, corner == 2u ? 0u : corner + 1u) - s.o;
+    s.b = crt_triangle_vertex(triangle, corner == 0u ? 2u : corner - 1u) - s.o;
+    s.parallelogram = (emitter->flags & CRT_EMITTER_PARALLELOGRAM) != 0u;
+    return s;
+}
+
+CRT_FN int crt_seen_large(CrtLightShape shape, f32 area, vec3 p) {
+    const vec3 d = shape.o + (shape.a + shape.b) * (shape.parallelogram ? 0.5f : 1.0f / 3.0f) - p;
     return area > CRT_SOLID_ANGLE_THRESHOLD * dot3(d, d);
+}
+
+/* Solid angles of the triangle at o and, for a parallelogram, of the one across the diagonal. */
+typedef struct CrtLightView {
+    vec3 o, a, b, far; /* unit directions to the corners */
+    f32 omega, omega_far;
+} CrtLightView;
+
+CRT_FN CrtLightView crt_light_view(CrtLightShape shape, vec3 p) {
+    CrtLightView v;
+    v.o = normalize3(shape.o - p);
+    v.a = normalize3(shape.o + shape.a - p);
+    v.b = normalize3(shape.o + shape.b - p);
+    v.far = normalize3(shape.o + shape.a + shape.b - p);
+    v.omega = crt_solid_angle(v.o, v.a, v.b);
+    v.omega_far = shape.parallelogram ? crt_solid_angle(v.far, v.b, v.a) : 0.0f;
+    return v;
 }
 
 /* The part of v perpendicular to unit n, normalised. */
@@ -72,62 +107,62 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
         }
     }
     CRT_GLOBAL const CrtEmitter *emitter = emitters + index;
-    CRT_GLOBAL const CrtTriangle *triangle = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + emitter->slot;
-    const vec3 p0 = crt_triangle_vertex(triangle, 0u);
-    const vec3 p1 = crt_triangle_vertex(triangle, 1u);
-    const vec3 p2 = crt_triangle_vertex(triangle, 2u);
-    const vec3 normal = normalize3(cross3(p1 - p0, p2 - p0));
-    const CrtRandom2 u = crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT);
-    const vec3 test_error = crt_splat3(crt_largest3(abs3(p1 - p0) + abs3(p2 - p0)) * CRT_TEST_ERROR); /* the shadow ray must end before the emitter */
+    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
+    const CrtLightShape shape = crt_light_shape(ctx, emitter);
+    const vec3 normal = crt_load3(face->normal);
+    CrtRandom2 u = crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT);
     CrtLightSample s;
     s.spectrum = emitter->spectrum;
     s.pdf = 0.0f;
-    vec3 point, error;
-    if (crt_seen_large(p0, p1, p2, emitter->area, p)) {
-        const vec3 a = normalize3(p0 - p);
-        const vec3 b = normalize3(p1 - p);
-        const vec3 c = normalize3(p2 - p);
-        const f32 omega = crt_solid_angle(a, b, c);
-        s.wi = crt_sample_spherical_triangle(a, b, c, omega, u);
-        const f32 cosine = dot3(normal, s.wi);
-        const f32 t = dot3(normal, p0 - p) / cosine;
-        point = p + s.wi * t;
-        error = (abs3(p) + abs3(point)) * CRT_GAMMA(9.0f) + test_error;
-        const int lit = cosine < 0.0f || (emitter->flags & CRT_EMITTER_TWO_SIDED) != 0u;
-        if (lit && t > 0.0f && omega > 0.0f) s.pdf = emitter->choice_probability / omega;
+    s.reach = 0.0f;
+    f32 cosine, distance;
+    if (crt_seen_large(shape, emitter->area, p)) {
+        const CrtLightView view = crt_light_view(shape, p);
+        const f32 omega = view.omega + view.omega_far;
+        const f32 split = view.omega / omega;
+        if (u.x < split || view.omega_far == 0.0f) {
+            u.x = view.omega_far == 0.0f ? u.x : u.x / split;
+            s.wi = crt_sample_spherical_triangle(view.o, view.a, view.b, view.omega, u);
+        } else {
+            u.x = (u.x - split) / (1.0f - split);
+            s.wi = crt_sample_spherical_triangle(view.far, view.b, view.a, view.omega_far, u);
+        }
+        cosine = -dot3(normal, s.wi);
+        distance = -dot3(normal, shape.o - p) / cosine;
+        s.point = p + s.wi * distance;
+        if (distance > 0.0f && omega > 0.0f) s.pdf = emitter->choice_probability / omega;
     } else {
-        const f32 root = crt_sqrt(u.x);
-        const f32 b0 = 1.0f - root;
-        const f32 b1 = root * (1.0f - u.y);
-        const f32 b2 = root * u.y;
-        const vec3 q0 = p0 * b0;
-        const vec3 q1 = p1 * b1;
-        const vec3 q2 = p2 * b2;
-        point = q0 + q1 + q2;
-        error = (abs3(q0) + abs3(q1) + abs3(q2)) * CRT_GAMMA(9.0f) + test_error;
-        const vec3 d = point - p;
+        if (!shape.parallelogram) { /* uniform in the triangle */
+            const f32 root = crt_sqrt(u.x);
+            u.x = root * (1.0f - u.y);
+            u.y = root * u.y;
+        }
+        s.point = shape.o + shape.a * u.x + shape.b * u.y;
+        const vec3 d = s.point - p;
         const f32 distance2 = dot3(d, d);
-        s.wi = d / crt_sqrt(distance2);
-        f32 cosine = -dot3(normal, s.wi);
-        if ((emitter->flags & CRT_EMITTER_TWO_SIDED) != 0u) cosine = crt_abs(cosine);
-        if (cosine > 0.0f) s.pdf = emitter->choice_probability * distance2 / (cosine * emitter->area);
+        distance = crt_sqrt(distance2);
+        s.wi = d * (1.0f / distance);
+        cosine = -dot3(normal, s.wi);
+        if (cosine != 0.0f) s.pdf = emitter->choice_probability * distance2 / (crt_abs(cosine) * emitter->area);
     }
-    s.point = crt_offset_origin(point, error, normal, -s.wi);
+    const int two_sided = (emitter->flags & CRT_EMITTER_TWO_SIDED) != 0u;
+    if (!(cosine > 0.0f) && !(two_sided && cosine < 0.0f)) s.pdf = 0.0f;
+    /* The shadow ray stops short of the emitter by its clearance, measured along the ray. */
+    if (s.pdf > 0.0f) s.reach = 1.0f - face->clearance / (crt_abs(cosine) * distance);
     return s;
 }
 
 /* pdf per steradian with which crt_sample_light at p would have found the point at distance t along w_i on an emitter. */
 CRT_FN f32 crt_light_pdf(const CrtContext *ctx, u32 emitter_index, vec3 p, vec3 wi, f32 t) {
     CRT_GLOBAL const CrtEmitter *emitter = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + emitter_index;
-    CRT_GLOBAL const CrtTriangle *triangle = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + emitter->slot;
-    const vec3 p0 = crt_triangle_vertex(triangle, 0u);
-    const vec3 p1 = crt_triangle_vertex(triangle, 1u);
-    const vec3 p2 = crt_triangle_vertex(triangle, 2u);
-    if (crt_seen_large(p0, p1, p2, emitter->area, p)) {
-        const f32 omega = crt_solid_angle(normalize3(p0 - p), normalize3(p1 - p), normalize3(p2 - p));
+    const CrtLightShape shape = crt_light_shape(ctx, emitter);
+    if (crt_seen_large(shape, emitter->area, p)) {
+        const CrtLightView view = crt_light_view(shape, p);
+        const f32 omega = view.omega + view.omega_far;
         return omega > 0.0f ? emitter->choice_probability / omega : 0.0f;
     }
-    const f32 cosine = crt_abs(dot3(normalize3(cross3(p1 - p0, p2 - p0)), wi));
+    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
+    const f32 cosine = crt_abs(dot3(crt_load3(face->normal), wi));
     return cosine > 0.0f ? emitter->choice_probability * t * t / (cosine * emitter->area) : 0.0f;
 }
 

@@ -81,9 +81,9 @@ CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurfac
     const f32 cosine = dot3(light.wi, ns);
     if (!(light.pdf > 0.0f) || !(cosine > 0.0f) || !(dot3(light.wi, ng) > 0.0f)) return;
     CrtRay shadow;
-    shadow.o = crt_offset_origin(surface.p, surface.error, ng, light.wi);
+    shadow.o = crt_offset_origin(surface.p, surface.clearance, ng, light.wi);
     shadow.d = light.point - shadow.o;
-    shadow.reach = 1.0f;
+    shadow.reach = light.reach;
     rays->shadow += 1u;
     if (crt_trace_any(ctx, shadow)) return;
     const f32 scatter = crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction */
@@ -162,7 +162,7 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
     }
     path->eta_square = path->eta_square * scatter.eta_square;
     path->scatter_pdf = scatter.pdf;
-    path->ray.o = crt_offset_origin(surface.p, surface.error, surface.ng, scatter.wi);
+    path->ray.o = crt_offset_origin(surface.p, surface.clearance, surface.ng, scatter.wi);
     path->ray.d = scatter.wi;
     path->ray.reach = CRT_INFINITY;
     path->depth += 1u;

@@ -1,5 +1,5 @@
 /*
- * surface.h: hit → position with its error bound, normals, material; and where a new ray may start without meeting the surface that it leaves.
+ * surface.h: hit → position, normals, material; and where a new ray may start without meeting the surface that it leaves.
  */
 #ifndef CRT_SURFACE_H
 #define CRT_SURFACE_H
@@ -10,9 +10,9 @@ CRT_KERNEL_BEGIN
 
 typedef struct CrtSurface {
     vec3 p;
-    vec3 error;    /* how far, per axis, a ray must start from p to be sure of its side */
     vec3 ng;       /* unit geometric normal, by the order of the vertices */
     vec3 ns;       /* unit shading normal, on the side of ng */
+    f32 clearance; /* how far along ng a ray must start from p to be sure of its side */
     u32 material;
     u32 emitter;   /* CRT_NONE: none */
 } CrtSurface;
@@ -21,47 +21,40 @@ CRT_FN vec3 crt_triangle_vertex(CRT_GLOBAL const CrtTriangle *triangle, u32 i) {
     return make_vec3(triangle->p[i], triangle->p[3u + i], triangle->p[6u + i]);
 }
 
-/* Rounding of the triangle test, relative to the triangle's edges, that an origin must be clear of: measured, with a margin of four
+/* Rounding of the triangle test, relative to the triangle's size, that an origin must be clear of: measured, with a margin of four
    (tests/unit_kernel_rays.cpp). */
 #define CRT_TEST_ERROR CRT_GAMMA(16.0f)
-/* A position this near to an edge, in barycentrics, could by rounding lie beyond the neighbour across the edge. */
+/* A position nearer to an edge than this, in barycentrics, could by rounding lie beyond the neighbour across the edge. */
 #define CRT_EDGE_MARGIN 4e-6f
 #define CRT_EDGE_MARGIN_MAX 0.125f
 
-CRT_FN vec3 crt_splat3(f32 s) { return make_vec3(s, s, s); }
-CRT_FN f32 crt_largest3(vec3 v) { return crt_max(V3X(v), crt_max(V3Y(v), V3Z(v))); }
+/* How far off its plane a ray must start that leaves a triangle with coordinates up to `coordinate` and edges up to `size`. A position is the sum of
+   nine rounded operations a term (PBRT 4e, 6.8.5, and two for b0); the test that the new ray meets shears the triangle along the ray, so that its
+   size in every axis counts. √3: both are per axis. */
+CRT_FN f32 crt_clearance(f32 coordinate, f32 size) { return 1.7320509f * (coordinate * CRT_GAMMA(9.0f) + size * CRT_TEST_ERROR); }
+
+/* How far from its edges, in barycentrics, a path may start: a few ulp of the position against the triangle's height. A start in a corner within
+   rounding of the other wall might lie behind that wall, and leave a closed room. */
+CRT_FN f32 crt_edge_margin(f32 coordinate, f32 size, f32 twice_area) {
+    const f32 rounding = 16.0f * CRT_EPSILON * (coordinate + size) * size;
+    return rounding < CRT_EDGE_MARGIN_MAX * twice_area ? crt_min(CRT_EDGE_MARGIN + rounding / twice_area, CRT_EDGE_MARGIN_MAX) : CRT_EDGE_MARGIN_MAX;
+}
 
 CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     CRT_GLOBAL const CrtTriangle *triangle = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + hit.slot;
+    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + hit.slot;
     CRT_GLOBAL const CrtPrimitive *primitive = CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + hit.id;
-    const vec3 p0 = crt_triangle_vertex(triangle, 0u);
-    const vec3 p1 = crt_triangle_vertex(triangle, 1u);
-    const vec3 p2 = crt_triangle_vertex(triangle, 2u);
-    const vec3 extent = abs3(p1 - p0) + abs3(p2 - p0);
-    const vec3 normal = cross3(p1 - p0, p2 - p0);
-    const f32 twice_area = length3(normal);
-
-    /* A path that starts in a corner within rounding of the other wall might start behind it, and leave a closed room. Such a start is drawn in
-       from the edge: by a few ulp of the position against the triangle's height, at least a few ulp of its size. */
-    const f32 size = crt_largest3(extent);
-    const f32 rounding = 16.0f * CRT_EPSILON * crt_largest3(abs3(p0) + extent) * size / twice_area;
-    const f32 margin = crt_min(CRT_EDGE_MARGIN + rounding, CRT_EDGE_MARGIN_MAX);
-    const f32 c0 = crt_max(1.0f - hit.b1 - hit.b2, margin);
-    const f32 c1 = crt_max(hit.b1, margin);
-    const f32 c2 = crt_max(hit.b2, margin);
+    const f32 c0 = crt_max(1.0f - hit.b1 - hit.b2, face->margin);
+    const f32 c1 = crt_max(hit.b1, face->margin);
+    const f32 c2 = crt_max(hit.b2, face->margin);
     const f32 scale = 1.0f / (c0 + c1 + c2);
     const f32 b0 = c0 * scale;
     const f32 b1 = c1 * scale;
     const f32 b2 = c2 * scale;
-    const vec3 q0 = p0 * b0;
-    const vec3 q1 = p1 * b1;
-    const vec3 q2 = p2 * b2;
     CrtSurface s;
-    s.p = q0 + q1 + q2;
-    /* Of the position: seven rounded operations a term (PBRT 4e, 6.8.5) and two for b0. Of the test that a new ray meets: it shears the triangle along the
-       ray, so that its size in every axis counts in every axis. */
-    s.error = (abs3(q0) + abs3(q1) + abs3(q2)) * CRT_GAMMA(9.0f) + crt_splat3(size * CRT_TEST_ERROR);
-    s.ng = normal / twice_area;
+    s.p = crt_triangle_vertex(triangle, 0u) * b0 + crt_triangle_vertex(triangle, 1u) * b1 + crt_triangle_vertex(triangle, 2u) * b2;
+    s.ng = crt_load3(face->normal);
+    s.clearance = face->clearance;
     s.ns = s.ng;
     s.material = primitive->material;
     s.emitter = primitive->emitter;
@@ -80,19 +73,9 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     return s;
 }
 
-CRT_FN f32 crt_step_out(f32 x, f32 offset) {
-    const f32 moved = x + offset;
-    if (offset > 0.0f) return crt_next_up(moved);
-    if (offset < 0.0f) return crt_next_down(moved);
-    return moved;
-}
-
-/* Origin of a ray leaving p on the side of direction w: moved along the normal out of the box of the error (PBRT 4e, 6.8.6). No absolute epsilon. */
-CRT_FN vec3 crt_offset_origin(vec3 p, vec3 error, vec3 normal, vec3 w) {
-    const f32 d = dot3(abs3(normal), error);
-    vec3 offset = normal * d;
-    if (dot3(w, normal) < 0.0f) offset = -offset;
-    return make_vec3(crt_step_out(V3X(p), V3X(offset)), crt_step_out(V3Y(p), V3Y(offset)), crt_step_out(V3Z(p), V3Z(offset)));
+/* Origin of a ray leaving p on the side of direction w. No absolute epsilon: the clearance is the triangle's. */
+CRT_FN vec3 crt_offset_origin(vec3 p, f32 clearance, vec3 normal, vec3 w) {
+    return p + normal * (dot3(w, normal) < 0.0f ? -clearance : clearance);
 }
 
 CRT_KERNEL_END
