@@ -22,7 +22,7 @@ public:
     ExampleIntegrator(const Host& host, const CrtCreateInfo& info)
         : host_(host), device_(crt::plugin::chooseDevice(listDevices(host), info.device)) {}
 
-    // The scene is one block of bytes without pointers: copied as it is, or uploaded to a device in one go.
+    // The scene is one block of bytes without pointers: copied as it is, or uploaded to a device in one go. Film and report begin anew.
     void setScene(const CrtSceneBlob& scene) {
         scene_.resize((scene.size_bytes + sizeof(Block) - 1) / sizeof(Block));
         std::memcpy(scene_.data(), scene.data, scene.size_bytes);
@@ -30,13 +30,16 @@ public:
         sums_.assign(pixels * header().channels * 2, 0.0);
         counts_.assign(pixels, 0);
         primitives_.assign((header().aovs & CRT_AOV_PRIMITIVE) != 0 ? pixels : 0, CRT_NONE);
+        paths_ = closest_rays_ = shadow_rays_ = 0;
+        seconds_ = 0;
     }
 
     // Adds samples to the film. In which order, on how many threads, in what pieces: that is the backend's own affair, because the value
     // of a sample depends on the scene, the pixel and its number alone.
     bool render(const CrtRenderRange& range) {
-        if (scene_.empty() || range.x1 > header().width || range.y1 > header().height) {
-            throw PluginError(CRT_INVALID_ARGUMENT, "the rectangle leaves the film");
+        if (scene_.empty()) throw PluginError(CRT_INVALID_ARGUMENT, "there is no scene to render");
+        if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 > header().width || range.y1 > header().height) {
+            throw PluginError(CRT_INVALID_ARGUMENT, "the rectangle is none, or leaves the film");
         }
         const auto start = std::chrono::steady_clock::now();
         const crt::kernel::CrtContext context{blob(), &header()};
