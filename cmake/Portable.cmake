@@ -1,0 +1,81 @@
+# The target `portable`: crt in two archives for machines on which nothing can be installed, a cluster's nodes say.
+#
+#   crt-portable.tar.gz        the program, its backends, scenes, meshes, and the libraries they need but glibc's and the compiler's
+#   crt-portable-tests.tar.gz  the conformance suite and its reference backend, to be unpacked over the first
+#
+# Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's. Two things stay behind, because they
+# alone are larger than all the rest: OpenImageIO and the 250 libraries it brings, so images are written as .pfm and .ppm, not .exr and .png; and the
+# dragon's mesh, which `bin/crt-meshgen share/crt/meshes` makes in some seconds. The GPU's driver and NVRTC are the machine's own.
+#
+# Run as a script (cmake -P) it makes the archives from a build tree; the target does so with everything built.
+
+if(CMAKE_SCRIPT_MODE_FILE)
+  set(staging ${BUILD_DIR}/portable)
+  file(REMOVE_RECURSE ${staging})
+
+  function(run)
+    execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+    if(NOT result EQUAL 0)
+      string(JOIN " " command ${ARGV})
+      message(FATAL_ERROR "${command}\nended with ${result}:\n${output}")
+    endif()
+  endfunction()
+
+  # Packs ${staging}/${name}/crt into ${name}.tar.gz.
+  function(pack name)
+    set(tree ${staging}/${name}/crt)
+    file(GLOB_RECURSE binaries ${tree}/bin/* ${tree}/lib/*.so ${tree}/lib/*.so.*)
+    run(${STRIP} --strip-unneeded ${binaries})
+    run(${CMAKE_COMMAND} -E chdir ${staging}/${name} ${CMAKE_COMMAND} -E tar czf ${BUILD_DIR}/${name}.tar.gz crt)
+    file(GLOB_RECURSE files ${tree}/*)
+    set(bytes 0)
+    foreach(file IN LISTS files)
+      file(SIZE ${file} size)
+      math(EXPR bytes "${bytes} + ${size}")
+    endforeach()
+    file(SIZE ${BUILD_DIR}/${name}.tar.gz packed)
+    math(EXPR kib "(${bytes} + 1023) / 1024")
+    math(EXPR packed_kib "(${packed} + 1023) / 1024")
+    message(STATUS "${BUILD_DIR}/${name}.tar.gz: ${packed_kib} KiB, unpacked ${kib} KiB")
+  endfunction()
+
+  set(tree ${staging}/crt-portable/crt)
+  run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${tree})
+  file(REMOVE_RECURSE ${tree}/include ${tree}/lib/cmake)
+  file(GLOB archives ${tree}/lib/*.a)
+  file(REMOVE ${archives} ${tree}/lib/crt/crt_image_oiio.so ${tree}/share/crt/meshes/dragon.obj)
+  file(COPY ${BUILD_DIR}/bin/crt-meshgen DESTINATION ${tree}/bin)
+
+  # glibc must fit the kernel and the dynamic loader of the machine, and its drivers may need a newer libstdc++ than ours: those are its own.
+  file(GLOB backends ${tree}/lib/crt/*.so)
+  file(GET_RUNTIME_DEPENDENCIES
+    EXECUTABLES ${tree}/bin/crt MODULES ${backends}
+    RESOLVED_DEPENDENCIES_VAR libraries
+    POST_EXCLUDE_REGEXES "/ld-linux[^/]*$" "/lib(c|m|dl|rt|pthread|gcc_s|stdc\\+\\+)\\.so[^/]*$")
+  foreach(library IN LISTS libraries)
+    file(COPY ${library} DESTINATION ${tree}/lib FOLLOW_SYMLINK_CHAIN)
+  endforeach()
+
+  # The suite goes into a tree of its own and out of the program's, where `cmake --install` puts it.
+  set(tests ${staging}/crt-portable-tests/crt)
+  file(COPY ${REFERENCE_BACKEND} DESTINATION ${tests}/lib/crt)
+  file(MAKE_DIRECTORY ${tests}/bin)
+  file(RENAME ${tree}/bin/crt_conformance ${tests}/bin/crt_conformance)
+  pack(crt-portable)
+  pack(crt-portable-tests)
+  file(REMOVE_RECURSE ${staging})
+  return()
+endif()
+
+add_custom_target(portable
+  COMMAND ${CMAKE_COMMAND} -DBUILD_DIR=${PROJECT_BINARY_DIR} -DSTRIP=${CMAKE_STRIP} -DREFERENCE_BACKEND=$<TARGET_FILE:crt_backend_example>
+          -P ${CMAKE_CURRENT_LIST_FILE}
+  COMMENT "Packing crt-portable.tar.gz"
+  VERBATIM)
+# What is installed, and what is taken from the build tree.
+foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_kernel_cache crt_meshes crt-meshgen
+        conformance crt_backend_example)
+  if(TARGET ${part})
+    add_dependencies(portable ${part})
+  endif()
+endforeach()

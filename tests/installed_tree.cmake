@@ -1,0 +1,78 @@
+# What leaves the build tree runs without it: crt as `cmake --install` puts it, moved, and crt as the target `portable` packs it, unpacked. Both
+# render with an empty environment from a folder that has nothing to do with them.
+#
+#   cmake -DMODE=install|portable -DBUILD_DIR=… -DWORK_DIR=… [-DSTRIP=… -DREFERENCE_BACKEND=… -DPORTABLE_SCRIPT=…] -P installed_tree.cmake
+
+function(run)
+  execute_process(COMMAND ${ARGV} WORKING_DIRECTORY ${WORK_DIR}/elsewhere
+    RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    string(JOIN " " command ${ARGV})
+    message(FATAL_ERROR "${command}\nended with ${result}:\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+# Renders a scene of the tree into `outputs`, small and with any backend, and looks whether the files are there.
+function(render tree scene)
+  set(options "")
+  foreach(image IN LISTS ARGN)
+    list(APPEND options -o ${image})
+  endforeach()
+  run(env -i ${tree}/bin/crt render ${tree}/share/crt/configs/${scene}.yaml --set film.resolution=[32,32] --spp 2 --report none ${options})
+  foreach(image IN LISTS ARGN)
+    if(NOT EXISTS ${WORK_DIR}/elsewhere/${image})
+      message(FATAL_ERROR "crt ended well, but there is no ${image}:\n${output}")
+    endif()
+  endforeach()
+endfunction()
+
+file(REMOVE_RECURSE ${WORK_DIR})
+file(MAKE_DIRECTORY ${WORK_DIR}/elsewhere)
+
+if(MODE STREQUAL "install")
+  run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/installed)
+  file(RENAME ${WORK_DIR}/installed ${WORK_DIR}/moved)
+  render(${WORK_DIR}/moved cornell_box a.pfm a.exr a.png)
+  render(${WORK_DIR}/moved cornell_figure b.pfm)  # reads a mesh
+else()
+  run(${CMAKE_COMMAND} -DBUILD_DIR=${BUILD_DIR} -DSTRIP=${STRIP} -DREFERENCE_BACKEND=${REFERENCE_BACKEND} -P ${PORTABLE_SCRIPT})
+  # Small enough to be sent anywhere. The archive, too, is what it claims to be: only what it holds is used from here on.
+  set(limit 50331648)  # 48 MiB
+  foreach(archive crt-portable crt-portable-tests)
+    run(${CMAKE_COMMAND} -E chdir ${WORK_DIR} ${CMAKE_COMMAND} -E tar xzf ${BUILD_DIR}/${archive}.tar.gz)
+    if(archive STREQUAL "crt-portable")
+      set(bytes 0)
+      file(GLOB_RECURSE files ${WORK_DIR}/crt/*)
+      foreach(file IN LISTS files)
+        if(NOT IS_SYMLINK ${file})
+          file(SIZE ${file} size)
+          math(EXPR bytes "${bytes} + ${size}")
+        endif()
+      endforeach()
+      if(bytes GREATER limit)
+        message(FATAL_ERROR "crt-portable has ${bytes} bytes unpacked: more than ${limit}")
+      endif()
+    endif()
+  endforeach()
+
+  render(${WORK_DIR}/crt cornell_box a.pfm a.ppm)
+  render(${WORK_DIR}/crt cornell_figure b.pfm)
+  run(env -i ${WORK_DIR}/crt/bin/crt-meshgen ${WORK_DIR}/crt/share/crt/meshes)
+  render(${WORK_DIR}/crt cornell_dragon c.pfm)
+  run(env -i ${WORK_DIR}/crt/bin/crt_conformance --backend example [abi])
+
+  # Nothing but glibc and the compiler's library comes from this machine.
+  file(GLOB backends ${WORK_DIR}/crt/lib/crt/*.so)
+  foreach(file IN LISTS backends ITEMS ${WORK_DIR}/crt/bin/crt)
+    run(env -i ldd ${file})
+    string(REGEX MATCHALL "lib[^ /]* => /[^ ]*" libraries "${output}")
+    foreach(library IN LISTS libraries)
+      if(NOT library MATCHES "=> ${WORK_DIR}/" AND NOT library MATCHES "^lib(c|m|dl|rt|pthread|gcc_s|stdc\\+\\+)\\.so")
+        message(FATAL_ERROR "${file} needs a library that is not packed: ${library}")
+      endif()
+    endforeach()
+  endforeach()
+endif()
+
+file(REMOVE_RECURSE ${WORK_DIR})
