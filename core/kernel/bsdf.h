@@ -20,11 +20,16 @@ typedef struct CrtScatter {
     int valid;
 } CrtScatter;
 
-/* Unpolarised reflectance of an interface at |cos| of incidence; eta: index beyond / index before. Exactly 1 in total internal reflection. */
+/* (η·cos of refraction)² at cos of incidence, η² − 1 + cos²; ≤ 0 in total internal reflection. In this order an index of 1 gives back cos² itself,
+   however grazing. */
+CRT_FN f32 crt_refraction(f32 cos_i, f32 eta) { return (eta - 1.0f) * (eta + 1.0f) + cos_i * cos_i; }
+
+/* Unpolarised reflectance of an interface at |cos| of incidence; eta: index beyond / index before. Exactly 1 in total internal reflection, exactly 0 for an
+   index of 1. */
 CRT_FN f32 crt_fresnel_dielectric(f32 cos_i, f32 eta) {
-    const f32 sin2_t = (1.0f - cos_i * cos_i) / (eta * eta);
-    if (sin2_t >= 1.0f) return 1.0f;
-    const f32 cos_t = crt_sqrt(1.0f - sin2_t);
+    const f32 refraction = crt_refraction(cos_i, eta);
+    if (!(refraction > 0.0f)) return 1.0f;
+    const f32 cos_t = crt_sqrt(refraction) / eta;
     const f32 rs = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
     const f32 rp = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     return 0.5f * (rs * rs + rp * rp);
@@ -102,13 +107,13 @@ CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec
         return s;
     }
     const f32 inverse_eta = 1.0f / eta_hero;
-    const f32 cos2_t = 1.0f - (1.0f - cos_i * cos_i) * (inverse_eta * inverse_eta);
+    const f32 refraction = crt_refraction(cos_i, eta_hero);
     s.hero_only = CRT_HAS(DISPERSION) && dispersive && !alone;
     s.eta_square = eta_hero * eta_hero;
     s.weight = splat4((1.0f - fresnel_hero) / (1.0f - reflect) * (inverse_eta * inverse_eta));
     /* An index of exactly 1 is no surface: the direction passes unrounded. */
-    s.wi = eta_hero == 1.0f ? -wo : normalize3(wo * -inverse_eta + ns * (cos_i * inverse_eta - crt_sqrt(crt_max(cos2_t, 0.0f))));
-    s.valid = cos2_t > 0.0f && dot3(s.wi, ng) < 0.0f;
+    s.wi = eta_hero == 1.0f ? -wo : normalize3(wo * -inverse_eta + ns * (cos_i - crt_sqrt(crt_max(refraction, 0.0f))) * inverse_eta);
+    s.valid = refraction > 0.0f && dot3(s.wi, ng) < 0.0f;
     return s;
 }
 
