@@ -138,12 +138,21 @@ CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtRay ray, CrtS
         cb = c_swap;                      \
     }
 
+/* Boxes let NaN in, so that none is lost that is touched; those of unused children too, which lead back to the root. A ray with a number that is
+   none must not get there. */
+CRT_FN int crt_is_ray(CrtRay ray) {
+    const vec3 o = abs3(ray.o);
+    const vec3 d = abs3(ray.d);
+    return crt_is_finite((V3X(o) + V3Y(o) + V3Z(o)) + (V3X(d) + V3Y(d) + V3Z(d)));
+}
+
 CRT_FN CrtHit crt_bvh_closest(const CrtContext *ctx, CrtRay ray) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->nodes);
     const CrtShear shear = crt_shear(ray);
     const CrtSlab slab = crt_slab(ray);
     CrtHit best = crt_no_hit(ray.reach);
+    if (!crt_is_ray(ray)) return best;
     u32 stack[CRT_BVH_STACK];
     f32 entry[CRT_BVH_STACK];
     u32 size = 0u;
@@ -186,6 +195,7 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
     const CrtShear shear = crt_shear(ray);
     const CrtSlab slab = crt_slab(ray);
     CrtHit hit;
+    if (!crt_is_ray(ray)) return 0;
     u32 stack[CRT_BVH_STACK];
     u32 size = 1u;
     stack[0] = 0u;
