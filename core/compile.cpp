@@ -280,10 +280,29 @@ private:
         std::vector<kernel::CrtTriangle8> blocks((slots.size() + 7) / 8);
         for (kernel::CrtTriangle8& block : blocks) std::fill(std::begin(block.slot), std::end(block.slot), CRT_NONE);
         for (std::size_t i = 0; i < slots.size(); ++i) {
-            for (std::size_t k = 0; k < 9; ++k) blocks[i / 8].p[k][i % 8] = positions_[slots[i]][k];  // brute force keeps the author's order
             blocks[i / 8].slot[i % 8] = slots[i];
+            const Vec3d n = planeNormal(slots[i]);  // brute force keeps the author's order: slot and id are one
+            setRow(blocks[i / 8], 0, i % 8, n, vertexOf(slots[i], 0));
+            for (std::size_t v = 0; v < 3; ++v) {
+                const Vec3d edge = vertexOf(slots[i], (v + 1) % 3) - vertexOf(slots[i], v);
+                const double length = std::sqrt(dot(edge, edge));
+                setRow(blocks[i / 8], v + 1, i % 8, length > 0 ? cross(n, edge) * (1 / length) : Vec3d{}, vertexOf(slots[i], v));
+            }
         }
         return blocks;
+    }
+
+    /// The affine function that grows along `direction` and vanishes at `origin`.
+    static void setRow(kernel::CrtTriangle8& block, std::size_t row, std::size_t lane, const Vec3d& direction, const Vec3d& origin) {
+        for (std::size_t k = 0; k < 3; ++k) block.row[row][k][lane] = static_cast<float>(direction[k]);
+        block.row[row][3][lane] = static_cast<float>(-dot(direction, origin));
+    }
+
+    /// Unit normal by the order of the vertices; zero for a triangle without area.
+    Vec3d planeNormal(std::size_t i) const {
+        const Vec3d n = cross(vertexOf(i, 1) - vertexOf(i, 0), vertexOf(i, 2) - vertexOf(i, 0));
+        const double length = std::sqrt(dot(n, n));
+        return length > 0 ? n * (1 / length) : Vec3d{};
     }
 
     Vec3d vertexOf(std::size_t i, std::size_t v) const { return {positions_[i][v], positions_[i][3 + v], positions_[i][6 + v]}; }

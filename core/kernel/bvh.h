@@ -54,11 +54,10 @@ CRT_FN CrtHit crt_brute_force_closest(const CrtContext *ctx, CrtRay ray) {
 #if CRT_SIMD8
     CRT_GLOBAL const CrtTriangle8 *blocks = CRT_ARRAY(CrtTriangle8, ctx->blob, ctx->scene->triangles8);
     const u32 count = ctx->scene->triangles8.count;
-    for (u32 b = 0u; b < count; ++b) {
-        u32 lanes = crt_candidates8(blocks + b, shear, crt_tie_limit(best.t));
-        for (u32 lane = 0u; lanes != 0u; ++lane, lanes >>= 1)
-            if (lanes & 1u) crt_test_closest(triangles, blocks[b].slot[lane], shear, &best);
-    }
+    const f32 slack = crt_candidate_slack(ray.o);
+    for (u32 b = 0u; b < count; ++b)
+        for (u32 lanes = crt_candidates8(blocks + b, ray, slack, best.t); lanes != 0u; lanes &= lanes - 1u)
+            crt_test_closest(triangles, blocks[b].slot[crt_lowest_bit(lanes)], shear, &best);
 #else
     const u32 count = ctx->scene->triangle_count;
     for (u32 slot = 0u; slot < count; ++slot) crt_test_closest(triangles, slot, shear, &best);
@@ -71,18 +70,18 @@ CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtTriangle8 *blocks = CRT_ARRAY(CrtTriangle8, ctx->blob, ctx->scene->occluders8);
     const u32 count = ctx->scene->occluders8.count;
-    const CrtShear shear = crt_shear(ray);
     CrtHit hit;
-    for (u32 b = 0u; b < count; ++b) {
 #if CRT_SIMD8
-        u32 lanes = crt_candidates8(blocks + b, shear, ray.reach);
-        for (u32 lane = 0u; lanes != 0u; ++lane, lanes >>= 1)
-            if ((lanes & 1u) && crt_intersect_triangle(triangles + blocks[b].slot[lane], shear, ray.reach, &hit)) return 1;
+    const f32 slack = crt_candidate_slack(ray.o);
+    for (u32 b = 0u; b < count; ++b)
+        for (u32 lanes = crt_candidates8(blocks + b, ray, slack, ray.reach); lanes != 0u; lanes &= lanes - 1u)
+            if (crt_intersect_triangle(triangles + blocks[b].slot[crt_lowest_bit(lanes)], crt_shear(ray), ray.reach, &hit)) return 1;
 #else
+    const CrtShear shear = crt_shear(ray);
+    for (u32 b = 0u; b < count; ++b)
         for (u32 lane = 0u; lane < 8u && blocks[b].slot[lane] != CRT_NONE; ++lane)
             if (crt_intersect_triangle(triangles + blocks[b].slot[lane], shear, ray.reach, &hit)) return 1;
 #endif
-    }
     return 0;
 }
 

@@ -45,6 +45,7 @@ typedef float4 vec4;
 #define crt_bits(x) as_uint((float)(x))
 #define crt_from_bits(u) as_float((uint)(u))
 #define crt_mulhi(a, b) mul_hi((uint)(a), (uint)(b))
+#define crt_lowest_bit(u) (31u - clz((uint)(u) & (0u - (uint)(u)))) /* of a number that is not 0 */
 #define crt_sqrt4(v) sqrt((float4)(v))
 #define crt_load4(p) vload4(0, (p))
 #define crt_is_finite(x) isfinite((float)(x))
@@ -67,7 +68,9 @@ typedef int8 mask8;
 #define splat8(s) ((float8)(s))
 #define crt_load8(p) vload8(0, (p))
 #define crt_fma8(a, b, c) fma((float8)(a), (float8)(b), (float8)(c))
-#define mask8_any(m) (any(m) != 0)
+CRT_FN vec8 crt_min8(vec8 a, vec8 b) { return select(b, a, a < b); }
+#define crt_sign8(v) (as_int8(v) & (int8)(0x80000000))         /* sign bits alone */
+#define crt_flip8(v, signs) as_float8(as_int8(v) ^ (signs)) /* v with those signs flipped */
 /* Sign bits of the lanes, lane 0 in bit 0. */
 CRT_FN u32 mask8_bits(mask8 m) {
     const int8 w = m & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
@@ -213,6 +216,7 @@ CRT_FN f32 crt_floor(f32 x) { return __builtin_floorf(x); }
 CRT_FN u32 crt_bits(f32 x) { u32 u; std::memcpy(&u, &x, 4); return u; }
 CRT_FN f32 crt_from_bits(u32 u) { f32 x; std::memcpy(&x, &u, 4); return x; }
 CRT_FN u32 crt_mulhi(u32 a, u32 b) { return static_cast<u32>((static_cast<u64>(a) * b) >> 32); }
+CRT_FN u32 crt_lowest_bit(u32 u) { return static_cast<u32>(__builtin_ctz(u)); }
 CRT_FN bool crt_is_finite(f32 x) { return (crt_bits(x) & 0x7f800000u) != 0x7f800000u; }
 CRT_FN u32 crt_reverse_bits(u32 x) {
     x = ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
@@ -233,7 +237,9 @@ typedef i32 mask8 __attribute__((vector_size(32)));
 CRT_FN vec8 splat8(f32 s) { return vec8{s, s, s, s, s, s, s, s}; }
 CRT_FN vec8 crt_load8(const f32 *p) { return (vec8)_mm256_loadu_ps(p); }
 CRT_FN vec8 crt_fma8(vec8 a, vec8 b, vec8 c) { return (vec8)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c); }
-CRT_FN bool mask8_any(mask8 m) { return _mm256_movemask_ps((__m256)m) != 0; }
+CRT_FN vec8 crt_min8(vec8 a, vec8 b) { return (vec8)_mm256_min_ps((__m256)a, (__m256)b); }
+CRT_FN mask8 crt_sign8(vec8 v) { return (mask8)v & static_cast<i32>(0x80000000u); }
+CRT_FN vec8 crt_flip8(vec8 v, mask8 signs) { return (vec8)((mask8)v ^ signs); }
 CRT_FN u32 mask8_bits(mask8 m) { return static_cast<u32>(_mm256_movemask_ps((__m256)m)); }
 #else
 #define CRT_SIMD8 0

@@ -112,35 +112,32 @@ CRT_FN CrtHit crt_no_hit(f32 reach) {
 }
 
 #if CRT_SIMD8
-/* Lanes of eight triangles that the ray may hit at 0 < t < limit: the arithmetic of crt_intersect_triangle, lane by lane, so it finds
-   just those that the scalar test accepts. */
-CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtShear ray, f32 limit) {
-    CRT_GLOBAL const f32 *px = &block->p[3u * ray.kx][0];
-    CRT_GLOBAL const f32 *py = &block->p[3u * ray.ky][0];
-    CRT_GLOBAL const f32 *pz = &block->p[3u * ray.kz][0];
-    const vec8 az = crt_load8(pz) - splat8(ray.oz);
-    const vec8 bz = crt_load8(pz + 8) - splat8(ray.oz);
-    const vec8 cz = crt_load8(pz + 16) - splat8(ray.oz);
-    const vec8 sx = splat8(ray.sx);
-    const vec8 sy = splat8(ray.sy);
-    const vec8 ax = (crt_load8(px) - splat8(ray.ox)) - sx * az;
-    const vec8 bx = (crt_load8(px + 8) - splat8(ray.ox)) - sx * bz;
-    const vec8 cx = (crt_load8(px + 16) - splat8(ray.ox)) - sx * cz;
-    const vec8 ay = (crt_load8(py) - splat8(ray.oy)) - sy * az;
-    const vec8 by = (crt_load8(py + 8) - splat8(ray.oy)) - sy * bz;
-    const vec8 cy = (crt_load8(py + 16) - splat8(ray.oy)) - sy * cz;
-    const vec8 u1 = cy * bx, v1 = ay * cx, w1 = by * ax;
-    const vec8 u = crt_fma8(cx, by, -u1) + crt_fma8(-cy, bx, u1);
-    const vec8 v = crt_fma8(ax, cy, -v1) + crt_fma8(-ay, cx, v1);
-    const vec8 w = crt_fma8(bx, ay, -w1) + crt_fma8(-by, ax, w1);
-    const vec8 zero = splat8(0.0f);
-    const mask8 outside = ((u < zero) | (v < zero) | (w < zero)) & ((u > zero) | (v > zero) | (w > zero));
-    const vec8 det = u + v + w;
-    const vec8 sz = splat8(ray.sz);
-    const vec8 t = (u * (sz * az) + v * (sz * bz) + w * (sz * cz)) * (splat8(1.0f) / det);
-    /* A zero determinant makes t NaN or infinite, which fails both comparisons. */
-    const mask8 inside = ~outside & (t > zero) & (t < splat8(limit));
-    return mask8_bits(inside);
+/* Slack of crt_candidates8 for a ray from o, in lengths: bounds the rounding of its edge distances (at most some 30 · 2^-24 of 1 + |o|, scene
+   coordinates being within ±1) and what the exact test accepts outside an edge. */
+CRT_FN f32 crt_candidate_slack(vec3 o) { return 64.0f * CRT_EPSILON * (1.0f + crt_abs(V3X(o)) + crt_abs(V3Y(o)) + crt_abs(V3Z(o))); }
+
+/* row · (x, y, z, w) for eight triangles. */
+CRT_FN vec8 crt_row8(CRT_GLOBAL const f32 *row, vec8 x, vec8 y, vec8 z, vec8 w) {
+    return crt_fma8(crt_load8(row), x, crt_fma8(crt_load8(row + 8), y, crt_fma8(crt_load8(row + 16), z, crt_load8(row + 24) * w)));
+}
+
+/* Lanes of eight triangles that the ray may hit before `limit`. In homogeneous form, without a division: with h the height of the origin over the
+   plane and n the height gained per length of the ray, the ray meets the plane at (n·o − h·d) / n. It may name a triangle that
+   crt_intersect_triangle refuses, never miss one that it accepts: a ray's origin is clear of every plane by more than h can err (surface.h). */
+CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtRay ray, f32 slack, f32 limit) {
+    CRT_GLOBAL const f32 *row = &block->row[0][0][0];
+    const vec8 ox = splat8(V3X(ray.o)), oy = splat8(V3Y(ray.o)), oz = splat8(V3Z(ray.o));
+    const vec8 dx = splat8(V3X(ray.d)), dy = splat8(V3Y(ray.d)), dz = splat8(V3Z(ray.d));
+    const vec8 h = crt_fma8(crt_load8(row), ox, crt_fma8(crt_load8(row + 8), oy, crt_fma8(crt_load8(row + 16), oz, crt_load8(row + 24))));
+    const vec8 n = crt_fma8(crt_load8(row), dx, crt_fma8(crt_load8(row + 8), dy, crt_load8(row + 16) * dz));
+    const vec8 x = ox * n - h * dx;
+    const vec8 y = oy * n - h * dy;
+    const vec8 z = oz * n - h * dz;
+    const vec8 inside = crt_min8(crt_flip8(crt_row8(row + 32, x, y, z, n), crt_sign8(n)),
+                        crt_min8(crt_flip8(crt_row8(row + 64, x, y, z, n), crt_sign8(n)), crt_flip8(crt_row8(row + 96, x, y, z, n), crt_sign8(n))));
+    const vec8 t = crt_flip8(-h, crt_sign8(n)); /* times |n| */
+    const vec8 reach = crt_fma8(crt_flip8(n, crt_sign8(n)), splat8(crt_min(limit, 1e30f)), splat8(slack));
+    return mask8_bits((inside > splat8(-slack)) & (t > splat8(0.0f)) & (t < reach));
 }
 #endif
 

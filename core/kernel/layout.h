@@ -37,12 +37,13 @@ typedef struct CrtTriangle {
 } CrtTriangle;
 CRT_ASSERT_SIZE(CrtTriangle, 48);
 
-/* Eight triangles side by side, for the brute-force loops. Unused lanes have slot CRT_NONE and are all zero. */
+/* Eight triangles side by side, for the brute-force loops. A row (x, y, z, w) is an affine function of a point p: x·p.x + y·p.y + z·p.z + w. Row 0 is
+   the height over the triangle's plane; rows 1 to 3 the distance from each edge, positive inside. Unused lanes have slot CRT_NONE and are all zero. */
 typedef struct CrtTriangle8 {
-    f32 p[9][8];
+    f32 row[4][4][8];
     u32 slot[8]; /* in the triangle array */
 } CrtTriangle8;
-CRT_ASSERT_SIZE(CrtTriangle8, 320);
+CRT_ASSERT_SIZE(CrtTriangle8, 544);
 
 /* The plane of a triangle, by slot; how far off it a ray must start to be sure of its side, and how far from its edges, in barycentrics, to be
    sure of its neighbours' (surface.h). */

@@ -87,7 +87,8 @@ CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurfac
     rays->shadow += 1u;
     if (crt_trace_any(ctx, shadow)) return;
     const f32 scatter = crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction */
-    const f32 weight = crt_power_heuristic(light.pdf, scatter) * (scatter / light.pdf);
+    const f32 ratio = scatter / light.pdf;
+    const f32 weight = ratio / (1.0f + ratio * ratio); /* the power heuristic times f·cos / pdf */
     path->radiance =
         path->radiance + path->throughput * reflectance * crt_spectrum(ctx, light.spectrum, path->wavelengths.position) * weight;
 }
@@ -113,7 +114,7 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
     vec3 ns = outside ? surface.ns : -surface.ns;
     if (CRT_HAS(SMOOTH_NORMALS) && !(dot3(wo, ns) > 0.0f)) ns = ng;
 
-    if (CRT_HAS(AOV) && path->depth == 0u) {
+    if (CRT_HAS(AOV) && scene->aovs != 0u && path->depth == 0u) {
         path->first.normal = ns;
         path->first.depth = hit.t * scene->depth_scale;
         path->first.primitive = hit.id;

@@ -12,8 +12,8 @@ CRT_KERNEL_BEGIN
 
 /* Dimensions. Those of path vertex v follow CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX · v. */
 #define CRT_DIM_FILM 0u
-#define CRT_DIM_LENS 1u
-#define CRT_DIM_WAVELENGTH 2u
+#define CRT_DIM_WAVELENGTH 1u
+#define CRT_DIM_LENS 2u
 #define CRT_DIM_HERO 3u
 #define CRT_DIM_VERTEX 4u
 #define CRT_DIM_PER_VERTEX 4u

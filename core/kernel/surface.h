@@ -44,13 +44,18 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     CRT_GLOBAL const CrtTriangle *triangle = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + hit.slot;
     CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + hit.slot;
     CRT_GLOBAL const CrtPrimitive *primitive = CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + hit.id;
-    const f32 c0 = crt_max(1.0f - hit.b1 - hit.b2, face->margin);
-    const f32 c1 = crt_max(hit.b1, face->margin);
-    const f32 c2 = crt_max(hit.b2, face->margin);
-    const f32 scale = 1.0f / (c0 + c1 + c2);
-    const f32 b0 = c0 * scale;
-    const f32 b1 = c1 * scale;
-    const f32 b2 = c2 * scale;
+    f32 b0 = 1.0f - hit.b1 - hit.b2;
+    f32 b1 = hit.b1;
+    f32 b2 = hit.b2;
+    if (crt_min(b0, crt_min(b1, b2)) < face->margin) { /* rare: drawn in from the edge */
+        b0 = crt_max(b0, face->margin);
+        b1 = crt_max(b1, face->margin);
+        b2 = crt_max(b2, face->margin);
+        const f32 scale = 1.0f / (b0 + b1 + b2);
+        b0 *= scale;
+        b1 *= scale;
+        b2 *= scale;
+    }
     CrtSurface s;
     s.p = crt_triangle_vertex(triangle, 0u) * b0 + crt_triangle_vertex(triangle, 1u) * b1 + crt_triangle_vertex(triangle, 2u) * b2;
     s.ng = crt_load3(face->normal);
