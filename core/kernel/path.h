@@ -84,8 +84,11 @@ CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurfac
     shadow.o = crt_offset_origin(surface.p, surface.clearance, ng, light.wi);
     shadow.d = light.point - shadow.o;
     shadow.reach = light.reach;
-    rays->shadow += 1u;
-    if (crt_trace_any(ctx, shadow)) return;
+    /* Nothing fits in between where the emitter is nearer than its clearance. */
+    if (shadow.reach > 0.0f) {
+        rays->shadow += 1u;
+        if (crt_trace_any(ctx, shadow)) return;
+    }
     const f32 scatter = crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction */
     const f32 ratio = scatter / light.pdf;
     const f32 weight = ratio / (1.0f + ratio * ratio); /* the power heuristic times f·cos / pdf */

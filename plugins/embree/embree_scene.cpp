@@ -84,6 +84,19 @@ RTCRay embreeRay(const CrtRay& ray) {
     return r;
 }
 
+/// How much larger, relative to its centre, a triangle is shown to Embree, so that its edges move out by some 2e-6 of the scene: what the shared test
+/// accepts at an edge is then inside for Embree, whose own edge test rounds otherwise and now and then hides a hit from both sides.
+float growthOf(const CrtTriangle& triangle) {
+    using namespace kernel;
+    const vec3 a = crt_triangle_vertex(&triangle, 0);
+    const vec3 ab = crt_triangle_vertex(&triangle, 1) - a, ac = crt_triangle_vertex(&triangle, 2) - a;
+    const float twice_area = length3(cross3(ab, ac));
+    const float longest = crt_max(length3(ab), crt_max(length3(ac), length3(ac - ab)));
+    // The least height is twice_area / longest, and the centre lies a third of it from the edge.
+    const float growth = 3 * 2e-6f * longest;
+    return growth < twice_area ? growth / twice_area : 1.0f;
+}
+
 std::string errorText(RTCDevice device, const char* what) {
     const RTCError code = rtcGetDeviceError(device);
     return std::string(what) + " (Embree error " + std::to_string(static_cast<int>(code)) + ")";
@@ -130,10 +143,13 @@ Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t
         throw std::bad_alloc();
     }
     for (std::uint32_t t = 0; t < count; ++t) {
-        for (std::uint32_t v = 0; v < 3; ++v) {
-            for (std::uint32_t axis = 0; axis < 3; ++axis) vertices[9ull * t + 3 * v + axis] = triangles[t].p[3 * axis + v];
-            indices[3ull * t + v] = 3 * t + v;
+        const float growth = growthOf(triangles[t]);
+        for (std::uint32_t axis = 0; axis < 3; ++axis) {
+            const float* p = triangles[t].p + 3 * axis;
+            const float centre = (p[0] + p[1] + p[2]) / 3;
+            for (std::uint32_t v = 0; v < 3; ++v) vertices[9ull * t + 3 * v + axis] = p[v] + (p[v] - centre) * growth;
         }
+        for (std::uint32_t v = 0; v < 3; ++v) indices[3ull * t + v] = 3 * t + v;
     }
     rtcSetGeometryIntersectFilterFunction(geometry, closestFilter);
     rtcSetGeometryOccludedFilterFunction(geometry, anyFilter);

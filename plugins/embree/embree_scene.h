@@ -8,7 +8,7 @@ class Tracer;
 // The kernels of this backend carry the tracer along, and trace with it (kernels.cpp).
 #define CRT_CONTEXT_EXTRA const crt::embree::Tracer* tracer;
 #define CRT_BACKEND_TRACE
-#include "kernel/intersect.h"
+#include "kernel/surface.h"
 
 #include <memory>
 #include <string>
