@@ -259,8 +259,6 @@ CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_samp
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     const u64 pixel = (u64)y * scene->width + x;
     CRT_GLOBAL f64 *pairs = sums + pixel * scene->channels * 2u;
-    CrtSum sum_x, sum_y, sum_z, sum_yy;
-    sum_x.hi = sum_x.lo = sum_y.hi = sum_y.lo = sum_z.hi = sum_z.lo = sum_yy.hi = sum_yy.lo = 0.0;
     u32 valid = 0u;
     u32 done = 0u;
     int alive = 0;
@@ -279,10 +277,10 @@ CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_samp
         if (!alive) {
             if (crt_is_finite(V4X(xyz)) && crt_is_finite(V4Y(xyz)) && crt_is_finite(V4Z(xyz))) {
                 const f64 luminance = (f64)V4Y(xyz);
-                sum_x = crt_sum_add(sum_x, (f64)V4X(xyz));
-                sum_y = crt_sum_add(sum_y, luminance);
-                sum_z = crt_sum_add(sum_z, (f64)V4Z(xyz));
-                sum_yy = crt_sum_add(sum_yy, luminance * luminance);
+                crt_film_add(pairs + 0, (f64)V4X(xyz));
+                crt_film_add(pairs + 2, luminance);
+                crt_film_add(pairs + 4, (f64)V4Z(xyz));
+                crt_film_add(pairs + 6, luminance * luminance);
                 if (CRT_HAS(AOV)) {
                     if (scene->channels > CRT_CHANNELS_BASE) crt_add_aovs(ctx, &path, pairs);
                     if (primitives != 0 && valid == 0u && counts[pixel] == 0u) primitives[pixel] = path.first.primitive;
@@ -292,14 +290,6 @@ CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_samp
             done += 1u;
         }
     }
-    crt_film_add(pairs + 0, sum_x.hi);
-    crt_film_add(pairs + 0, sum_x.lo);
-    crt_film_add(pairs + 2, sum_y.hi);
-    crt_film_add(pairs + 2, sum_y.lo);
-    crt_film_add(pairs + 4, sum_z.hi);
-    crt_film_add(pairs + 4, sum_z.lo);
-    crt_film_add(pairs + 6, sum_yy.hi);
-    crt_film_add(pairs + 6, sum_yy.lo);
     counts[pixel] += valid;
 }
 
