@@ -26,7 +26,7 @@ struct Fixture {
     fs::path directory;
 
     Fixture() {
-        std::string pattern = (fs::temp_directory_path() / "crt-cache-XXXXXX").string();
+        std::string pattern = (fs::temp_directory_path() / ("crt-cache-" + std::string(6, 'X'))).string();
         REQUIRE(::mkdtemp(pattern.data()) != nullptr);
         directory = pattern;
     }

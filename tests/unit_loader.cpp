@@ -43,7 +43,7 @@ private:
 class TemporaryDirectory {
 public:
     TemporaryDirectory() {
-        std::string pattern = (fs::temp_directory_path() / "crt-loader-XXXXXX").string();
+        std::string pattern = (fs::temp_directory_path() / ("crt-loader-" + std::string(6, 'X'))).string();
         REQUIRE(::mkdtemp(pattern.data()) != nullptr);
         path_ = pattern;
     }

@@ -47,7 +47,7 @@ Driver openDriver() {
     const CUresult started = driver.cuInit(0);
     if (started == CUDA_ERROR_NO_DEVICE) throw PluginError(CRT_NO_DEVICE, "the NVIDIA driver is installed but sees no GPU");
     if (started == CUDA_ERROR_STUB_LIBRARY)
-        throw PluginError(CRT_NO_DEVICE, "no NVIDIA driver is installed: the libcuda.so.1 that was found is the toolkit's stub for linking");
+        throw PluginError(CRT_NO_DEVICE, "no NVIDIA driver is installed: the libcuda.so.1 that was found is the toolkit's, which is only there to be linked with");
     if (started != CUDA_SUCCESS) {
         const char* text = nullptr;
         driver.cuGetErrorString(started, &text);
