@@ -78,17 +78,13 @@ std::vector<std::uint64_t> choiceTable(const std::vector<double>& weights) {
     if (weights.empty()) return first;
     constexpr std::uint64_t kAll = std::uint64_t{1} << 32;
     const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
-    std::vector<std::uint64_t> shares;
-    std::uint64_t given = 0;
+    // One each, and of the rest what the weights so far are worth. Rounding each share by itself could give away more than there is.
+    const auto rest = static_cast<double>(kAll - weights.size());
+    double sum = 0;
     for (const double w : weights) {
-        const double share = std::floor(std::ldexp(w / total, 32));
-        shares.push_back(share >= 1 ? static_cast<std::uint64_t>(share) : 1);
-        given += shares.back();
+        sum += w;
+        first.push_back(first.size() + static_cast<std::uint64_t>(rest * (sum / total)));
     }
-    // What rounding left over, or took too much, is settled with the largest: it hardly notices.
-    auto largest = std::max_element(shares.begin(), shares.end());
-    *largest += kAll - given;
-    for (const std::uint64_t s : shares) first.push_back(first.back() + s);
     return first;
 }
 
