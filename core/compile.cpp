@@ -209,10 +209,26 @@ private:
         }
         scale_ = std::ldexp(1.0, out_.scale_exponent);
         positions_.resize(triangles_.size());
-        for (std::size_t i = 0; i < triangles_.size(); ++i)
+        std::uint64_t without_area = 0;
+        for (std::size_t i = 0; i < triangles_.size(); ++i) {
+            std::array<Vec3d, 3> p;
+            for (std::size_t v = 0; v < 3; ++v) p[v] = (triangles_[i].positions[v] - out_.centre) * scale_;
+            // Rounded to float, three points of one line make a sliver that can be hit; one point cannot.
+            if (!hasArea(p)) {
+                p[1] = p[2] = p[0];
+                ++without_area;
+            }
             for (std::size_t v = 0; v < 3; ++v)
-                for (std::size_t k = 0; k < 3; ++k)
-                    positions_[i][3 * k + v] = static_cast<float>((triangles_[i].positions[v][k] - out_.centre[k]) * scale_);
+                for (std::size_t k = 0; k < 3; ++k) positions_[i][3 * k + v] = static_cast<float>(p[v][k]);
+        }
+        if (without_area > 0)
+            logWarning("{} triangle{} no area and will not be seen", without_area, without_area == 1 ? " has" : "s have");
+    }
+
+    /// Coordinates within ±1. Higher over its edges than rounding in double makes three points of a line.
+    static bool hasArea(const std::array<Vec3d, 3>& p) {
+        const Vec3d a = p[1] - p[0], b = p[2] - p[0], n = cross(a, b);
+        return dot(n, n) > 1e-30 * std::max(dot(a, a), dot(b, b));
     }
 
     void chooseAccelerator() {
@@ -267,7 +283,7 @@ private:
             std::vector<std::uint32_t> all(count), occluders;
             for (std::uint32_t i = 0; i < count; ++i) {
                 all[i] = i;
-                if (canOcclude(i)) occluders.push_back(i);
+                if (count > kBruteForceTriangles || canOcclude(i)) occluders.push_back(i);  // asking takes quadratic time
             }
             header_.triangles8 = blob_.append(blocksOf(all));
             header_.occluders8 = blob_.append(blocksOf(occluders));
@@ -395,16 +411,12 @@ private:
         if (!isPath()) return;
         std::vector<kernel::CrtEmitter> emitters;
         std::vector<double> power;
-        std::uint64_t degenerate = 0;
         for (std::size_t i = 0; i < triangles_.size(); ++i) {
             if (triangles_[i].emission < 0) continue;
             const Emission& emission = scene_.emissions[static_cast<std::size_t>(triangles_[i].emission)];
             if (!(emission.radiance.max() > 0)) continue;
             double area = areaOf(i);
-            if (!(area > 0)) {
-                ++degenerate;
-                continue;
-            }
+            if (!(area > 0)) continue;
             kernel::CrtEmitter emitter{};
             emitter.slot = slot_of_[i];
             emitter.spectrum = spectra_.add(emission.radiance);
@@ -423,7 +435,6 @@ private:
             const Vec3d xyz = spectrumToXyz(emission.radiance);
             power.push_back(area * (xyz[0] + xyz[1] + xyz[2] + 1e-6 * emission.radiance.max()) * (emission.two_sided ? 2 : 1));
         }
-        if (degenerate > 0) logWarning("{} emissive triangles have no area and were left out of the lights", degenerate);
         const std::vector<std::uint64_t> first = choiceTable(power);
         for (std::size_t i = 0; i < emitters.size(); ++i) {
             emitters[i].choice = static_cast<std::uint32_t>(first[i]);
