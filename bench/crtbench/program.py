@@ -181,21 +181,26 @@ class Program:
             text = text.replace(str(folder), name)
         return text
 
-    def kernels_with(self, extra_bit):
-        """A copy of the kernel texts in which every kernel has one more feature; for CRT_KERNEL_DIR, which wants features.h itself untouched."""
-        directory = self.scratch / f"kernel-{extra_bit:05x}"
-        if not directory.exists():
-            shutil.copytree(self.repository / "core" / "kernel", directory)
-            more = ('#include "features.h"\n#undef CRT_HAS\n'
-                    f"#define CRT_HAS(name) (((CRT_FEATURES | {extra_bit:#x}u) & (unsigned)CRT_FEATURE_##name) != 0u)\n")
-            changed = 0
-            for header in directory.glob("*.h"):
-                text = header.read_text()
-                if header.name != "features.h" and '#include "features.h"\n' in text:
-                    header.write_text(text.replace('#include "features.h"\n', more))
-                    changed += 1
-            if changed == 0:
-                raise Failure("no kernel header includes features.h: kernels_with() has to be taught the new way")
+    def kernels_with(self, extra, masks):
+        """A copy of the kernel texts, for CRT_KERNEL_DIR, in which a kernel with one of the masks has the feature `extra` as well. Kernels with other
+        masks, which nobody asked for, have nothing at all, so that they compile fast."""
+        directory = self.scratch / f"kernel-{extra:05x}"
+        if directory.exists():
+            return directory
+        shutil.copytree(self.repository / "core" / "kernel", directory)
+        asked = " || ".join(f"(CRT_FEATURES) == {mask:#x}u" for mask in masks)
+        # CRT_KERNEL_DIR wants features.h itself untouched.
+        more = (f'#include "features.h"\n#undef CRT_HAS\n#if {asked}\n'
+                f"#define CRT_HAS(name) ((((CRT_FEATURES) | {extra:#x}u) & (unsigned)CRT_FEATURE_##name) != 0u)\n"
+                "#else\n#define CRT_HAS(name) (0)\n#endif\n")
+        changed = 0
+        for header in directory.glob("*.h"):
+            text = header.read_text()
+            if header.name != "features.h" and '#include "features.h"\n' in text:
+                header.write_text(text.replace('#include "features.h"\n', more))
+                changed += 1
+        if changed == 0:
+            raise Failure("no kernel header includes features.h: kernels_with() has to be taught the new way")
         return directory
 
 
