@@ -1,0 +1,610 @@
+// Scene → blob: which features a scene asks for, where the author's lengths and sides go, what lights, materials and tables come out, and what
+// is said to be left out.
+#include "kernel_test.h"
+
+#include "distributions.h"
+#include "error.h"
+
+#include <algorithm>
+#include <cstring>
+#include <functional>
+#include <set>
+#include <string>
+
+using namespace kernel_test;
+using crt::CompiledScene;
+using crt::Scene;
+using crt::Vec3d;
+
+namespace {
+
+/// A floor of one quad, 10 wide, and above it a lamp of one quad.
+Scene litFloor() {
+    Scene scene;
+    scene.camera.position = {0, 1, -5};
+    scene.camera.target = {0, 0, 0};
+    scene.film.width = 32;
+    scene.film.height = 24;
+    scene.materials.resize(1);
+    scene.materials[0].reflectance = crt::constantSpectrum(0.5);
+    scene.emissions.push_back({crt::constantSpectrum(2), false});
+    crt::Mesh floor, lamp;
+    floor.positions = {{-5, 0, -5}, {-5, 0, 5}, {5, 0, 5}, {5, 0, -5}};
+    lamp.positions = {{-1, 2, -1}, {1, 2, -1}, {1, 2, 1}, {-1, 2, 1}};
+    floor.triangles = lamp.triangles = {{0, 1, 2}, {0, 2, 3}};
+    scene.meshes = {floor, lamp};
+    scene.objects.resize(2);
+    scene.objects[0].material = scene.objects[1].material = 0;
+    scene.objects[1].mesh = 1;
+    scene.objects[1].emission = 0;
+    return scene;
+}
+
+CompiledScene compiled(const Scene& scene, std::uint32_t aovs = 0) { return crt::compileScene(scene, aovs); }
+CompiledScene changed(const std::function<void(Scene&)>& change) {
+    Scene scene = litFloor();
+    change(scene);
+    return compiled(scene);
+}
+std::uint32_t featuresOf(const std::function<void(Scene&)>& change) { return changed(change).features; }
+const CrtScene& headerOf(const CompiledScene& c) { return *reinterpret_cast<const CrtScene*>(c.data()); }
+
+bool sameBytes(const CompiledScene& a, const CompiledScene& b) { return a.size_bytes == b.size_bytes && std::memcmp(a.data(), b.data(), a.size_bytes) == 0; }
+
+template <class T>
+std::vector<T> listOf(const CompiledScene& c, CrtSpan span) {
+    const T* first = arrayOf<T>(c, span);
+    return std::vector<T>(first, first + span.count);
+}
+
+crt::Mesh smoothTetrahedron() {
+    crt::Mesh mesh;
+    mesh.positions = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+    mesh.triangles = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
+    mesh.normals = mesh.positions;
+    mesh.normal_index = mesh.triangles;
+    return mesh;
+}
+
+crt::Spectrum dispersiveIndex() {
+    crt::Spectrum s = crt::constantSpectrum(1.5);
+    s[0] = 1.6;
+    return s;
+}
+
+void makeGlass(Scene& s) {
+    s.materials[0].type = crt::MaterialType::Dielectric;
+    s.materials[0].eta = crt::constantSpectrum(1.5);
+}
+
+}  // namespace
+
+TEST_CASE("the mask names kinds, never values", "[compile]") {
+    const std::uint32_t base = compiled(litFloor()).features;
+    CHECK(base == (CRT_FEATURE_SOBOL | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE));
+    Random random(41);
+    for (int i = 0; i < 50; ++i) {
+        CHECK(featuresOf([&](Scene& s) {
+                  s.camera.position = {random.uniform(-9, 9), random.uniform(0.1, 9), random.uniform(-9, -1)};
+                  s.camera.tan_half_width = random.uniform(0.01, 2);
+                  s.film.width = 1 + static_cast<int>(random.below(500));
+                  s.materials[0].reflectance = crt::constantSpectrum(random.uniform());
+                  s.emissions[0].radiance = crt::constantSpectrum(random.uniform(0.1, 100));
+                  s.sampler.seed = random.bits();
+                  s.integrator.max_depth = 1 + static_cast<int>(random.below(100));
+                  s.integrator.roulette = random.bits() & 1;
+                  for (crt::Vec3d& p : s.meshes[1].positions) p[0] += random.uniform(-1, 1);
+              }) == base);
+    }
+    // A material that no surface has is no need.
+    CHECK(featuresOf([](Scene& s) {
+              s.materials.resize(2);
+              s.materials[1].type = crt::MaterialType::Dielectric;
+              s.materials[1].eta = dispersiveIndex();
+          }) == base);
+}
+
+TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compile]") {
+    const std::uint32_t base = compiled(litFloor()).features;
+    const auto differs = [&](std::uint32_t added, std::uint32_t removed, const std::function<void(Scene&)>& change) {
+        const std::uint32_t mask = featuresOf(change);
+        INFO("expected +" << crt::featureNames(added) << " -" << crt::featureNames(removed) << ", got " << crt::featureNames(mask));
+        CHECK(mask == ((base | added) & ~removed));
+        return mask;
+    };
+    std::uint32_t seen = base;
+    seen |= differs(CRT_FEATURE_INDEPENDENT, CRT_FEATURE_SOBOL, [](Scene& s) { s.sampler.type = crt::SamplerType::Independent; });
+    seen |= differs(CRT_FEATURE_XORSHIFT, CRT_FEATURE_SOBOL, [](Scene& s) { s.sampler.type = crt::SamplerType::XorShift; });
+    seen |= differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Bvh; });
+    seen |= differs(CRT_FEATURE_AABB, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Aabb; });
+    const auto other = [](crt::MaterialType type) {
+        return [type](Scene& s) {
+            s.materials.resize(2);
+            s.materials[1].type = type;
+            s.materials[1].eta = s.materials[1].k = s.materials[1].reflectance = crt::constantSpectrum(1.5);
+            s.objects[1].material = 1;
+        };
+    };
+    seen |= differs(CRT_FEATURE_CONDUCTOR, 0, other(crt::MaterialType::Mirror));
+    seen |= differs(CRT_FEATURE_CONDUCTOR, 0, other(crt::MaterialType::Conductor));
+    seen |= differs(CRT_FEATURE_DIELECTRIC, 0, other(crt::MaterialType::Dielectric));
+    seen |= differs(CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION, 0, [&](Scene& s) {
+        other(crt::MaterialType::Dielectric)(s);
+        s.materials[1].eta = dispersiveIndex();
+    });
+    seen |= differs(CRT_FEATURE_SMOOTH_NORMALS, 0, [](Scene& s) {
+        s.meshes.push_back(smoothTetrahedron());
+        s.objects.emplace_back();
+        s.objects.back().mesh = 2;
+    });
+    seen |= differs(CRT_FEATURE_ENVIRONMENT, 0, [](Scene& s) { s.environment = crt::Environment{crt::constantSpectrum(1)}; });
+    seen |= differs(CRT_FEATURE_LENS, 0, [](Scene& s) { s.camera.aperture_radius = 0.1; });
+    seen |= differs(CRT_FEATURE_FILTER, 0, [](Scene& s) { s.film.filter = crt::PixelFilter::Gaussian; });
+    constexpr std::uint32_t light = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
+    seen |= differs(CRT_FEATURE_VIEW, light, [](Scene& s) { s.integrator.type = crt::IntegratorType::Normals; });
+    seen |= differs(CRT_FEATURE_VIEW, light | CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.type = crt::IntegratorType::Aabb; });
+    seen |= compiled(litFloor(), crt::kAovDepth).features;
+    CHECK(compiled(litFloor(), crt::kAovDepth).features == (base | CRT_FEATURE_AOV));
+    // The film keeps these itself; the kernel need not know.
+    CHECK(compiled(litFloor(), crt::kAovVariance | crt::kAovSamples).features == base);
+    CHECK(seen == CRT_FEATURES_ALL);
+
+    differs(0, CRT_FEATURE_NEE, [](Scene& s) { s.integrator.nee = false; });
+    differs(CRT_FEATURE_DIELECTRIC, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, makeGlass);
+    differs(0, CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE, [](Scene& s) { s.objects[1].emission = -1; });
+    differs(0, CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE, [](Scene& s) { s.emissions[0].radiance = crt::constantSpectrum(0); });
+    // Nothing is scattered at depth 0.
+    differs(0, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, [](Scene& s) { s.integrator.max_depth = 0; });
+    differs(CRT_FEATURE_ENVIRONMENT, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, [](Scene& s) {
+        s.integrator.max_depth = 0;
+        makeGlass(s);
+        s.materials[0].eta = dispersiveIndex();
+        s.environment = crt::Environment{crt::constantSpectrum(1)};
+    });
+    // More triangles than brute force is good for.
+    differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.objects[0].transforms.resize(40, crt::kIdentity4d); });
+}
+
+TEST_CASE("the list of features is the mask, bit by bit", "[compile]") {
+    std::uint32_t mask = 0, count = 0;
+    std::set<std::string> names;
+#define CRT_TEST_FEATURE(bit, name, text) \
+    CHECK(bit == count++);                \
+    CHECK(CRT_FEATURE_##name == 1 << bit); \
+    CHECK(std::strlen(text) > 5);         \
+    mask |= 1u << bit;                    \
+    names.insert(crt::featureNames(1u << bit));
+    CRT_FEATURE_LIST(CRT_TEST_FEATURE)
+#undef CRT_TEST_FEATURE
+    CHECK(mask == CRT_FEATURES_ALL);
+    CHECK(names.size() == count);
+    CHECK(crt::featureNames(CRT_FEATURE_BVH | CRT_FEATURE_AREA_LIGHT) == "bvh, area-light");
+    CHECK(crt::featureNames(0).empty());
+}
+
+TEST_CASE("a mirroring transform keeps the outside outside, for faces and shading normals", "[compile]") {
+    for (const Vec3d& scale : {Vec3d{1, 1, 1}, Vec3d{-1, 1, 1}, Vec3d{2, -3, 1}, Vec3d{-1, -2, 0.5}, Vec3d{-1, -2, -0.3}}) {
+        Scene scene = litFloor();
+        scene.meshes[0] = smoothTetrahedron();
+        scene.objects.resize(1);
+        scene.objects[0].emission = 0;
+        // Scale, then shear, then move.
+        scene.objects[0].transforms = {{scale[0], 0.3 * scale[1], 0, 4, 0, scale[1], -0.2 * scale[2], 5, 0, 0, scale[2], 6, 0, 0, 0, 1}};
+        const CompiledScene c = compiled(scene);
+        const CrtContext ctx = contextOf(c);
+        const auto triangles = listOf<CrtTriangle>(c, ctx.scene->triangles);
+        const auto faces = listOf<CrtFace>(c, ctx.scene->faces);
+        const auto primitives = listOf<CrtPrimitive>(c, ctx.scene->primitives);
+        const auto normals = listOf<CrtNormals>(c, ctx.scene->normals);
+        REQUIRE(triangles.size() == 4);
+        Vec3d middle{};  // inside
+        for (const CrtTriangle& t : triangles)
+            for (u32 v = 0; v < 3; ++v) middle = plus(middle, times(toDouble(crt_triangle_vertex(&t, v)), 1.0 / 12));
+        for (std::size_t slot = 0; slot < 4; ++slot) {
+            INFO("scale " << scale[0] << " " << scale[1] << " " << scale[2]);
+            const CrtTriangle& t = triangles[slot];
+            const auto corner = [&](u32 v) { return toDouble(crt_triangle_vertex(&t, v)); };
+            const Vec3d n = cross(minus(corner(1), corner(0)), minus(corner(2), corner(0))), ng{faces[slot].normal[0], faces[slot].normal[1], faces[slot].normal[2]};
+            CHECK(dot(n, minus(corner(0), middle)) > 0);
+            CHECK(length(minus(unit(n), ng)) < 1e-6);
+            CHECK(length(ng) == Approx(1).margin(2e-7));
+            REQUIRE(primitives[t.id].normals != CRT_NONE);
+            for (u32 v = 0; v < 3; ++v) {
+                const CrtNormals& shading = normals[primitives[t.id].normals];
+                const Vec3d ns{shading.n[v], shading.n[3 + v], shading.n[6 + v]};
+                CHECK(length(ns) == Approx(1).margin(2e-7));
+                // A normal and a direction transform so that their product keeps its sign.
+                CHECK(dot(ns, minus(corner(v), middle)) > 0);
+            }
+        }
+    }
+}
+
+TEST_CASE("shading normals stay perpendicular to their surface under any transform", "[compile]") {
+    Random random(42);
+    for (int i = 0; i < 100; ++i) {
+        Scene scene = litFloor();
+        const Vec3d n = random.direction();
+        crt::Mesh& mesh = scene.meshes[0];
+        const Vec3d x = unit(cross(n, random.direction())), y = cross(n, x);
+        mesh.positions = {{0, 0, 0}, x, y};
+        mesh.triangles = mesh.normal_index = {{0, 1, 2}};
+        mesh.normals = {n, times(n, 3), times(n, 1e-3)};  // any length
+        scene.objects.resize(1);
+        for (double& m : scene.objects[0].transforms[0]) m = random.uniform(-1, 1);
+        scene.objects[0].transforms[0][12] = scene.objects[0].transforms[0][13] = scene.objects[0].transforms[0][14] = 0;
+        scene.objects[0].transforms[0][15] = 1;
+        const CompiledScene c = compiled(scene);
+        const auto face = listOf<CrtFace>(c, headerOf(c).faces)[0];
+        const auto normals = listOf<CrtNormals>(c, headerOf(c).normals)[0];
+        for (u32 v = 0; v < 3; ++v)
+            for (u32 k = 0; k < 3; ++k) CHECK(normals.n[3 * k + v] == Approx(face.normal[k]).margin(2e-4));
+    }
+}
+
+TEST_CASE("lengths are moved and scaled exactly", "[compile]") {
+    const auto placed = [](double scale, const Vec3d& shift) {
+        Scene scene = litFloor();
+        for (crt::Mesh& mesh : scene.meshes)
+            for (Vec3d& p : mesh.positions) p = plus(times(p, scale), shift);
+        scene.camera.position = plus(times(scene.camera.position, scale), shift);
+        scene.camera.target = plus(times(scene.camera.target, scale), shift);
+        return compiled(scene);
+    };
+    const CompiledScene here = placed(1, {0, 0, 0});
+    CHECK(here.scale_exponent == -3);  // half of 10 is in [2², 2³)
+    CHECK(here.centre == Vec3d{0, 1, 0});
+    CHECK(headerOf(here).depth_scale == 8);
+    // Every coordinate comes back.
+    for (const CrtTriangle& t : listOf<CrtTriangle>(here, headerOf(here).triangles))
+        for (u32 v = 0; v < 3; ++v) {
+            const Vec3d p = plus(times(toDouble(crt_triangle_vertex(&t, v)), 8), here.centre);
+            const Vec3d original = t.id < 2 ? litFloor().meshes[0].positions[t.id == 0 ? v : (v == 0 ? 0 : v + 1)] : litFloor().meshes[1].positions[t.id == 2 ? v : (v == 0 ? 0 : v + 1)];
+            CHECK(p == original);
+        }
+    // Moved by what doubles represent, nothing in the blob changes; scaled by 2^k, only the way back.
+    CHECK(sameBytes(here, placed(1, {1048576, -65536, 3})));
+    for (const int k : {-40, -1, 5, 60}) {
+        const CompiledScene scaled = placed(std::ldexp(1.0, k), {0, 0, 0});
+        CHECK(scaled.scale_exponent == -3 - k);
+        CHECK(headerOf(scaled).depth_scale == std::ldexp(8.0f, k));
+        const auto a = listOf<CrtTriangle>(here, headerOf(here).triangles), b = listOf<CrtTriangle>(scaled, headerOf(scaled).triangles);
+        CHECK(std::memcmp(a.data(), b.data(), a.size() * sizeof(CrtTriangle)) == 0);
+        CHECK(std::memcmp(&headerOf(here).camera, &headerOf(scaled).camera, sizeof(CrtCamera)) == 0);
+    }
+    // Whatever the lengths, coordinates fill [−1, 1] by half at least.
+    Random random(43);
+    for (int i = 0; i < 50; ++i) {
+        const double scale = std::pow(10.0, random.uniform(-30, 30));
+        const CompiledScene c = placed(scale, times(random.direction(), scale * std::pow(10.0, random.uniform(-3, 6))));
+        f32 largest = 0;
+        for (const CrtTriangle& t : listOf<CrtTriangle>(c, headerOf(c).triangles))
+            for (const f32 x : t.p) largest = std::max(largest, std::abs(x));
+        CHECK(largest >= 0.5f);
+        CHECK(largest <= 1);
+    }
+    // Nothing, and a single point.
+    CHECK(changed([](Scene& s) { s.objects.clear(); }).scale_exponent == 0);
+    const CompiledScene point = changed([](Scene& s) {
+        s.objects.resize(1);
+        for (Vec3d& p : s.meshes[0].positions) p = {7, 8, 9};
+    });
+    CHECK(point.scale_exponent == 0);
+    CHECK(point.centre == Vec3d{7, 8, 9});
+}
+
+TEST_CASE("what cannot be flattened is refused", "[compile]") {
+    CHECK_THROWS_AS(changed([](Scene& s) { s.objects[0].transforms[0][0] = 1e308 * 10; }), crt::Error);
+    CHECK_THROWS_AS(changed([](Scene& s) { s.camera.position = {1e60, 0, 0}; }), crt::Error);
+}
+
+TEST_CASE("shares of 2^32 are proportional, at least one each, and all of it", "[compile]") {
+    const auto check = [](const std::vector<double>& weights) {
+        const std::vector<std::uint64_t> first = crt::choiceTable(weights);
+        REQUIRE(first.size() == weights.size() + 1);
+        CHECK(first.front() == 0);
+        CHECK(first.back() == std::uint64_t{1} << 32);
+        double total = 0, worst = 0;
+        for (const double w : weights) total += w;
+        std::uint64_t without = 0;
+        const double others = static_cast<double>(weights.size());
+        for (std::size_t i = 0; i < weights.size(); ++i) {
+            without += first[i + 1] <= first[i];
+            // One share is given to each before the rest is dealt out, and rounding takes less than another.
+            const double wanted = 1 + (0x1p32 - others) * (weights[i] / total);
+            worst = std::max(worst, std::abs(static_cast<double>(first[i + 1] - first[i]) - wanted));
+        }
+        CHECK(without == 0);
+        CHECK(worst < 1.01);
+    };
+    CHECK(crt::choiceTable({}) == std::vector<std::uint64_t>{0});
+    CHECK(crt::choiceTable({3}) == std::vector<std::uint64_t>{0, std::uint64_t{1} << 32});
+    // Equal ones of a power of two are exactly equal.
+    const std::vector<std::uint64_t> eight = crt::choiceTable(std::vector<double>(8, 0.1));
+    for (std::uint64_t i = 0; i <= 8; ++i) CHECK(eight[i] == i << 29);
+    check({1e20, 1});
+    check({1, 1e20});
+    check({1e-20, 1, 1e-20});
+    check({0.1, 0.2, 0.3, 0.4});
+    Random random(44);
+    std::vector<double> many(300000);
+    for (double& w : many) w = std::pow(10.0, random.uniform(-12, 3));
+    check(many);
+    // As many faint as strong ones: each faint one's share must come from somewhere.
+    std::vector<double> classes(140000, 1e-20);
+    for (std::size_t i = 0; i < 65536; ++i) classes[2 * i] = 1;
+    check(classes);
+}
+
+TEST_CASE("wavelength and filter tables are monotone, complete, and distributed as they say", "[compile]") {
+    const std::vector<float> wavelengths = crt::wavelengthTable(CRT_WAVELENGTH_TABLE);
+    REQUIRE(wavelengths.size() == CRT_WAVELENGTH_TABLE + 1);
+    CHECK(wavelengths.front() == 360);
+    CHECK(wavelengths.back() == 830);
+    for (std::size_t i = 1; i < wavelengths.size(); ++i)
+        if (!(wavelengths[i] > wavelengths[i - 1])) FAIL("wavelengths stand still at " << i);
+    // Each cell holds the same part of x̄ + ȳ + z̄ + .001.
+    const auto& cie = crt::cieObserver();
+    const auto cumulative = [&](double nm) {
+        double sum = 0;
+        for (int i = 360; i < 830; ++i) {
+            const auto k = static_cast<std::size_t>(i - 360);
+            const double a = cie[0][k] + cie[1][k] + cie[2][k] + 1e-3, b = cie[0][k + 1] + cie[1][k + 1] + cie[2][k + 1] + 1e-3;
+            const double part = std::clamp(nm - i, 0.0, 1.0);
+            sum += part * (a + 0.5 * part * (b - a));
+        }
+        return sum;
+    };
+    const double all = cumulative(830);
+    for (std::size_t i = 0; i <= CRT_WAVELENGTH_TABLE; i += 16) CHECK(cumulative(wavelengths[i]) / all == Approx(static_cast<double>(i) / CRT_WAVELENGTH_TABLE).margin(2e-4));
+
+    crt::FilmSettings film;
+    CHECK(crt::filterTable(film, CRT_FILTER_TABLE).empty());  // the pixel itself
+    film.filter_radius = 1;
+    const std::vector<float> box = crt::filterTable(film, CRT_FILTER_TABLE);
+    CHECK(box[CRT_FILTER_TABLE / 4] == Approx(-0.5));
+    film.filter_radius = 1.5;
+    for (const crt::PixelFilter filter : {crt::PixelFilter::Gaussian, crt::PixelFilter::BlackmanHarris}) {
+        film.filter = filter;
+        const std::vector<float> table = crt::filterTable(film, CRT_FILTER_TABLE);
+        REQUIRE(table.size() == CRT_FILTER_TABLE + 1);
+        CHECK(table.front() == -1.5f);
+        CHECK(table.back() == 1.5f);
+        double variance = 0, mass = 0, expected = 0;
+        for (std::size_t i = 1; i < table.size(); ++i) {
+            if (!(table[i] > table[i - 1])) FAIL("offsets stand still at " << i);
+            CHECK(table[i] == Approx(-table[CRT_FILTER_TABLE - i]).margin(1e-6));
+            const double a = table[i - 1], b = table[i];
+            variance += (a * a + a * b + b * b) / 3 / CRT_FILTER_TABLE;
+        }
+        for (int i = 0; i < 3000; ++i) {
+            const double x = -1.5 + (i + 0.5) / 1000, t = 3.14159265358979323846 * (x / 1.5 + 1);
+            const double f = filter == crt::PixelFilter::Gaussian
+                                 ? std::exp(-2 * x * x) - std::exp(-2 * 2.25)
+                                 : 0.35875 - 0.48829 * std::cos(t) + 0.14128 * std::cos(2 * t) - 0.01168 * std::cos(3 * t);
+            mass += f;
+            expected += f * x * x;
+        }
+        CHECK(variance == Approx(expected / mass).epsilon(0.02));  // the outermost cells are wide, and flat inside
+    }
+}
+
+TEST_CASE("materials: the face's own, the object's, or grey; equal spectra once, unused ones never", "[compile]") {
+    Scene scene = litFloor();
+    scene.objects[1].emission = -1;
+    scene.materials.resize(4);
+    for (std::size_t i = 1; i < 4; ++i) scene.materials[i].reflectance = crt::constantSpectrum(0.1 * static_cast<double>(i));
+    scene.materials[3].reflectance = crt::constantSpectrum(0.5);  // as material 0
+    scene.meshes[0].material = {1, -1};
+    scene.objects[0].material = 3;
+    scene.objects[1].material = -1;
+    const CompiledScene c = compiled(scene);
+    const CrtContext ctx = contextOf(c);
+    const auto primitives = listOf<CrtPrimitive>(c, ctx.scene->primitives);
+    const auto materials = listOf<CrtMaterial>(c, ctx.scene->materials);
+    REQUIRE(primitives.size() == 4);
+    CHECK(primitives[0].material == 1);
+    CHECK(primitives[1].material == 3);
+    CHECK(primitives[2].material == 4);  // none named: grey .5 behind the author's
+    CHECK(primitives[0].object == 0);
+    CHECK(primitives[3].object == 1);
+    REQUIRE(materials.size() == 5);
+    CHECK(materials[4].type == CRT_MATERIAL_DIFFUSE);
+    CHECK(V4X(crt_spectrum(&ctx, materials[4].a, splat4(100))) == 0.5f);
+    CHECK(V4X(crt_spectrum(&ctx, materials[1].a, splat4(100))) == 0.1f);
+    CHECK(materials[3].a == materials[4].a);
+    CHECK(ctx.scene->spectra.count == 2);  // .1 and .5; .2 is nobody's
+
+    const CompiledScene kinds = changed([](Scene& s) {
+        s.materials.resize(5);
+        s.materials[1] = {"mirror", crt::MaterialType::Mirror, crt::constantSpectrum(0.9), {}, {}, {}};
+        s.materials[2] = {"metal", crt::MaterialType::Conductor, {}, crt::constantSpectrum(0.2), crt::constantSpectrum(3), {}};
+        s.materials[3] = {"glass", crt::MaterialType::Dielectric, {}, crt::constantSpectrum(1.5), {}, {}};
+        s.materials[4] = {"flint", crt::MaterialType::Dielectric, {}, dispersiveIndex(), {}, {}};
+        s.meshes[0].material = {1, 2};
+        s.meshes[1].material = {3, 4};
+    });
+    const auto m = listOf<CrtMaterial>(kinds, headerOf(kinds).materials);
+    CHECK(m[1].type == CRT_MATERIAL_MIRROR);
+    CHECK(m[2].type == CRT_MATERIAL_CONDUCTOR);
+    CHECK(m[3].type == CRT_MATERIAL_DIELECTRIC);
+    CHECK(m[3].flags == 0);
+    CHECK(m[4].flags == CRT_MATERIAL_DISPERSIVE);
+    const CrtContext kinds_ctx = contextOf(kinds);
+    CHECK(V4X(crt_spectrum(&kinds_ctx, m[2].a, splat4(7))) == 0.2f);
+    CHECK(V4X(crt_spectrum(&kinds_ctx, m[2].b, splat4(7))) == 3);
+    CHECK(V4X(crt_spectrum(&kinds_ctx, m[4].a, splat4(0))) == 1.6f);
+}
+
+TEST_CASE("emitters: one a triangle, or one a parallelogram, with its area and side", "[compile]") {
+    const CompiledScene c = compiled(litFloor());
+    auto emitters = listOf<CrtEmitter>(c, headerOf(c).emitters);
+    REQUIRE(emitters.size() == 1);
+    CHECK(emitters[0].flags == CRT_EMITTER_PARALLELOGRAM);
+    CHECK(emitters[0].area == 4.0f / 64);
+    CHECK(emitters[0].choice_probability == 1);
+    const auto primitives = listOf<CrtPrimitive>(c, headerOf(c).primitives);
+    CHECK(primitives[0].emitter == CRT_NONE);
+    CHECK(primitives[2].emitter == 0);
+    CHECK(primitives[3].emitter == 0);
+    // A trapezium is two triangles, and so is a quad of which the halves differ.
+    const auto of = [](const std::function<void(Scene&)>& change) {
+        const CompiledScene changed_scene = changed(change);
+        return listOf<CrtEmitter>(changed_scene, headerOf(changed_scene).emitters);
+    };
+    emitters = of([](Scene& s) { s.meshes[1].positions[2][0] = 1.5; });
+    REQUIRE(emitters.size() == 2);
+    CHECK(emitters[0].flags == 0);
+    CHECK(emitters[0].choice_probability + emitters[1].choice_probability == Approx(1));
+    CHECK(emitters[0].choice_probability / emitters[1].choice_probability == Approx(emitters[0].area / emitters[1].area));
+    emitters = of([](Scene& s) {
+        s.emissions.push_back({crt::constantSpectrum(6), true});
+        s.meshes[1].emission = {0, 1};
+    });
+    REQUIRE(emitters.size() == 2);
+    CHECK(emitters[1].flags == CRT_EMITTER_TWO_SIDED);
+    CHECK(emitters[1].choice_probability / emitters[0].choice_probability == Approx(6));  // three times as bright, on both sides
+    CHECK(of([](Scene& s) { s.meshes[1].positions[3] = s.meshes[1].positions[2]; }).size() == 1);  // the half without area gives no light
+    CHECK(of([](Scene& s) { s.emissions[0].radiance = crt::constantSpectrum(0); }).empty());
+    // A lamp of which the eye sees nothing is a lamp.
+    CHECK(of([](Scene& s) {
+              s.emissions[0].radiance = crt::constantSpectrum(0);
+              s.emissions[0].radiance[470] = 1;
+          }).size() == 1);
+}
+
+TEST_CASE("walls with the whole scene before them are not asked whether they occlude", "[compile]") {
+    const auto room = [](bool with_screen) {
+        Scene scene = litFloor();
+        crt::Mesh& mesh = scene.meshes[0];
+        mesh.positions.clear();
+        for (int i = 0; i < 8; ++i) mesh.positions.push_back({static_cast<double>(i & 1), static_cast<double>(i >> 1 & 1), static_cast<double>(i >> 2)});
+        mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4}, {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+        if (with_screen) {
+            mesh.positions.insert(mesh.positions.end(), {{0.2, 0.2, 0.5}, {0.8, 0.2, 0.5}, {0.5, 0.8, 0.5}});
+            mesh.triangles.push_back({8, 9, 10});
+        }
+        scene.objects.resize(1);
+        return scene;
+    };
+    CHECK(headerOf(compiled(room(false))).occluders8.count == 0);
+    CHECK(headerOf(compiled(room(false))).triangles8.count == 2);
+    const CompiledScene screened = compiled(room(true));
+    REQUIRE(headerOf(screened).occluders8.count == 1);
+    const auto block = listOf<CrtTriangle8>(screened, headerOf(screened).occluders8)[0];
+    CHECK(block.slot[0] == 12);
+    CHECK(block.slot[1] == CRT_NONE);
+    // Not of many triangles, where asking would take longer than rendering.
+    Scene many = room(false);
+    many.integrator.accelerator = crt::Accelerator::None;
+    many.objects[0].transforms.resize(6, crt::kIdentity4d);
+    CHECK(headerOf(compiled(many)).occluders8.count == 9);
+}
+
+TEST_CASE("what is left out is listed with a reason, and what is needed is not", "[compile]") {
+    const auto listed = [](const CompiledScene& c, const std::string& what) {
+        return std::any_of(c.left_out.begin(), c.left_out.end(), [&](const auto& entry) { return entry.first == what && entry.second.size() > 5; });
+    };
+    const CompiledScene plain = compiled(litFloor());
+    for (const char* what : {"BVH", "mirror and conductor", "dielectric", "hero wavelength selection", "shading normals", "environment", "thin lens",
+                             "pixel filter table", "AOV buffers", "normals and bounding-box views", "independent sampler", "xorshift sampler"}) {
+        INFO(what);
+        CHECK(listed(plain, what));
+    }
+    for (const char* what : {"Sobol sampler", "emission from surfaces", "light sampling and shadow rays"}) {
+        INFO(what);
+        CHECK_FALSE(listed(plain, what));
+    }
+    Scene rich = litFloor();
+    makeGlass(rich);
+    rich.materials[0].eta = dispersiveIndex();
+    rich.integrator.accelerator = crt::Accelerator::Bvh;
+    rich.camera.aperture_radius = 0.1;
+    rich.film.filter = crt::PixelFilter::BlackmanHarris;
+    rich.environment = crt::Environment{crt::constantSpectrum(1)};
+    const CompiledScene full = compiled(rich, crt::kAovAlbedo);
+    for (const char* what : {"BVH", "dielectric", "hero wavelength selection", "environment", "thin lens", "pixel filter table", "AOV buffers"}) {
+        INFO(what);
+        CHECK_FALSE(listed(full, what));
+    }
+    CHECK(listed(full, "light sampling and shadow rays"));  // glass alone cannot be lit by it
+}
+
+TEST_CASE("AOVs take channels in order, and only those that are asked for", "[compile]") {
+    const CompiledScene none = compiled(litFloor());
+    CHECK(none.channels == CRT_CHANNELS_BASE);
+    const CompiledScene all = compiled(litFloor(), 0xffu);
+    CHECK(headerOf(all).albedo_channel == 4);
+    CHECK(headerOf(all).normal_channel == 7);
+    CHECK(headerOf(all).depth_channel == 10);
+    CHECK(all.channels == CRT_CHANNELS_MAX);
+    const CompiledScene depth = compiled(litFloor(), crt::kAovDepth);
+    CHECK(headerOf(depth).albedo_channel == 0);
+    CHECK(headerOf(depth).depth_channel == 4);
+    CHECK(depth.channels == 5);
+}
+
+TEST_CASE("the hash is the scene's: the same for the same, another for another", "[compile]") {
+    const CompiledScene a = compiled(litFloor()), b = compiled(litFloor());
+    CHECK(a.hash == b.hash);
+    CHECK(sameBytes(a, b));
+    CHECK(a.hash.size() == 32);
+    CHECK(a.hash.find_first_not_of("0123456789abcdef") == std::string::npos);
+    std::set<std::string> hashes{a.hash};
+    for (const std::function<void(Scene&)>& change : std::vector<std::function<void(Scene&)>>{
+             [](Scene& s) { s.sampler.seed = 1; },
+             [](Scene& s) { s.sampler.seed = std::uint64_t{1} << 32; },
+             [](Scene& s) { s.integrator.max_depth = 3; },
+             [](Scene& s) { s.integrator.roulette = false; },
+             [](Scene& s) { s.integrator.nee = false; },
+             [](Scene& s) { s.camera.position[0] = 0.5; },
+             [](Scene& s) { s.film.crop = {1, 2, 3, 4}; },
+             [](Scene& s) { s.film.height = 25; },
+             [](Scene& s) { s.materials[0].reflectance[200] = 0.25; },
+             [](Scene& s) { s.emissions[0].two_sided = true; },
+             [](Scene& s) { s.meshes[0].positions[2][1] = 1e-6; },
+         })
+        hashes.insert(changed(change).hash);
+    CHECK(hashes.size() == 12);
+    // What the film does with the samples afterwards is not the scene's.
+    CHECK(changed([](Scene& s) {
+              s.film.exposure_ev = 2;
+              s.title = "another";
+              s.sampler.samples = 1000;
+          }).hash == a.hash);
+}
+
+TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]") {
+    for (const crt::Accelerator accelerator : {crt::Accelerator::None, crt::Accelerator::Bvh, crt::Accelerator::Aabb}) {
+        const CompiledScene c = changed([&](Scene& s) {
+            s.integrator.accelerator = accelerator;
+            s.film.filter = crt::PixelFilter::Gaussian;
+            s.meshes.push_back(smoothTetrahedron());
+            s.objects.emplace_back();
+            s.objects.back().mesh = 2;
+        });
+        CHECK(reinterpret_cast<std::uintptr_t>(c.data()) % 64 == 0);
+        CHECK(c.size_bytes % 64 == 0);
+        const CrtScene& h = headerOf(c);
+        CHECK(h.magic == CRT_SCENE_MAGIC);
+        CHECK(h.features == c.features);
+        const std::pair<CrtSpan, std::size_t> arrays[] = {
+            {h.triangles, sizeof(CrtTriangle)}, {h.faces, sizeof(CrtFace)}, {h.triangles8, sizeof(CrtTriangle8)}, {h.occluders8, sizeof(CrtTriangle8)},
+            {h.primitives, sizeof(CrtPrimitive)}, {h.normals, sizeof(CrtNormals)}, {h.nodes, sizeof(CrtNode4)}, {h.objects, sizeof(CrtObject)},
+            {h.materials, sizeof(CrtMaterial)}, {h.emitters, sizeof(CrtEmitter)}, {h.spectra, CRT_SPECTRUM_STRIDE * sizeof(f32)}, {h.observer, sizeof(f32)},
+            {h.wavelengths, sizeof(f32)}, {h.filter, sizeof(f32)}};
+        for (const auto& [span, size] : arrays) {
+            if (span.count == 0) continue;
+            CHECK(span.offset % 4 == 0);
+            CHECK(span.offset * std::size_t{16} >= sizeof(CrtScene));
+            CHECK(span.offset * std::size_t{16} + span.count * size <= c.size_bytes);
+        }
+        // Nothing is there that nothing reads.
+        CHECK((h.nodes.count > 0) == (accelerator == crt::Accelerator::Bvh));
+        CHECK((h.triangles8.count > 0) == (accelerator == crt::Accelerator::None));
+        CHECK((h.objects.count > 0) == (accelerator == crt::Accelerator::Aabb));
+        CHECK(h.triangles.count == 8);
+        CHECK(h.primitives.count == 8);
+        CHECK(h.normals.count == 4);
+    }
+}
