@@ -86,7 +86,7 @@ std::string materialsText(const Scene& scene) {
 
 std::string lightsText(const Scene& scene, const CompiledScene& compiled) {
     std::string text;
-    if (compiled.emitters > 0) text = counted(compiled.emitters, "emitting triangle", "emitting triangles");
+    if (compiled.emitters > 0) text = counted(compiled.emitters, "emitting triangle or parallelogram", "emitting triangles or parallelograms");
     if (scene.environment) text += text.empty() ? "constant environment" : ", constant environment";
     return text.empty() ? "none: every image will be black" : text;
 }

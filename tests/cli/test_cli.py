@@ -567,7 +567,7 @@ class Comparing(CliTest):
 class Info(CliTest):
     def test_scene(self):
         text = self.crt("info", "scene.yaml").stdout
-        for word in ("A lamp over a floor", "24 x 16", "2 objects, 4 triangles", "floor (diffuse)", "2 emitting triangles", "a loop over all",
+        for word in ("A lamp over a floor", "24 x 16", "2 objects, 4 triangles", "floor (diffuse)", "1 emitting triangle or parallelogram", "a loop over all",
                      "area-light", "left out", "scene hash"):
             self.assertIn(word, text)
 
