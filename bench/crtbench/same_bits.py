@@ -2,7 +2,8 @@
 variations of Embree (threads, tiles, resumed, merged) are compared with Embree's own image.
 
 The images are half of it: the films, double sums of every pixel, are compared too. Where Embree's differ, both backends render every sample
-number alone and the samples that differ are counted. Times nothing, so it needs no quiet machine."""
+number alone and the samples that differ are counted. Between the fast backends all samples are compared; backends of one thread, and variations of
+one backend, which a quarter of the samples shows as well, have fewer. Times nothing, so it needs no quiet machine."""
 import signal
 import struct
 import subprocess
@@ -12,24 +13,34 @@ from .program import Failure
 from .results import Results
 
 REFERENCE = "opencl"
+FAST = ("opencl", "embree", "cuda")
 
 
 class Film:
-    """A .crtfilm: what is compared is the sums and counts, not the header."""
+    """A .crtfilm: what is compared is sums, counts and primitives of every pixel, not the header."""
 
     def __init__(self, path):
         data = path.read_bytes()
         header_bytes, = struct.unpack_from("<I", data, 12)
-        self.width, self.height, self.channels, _aovs = struct.unpack_from("<4I", data, 32)
+        width, height, channels, aovs = struct.unpack_from("<4I", data, 32)
+        self.pixels = width * height
         self.body = memoryview(data)[header_bytes:]
+        # Two doubles for each channel, a count of 64 bits, and the primitive's number where the scene asks for it.
+        self.strides = [channels * 16, 8] + ([4] if aovs & 8 else [])
 
     def differing_pixels(self, other):
         if self.body == other.body:
             return 0
-        if len(self.body) != len(other.body):
+        if len(self.body) != len(other.body) or self.strides != other.strides:
             raise Failure("two films of one scene have different sizes")
-        pixels, stride = self.width * self.height, self.channels * 16
-        return sum(self.body[p * stride:(p + 1) * stride] != other.body[p * stride:(p + 1) * stride] for p in range(pixels))
+        differing, begin = set(), 0
+        for stride in self.strides:
+            for pixel in range(self.pixels):
+                at = begin + pixel * stride
+                if self.body[at:at + stride] != other.body[at:at + stride]:
+                    differing.add(pixel)
+            begin += self.pixels * stride
+        return len(differing)
 
 
 class Images:
@@ -37,7 +48,7 @@ class Images:
 
     def __init__(self, program, scene, size, spp):
         self.program, self.scene, self.size, self.spp = program, scene, size, spp
-        self.folder = program.scratch / scene
+        self.folder = program.scratch / f"{scene}-{spp}"
         self.folder.mkdir()
 
     def arguments(self, backend, outputs, more):
@@ -90,7 +101,7 @@ class Images:
         image = self.program.compare(self.folder / f"{name}.exr", self.folder / f"{reference}.exr")
         film = Film(self.folder / f"{name}.crtfilm").differing_pixels(Film(self.folder / f"{reference}.crtfilm"))
         return {"differing_pixels": image["differing_pixels"], "differing_film_pixels": film, "metrics": image["metrics"],
-                "channels": image["channels"], "pixels": self.size * self.size}
+                "channels": image["channels"], "pixels": self.size * self.size, "spp": self.spp}
 
     def differing_samples(self, backend, reference):
         """Every sample number alone, counted where the sums of a pixel differ."""
@@ -104,7 +115,7 @@ class Images:
 
 
 def measure(program, arguments):
-    size, spp = (64, 64) if arguments.tiny else (256, 64)
+    size, spp, fewer = (64, 64, 64) if arguments.tiny else (256, 64, 16)
     usable, absent = program.backends(["opencl", "embree", "cuda", "example", "cuda_on_host"])
     if REFERENCE not in usable:
         raise Failure(f"the reference backend '{REFERENCE}' cannot run: {absent[REFERENCE]}")
@@ -115,37 +126,42 @@ def measure(program, arguments):
     failures = 0
     for scene in scenes:
         print(f"{scene} …", flush=True)
-        images = Images(program, scene, size, spp)
-        images.render("reference", REFERENCE)
         column = {}
 
-        def check(label, name, reference="reference", column=column, images=images):
+        def check(images, label, name, reference, column=column):
             column[label] = images.compare(name, reference)
             print(f"  {label}: {column[label]['differing_pixels']} pixels differ", flush=True)
 
+        everything = Images(program, scene, size, spp)
+        everything.render(REFERENCE, REFERENCE)
         for backend in usable:
-            if backend != REFERENCE:
-                check(f"{backend} : opencl", images.render(backend, backend))
-        for backend in [b for b in ("opencl", "embree") if b in usable]:
-            own = "reference" if backend == REFERENCE else backend
-            for threads in (1, 2, 7):
-                check(f"{backend}, {threads} thread{'s' if threads > 1 else ''}", images.render(f"{backend}-t{threads}", backend, ["--threads", threads]), own)
-            for tile in (8, 37, 128):
-                check(f"{backend}, tiles of {tile}", images.render(f"{backend}-tile{tile}", backend, ["--tile", tile]), own)
-            check(f"{backend}, 5 samples at a time", images.render(f"{backend}-chunk", backend, ["--chunk", 5]), own)
-            check(f"{backend}, full kernel", images.render(f"{backend}-full", backend, ["--kernel", "full"]), own)
-            check(f"{backend}, two halves merged", images.merged(f"{backend}-merged", backend, backend), own)
+            if backend in FAST and backend != REFERENCE:
+                check(everything, f"{backend} : {REFERENCE}", everything.render(backend, backend), REFERENCE)
+        images = everything if fewer == spp else Images(program, scene, size, fewer)
+        for backend in usable:
+            if images is not everything and backend in FAST:
+                images.render(backend, backend)
+            if backend not in FAST:
+                check(images, f"{backend} : {REFERENCE}", images.render(backend, backend), REFERENCE)
+        for backend in [b for b in FAST if b in usable]:
+            threads = (1, 2, 7) if backend != "cuda" else ()
+            variations = {f"{n} thread{'s' if n > 1 else ''}": ["--threads", n] for n in threads}
+            variations |= {f"tiles of {n}": ["--tile", n] for n in (8, 37, 128)}
+            variations |= {"5 samples at a time": ["--chunk", 5], "full kernel": ["--kernel", "full"]}
+            for number, (what, more) in enumerate(variations.items()):
+                check(images, f"{backend}, {what}", images.render(f"{backend}-{number}", backend, more), backend)
+            check(images, f"{backend}, two halves merged", images.merged(f"{backend}-merged", backend, backend), backend)
             name, stopped_after = images.resumed(f"{backend}-resumed", backend)
-            check(f"{backend}, stopped and resumed", name, own)
+            check(images, f"{backend}, stopped and resumed", name, backend)
             column[f"{backend}, stopped and resumed"]["stopped_after_samples"] = stopped_after
         if "example" in usable:
-            check("merged of opencl and example", images.merged("mixed", "opencl", "example"))
+            check(images, f"halves of {REFERENCE} and example merged", images.merged("mixed", REFERENCE, "example"), REFERENCE)
 
         for label, result in column.items():
             if result["differing_pixels"] == 0 and result["differing_film_pixels"] == 0:
                 result["differing_samples"] = 0
             elif label == "embree : opencl":
-                result["differing_samples"] = images.differing_samples("embree", REFERENCE)
+                result["differing_samples"] = everything.differing_samples("embree", REFERENCE)
                 result["samples"] = size * size * spp
         data[scene] = column
         for label, result in column.items():
@@ -158,10 +174,11 @@ def measure(program, arguments):
     comparisons = sum(len(column) for column in data.values())
     equal = sum(r["differing_pixels"] == 0 and r["differing_film_pixels"] == 0 for column in data.values() for r in column.values())
     results.paragraph(
-        f"Every scene at {size} × {size} pixels and {spp} samples per pixel, rendered in every way there is here, and the images compared bit by "
+        f"Every scene at {size} × {size} pixels, rendered in every way there is here, and the images compared bit by "
         f"bit in all their channels, AOVs included. **{equal} of {comparisons} comparisons: the same bits in every pixel.** A cell is the number "
         f"of pixels, of {size * size}, in which any bit of any channel differs; in brackets the same for the film, the double sums that the image is "
-        "rounded from, where that number is another. `a : b` compares two backends; the other rows compare one backend with itself.")
+        "rounded from, where that number is another. `a : b` compares two backends; the other rows compare one backend with "
+        "itself.")
     rows = []
     for label, by_scene in table.items():
         cells = []
@@ -169,8 +186,8 @@ def measure(program, arguments):
             result = by_scene[scene]
             image, film = result["differing_pixels"], result["differing_film_pixels"]
             cells.append(f"{image}" + (f" ({film})" if film != image else ""))
-        rows.append([label, *cells])
-    results.table(["", *scenes], rows)
+        rows.append([label, by_scene[scenes[0]]["spp"], *cells])
+    results.table(["", "samples per pixel", *scenes], rows)
 
     if "embree" in usable:
         counted = {scene: column["embree : opencl"]["differing_samples"] for scene, column in data.items()}
@@ -179,16 +196,16 @@ def measure(program, arguments):
                           + ", ".join(f"{scene} {n}" + (f" ({n / total:.1e})" if n else "") for scene, n in counted.items())
                           + ". The bound that crt sets itself is 1e-6.")
     stopped = "; ".join(f"{scene} " + ", ".join(f"{b} {column[f'{b}, stopped and resumed']['stopped_after_samples']}"
-                                                for b in ("opencl", "embree") if f"{b}, stopped and resumed" in column)
+                                                for b in FAST if f"{b}, stopped and resumed" in column)
                         for scene, column in data.items())
-    results.paragraph(f"Stopped by SIGINT after so many of {spp} samples per pixel, then resumed: {stopped}.")
+    results.paragraph(f"Stopped by SIGINT after so many of {fewer} samples per pixel, then resumed: {stopped}.")
     results.paragraph("`example` is the kernel as portable C++, `cuda_on_host` the CUDA backend's entry points compiled for the host; both run "
                       "on one thread.")
     for name, reason in absent.items():
         results.paragraph(f"Not compared: `{name}` ({reason}).")
     results.command(f"crt render configs/SCENE.yaml --set 'film.resolution=[{size},{size}]' --spp {spp} --backend BACKEND -o a.exr -o a.crtfilm")
     results.command("crt compare --all-channels --json a.exr b.exr")
-    results.data = {"size": size, "spp": spp, "reference": REFERENCE, "absent": absent, "scenes": data}
+    results.data = {"size": size, "reference": REFERENCE, "absent": absent, "scenes": data}
     results.write()
     if failures:
         print(f"{failures} comparisons are beyond what is promised")
