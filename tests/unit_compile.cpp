@@ -389,7 +389,7 @@ TEST_CASE("wavelength and filter tables are monotone, complete, and distributed 
     }
 }
 
-TEST_CASE("materials: the face's own, the object's, or grey; equal spectra once, unused ones never", "[compile]") {
+TEST_CASE("materials: the face's own, the object's, or grey, and equal spectra once", "[compile]") {
     Scene scene = litFloor();
     scene.objects[1].emission = -1;
     scene.materials.resize(4);
