@@ -115,6 +115,8 @@ class Images:
 
 
 def measure(program, arguments):
+    # Started in the background, a shell would have us ignore SIGINT, and crt would inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     size, spp, fewer = (64, 64, 64) if arguments.tiny else (256, 64, 16)
     usable, absent = program.backends(["opencl", "embree", "cuda", "example", "cuda_on_host"])
     if REFERENCE not in usable:
