@@ -466,11 +466,14 @@ TEST_CASE("emitters: one a triangle, or one a parallelogram, with its area and s
     CHECK(emitters[1].choice_probability / emitters[0].choice_probability == Approx(6));  // three times as bright, on both sides
     CHECK(of([](Scene& s) { s.meshes[1].positions[3] = s.meshes[1].positions[2]; }).size() == 1);  // the half without area gives no light
     CHECK(of([](Scene& s) { s.emissions[0].radiance = crt::constantSpectrum(0); }).empty());
-    // A lamp of which the eye sees nothing is a lamp.
-    CHECK(of([](Scene& s) {
-              s.emissions[0].radiance = crt::constantSpectrum(0);
-              s.emissions[0].radiance[470] = 1;
-          }).size() == 1);
+    // A lamp of which the eye sees next to nothing is chosen more often than its luminance says.
+    emitters = of([](Scene& s) {
+        s.emissions.push_back({crt::constantSpectrum(0), false});
+        s.emissions[1].radiance[470] = 1;
+        s.meshes[1].emission = {0, 1};
+    });
+    REQUIRE(emitters.size() == 2);
+    CHECK(emitters[1].choice_probability > 1e-7f);
 }
 
 TEST_CASE("walls with the whole scene before them are not asked whether they occlude", "[compile]") {
