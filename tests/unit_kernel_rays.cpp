@@ -633,6 +633,28 @@ TEST_CASE("no path leaves a closed room, and none meets the wall that it leaves"
     CHECK(static_cast<double>(all.dark) < 2e-4 * static_cast<double>(all.lit));
 }
 
+TEST_CASE("a ray starts on the side that it goes to, reflected or refracted", "[kernel][rays]") {
+    Random random(31);
+    std::uint64_t wrong = 0;
+    for (int i = 0; i < 2000; ++i) {
+        const crt::CompiledScene compiled = crt::compileScene(sceneOf(soup(random, 2), Accelerator::None), 0);
+        const CrtContext ctx = contextOf(compiled);
+        for (int k = 0; k < 50; ++k) {
+            CrtHit hit = crt_no_hit(CRT_INFINITY);
+            hit.slot = hit.id = random.below(2);
+            hit.b1 = static_cast<f32>(random.uniform(0, 0.5));
+            hit.b2 = static_cast<f32>(random.uniform(0, 0.5));
+            const CrtSurface surface = crt_surface(&ctx, hit);
+            const vec3 w = toFloat(random.direction());
+            const Vec3d o = toDouble(crt_offset_origin(surface.p, surface.clearance, surface.ng, w));
+            const CrtTriangle& t = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles)[hit.slot];
+            const Vec3d a = toDouble(vertexOf(t, 0)), n = cross(minus(toDouble(vertexOf(t, 1)), a), minus(toDouble(vertexOf(t, 2)), a));
+            wrong += (dot(minus(o, a), n) > 0) != (dot(toDouble(w), n) > 0);
+        }
+    }
+    CHECK(wrong == 0);
+}
+
 TEST_CASE("parallel layers at 1e-5 of their size are seen", "[kernel][rays]") {
     // An offset that is safe because it is large steps over the neighbour. From anywhere on the lower layer but its rim, the upper one is met.
     Random random(29);
