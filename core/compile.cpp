@@ -239,7 +239,8 @@ private:
             case Accelerator::Auto:
                 header_.accelerator = triangles_.size() <= kBruteForceTriangles ? CRT_ACCELERATOR_BRUTE_FORCE : CRT_ACCELERATOR_BVH;
         }
-        if (triangles_.empty()) header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;
+        // Nothing to find, or, in the view of the boxes, nobody who looks.
+        if (triangles_.empty() || scene_.integrator.type == IntegratorType::Aabb) header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;
     }
 
     TriangleBounds boundsOf(std::size_t i) const {
@@ -279,7 +280,7 @@ private:
         std::vector<kernel::CrtFace> faces(count);
         for (std::size_t i = 0; i < count; ++i) faces[slot_of_[i]] = faceOf(i);
         header_.faces = blob_.append(faces);
-        if (header_.accelerator == CRT_ACCELERATOR_BRUTE_FORCE) {
+        if (header_.accelerator == CRT_ACCELERATOR_BRUTE_FORCE && scene_.integrator.type != IntegratorType::Aabb) {
             std::vector<std::uint32_t> all(count), occluders;
             for (std::uint32_t i = 0; i < count; ++i) {
                 all[i] = i;
