@@ -58,7 +58,7 @@ const char* spaceName(ColorSpace space) {
 
 }  // namespace
 
-SampleRanges::SampleRanges(std::vector<SampleRange> ranges) {
+SampleRanges::SampleRanges(const std::vector<SampleRange>& ranges) {
     for (const SampleRange& range : ranges) add(range);
 }
 

@@ -23,7 +23,7 @@ using SampleRange = std::pair<std::uint64_t, std::uint64_t>;
 class SampleRanges {
 public:
     SampleRanges() = default;
-    explicit SampleRanges(std::vector<SampleRange> ranges);
+    explicit SampleRanges(const std::vector<SampleRange>& ranges);
     /// Throws crt::Error(Usage) when `range` overlaps what is there.
     void add(SampleRange range);
     std::uint64_t count() const;

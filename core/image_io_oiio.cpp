@@ -75,7 +75,7 @@ void addMetadata(ImageSpec& spec, const CrtImageText* metadata, std::uint32_t co
     }
 }
 
-void writeWith(const char* format, const char* path, const ImageSpec& spec, TypeDesc type, const void* pixels) {
+void writeWith(const char* format, const char* path, const ImageSpec& spec, const TypeDesc& type, const void* pixels) {
     const std::unique_ptr<ImageOutput> output = ImageOutput::create(format);
     if (!output) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
     if (!output->open(path, spec)) throw Failure{wordsOr(output->geterror(), "the file cannot be opened")};

@@ -316,9 +316,9 @@ private:
         return static_cast<unsigned>(n);
     }
 
-    static CLI::Validator oneOf(std::vector<std::string> words) {
+    static CLI::Validator oneOf(std::vector<std::string> choices) {
         return CLI::Validator(
-            [words](std::string& text) {
+            [words = std::move(choices)](std::string& text) {
                 if (std::find(words.begin(), words.end(), text) != words.end()) return std::string();
                 const std::string hint = didYouMean(text, words);
                 return fmt::format("takes one of {}, not '{}'{}", fmt::join(words, ", "), text, hint.empty() ? "" : "; " + hint);

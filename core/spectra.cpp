@@ -37,7 +37,7 @@ Spectrum resample(const std::vector<double>& x, const std::vector<double>& y, Ou
     return s;
 }
 
-[[noreturn]] void fail(std::string sentence, SourcePlace place = {}) {
+[[noreturn]] void fail(const std::string& sentence, SourcePlace place = {}) {
     throw Error(ErrorKind::Scene, sentence, std::move(place));
 }
 
