@@ -28,6 +28,15 @@ std::string firstLines(const std::string& text, int line_count) {
     return text.substr(0, end) + "(more lines follow)";
 }
 
+/// NVRTC asks the loader for its companion by bare name, which finds it only in the system's folders. One that lies beside an NVRTC opened by path is
+/// loaded beforehand: the loader then knows it by its name. Without it, compiling fails with a message that says so.
+void loadBuiltins(const std::string& nvrtc_path, int major, int minor) {
+    const std::size_t slash = nvrtc_path.rfind('/');
+    if (slash == std::string::npos) return;
+    const std::string name = "libnvrtc-builtins.so." + std::to_string(major) + "." + std::to_string(minor);
+    dlopen((nvrtc_path.substr(0, slash + 1) + name).c_str(), RTLD_NOW | RTLD_LOCAL);
+}
+
 int isAbandoned(void* flag, void*) { return static_cast<const std::atomic<bool>*>(flag)->load() ? 1 : 0; }
 
 }  // namespace
@@ -65,6 +74,7 @@ Nvrtc Nvrtc::open(const std::vector<std::string>& candidates) {
             refusals = path + " is too old: CUDA 11.2 is the least";
             continue;
         }
+        loadBuiltins(path, nvrtc.major_, nvrtc.minor_);
         nvrtc.archs_.resize(static_cast<std::size_t>(count));
         if (count > 0) nvrtc.nvrtcGetSupportedArchs_(nvrtc.archs_.data());
         nvrtc.set_flow_callback_ = reinterpret_cast<SetFlowCallback>(dlsym(library, "nvrtcSetFlowCallback"));
