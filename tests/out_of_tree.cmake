@@ -1,5 +1,5 @@
-# The road of somebody who writes a backend: install crt, move the tree to where he wants it, build docs/example_backend against it, and find
-# it usable. Nothing of the source or build tree of crt is used after the install.
+# The road of somebody who writes a backend: install crt, move the tree to where he wants it, build docs/example_backend against it, and see
+# that it is usable and passes the ABI part of the conformance suite. Nothing of the source or build tree of crt is used after the install but that suite.
 #
 #   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=… [-DCXX_FLAGS=…] -P out_of_tree.cmake
 
@@ -33,6 +33,12 @@ run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${WORK_DIR}/example_backend -B ${WORK_DI
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
 run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${WORK_DIR}/moved/bin/crt plugins)
 expect_usable("${output}" "by CRT_BACKEND_PATH")
+
+# The border's part of the conformance suite, on the backend that crt has never seen.
+run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${BUILD_DIR}/bin/crt_conformance --backend example --against example "[abi]")
+if(NOT output MATCHES "All tests passed")
+  message(FATAL_ERROR "the out-of-tree backend was not tested:\n${output}")
+endif()
 
 run(${CMAKE_COMMAND} --install ${WORK_DIR}/build --prefix ${WORK_DIR}/moved)
 run(${CMAKE_COMMAND} -E env --unset=CRT_BACKEND_PATH ${WORK_DIR}/moved/bin/crt plugins)
