@@ -24,7 +24,7 @@ namespace {
 
 using kernel::CrtSpan;
 
-/// Up to this many triangles the brute-force loop beats the BVH: measured by bench/accelerators, docs/results/accelerators.md.
+/// Up to this many triangles `auto` takes the brute-force loop. A choice, not yet a measurement: `bench/run accelerators` finds the crossover.
 constexpr std::size_t kBruteForceTriangles = 64;
 
 /// Around boxes, in lengths after normalisation (coordinates within ±1): the triangle test accepts hits whose offset from the ray
