@@ -3,9 +3,9 @@
 #   crt-portable.tar.gz        the program, its backends, scenes, meshes, and the libraries they need but glibc's and the compiler's
 #   crt-portable-tests.tar.gz  the conformance suite and its reference backend, to be unpacked over the first
 #
-# Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's. Two things stay behind, because they
-# alone are larger than all the rest: OpenImageIO and the 250 libraries it brings, so images are written as .pfm and .ppm, not .exr and .png; and the
-# dragon's mesh, which `bin/crt-meshgen share/crt/meshes` makes in some seconds. The GPU's driver and NVRTC are the machine's own.
+# Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's. OpenImageIO and the 250 libraries it brings
+# stay behind, being larger than all the rest: images are written as .pfm and .ppm, not .exr and .png. The GPU's driver and NVRTC are the
+# machine's own.
 #
 # Run as a script (cmake -P) it makes the archives from a build tree; the target does so with everything built.
 
@@ -43,7 +43,7 @@ if(CMAKE_SCRIPT_MODE_FILE)
   run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${tree})
   file(REMOVE_RECURSE ${tree}/include ${tree}/lib/cmake)
   file(GLOB archives ${tree}/lib/*.a)
-  file(REMOVE ${archives} ${tree}/lib/crt/crt_image_oiio.so ${tree}/share/crt/meshes/dragon.obj)
+  file(REMOVE ${archives} ${tree}/lib/crt/crt_image_oiio.so)
   file(COPY ${BUILD_DIR}/bin/crt-meshgen DESTINATION ${tree}/bin)
 
   # glibc must fit the kernel and the dynamic loader of the machine, and its drivers may need a newer libstdc++ than ours: those are its own.
