@@ -4,6 +4,7 @@
 #include "error.h"
 #include "job.h"
 #include "log.h"
+#include "verify/command.h"
 #include "yaml_reader.h"
 
 #include <CLI/CLI.hpp>
@@ -40,7 +41,7 @@ Half of the samples here and half on another machine, then both together:
 
 constexpr const char* kExitCodes = R"(
 Exit codes: 0 done, 1 internal error, 2 command line, 3 scene, 4 backend or device not available,
-5 device failed (what there was is saved), 6 output not written, 7 images differ,
+5 device failed (what there was is saved), 6 output not written, 7 images differ or a case of verify fails,
 130 and 143 stopped by Ctrl-C or kill (image and checkpoint are saved).
 )";
 
@@ -112,6 +113,7 @@ public:
         addInfo();
         addCompare();
         addMerge();
+        addVerify();
         addPlugins();
         addSchema();
         app_.footer(std::string(kExamples) + kExitCodes);  // Now: commands inherit what is there when they are added.
@@ -296,6 +298,53 @@ private:
         merge->add_flag_callback("-q,--quiet", [this] { beQuiet(); }, "only warnings and errors");
     }
 
+    void addVerify() {
+        CLI::App* command = addCommand("verify", "render scenes whose answer is known; exit code 7 when a backend does not find it",
+                                       [this] { return verify::verify(verify_); });
+        command->footer("\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, deterministic quadrature, relations between\n"
+                        "images. A case passes, is refused as documented, does not apply (and says why), is INCONCLUSIVE (the noise hides the answer) or\n"
+                        "FAILS; the last two make the exit code 7, and the line below says what the figures suggest. docs/stability.md describes every case.\n"
+                        "\nExamples:\n"
+                        "  crt verify                                          the level for every commit, on the best backend\n"
+                        "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.html and out/verify.json\n"
+                        "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
+                        "  crt verify --backend mine --plugin-path build       a backend of your own\n"
+                        "  crt verify --list --level nightly                   everything there is\n");
+        const char* group = "What is asked";
+        reader_.repeatable(*command, "--case", "NAME", "only these: ids (A03), names (furnace), groups (H), with commas or repeated",
+                       [this](const std::string& text) { verify_.cases.push_back(text); })
+            ->group(group);
+        reader_.option(*command, "--level", "LEVEL", "commit (a minute or so), merge (a quarter of an hour) or nightly",
+                       [this](const std::string& text) { verify_.level = *verify::levelNamed(text); })
+            ->check(oneOf({"commit", "merge", "nightly"}))
+            ->group(group);
+        command->add_flag("--list", verify_.list, "show the cases and run nothing")->group(group);
+        group = "Of whom";
+        reader_.option(*command, "-b,--backend", "NAME", "cuda, embree, opencl, another, a path of one, or auto (CRT_BACKEND)",
+                       [this](const std::string& text) { verify_.backend = text; })
+            ->envname("CRT_BACKEND")
+            ->group(group);
+        reader_.option(*command, "--plugin-path", "DIR", "look for the backend here first",
+                       [this](const std::string& text) { verify_.plugin_path = text; })
+            ->group(group);
+        reader_.option(*command, "-d,--device", "NAME", "number or part of the name, as 'crt plugins' lists them (CRT_DEVICE)",
+                       [this](const std::string& text) { verify_.integrator.device = text; })
+            ->envname("CRT_DEVICE")
+            ->group(group);
+        reader_.option(*command, "-t,--threads", "N", "threads of the processor; 0 for all",
+                       [this](const std::string& text) { verify_.integrator.threads = smallCount(text, "--threads", 0); })
+            ->group(group);
+        group = "Output";
+        reader_.option(*command, "-o,--output", "DIR", "write verify.json and verify.html there",
+                       [this](const std::string& text) { verify_.output = text; })
+            ->group(group);
+        command->add_flag("-q,--quiet", verify_.quiet, "only what fails, and the summary")->group(group);
+        command->add_flag("--markdown", verify_.markdown, "print docs/stability.md instead")->group(group);
+        reader_.repeatable(*command, "--figures", "FILE", "with --markdown: a verify.json whose figures go into it; repeatable",
+                       [this](const std::string& text) { verify_.suites.push_back(text); })
+            ->group(group);
+    }
+
     void addPlugins() {
         addCommand("plugins", "list the backends, their devices, and why one cannot run", [] { return listPlugins(); });
     }
@@ -333,6 +382,7 @@ private:
     SceneRequest info_;
     CompareArguments compare_;
     MergeArguments merge_;
+    verify::Arguments verify_;
     bool markdown_ = false;
 };
 

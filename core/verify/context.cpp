@@ -1,0 +1,235 @@
+#include "verify/context.h"
+
+#include "compile.h"
+#include "error.h"
+#include "verify/physics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace crt::verify {
+namespace {
+
+constexpr double kConfidence = 0.999;
+
+stats::Interval meanOf(const std::vector<double>& replicates) { return stats::meanInterval(stats::summarize(replicates), kConfidence); }
+
+stats::Interval relativeTo(double expected, const stats::Interval& i) { return {i.lower - expected, i.upper - expected}; }
+
+Verdict verdictOf(stats::Verdict verdict) {
+    switch (verdict) {
+        case stats::Verdict::Pass: return Verdict::Pass;
+        case stats::Verdict::Fail: return Verdict::Fail;
+        case stats::Verdict::Inconclusive: break;
+    }
+    return Verdict::Inconclusive;
+}
+
+std::string percent(double delta) { return fmt::format("± {:g} %, 99.9 % interval", 100 * delta); }
+
+/// Differing pixels, as the floats that are written.
+std::uint64_t differingPixels(const Film& a, const Film& b) {
+    std::uint64_t differing = 0;
+    for (std::uint32_t y = 0; y < a.shape().height; ++y)
+        for (std::uint32_t x = 0; x < a.shape().width; ++x) {
+            const std::size_t pixel = static_cast<std::size_t>(y) * a.shape().width + x;
+            bool same = a.counts[pixel] == b.counts[pixel] && (a.primitives.empty() || a.primitives[pixel] == b.primitives[pixel]);
+            for (std::uint32_t c = 0; c < a.shape().channels; ++c)
+                same = same && static_cast<float>(a.mean(x, y, c)) == static_cast<float>(b.mean(x, y, c));
+            differing += same ? 0 : 1;
+        }
+    return differing;
+}
+
+}  // namespace
+
+Context::Context(const LoadedBackend& backend, const IntegratorOptions& options, Level level) : backend_(backend), options_(options), level_(level) {}
+
+Scene Context::scene(const std::string& yaml, const std::vector<SceneOverride>& overrides) const { return parseScene(yaml, "case.yaml", ".", overrides); }
+
+Integrator& Context::integratorFor(const Render& how) {
+    auto& integrator = integrators_[{static_cast<int>(how.kernel), how.threads, how.tile_size}];
+    if (!integrator) {
+        IntegratorOptions options = options_;
+        options.kernel = how.kernel;
+        if (how.threads != 0) options.threads = how.threads;
+        options.tile_size = how.tile_size;
+        integrator = std::make_unique<Integrator>(backend_, options);
+    }
+    return *integrator;
+}
+
+Film Context::render(const std::string& yaml, const Render& how) { return render(scene(yaml), how); }
+
+Film Context::render(const Scene& original, const Render& how) {
+    Scene with_seed;
+    const Scene* what = &original;
+    if (how.seed && *how.seed != original.sampler.seed) {
+        with_seed = original;
+        with_seed.sampler.seed = *how.seed;
+        what = &with_seed;
+    }
+    const CompiledScene compiled = compileScene(*what, how.aovs);
+    Integrator& integrator = integratorFor(how);
+    integrator.setScene(compiled);
+    integrator.render({.first_sample = how.first_sample, .sample_count = how.samples});
+    Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+    integrator.readFilm(film);
+    if (const std::uint64_t invalid = film.invalidSamples(); invalid > 0)
+        holds("every sample is finite", false, "0 samples",
+              "a division by zero, or a square root of a negative number, on the way", fmt::format("{} samples were NaN or infinite", invalid));
+    return film;
+}
+
+void Context::relative(const std::string& what, double measured, double expected, double tolerance, const std::vector<Mistake>& mistakes) {
+    Outcome o;
+    o.what = what;
+    o.measured = measured;
+    o.expected = expected;
+    o.tolerance = expected == 0 ? "exactly" : fmt::format("{:g} relative", tolerance);
+    o.verdict = std::abs(measured - expected) <= tolerance * std::abs(expected) ? Verdict::Pass : Verdict::Fail;
+    if (o.verdict == Verdict::Fail) o.physics = diagnose(measured, expected, 0, mistakes);
+    add(std::move(o));
+}
+
+void Context::absolute(const std::string& what, double measured, double expected, double tolerance, const std::vector<Mistake>& mistakes) {
+    Outcome o;
+    o.what = what;
+    o.measured = measured;
+    o.expected = expected;
+    o.tolerance = fmt::format("± {:g}", tolerance);
+    o.verdict = std::abs(measured - expected) <= tolerance ? Verdict::Pass : Verdict::Fail;
+    if (o.verdict == Verdict::Fail) o.physics = diagnose(measured, expected, tolerance, mistakes);
+    add(std::move(o));
+}
+
+void Context::equivalent(const std::string& what, const std::vector<double>& replicates, double expected, double delta,
+                         const std::vector<Mistake>& mistakes) {
+    const stats::Interval interval = meanOf(replicates);
+    Outcome o;
+    o.what = what;
+    o.measured = interval.center();
+    o.expected = expected;
+    o.interval = interval;
+    o.tolerance = percent(delta);
+    o.verdict = verdictOf(stats::equivalence(relativeTo(expected, interval), delta * std::abs(expected)));
+    if (o.verdict == Verdict::Fail) o.physics = diagnose(interval.center(), expected, interval.halfWidth(), mistakes);
+    if (o.verdict == Verdict::Inconclusive)
+        o.physics = fmt::format("the interval is ± {:.3g} % wide: the noise is larger than the budget of samples allows for",
+                                100 * interval.halfWidth() / std::abs(expected));
+    add(std::move(o));
+}
+
+void Context::estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected, double delta, const Effort& effort,
+                       const std::vector<Mistake>& mistakes) {
+    const Scene parsed = scene(yaml);
+    std::vector<Film> films;
+    std::vector<double> replicates(static_cast<std::size_t>(effort.seeds));
+    for (std::uint64_t there = 0, wanted = effort.samples;; wanted = std::min(4 * wanted, effort.most)) {
+        for (std::size_t i = 0; i < replicates.size(); ++i) {
+            Film more = render(parsed, {.samples = wanted - there, .first_sample = there, .seed = 1 + i});
+            if (there == 0)
+                films.push_back(std::move(more));
+            else
+                films[i].add(more);
+            replicates[i] = measure(films[i]);
+        }
+        there = wanted;
+        const stats::Verdict verdict = stats::equivalence(relativeTo(expected, meanOf(replicates)), delta * std::abs(expected));
+        if (verdict != stats::Verdict::Inconclusive || wanted >= effort.most) break;
+    }
+    equivalent(what, replicates, expected, delta, mistakes);
+}
+
+void Context::rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound, const std::string& physics) {
+    Outcome o;
+    o.what = what;
+    const stats::Interval interval = stats::clopperPearson(failures, trials, kConfidence);
+    o.measured = static_cast<double>(failures) / static_cast<double>(trials);
+    o.expected = 0;
+    o.interval = interval;
+    o.tolerance = fmt::format("rate ≤ {:g}, 99.9 % interval", bound);
+    o.note = fmt::format("{} of {}", failures, trials);
+    o.verdict = interval.upper <= bound ? Verdict::Pass : (interval.lower > bound ? Verdict::Fail : Verdict::Inconclusive);
+    if (failed(o.verdict)) o.physics = physics;
+    add(std::move(o));
+}
+
+void Context::sameBits(const std::string& what, const Film& a, const Film& b, const std::string& physics) {
+    const bool comparable = a.shape() == b.shape();
+    const std::uint64_t differing = comparable ? differingPixels(a, b) : 0;
+    holds(what, comparable && differing == 0, "same bits", physics,
+          comparable ? fmt::format("{} of {} pixels differ", differing, a.counts.size()) : std::string("films of different shapes"));
+}
+
+void Context::holds(const std::string& what, bool true_, const std::string& tolerance, const std::string& physics, const std::string& note) {
+    Outcome o;
+    o.what = what;
+    o.verdict = true_ ? Verdict::Pass : Verdict::Fail;
+    o.tolerance = tolerance;
+    o.note = note;
+    if (!true_) o.physics = physics;
+    add(std::move(o));
+}
+
+void Context::refused(const std::string& what, const std::string& yaml, const std::string& words) {
+    Outcome o;
+    o.what = what;
+    o.tolerance = fmt::format("refused, saying \"{}\"", words);
+    try {
+        compileScene(scene(yaml), 0);
+        o.verdict = Verdict::Fail;
+        o.physics = "accepted, though nothing sensible can be rendered from it";
+    } catch (const Error& error) {
+        const std::string text = error.what();
+        o.note = text.substr(0, text.find('\n'));
+        o.verdict = text.find(words) != std::string::npos && error.kind() == ErrorKind::Scene ? Verdict::Refused : Verdict::Fail;
+        if (o.verdict == Verdict::Fail) o.physics = "refused, but with another message";
+    }
+    add(std::move(o));
+}
+
+void Context::notApplicable(const std::string& what, const std::string& reason) {
+    Outcome o;
+    o.what = what;
+    o.verdict = Verdict::NotApplicable;
+    o.note = reason;
+    add(std::move(o));
+}
+
+void Context::add(Outcome outcome) { outcomes_.push_back(std::move(outcome)); }
+
+std::vector<Outcome> Context::take() { return std::exchange(outcomes_, {}); }
+
+double radiance(const Film& film, std::uint32_t x, std::uint32_t y) {
+    static const double unit = [] {
+        const Vec3d xyz = spectrumToXyz(constantSpectrum(1));
+        return xyz[0] + xyz[1] + xyz[2];
+    }();
+    return (film.mean(x, y, 0) + film.mean(x, y, 1) + film.mean(x, y, 2)) / unit;
+}
+
+namespace {
+
+template <class OfPixel>
+double meanOver(const Film& film, OfPixel ofPixel) {
+    double sum = 0;
+    for (std::uint32_t y = 0; y < film.shape().height; ++y)
+        for (std::uint32_t x = 0; x < film.shape().width; ++x) sum += ofPixel(x, y);
+    return sum / (static_cast<double>(film.shape().width) * film.shape().height);
+}
+
+}  // namespace
+
+double radiance(const Film& film) {
+    return meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return radiance(film, x, y); });
+}
+
+double luminance(const Film& film) {
+    return meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return film.mean(x, y, 1); });
+}
+
+}  // namespace crt::verify

@@ -1,0 +1,102 @@
+/// What a case has in its hands: the backend under test, renders of scenes given as YAML, and the checks that turn figures into outcomes.
+#pragma once
+
+#include "backend/integrator.h"
+#include "backend/loader.h"
+#include "film.h"
+#include "scene_yaml.h"
+#include "verify/case.h"
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace crt::verify {
+
+/// How a scene is rendered.
+struct Render {
+    std::uint64_t samples = 16;
+    std::uint64_t first_sample = 0;
+    std::optional<std::uint64_t> seed{};  ///< Instead of the scene's.
+    std::uint32_t aovs = 0;
+    CrtKernelChoice kernel = CRT_KERNEL_LEAN;
+    unsigned threads = 0;
+    unsigned tile_size = 0;
+};
+
+/// A value that a known mistake would give instead of the right one. A failing check names the mistake whose value it found.
+struct Mistake {
+    double value;
+    std::string physics;
+};
+
+/// How many samples an estimate may take. It begins with `samples` a pixel and seed, and goes on with four times as many while it cannot tell.
+struct Effort {
+    std::uint64_t samples = 64;
+    std::uint64_t most = 4096;
+    int seeds = 16;
+};
+
+/// A number that is made of a film: the mean radiance, one pixel, a ratio.
+using Measure = std::function<double(const Film&)>;
+
+class Context {
+public:
+    Context(const LoadedBackend& backend, const IntegratorOptions& options, Level level);
+
+    const LoadedBackend& backend() const { return backend_; }
+    Level level() const { return level_; }
+    /// Whether the questions that are reserved for `level` are to be asked.
+    bool atLeast(Level level) const { return level_ >= level; }
+
+    // Rendering. Samples that are NaN or infinite fail the case.
+    Scene scene(const std::string& yaml, const std::vector<SceneOverride>& overrides = {}) const;
+    Film render(const std::string& yaml, const Render& how = {});
+    Film render(const Scene& scene, const Render& how = {});
+
+    // Checks. Each adds an outcome.
+    /// |measured − expected| ≤ relative · |expected|; where 0 is expected, exactly 0.
+    void relative(const std::string& what, double measured, double expected, double tolerance, const std::vector<Mistake>& mistakes = {});
+    void absolute(const std::string& what, double measured, double expected, double tolerance, const std::vector<Mistake>& mistakes = {});
+    /// Equivalence: the 99.9 % Student interval of the mean of `replicates` lies within ±delta · expected.
+    void equivalent(const std::string& what, const std::vector<double>& replicates, double expected, double delta,
+                    const std::vector<Mistake>& mistakes = {});
+    /// The same of `measure` over the films of several seeds, with as many samples as it takes.
+    void estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected, double delta, const Effort& effort = {},
+                  const std::vector<Mistake>& mistakes = {});
+    /// The upper end of the 99.9 % Clopper–Pearson interval of the rate of failures is at most `bound`.
+    void rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound, const std::string& physics);
+    /// Every channel of every pixel the same, as the floats that are written.
+    void sameBits(const std::string& what, const Film& a, const Film& b, const std::string& physics);
+    /// A yes or no.
+    void holds(const std::string& what, bool true_, const std::string& tolerance, const std::string& physics, const std::string& note = {});
+    /// The scene is turned down before rendering, with an error that says `words`.
+    void refused(const std::string& what, const std::string& yaml, const std::string& words);
+    void notApplicable(const std::string& what, const std::string& reason);
+    void add(Outcome outcome);
+
+    /// Outcomes so far; the runner takes them.
+    std::vector<Outcome> take();
+
+private:
+    Integrator& integratorFor(const Render& how);
+
+    const LoadedBackend& backend_;
+    IntegratorOptions options_;
+    Level level_;
+    std::map<std::tuple<int, unsigned, unsigned>, std::unique_ptr<Integrator>> integrators_;
+    std::vector<Outcome> outcomes_;
+};
+
+/// Radiance of one pixel for light without colour: (X + Y + Z) over what radiance 1 gives. Wavelengths are drawn in proportion to x̄ + ȳ + z̄, so
+/// that this sum, unlike Y, hardly varies with them.
+double radiance(const Film& film, std::uint32_t x, std::uint32_t y);
+/// Mean over all pixels.
+double radiance(const Film& film);
+/// Mean of Y over all pixels.
+double luminance(const Film& film);
+
+}  // namespace crt::verify

@@ -1,0 +1,92 @@
+#include "verify/references.h"
+
+#include <boost/math/quadrature/gauss.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace crt::verify {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+Vec3d operator-(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Vec3d operator+(const Vec3d& a, const Vec3d& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+Vec3d operator*(const Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
+double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3d cross(const Vec3d& a, const Vec3d& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+double length(const Vec3d& v) { return std::sqrt(dot(v, v)); }
+
+/// Of a polygon around the point, what lies on the side of the normal (Sutherland and Hodgman 1974, one plane).
+std::vector<Vec3d> aboveHorizon(const std::vector<Vec3d>& polygon, const Vec3d& normal) {
+    std::vector<Vec3d> out;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+        const Vec3d& a = polygon[i];
+        const Vec3d& b = polygon[(i + 1) % polygon.size()];
+        const double ha = dot(a, normal), hb = dot(b, normal);
+        if (ha >= 0) out.push_back(a);
+        if ((ha > 0 && hb < 0) || (ha < 0 && hb > 0)) out.push_back(a + (b - a) * (ha / (ha - hb)));
+    }
+    return out;
+}
+
+/// Of a rectangle a × b at height 1 with one corner straight above the point.
+double cornerFormFactor(double a, double b) {
+    const double sign = (a < 0) == (b < 0) ? 1 : -1;
+    a = std::abs(a);
+    b = std::abs(b);
+    const double ra = std::sqrt(1 + a * a), rb = std::sqrt(1 + b * b);
+    return sign * (a / ra * std::atan(b / ra) + b / rb * std::atan(a / rb)) / (2 * kPi);
+}
+
+}  // namespace
+
+double polygonFormFactor(const Vec3d& point, const Vec3d& normal, const std::vector<Vec3d>& polygon) {
+    std::vector<Vec3d> corners;
+    for (const Vec3d& v : polygon) corners.push_back(v - point);
+    corners = aboveHorizon(corners, normal);
+    double sum = 0;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+        const Vec3d& a = corners[i];
+        const Vec3d& b = corners[(i + 1) % corners.size()];
+        const Vec3d n = cross(a, b);
+        const double sine = length(n);
+        if (sine > 0) sum += std::atan2(sine, dot(a, b)) * dot(n, normal) / sine;
+    }
+    return std::abs(sum) / (2 * kPi);
+}
+
+double squareFormFactor(double x, double half_side) {
+    const double u0 = x - half_side, u1 = x + half_side;
+    return 2 * (cornerFormFactor(u1, half_side) - cornerFormFactor(u0, half_side));
+}
+
+double rectangleIntegral(const std::function<double(double, double)>& f, double u0, double u1, double v0, double v1, int panels) {
+    using Gauss = boost::math::quadrature::gauss<double, 30>;
+    double sum = 0;
+    for (int i = 0; i < panels; ++i)
+        for (int j = 0; j < panels; ++j) {
+            const double ua = u0 + (u1 - u0) * i / panels, ub = u0 + (u1 - u0) * (i + 1) / panels;
+            const double va = v0 + (v1 - v0) * j / panels, vb = v0 + (v1 - v0) * (j + 1) / panels;
+            sum += Gauss::integrate([&](double u) { return Gauss::integrate([&](double v) { return f(u, v); }, va, vb); }, ua, ub);
+        }
+    return sum;
+}
+
+double fresnelDielectric(double cos_incidence, double eta) {
+    const double sin2 = (1 - cos_incidence * cos_incidence) / (eta * eta);
+    if (sin2 >= 1) return 1;
+    const double cos_t = std::sqrt(1 - sin2);
+    const double rs = (cos_incidence - eta * cos_t) / (cos_incidence + eta * cos_t);
+    const double rp = (eta * cos_incidence - cos_t) / (eta * cos_incidence + cos_t);
+    return 0.5 * (rs * rs + rp * rp);
+}
+
+double planck_W_m3_sr(double wavelength_nm, double temperature_K) {
+    constexpr double h = 6.62607015e-34, c = 299792458.0, k = 1.380649e-23;
+    const double metres = wavelength_nm * 1e-9;
+    return 2 * h * c * c / (std::pow(metres, 5) * std::expm1(h * c / (metres * k * temperature_K)));
+}
+
+}  // namespace crt::verify

@@ -1,0 +1,30 @@
+/// What the cases expect, worked out in double from closed forms and deterministic quadrature.
+#pragma once
+
+#include "spectra.h"
+
+#include <functional>
+#include <vector>
+
+namespace crt::verify {
+
+/// Form factor of a polygon seen from a point with a unit normal: the share of the Lambertian's hemisphere that it fills, irradiance over π·radiance.
+/// Lambert's formula (1760): (1/2π) Σ Θᵢ Γᵢ·n over the edges, after cutting off what lies below the horizon. The polygon is flat and convex; its
+/// sense does not matter.
+double polygonFormFactor(const Vec3d& point, const Vec3d& normal, const std::vector<Vec3d>& polygon);
+
+/// The same of an axis-parallel square of half side `half_side` at height 1 over a horizontal point, its centre at horizontal offset x: the sum of
+/// corner rectangles, F(a, b) = (1/2π) (A atan B + …) (Howell, "A Catalog of Radiation Heat Transfer Configuration Factors", B-3). A second route to
+/// the same number.
+double squareFormFactor(double x, double half_side);
+
+/// ∫∫ f(u, v) over [u0, u1] × [v0, v1], Gauss–Legendre of 30 × 30 points on `panels` × `panels` panels.
+double rectangleIntegral(const std::function<double(double, double)>& f, double u0, double u1, double v0, double v1, int panels = 4);
+
+/// Unpolarised reflectance of a smooth interface; eta is the index beyond over the index before. 1 in total internal reflection.
+double fresnelDielectric(double cos_incidence, double eta);
+
+/// Planck's law in W·m⁻³·sr⁻¹ (CODATA 2018, exact constants).
+double planck_W_m3_sr(double wavelength_nm, double temperature_K);
+
+}  // namespace crt::verify

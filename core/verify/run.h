@@ -1,0 +1,38 @@
+/// Runs cases one after another and keeps what came of them.
+#pragma once
+
+#include "verify/context.h"
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace crt::verify {
+
+struct CaseResult {
+    const Case* which = nullptr;
+    Verdict verdict = Verdict::Fail;
+    std::vector<Outcome> outcomes;
+    double seconds = 0;
+};
+
+struct SuiteResult {
+    std::string backend, version, build, device;
+    Level level = Level::Commit;
+    std::vector<CaseResult> cases;
+    int signal = 0;          ///< That ended the run early; the cases after it are missing.
+    std::size_t asked = 0;   ///< Cases that were to run.
+    double seconds = 0;
+
+    std::size_t count(Verdict verdict) const;
+    bool passed() const;
+};
+
+/// Called before each case with null, after it with its result.
+using Watcher = std::function<void(const Case& next, std::size_t index, const CaseResult* result)>;
+
+/// Runs the cases. A case whose backend throws fails; the others go on. The caller holds the InterruptGuard.
+SuiteResult runCases(const LoadedBackend& backend, const IntegratorOptions& options, Level level, const std::vector<const Case*>& cases,
+                     const Watcher& watch);
+
+}  // namespace crt::verify
