@@ -28,6 +28,7 @@ constexpr std::array<unsigned char, 8> kMagic{0x89, 'C', 'R', 'T', 'F', 0x0d, 0x
 constexpr std::size_t kHashDigits = 32;
 constexpr std::size_t kVersionBytesMax = 255;
 constexpr std::uint32_t kRangesMax = 1u << 20;
+constexpr std::uint32_t kSideMax = 65535;  // Of a film, as scene files have it.
 
 /// The part of fixed size.
 struct Header {
@@ -179,6 +180,9 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         header.range_count > kRangesMax ||
         header.header_bytes != sizeof(Header) + header.range_count * std::uint64_t{16} + roundUp8(header.version_bytes))
         refuse(path, "is damaged: its header contradicts its size");
+    // A side of no pixels makes any other side fit the size; walking four thousand million empty rows would take a minute.
+    if (std::min(header.width, header.height) < 1 || std::max(header.width, header.height) > kSideMax)
+        refuse(path, fmt::format("is damaged: its header says {} x {} pixels, and films have 1 to {} a side", header.width, header.height, kSideMax));
 
     const char* const kBadChecksum = "is damaged: its checksum does not match its content";
     Checksum checksum;

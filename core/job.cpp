@@ -48,7 +48,8 @@ Files planFiles(const Job& job, const Scene& scene) {
     files.checkpoint_wanted = job.resume || !job.checkpoint_file.empty();  // Who resumes once will want to resume again.
     if (job.resume) {
         files.resume = !job.resume_file.empty() ? job.resume_file : files.checkpoint;
-        if (!std::filesystem::exists(files.resume)) {
+        std::error_code unreadable;
+        if (!std::filesystem::exists(files.resume, unreadable)) {
             if (!job.resume_file.empty())
                 throw Error(ErrorKind::Usage, fmt::format("there is no checkpoint '{}' to resume", files.resume));
             // A batch job that is started again and again with one command line begins somewhere.

@@ -155,7 +155,8 @@ public:
     bool operator()(const std::string&, std::vector<tinyobj::material_t>* materials, std::map<std::string, int>* by_name,
                     std::string*, std::string*) override {
         std::string_view arguments = obj_lines_.arguments();
-        if (std::filesystem::exists(besideObj(arguments))) {
+        std::error_code ignored;  // Names that no file can have (too long) are not there either.
+        if (std::filesystem::exists(besideObj(arguments), ignored)) {
             read(arguments, *materials, *by_name);
         } else {
             for (std::string_view name = nextField(arguments); !name.empty(); name = nextField(arguments))

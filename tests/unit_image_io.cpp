@@ -307,6 +307,18 @@ TEST_CASE("damaged images are refused with a sentence", "[image_io]") {
     refused(whole.substr(0, 100), "");
 }
 
+// Both found by fuzzing. A file of no known format went through all of OpenImageIO's readers; a header could ask for any amount of memory.
+TEST_CASE("files of other formats and headers beyond the file's size are refused", "[image_io]") {
+    const TemporaryDirectory directory;
+    const std::string path = directory / "image";
+    spit(path, "GIF89a, which OpenImageIO would read");
+    CHECK_THROWS_WITH(readImage(path), Contains("no EXR, PNG"));
+
+    // A Radiance HDR header and eight bytes of one of its 65535 x 65535 pixels.
+    spit(path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 65535 +X 65535\n12345678");
+    CHECK_THROWS_WITH(readImage(path), Contains("65535 x 65535") && Contains("more than a file of its size can hold"));
+}
+
 TEST_CASE("an image that lacks what it must have is refused", "[image_io]") {
     const TemporaryDirectory directory;
     for (const OutputFormat format : {OutputFormat::Exr, OutputFormat::Png, OutputFormat::Ppm, OutputFormat::Pfm}) {

@@ -207,6 +207,11 @@ TEST_CASE("triangles without area are dropped and counted", "[mesh_io]") {
     CHECK(loadText("v 0 0 0\nv 1e200 0 0\nv 0 1e200 0\nf 1 2 3\n").mesh.triangles.size() == 1);
 }
 
+// Found by fuzzing: asking whether a file of such a name exists is an error of its own, which came out as std::filesystem::filesystem_error.
+TEST_CASE("an mtllib whose name no file can have is refused with its line", "[mesh_io]") {
+    CHECK_THROWS_WITH(loadText("v 0 0 0\nmtllib " + std::string(300, 'a') + "\n"), Contains("cannot open material file"));
+}
+
 TEST_CASE("bad meshes are refused with their line", "[mesh_io]") {
     checkRefused("v 0 0 0\nv nan 0 0\n", 2, "finite");
     checkRefused("v 0 0 0\nv 0 -inf 0\n", 2, "finite");

@@ -487,6 +487,7 @@ class StoppingAndGoingOn(CliTest):
 
     def test_a_damaged_or_absent_checkpoint_is_refused(self):
         self.assert_one_error(self.crt("scene.yaml", "-b", "fake", "--resume", "none.crtfilm", expect=2), "none.crtfilm")
+        self.assert_one_error(self.crt("scene.yaml", "-b", "fake", "--resume", "n" * 300 + ".crtfilm", expect=2), "nnn.crtfilm")
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
         with open(self.path("c.crtfilm"), "r+b") as file:
             file.truncate(os.path.getsize(self.path("c.crtfilm")) // 2)

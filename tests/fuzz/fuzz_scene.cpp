@@ -1,0 +1,32 @@
+// Scene YAML → Scene → CompiledScene. The text is a whole scene file; beside it lie a mesh and a spectrum that it may name.
+#include "fuzz_target.h"
+
+#include "compile.h"
+#include "scene_yaml.h"
+
+namespace {
+
+const crt::fuzz::Directory& directory() {
+    static const crt::fuzz::Directory place = [] {
+        const crt::fuzz::Directory d;
+        d.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
+        d.write("a.mtl", "newmtl m\nKd .5 .5 .5\nKe 1 1 1\n");
+        d.write("a.spd", "300 0.2\n900 0.8\n");
+        return d;
+    }();
+    return place;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    using namespace crt;
+    const std::string text(reinterpret_cast<const char*>(data), size);
+    fuzz::expectRefusalOrSuccess(ErrorKind::Scene, [&] {
+        const Scene scene = parseScene(text, "scene.yaml", directory().path());
+        const CompiledScene compiled = compileScene(scene, kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive);
+        if (compiled.hash.size() != 32 || compiled.size_bytes > compiled.blob.size() * sizeof(CompiledScene::Line))
+            fuzz::finding("compiled scene", "is not what its sizes say");
+    });
+    return 0;
+}

@@ -1,0 +1,71 @@
+/// What the fuzz targets share: files in memory, and the rule of what may come back from hostile input.
+#pragma once
+
+#include "error.h"
+#include "log.h"
+
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace crt::fuzz {
+
+/// A finding that no sanitizer sees.
+[[noreturn]] inline void finding(const char* what, const char* detail) {
+    std::fprintf(stderr, "FINDING: %s: %s\n", what, detail);
+    std::abort();
+}
+
+/// Runs `body`. Hostile input may be refused, by an error that says whose fault it is; it may not find a bug in crt (Internal), and nothing but
+/// crt::Error may come out: std::bad_alloc or std::out_of_range would reach the user as an internal error.
+template <class Body>
+void expectRefusalOrSuccess(ErrorKind refusal, Body&& body) {
+    try {
+        body();
+    } catch (const Error& error) {
+        if (error.kind() != refusal) finding("refused as the wrong kind of error", error.what());
+        if (error.what()[0] == '\0') finding("refused", "without a word");
+    } catch (const std::exception& exception) {
+        finding("not a crt::Error", exception.what());
+    }
+}
+
+/// A directory in memory where this process keeps the files of one run; left to the system's cleaning, being a few kilobytes.
+class Directory {
+public:
+    Directory() {
+        setLogLevel(LogLevel::Off);
+        for (const char* parent : {"/dev/shm", "/tmp"}) {
+            path_ = std::string(parent) + "/crt-fuzz-XXXXXX";
+            if (::mkdtemp(path_.data()) != nullptr) return;
+        }
+        finding("no place for files", std::strerror(errno));
+    }
+
+    std::string file(const char* name) const { return path_ + "/" + name; }
+    const std::string& path() const { return path_; }
+
+    /// Overwrites a file and returns its path.
+    std::string write(const char* name, const void* bytes, std::size_t size) const {
+        std::string path = file(name);
+        const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+        if (descriptor < 0 || ::write(descriptor, bytes, size) != static_cast<ssize_t>(size)) finding("cannot write", path.c_str());
+        ::close(descriptor);
+        return path;
+    }
+    std::string write(const char* name, std::string_view text) const { return write(name, text.data(), text.size()); }
+
+private:
+    std::string path_;
+};
+
+}  // namespace crt::fuzz
