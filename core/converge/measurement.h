@@ -11,6 +11,7 @@
 #include "film.h"
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -72,7 +73,7 @@ struct Row {
     std::optional<double> cpu_clock_mhz, load_average; ///< At the moment of the look.
     std::string stop_reason;                           ///< On the replicate's last row: "samples", "time", "target", "interrupted", "failed: …".
 
-    bool isVoid() const { return invalid_samples > 0; }
+    bool isVoid() const { return invalid_samples > 0 || (error && !std::isfinite(error->mse)); }
 };
 
 /// Where the time of one configuration goes, seconds on the wall clock; medians over its replicates from `first_sample` on.

@@ -1,0 +1,119 @@
+/// From rows to statements: how fast a configuration converges, what it costs, whether it is right, and how sure all that is.
+///
+/// Relative to the scene. Errors are divided by the mean of the reference (of the replicates, without one), so mean squared errors here are relative²
+/// and 0.01² is "1 %". The reference's own variance is subtracted from every mean squared error.
+///
+/// Where intervals come from. Rows of one replicate are looks at one progressive render, so only replicates are independent. Every interval is the
+/// jackknife over replicates (Tukey 1958; Miller 1974) with Student's t, R − 1 degrees of freedom: leave one replicate out, repeat the whole fit.
+/// Positive quantities are treated as logarithms. For means it is Student's interval exactly; for the rest unit_fits.cpp measures the coverage.
+///
+/// Without a reference the error is the variance between replicates: unbiased for the variance, blind to bias. Deviations from their common mean are not
+/// independent; for normal errors intervals come out too short by √((R − 2)/(R − 1)), and are widened by that.
+#pragma once
+
+#include "converge/measurement.h"
+#include "stats/statistics.h"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt::converge {
+
+struct FitOptions {
+    double confidence = 0.95;            ///< Of every interval that does not decide a verdict.
+    double verdict_confidence = 0.999;   ///< Of those that do.
+    double equivalence_margin = 0.01;    ///< δ: a relative bias of the image mean that would matter.
+    double family_alpha = 1e-3;          ///< Below it a tile's or pixel's adjusted p-value is a difference.
+    std::array<double, 2> targets{0.01, 0.001};  ///< Relative RMSE.
+};
+
+enum class ErrorSource {
+    Reference,          ///< Against the scene's reference.
+    BetweenReplicates,  ///< There is none.
+};
+
+/// A configuration at N samples per pixel, over the replicates that got there and are not void.
+struct Point {
+    std::uint64_t samples = 0;
+    std::uint32_t replicates = 0;
+    Estimate seconds;            ///< What a user waits who asks for N: start-up and render.
+    Estimate render_seconds;
+    Estimate relative_rmse;
+    Estimate efficiency;         ///< 1/(relative MSE × seconds), start-up included. 1/s.
+    /// Mean of the image over that of the reference, − 1, averaged over R, G and B; with the verdict's confidence in `mean_bias_verdict`.
+    std::optional<Estimate> mean_bias;
+    std::optional<Estimate> bias_squared;   ///< mean (E I − R)², relative²; may be below 0, which is how it contains it.
+    std::optional<Estimate> calibration;    ///< Predicted over actual relative RMSE.
+    std::uint32_t covered = 0, predicted = 0;  ///< Replicates whose predicted interval holds their actual error, and those that predicted.
+    std::optional<double> relmse, smape, mae, flip_mean, delta_e2000_mean;  ///< Means over replicates.
+};
+
+/// render seconds = launch + per_sample · N, by least squares with relative errors.
+struct TimeFit {
+    double before_first_sample = 0;  ///< Median over replicates, seconds.
+    Estimate launch;                 ///< Seconds; may be below 0.
+    Estimate per_sample;             ///< c, seconds per sample per pixel.
+    double r2 = 0;
+    double start() const { return before_first_sample + launch.value; }  ///< t0
+};
+
+/// relative MSE = v/N + b², by least squares with relative errors.
+struct ErrorFit {
+    Estimate variance;     ///< v: relative MSE of one sample per pixel.
+    Estimate intercept;    ///< b² of this line. Below 0 where error falls faster than 1/N, as it does with Sobol points on smooth images.
+    /// b² without the assumption of 1/N: mean squared error minus variance between replicates, all N weighted by N². Empty without a reference.
+    std::optional<Estimate> bias_squared;
+    /// The better of the two: bias_squared where there is one, else the intercept.
+    const Estimate& floor() const { return bias_squared ? *bias_squared : intercept; }
+    bool flattening = false;         ///< floor() is above 0 at the verdict's confidence.
+    bool faster_than_inverse = false;  ///< intercept lies below 0 altogether: v/N is not the law here.
+};
+
+/// Samples and seconds to a relative RMSE.
+struct Target {
+    double relative_rmse = 0;
+    bool reached = false;             ///< Measured. If not, `samples` and `seconds` extrapolate the last points; empty where a floor forbids it.
+    bool at_first_point = false;      ///< The fewest samples measured were enough: the figures are upper bounds.
+    std::optional<Estimate> samples, seconds;
+};
+
+struct Judgement {
+    stats::Verdict verdict = stats::Verdict::Inconclusive;
+    std::string reason;               ///< One sentence.
+    /// Relative bias of the image mean in R, G and B at the most samples, with the verdict's confidence. Empty without a reference.
+    std::optional<std::array<Estimate, 3>> mean_bias;
+};
+
+/// All that is said about one configuration.
+struct ConfigurationFit {
+    Key key;
+    std::uint32_t replicates = 0;     ///< In the fits; points may have more.
+    std::uint32_t void_rows = 0;
+    ErrorSource source = ErrorSource::BetweenReplicates;
+    std::vector<Point> points;        ///< By samples. Those with two replicates at least.
+    bool fitted = false;              ///< Three points or more with two replicates each; else the four below are empty.
+    TimeFit time;
+    ErrorFit error;
+    Estimate slope_samples;           ///< d log RMSE / d log N
+    Estimate slope_seconds;           ///< d log RMSE / d log(t − t0)
+    Estimate efficiency;              ///< 1/(v·c), start-up excluded. 1/s.
+    std::vector<Target> targets;      ///< As in FitOptions::targets.
+    Judgement judgement;
+};
+
+struct Analysis {
+    FitOptions options;
+    std::vector<ConfigurationFit> fits;  ///< One for each of Run::configurations, in that order.
+
+    const ConfigurationFit* find(const Key& key) const;
+};
+
+Analysis analyze(const Run& run, const FitOptions& options = {});
+
+/// The reference of a scene, or null when there is none.
+const ReferenceInfo* findReference(const Run& run, const std::string& scene);
+
+}  // namespace crt::converge
