@@ -1,6 +1,6 @@
 #include "stats/flip.h"
 
-#include "error.h"
+#include "stats/color_difference.h"
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,6 @@ namespace crt::stats {
 namespace {
 
 using std::numbers::pi;
-using Color = std::array<double, 3>;
 using Plane = std::vector<double>;
 using Planes = std::array<Plane, 3>;
 
@@ -27,47 +26,26 @@ constexpr double kFeatureExponent = 0.5, kFeatureWidthDegrees = 0.082;
 
 // -------------------------------------------------------------------------------------------------------------------- colour spaces
 
-/// Rec. 709 primaries and D65 at (0.31271, 0.32902), of luminance 1.
-constexpr std::array<Color, 3> kRgbToXyz{{{0.412386563252992, 0.357591490920625, 0.180450491203564},
-                                          {0.212636821677324, 0.715182981841251, 0.072180196481425},
-                                          {0.019330620152484, 0.119197163640208, 0.950372587005435}}};
-constexpr std::array<Color, 3> kXyzToRgb{{{3.241003232976359, -1.537398969488786, -0.498615881996362},
-                                          {-0.969224252202517, 1.875929983695176, 0.041554226340085},
-                                          {0.055639419851975, -0.20401120612391, 1.057148977187533}}};
-constexpr Color kWhite{0.950428545377181, 1.0, 1.088900370798128};
-
-Color product(const std::array<Color, 3>& m, const Color& v) {
-    Color r;
-    for (std::size_t i = 0; i < 3; ++i) r[i] = m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2];
-    return r;
-}
-
 /// Opponent colours, linear in XYZ: what contrast sensitivities are measured in.
 Color toYcxcz(const Color& rgb) {
-    const Color xyz = product(kRgbToXyz, rgb);
-    const double x = xyz[0] / kWhite[0], y = xyz[1] / kWhite[1], z = xyz[2] / kWhite[2];
+    const Color xyz = linearSrgbToXyz(rgb);
+    const double x = xyz[0] / kD65White[0], y = xyz[1] / kD65White[1], z = xyz[2] / kD65White[2];
     return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
 }
 
 Color fromYcxcz(const Color& c) {
     const double y = (c[0] + 16) / 116, x = y + c[1] / 500, z = y - c[2] / 200;
-    return product(kXyzToRgb, {x * kWhite[0], y * kWhite[1], z * kWhite[2]});
+    return xyzToLinearSrgb({x * kD65White[0], y * kD65White[1], z * kD65White[2]});
 }
 
 /// CIE L*a*b*, its chroma weighed by lightness: colours of dark pixels differ less to the eye (Hunt 1952).
-Color toHuntLab(const Color& rgb) {
-    const Color xyz = product(kRgbToXyz, rgb);
-    const auto f = [](double t) {
-        constexpr double delta = 6.0 / 29;
-        return t > delta * delta * delta ? std::cbrt(t) : t / (3 * delta * delta) + 4.0 / 29;
-    };
-    const double x = f(xyz[0] / kWhite[0]), y = f(xyz[1] / kWhite[1]), z = f(xyz[2] / kWhite[2]);
-    const double lightness = 116 * y - 16;
-    return {lightness, 0.01 * lightness * 500 * (x - y), 0.01 * lightness * 200 * (y - z)};
+Lab toHuntLab(const Color& rgb) {
+    const Lab lab = labFromLinearSrgb(rgb);
+    return {lab.lightness, 0.01 * lab.lightness * lab.a, 0.01 * lab.lightness * lab.b};
 }
 
 /// City block in lightness, Euclidean in chroma, which large differences ask for (Abasi et al. 2020).
-double hyab(const Color& p, const Color& q) { return std::abs(p[0] - q[0]) + std::hypot(p[1] - q[1], p[2] - q[2]); }
+double hyab(const Lab& p, const Lab& q) { return std::abs(p.lightness - q.lightness) + std::hypot(p.a - q.a, p.b - q.b); }
 
 // ------------------------------------------------------------------------------------------------------------------------- filters
 
@@ -158,7 +136,7 @@ FeatureTaps featureTaps(double pixels_per_degree) {
 
 /// One image, ready to be compared.
 struct Seen {
-    std::vector<Color> lab;  ///< As blurred by the eye.
+    std::vector<Lab> lab;    ///< As blurred by the eye.
     Plane edge, point;       ///< Strength of edges and points, of the sharp image.
 };
 
@@ -218,16 +196,6 @@ void compareSeen(const Seen& test, const Seen& reference, std::vector<float>& la
     }
 }
 
-bool allFinite(const RgbView& image) {
-    return std::all_of(image.values.begin(), image.values.end(), [](float v) { return std::isfinite(v); });
-}
-
-void requireSizes(const RgbView& test, const RgbView& reference) {
-    const std::size_t values = std::size_t{3} * reference.width * reference.height;
-    if (test.width != reference.width || test.height != reference.height || test.values.size() != values || reference.values.size() != values)
-        throw Error(ErrorKind::Internal, "FLIP needs two images of one size, three values a pixel");
-}
-
 void finish(FlipResult& result) {
     result.mean = std::accumulate(result.error.begin(), result.error.end(), 0.0) / static_cast<double>(result.error.size());
 }
@@ -275,10 +243,10 @@ std::vector<Color> show(const RgbView& image, double gain, const ToneCurve& curv
 }  // namespace
 
 FlipResult flipLdr(const RgbView& test, const RgbView& reference, double pixels_per_degree) {
-    requireSizes(test, reference);
+    requireSameSize(test, reference);
     FlipResult result;
     result.error.assign(reference.values.size() / 3, 0.0f);
-    if (!allFinite(test) || !allFinite(reference)) {
+    if (!test.allFinite() || !reference.allFinite()) {
         result.mean = std::numeric_limits<double>::quiet_NaN();
         return result;
     }
@@ -295,11 +263,11 @@ FlipResult flipLdr(const RgbView& test, const RgbView& reference, double pixels_
 }
 
 FlipResult flipHdr(const RgbView& test, const RgbView& reference, double pixels_per_degree) {
-    requireSizes(test, reference);
+    requireSameSize(test, reference);
     FlipResult result;
     result.error.assign(reference.values.size() / 3, 0.0f);
     const ToneCurve curve;
-    if (!allFinite(test) || !allFinite(reference) || !chooseExposures(reference, curve, result)) {
+    if (!test.allFinite() || !reference.allFinite() || !chooseExposures(reference, curve, result)) {
         result.mean = std::numeric_limits<double>::quiet_NaN();
         return result;
     }

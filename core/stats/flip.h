@@ -5,20 +5,14 @@
 /// this agrees with it (unit_flip.cpp).
 #pragma once
 
-#include <cstdint>
-#include <span>
+#include "stats/rgb_view.h"
+
 #include <vector>
 
 namespace crt::stats {
 
 /// A monitor 0.7 m wide with 3840 pixels, seen from 0.7 m: 67.02 pixels a degree.
 inline constexpr double kFlipPixelsPerDegree = 67.020643276582255;
-
-/// Linear sRGB, three values a pixel, top row first. The caller keeps the values.
-struct RgbView {
-    std::span<const float> values;
-    std::uint32_t width = 0, height = 0;
-};
 
 struct FlipResult {
     std::vector<float> error;  ///< Of every pixel, in [0, 1].
