@@ -168,13 +168,51 @@ constexpr KnownFormat kKnownFormats[] = {
     {"hdr", std::string_view("#?RADIANCE", 10)},
 };
 
+/// Walks the attributes of an EXR's headers, each a name, a type, a size and as many bytes ("OpenEXR File Layout", openexr.com), and refuses one that goes
+/// beyond the file: OpenEXR takes its word for up to 2 GiB.
+void checkExrAttributes(std::ifstream& file) {
+    constexpr std::uint32_t kMultipart = 0x1000;
+    constexpr std::size_t kMaxName = 255;
+    file.seekg(0, std::ios::end);
+    const std::streamoff file_bytes = file.tellg();
+    file.seekg(4);
+    const auto number = [&] {
+        std::uint32_t value = 0;
+        file.read(reinterpret_cast<char*>(&value), sizeof value);  // Little-endian, as every machine that crt runs on (checkpoint.cpp).
+        return value;
+    };
+    const auto word = [&] {
+        std::string text;
+        for (char c = 0; file.get(c) && c != '\0';)
+            if (text.size() < kMaxName)
+                text += c;
+            else
+                throw Failure{"a name in its header is too long"};
+        if (!file) throw Failure{"it ends within its header"};
+        return text;
+    };
+    const bool multipart = number() & kMultipart;
+    for (bool more = true; more;) {
+        more = false;
+        for (std::string name = word(); !name.empty(); name = word()) {
+            word();  // Its type.
+            const std::uint32_t size = number();
+            if (!file || size > file_bytes - file.tellg()) throw Failure{"its attribute '" + name + "' goes beyond the end of the file"};
+            file.seekg(size, std::ios::cur);
+            more = multipart;
+        }
+    }
+}
+
 std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
     char beginning[16] = {};
     std::ifstream file(path, std::ios::binary);
     file.read(beginning, sizeof beginning);
     const std::string_view there(beginning, static_cast<std::size_t>(file.gcount()));
+    file.clear();
     for (const KnownFormat& format : kKnownFormats) {
         if (there.substr(0, format.signature.size()) != format.signature) continue;
+        if (std::string_view(format.name) == "openexr") checkExrAttributes(file);
         std::unique_ptr<ImageInput> input = ImageInput::create(format.name);
         if (!input) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
         if (!input->open(path, spec)) throw Failure{wordsOr(input->geterror(), "it cannot be opened")};

@@ -307,12 +307,16 @@ TEST_CASE("damaged images are refused with a sentence", "[image_io]") {
     refused(whole.substr(0, 100), "");
 }
 
-// Both found by fuzzing. A file of no known format went through all of OpenImageIO's readers; a header could ask for any amount of memory.
+// Found by fuzzing. A file of no known format went through all of OpenImageIO's readers; a header could ask for any amount of memory.
 TEST_CASE("files of other formats and headers beyond the file's size are refused", "[image_io]") {
     const TemporaryDirectory directory;
     const std::string path = directory / "image";
     spit(path, "GIF89a, which OpenImageIO would read");
     CHECK_THROWS_WITH(readImage(path), Contains("no EXR, PNG"));
+
+    // An EXR whose first attribute says 2 GiB; OpenEXR allocates them.
+    spit(path, std::string("\x76\x2f\x31\x01\x02\0\0\0note\0string\0\xff\xff\xff\x7fx", 25));
+    CHECK_THROWS_WITH(readImage(path), Contains("attribute 'note' goes beyond the end"));
 
     // A Radiance HDR header and eight bytes of one of its 65535 x 65535 pixels.
     spit(path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 65535 +X 65535\n12345678");
