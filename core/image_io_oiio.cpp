@@ -1,5 +1,6 @@
 // The image codec module: EXR and PNG through OpenImageIO, behind image_module.h. Built as a library of its own; nothing else in crt
 // includes OpenImageIO.
+#include "image_headers.h"
 #include "image_module.h"
 
 #include <OpenImageIO/imageio.h>
@@ -10,7 +11,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
-#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -158,61 +158,25 @@ bool isInteger(const ImageSpec& spec, int channel) {
 struct KnownFormat {
     const char* name;  ///< As OpenImageIO calls it.
     std::string_view signature;
+    void (*check_header)(const std::string& path) = nullptr;
 };
 constexpr KnownFormat kKnownFormats[] = {
-    {"openexr", std::string_view("\x76\x2f\x31\x01", 4)},
-    {"png", std::string_view("\x89PNG\r\n\x1a\n", 8)},
+    {"openexr", std::string_view("\x76\x2f\x31\x01", 4), crt::image::checkExrHeader},
+    {"png", std::string_view("\x89PNG\r\n\x1a\n", 8), crt::image::checkPngHeader},
     {"tiff", std::string_view("II*\0", 4)},
     {"tiff", std::string_view("MM\0*", 4)},
     {"jpeg", std::string_view("\xff\xd8\xff", 3)},
     {"hdr", std::string_view("#?RADIANCE", 10)},
 };
 
-/// Walks the attributes of an EXR's headers, each a name, a type, a size and as many bytes ("OpenEXR File Layout", openexr.com), and refuses one that goes
-/// beyond the file: OpenEXR takes its word for up to 2 GiB.
-void checkExrAttributes(std::ifstream& file) {
-    constexpr std::uint32_t kMultipart = 0x1000;
-    constexpr std::size_t kMaxName = 255;
-    file.seekg(0, std::ios::end);
-    const std::streamoff file_bytes = file.tellg();
-    file.seekg(4);
-    const auto number = [&] {
-        std::uint32_t value = 0;
-        file.read(reinterpret_cast<char*>(&value), sizeof value);  // Little-endian, as every machine that crt runs on (checkpoint.cpp).
-        return value;
-    };
-    const auto word = [&] {
-        std::string text;
-        for (char c = 0; file.get(c) && c != '\0';)
-            if (text.size() < kMaxName)
-                text += c;
-            else
-                throw Failure{"a name in its header is too long"};
-        if (!file) throw Failure{"it ends within its header"};
-        return text;
-    };
-    const bool multipart = number() & kMultipart;
-    for (bool more = true; more;) {
-        more = false;
-        for (std::string name = word(); !name.empty(); name = word()) {
-            word();  // Its type.
-            const std::uint32_t size = number();
-            if (!file || size > file_bytes - file.tellg()) throw Failure{"its attribute '" + name + "' goes beyond the end of the file"};
-            file.seekg(size, std::ios::cur);
-            more = multipart;
-        }
-    }
-}
-
 std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
     char beginning[16] = {};
     std::ifstream file(path, std::ios::binary);
     file.read(beginning, sizeof beginning);
     const std::string_view there(beginning, static_cast<std::size_t>(file.gcount()));
-    file.clear();
     for (const KnownFormat& format : kKnownFormats) {
         if (there.substr(0, format.signature.size()) != format.signature) continue;
-        if (std::string_view(format.name) == "openexr") checkExrAttributes(file);
+        if (format.check_header != nullptr) format.check_header(path);
         std::unique_ptr<ImageInput> input = ImageInput::create(format.name);
         if (!input) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
         if (!input->open(path, spec)) throw Failure{wordsOr(input->geterror(), "it cannot be opened")};
@@ -221,25 +185,14 @@ std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
     throw Failure{"it is no EXR, PNG, PFM, PPM, TIFF, JPEG or Radiance HDR file"};
 }
 
-/// Refuses sizes that the file cannot hold, before memory is asked for them: a damaged header must not allocate a terabyte.
-void checkSize(const char* path, const ImageSpec& spec) {
-    // Deflate, which EXR, PNG and TIFF use, reaches 1032:1 on bytes; EXR's lossy DWAB some sixty times that on a constant image.
-    constexpr double kDecodedBytesAByte = 65536;
-    if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0) throw Failure{"its header says that it has no pixels"};
-    const double decoded_bytes = 4.0 * spec.width * spec.height * spec.nchannels;
-    const double file_bytes = static_cast<double>(std::filesystem::file_size(path));
-    if (decoded_bytes > kDecodedBytesAByte * file_bytes)
-        throw Failure{"its header says " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels of " +
-                      std::to_string(spec.nchannels) + " channels, more than a file of its size can hold"};
-}
-
 std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* reason, std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
         ImageSpec spec;
         const std::unique_ptr<ImageInput> input = openImage(path, spec);
         if (spec.deep) throw Failure{"it is a deep image"};
         if (spec.depth > 1) throw Failure{"it is a volume"};
-        checkSize(path, spec);
+        crt::image::checkPixels(path, static_cast<std::uint64_t>(std::max(spec.width, 0)), static_cast<std::uint64_t>(std::max(spec.height, 0)),
+                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
 
         auto owned = std::make_unique<OwnedImage>();
         // The names of a format without named channels follow from their number.

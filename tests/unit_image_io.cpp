@@ -318,6 +318,14 @@ TEST_CASE("files of other formats and headers beyond the file's size are refused
     spit(path, std::string("\x76\x2f\x31\x01\x02\0\0\0note\0string\0\xff\xff\xff\x7fx", 25));
     CHECK_THROWS_WITH(readImage(path), Contains("attribute 'note' goes beyond the end"));
 
+    // One of a known type that is shorter than the type: OpenEXR would go on reading in the middle of the next.
+    spit(path, std::string("\x76\x2f\x31\x01\x02\0\0\0w\0box2i\0\x05\0\0\0.....", 25));
+    CHECK_THROWS_WITH(readImage(path), Contains("'w' has 5 bytes and its type, box2i, takes 16"));
+
+    // A PNG whose only chunk says 2 GiB; libpng allocates them.
+    spit(path, std::string("\x89PNG\r\n\x1a\n\x7f\xff\xff\xf0tEXtx", 17));
+    CHECK_THROWS_WITH(readImage(path), Contains("chunks goes beyond the end"));
+
     // A Radiance HDR header and eight bytes of one of its 65535 x 65535 pixels.
     spit(path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 65535 +X 65535\n12345678");
     CHECK_THROWS_WITH(readImage(path), Contains("65535 x 65535") && Contains("more than a file of its size can hold"));

@@ -1,0 +1,141 @@
+#include "image_headers.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string_view>
+
+namespace crt::image {
+namespace {
+
+/// The first bytes of a file, taken off the front. Little-endian as every machine that crt runs on (checkpoint.cpp).
+class Bytes {
+public:
+    explicit Bytes(std::string_view rest) : rest_(rest) {}
+
+    std::size_t left() const { return rest_.size(); }
+    bool empty() const { return rest_.empty(); }
+    std::string_view take(std::uint64_t size, const std::string& what) {
+        if (size > rest_.size()) throw DamagedHeader(fmt::format("{} goes beyond the end of the file", what));
+        const std::string_view taken = rest_.substr(0, size);
+        rest_.remove_prefix(size);
+        return taken;
+    }
+    std::uint32_t u32(const std::string& what) {
+        std::uint32_t value;
+        std::memcpy(&value, take(sizeof value, what).data(), sizeof value);
+        return value;
+    }
+    /// Up to and without a NUL.
+    std::string text(const std::string& what) {
+        constexpr std::size_t kMaxLength = 255;
+        const std::size_t end = rest_.find('\0');
+        if (end == std::string_view::npos || end > kMaxLength) throw DamagedHeader(fmt::format("{} has no end", what));
+        const std::string value(rest_.substr(0, end));
+        rest_.remove_prefix(end + 1);
+        return value;
+    }
+
+private:
+    std::string_view rest_;
+};
+
+/// As much of a file as a header takes.
+std::string beginningOf(const std::string& path) {
+    constexpr std::size_t kMaxHeaderBytes = std::size_t{16} << 20;
+    std::ifstream file(path, std::ios::binary);
+    std::string bytes(std::min<std::uintmax_t>(std::filesystem::file_size(path), kMaxHeaderBytes), '\0');
+    file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    bytes.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
+    return bytes;
+}
+
+/// Types of attributes whose size is the type's: OpenEXR reads that many bytes whatever the file says.
+const std::map<std::string_view, std::uint32_t>& fixedSizes() {
+    static const std::map<std::string_view, std::uint32_t> sizes{
+        {"box2f", 16},     {"box2i", 16}, {"chromaticities", 32}, {"compression", 1}, {"deepImageState", 1}, {"double", 8},   {"envmap", 1},
+        {"float", 4},      {"int", 4},    {"keycode", 28},        {"lineOrder", 1},   {"m33d", 72},          {"m33f", 36},    {"m44d", 128},
+        {"m44f", 64},      {"rational", 8}, {"tiledesc", 9},      {"timecode", 8},    {"v2d", 16},           {"v2f", 8},      {"v2i", 8},
+        {"v3d", 24},       {"v3f", 12},   {"v3i", 12}};
+    return sizes;
+}
+
+/// The value of an attribute, by "OpenEXR File Layout" (openexr.com). What is not named here is opaque to OpenEXR, too.
+void checkValue(const std::string& path, const std::string& what, const std::string& type, std::string_view value) {
+    const auto fixed = fixedSizes().find(type);
+    if (fixed != fixedSizes().end() && value.size() != fixed->second)
+        throw DamagedHeader(fmt::format("{} has {} bytes and its type, {}, takes {}", what, value.size(), type, fixed->second));
+    Bytes bytes(value);
+    if (type == "chlist") {
+        constexpr std::uint64_t kBytesAChannel = 16;  // Type, linearity, sampling.
+        while (!bytes.text(what).empty()) bytes.take(kBytesAChannel, what);
+        if (!bytes.empty()) throw DamagedHeader(fmt::format("{} has more bytes than channels", what));
+    } else if (type == "stringvector") {
+        while (!bytes.empty()) bytes.take(bytes.u32(what), what);
+    } else if (type == "preview") {
+        const std::uint64_t width = bytes.u32(what), height = bytes.u32(what);
+        if (bytes.left() % 4 != 0 || width > bytes.left() || height > bytes.left() || width * height != bytes.left() / 4)
+            throw DamagedHeader(fmt::format("{} does not have {} x {} pixels", what, width, height));
+    } else if (type == "tiledesc") {
+        const std::uint64_t width = bytes.u32(what), height = bytes.u32(what);
+        checkPixels(path, width, height, 1);
+    } else if (type == "box2i" && what.find("Window'") != std::string::npos) {
+        std::int64_t corner[4];
+        for (std::int64_t& c : corner) c = static_cast<std::int32_t>(bytes.u32(what));
+        if (corner[2] < corner[0] || corner[3] < corner[1]) throw DamagedHeader(fmt::format("{} is empty", what));
+        // The display window may be any size; it holds no pixels.
+        if (what.find("dataWindow") != std::string::npos)
+            checkPixels(path, static_cast<std::uint64_t>(corner[2] - corner[0] + 1), static_cast<std::uint64_t>(corner[3] - corner[1] + 1), 1);
+    }
+}
+
+}  // namespace
+
+void checkExrHeader(const std::string& path) {
+    constexpr std::uint32_t kMultipart = 0x1000;
+    const std::string beginning = beginningOf(path);
+    Bytes bytes(beginning);
+    bytes.u32("its mark");
+    const bool multipart = bytes.u32("its version") & kMultipart;
+    // A header is attributes and an empty name; several end with an empty header.
+    for (bool more = true; more;) {
+        more = false;
+        for (std::string name = bytes.text("its header"); !name.empty(); name = bytes.text("its header")) {
+            const std::string what = fmt::format("its attribute '{}'", name), type = bytes.text(what);
+            checkValue(path, what, type, bytes.take(bytes.u32(what), what));
+            more = multipart;
+        }
+    }
+}
+
+void checkPngHeader(const std::string& path) {
+    // By the PNG Specification, 5.3: length (big-endian), name, as many bytes, checksum.
+    constexpr std::uint64_t kSignatureBytes = 8, kHeadBytes = 8, kChecksumBytes = 4;
+    std::ifstream file(path, std::ios::binary);
+    const std::uint64_t file_bytes = std::filesystem::file_size(path);
+    std::string name;
+    for (std::uint64_t at = kSignatureBytes; name != "IEND";) {
+        unsigned char head[kHeadBytes] = {};
+        file.seekg(static_cast<std::streamoff>(at));
+        if (!file.read(reinterpret_cast<char*>(head), kHeadBytes)) throw DamagedHeader("it ends before its last chunk");
+        const std::uint64_t size = std::uint64_t{head[0]} << 24 | head[1] << 16 | head[2] << 8 | head[3];
+        name.assign(reinterpret_cast<const char*>(head) + 4, 4);
+        at += kHeadBytes + size + kChecksumBytes;
+        if (at > file_bytes) throw DamagedHeader("one of its chunks goes beyond the end of the file");
+    }
+}
+
+void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height, std::uint64_t channels) {
+    // Deflate, which EXR, PNG and TIFF use, reaches 1032:1 on bytes; EXR's lossy DWAB some sixty times that on a constant image.
+    constexpr double kDecodedBytesAByte = 65536;
+    const double decoded_bytes = 4.0 * static_cast<double>(width) * static_cast<double>(height) * static_cast<double>(channels);
+    if (decoded_bytes == 0) throw DamagedHeader("its header says that it has no pixels");
+    if (decoded_bytes > kDecodedBytesAByte * static_cast<double>(std::filesystem::file_size(path)))
+        throw DamagedHeader(fmt::format("its header says {} x {} pixels, more than a file of its size can hold", width, height));
+}
+
+}  // namespace crt::image
