@@ -33,6 +33,21 @@ bool endsWith(const std::string& text, std::string_view end) {
     return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
+/// "option word" → "option=word" where the word ends in `extension`, else "option=otherwise": an option whose value may be left out must not swallow
+/// what comes after it.
+void giveValue(std::vector<std::string>& arguments, const char* option, std::string_view extension, const char* otherwise) {
+    for (std::size_t i = 0; i < arguments.size(); ++i) {
+        if (arguments[i] == "--") break;
+        if (arguments[i] != option) continue;
+        if (i + 1 < arguments.size() && endsWith(arguments[i + 1], extension)) {
+            arguments[i] += "=" + arguments[i + 1];
+            arguments.erase(arguments.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+        } else {
+            arguments[i] += fmt::format("={}", otherwise);
+        }
+    }
+}
+
 }  // namespace
 
 std::uint64_t parseCount(const std::string& text, const std::string& option, std::uint64_t least) {
@@ -46,6 +61,14 @@ double parseTolerance(const std::string& text, const std::string& option) {
     const Parsed<double> number = parseNumber(text);
     if (!number.value || *number.value < 0) refuse(option, "a number of at least 0", text);
     return *number.value;
+}
+
+double parseFraction(const std::string& text, const std::string& option) {
+    const bool percent = !text.empty() && text.back() == '%';
+    const Parsed<double> number = parseNumber(percent ? text.substr(0, text.size() - 1) : text);
+    const double fraction = number.value ? *number.value * (percent ? 0.01 : 1) : 0;
+    if (!(fraction > 0 && fraction < 1)) refuse(option, "an error such as 1% or 0.01", text);
+    return fraction;
 }
 
 double parseDuration(const std::string& text, const std::string& option) {
@@ -107,16 +130,8 @@ std::vector<std::string> writtenOut(std::vector<std::string> arguments, const st
         }
         arguments.insert(arguments.begin(), "render");
     }
-    for (std::size_t i = 0; i < arguments.size(); ++i) {
-        if (arguments[i] == "--") break;
-        if (arguments[i] != "--resume") continue;
-        if (i + 1 < arguments.size() && endsWith(arguments[i + 1], kCheckpointExtension)) {
-            arguments[i] += "=" + arguments[i + 1];
-            arguments.erase(arguments.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-        } else {
-            arguments[i] += "=auto";
-        }
-    }
+    giveValue(arguments, "--resume", kCheckpointExtension, "auto");
+    if (arguments.front() == "compare") giveValue(arguments, "--json", ".json", "-");
     return arguments;
 }
 

@@ -16,6 +16,9 @@ std::uint64_t parseCount(const std::string& text, const std::string& option, std
 /// A number of at least zero.
 double parseTolerance(const std::string& text, const std::string& option);
 
+/// "1%" or "0.01": above 0, below 1.
+double parseFraction(const std::string& text, const std::string& option);
+
 /// "90", "90s", "1.5m", "2h", "1h30m", "250ms" in seconds; above zero.
 double parseDuration(const std::string& text, const std::string& option);
 
@@ -27,7 +30,7 @@ std::array<int, 4> parseRectangle(const std::string& text, const std::string& op
 
 /// What the program's arguments (without its name) mean once abbreviations are written out: a first word that is none of `commands` is
 /// preceded by "render"; "--resume FILE.crtfilm" becomes "--resume=FILE.crtfilm" and "--resume" before anything else "--resume=auto", so that it
-/// never swallows the scene. Throws crt::Error(Usage) for a first word that is a command misspelt.
+/// never swallows the scene; the same with compare's "--json FILE.json", or "--json=-". Throws crt::Error(Usage) for a first word that is a command misspelt.
 std::vector<std::string> writtenOut(std::vector<std::string> arguments, const std::vector<std::string>& commands);
 
 /// The arguments as one line that a POSIX shell reads back as them.

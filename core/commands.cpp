@@ -160,17 +160,6 @@ int showInfo(const SceneRequest& what) {
     return 0;
 }
 
-int compareFiles(const CompareArguments& arguments) {
-    constexpr int kDifferent = 7;
-    if (!arguments.difference_file.empty()) checkWritable(arguments.difference_file);
-    const Image first = readImage(arguments.first);
-    const Image second = readImage(arguments.second);
-    const CompareResult result = compareImages(first, second, arguments.options);
-    fmt::print("{}\n", arguments.json ? compareJson(result) : compareText(result));
-    if (!arguments.difference_file.empty() && result.mismatch.empty()) writeDifference(arguments.difference_file, first, second);
-    return result.same ? 0 : kDifferent;
-}
-
 int mergeFilms(const MergeArguments& arguments) {
     // Everything that can be refused is refused before the parts, which may be large, are read.
     Scene scene;

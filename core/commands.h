@@ -12,12 +12,14 @@ namespace crt {
 /// `crt info`: what a scene needs, or what a film or an image holds, by the name's extension.
 int showInfo(const SceneRequest& what);
 
-/// `crt compare`: exit code 7 when the images differ (compare.h says what that means).
+/// `crt compare A B`: exit code 7 when the images differ (compare.h says what that means).
 struct CompareArguments {
     std::string first, second;
     CompareOptions options;
-    bool json = false;
+    std::string reference;        ///< An image that both are measured against; empty: none.
+    std::string json_file;        ///< "-" for stdout, then instead of the text; empty: none.
     std::string difference_file;  ///< Empty: none.
+    std::string map_file;         ///< Of z; empty: none.
 };
 int compareFiles(const CompareArguments& arguments);
 

@@ -2,9 +2,9 @@
 
 #include "error.h"
 #include "image_io.h"
+#include "stats/metrics.h"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -36,12 +36,6 @@ std::optional<Plane> findPlane(const Image& image, const std::string& name) {
     return std::nullopt;
 }
 
-bool hasColor(const Image& image) {
-    for (const char* name : {"R", "G", "B"})
-        if (std::find(image.channels.begin(), image.channels.end(), name) == image.channels.end()) return false;
-    return true;
-}
-
 /// Channels of `image` that the other lacks or has in another type.
 std::vector<std::string> missingFrom(const Image& image, const Image& other) {
     std::vector<std::string> names;
@@ -59,6 +53,50 @@ std::int64_t place(float v) {
     const auto bits = std::bit_cast<std::uint32_t>(v);
     const auto magnitude = static_cast<std::int64_t>(bits & 0x7fffffffu);
     return bits >> 31 ? -magnitude : magnitude;
+}
+
+/// Floats between two, when both are numbers.
+std::optional<std::uint64_t> ulpsBetween(const Plane& a, const Plane& b, std::size_t pixel) {
+    if (a.isInteger() || b.isInteger() || !std::isfinite(a.value(pixel)) || !std::isfinite(b.value(pixel))) return std::nullopt;
+    return static_cast<std::uint64_t>(std::abs(place(a.floats[pixel * a.stride]) - place(b.floats[pixel * b.stride])));
+}
+
+/// Values of the named planes, pixel by pixel.
+std::vector<float> valuesOf(const Image& image, const std::vector<std::string>& names) {
+    std::vector<Plane> planes;
+    for (const std::string& name : names) planes.push_back(*findPlane(image, name));
+    std::vector<float> values;
+    const std::size_t pixels = std::size_t{image.width} * image.height;
+    values.reserve(pixels * planes.size());
+    for (std::size_t p = 0; p < pixels; ++p)
+        for (const Plane& plane : planes) values.push_back(plane.floats[p * plane.stride]);
+    return values;
+}
+
+void addMetrics(CompareResult& result, const std::vector<float>& a, const std::vector<float>& b) {
+    const stats::ErrorMetrics m = stats::errorMetrics(a, b);
+    result.not_finite = {m.test.total(), m.reference.total()};
+    result.metrics_valid = m.valid();
+    if (!m.valid()) return;
+    for (std::size_t i = 0; i < a.size(); ++i)
+        result.max_ulp = std::max(result.max_ulp, static_cast<std::uint64_t>(std::abs(place(a[i]) - place(b[i]))));
+    result.max_absolute = m.max_absolute;
+    result.p99_absolute = m.p99_absolute;
+    result.mse = m.mse;
+    result.rmse = m.rmse;
+    result.relative_rmse = m.relative_rmse;
+    result.relmse = m.relmse;
+    result.mae = m.mae;
+    result.smape = m.smape;
+    result.mean = {m.test_mean, m.reference_mean};
+    result.mean_ratio = m.mean_ratio;
+}
+
+void addLooks(CompareResult& result, const Image& a, const Image& b, bool display_referred) {
+    const auto seen_a = linearSrgb(a), seen_b = linearSrgb(b);
+    if (!seen_a || !seen_b) return;
+    // Same colours look the same; the answer is known without seconds of FLIP.
+    result.looks = *seen_a == *seen_b ? Looks{0, !display_referred, 0, 0} : compareLooks(*seen_a, *seen_b, a.width, a.height, display_referred);
 }
 
 /// The colour of both images side by side; throws when they do not match.
@@ -86,9 +124,13 @@ Image rgbImage(const Image& like) {
     return image;
 }
 
-std::string number(double v) { return fmt::format("{:.6g}", v); }
-
 }  // namespace
+
+bool hasColor(const Image& image) {
+    for (const char* name : {"R", "G", "B"})
+        if (std::find(image.channels.begin(), image.channels.end(), name) == image.channels.end()) return false;
+    return true;
+}
 
 CompareResult compareImages(const Image& a, const Image& b, const CompareOptions& options) {
     CompareResult result;
@@ -126,47 +168,13 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
             ++result.differing_pixels;
             if (!result.first_difference)
                 result.first_difference = Difference{static_cast<std::uint32_t>(p % a.width), static_cast<std::uint32_t>(p / a.width),
-                                                     result.channels[c], plane_a.value(p), plane_b.value(p)};
+                                                     result.channels[c], plane_a.value(p), plane_b.value(p),
+                                                     ulpsBetween(plane_a, plane_b, p)};
             break;
         }
 
-    // Two passes, because relMSE needs the mean of the reference first.
-    std::vector<std::pair<Plane, Plane>> metric;
-    for (const std::string& name : metric_channels) metric.emplace_back(*findPlane(a, name), *findPlane(b, name));
-    const auto for_each = [&](const auto& visit) {
-        for (std::size_t p = 0; p < pixels; ++p)
-            for (const auto& [plane_a, plane_b] : metric) visit(plane_a.floats[p * plane_a.stride], plane_b.floats[p * plane_b.stride]);
-    };
-    const double count = static_cast<double>(pixels) * static_cast<double>(metric.size());
-    double sum_a = 0, sum_b = 0;
-    for_each([&](float va, float vb) {
-        result.not_finite[0] += !std::isfinite(va);
-        result.not_finite[1] += !std::isfinite(vb);
-        sum_a += va;
-        sum_b += vb;
-    });
-    result.metrics_valid = result.not_finite[0] == 0 && result.not_finite[1] == 0 && count > 0;
-    if (result.metrics_valid) {
-        result.mean = {sum_a / count, sum_b / count};
-        result.mean_ratio = result.mean[0] / result.mean[1];
-        const double epsilon = 1e-2 * result.mean[1];
-        double squares = 0, relative = 0, absolute = 0, symmetric = 0;
-        for_each([&](float va, float vb) {
-            const double x = va, y = vb, difference = std::abs(x - y);
-            result.max_ulp = std::max(result.max_ulp, static_cast<std::uint64_t>(std::abs(place(va) - place(vb))));
-            if (difference == 0) return;  // Adds nothing, and keeps 0/0 out where both are black.
-            result.max_absolute = std::max(result.max_absolute, difference);
-            squares += difference * difference;
-            relative += difference * difference / (y * y + epsilon * epsilon);
-            absolute += difference;
-            symmetric += 2 * difference / (std::abs(x) + std::abs(y));
-        });
-        result.rmse = std::sqrt(squares / count);
-        result.relative_rmse = squares == 0 ? 0.0 : result.rmse / std::abs(result.mean[1]);
-        result.relmse = relative / count;
-        result.mae = absolute / count;
-        result.smape = symmetric / count;
-    }
+    addMetrics(result, valuesOf(a, metric_channels), valuesOf(b, metric_channels));
+    if (result.metrics_valid && color) addLooks(result, a, b, options.display_referred);
 
     if (options.tolerance > 0) {
         result.same = result.metrics_valid && result.relative_rmse <= options.tolerance;
@@ -174,61 +182,6 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
         result.same = result.differing_pixels == 0;
     }
     return result;
-}
-
-std::string compareText(const CompareResult& r) {
-    if (!r.mismatch.empty()) return "different: " + r.mismatch;
-    std::string text;
-    const std::uint64_t pixels = std::uint64_t{r.width} * r.height;
-    const char* const verdict = r.same ? (r.differing_pixels == 0 ? "same bits" : "same within the tolerance") : "different";
-    text += fmt::format("{}: {} of {} pixels differ ({})", verdict, r.differing_pixels, pixels, fmt::join(r.channels, ", "));
-    const auto line = [&text](const char* name, const std::string& value) { text += fmt::format("\n  {:<18}{}", name, value); };
-    if (r.first_difference) {
-        const Difference& d = *r.first_difference;
-        line("first difference", fmt::format("pixel {},{} channel {}: {:.9g} and {:.9g}", d.x, d.y, d.channel, d.first, d.second));
-    }
-    if (!r.metrics_valid) {
-        line("not finite", fmt::format("{} values in the first image, {} in the second: no metric means anything", r.not_finite[0],
-                                       r.not_finite[1]));
-    } else if (r.differing_pixels > 0) {
-        line("largest", fmt::format("{} absolute, {} ulp", number(r.max_absolute), r.max_ulp));
-        line("RMSE", fmt::format("{} ({} of the mean{})", number(r.rmse), number(r.relative_rmse),
-                                 r.tolerance > 0 ? fmt::format(", {} allowed", number(r.tolerance)) : ""));
-        line("relMSE", number(r.relmse));
-        line("MAE", number(r.mae));
-        line("SMAPE", number(r.smape));
-        line("mean", fmt::format("{} and {}, ratio {:.9g}", number(r.mean[0]), number(r.mean[1]), r.mean_ratio));
-    }
-    if (!r.other_channels.empty()) line("not compared", fmt::format("{} (in one image only)", fmt::join(r.other_channels, ", ")));
-    return text;
-}
-
-std::string compareJson(const CompareResult& r) {
-    using nlohmann::ordered_json;
-    ordered_json json;
-    json["same"] = r.same;
-    json["tolerance"] = r.tolerance;
-    json["mismatch"] = r.mismatch.empty() ? ordered_json(nullptr) : ordered_json(r.mismatch);
-    if (!r.mismatch.empty()) return json.dump(2);
-    json["width"] = r.width;
-    json["height"] = r.height;
-    json["channels"] = r.channels;
-    json["other_channels"] = r.other_channels;
-    json["differing_pixels"] = r.differing_pixels;
-    if (r.first_difference) {
-        const Difference& d = *r.first_difference;
-        json["first_difference"] = {{"x", d.x}, {"y", d.y}, {"channel", d.channel}, {"first", d.first}, {"second", d.second}};
-    } else {
-        json["first_difference"] = nullptr;
-    }
-    json["not_finite"] = r.not_finite;
-    // The library writes infinities and NaN as null, which JSON has no numbers for.
-    json["metrics"] = nullptr;
-    if (r.metrics_valid)
-        json["metrics"] = ordered_json{{"max_absolute", r.max_absolute}, {"max_ulp", r.max_ulp},         {"rmse", r.rmse},
-                                       {"relative_rmse", r.relative_rmse}, {"relmse", r.relmse},         {"mae", r.mae},
-                                       {"smape", r.smape},               {"mean", r.mean},               {"mean_ratio", r.mean_ratio}};
-    return json.dump(2);
 }
 
 Image differenceImage(const Image& a, const Image& b) {

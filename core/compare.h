@@ -1,6 +1,7 @@
 /// Image against image: are they the same bits, and if not, where and by how much.
 #pragma once
 
+#include "compare_looks.h"
 #include "film.h"
 
 #include <array>
@@ -17,6 +18,8 @@ struct CompareOptions {
     double tolerance = 0;
     /// Compare every channel, the integer ones too, instead of R, G and B. Metrics stay those of the colour.
     bool all_channels = false;
+    /// The values are what a screen shows, as those of PNG files are, and not radiances: chooses the kind of FLIP.
+    bool display_referred = false;
 };
 
 /// Where two images first differ, in reading order.
@@ -24,6 +27,7 @@ struct Difference {
     std::uint32_t x = 0, y = 0;
     std::string channel;
     double first = 0, second = 0;
+    std::optional<std::uint64_t> ulps;  ///< Floats between the two; nothing when one is no number or they are integers.
 };
 
 /// The second image is the reference. Metrics run over the colour values: R, G and B of every pixel, or every float channel when the images
@@ -43,22 +47,23 @@ struct CompareResult {
     bool metrics_valid = false;               ///< False when a colour value is NaN or infinite: no average means anything then.
     double max_absolute = 0;                  ///< max |a − b|
     std::uint64_t max_ulp = 0;                ///< Most floats between two values.
-    double rmse = 0;                          ///< √ mean (a − b)²
+    double p99_absolute = 0;                  ///< The smallest |a − b| that 99 % of the values do not exceed.
+    double mse = 0;                           ///< mean (a − b)²
+    double rmse = 0;                          ///< √mse
     double relative_rmse = 0;                 ///< rmse / mean b; infinite when b is black and a is not.
     double relmse = 0;                        ///< mean (a − b)² / (b² + ε²), ε = mean(b)/100
     double mae = 0;                           ///< mean |a − b|
     double smape = 0;                         ///< mean 2|a − b| / (|a| + |b|), in [0,2]
     std::array<double, 2> mean{0, 0};
     double mean_ratio = 1;                    ///< mean a / mean b; NaN when both are black, infinite when only b is.
+    std::optional<Looks> looks;               ///< When both have R, G and B of known primaries, and metrics are valid.
     std::vector<std::string> other_channels;  ///< In one image only; they do not matter unless all_channels.
 };
 
-CompareResult compareImages(const Image& a, const Image& b, const CompareOptions& options = {});
+/// Has it channels R, G and B?
+bool hasColor(const Image& image);
 
-/// A few lines for people, without a final newline.
-std::string compareText(const CompareResult& result);
-/// One JSON object; what is not a number is null.
-std::string compareJson(const CompareResult& result);
+CompareResult compareImages(const Image& a, const Image& b, const CompareOptions& options = {});
 
 /// a − b of R, G and B.
 Image differenceImage(const Image& a, const Image& b);

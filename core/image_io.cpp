@@ -57,20 +57,6 @@ Matrix3d inverse(const Matrix3d& m) {
     return r;
 }
 
-/// From the image's colour space to linear sRGB; empty when it is sRGB already, which an image without chromaticities is taken for.
-std::optional<Matrix3d> toLinearSrgb(const Image& image) {
-    if (!image.chromaticities) return std::nullopt;
-    const auto is = [&](ColorSpace space) {
-        const std::array<double, 8> known = chromaticities(space);
-        // A file holds them as float.
-        return std::equal(known.begin(), known.end(), image.chromaticities->begin(), [](double a, double b) { return std::abs(a - b) < 1e-6; });
-    };
-    if (is(ColorSpace::LinearSrgb)) return std::nullopt;
-    for (const ColorSpace space : {ColorSpace::AcesCg, ColorSpace::Xyz})
-        if (is(space)) return multiply(xyzToRgb(ColorSpace::LinearSrgb), inverse(xyzToRgb(space)));
-    throw Error(ErrorKind::Output, "the image's primaries are neither those of sRGB, of ACEScg nor of XYZ, so it cannot become 8-bit sRGB");
-}
-
 // ---------------------------------------------------------------------------------------------------------------- PFM, PPM
 
 /// "PF", size, −1 for little-endian, then rows from the bottom up (Debevec's Portable FloatMap).
@@ -341,6 +327,19 @@ std::optional<OutputFormat> formatOfFile(const std::string& path) {
     if (extension == ".ppm") return OutputFormat::Ppm;
     if (extension == ".pfm") return OutputFormat::Pfm;
     return std::nullopt;
+}
+
+std::optional<Matrix3d> toLinearSrgb(const Image& image) {
+    if (!image.chromaticities) return std::nullopt;
+    const auto is = [&](ColorSpace space) {
+        const std::array<double, 8> known = chromaticities(space);
+        // A file holds them as float.
+        return std::equal(known.begin(), known.end(), image.chromaticities->begin(), [](double a, double b) { return std::abs(a - b) < 1e-6; });
+    };
+    if (is(ColorSpace::LinearSrgb)) return std::nullopt;
+    for (const ColorSpace space : {ColorSpace::AcesCg, ColorSpace::Xyz})
+        if (is(space)) return multiply(xyzToRgb(ColorSpace::LinearSrgb), inverse(xyzToRgb(space)));
+    throw Error(ErrorKind::Output, "the image's primaries are neither those of sRGB, of ACEScg nor of XYZ, so it cannot become 8-bit sRGB");
 }
 
 EncodedImage encodeSrgb8(const Image& image) {

@@ -11,6 +11,7 @@
 #include "atomic_file.h"
 #include "film.h"
 #include "scene.h"
+#include "spectra.h"
 
 #include <cstdint>
 #include <optional>
@@ -31,6 +32,10 @@ Image readImage(const std::string& path);
 
 /// Value of a metadata key, or empty.
 std::string metadataValue(const Image& image, const std::string& key);
+
+/// From the image's colour space to linear sRGB; empty when it is sRGB already, which an image without chromaticities is taken for. Throws
+/// crt::Error(Output) for primaries that are none of sRGB's, ACEScg's and XYZ's.
+std::optional<Matrix3d> toLinearSrgb(const Image& image);
 
 /// 8-bit sRGB of an image, row-major, top row first, three bytes a pixel; what PNG and PPM hold.
 struct EncodedImage {

@@ -45,6 +45,20 @@ Exit codes: 0 done, 1 internal error, 2 command line, 3 scene, 4 backend or devi
 130 and 143 stopped by Ctrl-C or kill (image and checkpoint are saved).
 )";
 
+constexpr const char* kCompareHelp = R"(
+What is printed: whether the bits are the same; where the first difference is, with both values and how many floats lie between
+them (ulp); errors over all values of R, G and B; what it looks like (FLIP, Delta E). Where an image says how large its noise is
+(output AOV 'variance' or 'error', or a reference of 'crt reference'), also whether the difference is noise or bias: the bias of each
+channel with its 99.9 % interval, and how many tiles and pixels differ by more than noise would let any of them (alpha 0.1 %).
+One NaN or infinity voids all of it: nothing is dropped.
+
+Examples:
+  crt compare cuda.exr embree.exr                        are they the same bits?
+  crt compare --tolerance 0.01 --diff d.png a.exr b.exr  is the RMS difference below 1 % of b's mean?
+  crt compare a.exr b.exr --map z.png                    where is the difference more than noise?
+  crt compare a.exr b.exr --reference r.exr              which is nearer to r, and by how much?
+)";
+
 /// Usage lines as people write them, and on the top page the options of the command that needs no name.
 class HelpFormatter : public CLI::Formatter {
 public:
@@ -270,17 +284,29 @@ private:
 
     void addCompare() {
         CLI::App* compare = addCommand("compare", "compare two images; exit code 7 when they differ", [this] { return compareFiles(compare_); });
-        compare->footer("\nExamples:\n"
-                        "  crt compare cuda.exr embree.exr                    are they the same bits?\n"
-                        "  crt compare --tolerance 0.01 --diff d.png a.exr b.exr\n");
+        compare->footer(kCompareHelp);
         compare->add_option("A", compare_.first, "image")->required();
-        compare->add_option("B", compare_.second, "image")->required();
+        compare->add_option("B", compare_.second, "image; relative numbers are relative to it")->required();
+        const char* group = "Same or not (exit code)";
         reader_.option(*compare, "--tolerance", "X", "RMS difference, as a share of B's mean, that counts as equal (0: same bits)",
-                       [this](const std::string& text) { compare_.options.tolerance = parseTolerance(text, "--tolerance"); });
-        compare->add_flag("--all-channels", compare_.options.all_channels, "compare every channel, not only R, G and B");
-        compare->add_flag("--json", compare_.json, "print the numbers as JSON");
+                       [this](const std::string& text) { compare_.options.tolerance = parseTolerance(text, "--tolerance"); })
+            ->group(group);
+        compare->add_flag("--all-channels", compare_.options.all_channels, "compare every channel, not only R, G and B")->group(group);
+        group = "More to see";
+        reader_.option(*compare, "--reference", "FILE", "errors of A and of B against this image, side by side",
+                       [this](const std::string& text) { compare_.reference = text; })
+            ->group(group);
         reader_.option(*compare, "--diff", "FILE", "write the difference: values to .exr or .pfm, colours to .png or .ppm",
-                       [this](const std::string& text) { compare_.difference_file = text; });
+                       [this](const std::string& text) { compare_.difference_file = text; })
+            ->group(group);
+        reader_.option(*compare, "--map", "FILE", "write z, the difference in standard errors: values to .exr or .pfm, else colours",
+                       [this](const std::string& text) { compare_.map_file = text; })
+            ->group(group);
+        reader_.option(*compare, "--json", "[FILE]", "all numbers as JSON: into FILE.json too, or instead of the text",
+                       [this](const std::string& text) { compare_.json_file = text; })
+            ->group(group);
+        compare->set_help_flag();  // Taken away and added again, so that it comes last.
+        compare->set_help_flag("-h,--help", "this page")->group(group);
     }
 
     void addMerge() {

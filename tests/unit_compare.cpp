@@ -1,5 +1,5 @@
 // Comparing images: metrics worked out by hand, and everything that must not pass for equal.
-#include "compare.h"
+#include "compare_text.h"
 #include "error.h"
 
 #include <catch2/catch.hpp>

@@ -1,0 +1,24 @@
+/// How different two images look: FLIP and CIEDE2000 of what a screen shows of them.
+#pragma once
+
+#include "film.h"
+
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace crt {
+
+struct Looks {
+    double flip_mean = 0;              ///< Andersson et al. 2020 and 2021, in [0, 1]. NaN against black where exposures are chosen by the reference.
+    bool high_range = false;           ///< HDR-FLIP, over all exposures that the reference asks for; else LDR-FLIP.
+    double delta_e_mean = 0, delta_e_max = 0;  ///< CIEDE2000, 1 being white.
+};
+
+/// R, G and B of every pixel in linear sRGB; nothing when they are missing or the image's primaries are unknown.
+std::optional<std::vector<float>> linearSrgb(const Image& image);
+
+/// Values as linearSrgb gives them, all finite. `display_referred`: both are as a screen shows them, as PNG files are; else they are radiances.
+Looks compareLooks(std::span<const float> test, std::span<const float> reference, std::uint32_t width, std::uint32_t height, bool display_referred);
+
+}  // namespace crt

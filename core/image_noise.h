@@ -1,0 +1,47 @@
+/// What an image says of its own noise, by the channels that it carries beside its colour.
+#pragma once
+
+#include "film.h"
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// Independent parts that a reference keeps ("Fold.0.R" … "Fold.7.B").
+inline constexpr std::size_t kFolds = 8;
+
+/// Values and their variances, pixel by pixel.
+struct NoisyImage {
+    std::vector<std::string> channels;  ///< R, G, B, or Y alone.
+    std::vector<double> values;         ///< [pixel][channel]
+    std::vector<double> variances;      ///< Of the values; [pixel][channel]
+    double dof = 0;                     ///< Degrees of freedom of each variance.
+    std::string source;                 ///< "StdError.Y", …: where the variances are from.
+    std::vector<std::vector<double>> fold_means;  ///< [channel][fold], over the image; empty without folds.
+};
+
+enum class NoiseOf { Color, Luminance };
+
+/// With NoiseOf::Color, from channels StdError.R, .G and .B, Variance.R, .G and .B, or folds. With NoiseOf::Luminance, from StdError.Y, Variance.Y or
+/// folds; the values are then the luminance of R, G and B by the image's primaries. Nothing when there is none of them, or they are not finite.
+///
+/// StdError and Variance are of the pixel's mean, in the image's exposure. Their degrees of freedom are taken as 15, those of the 16 replicates that a
+/// render has: what was counted over more samples than that has tails that make up for it.
+std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what);
+
+/// One sentence when both images name the same seed in their metadata, so that they may share samples; else empty.
+std::string sameSeed(const Image& a, const Image& b);
+
+/// Are there channels of eight folds?
+bool hasFolds(const Image& image);
+
+/// R, G and B of every pixel without fold `left_out`: the mean of the seven others. Requires hasFolds.
+std::vector<float> colorWithoutFold(const Image& image, std::size_t left_out);
+
+/// Weights of R, G and B in luminance, adding to 1: of the image's primaries, or of sRGB when it names none.
+std::array<double, 3> luminanceWeights(const Image& image);
+
+}  // namespace crt
