@@ -191,6 +191,20 @@ TEST_CASE("primitive ids come from the film with the lower first sample, whoever
     CHECK(c.primitives[0] == 22);
 }
 
+TEST_CASE("counts beyond 2^32 samples are kept", "[film]") {
+    constexpr std::uint64_t kHalf = 3'000'000'000u;  // Beyond an int, and twice it beyond 32 bits.
+    Film film({1, 1, 4, 0}), more({1, 1, 4, 0});
+    film.counts[0] = more.counts[0] = kHalf;
+    film.sums[2] = more.sums[2] = 0.25 * kHalf;
+    film.samples.add({0, kHalf});
+    more.samples.add({kHalf, 2 * kHalf});
+    film.add(more);
+    CHECK(film.counts[0] == 2 * kHalf);
+    CHECK(film.samples.count() == 2 * kHalf);
+    CHECK(film.mean(0, 0, 1) == 0.25);
+    CHECK(film.invalidSamples() == 0);
+}
+
 TEST_CASE("dropped samples are counted", "[film]") {
     Film film({2, 2, 4, 0});
     film.samples.add({0, 100});

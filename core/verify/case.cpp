@@ -12,7 +12,7 @@
 namespace crt::verify {
 namespace {
 
-constexpr std::array<std::pair<char, const char*>, 13> kGroups{{
+constexpr std::array<std::pair<char, const char*>, 14> kGroups{{
     {'A', "Closed forms"},
     {'B', "Scale and position"},
     {'C', "Degenerate and awkward geometry"},
@@ -26,6 +26,7 @@ constexpr std::array<std::pair<char, const char*>, 13> kGroups{{
     {'K', "Input hygiene and size"},
     {'L', "Floating point environment and backends"},
     {'M', "Relations between images"},
+    {'N', "Faults that no other case would notice"},
 }};
 
 constexpr std::array kLevels{"commit", "merge", "nightly"};
@@ -73,7 +74,7 @@ Verdict worst(const std::vector<Outcome>& outcomes) {
 const std::vector<Case>& registry() {
     static const std::vector<Case> cases = [] {
         std::vector<Case> all;
-        for (const auto group : {closedFormCases, stiffCases})
+        for (const auto group : {closedFormCases, stiffCases, mutantCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

@@ -76,5 +76,6 @@ std::vector<const Case*> select(const std::vector<std::string>& words, Level lev
 /// Groups, each in a file of its own.
 std::vector<Case> closedFormCases();     ///< A
 std::vector<Case> stiffCases();          ///< F
+std::vector<Case> mutantCases();         ///< N
 
 }  // namespace crt::verify
