@@ -377,8 +377,9 @@ void fit(ConfigurationFit& result, const Block& block, const Measure& measure, c
     error.intercept = estimate(intercept, Scale::Linear, widening, options.confidence);
     error.faster_than_inverse = error.intercept.high < 0;
     if (const Estimate bias = estimate(bias_squared, Scale::Linear, 1, options.confidence); std::isfinite(bias.value)) error.bias_squared = bias;
-    error.flattening = (error.bias_squared ? estimate(bias_squared, Scale::Linear, 1, options.verdict_confidence)
-                                           : estimate(intercept, Scale::Linear, widening, options.verdict_confidence)).low > 0;
+    error.verdict_floor = error.bias_squared ? estimate(bias_squared, Scale::Linear, 1, options.verdict_confidence)
+                                             : estimate(intercept, Scale::Linear, widening, options.verdict_confidence);
+    error.flattening = error.verdict_floor.low > 0;
 
     result.slope_samples = estimate([&](Replicates r) { return model.slopeSamples(r); }, Scale::Linear, widening, options.confidence);
     result.slope_seconds =
@@ -389,9 +390,10 @@ void fit(ConfigurationFit& result, const Block& block, const Measure& measure, c
         result.targets.push_back(reachTarget(model, block.replicates(), target, error, first_mse, widening, options.confidence));
 }
 
-std::string percent(double value) { return fmt::format("{:+.2g} %", 100 * value); }
+/// "+0.31 %", with a true minus sign.
+std::string signedPercent(double value) { return fmt::format("{}{:.2g} %", value < 0 ? "−" : "+", 100 * std::abs(value)); }
 
-/// numerics' gate: void rows, pooled equivalence per channel, tiles and pixels, tail guard; the first that speaks decides.
+/// Void rows, pooled equivalence per channel, bias floor, tiles and pixels, then the guard against heavy tails: the first that speaks decides.
 Judgement judge(const ConfigurationFit& fits, const ImageTests& tests, const RowsBySamples& by_samples, const ReferenceInfo* reference,
                 const FitOptions& options) {
     using stats::Verdict;
@@ -427,6 +429,8 @@ Judgement judge(const ConfigurationFit& fits, const ImageTests& tests, const Row
     if (pooled == Verdict::Fail)
         return say(Verdict::Fail, fmt::format("The image mean is off by more than {:.2g} % at {:.3g} % confidence.", 100 * options.equivalence_margin,
                                               confidence));
+    if (fits.fitted && fits.error.verdict_floor.low > options.equivalence_margin * options.equivalence_margin)
+        return say(Verdict::Fail, fmt::format("The error does not fall below {:.2g} %: pixels are off.", 100 * std::sqrt(fits.error.verdict_floor.low)));
     if (tests.smallest_tile_p && *tests.smallest_tile_p < options.family_alpha)
         return say(Verdict::Fail, fmt::format("A tile differs from the reference (p = {:.1e} after Holm).", *tests.smallest_tile_p));
     if (tests.tile_p_uniformity && *tests.tile_p_uniformity < options.family_alpha)
@@ -440,9 +444,9 @@ Judgement judge(const ConfigurationFit& fits, const ImageTests& tests, const Row
         return say(Verdict::Inconclusive, fmt::format("One sample carries {:.2g} % of the image.", 100 * *tests.largest_sample_share));
     if (pooled == Verdict::Inconclusive)
         return say(Verdict::Inconclusive, fmt::format("The {:.3g} % interval of the image mean's bias reaches {}; ±{:.2g} % is allowed. More samples decide.",
-                                                      confidence, percent(worst), 100 * options.equivalence_margin));
+                                                      confidence, signedPercent(worst), 100 * options.equivalence_margin));
     return say(Verdict::Pass, fmt::format("The image mean is within ±{:.2g} % of the reference; the {:.3g} % interval reaches {}.",
-                                          100 * options.equivalence_margin, confidence, percent(worst)));
+                                          100 * options.equivalence_margin, confidence, signedPercent(worst)));
 }
 
 }  // namespace

@@ -68,7 +68,8 @@ struct ErrorFit {
     std::optional<Estimate> bias_squared;
     /// The better of the two: bias_squared where there is one, else the intercept.
     const Estimate& floor() const { return bias_squared ? *bias_squared : intercept; }
-    bool flattening = false;         ///< floor() is above 0 at the verdict's confidence.
+    Estimate verdict_floor;          ///< floor() with the verdict's confidence.
+    bool flattening = false;         ///< verdict_floor is above 0.
     bool faster_than_inverse = false;  ///< intercept lies below 0 altogether: v/N is not the law here.
 };
 

@@ -1,0 +1,454 @@
+#include "converge/files.h"
+
+#include "atomic_file.h"
+#include "error.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+// In the header's inline form, so that nothing has to be linked or found at run time.
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <tuple>
+#include <unistd.h>
+
+namespace crt::converge {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// JSON has no infinity and no NaN.
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
+Json numbers(const std::array<double, 3>& values) { return Json::array({number(values[0]), number(values[1]), number(values[2])}); }
+Json interval(const Estimate& e) { return Json{{"value", number(e.value)}, {"low", number(e.low)}, {"high", number(e.high)}}; }
+Json interval(const std::optional<Estimate>& e) { return e ? interval(*e) : Json(nullptr); }
+
+double numberIn(const Json& value) { return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>(); }
+std::optional<double> knownNumberIn(const Json& value) { return value.is_null() ? std::nullopt : std::optional(value.get<double>()); }
+std::array<double, 3> numbersIn(const Json& value) { return {numberIn(value.at(0)), numberIn(value.at(1)), numberIn(value.at(2))}; }
+
+// ------------------------------------------------------------------------------------------------------------------------- rows
+
+Json errorJson(const ErrorMetrics& e) {
+    return {{"mse", number(e.mse)},     {"rmse", number(e.rmse)}, {"relative_rmse", number(e.relative_rmse)}, {"relmse", number(e.relmse)},
+            {"smape", number(e.smape)}, {"mae", number(e.mae)},   {"max_absolute", number(e.max_absolute)},   {"flip_mean", number(e.flip_mean)},
+            {"delta_e2000_mean", number(e.delta_e2000_mean)}};
+}
+
+ErrorMetrics errorOf(const Json& json) {
+    ErrorMetrics e;
+    e.mse = numberIn(json.at("mse"));
+    e.rmse = numberIn(json.at("rmse"));
+    e.relative_rmse = numberIn(json.at("relative_rmse"));
+    e.relmse = numberIn(json.at("relmse"));
+    e.smape = numberIn(json.at("smape"));
+    e.mae = numberIn(json.at("mae"));
+    e.max_absolute = numberIn(json.at("max_absolute"));
+    e.flip_mean = knownNumberIn(json.at("flip_mean"));
+    e.delta_e2000_mean = knownNumberIn(json.at("delta_e2000_mean"));
+    return e;
+}
+
+Json rowJson(const Row& row) {
+    Json json;
+    json["scene"] = row.key.scene;
+    json["backend"] = row.key.backend;
+    json["variant"] = row.key.variant;
+    json["seed"] = row.seed;
+    json["replicate"] = row.replicate;
+    json["samples_per_pixel"] = row.samples;
+    json["render_wall_seconds"] = number(row.render_wall_seconds);
+    json["render_device_seconds"] = number(row.render_device_seconds);
+    json["seconds_before_first_sample"] = number(row.seconds_before_first_sample);
+    json["paths"] = row.paths;
+    json["closest_rays"] = row.closest_rays;
+    json["shadow_rays"] = row.shadow_rays;
+    json["error"] = row.error ? errorJson(*row.error) : Json(nullptr);
+    json["between_replicates_mse"] = number(row.between_replicates_mse);
+    json["predicted_relative_rmse"] = interval(row.predicted_relative_rmse);
+    json["image_mean"] = numbers(row.image_mean);
+    json["image_mean_standard_error"] = row.image_mean_standard_error ? numbers(*row.image_mean_standard_error) : Json(nullptr);
+    json["invalid_samples"] = row.invalid_samples;
+    json["void"] = row.isVoid();  // For readers; what makes it so is above.
+    json["cpu_clock_mhz"] = number(row.cpu_clock_mhz);
+    json["load_average"] = number(row.load_average);
+    json["stop_reason"] = row.stop_reason;
+    return json;
+}
+
+Row rowOf(const Json& json) {
+    Row row;
+    row.key = {json.at("scene").get<std::string>(), json.at("backend").get<std::string>(), json.at("variant").get<std::string>()};
+    row.seed = json.at("seed").get<std::uint64_t>();
+    row.replicate = json.at("replicate").get<std::uint32_t>();
+    row.samples = json.at("samples_per_pixel").get<std::uint64_t>();
+    row.render_wall_seconds = numberIn(json.at("render_wall_seconds"));
+    row.render_device_seconds = knownNumberIn(json.at("render_device_seconds"));
+    row.seconds_before_first_sample = numberIn(json.at("seconds_before_first_sample"));
+    row.paths = json.at("paths").get<std::uint64_t>();
+    row.closest_rays = json.at("closest_rays").get<std::uint64_t>();
+    row.shadow_rays = json.at("shadow_rays").get<std::uint64_t>();
+    if (const Json& error = json.at("error"); !error.is_null()) row.error = errorOf(error);
+    row.between_replicates_mse = knownNumberIn(json.at("between_replicates_mse"));
+    if (const Json& predicted = json.at("predicted_relative_rmse"); !predicted.is_null())
+        row.predicted_relative_rmse = Estimate{numberIn(predicted.at("value")), numberIn(predicted.at("low")), numberIn(predicted.at("high"))};
+    row.image_mean = numbersIn(json.at("image_mean"));
+    if (const Json& error = json.at("image_mean_standard_error"); !error.is_null()) row.image_mean_standard_error = numbersIn(error);
+    row.invalid_samples = json.at("invalid_samples").get<std::uint64_t>();
+    row.cpu_clock_mhz = knownNumberIn(json.at("cpu_clock_mhz"));
+    row.load_average = knownNumberIn(json.at("load_average"));
+    row.stop_reason = json.at("stop_reason").get<std::string>();
+    return row;
+}
+
+[[noreturn]] void cannotWrite(const std::string& path) {
+    throw Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, std::strerror(errno)), {path});
+}
+
+void writeWhole(const std::string& path, const std::string& text) {
+    AtomicFile file(path);
+    file.write(text.data(), text.size());
+    file.commit();
+}
+
+// -------------------------------------------------------------------------------------------------------------------------- csv
+
+/// A field of RFC 4180: quoted where it has to be.
+std::string csvField(const std::string& text) {
+    if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+    std::string quoted = "\"";
+    for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return quoted + '"';
+}
+std::string csvField(double value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string(); }
+std::string csvField(std::uint64_t value) { return std::to_string(value); }
+std::string csvField(const std::optional<double>& value) { return value ? csvField(*value) : std::string(); }
+
+struct Column {
+    const char* name;
+    std::function<std::string(const Row&)> field;
+};
+
+/// A column that is empty where the row has no reference.
+template <typename Member>
+std::function<std::string(const Row&)> errorField(Member ErrorMetrics::*member) {
+    return [member](const Row& row) { return row.error ? csvField((*row.error).*member) : std::string(); };
+}
+
+std::function<std::string(const Row&)> predictionField(double Estimate::*member) {
+    return [member](const Row& row) { return row.predicted_relative_rmse ? csvField((*row.predicted_relative_rmse).*member) : std::string(); };
+}
+
+std::function<std::string(const Row&)> standardErrorField(std::size_t channel) {
+    return [channel](const Row& row) { return row.image_mean_standard_error ? csvField((*row.image_mean_standard_error)[channel]) : std::string(); };
+}
+
+const std::vector<Column>& csvColumns() {
+    static const std::vector<Column> columns{
+        {"scene", [](const Row& r) { return csvField(r.key.scene); }},
+        {"backend", [](const Row& r) { return csvField(r.key.backend); }},
+        {"variant", [](const Row& r) { return csvField(r.key.variant); }},
+        {"seed", [](const Row& r) { return csvField(r.seed); }},
+        {"replicate", [](const Row& r) { return csvField(std::uint64_t{r.replicate}); }},
+        {"samples_per_pixel", [](const Row& r) { return csvField(r.samples); }},
+        {"render_wall_seconds", [](const Row& r) { return csvField(r.render_wall_seconds); }},
+        {"render_device_seconds", [](const Row& r) { return csvField(r.render_device_seconds); }},
+        {"seconds_before_first_sample", [](const Row& r) { return csvField(r.seconds_before_first_sample); }},
+        {"paths", [](const Row& r) { return csvField(r.paths); }},
+        {"closest_rays", [](const Row& r) { return csvField(r.closest_rays); }},
+        {"shadow_rays", [](const Row& r) { return csvField(r.shadow_rays); }},
+        {"mse", errorField(&ErrorMetrics::mse)},
+        {"rmse", errorField(&ErrorMetrics::rmse)},
+        {"relative_rmse", errorField(&ErrorMetrics::relative_rmse)},
+        {"relmse", errorField(&ErrorMetrics::relmse)},
+        {"smape", errorField(&ErrorMetrics::smape)},
+        {"mae", errorField(&ErrorMetrics::mae)},
+        {"max_absolute", errorField(&ErrorMetrics::max_absolute)},
+        {"flip_mean", errorField(&ErrorMetrics::flip_mean)},
+        {"delta_e2000_mean", errorField(&ErrorMetrics::delta_e2000_mean)},
+        {"between_replicates_mse", [](const Row& r) { return csvField(r.between_replicates_mse); }},
+        {"predicted_relative_rmse", predictionField(&Estimate::value)},
+        {"predicted_relative_rmse_low", predictionField(&Estimate::low)},
+        {"predicted_relative_rmse_high", predictionField(&Estimate::high)},
+        {"image_mean_r", [](const Row& r) { return csvField(r.image_mean[0]); }},
+        {"image_mean_g", [](const Row& r) { return csvField(r.image_mean[1]); }},
+        {"image_mean_b", [](const Row& r) { return csvField(r.image_mean[2]); }},
+        {"image_mean_standard_error_r", standardErrorField(0)},
+        {"image_mean_standard_error_g", standardErrorField(1)},
+        {"image_mean_standard_error_b", standardErrorField(2)},
+        {"invalid_samples", [](const Row& r) { return csvField(r.invalid_samples); }},
+        {"void", [](const Row& r) { return std::string(r.isVoid() ? "1" : "0"); }},
+        {"cpu_clock_mhz", [](const Row& r) { return csvField(r.cpu_clock_mhz); }},
+        {"load_average", [](const Row& r) { return csvField(r.load_average); }},
+        {"stop_reason", [](const Row& r) { return csvField(r.stop_reason); }},
+    };
+    return columns;
+}
+
+// ---------------------------------------------------------------------------------------------------------------------- summary
+
+Json keyJson(const Key& key) { return {{"scene", key.scene}, {"backend", key.backend}, {"variant", key.variant}}; }
+
+Json pointJson(const Point& p) {
+    return {{"samples_per_pixel", p.samples},
+            {"replicates", p.replicates},
+            {"seconds", interval(p.seconds)},
+            {"render_seconds", interval(p.render_seconds)},
+            {"relative_rmse", interval(p.relative_rmse)},
+            {"efficiency_per_second", interval(p.efficiency)},
+            {"relative_mean_bias", interval(p.mean_bias)},
+            {"relative_bias_squared", interval(p.bias_squared)},
+            {"predicted_over_actual_error", interval(p.calibration)},
+            {"predictions", p.predicted},
+            {"predictions_that_hold", p.covered},
+            {"relmse", number(p.relmse)},
+            {"smape", number(p.smape)},
+            {"mae", number(p.mae)},
+            {"flip_mean", number(p.flip_mean)},
+            {"delta_e2000_mean", number(p.delta_e2000_mean)}};
+}
+
+Json targetJson(const Target& t) {
+    return {{"relative_rmse", t.relative_rmse},
+            {"reached", t.reached},
+            {"at_first_point", t.at_first_point},
+            {"samples_per_pixel", interval(t.samples)},
+            {"seconds", interval(t.seconds)}};
+}
+
+Json fitJson(const ConfigurationFit& fit) {
+    Json json = keyJson(fit.key);
+    json["replicates"] = fit.replicates;
+    json["void_rows"] = fit.void_rows;
+    json["error_source"] = fit.source == ErrorSource::Reference ? "reference" : "between replicates";
+    json["verdict"] = stats::verdictName(fit.judgement.verdict);
+    json["verdict_reason"] = fit.judgement.reason;
+    json["relative_mean_bias_rgb"] = nullptr;
+    if (const auto& bias = fit.judgement.mean_bias)
+        json["relative_mean_bias_rgb"] = Json::array({interval((*bias)[0]), interval((*bias)[1]), interval((*bias)[2])});
+    if (fit.fitted) {
+        json["time"] = {{"before_first_sample_seconds", number(fit.time.before_first_sample)},
+                        {"launch_seconds", interval(fit.time.launch)},
+                        {"seconds_per_sample", interval(fit.time.per_sample)},
+                        {"r2", number(fit.time.r2)}};
+        json["error"] = {{"variance_of_one_sample", interval(fit.error.variance)},
+                         {"fitted_bias_squared", interval(fit.error.intercept)},
+                         {"bias_squared", interval(fit.error.bias_squared)},
+                         {"flattening", fit.error.flattening},
+                         {"faster_than_inverse", fit.error.faster_than_inverse}};
+        json["slope_against_samples"] = interval(fit.slope_samples);
+        json["slope_against_seconds"] = interval(fit.slope_seconds);
+        json["efficiency_per_second"] = interval(fit.efficiency);
+        json["targets"] = Json::array();
+        for (const Target& target : fit.targets) json["targets"].push_back(targetJson(target));
+    }
+    json["points"] = Json::array();
+    for (const Point& point : fit.points) json["points"].push_back(pointJson(point));
+    return json;
+}
+
+Json featuresJson(const std::vector<Feature>& features) {
+    Json json = Json::array();
+    for (const Feature& feature : features) json.push_back({{"what", feature.name}, {"why", feature.reason}});
+    return json;
+}
+
+Json stagesJson(const StageSeconds& s) {
+    return {{"parse", number(s.parse)},     {"build", number(s.build)},
+            {"compile", number(s.compile)}, {"upload", number(s.upload)},
+            {"first_sample", number(s.first_sample)},
+            {"render_wall", number(s.render_wall)},
+            {"render_device", number(s.render_device)},
+            {"write", number(s.write)}};
+}
+
+Json testsJson(const ImageTests& t) {
+    return {{"smallest_tile_p", number(t.smallest_tile_p)},
+            {"tile_p_uniformity", number(t.tile_p_uniformity)},
+            {"smallest_pixel_p", number(t.smallest_pixel_p)},
+            {"variance_of_variance", number(t.variance_of_variance)},
+            {"largest_sample_share", number(t.largest_sample_share)}};
+}
+
+Json configurationJson(const Configuration& c) {
+    Json json = keyJson(c.key);
+    json["omitted"] = c.omitted.empty() ? Json(nullptr) : Json(c.omitted);
+    if (!c.omitted.empty()) return json;
+    json["device"] = c.device;
+    json["driver"] = c.driver;
+    json["kernel"] = c.kernel;
+    json["threads"] = c.threads;
+    json["scene_file"] = c.scene_file;
+    json["scene_hash"] = c.scene_hash;
+    json["width"] = c.width;
+    json["height"] = c.height;
+    json["kept"] = featuresJson(c.kept);
+    json["left_out"] = featuresJson(c.left_out);
+    json["stage_seconds"] = stagesJson(c.stages);
+    json["image_tests"] = testsJson(c.tests);
+    return json;
+}
+
+Json referenceJson(const ReferenceInfo& r) {
+    return {{"scene", r.scene},
+            {"kind", referenceKindName(r.kind)},
+            {"file", r.file},
+            {"hash", r.hash},
+            {"samples_per_pixel", r.samples},
+            {"estimator", r.estimator},
+            {"image_mean", numbers(r.image_mean)},
+            {"image_mean_standard_error", numbers(r.image_mean_standard_error)},
+            {"mean_variance", number(r.mean_variance)},
+            {"eightfold_spread", number(r.eightfold_spread)}};
+}
+
+Json environmentJson(const Environment& e) {
+    return {{"crt_version", e.crt_version},   {"commit", e.commit},
+            {"dirty", e.dirty},               {"compiler", e.compiler},
+            {"build_flags", e.build_flags},   {"cpu", e.cpu},
+            {"operating_system", e.operating_system},
+            {"threads", e.threads},           {"load_start", e.load_start},
+            {"load_end", e.load_end},         {"working_directory", e.working_directory},
+            {"commands", e.commands},         {"started", e.started},
+            {"finished", e.finished},         {"budget_seconds", number(e.budget_seconds)},
+            {"spent_seconds", number(e.spent_seconds)}};
+}
+
+}  // namespace
+
+const char* referenceKindName(ReferenceKind kind) {
+    switch (kind) {
+        case ReferenceKind::Analytic: return "analytic";
+        case ReferenceKind::Quadrature: return "quadrature";
+        case ReferenceKind::Independent: return "independent";
+        case ReferenceKind::None: break;
+    }
+    return "none";
+}
+
+ResultsLog::ResultsLog(const std::string& path) : path_(path) {
+    descriptor_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    if (descriptor_ < 0) cannotWrite(path);
+    off_t end = ::lseek(descriptor_, 0, SEEK_END);
+    for (char last = 0; end > 0; --end) {
+        if (::pread(descriptor_, &last, 1, end - 1) != 1) break;
+        if (last == '\n') break;
+    }
+    if (end < 0 || ::ftruncate(descriptor_, end) != 0) {
+        ::close(descriptor_);
+        cannotWrite(path);
+    }
+}
+
+ResultsLog::~ResultsLog() { ::close(descriptor_); }
+
+void ResultsLog::append(const Row& row) {
+    const std::string line = rowJson(row).dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+    for (std::size_t written = 0; written < line.size();) {
+        const ssize_t count = ::write(descriptor_, line.data() + written, line.size() - written);
+        if (count < 0 && errno != EINTR) cannotWrite(path_);
+        if (count > 0) written += static_cast<std::size_t>(count);
+    }
+}
+
+std::vector<Row> readResults(const std::string& path) {
+    std::vector<Row> rows;
+    std::error_code ignored;
+    if (!fs::exists(path, ignored)) return rows;
+    std::ifstream file(path, std::ios::binary);
+    std::map<std::tuple<Key, std::uint32_t, std::uint64_t>, std::size_t> place;
+    int line_number = 0;
+    for (std::string line; std::getline(file, line);) {
+        ++line_number;
+        if (file.eof()) break;  // No end of line: torn.
+        try {
+            Row row = rowOf(Json::parse(line));
+            const auto [found, is_new] = place.try_emplace({row.key, row.replicate, row.samples}, rows.size());
+            if (is_new)
+                rows.push_back(std::move(row));
+            else
+                rows[found->second] = std::move(row);
+        } catch (const nlohmann::json::exception& e) {
+            throw Error(ErrorKind::Usage, fmt::format("this line is not a row of 'crt converge' ({}); remove it, or write to a new folder", e.what()),
+                        {path, line_number});
+        }
+    }
+    if (file.bad() || !file.eof()) throw Error(ErrorKind::Usage, fmt::format("cannot read '{}'", path), {path});
+    return rows;
+}
+
+void writeCsv(const std::string& path, const std::vector<Row>& rows) {
+    std::string text;
+    const auto add_line = [&](const std::function<std::string(const Column&)>& field) {
+        for (const Column& column : csvColumns()) text += field(column) + ',';
+        text.back() = '\n';
+    };
+    add_line([](const Column& column) { return std::string(column.name); });
+    for (const Row& row : rows) add_line([&](const Column& column) { return column.field(row); });
+    writeWhole(path, text);
+}
+
+void writeSummary(const std::string& path, const Run& run, const Analysis& analysis) {
+    Json json;
+    json["environment"] = environmentJson(run.environment);
+    json["options"] = {{"confidence", analysis.options.confidence},
+                       {"verdict_confidence", analysis.options.verdict_confidence},
+                       {"equivalence_margin", analysis.options.equivalence_margin},
+                       {"family_alpha", analysis.options.family_alpha}};
+    json["notes"] = run.notes;
+    json["references"] = Json::array();
+    for (const ReferenceInfo& reference : run.references) json["references"].push_back(referenceJson(reference));
+    json["configurations"] = Json::array();
+    for (const Configuration& configuration : run.configurations) json["configurations"].push_back(configurationJson(configuration));
+    json["fits"] = Json::array();
+    for (const ConfigurationFit& fit : analysis.fits) json["fits"].push_back(fitJson(fit));
+    writeWhole(path, json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n');
+}
+
+std::string hashOfFile(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    const std::unique_ptr<XXH3_state_t, void (*)(XXH3_state_t*)> state(XXH3_createState(), [](XXH3_state_t* s) { XXH3_freeState(s); });
+    if (!state) throw std::bad_alloc();
+    XXH3_128bits_reset(state.get());
+    std::vector<char> buffer(1 << 16);
+    while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0)
+        XXH3_128bits_update(state.get(), buffer.data(), static_cast<std::size_t>(file.gcount()));
+    if (file.bad() || !file.eof()) throw Error(ErrorKind::Usage, fmt::format("cannot read '{}'", path), {path});
+    const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+    return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
+void writeManifest(const std::string& path, const Run& run, const std::vector<std::string>& files) {
+    Json json;
+    json["format"] = "crt converge 1";
+    json["environment"] = environmentJson(run.environment);
+    json["scenes"] = Json::array();
+    std::map<std::string, std::string> listed;
+    for (const Configuration& c : run.configurations)
+        if (c.omitted.empty() && listed.emplace(c.scene_file + c.scene_hash, c.key.scene).second)
+            json["scenes"].push_back({{"scene", c.key.scene}, {"file", c.scene_file}, {"compiled_hash", c.scene_hash}});
+    json["references"] = Json::array();
+    for (const ReferenceInfo& reference : run.references) json["references"].push_back(referenceJson(reference));
+    json["files"] = Json::array();
+    for (const std::string& name : files) {
+        const fs::path file = fs::path(path).parent_path() / name;
+        const std::string hash = hashOfFile(file.string());
+        json["files"].push_back({{"name", name}, {"bytes", fs::file_size(file)}, {"xxh3_128", hash}});
+    }
+    writeWhole(path, json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n');
+}
+
+}  // namespace crt::converge

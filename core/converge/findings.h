@@ -1,0 +1,33 @@
+/// What a run has shown, in sentences: who is first and by how much, whether a bias was seen, whether images judge themselves rightly, what is missing.
+#pragma once
+
+#include "converge/fits.h"
+#include "converge/measurement.h"
+
+#include <string>
+#include <vector>
+
+namespace crt::converge {
+
+enum class Tone {
+    Good,     ///< As it should be.
+    Neutral,  ///< A figure.
+    Warning,  ///< Not shown, not measured, or not to be trusted.
+    Bad,      ///< Wrong.
+};
+
+struct Finding {
+    Tone tone = Tone::Neutral;
+    std::string text;  ///< One or two sentences, plain text.
+};
+
+/// About one scene. The first is the headline.
+std::vector<Finding> findingsOfScene(const Run& run, const Analysis& analysis, const std::string& scene);
+
+/// The scenes of a run, in the order of its configurations.
+std::vector<std::string> scenesOf(const Run& run);
+
+/// "embree, sampler=sobol": a configuration within its scene.
+std::string labelOf(const Key& key);
+
+}  // namespace crt::converge

@@ -1,0 +1,25 @@
+/// Numbers for people: few digits, units always, and the interval beside the value. Plain UTF-8, not yet escaped for HTML.
+#pragma once
+
+#include "converge/measurement.h"
+
+#include <cstdint>
+#include <string>
+
+namespace crt::converge {
+
+/// `digits` significant ones, without exponent between 10⁻⁴ and 10⁶: "0.0123", "412", "1.2·10⁷". Not a number: "–".
+std::string numberText(double value, int digits = 3);
+/// "1.23 %"; of 0.0123.
+std::string percentText(double value, int digits = 3);
+/// "12 ms", "3.41 s", "4.2 min", "3.1 h"
+std::string secondsText(double seconds, int digits = 3);
+/// "65 536", with narrow no-break spaces from 10 000 on.
+std::string countText(std::uint64_t count);
+
+/// "2.41 s (2.35–2.47)": the interval in the value's unit. Without bounds, "2.41 s (no interval)".
+std::string secondsText(const Estimate& estimate, int digits = 3);
+std::string percentText(const Estimate& estimate, int digits = 3);
+std::string numberText(const Estimate& estimate, int digits = 3);
+
+}  // namespace crt::converge

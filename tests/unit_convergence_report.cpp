@@ -1,0 +1,427 @@
+// Files and report of `crt converge`, on a run that never was: 3 scenes, 2 backends, 2 variants, and everything that can be wrong with them.
+#include "converge/files.h"
+#include "converge/findings.h"
+#include "converge/quantity_text.h"
+#include "converge/report_html.h"
+#include "converge/svg_plot.h"
+#include "error.h"
+#include "synthetic_run.h"
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include <cctype>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+using namespace crt;
+using namespace crt::converge;
+using Catch::Matchers::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A folder of this test, gone afterwards.
+class Folder {
+public:
+    explicit Folder(const std::string& name) : path_(fs::temp_directory_path() / (name + std::to_string(::getpid()))) { fs::create_directories(path_); }
+    ~Folder() { fs::remove_all(path_); }
+    std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+    std::string text() const { return path_.string(); }
+
+private:
+    fs::path path_;
+};
+
+std::string readText(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void writeText(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+
+/// A box lit from above, and noise on it.
+Maps syntheticMaps(double deviation, std::uint64_t seed) {
+    constexpr std::uint32_t size = 128;
+    std::mt19937_64 engine(seed);
+    std::normal_distribution<float> normal;
+    Maps maps;
+    maps.samples = 1024;
+    maps.image.width = maps.image.height = size;
+    maps.image.channels = {"R", "G", "B"};
+    for (Plane* plane : {&maps.error, &maps.standard_error, &maps.z, &maps.flip}) *plane = {size, size, {}};
+    for (std::uint32_t y = 0; y < size; ++y)
+        for (std::uint32_t x = 0; x < size; ++x) {
+            const float u = static_cast<float>(x) / size, v = static_cast<float>(y) / size;
+            const bool left = u < 0.18f, right = u > 0.82f, lamp = v < 0.05f && u > 0.4f && u < 0.6f;
+            const float light = lamp ? 1.0f : 0.55f / (1 + 3 * (u - 0.5f) * (u - 0.5f) + 2 * v * v);
+            const float sd = static_cast<float>(deviation) * (0.3f + light + (left || right ? 0.5f : 0.0f)), z = normal(engine);
+            const float colour[3] = {right ? 0.15f : 0.75f, left ? 0.1f : right ? 0.5f : 0.73f, left || right ? 0.1f : 0.7f};
+            for (const float c : colour) maps.image.pixels.push_back(c * light + sd * z * 0.5f);
+            maps.error.values.push_back(std::abs(sd * z));
+            maps.standard_error.values.push_back(sd);
+            maps.z.values.push_back(z);
+            maps.flip.values.push_back(std::min(1.0f, 4 * std::abs(sd * z)));
+        }
+    return maps;
+}
+
+Run syntheticStudy() {
+    Run run;
+    converge::Environment& e = run.environment;
+    e = {"0.1.0", "f8994df0c1d2e3f4a5b6", true, "g++ 12.2.0", "-O3 -ffp-contract=off", "Example CPU @ 2.10GHz", "Debian GNU/Linux 12, Linux 6.1 x86_64", 8, "0.31 0.40 0.38",
+         "7.92 5.10 2.33", "/home/me/crt", {"crt converge configs/cornell_box.yaml configs/furnace.yaml configs/dragon.yaml --backends embree,opencl,cuda "
+         "--vary sampler=sobol,independent --time 120 -o out/converge"}, "2026-11-20T13:00:00Z", "2026-11-20T13:02:03Z", 120, 118.6};
+    run.notes = {"'cuda' was asked for, and there is no GPU here: its configurations were left out."};
+
+    ReferenceInfo cornell;
+    cornell.scene = "cornell_box";
+    cornell.kind = ReferenceKind::Independent;
+    cornell.file = "cornell_box.ref.exr";
+    cornell.hash = "00112233445566778899aabbccddeeff";
+    cornell.samples = 65536;
+    cornell.estimator = "independent sampler, BSDF sampling only, seed 77";
+    cornell.image_mean = {1, 1, 1};
+    cornell.mean_variance = 1e-7;
+    cornell.eightfold_spread = 0.0009;
+    ReferenceInfo furnace;
+    furnace.scene = "furnace";
+    furnace.kind = ReferenceKind::Analytic;
+    furnace.estimator = "radiance 1 everywhere";
+    furnace.image_mean = {1, 1, 1};
+    run.references = {cornell, furnace};
+
+    std::uint64_t seed = 1;
+    for (const std::string scene : {"cornell_box", "furnace", "dragon"})
+        for (const std::string backend : {"embree", "opencl"})
+            for (const std::string variant : {"sampler=sobol", "sampler=independent"}) {
+                Configuration c;
+                c.key = {scene, backend, variant};
+                c.device = backend == "embree" ? "Example CPU, AVX2" : "pthread-Example CPU (PoCL 3.1)";
+                c.driver = backend == "embree" ? "Embree 3.13.5" : "OpenCL 1.2 PoCL 3.1";
+                c.kernel = "lean: bvh, diffuse, emission; from the cache";
+                c.threads = 8;
+                c.scene_file = "configs/" + scene + ".yaml";
+                c.scene_hash = "0123456789abcdef0123456789abcdef";
+                c.width = c.height = 512;
+                c.kept = {{"diffuse", "a material needs it"}, {"next-event estimation", "there is an emitter"}};
+                c.left_out = {{"glass", "no material is a dielectric"}, {"environment", "the scene has none; rays that leave are black"}};
+                if (scene == "furnace") c.left_out.push_back({"bounding volume hierarchy", "12 triangles are tested one by one"});
+                const bool embree = backend == "embree", sobol = variant == "sampler=sobol";
+                SyntheticRender what;
+                what.pixels = 256;
+                what.variance = scene == "dragon" ? 4 : scene == "furnace" ? 0.02 : 0.3;
+                what.rate = sobol && scene != "dragon" ? 1.25 : 1;
+                what.seconds_per_sample = (embree ? 0.004 : 0.011) * (sobol ? 1.1 : 1);
+                what.before_first_sample = embree ? 0.06 : 0.85;
+                what.looks = scene == "dragon" ? 9 : 12;
+                what.has_reference = scene != "dragon";
+                what.prediction = embree || scene != "cornell_box" ? 1 : 0.8;
+                if (scene == "furnace" && backend == "opencl" && sobol) what.bias = 0.006;
+                what.mean_bias = scene == "cornell_box" && !embree && !sobol ? 0.03 : 0;
+                for (Row& row : syntheticRows(c.key, what, seed += 1000)) run.rows.push_back(std::move(row));
+                c.stages = {0.002, 0.011, embree ? 0.004 : 0.72, 0.003, 0.02, what.seconds_per_sample * (1 << (what.looks - 1)), std::nullopt, 0.19};
+                if (scene == "dragon") c.stages.render_device = 0.9 * c.stages.render_wall;
+                c.maps = syntheticMaps(std::sqrt(what.variance / 1024), seed);
+                if (!what.has_reference) c.maps.error = c.maps.z = c.maps.flip = {};
+                run.configurations.push_back(std::move(c));
+            }
+    for (Row& row : run.rows)
+        if (row.key.scene == "furnace" && row.key.backend == "embree" && row.key.variant == "sampler=independent" && row.replicate == 3 && row.samples >= 512)
+            row.invalid_samples = row.samples / 512;
+    Configuration cuda;
+    cuda.key = {"cornell_box", "cuda", "sampler=sobol"};
+    cuda.omitted = "no CUDA driver was found (libcuda.so.1 cannot be opened)";
+    run.configurations.push_back(cuda);
+    return run;
+}
+
+/// Balanced tags, quoted attributes, no bare '<' or '&': what XML asks for, so that any reader takes the page or figure alike. Empty when all is well.
+std::string whyNotWellFormed(const std::string& text) {
+    std::vector<std::string> open;
+    for (std::size_t at = 0; at < text.size(); ++at) {
+        const auto here = [&] { return " at: " + text.substr(at, 60); };
+        if (text[at] == '&') {
+            const std::size_t end = text.find(';', at);
+            if (end == std::string::npos || end - at > 8) return "bare &" + here();
+        }
+        if (text[at] != '<') continue;
+        if (text.compare(at, 2, "<!") == 0 || text.compare(at, 2, "<?") == 0) {
+            at = text.find('>', at);
+            continue;
+        }
+        const bool closing = text[at + 1] == '/';
+        std::size_t end = at + (closing ? 2 : 1);
+        const std::size_t name_begin = end;
+        while (std::isalnum(static_cast<unsigned char>(text[end])) != 0) ++end;
+        const std::string name = text.substr(name_begin, end - name_begin);
+        if (name.empty()) return "bare <" + here();
+        bool quoted = false;
+        for (; end < text.size() && (quoted || text[end] != '>'); ++end) {
+            if (text[end] == '"') quoted = !quoted;
+            if (text[end] == '<') return "< inside a tag" + here();
+        }
+        if (end == text.size()) return "a tag does not end" + here();
+        const bool empty = text[end - 1] == '/';
+        if (closing) {
+            if (open.empty() || open.back() != name) return "</" + name + "> closes " + (open.empty() ? "nothing" : open.back()) + here();
+            open.pop_back();
+        } else if (!empty) {
+            open.push_back(name);
+        }
+        at = end;
+    }
+    return open.empty() ? "" : "<" + open.back() + "> is not closed";
+}
+
+bool sameRow(const Row& a, const Row& b) {
+    const auto same = [](const std::optional<Estimate>& x, const std::optional<Estimate>& y) {
+        return x.has_value() == y.has_value() && (!x || (x->value == y->value && x->low == y->low && x->high == y->high));
+    };
+    return a.key == b.key && a.seed == b.seed && a.replicate == b.replicate && a.samples == b.samples && a.render_wall_seconds == b.render_wall_seconds &&
+           a.render_device_seconds == b.render_device_seconds && a.seconds_before_first_sample == b.seconds_before_first_sample && a.paths == b.paths &&
+           a.closest_rays == b.closest_rays && a.shadow_rays == b.shadow_rays && a.error.has_value() == b.error.has_value() &&
+           (!a.error || (a.error->mse == b.error->mse && a.error->rmse == b.error->rmse && a.error->relative_rmse == b.error->relative_rmse &&
+                         a.error->relmse == b.error->relmse && a.error->smape == b.error->smape && a.error->mae == b.error->mae &&
+                         a.error->max_absolute == b.error->max_absolute && a.error->flip_mean == b.error->flip_mean &&
+                         a.error->delta_e2000_mean == b.error->delta_e2000_mean)) &&
+           a.between_replicates_mse == b.between_replicates_mse && same(a.predicted_relative_rmse, b.predicted_relative_rmse) && a.image_mean == b.image_mean &&
+           a.image_mean_standard_error == b.image_mean_standard_error && a.invalid_samples == b.invalid_samples && a.cpu_clock_mhz == b.cpu_clock_mhz &&
+           a.load_average == b.load_average && a.stop_reason == b.stop_reason;
+}
+
+std::vector<Row> fewRows() {
+    SyntheticRender what;
+    what.replicates = 3;
+    what.looks = 2;
+    std::vector<Row> rows = syntheticRows({"scene, with \"quotes\"", "embree", "sampler=sobol nee=true"}, what, 1);
+    rows[0].render_device_seconds = 0.1 + 0.2;
+    rows[0].cpu_clock_mhz = 2100;
+    rows[0].error->delta_e2000_mean = 1.5;
+    rows[1].error.reset();
+    rows[1].predicted_relative_rmse.reset();
+    rows[2].seed = 0xffffffffffffffffull;
+    rows[2].image_mean_standard_error.reset();
+    return rows;
+}
+
+}  // namespace
+
+TEST_CASE("rows come back from results.jsonl with every bit", "[converge]") {
+    const Folder folder("crt-results-");
+    const std::vector<Row> rows = fewRows();
+    {
+        ResultsLog log(folder / "results.jsonl");
+        for (const Row& row : rows) log.append(row);
+    }
+    const std::vector<Row> read = readResults(folder / "results.jsonl");
+    REQUIRE(read.size() == rows.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) CHECK(sameRow(read[i], rows[i]));
+    CHECK(readResults(folder / "absent.jsonl").empty());
+}
+
+TEST_CASE("a row appended again replaces the earlier one in its place", "[converge]") {
+    const Folder folder("crt-results-");
+    std::vector<Row> rows = fewRows();
+    ResultsLog log(folder / "results.jsonl");
+    for (const Row& row : rows) log.append(row);
+    rows[1].between_replicates_mse = 0.25;
+    log.append(rows[1]);
+    const std::vector<Row> read = readResults(folder / "results.jsonl");
+    REQUIRE(read.size() == rows.size());
+    CHECK(sameRow(read[1], rows[1]));
+}
+
+TEST_CASE("a torn last line is left out, and cut off before the next row", "[converge]") {
+    const Folder folder("crt-results-");
+    const std::string path = folder / "results.jsonl";
+    const std::vector<Row> rows = fewRows();
+    { ResultsLog(path).append(rows[0]); }
+    const std::string whole = readText(path);
+    writeText(path, whole + whole.substr(0, whole.size() / 2));
+    CHECK(readResults(path).size() == 1);
+    { ResultsLog(path).append(rows[1]); }
+    const std::vector<Row> read = readResults(path);
+    REQUIRE(read.size() == 2);
+    CHECK(sameRow(read[1], rows[1]));
+    writeText(path, whole + "{\"scene\":1}\n");
+    CHECK_THROWS_WITH(readResults(path), Contains("not a row"));
+}
+
+TEST_CASE("numbers that are none survive as null, and void their row", "[converge]") {
+    const Folder folder("crt-results-");
+    Row row = fewRows()[0];
+    row.error->mse = std::numeric_limits<double>::infinity();
+    { ResultsLog(folder / "results.jsonl").append(row); }
+    const std::vector<Row> read = readResults(folder / "results.jsonl");
+    REQUIRE(read.size() == 1);
+    CHECK(std::isnan(read[0].error->mse));
+    CHECK(read[0].isVoid());
+}
+
+TEST_CASE("results.csv has as many fields in each line as in its header", "[converge]") {
+    const Folder folder("crt-csv-");
+    writeCsv(folder / "results.csv", fewRows());
+    std::ifstream file(folder / "results.csv");
+    std::size_t columns = 0, lines = 0;
+    for (std::string line; std::getline(file, line); ++lines) {
+        std::size_t fields = 1;
+        bool quoted = false;
+        for (const char c : line) {
+            if (c == '"') quoted = !quoted;
+            fields += !quoted && c == ',' ? 1 : 0;
+        }
+        if (lines == 0) columns = fields;
+        CHECK(fields == columns);
+        if (lines > 0) CHECK_THAT(line, Contains("\"scene, with \"\"quotes\"\"\""));
+    }
+    CHECK(lines == 7);
+    CHECK_THAT(readText(folder / "results.csv"), Contains("0.30000000000000004"));  // Every bit here, too.
+}
+
+TEST_CASE("the manifest has size and hash of every file", "[converge]") {
+    const Folder folder("crt-manifest-");
+    writeText(folder / "empty.txt", "");
+    writeText(folder / "a.txt", "a");
+    writeManifest(folder / "manifest.json", syntheticStudy(), {"empty.txt", "a.txt"});
+    const nlohmann::json manifest = nlohmann::json::parse(readText(folder / "manifest.json"));
+    CHECK(manifest["files"][0]["xxh3_128"] == "99aa06d3014798d86001c324468d497f");  // XXH3's published value of nothing.
+    CHECK(manifest["files"][1]["bytes"] == 1);
+    CHECK(manifest["files"][1]["xxh3_128"] != manifest["files"][0]["xxh3_128"]);
+    CHECK(manifest["scenes"].size() == 3);
+    CHECK_THROWS_AS(writeManifest(folder / "manifest.json", syntheticStudy(), {"absent.txt"}), Error);
+}
+
+TEST_CASE("quantities are short, have units, and round up to the next unit", "[converge]") {
+    CHECK(numberText(0.9996) == "1.00");
+    CHECK(numberText(123456) == "123000");
+    CHECK(numberText(-0.5, 2) == "−0.50");
+    CHECK(numberText(1.234e-7) == "1.23·10⁻⁷");
+    CHECK(numberText(std::nan("")) == "–");
+    CHECK(percentText(0.01, 1) == "1 %");
+    CHECK(percentText(0.001, 1) == "0.1 %");
+    CHECK(secondsText(0.9996) == "1.00 s");
+    CHECK(secondsText(0.0123) == "12.3 ms");
+    CHECK(secondsText(600) == "10.0 min");
+    CHECK(countText(1024) == "1024");
+    CHECK(countText(1234567) == "1\u202f234\u202f567");
+    CHECK(secondsText(Estimate{2, 1.9, 2.1}) == "2.00 s (1.90–2.10)");
+    CHECK(numberText(Estimate{0, -1, 1}, 1) == "0 (−1 to 1)");
+}
+
+TEST_CASE("markup in names is escaped", "[converge]") {
+    CHECK(escapeXml("<a href=\"x\">&") == "&lt;a href=&quot;x&quot;&gt;&amp;");
+    Run run = syntheticStudy();
+    for (Configuration& c : run.configurations) c.key.scene = "<b>&\"";
+    for (Row& row : run.rows) row.key.scene = "<b>&\"";
+    const Folder folder("crt-escape-");
+    writeReport(folder.text(), run, analyze(run));
+    const std::string html = readText(folder / "report.html");
+    CHECK(html.find("<b>&") == std::string::npos);
+    CHECK(whyNotWellFormed(html) == "");
+}
+
+TEST_CASE("the report is one well-formed page without requests, and leaves nothing out", "[converge]") {
+    // To look at: CRT_REPORT_FIXTURE=out/fixture unit_tests "[converge]"
+    const char* kept = std::getenv("CRT_REPORT_FIXTURE");
+    const Folder temporary("crt-report-");
+    const std::string folder = kept ? kept : temporary.text();
+    fs::create_directories(folder);
+    const Run run = syntheticStudy();
+    const Analysis analysis = analyze(run);
+    const std::vector<std::string> files = writeReport(folder, run, analysis);
+    const std::string html = readText(folder + "/report.html");
+
+    CHECK(whyNotWellFormed(html) == "");
+    for (const char* request : {"http:", "https:", "//", "<script", "<link", "@import", "url(", "src=\"/", "<iframe", "<object"}) {
+        INFO(request);
+        // Base64 may hold "//".
+        std::string without_data;
+        for (std::size_t at = 0; at < html.size();) {
+            const std::size_t data = html.find("data:image/png;base64,", at);
+            without_data += html.substr(at, data - at);
+            at = data == std::string::npos ? html.size() : html.find('"', data);
+        }
+        CHECK(without_data.find(request) == std::string::npos);
+    }
+    for (const Configuration& configuration : run.configurations) {
+        INFO(configuration.key.scene << ' ' << labelOf(configuration.key));
+        const std::size_t section = html.find("<section id=\"scene-" + (configuration.key.scene == "cornell_box" ? "cornell-box" : configuration.key.scene));
+        REQUIRE(section != std::string::npos);
+        const std::string own = html.substr(section, html.find("</section>", section) - section);
+        CHECK_THAT(own, Contains("</span>" + labelOf(configuration.key) + "</th>"));
+        if (!configuration.omitted.empty()) CHECK_THAT(own, Contains(configuration.omitted));
+    }
+    std::size_t void_rows = 0;
+    for (const Row& row : run.rows) {
+        if (!row.isVoid()) continue;
+        ++void_rows;
+        CHECK_THAT(html, Contains("replicate\"><span>" + std::to_string(row.replicate) + "</span></td><td class=\"num\" data-label=\"samples per pixel\"><span>" +
+                                  countText(row.samples)));
+    }
+    CHECK(void_rows == 3);
+    CHECK_THAT(html, Contains(escapeXml(run.environment.commands[0])));
+    CHECK_THAT(html, Contains("no material is a dielectric"));
+    CHECK_THAT(html, Contains(run.notes[0].substr(8)));
+
+    std::size_t svgs = 0, pngs = 0;
+    for (const std::string& file : files) {
+        INFO(file);
+        const std::string bytes = readText(folder + "/" + file);
+        REQUIRE_FALSE(bytes.empty());
+        if (file.ends_with(".svg")) {
+            ++svgs;
+            CHECK(whyNotWellFormed(bytes) == "");
+            CHECK_THAT(bytes, Contains("xmlns=\"http://www.w3.org/2000/svg\""));
+            CHECK_THAT(bytes, !Contains("nan") && !Contains("inf"));
+        }
+        pngs += file.ends_with(".png") ? 1 : 0;
+    }
+    CHECK(svgs == 3 * 7 - 1);      // No reference, no bias: one figure fewer.
+    CHECK(pngs == 8 * 5 + 4 * 2);  // No reference: image and standard error.
+}
+
+TEST_CASE("findings say who is first, what is wrong and what is missing", "[converge]") {
+    const Run run = syntheticStudy();
+    const Analysis analysis = analyze(run);
+    const auto textOf = [&](const char* scene) {
+        std::string text;
+        for (const Finding& finding : findingsOfScene(run, analysis, scene)) text += finding.text + '\n';
+        return text;
+    };
+    const std::string cornell = textOf("cornell_box"), furnace = textOf("furnace"), dragon = textOf("dragon");
+    CHECK_THAT(cornell, Contains("embree, sampler=sobol reaches 1 % relative RMSE first"));
+    CHECK_THAT(cornell, Contains("opencl, sampler=independent FAILS: The image mean is off by more than 1 %"));
+    CHECK_THAT(cornell, Contains("opencl, sampler=sobol understates its own error"));
+    CHECK_THAT(cornell, Contains("cuda, sampler=sobol was left out: no CUDA driver"));
+    CHECK_THAT(furnace, Contains("embree, sampler=independent FAILS: 3 rows are void"));
+    CHECK_THAT(furnace, Contains("opencl, sampler=sobol flattens: its error stops falling near 0.6"));
+    CHECK_THAT(dragon, Contains("No configuration reached 1 % relative RMSE; embree"));
+    CHECK_THAT(dragon, Contains("There is no reference for this scene"));
+}
+
+TEST_CASE("a run without rows still makes a report", "[converge]") {
+    Run run = syntheticStudy();
+    run.rows.clear();
+    const Folder folder("crt-empty-");
+    writeReport(folder.text(), run, analyze(run));
+    CHECK(whyNotWellFormed(readText(folder / "report.html")) == "");
+    writeSummary(folder / "summary.json", run, analyze(run));
+    CHECK(nlohmann::json::parse(readText(folder / "summary.json"))["fits"].size() == 13);
+}
+
+TEST_CASE("the summary has the fits of every configuration", "[converge]") {
+    const Folder folder("crt-summary-");
+    const Run run = syntheticStudy();
+    writeSummary(folder / "summary.json", run, analyze(run));
+    const nlohmann::json summary = nlohmann::json::parse(readText(folder / "summary.json"));
+    CHECK(summary["configurations"].size() == 13);
+    CHECK(summary["fits"][0]["points"].size() == 12);
+    CHECK(summary["fits"][0]["targets"][0]["reached"] == true);
+    CHECK(summary["fits"][0]["verdict"] == "PASS");
+    CHECK(summary["configurations"][12]["omitted"].get<std::string>().find("CUDA") != std::string::npos);
+}
