@@ -128,6 +128,7 @@ Run syntheticStudy() {
                 if (scene == "dragon") c.stages.render_device = 0.9 * c.stages.render_wall;
                 c.maps = syntheticMaps(std::sqrt(what.variance / 1024), seed);
                 if (!what.has_reference) c.maps.error = c.maps.z = c.maps.flip = {};
+                if (what.has_reference) c.tests = {0.31, 0.48, 0.22, std::nullopt, 0.0004};
                 run.configurations.push_back(std::move(c));
             }
     for (Row& row : run.rows)

@@ -235,6 +235,18 @@ TEST_CASE("verdicts", "[fits]") {
     SECTION("a heavy tail is not trusted") {
         run.configurations[0].tests.variance_of_variance = 0.2;
         CHECK(verdict() == Verdict::Inconclusive);
+        run.configurations[0].tests = {};
+        run.configurations[0].tests.largest_share = 0.2;
+        CHECK(verdict() == Verdict::Inconclusive);
+    }
+    SECTION("pixels that are off by more than the margin fail, though the image mean is right") {
+        what.bias = 0.03;
+        run = syntheticRun(what, 10);
+        CHECK(verdict() == Verdict::Fail);
+        CHECK(reason().find("pixels are off") != std::string::npos);
+        what.bias = 0.005;
+        run = syntheticRun(what, 10);
+        CHECK(verdict() == Verdict::Pass);
     }
     SECTION("the reference's own error counts") {
         run.references[0].image_mean_standard_error = {0.01, 0.01, 0.01};

@@ -280,7 +280,7 @@ Json testsJson(const ImageTests& t) {
             {"tile_p_uniformity", number(t.tile_p_uniformity)},
             {"smallest_pixel_p", number(t.smallest_pixel_p)},
             {"variance_of_variance", number(t.variance_of_variance)},
-            {"largest_sample_share", number(t.largest_sample_share)}};
+            {"largest_share", number(t.largest_share)}};
 }
 
 Json configurationJson(const Configuration& c) {

@@ -12,6 +12,7 @@
 #pragma once
 
 #include "converge/measurement.h"
+#include "stats/image_tests.h"
 #include "stats/statistics.h"
 
 #include <array>
@@ -113,6 +114,9 @@ struct Analysis {
 };
 
 Analysis analyze(const Run& run, const FitOptions& options = {});
+
+/// What Configuration::tests takes over from a gate; empty where the gate had values that are no numbers.
+ImageTests imageTestsOf(const stats::GateResult& gate);
 
 /// The reference of a scene, or null when there is none.
 const ReferenceInfo* findReference(const Run& run, const std::string& scene);

@@ -93,13 +93,13 @@ struct Feature {
     std::string name, reason;
 };
 
-/// Tests of the final image against the reference that need pixels (numerics: batch means over the replicates, Student t).
+/// Tests of the images against the reference that need pixels: what stats::gate() finds at the most samples.
 struct ImageTests {
     std::optional<double> smallest_tile_p;   ///< Welch on 8×8 tiles, smallest p after Holm's adjustment.
-    std::optional<double> tile_p_uniformity; ///< Kolmogorov–Smirnov p of the tiles' p-values being uniform (Jung et al. 2020).
-    std::optional<double> smallest_pixel_p;  ///< Largest |t| of all pixels and channels, Šidák-adjusted.
+    std::optional<double> tile_p_uniformity; ///< Kolmogorov–Smirnov p of the tiles' p-values being uniform (Jung et al. 2020); shown, not judged by.
+    std::optional<double> smallest_pixel_p;  ///< Of all pixels and channels, Šidák-adjusted.
     std::optional<double> variance_of_variance;   ///< VOV of the pooled estimate, as MCNP defines it; trusted below 0.1.
-    std::optional<double> largest_sample_share;   ///< Largest single sample over the sum; trusted below 0.05.
+    std::optional<double> largest_share;     ///< Part of the squared spread of all replicates that one value carries; trusted below 0.05.
 };
 
 /// One float per pixel, row-major, top row first.

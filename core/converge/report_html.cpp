@@ -143,6 +143,24 @@ std::string metricTable(const Run& run, const Analysis& analysis, const std::str
     return "<h3>At the most samples</h3>\n" + tableOf(columns, rows);
 }
 
+/// What pixels say, where somebody asked them.
+std::string testTable(const Run& run, const std::string& scene) {
+    std::string rows;
+    const auto known = [](const std::optional<double>& value) { return value ? h(numberText(*value, 2)) : std::string("–"); };
+    for (const Configuration& c : run.configurations) {
+        const ImageTests& t = c.tests;
+        if (c.key.scene != scene || !(t.smallest_tile_p || t.smallest_pixel_p || t.variance_of_variance || t.largest_share)) continue;
+        rows += "<tr>" + rowHead(run, c.key) + cell("smallest p of tiles", known(t.smallest_tile_p)) + cell("smallest p of pixels", known(t.smallest_pixel_p)) +
+                cell("tiles’ p uniform", known(t.tile_p_uniformity)) + cell("variance of the variance", known(t.variance_of_variance)) +
+                cell("largest share", t.largest_share ? h(percentText(*t.largest_share, 2)) : "–") + "</tr>\n";
+    }
+    if (rows.empty()) return {};
+    return "<h3>Tests against the reference</h3>\n<p>Smallest p-values are adjusted for how many tiles and pixels there are: below 0.001, one differs. The largest share is "
+           "the part of all squared error that a single value carries.</p>\n" +
+           tableOf({{"configuration", ""}, {"smallest p of tiles", "num"}, {"smallest p of pixels", "num"}, {"tiles’ p uniform", "num"},
+                    {"variance of the variance", "num"}, {"largest share", "num"}}, rows);
+}
+
 std::string voidTable(const Run& run, const std::string& scene) {
     std::string rows;
     for (const Row& row : run.rows) {
@@ -371,7 +389,7 @@ std::string sceneSection(const std::string& folder, const Run& run, const Analys
     for (const Figure& figure : figures) writeText(folder, figure.file, svgFile(figure.svg), written);
     return fmt::format("<section id=\"scene-{}\"><h2>{}</h2>\n", slug(scene), h(scene)) + findingsList(findingsOfScene(run, analysis, scene)) +
            "<p class=\"sub\">" + sentence(referenceSentence(run, scene)) + "</p>\n" + resultTable(run, analysis, scene) + figuresSection(figures) +
-           metricTable(run, analysis, scene) + voidTable(run, scene) + sceneMaps(folder, run, scene, written) + "<h3>Seconds by stage</h3>\n" +
+           metricTable(run, analysis, scene) + testTable(run, scene) + voidTable(run, scene) + sceneMaps(folder, run, scene, written) + "<h3>Seconds by stage</h3>\n" +
            stageTable(run, scene) + featureTable(run, scene) + "</section>\n";
 }
 

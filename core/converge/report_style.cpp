@@ -70,8 +70,9 @@ dl{grid-template-columns:1fr;gap:0}dd{margin-bottom:8px}
 .cards td.wide{display:block;min-width:0}.cards td.wide>span{text-align:left}.cards td.wide::before{display:block;max-width:none}
 .num{white-space:normal}
 }
-@media print{body{font-size:10pt}main,header,footer{max-width:none;padding:0}h2{break-before:page}h3{break-after:avoid}tr{break-inside:avoid}
-.figures{grid-template-columns:1fr 1fr;gap:18px 24px}nav{display:none}}
+@page{size:landscape;margin:14mm}
+@media print{html{font-size:12.5px}body{font-size:1rem}main,header,footer{max-width:none;padding:0}section+section h2{break-before:page}h3{break-after:avoid}
+tr,.maps{break-inside:avoid}.tablebox{overflow:visible}td.wide{min-width:12em}p.sub{break-after:avoid}.figures{grid-template-columns:1fr 1fr 1fr;gap:18px 24px}nav{display:none}}
 )";
 }
 

@@ -196,8 +196,11 @@ std::string slopeGuide(const Plot& plot, const Ruler& x, const Ruler& y) {
     if (!(level > 0) || !(left < right)) return {};
     const auto height = [&](double at) { return level * std::pow(at, slope); };
     std::string svg = line(x.at(left), y.at(height(left)), x.at(right), y.at(height(right)), "guide");
-    const double label = left * std::pow(right / left, 0.7);
-    return svg + text(x.at(label) + 5, y.at(height(label)) - 5, "t halo", fmt::format("slope {}", slope == -0.5 ? "−½" : fmt::format("{}", slope)));
+    // Right of the line and above it, where the line leaves room: at 70 % of its length, or further left when the frame is near.
+    const std::string label = fmt::format("slope {}", slope == -0.5 ? "−½" : fmt::format("{}", slope));
+    const double from = x.at(left), length_x = x.at(right) - from;
+    const double share = std::min(0.7, (kWidth - kRight - textWidth(label) - 6 - from) / length_x);
+    return svg + text(from + share * length_x + 5, y.at(height(left * std::pow(right / left, share))) - 5, "t halo", label);
 }
 
 std::string rules(const Plot& plot, const Ruler& y) {
