@@ -103,6 +103,13 @@ SampleRange parseSampleRange(const std::string& text, const std::string& option)
     return {*first.value, *end.value};
 }
 
+std::vector<std::string> parseList(const std::string& text, const std::string& option) {
+    std::vector<std::string> words = split(text, ',');
+    for (const std::string& word : words)
+        if (word.empty()) refuse(option, "names with commas between them, such as cuda,embree", text);
+    return words;
+}
+
 std::array<int, 4> parseRectangle(const std::string& text, const std::string& option) {
     const std::vector<std::string> parts = split(text, ',');
     std::array<int, 4> rectangle{};

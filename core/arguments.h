@@ -25,6 +25,9 @@ double parseDuration(const std::string& text, const std::string& option);
 /// "0:512": first sample, and one past the last.
 SampleRange parseSampleRange(const std::string& text, const std::string& option);
 
+/// "cuda,embree": words between commas, none of them empty.
+std::vector<std::string> parseList(const std::string& text, const std::string& option);
+
 /// "x0,y0,x1,y1".
 std::array<int, 4> parseRectangle(const std::string& text, const std::string& option);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compare.h"
+#include "compare_backends.h"
 #include "job.h"
 
 #include <string>
@@ -12,16 +13,19 @@ namespace crt {
 /// `crt info`: what a scene needs, or what a film or an image holds, by the name's extension.
 int showInfo(const SceneRequest& what);
 
-/// `crt compare A B`: exit code 7 when the images differ (compare.h says what that means).
+/// `crt compare A B`: exit code 7 when the images differ (compare.h says what that means). `crt compare --backends X,Y SCENE`: 7 when the verdict is
+/// not PASS.
 struct CompareArguments {
-    std::string first, second;
+    std::string first, second;    ///< With backends, the first is the scene and there is no second.
     CompareOptions options;
     std::string reference;        ///< An image that both are measured against; empty: none.
     std::string json_file;        ///< "-" for stdout, then instead of the text; empty: none.
     std::string difference_file;  ///< Empty: none.
     std::string map_file;         ///< Of z; empty: none.
+    SceneRequest scene;           ///< How to change the scene; its name is in `first`.
+    BackendComparisonOptions backends;
 };
-int compareFiles(const CompareArguments& arguments);
+int compare(const CompareArguments& arguments);
 
 /// `crt merge`: disjoint partial films into one film, or into the images of a scene.
 struct MergeArguments {

@@ -1,6 +1,8 @@
 #include "atomic_file.h"
 #include "commands.h"
+#include "compare_backends.h"
 #include "compare_text.h"
+#include "error.h"
 #include "image_io.h"
 
 #include <fmt/format.h>
@@ -29,11 +31,17 @@ void writeText(const std::string& file, const std::string& text) {
     out.commit();
 }
 
-}  // namespace
+/// Text to stdout and JSON to its file, or JSON to stdout.
+void print(const CompareArguments& arguments, const std::string& text, const std::string& json) {
+    fmt::print("{}\n", arguments.json_file == "-" ? json : text);
+    if (!arguments.json_file.empty() && arguments.json_file != "-") writeText(arguments.json_file, json + "\n");
+}
 
 int compareFiles(const CompareArguments& arguments) {
-    for (const std::string& file : {arguments.difference_file, arguments.map_file, arguments.json_file})
-        if (!file.empty() && file != "-") checkWritable(file);
+    if (arguments.second.empty())
+        throw Error(ErrorKind::Usage, fmt::format("there is nothing to compare '{}' with; name a second image, or backends with --backends", arguments.first));
+    if (arguments.scene.seed || arguments.scene.crop || !arguments.scene.overrides.empty())
+        throw Error(ErrorKind::Usage, "--set, --seed and --crop change a scene, and need --backends");
     const Image a = readImage(arguments.first), b = readImage(arguments.second);
     std::optional<Image> reference_image;
     if (!arguments.reference.empty()) reference_image = readImage(arguments.reference);
@@ -49,18 +57,31 @@ int compareFiles(const CompareArguments& arguments) {
     if (reference_image && result.mismatch.empty()) reference = compareWithReference(a, b, *reference_image, options.display_referred);
 
     const Comparison comparison{&result, noise ? &*noise : nullptr, reference ? &*reference : nullptr};
-    if (arguments.json_file == "-") {
-        fmt::print("{}\n", comparisonJson(comparison));
-    } else {
-        fmt::print("{}\n", comparisonText(comparison));
-        if (!arguments.json_file.empty()) writeText(arguments.json_file, comparisonJson(comparison) + "\n");
-    }
+    print(arguments, comparisonText(comparison), comparisonJson(comparison));
     if (!arguments.difference_file.empty() && result.mismatch.empty()) writeDifference(arguments.difference_file, a, b);
     if (!arguments.map_file.empty()) {
         if (!noise) throw Error(ErrorKind::Usage, "there is no z map of images that differ in size, lack R, G and B, or hold values that are not finite");
         writeZMap(arguments.map_file, *noise, a.width, a.height);
     }
     return result.same ? 0 : kDifferent;
+}
+
+int compareBackends(const CompareArguments& arguments) {
+    if (!arguments.second.empty())
+        throw Error(ErrorKind::Usage, fmt::format("--backends takes one scene: '{}' is one too many", arguments.second));
+    SceneRequest request = arguments.scene;
+    request.file = arguments.first;
+    const BackendComparison comparison = compareBackends(loadScene(request), arguments.backends);
+    print(arguments, backendComparisonText(comparison), backendComparisonJson(comparison));
+    return comparison.passes() ? 0 : kDifferent;
+}
+
+}  // namespace
+
+int compare(const CompareArguments& arguments) {
+    for (const std::string& file : {arguments.difference_file, arguments.map_file, arguments.json_file})
+        if (!file.empty() && file != "-") checkWritable(file);
+    return arguments.backends.backends.empty() ? compareFiles(arguments) : compareBackends(arguments);
 }
 
 }  // namespace crt

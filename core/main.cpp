@@ -52,11 +52,17 @@ them (ulp); errors over all values of R, G and B; what it looks like (FLIP, Delt
 channel with its 99.9 % interval, and how many tiles and pixels differ by more than noise would let any of them (alpha 0.1 %).
 One NaN or infinity voids all of it: nothing is dropped.
 
+With --backends, the scene is rendered with one seed by all, which crt's own backends do to the same bits, and with other seeds for a
+verdict: PASS when the 99.9 % interval of the means' difference lies within +-delta and no tile and no pixel differs by more than
+noise, FAIL when one does for certain, INCONCLUSIVE when more samples are needed or one value carries too much of the error. The exit
+code is 7 unless all PASS.
+
 Examples:
   crt compare cuda.exr embree.exr                        are they the same bits?
   crt compare --tolerance 0.01 --diff d.png a.exr b.exr  is the RMS difference below 1 % of b's mean?
   crt compare a.exr b.exr --map z.png                    where is the difference more than noise?
   crt compare a.exr b.exr --reference r.exr              which is nearer to r, and by how much?
+  crt compare --backends cuda,embree scene.yaml          do both render the same?
 )";
 
 /// Usage lines as people write them, and on the top page the options of the command that needs no name.
@@ -283,10 +289,11 @@ private:
     }
 
     void addCompare() {
-        CLI::App* compare = addCommand("compare", "compare two images; exit code 7 when they differ", [this] { return compareFiles(compare_); });
+        CLI::App* compare =
+            addCommand("compare", "compare two images, or backends; exit code 7 when they differ", [this] { return crt::compare(compare_); });
         compare->footer(kCompareHelp);
-        compare->add_option("A", compare_.first, "image")->required();
-        compare->add_option("B", compare_.second, "image; relative numbers are relative to it")->required();
+        compare->add_option("A", compare_.first, "image; with --backends a scene")->required();
+        compare->add_option("B", compare_.second, "image; relative numbers are relative to it");
         const char* group = "Same or not (exit code)";
         reader_.option(*compare, "--tolerance", "X", "RMS difference, as a share of B's mean, that counts as equal (0: same bits)",
                        [this](const std::string& text) { compare_.options.tolerance = parseTolerance(text, "--tolerance"); })
@@ -305,8 +312,31 @@ private:
         reader_.option(*compare, "--json", "[FILE]", "all numbers as JSON: into FILE.json too, or instead of the text",
                        [this](const std::string& text) { compare_.json_file = text; })
             ->group(group);
+        addBackendComparison(*compare);
         compare->set_help_flag();  // Taken away and added again, so that it comes last.
         compare->set_help_flag("-h,--help", "this page")->group(group);
+    }
+
+    void addBackendComparison(CLI::App& compare) {
+        const char* group = "Backends instead of images";
+        BackendComparisonOptions& options = compare_.backends;
+        CLI::Option* backends = reader_.option(compare, "--backends", "X,Y", "render scene A with each; the last is what the others are compared with",
+                                               [&options](const std::string& text) { options.backends = parseList(text, "--backends"); });
+        backends->group(group);
+        reader_.option(compare, "--spp", "N", "samples per pixel of each render (so many that all replicates have the scene's)",
+                       [&options](const std::string& text) { options.samples = parseCount(text, "--spp", 1); })
+            ->group(group)
+            ->needs(backends);
+        reader_.option(compare, "--replicates", "R", "renders of each backend, every one with its own seed (16)",
+                       [&options](const std::string& text) { options.replicates = smallCount(text, "--replicates", 2); })
+            ->group(group)
+            ->needs(backends);
+        reader_.option(compare, "--delta", "PERCENT", "means that differ by less are equivalent (1%)",
+                       [&options](const std::string& text) { options.gate.delta = parseFraction(text, "--delta"); })
+            ->group(group)
+            ->needs(backends);
+        addSceneChanges(compare, compare_.scene, group);
+        compare.add_flag_callback("-q,--quiet", [this] { compare_.backends.progress = ProgressMode::None; }, "no progress")->group(group);
     }
 
     void addMerge() {

@@ -62,9 +62,10 @@ void judge(GateResult& result, const GateOptions& options) {
         result.reasons.push_back(std::move(reason));
     };
     for (std::size_t c = 0; c < result.channels.size(); ++c) {
-        if (result.channels[c].verdict == Verdict::Fail) because(fails, fmt::format("the means of channel {} differ by more than delta", c));
+        const std::string name = c < options.channel_names.size() ? options.channel_names[c] : std::to_string(c);
+        if (result.channels[c].verdict == Verdict::Fail) because(fails, fmt::format("the means of channel {} differ by more than delta", name));
         if (result.channels[c].verdict == Verdict::Inconclusive)
-            because(undecided, fmt::format("the interval of channel {} reaches beyond delta: more samples are needed", c));
+            because(undecided, fmt::format("the interval of channel {} reaches beyond delta: more samples are needed", name));
     }
     if (result.tiles.rejected > 0) because(fails, fmt::format("{} of {} tile tests differ", result.tiles.rejected, result.tiles.tests));
     if (result.pixels.rejected > 0) because(fails, fmt::format("{} of {} pixel tests differ", result.pixels.rejected, result.pixels.tests));

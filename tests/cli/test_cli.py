@@ -558,6 +558,78 @@ class Comparing(CliTest):
         self.assertFalse(result["same"])
         self.assertTrue(os.path.exists(self.path("d.pfm")))
 
+    def test_json_beside_the_text_and_instead_of_it(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
+        text = self.crt("compare", "a.pfm", "a.pfm", "--json", "out.json").stdout
+        self.assertIn("same bits", text)
+        with open(self.path("out.json")) as file:
+            self.assertTrue(json.load(file)["same"])
+        self.assertTrue(json.loads(self.crt("compare", "--json", "a.pfm", "a.pfm").stdout)["same"])
+
+    def test_the_first_difference_in_ulps(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
+        shutil.copy(self.path("a.pfm"), self.path("b.pfm"))
+        with open(self.path("b.pfm"), "r+b") as file:  # The last float of a PFM belongs to the top row's last pixel: B of 23,0.
+            file.seek(-4, os.SEEK_END)
+            value = struct.unpack("<i", file.read(4))[0]
+            file.seek(-4, os.SEEK_END)
+            file.write(struct.pack("<i", value + 3))
+        text = self.crt("compare", "a.pfm", "b.pfm", expect=7).stdout
+        self.assertRegex(text, r"first difference +pixel 23,0 channel B: .* \(3 ulp\)")
+        self.assertRegex(text, r"HDR-FLIP")
+
+    def test_noise_reference_and_z_map(self):
+        scene = SCENE + "outputs: [{file: a.exr, aovs: [variance]}]\n"
+        with open(self.path("with.yaml"), "w") as file:
+            file.write(scene)
+        for seed, name in ((1, "a.exr"), (2, "b.exr"), (3, "r.exr")):
+            self.crt("with.yaml", "-b", "fake", "--seed", str(seed), "--spp", "256", "-o", name)
+        text = self.crt("compare", "a.exr", "b.exr", "--reference", "r.exr", "--map", "z.png", expect=7).stdout
+        self.assertIn("may be noise", text)
+        self.assertIn("0 of 6 tests differ beyond noise", text)
+        self.assertIn("Against the reference R", text)
+        with open(self.path("z.png"), "rb") as file:
+            self.assertEqual(file.read(4), b"\x89PNG")
+        self.crt("with.yaml", "-b", "fake_biased", "--seed", "4", "--spp", "256", "-o", "c.exr")
+        self.assertIn("more than noise", self.crt("compare", "c.exr", "b.exr", expect=7).stdout)
+        run = self.crt("compare", "a.exr", "a.exr", "--map", "z.png", expect=2)
+        self.assert_one_error(run, "seed 1")
+
+    def test_backends_that_agree(self):
+        run = self.crt("compare", "--backends", "fake,fake", "scene.yaml", "--spp", "64", "--json", "v.json")
+        self.assertIn("fake against fake: PASS", run.stdout)
+        self.assertIn("same bits", run.stdout)
+        with open(self.path("v.json")) as file:
+            verdict = json.load(file)
+        self.assertTrue(verdict["passes"])
+        self.assertEqual([m["channel"] for m in verdict["backends"][0]["means"]], ["X", "Y", "Z"])
+
+    def test_a_backend_that_is_two_percent_brighter(self):
+        text = self.crt("compare", "--backends", "fake_biased,fake", "scene.yaml", "--spp", "64", expect=7).stdout
+        self.assertIn("fake_biased against fake: FAIL", text)
+        self.assertIn("OTHER BITS", text)
+        # Wider means are allowed; tiles are still tested for any difference.
+        text = self.crt("compare", "--backends", "fake_biased,fake", "scene.yaml", "--spp", "64", "--delta", "3%", expect=7).stdout
+        self.assertNotIn("means of channel", text)
+        self.assertRegex(text, r"because +\d+ of 18 tile tests differ")
+
+    def test_backends_with_too_few_samples_or_with_nan(self):
+        text = self.crt("compare", "--backends", "fake,fake", "scene.yaml", "--spp", "1", "--delta", "0.1%", expect=7).stdout
+        self.assertIn("INCONCLUSIVE", text)
+        self.assertRegex(text, r"about --spp \d+")
+        text = self.crt("compare", "--backends", "fake,fake", "scene.yaml", "--spp", "64", expect=7, CRT_FAKE_FAULT="nan").stdout
+        self.assertIn("INCONCLUSIVE", text)
+        self.assertIn("samples were no numbers", text)
+
+    def test_backends_asked_for_wrongly(self):
+        self.assert_one_error(self.crt("compare", "--backends", "fake", "scene.yaml", expect=2), "two names")
+        self.assert_one_error(self.crt("compare", "--backends", "fake,,fake", "scene.yaml", expect=2), "fake,,fake")
+        self.assert_one_error(self.crt("compare", "--backends", "fake,fake", "scene.yaml", "b.pfm", expect=2), "b.pfm")
+        self.assert_one_error(self.crt("compare", "--backends", "fake,absent", "scene.yaml", expect=4), "absent")
+        self.assert_one_error(self.crt("compare", "a.pfm", "b.pfm", "--spp", "4", expect=2), "--backends")
+        self.assert_one_error(self.crt("compare", "a.pfm", expect=2), "--backends")
+        self.assert_one_error(self.crt("compare", "a.pfm", "b.pfm", "--seed", "4", expect=2), "--backends")
+
     def test_other_size_and_absent(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
         self.crt("scene.yaml", "-b", "fake", "--crop", "0,0,8,8", "-o", "b.pfm")

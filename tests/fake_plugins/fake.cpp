@@ -95,7 +95,7 @@ private:
             if (with_invalid && crt::fake::isInvalid(film_x, film_y, sample)) continue;
             ++counts_[pixel];
             for (std::uint32_t c = 0; c < scene_.channels; ++c) {
-                addTo(&sums_[(pixel * scene_.channels + c) * 2], crt::fake::sampleValue(seed, film_x, film_y, sample, c));
+                addTo(&sums_[(pixel * scene_.channels + c) * 2], CRT_FAKE_FACTOR * crt::fake::sampleValue(seed, film_x, film_y, sample, c));
             }
         }
     }
@@ -112,4 +112,4 @@ private:
 
 }  // namespace
 
-CRT_DEFINE_BACKEND(FakeIntegrator, listDevices, "fake", CRT_HEADERS_VERSION, CRT_FEATURES_ALL)
+CRT_DEFINE_BACKEND(FakeIntegrator, listDevices, CRT_FAKE_NAME, CRT_HEADERS_VERSION, CRT_FEATURES_ALL)
