@@ -3,10 +3,12 @@
 #include "image_headers.h"
 #include "image_module.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -17,6 +19,9 @@
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include <fcntl.h>
+#include <unistd.h>
 
 namespace {
 
@@ -78,13 +83,76 @@ void addMetadata(ImageSpec& spec, const CrtImageText* metadata, std::uint32_t co
     }
 }
 
+/// A file for OpenImageIO to write to that remembers the first failure. Left to itself the library writes through a buffer, and what the last flush
+/// of it could not write, on a full disk, it does not say: the image would be cut off in silence.
+class CheckedFile : public OIIO::Filesystem::IOProxy {
+public:
+    explicit CheckedFile(const char* path) : IOProxy(path, Write), descriptor_(::open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
+        if (descriptor_ < 0) error_number_ = errno;
+    }
+    ~CheckedFile() override { close(); }
+    CheckedFile(const CheckedFile&) = delete;
+    CheckedFile& operator=(const CheckedFile&) = delete;
+
+    const char* proxytype() const override { return "crt"; }
+    bool opened() const override { return descriptor_ >= 0; }
+    void close() override {
+        if (descriptor_ >= 0 && ::close(descriptor_) != 0 && error_number_ == 0) error_number_ = errno;
+        descriptor_ = -1;
+    }
+    bool seek(std::int64_t offset) override {
+        m_pos = offset;
+        return offset >= 0;
+    }
+    std::size_t write(const void* bytes, std::size_t size) override {
+        const std::size_t written = pwrite(bytes, size, m_pos);
+        m_pos += static_cast<std::int64_t>(written);
+        return written;
+    }
+    std::size_t pwrite(const void* bytes, std::size_t size, std::int64_t offset) override {
+        std::size_t done = 0;
+        while (done < size) {
+            const ssize_t n = ::pwrite(descriptor_, static_cast<const char*>(bytes) + done, size - done, offset + static_cast<std::int64_t>(done));
+            if (n < 0 && errno == EINTR) continue;
+            if (n < 0 && error_number_ == 0) error_number_ = errno;
+            if (n <= 0) break;
+            done += static_cast<std::size_t>(n);
+        }
+        return done;
+    }
+    void flush() const override {}
+
+    void requireNoFailure() const {
+        if (error_number_ != 0) throw Failure{std::strerror(error_number_)};
+    }
+
+private:
+    int descriptor_ = -1;
+    int error_number_ = 0;
+};
+
 void writeWith(const char* format, const char* path, const ImageSpec& spec, const TypeDesc& type, const void* pixels) {
+    CheckedFile file(path);  // Outlives the writer, whose destructor may still write.
+    file.requireNoFailure();
     const std::unique_ptr<ImageOutput> output = ImageOutput::create(format);
     if (!output) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
-    if (!output->open(path, spec)) throw Failure{wordsOr(output->geterror(), "the file cannot be opened")};
-    // Both calls report: a full disk often shows only when the last buffer is flushed.
-    if (!output->write_image(type, pixels)) throw Failure{wordsOr(output->geterror(), "the pixels cannot be written")};
-    if (!output->close()) throw Failure{wordsOr(output->geterror(), "the file cannot be completed")};
+    output->set_ioproxy(&file);
+    const auto write = [&] {
+        if (!output->open(path, spec)) throw Failure{wordsOr(output->geterror(), "the file cannot be opened")};
+        if (!output->write_image(type, pixels)) throw Failure{wordsOr(output->geterror(), "the pixels cannot be written")};
+        if (!output->close()) throw Failure{wordsOr(output->geterror(), "the file cannot be completed")};
+    };
+    try {
+        write();
+    } catch (const std::exception&) {
+        file.requireNoFailure();
+        throw;
+    } catch (const Failure&) {
+        file.requireNoFailure();  // What the disk said is better than what the library makes of it.
+        throw;
+    }
+    file.close();
+    file.requireNoFailure();
 }
 
 std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reason, std::uint32_t reason_size) {

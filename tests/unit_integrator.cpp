@@ -211,6 +211,23 @@ TEST_CASE("samples that are not a number are dropped and counted", "[integrator]
     CHECK(film.counts[0] == 12);
 }
 
+TEST_CASE("a film that no sound backend hands over is refused, and what was there before is kept", "[integrator]") {
+    const CompiledScene scene = makeScene(5, 3);
+    Integrator integrator(openFake("fake"), {});
+    integrator.setScene(scene);
+    integrator.render({{}, 0, 14});
+    Film film = filmOf(scene);
+    for (const auto& [fault, words] : {std::pair{"nan_film", "broke the contract: pixel 2,1 of its film is not a number"},
+                                       {"count_film", "pixel 0,0 of its film has 15 samples and 14 were asked for"}}) {
+        const ScopedFault scoped(fault);
+        CHECK(kindOfFailure([&] { integrator.readFilm(film); }, words) == ErrorKind::Internal);
+        CHECK(film.samples.count() == 0);
+        CHECK(film.sums == filmOf(scene).sums);
+    }
+    integrator.readFilm(film);
+    CHECK(film.samples.count() == 14);
+}
+
 TEST_CASE("devices are chosen by number or by name", "[integrator]") {
     const auto device = [](const std::string& wanted) {
         IntegratorOptions options;

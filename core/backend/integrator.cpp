@@ -5,6 +5,7 @@
 #include "log.h"
 
 #include <algorithm>
+#include <cmath>
 #include <array>
 #include <cstddef>
 #include <exception>
@@ -196,6 +197,21 @@ struct Integrator::Impl {
                                                 sentence != nullptr && *sentence != '\0' ? sentence : statusText(status)));
     }
 
+    /// A plugin leaves out samples that are no numbers and counts what it keeps (crt_backend.h). One pixel that is none, once in a checkpoint, would
+    /// stay there for good.
+    void checkContents(const Film& part) const {
+        const std::uint64_t asked = part.samples.count();
+        for (std::size_t pixel = 0; pixel < part.counts.size(); ++pixel) {
+            const double* const sums = &part.sums[pixel * channels * 2];
+            const bool finite = std::all_of(sums, sums + channels * std::size_t{2}, [](double v) { return std::isfinite(v); });
+            if (finite && part.counts[pixel] <= asked) continue;
+            throw Error(ErrorKind::Internal,
+                        fmt::format("backend '{}' broke the contract: pixel {},{} of its film {}; what was rendered before is kept", backend.name, pixel % width,
+                                    pixel / width,
+                                    finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked) : "is not a number"));
+        }
+    }
+
     static std::int32_t onProgress(void* user, double done) noexcept {
         Impl& self = *static_cast<Impl*>(user);
         const std::lock_guard lock(self.progress_mutex);
@@ -314,6 +330,7 @@ void Integrator::readFilm(Film& film) {
     view.primitives = part.primitives.empty() ? nullptr : part.primitives.data();
     self.check(self.call("read_film", [&] { return self.table.read_film(self.table.state, &view); }));
     part.samples = self.coverage.ranges();
+    self.checkContents(part);
     film.add(part);
 }
 

@@ -6,6 +6,8 @@
 //   device  the device fails, half-way through the range
 //   nan     every seventh sample is not a number
 //   slow    2 ms a row, with a look at cancel after each
+//   hang    never comes back
+//   nan_film, count_film   the film that is handed over holds a NaN, or more samples than were asked for
 #include "backend/plugin_guard.h"
 
 #include "fake_pattern.h"
@@ -14,6 +16,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <limits>
 #include <thread>
 
 namespace {
@@ -48,8 +51,8 @@ public:
     }
 
     bool render(const CrtRenderRange& range) {
-        const char* value = std::getenv("CRT_FAKE_FAULT");
-        const std::string fault = value != nullptr ? value : "";
+        const std::string fault = wantedFault();
+        while (fault == "hang") std::this_thread::sleep_for(std::chrono::seconds(1));
         if (range.x1 > scene_.width || range.y1 > scene_.height) throw PluginError(CRT_INVALID_ARGUMENT, "the rectangle leaves the film");
 
         const auto start = std::chrono::steady_clock::now();
@@ -74,6 +77,8 @@ public:
         std::copy(sums_.begin(), sums_.end(), film.sums);
         std::copy(counts_.begin(), counts_.end(), film.counts);
         if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);
+        if (wantedFault() == "nan_film") film.sums[sums_.size() / 2] = std::numeric_limits<double>::quiet_NaN();
+        if (wantedFault() == "count_film") film.counts[0] += 1;
     }
 
     void report(CrtBackendReport& report) {
@@ -85,6 +90,11 @@ public:
     }
 
 private:
+    static std::string wantedFault() {
+        const char* value = std::getenv("CRT_FAKE_FAULT");
+        return value != nullptr ? value : "";
+    }
+
     void renderPixel(const CrtRenderRange& range, std::uint64_t seed, std::uint32_t x, std::uint32_t y, bool with_invalid) {
         const std::uint32_t film_x = scene_.crop_x + x, film_y = scene_.crop_y + y;
         const std::size_t pixel = std::size_t{y} * scene_.width + x;

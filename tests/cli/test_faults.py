@@ -1,0 +1,247 @@
+#!/usr/bin/env python3
+"""What happens to the program from outside: killed at any moment, disks that fill up or turn read-only, backends that hang, lie or lose their device, and
+storms of signals. Always the same demand: what was saved stays, and the exit code and one sentence say what happened (docs/architecture.md).
+
+    test_faults.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
+
+Tests that mount a small disk need root and are skipped by name without it. Python's standard library only.
+"""
+
+import glob
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+import test_cli
+from test_cli import CliTest, environment, read_bytes
+
+
+class KilledAtAnyMoment(CliTest):
+    """kill -9 while checkpoints are written as fast as the disk takes them."""
+
+    ROUNDS = 25
+    # Large enough that writing it is most of what the program does: 1 MB a checkpoint.
+    BIG = ["--set", "film.resolution=[128,128]", "--chunk", "1", "--spp", "100000", "--checkpoint", "c.crtfilm", "--checkpoint-every", "1ms"]
+
+    def test_the_checkpoint_is_the_old_or_the_new_one(self):
+        random.seed(1)
+        resumed_before, while_writing = 0, 0
+        for round_number in range(self.ROUNDS):
+            resume = ["--resume", "c.crtfilm"] if round_number else []
+            process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", *resume, *self.BIG)
+            self.assertIn("fake on pattern", self.line_with(process, "fake on pattern"))
+            time.sleep(random.uniform(0.0, 0.25) + (0.5 if round_number == 0 else 0.05))
+            process.kill()
+            process.communicate()
+            leftovers = glob.glob(self.path("c.crtfilm.*.tmp"))
+            while_writing += bool(leftovers)
+            for name in leftovers:
+                os.remove(name)
+            # A complete run of no further sample reads the whole file, checksum included.
+            self.crt("scene.yaml", "-b", "fake", "--set", "film.resolution=[128,128]", "-o", "b.pfm", "--spp", "1", "--resume", "c.crtfilm", "--checkpoint", "d.crtfilm",
+                     "--report", "r.json")
+            resumed = self.report("r.json")["samples"]["resumed"]
+            self.assertGreaterEqual(resumed, resumed_before, "samples that were saved are gone")
+            resumed_before = resumed
+        self.assertGreater(resumed_before, self.ROUNDS)
+        self.assertGreater(while_writing, 0, "no kill came while a file was being written")
+
+    def line_with(self, process, words):
+        for line in process.stderr:
+            if words in line:
+                return line
+        return ""
+
+
+def can_mount():
+    """Whether this process may mount a disk, which root in a container may not."""
+    if os.geteuid() != 0 or shutil.which("mount") is None:
+        return False
+    probe = "/tmp/crt-mount-probe"
+    os.makedirs(probe, exist_ok=True)
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "crt-test", probe], capture_output=True).returncode == 0
+    if mounted:
+        subprocess.run(["umount", probe], capture_output=True)
+    os.rmdir(probe)
+    return mounted
+
+
+@unittest.skipUnless(can_mount(), "needs root and the right to mount a tmpfs")
+class SmallDisk(CliTest):
+    """A disk of 192 KiB; the film of 24 x 16 pixels takes 27 KiB, one of 64 x 64 takes 288."""
+
+    def setUp(self):
+        super().setUp()
+        os.mkdir(self.path("disk"))
+        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=192k", "crt-test", self.path("disk")], check=True)
+        self.addCleanup(subprocess.run, ["umount", "-l", self.path("disk")], check=False)
+
+    def fill(self):
+        with open(self.path("disk/ballast"), "wb", buffering=0) as file:
+            try:
+                while True:
+                    file.write(bytes(4096))
+            except OSError:
+                pass
+
+    def test_a_checkpoint_that_does_not_fit_leaves_the_old_one(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "disk/c.crtfilm")
+        before = read_bytes(self.path("disk/c.crtfilm"))
+        self.fill()
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "disk/c.crtfilm", expect=6)
+        self.assert_one_error(run, "disk/c.crtfilm", "No space left")
+        self.assertEqual(read_bytes(self.path("disk/c.crtfilm")), before)
+        self.assertEqual(glob.glob(self.path("disk/*.tmp")), [])
+        # The image, which lies elsewhere, has all samples.
+        self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 16)
+        os.remove(self.path("disk/ballast"))
+        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "16", "--resume", "disk/c.crtfilm")
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("b.pfm")))
+
+    def test_an_image_that_does_not_fit_costs_no_samples(self):
+        for name in ("disk/a.pfm", "disk/a.ppm", "disk/a.exr", "disk/a.png"):
+            with self.subTest(name=name):
+                self.crt("scene.yaml", "-b", "fake", "-o", name, "--report", "none")
+                before = read_bytes(self.path(name))
+                self.fill()
+                run = self.crt("scene.yaml", "-b", "fake", "--seed", "1", "-o", name, "--checkpoint", "kept.crtfilm", "--report", "none", expect=6)
+                self.assert_one_error(run, name)
+                self.assertEqual(read_bytes(self.path(name)), before)
+                self.assertTrue(os.path.exists(self.path("kept.crtfilm")))
+                self.assertEqual(glob.glob(self.path("disk/*.tmp")), [])
+                for file in (name, "disk/ballast", "kept.crtfilm"):
+                    os.remove(self.path(file))
+
+    def test_rendering_goes_on_while_the_disk_is_full(self):
+        process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", "--checkpoint", "disk/c.crtfilm", "--checkpoint-every", "50ms", "--chunk", "1", "--spp", "40",
+                             fault="slow")
+        self.wait_for_rendering(process)
+        self.fill()
+        time.sleep(0.4)
+        os.remove(self.path("disk/ballast"))
+        _, messages = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 0, messages)
+        self.assertIn("rendering goes on, and so do the attempts", messages)
+        self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 40)
+
+    def test_a_read_only_disk_is_found_before_rendering(self):
+        subprocess.run(["mount", "-o", "remount,ro", self.path("disk")], check=True)
+        for arguments in (["-o", "disk/a.pfm"], ["-o", "a.pfm", "--checkpoint", "disk/c.crtfilm"], ["-o", "a.pfm", "--report", "disk/r.json"]):
+            with self.subTest(arguments=arguments):
+                # A backend that does not exist would be exit code 4: the output is looked at earlier.
+                self.assert_one_error(self.crt("scene.yaml", "-b", "nonsense", *arguments, expect=6), "Read-only file system")
+
+    def test_a_disk_that_turns_read_only_keeps_what_it_has(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "disk/c.crtfilm")
+        process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "30", "--resume", "disk/c.crtfilm", "--chunk", "1", fault="slow")
+        self.assertIn("resuming", process.stderr.readline())
+        self.wait_for_rendering(process)
+        subprocess.run(["mount", "-o", "remount,ro", self.path("disk")], check=True)
+        _, messages = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 6, messages)
+        self.assertIn("Read-only file system", messages)
+        self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 30)
+        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "30", "--resume", "disk/c.crtfilm", "--checkpoint", "e.crtfilm")
+        self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+
+
+class ReadOnlyDirectory(CliTest):
+    @unittest.skipIf(os.geteuid() == 0, "root may write anywhere")
+    def test_it_is_found_before_rendering(self):
+        os.mkdir(self.path("out"), 0o555)
+        self.assert_one_error(self.crt("scene.yaml", "-b", "nonsense", "-o", "out/a.pfm", expect=6), "Permission denied")
+
+
+class UnsoundBackends(CliTest):
+    def test_a_backend_that_hangs_is_left_by_the_second_signal(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm")
+        saved = read_bytes(self.path("c.crtfilm"))
+        process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm", fault="hang")
+        self.assertIn("resuming", process.stderr.readline())
+        self.wait_for_rendering(process)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.5)
+        self.assertIsNone(process.poll(), "the first signal waits for the chunk")
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=10)
+        self.assertEqual(process.returncode, 130)
+        self.assertEqual(read_bytes(self.path("c.crtfilm")), saved)
+
+    def test_a_film_that_is_no_film_is_refused_and_the_saved_one_kept(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "whole.pfm", "--spp", "16")
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm")
+        for fault, words in (("nan_film", "is not a number"), ("count_film", "were asked for")):
+            with self.subTest(fault=fault):
+                run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm", fault=fault, expect=1)
+                self.assert_one_error(run, "broke the contract", words)
+                self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "16", "--resume", "c.crtfilm", "--checkpoint", "d.crtfilm")
+                self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+                self.assertEqual(read_bytes(self.path("b.pfm")), read_bytes(self.path("whole.pfm")))
+
+    def test_a_backend_that_throws_keeps_what_was_saved(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm")
+        run = self.crt("scene.yaml", "-b", "throws_in_render", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm", expect=1)
+        self.assert_one_error(run, "broke the contract", "throws_in_render")
+        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "16", "--resume", "c.crtfilm")
+        self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+
+
+class LostGpu(CliTest):
+    """The real CUDA backend on the driver of tests/cuda_on_host, which has one GB and fails on demand."""
+
+    def setUp(self):
+        super().setUp()
+        build = os.path.dirname(os.path.dirname(test_cli.FAKE_DIR.rstrip("/")))
+        self.driver = os.path.join(build, "tests", "fake_cuda")
+        plugins = os.path.join(build, "lib", "crt")
+        if not os.path.exists(os.path.join(self.driver, "libcuda.so.1")) or not os.path.exists(os.path.join(plugins, "crt_backend_cuda.so")):
+            self.skipTest("built without the CUDA backend")
+        self.gpu = {"LD_LIBRARY_PATH": self.driver, "CRT_BACKEND_PATH": plugins, "CRT_CACHE_DIR": self.path("cache")}
+
+    def test_a_launch_that_fails(self):
+        run = self.crt("scene.yaml", "-b", "cuda", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm", CRT_FAKE_CUDA="launch", expect=5, **self.gpu)
+        self.assert_one_error(run, "CUDA_ERROR_LAUNCH_FAILED")
+        self.assertFalse(os.path.exists(self.path("a.pfm")))
+
+    def test_memory_that_does_not_suffice(self):
+        # 7000 x 7000 pixels: sums of 3 GB on a device of one.
+        run = self.crt("scene.yaml", "-b", "cuda", "-o", "a.pfm", "--set", "film.resolution=[7000,7000]", "--spp", "1", expect=5, **self.gpu)
+        self.assert_one_error(run, "the film needs 3136.0 MB", "MB free")
+
+
+class SignalStorm(CliTest):
+    def test_a_burst_is_one_wish_to_stop(self):
+        process = self.start("scene.yaml", "-b", "fake", "--spp", "64", "-o", "a.pfm", "--chunk", "1", fault="slow")
+        self.wait_for_rendering(process)
+        for _ in range(20):
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                process.send_signal(number)
+        _, messages = process.communicate(timeout=60)
+        self.assertIn(process.returncode, (130, 143, 129), messages)
+        samples = self.report("a.report.json")["samples"]["per_pixel"]
+        self.assertTrue(0 < samples < 64)
+        self.crt("scene.yaml", "-b", "fake", "--spp", "64", "-o", "b.pfm", "--resume", "a.crtfilm")
+        self.assertEqual(self.report("b.report.json")["samples"]["resumed"], samples)
+
+    def test_a_storm_ends_the_program_and_spares_what_was_saved(self):
+        self.crt("scene.yaml", "-b", "fake", "--spp", "8", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
+        process = self.start("scene.yaml", "-b", "fake", "--spp", "100000", "-o", "a.pfm", "--resume", "c.crtfilm", "--checkpoint-every", "1ms", "--chunk", "1", fault="slow")
+        self.assertIn("resuming", process.stderr.readline())
+        self.wait_for_rendering(process)
+        end = time.monotonic() + 10
+        while process.poll() is None and time.monotonic() < end:
+            process.send_signal(random.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP)))
+        process.communicate(timeout=10)
+        self.assertIn(process.returncode, (130, 143, 129))
+        self.crt("scene.yaml", "-b", "fake", "--spp", "1", "-o", "b.pfm", "--resume", "c.crtfilm", "--checkpoint", "d.crtfilm")
+        self.assertGreaterEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+
+
+if __name__ == "__main__":
+    test_cli.CRT, test_cli.CONFIG_DIR, test_cli.FAKE_DIR = map(os.path.abspath, sys.argv[1:4])
+    unittest.main(argv=sys.argv[:1] + sys.argv[4:], verbosity=1)
