@@ -415,6 +415,30 @@ TEST_CASE("a run without rows still makes a report", "[converge]") {
     CHECK(nlohmann::json::parse(readText(folder / "summary.json"))["fits"].size() == 13);
 }
 
+TEST_CASE("few replicates, few looks and no reference make a report with what there is", "[converge]") {
+    for (const std::uint32_t replicates : {1u, 2u, 3u})
+        for (const std::uint32_t looks : {1u, 4u}) {
+            INFO(replicates << " replicates, " << looks << " looks");
+            SyntheticRender what;
+            what.replicates = replicates;
+            what.looks = looks;
+            what.has_reference = false;
+            Run run = syntheticRun(what, 1);
+            if (replicates == 1)
+                for (Row& row : run.rows) row.between_replicates_mse.reset();
+            const Folder folder("crt-few-");
+            const Analysis analysis = analyze(run);
+            for (const std::string& file : writeReport(folder.text(), run, analysis)) {
+                INFO(file);
+                const std::string text = readText(folder / file);
+                CHECK(whyNotWellFormed(text) == "");
+                for (const char* wrong : {"\"nan", "\"-nan", "\"inf", "\"-inf", " nan", " inf ", ">nan", ">inf"}) CHECK_THAT(text, !Contains(wrong));
+            }
+            writeSummary(folder / "summary.json", run, analysis);
+            CHECK(nlohmann::json::parse(readText(folder / "summary.json"))["fits"].size() == 1);
+        }
+}
+
 TEST_CASE("the summary has the fits of every configuration", "[converge]") {
     const Folder folder("crt-summary-");
     const Run run = syntheticStudy();

@@ -115,32 +115,33 @@ std::string resultTable(const Run& run, const Analysis& analysis, const std::str
     return tableOf(columns, rows);
 }
 
-/// Other measures at the most samples.
+/// Error and other measures at the most samples; measures that no configuration has are left out.
 std::string metricTable(const Run& run, const Analysis& analysis, const std::string& scene) {
-    std::string rows;
-    bool flip = false, delta_e = false;
-    for (const ConfigurationFit& fit : analysis.fits) {
-        if (fit.key.scene != scene || fit.points.empty()) continue;
-        flip = flip || fit.points.back().flip_mean;
-        delta_e = delta_e || fit.points.back().delta_e2000_mean;
-    }
-    const auto known = [](const std::optional<double>& value) { return value ? h(numberText(*value)) : std::string("–"); };
-    for (const ConfigurationFit& fit : analysis.fits) {
-        if (fit.key.scene != scene || fit.points.empty()) continue;
-        const Point& p = fit.points.back();
-        rows += "<tr>" + rowHead(run, fit.key) + cell("samples per pixel", h(countText(p.samples))) + cell("replicates", std::to_string(p.replicates)) +
-                cell("seconds", withInterval(secondsText(p.seconds))) + cell("relative RMSE", withInterval(percentText(p.relative_rmse))) +
-                cell("relMSE", known(p.relmse)) + cell("SMAPE", known(p.smape)) + cell("MAE", known(p.mae));
-        if (flip) rows += cell("FLIP", known(p.flip_mean));
-        if (delta_e) rows += cell("ΔE2000", known(p.delta_e2000_mean));
-        rows += "</tr>\n";
-    }
-    if (rows.empty()) return {};
+    const std::pair<const char*, std::optional<double> Point::*> measures[] = {{"relMSE", &Point::relmse}, {"SMAPE", &Point::smape}, {"MAE", &Point::mae},
+                                                                               {"FLIP", &Point::flip_mean}, {"ΔE2000", &Point::delta_e2000_mean}};
+    std::vector<const ConfigurationFit*> fits;
+    for (const ConfigurationFit& fit : analysis.fits)
+        if (fit.key.scene == scene && !fit.points.empty()) fits.push_back(&fit);
+    if (fits.empty()) return {};
     std::vector<std::pair<std::string, const char*>> columns{{"configuration", ""}};
-    for (const char* name : {"samples per pixel", "replicates", "seconds", "relative RMSE", "relMSE", "SMAPE", "MAE"}) columns.emplace_back(name, "num");
-    if (flip) columns.emplace_back("FLIP", "num");
-    if (delta_e) columns.emplace_back("ΔE2000", "num");
-    return "<h3>At the most samples</h3>\n" + tableOf(columns, rows);
+    for (const char* name : {"samples per pixel", "replicates", "seconds", "relative RMSE"}) columns.emplace_back(name, "num");
+    std::vector<std::string> rows;
+    for (const ConfigurationFit* fit : fits) {
+        const Point& p = fit->points.back();
+        rows.push_back(rowHead(run, fit->key) + cell("samples per pixel", h(countText(p.samples))) + cell("replicates", std::to_string(p.replicates)) +
+                       cell("seconds", withInterval(secondsText(p.seconds))) + cell("relative RMSE", withInterval(percentText(p.relative_rmse))));
+    }
+    for (const auto& [name, measure] : measures) {
+        if (std::none_of(fits.begin(), fits.end(), [m = measure](const ConfigurationFit* fit) { return (fit->points.back().*m).has_value(); })) continue;
+        columns.emplace_back(name, "num");
+        for (std::size_t i = 0; i < fits.size(); ++i) {
+            const std::optional<double>& value = fits[i]->points.back().*measure;
+            rows[i] += cell(name, value ? h(numberText(*value)) : "–");
+        }
+    }
+    std::string body;
+    for (const std::string& row : rows) body += "<tr>" + row + "</tr>\n";
+    return "<h3>At the most samples</h3>\n" + tableOf(columns, body);
 }
 
 /// What pixels say, where somebody asked them.
@@ -346,7 +347,7 @@ std::string methodSection(const Analysis& analysis) {
         "<p><b>Error floor</b> is b, what would be left after infinitely many samples: with a reference, mean squared error minus the variance between "
         "replicates. It is called seen when its {1:.4g} % interval lies above 0.</p>\n"
         "<p><b>Verdict</b>: PASS when the {1:.4g} % interval of the image mean’s bias lies within ±{2:.3g} % for every colour, and no tile or pixel differs from the "
-        "reference; FAIL when all of it lies outside, a tile or pixel differs, or a sample was NaN or infinite; else INCONCLUSIVE: more samples, or a reference, are needed.</p>\n"
+        "reference; FAIL when all of it lies outside, the error floor lies above that margin, a tile or pixel differs, or a sample was NaN or infinite; else INCONCLUSIVE: more samples, or a reference, are needed.</p>\n"
         "<p>All rows are in <code>results.jsonl</code> and <code>results.csv</code>, all fits in <code>summary.json</code>, hashes in <code>manifest.json</code>.</p>\n"
         "</section>\n",
         100 * o.confidence, 100 * o.verdict_confidence, 100 * o.equivalence_margin);

@@ -148,8 +148,9 @@ Picture writePicture(const std::string& folder, const std::string& file, const s
 double topOfErrors(const std::vector<const Maps*>& maps) {
     std::vector<float> values;
     for (const Maps* map : maps)
-        for (const float value : map->error.values)
-            if (std::isfinite(value)) values.push_back(value);
+        for (const Plane* plane : {&map->error, &map->standard_error})
+            for (const float value : plane->values)
+                if (std::isfinite(value)) values.push_back(value);
     if (values.empty()) return 1;
     const auto at = values.begin() + static_cast<std::ptrdiff_t>(0.995 * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());

@@ -273,7 +273,9 @@ std::string svgOfPlot(const Plot& plot) {
         for (const PlotPoint& point : series.points) {
             if (!drawable(point, plot)) continue;
             xs.push_back(point.x);
-            ys.insert(ys.end(), {point.y, point.low, point.high});
+            // On logarithmic axes intervals of few replicates may span decades; they do not get to squeeze the points.
+            const bool log = plot.y.scale != AxisScale::Linear;
+            ys.insert(ys.end(), {point.y, log ? std::max(point.low, point.y / 3) : point.low, log ? std::min(point.high, point.y * 3) : point.high});
         }
         if (series.x_mark) xs.push_back(*series.x_mark);
     }
