@@ -45,6 +45,7 @@ Exit codes: 0 done, 1 internal error, 2 command line, 3 scene, 4 backend or devi
 130 and 143 stopped by Ctrl-C or kill (image and checkpoint are saved).
 )";
 
+constexpr const char* kBackendGroup = "Backends instead of images";
 constexpr const char* kCompareHelp = R"(
 What is printed: whether the bits are the same; where the first difference is, with both values and how many floats lie between
 them (ulp); errors over all values of R, G and B; what it looks like (FLIP, Delta E). Where an image says how large its noise is
@@ -314,11 +315,11 @@ private:
             ->group(group);
         addBackendComparison(*compare);
         compare->set_help_flag();  // Taken away and added again, so that it comes last.
-        compare->set_help_flag("-h,--help", "this page")->group(group);
+        compare->set_help_flag("-h,--help", "this page")->group(kBackendGroup);
     }
 
     void addBackendComparison(CLI::App& compare) {
-        const char* group = "Backends instead of images";
+        const char* group = kBackendGroup;
         BackendComparisonOptions& options = compare_.backends;
         CLI::Option* backends = reader_.option(compare, "--backends", "X,Y", "render scene A with each; the last is what the others are compared with",
                                                [&options](const std::string& text) { options.backends = parseList(text, "--backends"); });
