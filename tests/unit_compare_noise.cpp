@@ -120,7 +120,11 @@ TEST_CASE("noise alone is no bias, and z says that it is noise", "[compare-noise
         REQUIRE(n.unknown.empty());
         REQUIRE(n.channels.size() == 3);
         CHECK(n.rms_z == Approx(1).margin(0.06));
-        for (const ChannelBias& c : n.channels) covered += c.interval.contains(0);
+        for (const ChannelBias& c : n.channels) {
+            covered += c.interval.contains(0);
+            // 960 pixels of 15 degrees of freedom each: next to the normal quantile, not the 4.07 of one pixel.
+            CHECK(c.interval.halfWidth() == Approx(3.2905 * kNoise * std::sqrt(2.0 / 960)).epsilon(2e-3));
+        }
         alarms += n.tiles.rejected > 0 || n.pixels.rejected > 0;
     }
     CHECK(covered >= 118);  // 99.9 % of 120; two misses have a probability of 0.007.
