@@ -127,13 +127,13 @@ std::string aovText(std::uint32_t aovs) {
 
 void showFilm(const std::string& file) {
     const auto [film, identity] = readCheckpoint(file);
-    const double error = film.relativeError();
+    const std::optional<ErrorEstimate> error = estimateError(film);
     fmt::print("{}: partial render\n", file);
     row("film", fmt::format("{} x {} pixels", film.shape().width, film.shape().height));
     row("aovs", aovText(film.shape().aovs));
     row("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
     row("invalid", counted(film.invalidSamples(), "sample", "samples"));
-    row("error", std::isfinite(error) ? percentText(error) : "unknown");
+    row("error", error ? errorText(*error).substr(6) : "unknown");
     row("scene hash", identity.scene_hash);
     row("written by", "crt " + identity.version);
 }

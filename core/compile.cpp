@@ -116,6 +116,7 @@ public:
     Compiler(const Scene& scene, std::uint32_t aovs) : scene_(scene) {
         header_.magic = CRT_SCENE_MAGIC;
         out_.aovs = aovs & (kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive);
+        if (hasReplicates(scene_)) out_.aovs |= kAovReplicates;
     }
 
     CompiledScene run() {
@@ -553,6 +554,7 @@ private:
         take(kAovAlbedo, header_.albedo_channel, 3);
         take(kAovNormal, header_.normal_channel, 3);
         take(kAovDepth, header_.depth_channel, 1);
+        take(kAovReplicates, header_.replicate_channel, CRT_REPLICATES);
         header_.depth_scale = static_cast<float>(std::ldexp(1.0, -out_.scale_exponent));
         out_.width = header_.width;
         out_.height = header_.height;
@@ -620,7 +622,8 @@ private:
         need(header_.camera.lens_radius > 0, CRT_FEATURE_LENS);
         need(header_.filter.count > 0, CRT_FEATURE_FILTER);
         need(!isPath(), CRT_FEATURE_VIEW);
-        need(out_.aovs != 0, CRT_FEATURE_AOV);
+        need((out_.aovs & ~kAovReplicates) != 0, CRT_FEATURE_AOV);
+        need((out_.aovs & kAovReplicates) != 0, CRT_FEATURE_REPLICATES);
         header_.features = f;
         out_.features = f;
     }
@@ -646,6 +649,10 @@ private:
         if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
         if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
         if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");
+        if (!has(CRT_FEATURE_REPLICATES))
+            left_out("replicates", !isPath()                        ? "integrator.type is a view"
+                                   : scene_.sampler.replicates == 1 ? "sampler.replicates is 1"
+                                                                    : "the samples are independent: their own spread tells the error");
         if (!has(CRT_FEATURE_VIEW)) left_out("normals and bounding-box views", "integrator.type is path");
         for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"}, std::pair{CRT_FEATURE_INDEPENDENT, "independent sampler"},
                                             std::pair{CRT_FEATURE_XORSHIFT, "xorshift sampler"}})

@@ -1,5 +1,6 @@
 #include "film.h"
 
+#include "error_estimate.h"
 #include "kernel/layout.h"
 
 #include <fmt/format.h>
@@ -12,8 +13,9 @@
 namespace crt {
 namespace {
 
+static_assert(Film::kReplicates == CRT_REPLICATES);
 static_assert(kAovAlbedo == CRT_AOV_ALBEDO && kAovNormal == CRT_AOV_NORMAL && kAovDepth == CRT_AOV_DEPTH &&
-                  kAovPrimitive == CRT_AOV_PRIMITIVE,
+                  kAovPrimitive == CRT_AOV_PRIMITIVE && kAovReplicates == CRT_AOV_REPLICATES,
               "the film's AOV bits are the kernel's");
 
 /// a + b = sum + error exactly (Knuth 1969, TAOCP 2, 4.2.2). Needs no |a| ≥ |b|.
@@ -33,17 +35,31 @@ void addPair(double* pair, const double* other) {
     twoSum(high, low + low_error, pair[0], pair[1]);
 }
 
-/// First film channel of an AOV; the order is the kernel's: albedo, normal, depth, each only when asked for.
+/// First film channel of an AOV; the order is the kernel's: albedo, normal, depth, replicates, each only when asked for.
 std::uint32_t firstChannel(std::uint32_t aovs, std::uint32_t aov) {
     std::uint32_t channel = CRT_CHANNELS_BASE;
     if (aov == kAovAlbedo) return channel;
     if (aovs & kAovAlbedo) channel += 3;
     if (aov == kAovNormal) return channel;
     if (aovs & kAovNormal) channel += 3;
+    if (aov == kAovDepth) return channel;
+    if (aovs & kAovDepth) channel += 1;
     return channel;
 }
 
-std::uint32_t channelsFor(std::uint32_t aovs) { return firstChannel(aovs, kAovDepth) + ((aovs & kAovDepth) ? 1 : 0); }
+std::uint32_t channelsFor(std::uint32_t aovs) {
+    return firstChannel(aovs, kAovReplicates) + ((aovs & kAovReplicates) ? CRT_REPLICATES : 0);
+}
+
+/// Samples of `range` that belong to a replicate: its turn is one block in every round of all replicates.
+std::uint64_t samplesOfReplicate(SampleRange range, std::uint64_t replicate) {
+    constexpr std::uint64_t kBlock = CRT_REPLICATE_BLOCK, kRound = kBlock * CRT_REPLICATES;
+    const auto below = [=](std::uint64_t end) {
+        const std::uint64_t begin_of_turn = std::min(end % kRound, replicate * kBlock);
+        return end / kRound * kBlock + std::min(end % kRound - begin_of_turn, kBlock);
+    };
+    return below(range.second) - below(range.first);
+}
 
 std::string rangeText(SampleRange range) { return fmt::format("{}-{}", range.first, range.second); }
 
@@ -143,14 +159,14 @@ double Film::mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const
     return n == 0 ? 0.0 : sum(x, y, channel) / static_cast<double>(n);
 }
 
-double Film::luminanceVariance(std::uint32_t x, std::uint32_t y) const {
-    const std::uint64_t n = counts[std::size_t{y} * shape_.width + x];
-    // One sample says nothing about its own error; zero would claim perfection.
-    if (n < 2) return std::numeric_limits<double>::infinity();
-    const double mean_y = mean(x, y, 1);
-    // Rounding can push the difference of nearly equal numbers below zero.
-    const double spread = std::max(0.0, mean(x, y, 3) - mean_y * mean_y);
-    return spread / static_cast<double>(n - 1);
+double Film::replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const {
+    return sum(x, y, firstChannel(shape_.aovs, kAovReplicates) + replicate);
+}
+
+std::uint64_t Film::replicateSamples(std::uint32_t replicate) const {
+    std::uint64_t count = 0;
+    for (const SampleRange& range : samples.ranges()) count += samplesOfReplicate(range, replicate);
+    return count;
 }
 
 std::uint64_t Film::invalidSamples() const {
@@ -158,24 +174,6 @@ std::uint64_t Film::invalidSamples() const {
     std::uint64_t invalid = 0;
     for (const std::uint64_t n : counts) invalid += asked > n ? asked - n : 0;
     return invalid;
-}
-
-double Film::relativeError() const {
-    double variance = 0, luminance = 0;
-    std::uint64_t known = 0;
-    for (std::uint32_t y = 0; y < shape_.height; ++y)
-        for (std::uint32_t x = 0; x < shape_.width; ++x) {
-            luminance += mean(x, y, 1);
-            // A pixel whose samples are all invalid is reported by invalidSamples(); here it would only hide the others.
-            const double v = luminanceVariance(x, y);
-            if (std::isinf(v)) continue;
-            variance += v;
-            ++known;
-        }
-    // Nothing known, or no light found yet: no claim.
-    if (known == 0 || luminance <= 0) return std::numeric_limits<double>::infinity();
-    const double pixels = static_cast<double>(counts.size());
-    return std::sqrt(variance / static_cast<double>(known)) / (luminance / pixels);
 }
 
 Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
@@ -213,9 +211,11 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     if (aovs & kAovNormal) image.channels.insert(image.channels.end(), {"Ns.X", "Ns.Y", "Ns.Z"});
     if (aovs & kAovDepth) image.channels.emplace_back("Z");
     if (aovs & kAovVariance) image.channels.emplace_back("Variance.Y");
+    if (aovs & kAovError) image.channels.emplace_back("StdError.Y");
     if (aovs & kAovPrimitive) image.integer_channels.emplace_back("id.primitive");
     if (aovs & kAovSamples) image.integer_channels.emplace_back("sampleCount");
 
+    const LuminanceVariance variance(film);
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
     image.pixels.reserve(pixels * image.channels.size());
     image.integers.reserve(pixels * image.integer_channels.size());
@@ -231,8 +231,8 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
             if (aovs & kAovNormal) append(triple(firstChannel(shape.aovs, kAovNormal)));
             if (aovs & kAovDepth)
                 image.pixels.push_back(static_cast<float>(film.mean(x, y, firstChannel(shape.aovs, kAovDepth))));
-            if (aovs & kAovVariance)
-                image.pixels.push_back(static_cast<float>(film.luminanceVariance(x, y) * exposure * exposure));
+            if (aovs & kAovVariance) image.pixels.push_back(static_cast<float>(variance(x, y) * exposure * exposure));
+            if (aovs & kAovError) image.pixels.push_back(static_cast<float>(std::sqrt(variance(x, y)) * exposure));
             if (aovs & kAovPrimitive) image.integers.push_back(film.primitives[pixel]);
             if (aovs & kAovSamples)
                 image.integers.push_back(static_cast<std::uint32_t>(

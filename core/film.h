@@ -37,8 +37,8 @@ private:
 
 struct FilmShape {
     std::uint32_t width = 0, height = 0;
-    std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, Y², then AOV channels.
-    std::uint32_t aovs = 0;       ///< Bits of Aov that need film channels or the primitive plane.
+    std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, Y², then AOV channels, then replicates.
+    std::uint32_t aovs = 0;       ///< Bits of Aov that need film channels or the primitive plane, kAovReplicates among them.
     bool operator==(const FilmShape&) const = default;
 };
 
@@ -60,13 +60,13 @@ public:
     double sum(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
     /// Mean of a channel; 0 when the pixel has no valid sample.
     double mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
-    /// Variance of the pixel mean of luminance Y, from the second moment: (E[Y²] − E[Y]²)/(n − 1). For a quasi-Monte Carlo sampler this is an
-    /// upper estimate.
-    double luminanceVariance(std::uint32_t x, std::uint32_t y) const;
+    /// Sum of Y of the samples of a replicate (layout.h), and how many samples were asked of it; error_estimate.h makes error bars of them.
+    static constexpr std::uint32_t kReplicates = 16;
+    bool hasReplicates() const { return (shape_.aovs & kAovReplicates) != 0; }
+    double replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const;
+    std::uint64_t replicateSamples(std::uint32_t replicate) const;
     /// Samples that were NaN or infinite and were dropped.
     std::uint64_t invalidSamples() const;
-    /// Root mean square of the pixels' standard errors over the image mean of Y: the error estimate on the progress line.
-    double relativeError() const;
 
 private:
     FilmShape shape_;

@@ -66,6 +66,16 @@ Files planFiles(const Job& job, const Scene& scene) {
     return files;
 }
 
+/// A target error is decided on and judged by different replicates, so there must be some. Independent samples are the same with them.
+void requireReplicates(Scene& scene) {
+    if (hasReplicates(scene)) return;
+    if (scene.integrator.type != IntegratorType::Path)
+        throw Error(ErrorKind::Usage, "--target-error is for integrator.type path: the views have no noise");
+    if (scene.sampler.type == SamplerType::Sobol)
+        throw Error(ErrorKind::Usage, "--target-error needs the replicates that sampler.replicates: 1 leaves out; add --set sampler.replicates=16");
+    scene.sampler.replicates = 16;
+}
+
 /// An empty film, or what an earlier run of the same scene left.
 Film openFilm(const Files& files, const CompiledScene& compiled, const FilmIdentity& identity) {
     Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
@@ -81,6 +91,8 @@ Film openFilm(const Files& files, const CompiledScene& compiled, const FilmIdent
 SamplingPlan planSamples(const Job& job, const Scene& scene, const Film& film, const Files& files) {
     SamplingPlan plan;
     plan.time_limit_seconds = job.time_limit_seconds;
+    plan.target_error = job.target_error;
+    plan.independent_samples = scene.sampler.type != SamplerType::Sobol;
     plan.chunk = job.chunk;
     if (files.checkpoint_wanted) plan.checkpoint_interval_seconds = job.checkpoint_interval_seconds;
     if (job.samples) {
@@ -91,7 +103,7 @@ SamplingPlan planSamples(const Job& job, const Scene& scene, const Film& film, c
         plan.target = together.count();
         return plan;
     }
-    const bool endless = !job.spp && job.time_limit_seconds > 0;
+    const bool endless = !job.spp && (job.time_limit_seconds > 0 || job.target_error > 0);
     plan.ranges = missingSamples({0, endless ? kEndlessSamples : job.spp.value_or(scene.sampler.samples)}, film.samples);
     if (endless) return plan;
     plan.target = film.samples.count();
@@ -195,7 +207,7 @@ void writeFiles(const Files& files, const Scene& scene, const Film& film, const 
                 FirstFailure& failure) {
     const Stopwatch writing;
     // With nothing but a time to go by, the end of the time is the end of the work.
-    const bool complete = facts.stop == StopReason::Samples || (facts.stop == StopReason::Time && facts.target_samples == 0);
+    const bool complete = facts.stop == StopReason::Samples || facts.stop == StopReason::Target || (facts.stop == StopReason::Time && facts.target_samples == 0);
     Metadata metadata{{"Software", "crt " CRT_VERSION},
                       {"crt/version", CRT_VERSION},
                       {"crt/sceneHash", identity.scene_hash},
@@ -241,8 +253,21 @@ std::string summary(const RunFacts& facts, const Film& film) {
         const double paths = static_cast<double>(facts.rendered_samples) * static_cast<double>(film.counts.size());
         text += fmt::format(", {}, {}", durationText(facts.sampling_seconds), rateText(paths / facts.sampling_seconds, "paths/s"));
     }
-    if (facts.relative_error >= 0) text += ", error " + percentText(facts.relative_error);
+    if (facts.error) text += ", " + errorText(*facts.error);
     return text;
+}
+
+/// Whether the target error is reached, by those who did not decide when to stop; else what it, or 1 %, would still take.
+void tellTarget(const RunFacts& facts) {
+    const double target = facts.target_error > 0 ? facts.target_error : 0.01;
+    if (facts.stop == StopReason::Target && facts.verdict)
+        logInfo("target error {:.3g} % reached: the replicates that did not decide put the 95 % half-width at {}", target * 100,
+                percentText(facts.verdict->half_width_95));
+    if (facts.error->half_width_95 <= target || facts.rendered_samples == 0) return;
+    const auto samples = static_cast<double>(facts.samples.count());
+    const double more = std::ceil(facts.error->samplesFor(target, samples) - samples);
+    logInfo("{:.3g} % would take about {:.0f} samples per pixel more, {}", target * 100, more,
+            durationText(more * facts.sampling_seconds / static_cast<double>(facts.rendered_samples)));
 }
 
 }  // namespace
@@ -266,7 +291,8 @@ int runJob(const Job& job) {
     facts.command = job.command;
 
     // What is to be seen, and where it is to be written.
-    const Scene scene = loadScene(job.scene);
+    Scene scene = loadScene(job.scene);
+    if (job.target_error > 0) requireReplicates(scene);
     const Files files = planFiles(job, scene);
 
     // What it takes to see it: one flat blob, and the mask of what it needs.
@@ -294,7 +320,9 @@ int runJob(const Job& job) {
     FirstFailure failure(plan.ranges.empty() ? std::nullopt : renderSamples(job, compiled, plan, film, saveCheckpoint, facts));
     facts.samples = film.samples;
     facts.invalid_samples = film.invalidSamples();
-    if (const double error = film.relativeError(); std::isfinite(error)) facts.relative_error = error;
+    facts.error = estimateError(film, ReplicateSet::All, scene.sampler.type != SamplerType::Sobol);
+    facts.target_error = job.target_error;
+    if (job.target_error > 0) facts.verdict = estimateError(film, ReplicateSet::Odd);
     if (facts.invalid_samples > 0) logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
 
     // Images, and the report of how they came about.
@@ -308,6 +336,7 @@ int runJob(const Job& job) {
     if (!files.report.empty()) failure.attempt([&] { writeReport(files.report, reportJson(scene, compiled, facts)); });
 
     logInfo("{}", summary(facts, film));
+    if (facts.error) tellTarget(facts);
     if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
     if (failure.get()) throw *failure.get();
     if (facts.stop == StopReason::Interrupted)

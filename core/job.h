@@ -35,6 +35,7 @@ struct Job {
     std::optional<std::uint64_t> spp;        ///< Render until every pixel has the samples [0, spp).
     std::optional<SampleRange> samples;      ///< Exactly these instead.
     double time_limit_seconds = 0;           ///< 0: none. Alone it replaces the scene's number of samples.
+    double target_error = 0;                 ///< Stop at this relative error; 0: none. Alone it replaces the scene's number of samples.
     std::uint64_t chunk = 0;                 ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
 
     bool resume = false;

@@ -29,6 +29,7 @@ Examples:
   crt --backend cuda configs/cornell_box.yaml         with this one; all give the same bits
   crt scene.yaml --spp 1024 -o a.exr -o a.png         more samples, into these files
   crt scene.yaml --time 30m                           as many samples as 30 minutes allow
+  crt scene.yaml --target-error 1%                    as many as it takes for an error of 1 % of the mean
   crt scene.yaml --resume --spp 4096                  go on where Ctrl-C or a power cut stopped it
   crt scene.yaml --set film.resolution=[256,256] --set integrator.max_depth=4
   crt info scene.yaml                                 what a scene needs, and what is left out
@@ -223,6 +224,9 @@ private:
         spp->group(group);
         reader_.option(*render, "--time", "DURATION", "stop after 90s, 30m, 2h, 1h30m; with --spp, whichever comes first",
                        [this](const std::string& text) { job_.time_limit_seconds = parseDuration(text, "--time"); })
+            ->group(group);
+        reader_.option(*render, "--target-error", "PERCENT", "stop when the image's error is below, e.g. 1%, with 95 % confidence",
+                       [this](const std::string& text) { job_.target_error = parseFraction(text, "--target-error"); })
             ->group(group);
         reader_.option(*render, "--samples", "A:B", "exactly the samples A to B-1: a part to merge with others",
                        [this](const std::string& text) { job_.samples = parseSampleRange(text, "--samples"); })

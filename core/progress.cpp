@@ -36,6 +36,15 @@ void writeStderr(std::string_view text) {
     }
 }
 
+/// What the target error, or 1 % where there is none, would still take. Power-of-two checks may make it more.
+std::string stillNeeded(const ProgressState& state) {
+    const double target = state.target_error > 0 ? state.target_error : 0.01;
+    if (state.error->half_width_95 <= target || !(state.samples > state.start_samples)) return {};
+    const double samples = state.error->samplesFor(target, state.samples);
+    const double seconds = (samples - state.samples) * state.elapsed_seconds / (state.samples - state.start_samples);
+    return fmt::format("  {:.3g} % at {:.0f} spp, in {}", target * 100, std::ceil(samples), clockText(seconds));
+}
+
 }  // namespace
 
 double ProgressState::pathsPerSecond() const {
@@ -93,6 +102,13 @@ std::string percentText(double fraction) {
     return fmt::format("{:.{}f} %", percent, percent < 0.0995 ? 3 : percent < 0.995 ? 2 : percent < 99.5 ? 1 : 0);
 }
 
+std::string errorText(const ErrorEstimate& error) {
+    if (error.is_bound) return "error below " + percentText(error.relative_rmse);
+    const double lower = error.relative_rmse_95.lower * 100, upper = error.relative_rmse_95.upper * 100;
+    const int digits = std::clamp(-static_cast<int>(std::floor(std::log10(std::max(upper - lower, 1e-6)))), 1, 6);
+    return fmt::format("error {:.{}f} % ({:.{}f}-{:.{}f})", error.relative_rmse * 100, digits, lower, digits, upper, digits);
+}
+
 std::string bytesText(double bytes) {
     for (const auto& [scale, unit] : {std::pair{1e9, "GB"}, {1e6, "MB"}, {1e3, "kB"}}) {
         const double value = bytes / scale;
@@ -105,8 +121,9 @@ std::string progressText(const ProgressState& state) {
     std::string text = fmt::format("{:3.0f} %  {:.0f}", std::floor(state.fraction() * 100), std::floor(state.samples));
     text += state.target > 0 ? fmt::format("/{} spp", state.target) : std::string(" spp");
     if (state.pathsPerSecond() > 0) text += "  " + rateText(state.pathsPerSecond(), "paths/s");
-    if (state.relative_error >= 0) text += "  error " + percentText(state.relative_error);
     if (state.secondsLeft() >= 0) text += "  " + clockText(state.secondsLeft()) + " left";
+    // Last, because a narrow terminal cuts here.
+    if (state.error) text += "  " + errorText(*state.error) + stillNeeded(state);
     return text;
 }
 

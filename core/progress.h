@@ -1,6 +1,8 @@
 /// Tells how far a render is: a bar on a terminal, otherwise a line every ten seconds.
 #pragma once
 
+#include "error_estimate.h"
+
 #include <chrono>
 #include <cstdint>
 #include <mutex>
@@ -23,7 +25,8 @@ struct ProgressState {
     double elapsed_seconds = 0;      ///< Of this run.
     double time_limit_seconds = 0;   ///< 0: none.
     std::uint64_t pixels = 0;        ///< Of the crop window.
-    double relative_error = -1;      ///< Of the image so far; negative while unknown.
+    double target_error = 0;         ///< half_width_95 to stop at; 0: none.
+    std::optional<ErrorEstimate> error;  ///< Of the image so far.
 
     /// Camera paths per second of this run; 0 while unknown.
     double pathsPerSecond() const;
@@ -33,7 +36,7 @@ struct ProgressState {
     double secondsLeft() const;
 };
 
-/// "43 %  28/64 spp  12.3 Mpaths/s  error 1.9 %  0:42 left"
+/// "43 %  28/64 spp  12.3 Mpaths/s  0:42 left  error 1.90 % (1.86-1.94)  1 % at 101 spp, in 2:12"; a target error stands instead of 1 %.
 std::string progressText(const ProgressState& state);
 /// The same behind a bar, fitted into `columns`.
 std::string progressBar(const ProgressState& state, int columns);
@@ -46,6 +49,9 @@ std::string durationText(double seconds);
 std::string rateText(double per_second, const char* unit);
 /// "1.9 %"
 std::string percentText(double fraction);
+/// "error 1.90 % (1.86-1.94)": relative root mean square error with its 95 % interval; "error below 9 %" where only a
+/// bound is known. ASCII, so that bytes are columns.
+std::string errorText(const ErrorEstimate& error);
 /// "138 MB"
 std::string bytesText(double bytes);
 

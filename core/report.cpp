@@ -62,6 +62,7 @@ const char* stopName(StopReason reason) {
     switch (reason) {
         case StopReason::Samples: return "samples";
         case StopReason::Time: return "time";
+        case StopReason::Target: return "target error";
         case StopReason::Interrupted: return "interrupted";
         case StopReason::Failed: break;
     }
@@ -92,6 +93,35 @@ std::uint64_t peakHostMemory() {
     std::uint64_t kilobytes = 0;
     std::from_chars(text.data(), text.data() + text.size(), kilobytes);
     return kilobytes * 1024;
+}
+
+/// What the image knows of its own error (docs/error.md), relative to its mean luminance.
+Json estimateJson(const std::optional<ErrorEstimate>& error) {
+    if (!error) return nullptr;
+    const stats::Interval mean = error->meanInterval(0.95);
+    return {{"relative_rmse", error->relative_rmse},
+            {"relative_rmse_95", {error->relative_rmse_95.lower, error->relative_rmse_95.upper}},
+            {"half_width_95", error->half_width_95},
+            {"mean_luminance", error->mean_luminance},
+            {"mean_luminance_standard_error", error->mean_standard_error},
+            {"mean_luminance_95", {mean.lower, mean.upper}},
+            {"degrees_of_freedom", error->degrees_of_freedom},
+            {"is_upper_bound", error->is_bound}};
+}
+
+Json errorJson(const RunFacts& facts) {
+    Json json = estimateJson(facts.error);
+    if (!facts.error) return json;
+    const auto samples = static_cast<double>(facts.samples.count());
+    const double target = facts.target_error > 0 ? facts.target_error : 0.01;
+    const double more = facts.error->samplesFor(target, samples) - samples;
+    json["to_target"] = {{"half_width_95", target},
+                         {"more_samples", std::ceil(more)},
+                         {"more_seconds", facts.rendered_samples > 0
+                                              ? Json(more * facts.sampling_seconds / static_cast<double>(facts.rendered_samples))
+                                              : Json(nullptr)}};
+    if (facts.target_error > 0) json["verdict"] = estimateJson(facts.verdict);
+    return json;
 }
 
 std::string reportJson(const Scene& scene, const CompiledScene& compiled, const RunFacts& facts) {
@@ -160,7 +190,7 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
     report["memory"] = {{"scene_bytes", compiled.size_bytes},
                         {"host_peak_bytes", peakHostMemory()},
                         {"device_peak_bytes", b.peak_memory_bytes}};
-    report["error"] = {{"relative", knownOrNull(facts.relative_error)}};
+    report["error"] = errorJson(facts);
     report["warnings"] = facts.warnings;
 
     Json outputs = Json::array();

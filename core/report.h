@@ -3,6 +3,7 @@
 
 #include "backend/crt_backend.h"
 #include "compile.h"
+#include "error_estimate.h"
 #include "film.h"
 #include "scene.h"
 
@@ -16,6 +17,7 @@ namespace crt {
 enum class StopReason {
     Samples,      ///< Every sample asked for is there.
     Time,         ///< --time is up.
+    Target,       ///< The target error is reached.
     Interrupted,  ///< A signal.
     Failed,       ///< The backend failed; the images hold what was rendered before.
 };
@@ -40,7 +42,9 @@ struct RunFacts {
     SampleRanges samples;               ///< All that are in the film.
     std::uint64_t chunks = 0;
     std::uint64_t invalid_samples = 0;
-    double relative_error = -1;         ///< Film::relativeError(), negative when unknown.
+    std::optional<ErrorEstimate> error; ///< Of the film, by all replicates; nothing while unknown.
+    std::optional<ErrorEstimate> verdict;  ///< With a target error: by the replicates that did not decide when to stop.
+    double target_error = 0;            ///< 0: none.
 
     StopReason stop = StopReason::Samples;
     int signal = 0;       ///< With StopReason::Interrupted.

@@ -1,8 +1,10 @@
 #include "sampling.h"
 
 #include "interrupt.h"
+#include "kernel/layout.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <utility>
@@ -46,8 +48,8 @@ private:
 /// The film on the host, kept close behind the one on the device.
 class FilmReader {
 public:
-    FilmReader(Integrator& integrator, Film& film)
-        : integrator_(integrator), film_(film), read_seconds_(static_cast<double>(film.sums.size() * sizeof(double)) / kReadBytesPerSecond) {
+    FilmReader(Integrator& integrator, Film& film, bool independent_samples)
+        : integrator_(integrator), film_(film), independent_samples_(independent_samples), read_seconds_(static_cast<double>(film.sums.size() * sizeof(double)) / kReadBytesPerSecond) {
         // A film that begins empty need not be kept twice.
         if (film.samples.count() > 0) before_ = film;
     }
@@ -58,8 +60,7 @@ public:
         Film fresh = before_ ? *before_ : Film(film_.shape());
         integrator_.readFilm(fresh);
         film_ = std::move(fresh);
-        const double error = film_.relativeError();
-        relative_error_ = std::isfinite(error) ? error : -1;
+        error_ = estimateError(film_, ReplicateSet::All, independent_samples_);
         read_seconds_ = secondsSince(start);
         read_at_ = Clock::now();
         current_ = true;
@@ -69,19 +70,25 @@ public:
     /// Is it time to read again, within the share of time that reading may take?
     bool due() const { return !current_ && secondsSince(read_at_) >= read_seconds_ / kReadShare; }
     bool current() const { return current_; }
-    double relativeError() const { return relative_error_; }
+    const std::optional<ErrorEstimate>& error() const { return error_; }
 
 private:
     Integrator& integrator_;
     Film& film_;
+    bool independent_samples_;
     std::optional<Film> before_;
     double read_seconds_;
-    double relative_error_ = -1;
+    std::optional<ErrorEstimate> error_;
     Clock::time_point read_at_ = Clock::now();
     bool current_ = true;  // The device's film begins empty.
 };
 
 }  // namespace
+
+std::uint64_t nextTargetCheck(std::uint64_t samples) {
+    constexpr std::uint64_t kFirstCheck = 4 * CRT_REPLICATE_BLOCK;
+    return samples < kFirstCheck ? kFirstCheck : std::bit_floor(samples) * 2;
+}
 
 std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& there) {
     std::vector<SampleRange> missing;
@@ -101,19 +108,30 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
     Clock::time_point checkpoint_at = start;
     SamplingResult result;
     ChunkSizer sizer(plan.chunk);
-    FilmReader reader(integrator, film);
+    FilmReader reader(integrator, film, plan.independent_samples);
 
     ProgressState state;
     const std::uint64_t resumed = film.samples.count();
     state.samples = state.start_samples = static_cast<double>(resumed);
     state.target = plan.target;
     state.time_limit_seconds = plan.time_limit_seconds;
+    state.target_error = plan.target_error;
     state.pixels = film.counts.size();
+
+    std::uint64_t check_at = nextTargetCheck(resumed > 0 ? resumed - 1 : 0);
+    const auto targetReached = [&] {
+        if (plan.target_error <= 0 || resumed + result.rendered < check_at) return false;
+        check_at = nextTargetCheck(resumed + result.rendered);
+        if (!reader.current()) reader.read();
+        const std::optional<ErrorEstimate> error = estimateError(film, ReplicateSet::Even);
+        return error && error->half_width_95 <= plan.target_error;
+    };
 
     // Why to stop before the samples are there; nothing while there is no reason.
     const auto reasonToStop = [&]() -> std::optional<StopReason> {
         if (InterruptGuard::signalReceived() != 0) return StopReason::Interrupted;
         if (plan.time_limit_seconds > 0 && secondsSince(start) >= plan.time_limit_seconds) return StopReason::Time;
+        if (targetReached()) return StopReason::Target;
         return std::nullopt;
     };
 
@@ -141,7 +159,7 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
             checkpoint_at = Clock::now();
         }
         state.samples = state.start_samples + static_cast<double>(result.rendered);
-        state.relative_error = reader.relativeError();
+        state.error = reader.error();
     };
 
     const auto renderAll = [&]() -> StopReason {
@@ -149,7 +167,8 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
             for (std::uint64_t next = first; next < end;) {
                 if (const auto reason = reasonToStop()) return *reason;
                 const double left = plan.time_limit_seconds > 0 ? plan.time_limit_seconds - secondsSince(start) : kChunkSeconds;
-                const std::uint64_t count = std::min(sizer.next(left), end - next);
+                std::uint64_t count = std::min(sizer.next(left), end - next);
+                if (plan.target_error > 0) count = std::min(count, check_at - (resumed + result.rendered));
                 renderChunk(next, count);
                 next += count;
             }

@@ -4,6 +4,7 @@
 
 #include "backend/integrator.h"
 #include "error.h"
+#include "error_estimate.h"
 #include "film.h"
 #include "progress.h"
 #include "report.h"
@@ -25,6 +26,8 @@ struct SamplingPlan {
     std::vector<SampleRange> ranges;     ///< To render, in order.
     std::uint64_t target = 0;            ///< Samples per pixel in the film when all ranges are there; 0: endless.
     double time_limit_seconds = 0;       ///< 0: none. Looked at between chunks.
+    bool independent_samples = false;    ///< By the scene's sampler: their spread tells the error.
+    double target_error = 0;             ///< Stop when half_width_95 (error_estimate.h) is at most this; 0: never.
     std::uint64_t chunk = 0;             ///< Samples per chunk; 0: adaptive, at most half a second.
     double checkpoint_interval_seconds = 0;  ///< 0: never call `checkpoint`.
 };
@@ -37,6 +40,10 @@ struct SamplingResult {
     std::uint64_t chunks = 0;
     double seconds = 0;
 };
+
+/// The target error is looked at when the film holds a power of two of samples, enough for two even and two odd replicates: looking all the time
+/// would stop at the luckiest moment. Only even replicates are asked, so that odd ones can judge the result (estimateError) without having chosen it.
+std::uint64_t nextTargetCheck(std::uint64_t samples);
 
 /// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at most a small part of the run
 /// behind: a backend that failed cannot be asked for its film any more. The caller holds the InterruptGuard.

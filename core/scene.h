@@ -62,6 +62,7 @@ struct SamplerSettings {
     SamplerType type = SamplerType::Sobol;
     std::uint64_t seed = 0;
     std::uint64_t samples = 64;  ///< Samples per pixel when neither --spp nor --time says otherwise.
+    int replicates = 0;          ///< 16, 1, or 0: 16 where samples are not independent of each other.
 };
 
 enum class MaterialType { Diffuse, Mirror, Conductor, Dielectric };
@@ -115,6 +116,8 @@ enum Aov : std::uint32_t {
     kAovPrimitive = 1u << 3,
     kAovVariance = 1u << 4,
     kAovSamples = 1u << 5,
+    kAovReplicates = 1u << 6,  ///< Not an output: the sums that error estimates come from.
+    kAovError = 1u << 7,
 };
 
 struct Output {
@@ -140,5 +143,11 @@ struct Scene {
     std::vector<std::string> files_read;  ///< Every file that went into the scene, the YAML first.
     double parse_seconds = 0;
 };
+
+/// Whether the film keeps the sums of independent replicates, from which the image's error follows (layout.h: CRT_REPLICATES).
+inline bool hasReplicates(const Scene& scene) {
+    if (scene.integrator.type != IntegratorType::Path) return false;
+    return scene.sampler.replicates > 1 || (scene.sampler.replicates == 0 && scene.sampler.type == SamplerType::Sobol);
+}
 
 }  // namespace crt

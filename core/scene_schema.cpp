@@ -167,6 +167,9 @@ SectionSchema sampler() {
                  .doc = "Another seed is another, equally good, noise."},
                 {.name = "samples", .kind = Kind::Integer, .range = {1, 9007199254740992.0, false, false}, .unit = "per pixel",
                  .fallback = yaml(d.samples), .doc = "Used when neither --spp nor --time says otherwise."},
+                {.name = "replicates", .kind = Kind::Integer, .range = {1, 16, false, false},
+                 .doc = "16: blocks of 64 samples take turns between 16 independent sequences, from which the image knows its own error. 1: one sequence, with "
+                        "less noise beyond 64 samples, whose error is only bounded. By default 16 for sobol, 1 for the others, which do not need them."},
             }};
 }
 
@@ -298,7 +301,7 @@ void addOutside(std::vector<SectionSchema>& all) {
                     {.name = "format", .kind = Kind::Choice, .choices = {"exr", "png", "ppm", "pfm"},
                      .doc = "By the extension of `file` when left out."},
                     {.name = "aovs", .kind = Kind::Choice, .shape = Shape::List,
-                     .choices = {"albedo", "normal", "depth", "primitive", "variance", "samples"}, .fallback = "[]",
+                     .choices = {"albedo", "normal", "depth", "primitive", "variance", "samples", "error"}, .fallback = "[]",
                      .doc = "Further channels; exr only."}}});
 }
 

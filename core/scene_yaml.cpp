@@ -243,6 +243,8 @@ void readSampler(const SectionReader& section, SamplerSettings& settings) {
     section.readEnum("type", settings.type);
     section.read("seed", settings.seed);
     section.read("samples", settings.samples);
+    if (section.read("replicates", settings.replicates) && settings.replicates != 1 && settings.replicates != 16)
+        section.error("replicates", fmt::format("{} replicates cannot be had: 16, or 1 for a single sequence", settings.replicates));
 }
 
 void readOutput(const SectionReader& section, std::vector<Output>& outputs) {

@@ -30,14 +30,15 @@ constexpr int kSkipped = 77;
 /// Masks as compileScene derives them, by name. One is compiled once however many names lead to it.
 std::map<std::uint32_t, std::string> representativeMasks() {
     constexpr std::uint32_t lit = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
-    constexpr std::uint32_t box = lit | CRT_FEATURE_SOBOL | CRT_FEATURE_BRUTE_FORCE;
-    constexpr std::uint32_t mesh = lit | CRT_FEATURE_SOBOL | CRT_FEATURE_BVH;
+    constexpr std::uint32_t sobol = CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES;
+    constexpr std::uint32_t box = lit | sobol | CRT_FEATURE_BRUTE_FORCE;
+    constexpr std::uint32_t mesh = lit | sobol | CRT_FEATURE_BVH;
     constexpr std::uint32_t glass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION;
     return {
         {CRT_FEATURES_ALL, "everything"},
         {box, "a box, Sobol, brute force"},
-        {(box & ~CRT_FEATURE_SOBOL) | CRT_FEATURE_INDEPENDENT, "a box, independent sampler"},
-        {(box & ~CRT_FEATURE_SOBOL) | CRT_FEATURE_XORSHIFT, "a box, xorshift sampler"},
+        {(box & ~sobol) | CRT_FEATURE_INDEPENDENT, "a box, independent sampler"},
+        {(box & ~sobol) | CRT_FEATURE_XORSHIFT, "a box, xorshift sampler"},
         {(box & ~CRT_FEATURE_BRUTE_FORCE) | CRT_FEATURE_AABB, "a box, object boxes"},
         {box & ~CRT_FEATURE_NEE, "a box, no light sampling"},
         {mesh, "a mesh, BVH"},

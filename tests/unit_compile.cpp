@@ -81,7 +81,8 @@ void makeGlass(Scene& s) {
 
 TEST_CASE("the mask names kinds, never values", "[compile]") {
     const std::uint32_t base = compiled(litFloor()).features;
-    CHECK(base == (CRT_FEATURE_SOBOL | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE));
+    CHECK(base == (CRT_FEATURE_SOBOL | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE |
+                   CRT_FEATURE_REPLICATES));
     Random random(41);
     for (int i = 0; i < 50; ++i) {
         CHECK(featuresOf([&](Scene& s) {
@@ -113,8 +114,14 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         return mask;
     };
     std::uint32_t seen = base;
-    seen |= differs(CRT_FEATURE_INDEPENDENT, CRT_FEATURE_SOBOL, [](Scene& s) { s.sampler.type = crt::SamplerType::Independent; });
-    seen |= differs(CRT_FEATURE_XORSHIFT, CRT_FEATURE_SOBOL, [](Scene& s) { s.sampler.type = crt::SamplerType::XorShift; });
+    constexpr std::uint32_t sobol = CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES;
+    seen |= differs(CRT_FEATURE_INDEPENDENT, sobol, [](Scene& s) { s.sampler.type = crt::SamplerType::Independent; });
+    seen |= differs(CRT_FEATURE_XORSHIFT, sobol, [](Scene& s) { s.sampler.type = crt::SamplerType::XorShift; });
+    differs(0, CRT_FEATURE_REPLICATES, [](Scene& s) { s.sampler.replicates = 1; });
+    differs(CRT_FEATURE_INDEPENDENT, CRT_FEATURE_SOBOL, [](Scene& s) {
+        s.sampler.type = crt::SamplerType::Independent;
+        s.sampler.replicates = 16;
+    });
     seen |= differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Bvh; });
     seen |= differs(CRT_FEATURE_AABB, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Aabb; });
     const auto other = [](crt::MaterialType type) {
@@ -140,7 +147,7 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     seen |= differs(CRT_FEATURE_ENVIRONMENT, 0, [](Scene& s) { s.environment = crt::Environment{crt::constantSpectrum(1)}; });
     seen |= differs(CRT_FEATURE_LENS, 0, [](Scene& s) { s.camera.aperture_radius = 0.1; });
     seen |= differs(CRT_FEATURE_FILTER, 0, [](Scene& s) { s.film.filter = crt::PixelFilter::Gaussian; });
-    constexpr std::uint32_t light = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
+    constexpr std::uint32_t light = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_REPLICATES;
     seen |= differs(CRT_FEATURE_VIEW, light, [](Scene& s) { s.integrator.type = crt::IntegratorType::Normals; });
     seen |= differs(CRT_FEATURE_VIEW, light | CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.type = crt::IntegratorType::Aabb; });
     seen |= compiled(litFloor(), crt::kAovDepth).features;
@@ -536,16 +543,25 @@ TEST_CASE("what is left out is listed with a reason, and what is needed is not",
 }
 
 TEST_CASE("AOVs take channels in order, and only those that are asked for", "[compile]") {
-    const CompiledScene none = compiled(litFloor());
-    CHECK(none.channels == CRT_CHANNELS_BASE);
+    const auto single = [](std::uint32_t aovs) {
+        Scene scene = litFloor();
+        scene.sampler.replicates = 1;
+        return compiled(scene, aovs);
+    };
+    CHECK(single(0).channels == CRT_CHANNELS_BASE);
+    const CompiledScene replicates = compiled(litFloor());
+    CHECK(headerOf(replicates).replicate_channel == CRT_CHANNELS_BASE);
+    CHECK(replicates.channels == CRT_CHANNELS_BASE + CRT_REPLICATES);
     const CompiledScene all = compiled(litFloor(), 0xffu);
     CHECK(headerOf(all).albedo_channel == 4);
     CHECK(headerOf(all).normal_channel == 7);
     CHECK(headerOf(all).depth_channel == 10);
+    CHECK(headerOf(all).replicate_channel == 11);
     CHECK(all.channels == CRT_CHANNELS_MAX);
-    const CompiledScene depth = compiled(litFloor(), crt::kAovDepth);
+    const CompiledScene depth = single(crt::kAovDepth);
     CHECK(headerOf(depth).albedo_channel == 0);
     CHECK(headerOf(depth).depth_channel == 4);
+    CHECK(headerOf(depth).replicate_channel == 0);
     CHECK(depth.channels == 5);
 }
 

@@ -94,15 +94,22 @@ TEST_CASE("progress: numbers and texts") {
     CHECK(state.pathsPerSecond() == Approx(1e6));
     CHECK(state.fraction() == Approx(0.6));
     CHECK(state.secondsLeft() == Approx(20));
-    state.relative_error = 0.019;
-    CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  error 1.9 %  0:20 left");
+    ErrorEstimate error;
+    error.relative_rmse = error.half_width_95 = 0.02;
+    error.relative_rmse_95 = {0.0196, 0.0204};
+    error.is_bound = false;
+    state.error = error;
+    // A fourth of the samples that 1 % takes are there, at one a second.
+    CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error 2.00 % (1.96-2.04)  1 % at 120 spp, in 1:30");
+    state.target_error = 0.02;
+    CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error 2.00 % (1.96-2.04)");
 
     SECTION("time can end it first") {
         state.time_limit_seconds = 25;
         CHECK(state.fraction() == Approx(0.8));
         CHECK(state.secondsLeft() == Approx(5));
         state.target = 0;
-        CHECK(progressText(state) == " 80 %  30 spp  1.00 Mpaths/s  error 1.9 %  0:05 left");
+        CHECK(progressText(state) == " 80 %  30 spp  1.00 Mpaths/s  0:05 left  error 2.00 % (1.96-2.04)");
     }
     SECTION("nothing is claimed at the start") {
         state = {};

@@ -150,13 +150,20 @@ CRT_ASSERT_SIZE(CrtCamera, 96);
 #define CRT_ACCELERATOR_BVH 1u
 #define CRT_ACCELERATOR_AABB 2u
 
-/* Film channels: X, Y, Z and Y² of each sample; AOV channels follow where the scene asks for them. */
+/* Film channels: X, Y, Z and Y² of each sample; those of AOVs and of the replicates follow where the scene asks for them. */
 #define CRT_CHANNELS_BASE 4u
-#define CRT_CHANNELS_MAX 11u
+#define CRT_CHANNELS_MAX 27u
 #define CRT_AOV_ALBEDO 1u
 #define CRT_AOV_NORMAL 2u
 #define CRT_AOV_DEPTH 4u
 #define CRT_AOV_PRIMITIVE 8u
+#define CRT_AOV_REPLICATES 64u
+
+/* Replicates are scrambled independently of each other, so that the spread of their means is an unbiased measure of the image's error; each has a
+   channel, the sum of Y. They take turns in blocks of 64 samples: up to 64 samples are one sequence, with all its stratification, and from 1024 on all
+   16 have equally many (docs/decisions/0007-replicates.md has what other layouts lose). */
+#define CRT_REPLICATES 16u
+#define CRT_REPLICATE_BLOCK 64u
 
 typedef struct CrtScene {
     u32 magic;
@@ -173,6 +180,8 @@ typedef struct CrtScene {
 
     u32 albedo_channel, normal_channel, depth_channel; /* first channel of each; 0 when not asked for */
     f32 depth_scale;             /* scene units per length here: a power of two */
+    u32 replicate_channel;       /* likewise */
+    u32 padding[3];
 
     u32 sampler;
     u32 seed_low, seed_high;
@@ -200,7 +209,7 @@ typedef struct CrtScene {
 
     CrtCamera camera;
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 304);
+CRT_ASSERT_SIZE(CrtScene, 320);
 
 CRT_KERNEL_END
 

@@ -42,7 +42,8 @@ CRT_FN CrtPath crt_path_begin(const CrtContext *ctx, u32 x, u32 y, u64 sample) {
     const u32 pixel_x = scene->crop_x + x;
     const u32 pixel_y = scene->crop_y + y;
     CrtPath path;
-    path.sampler = crt_sampler_begin(scene->sampler, scene->seed_low, scene->seed_high, pixel_y * scene->film_width + pixel_x, sample);
+    path.sampler = crt_sampler_begin(scene->sampler, scene->replicate_channel != 0u, scene->seed_low, scene->seed_high,
+                                     pixel_y * scene->film_width + pixel_x, sample);
     path.ray = crt_camera_ray(ctx, &path.sampler, pixel_x, pixel_y);
     path.wavelengths = crt_sample_wavelengths(ctx, crt_sample_1d(&path.sampler, CRT_DIM_WAVELENGTH));
     path.hero = make_vec4(1.0f, 0.0f, 0.0f, 0.0f);
@@ -281,6 +282,8 @@ CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_samp
                 crt_film_add(pairs + 2, luminance);
                 crt_film_add(pairs + 4, (f64)V4Z(xyz));
                 crt_film_add(pairs + 6, luminance * luminance);
+                if (CRT_HAS(REPLICATES) && scene->replicate_channel != 0u)
+                    crt_film_add(pairs + 2u * (scene->replicate_channel + crt_replicate(first_sample + done)), luminance);
                 if (CRT_HAS(AOV)) {
                     if (scene->channels > CRT_CHANNELS_BASE) crt_add_aovs(ctx, &path, pairs);
                     if (primitives != 0 && valid == 0u && counts[pixel] == 0u) primitives[pixel] = path.first.primitive;

@@ -96,8 +96,18 @@ CRT_FN CrtPhilox crt_philox(u32 c0, u32 c1, u32 c2, u32 c3, u32 k0, u32 k1) {
     return r;
 }
 
-/* Numbers of sample `sample` of the pixel with index `pixel` in the whole film. */
-CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 seed_low, u32 seed_high, u32 pixel, u64 sample) {
+/* The replicate that a sample belongs to, and its place there (layout.h). */
+CRT_FN u32 crt_replicate(u64 sample) { return (u32)(sample / CRT_REPLICATE_BLOCK) % CRT_REPLICATES; }
+CRT_FN u64 crt_index_in_replicate(u64 sample) {
+    return sample / (CRT_REPLICATE_BLOCK * CRT_REPLICATES) * CRT_REPLICATE_BLOCK + sample % CRT_REPLICATE_BLOCK;
+}
+
+/*
+ * Numbers of sample `sample` of the pixel with index `pixel` in the whole film. With replicates, Sobol samples take turns between sequences that are
+ * each scrambled on their own (Owen 1997, "Monte Carlo variance of scrambled net quadrature", section 3). The other samplers' samples are independent
+ * as it is.
+ */
+CRT_FN CrtSampler crt_sampler_begin(u32 kind, int replicates, u32 seed_low, u32 seed_high, u32 pixel, u64 sample) {
     CrtSampler s;
     const u32 low = (u32)sample;
     const u32 high = (u32)(sample >> 32);
@@ -110,8 +120,11 @@ CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 seed_low, u32 seed_high, u32 p
     s.block = CRT_NONE;
     s.b0 = s.b1 = s.b2 = s.b3 = 0u;
     if (CRT_HAS(SOBOL) && kind == CRT_SAMPLER_SOBOL) {
-        s.pixel_key = crt_hash(pixel ^ crt_hash(seed_low ^ crt_hash(seed_high ^ crt_hash(high + 0x632be5abu))));
-        s.index = crt_reverse_bits(low);
+        const int split = CRT_HAS(REPLICATES) && replicates;
+        const u64 index = split ? crt_index_in_replicate(sample) : sample;
+        s.pixel_key = crt_hash(pixel ^ crt_hash(seed_low ^ crt_hash(seed_high ^ crt_hash((u32)(index >> 32) + 0x632be5abu))));
+        if (split) s.pixel_key = crt_hash(s.pixel_key ^ crt_hash(crt_replicate(sample) + 0x5bd1e995u));
+        s.index = crt_reverse_bits((u32)index);
     }
     if (CRT_HAS(XORSHIFT) && kind == CRT_SAMPLER_XORSHIFT) {
         /* Marsaglia's xorshift32 has one bad state, 0, and neighbouring seeds give neighbouring streams: seed it with a hash. */
