@@ -27,10 +27,6 @@ using kernel::CrtSpan;
 /// Up to this many triangles `auto` takes the brute-force loop. A choice, not yet a measurement: `bench/run accelerators` finds the crossover.
 constexpr std::size_t kBruteForceTriangles = 64;
 
-/// Around boxes, in lengths after normalisation (coordinates within ±1): the triangle test accepts hits whose offset from the ray
-/// is rounding, a few 2^-24; what is culled must not be what it would accept.
-constexpr float kBoxPadding = 5e-7f;
-
 Vec3d operator-(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Vec3d operator*(const Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
 Vec3d cross(const Vec3d& a, const Vec3d& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
@@ -262,7 +258,7 @@ private:
             const auto start = std::chrono::steady_clock::now();
             std::vector<TriangleBounds> bounds(count);
             for (std::size_t i = 0; i < count; ++i) bounds[i] = boundsOf(i);
-            Bvh bvh = buildBvh(bounds, kBoxPadding);
+            Bvh bvh = buildBvh(bounds, CRT_BOX_PADDING);
             order = std::move(bvh.order);
             header_.nodes = blob_.append(bvh.nodes);
             out_.nodes = bvh.nodes.size();
@@ -376,8 +372,8 @@ private:
             kernel::CrtObject& object = objects.back();
             ++object.count;
             for (std::size_t k = 0; k < 3; ++k) {
-                object.lower[k] = std::min(object.lower[k], b.lower[k] - kBoxPadding);
-                object.upper[k] = std::max(object.upper[k], b.upper[k] + kBoxPadding);
+                object.lower[k] = std::min(object.lower[k], b.lower[k] - CRT_BOX_PADDING);
+                object.upper[k] = std::max(object.upper[k], b.upper[k] + CRT_BOX_PADDING);
             }
         }
         header_.objects = blob_.append(objects);

@@ -51,6 +51,10 @@ CRT_FN CrtShear crt_shear(CrtRay ray) {
     return s;
 }
 
+/* Around boxes, in lengths after normalisation (coordinates within ±1): the triangle test accepts hits whose offset from the ray is rounding, a few
+   2^-24; what culls must not cull what it would accept. */
+#define CRT_BOX_PADDING 5e-7f
+
 /* Does the ray hit the triangle at 0 < t < limit? Fills t, b1, b2. There is no least t: a ray starts far enough off its surface (surface.h) that
    the sign of t is right, and whatever is really in front, however near, must stop it, or light leaks through corners. */
 CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShear ray, f32 limit, CrtHit *hit) {

@@ -8,6 +8,8 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <algorithm>
+#include <limits>
 #include <new>
 
 namespace crt::embree {
@@ -29,7 +31,7 @@ using QueryContext = RTCIntersectContext;
 void initContext(QueryContext* context) { rtcInitIntersectContext(context); }
 #endif
 
-/// What the filter callbacks need; Embree hands them the context back, which is its first member.
+/// What the callbacks need; Embree hands them the context back, which is its first member.
 struct Query {
     QueryContext context;
     const CrtTriangle* triangles;
@@ -38,23 +40,33 @@ struct Query {
     float reach;
 };
 
-Query& queryOf(const RTCFilterFunctionNArguments* arguments) { return *reinterpret_cast<Query*>(arguments->context); }
-
-/// A candidate for the closest hit. Accepting shortens Embree's ray to just beyond the best shared hit, so that ties still come here.
-void closestFilter(const RTCFilterFunctionNArguments* arguments) {
-    Query& query = queryOf(arguments);
+/// Tests one triangle whose box the ray meets, and lets Embree go no further than just beyond the best hit, so that ties still come here.
+void closestHit(const RTCIntersectFunctionNArguments* arguments) {
+    Query& query = *reinterpret_cast<Query*>(arguments->context);
     const float before = query.best.t;
-    crt_test_closest(query.triangles, RTCHitN_primID(arguments->hit, 1, 0), query.shear, &query.best);
-    if (query.best.t < before)
-        RTCRayN_tfar(arguments->ray, 1, 0) = query.best.t * kReachSlack;
-    else
-        arguments->valid[0] = 0;
+    crt_test_closest(query.triangles, arguments->primID, query.shear, &query.best);
+    if (query.best.t < before) RTCRayN_tfar(RTCRayHitN_RayN(arguments->rayhit, 1), 1, 0) = query.best.t * kReachSlack;
 }
 
-void anyFilter(const RTCFilterFunctionNArguments* arguments) {
-    Query& query = queryOf(arguments);
+void anyHit(const RTCOccludedFunctionNArguments* arguments) {
+    Query& query = *reinterpret_cast<Query*>(arguments->context);
     CrtHit hit;
-    if (!crt_intersect_triangle(query.triangles + RTCHitN_primID(arguments->hit, 1, 0), query.shear, query.reach, &hit)) arguments->valid[0] = 0;
+    if (crt_intersect_triangle(query.triangles + arguments->primID, query.shear, query.reach, &hit))
+        RTCRayN_tfar(arguments->ray, 1, 0) = -std::numeric_limits<float>::infinity();
+}
+
+/// Padded as the kernel's own boxes are: what the shared test accepts by rounding lies inside.
+void triangleBounds(const RTCBoundsFunctionArguments* arguments) {
+    const CrtTriangle& triangle = static_cast<const CrtTriangle*>(arguments->geometryUserPtr)[arguments->primID];
+    const auto bound = [&](std::uint32_t axis, float& lower, float& upper) {
+        const float* p = triangle.p + 3 * axis;
+        lower = std::min({p[0], p[1], p[2]}) - CRT_BOX_PADDING;
+        upper = std::max({p[0], p[1], p[2]}) + CRT_BOX_PADDING;
+    };
+    RTCBounds& b = *arguments->bounds_o;
+    bound(0, b.lower_x, b.upper_x);
+    bound(1, b.lower_y, b.upper_y);
+    bound(2, b.lower_z, b.upper_z);
 }
 
 Query makeQuery(const CrtTriangle* triangles, const CrtRay& ray) {
@@ -82,19 +94,6 @@ RTCRay embreeRay(const CrtRay& ray) {
     r.id = 0;
     r.flags = 0;
     return r;
-}
-
-/// How much larger, relative to its centre, a triangle is shown to Embree, so that its edges move out by some 2e-6 of the scene: what the shared test
-/// accepts at an edge is then inside for Embree, whose own edge test rounds otherwise and now and then hides a hit from both sides.
-float growthOf(const CrtTriangle& triangle) {
-    using namespace kernel;
-    const vec3 a = crt_triangle_vertex(&triangle, 0);
-    const vec3 ab = crt_triangle_vertex(&triangle, 1) - a, ac = crt_triangle_vertex(&triangle, 2) - a;
-    const float twice_area = length3(cross3(ab, ac));
-    const float longest = crt_max(length3(ab), crt_max(length3(ac), length3(ac - ab)));
-    // The least height is twice_area / longest, and the centre lies a third of it from the edge.
-    const float growth = 3 * 2e-6f * longest;
-    return growth < twice_area ? growth / twice_area : 1.0f;
 }
 
 std::string errorText(RTCDevice device, const char* what) {
@@ -129,30 +128,14 @@ Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t
     RTCDevice rtc = device.impl_->device;
     impl_->triangles = triangles;
     impl_->scene = rtcNewScene(rtc);
-    // Robust: candidates at edges and vertices must reach the shared test whichever side Embree's own rounding puts them on.
+    // Robust: a box that is touched is entered, whichever way Embree rounds.
     rtcSetSceneFlags(impl_->scene, RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(impl_->scene, RTC_BUILD_QUALITY_HIGH);
-    RTCGeometry geometry = rtcNewGeometry(rtc, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3ull * count));
-    auto* indices = static_cast<std::uint32_t*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), count));
-    if (vertices == nullptr || indices == nullptr) {
-        rtcReleaseGeometry(geometry);
-        rtcReleaseScene(impl_->scene);
-        throw std::bad_alloc();
-    }
-    for (std::uint32_t t = 0; t < count; ++t) {
-        const float growth = growthOf(triangles[t]);
-        for (std::uint32_t axis = 0; axis < 3; ++axis) {
-            const float* p = triangles[t].p + 3 * axis;
-            const float centre = (p[0] + p[1] + p[2]) / 3;
-            for (std::uint32_t v = 0; v < 3; ++v) vertices[9ull * t + 3 * v + axis] = p[v] + (p[v] - centre) * growth;
-        }
-        for (std::uint32_t v = 0; v < 3; ++v) indices[3ull * t + v] = 3 * t + v;
-    }
-    rtcSetGeometryIntersectFilterFunction(geometry, closestFilter);
-    rtcSetGeometryOccludedFilterFunction(geometry, anyFilter);
+    RTCGeometry geometry = rtcNewGeometry(rtc, RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, count);
+    rtcSetGeometryUserData(geometry, const_cast<CrtTriangle*>(triangles));
+    rtcSetGeometryBoundsFunction(geometry, triangleBounds, nullptr);
+    rtcSetGeometryIntersectFunction(geometry, closestHit);
+    rtcSetGeometryOccludedFunction(geometry, anyHit);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(impl_->scene, geometry);
     rtcReleaseGeometry(geometry);
