@@ -31,7 +31,13 @@ Vec3d operator-(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[
 Vec3d operator*(const Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
 Vec3d cross(const Vec3d& a, const Vec3d& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
 double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3d normalise(const Vec3d& v) { return v * (1.0 / std::sqrt(dot(v, v))); }
+/// By a power of two first, so that no square overflows or vanishes.
+Vec3d normalise(const Vec3d& v) {
+    int exponent = 0;
+    std::frexp(std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}), &exponent);
+    const Vec3d near_one = v * std::ldexp(1.0, -exponent);
+    return near_one * (1.0 / std::sqrt(dot(near_one, near_one)));
+}
 
 Vec3d transformPoint(const Matrix4d& m, const Vec3d& p) {
     return {m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
@@ -183,43 +189,61 @@ private:
     }
 
     /// Centre and power-of-two scale in double, so that far-away and huge or tiny scenes lose nothing in float, and moving or scaling
-    /// a scene by representable amounts gives the same bits.
+    /// a scene by representable amounts gives the same bits. Triangles without area have no part in it: nobody sees them.
     void normaliseLengths() {
+        std::vector<bool> seen(triangles_.size(), true);
+        measure(seen);
+        std::uint64_t without_area = 0;
+        for (std::size_t i = 0; i < triangles_.size(); ++i) {
+            seen[i] = hasArea(normalised(i));
+            without_area += seen[i] ? 0 : 1;
+        }
+        if (without_area > 0) {
+            logWarning("{} triangle{} no area and will not be seen", without_area, without_area == 1 ? " has" : "s have");
+            measure(seen);
+        }
+        positions_.resize(triangles_.size());
+        for (std::size_t i = 0; i < triangles_.size(); ++i) {
+            std::array<Vec3d, 3> p = normalised(i);
+            // Rounded to float, three points of one line make a sliver that can be hit; one point cannot.
+            if (!seen[i]) p[0] = p[1] = p[2] = {};
+            for (std::size_t v = 0; v < 3; ++v)
+                for (std::size_t k = 0; k < 3; ++k) positions_[i][3 * k + v] = static_cast<float>(p[v][k]);
+        }
+    }
+
+    /// Sets centre and scale by the bounding box of the triangles that are `seen`.
+    void measure(const std::vector<bool>& seen) {
         constexpr double inf = std::numeric_limits<double>::infinity();
         Vec3d lower{inf, inf, inf}, upper{-inf, -inf, -inf};
-        for (const FlatTriangle& t : triangles_)
-            for (const Vec3d& p : t.positions)
+        for (std::size_t i = 0; i < triangles_.size(); ++i) {
+            if (!seen[i]) continue;
+            for (const Vec3d& p : triangles_[i].positions)
                 for (std::size_t k = 0; k < 3; ++k) {
                     lower[k] = std::min(lower[k], p[k]);
                     upper[k] = std::max(upper[k], p[k]);
                 }
+        }
+        out_.centre = {};
+        out_.scale_exponent = 0;
         double half_extent = 0;
-        if (!triangles_.empty())
-            for (std::size_t k = 0; k < 3; ++k) {
-                out_.centre[k] = lower[k] + (upper[k] - lower[k]) / 2;
-                half_extent = std::max(half_extent, (upper[k] - lower[k]) / 2);
-            }
+        for (std::size_t k = 0; k < 3 && lower[k] <= upper[k]; ++k) {
+            out_.centre[k] = lower[k] + (upper[k] - lower[k]) / 2;
+            half_extent = std::max(half_extent, (upper[k] - lower[k]) / 2);
+        }
         if (half_extent > 0) {
             int exponent = 0;
             std::frexp(half_extent, &exponent);
             out_.scale_exponent = -exponent;  // half_extent · 2^-exponent is in [½, 1)
         }
         scale_ = std::ldexp(1.0, out_.scale_exponent);
-        positions_.resize(triangles_.size());
-        std::uint64_t without_area = 0;
-        for (std::size_t i = 0; i < triangles_.size(); ++i) {
-            std::array<Vec3d, 3> p;
-            for (std::size_t v = 0; v < 3; ++v) p[v] = (triangles_[i].positions[v] - out_.centre) * scale_;
-            // Rounded to float, three points of one line make a sliver that can be hit; one point cannot.
-            if (!hasArea(p)) {
-                p[1] = p[2] = p[0];
-                ++without_area;
-            }
-            for (std::size_t v = 0; v < 3; ++v)
-                for (std::size_t k = 0; k < 3; ++k) positions_[i][3 * k + v] = static_cast<float>(p[v][k]);
-        }
-        if (without_area > 0)
-            logWarning("{} triangle{} no area and will not be seen", without_area, without_area == 1 ? " has" : "s have");
+    }
+
+    /// Corners of triangle i, centred and scaled.
+    std::array<Vec3d, 3> normalised(std::size_t i) const {
+        std::array<Vec3d, 3> p;
+        for (std::size_t v = 0; v < 3; ++v) p[v] = (triangles_[i].positions[v] - out_.centre) * scale_;
+        return p;
     }
 
     /// Coordinates within ±1. Higher over its edges than rounding in double makes three points of a line.
@@ -570,7 +594,7 @@ private:
             c.step_y[k] = static_cast<float>(-up[k] * 2 * camera.tan_half_height / scene_.film.height);
             c.lens_x[k] = static_cast<float>(right[k]);
             c.lens_y[k] = static_cast<float>(up[k]);
-            if (!std::isfinite(c.origin[k]))
+            if (!std::isfinite(c.origin[k] + c.corner[k] + c.step_x[k] + c.step_y[k]))
                 throw Error(ErrorKind::Scene, "the camera is too far from the scene for single precision", camera.place);
         }
         const Vec3d to_target = camera.target - camera.position;

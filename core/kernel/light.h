@@ -13,6 +13,10 @@ CRT_KERNEL_BEGIN
    fifth of the cost; above, its 1/r² and cosine make it noisy. The choice depends on the triangle and the point alone, so that sampling and pdf agree. */
 #define CRT_SOLID_ANGLE_THRESHOLD 0.3f
 
+/* A spherical triangle of nearly a hemisphere, seen from just under a large lamp, has angles of nearly π, whose sines are lost in rounding. Area sampling
+   is then noisy, but chance hits have nearly all the weight. */
+#define CRT_SOLID_ANGLE_MAX 6.0f
+
 typedef struct CrtLightSample {
     vec3 point;   /* on the emitter */
     vec3 wi;      /* unit, from the shaded point */
@@ -53,16 +57,20 @@ CRT_FN int crt_seen_large(CrtLightShape shape, f32 area, vec3 p) {
 typedef struct CrtLightView {
     vec3 o, a, b, far; /* unit directions to the corners */
     f32 omega, omega_far;
+    int usable; /* whether directions are to be sampled by solid angle */
 } CrtLightView;
 
-CRT_FN CrtLightView crt_light_view(CrtLightShape shape, vec3 p) {
+CRT_FN CrtLightView crt_light_view(CrtLightShape shape, f32 area, vec3 p) {
     CrtLightView v;
+    v.usable = crt_seen_large(shape, area, p);
+    if (!v.usable) return v;
     v.o = normalize3(shape.o - p);
     v.a = normalize3(shape.o + shape.a - p);
     v.b = normalize3(shape.o + shape.b - p);
     v.far = normalize3(shape.o + shape.a + shape.b - p);
     v.omega = crt_solid_angle(v.o, v.a, v.b);
     v.omega_far = shape.parallelogram ? crt_solid_angle(v.far, v.b, v.a) : 0.0f;
+    v.usable = crt_max(v.omega, v.omega_far) < CRT_SOLID_ANGLE_MAX;
     return v;
 }
 
@@ -116,8 +124,8 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
     s.pdf = 0.0f;
     s.reach = 0.0f;
     f32 cosine, distance;
-    if (crt_seen_large(shape, emitter->area, p)) {
-        const CrtLightView view = crt_light_view(shape, p);
+    const CrtLightView view = crt_light_view(shape, emitter->area, p);
+    if (view.usable) {
         const f32 omega = view.omega + view.omega_far;
         const f32 split = view.omega / omega;
         if (u.x < split || view.omega_far == 0.0f) {
@@ -156,8 +164,8 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
 CRT_FN f32 crt_light_pdf(const CrtContext *ctx, u32 emitter_index, vec3 p, vec3 wi, f32 t) {
     CRT_GLOBAL const CrtEmitter *emitter = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + emitter_index;
     const CrtLightShape shape = crt_light_shape(ctx, emitter);
-    if (crt_seen_large(shape, emitter->area, p)) {
-        const CrtLightView view = crt_light_view(shape, p);
+    const CrtLightView view = crt_light_view(shape, emitter->area, p);
+    if (view.usable) {
         const f32 omega = view.omega + view.omega_far;
         return omega > 0.0f ? emitter->choice_probability / omega : 0.0f;
     }

@@ -75,6 +75,7 @@ std::vector<const Case*> select(const std::vector<std::string>& words, Level lev
 
 /// Groups, each in a file of its own.
 std::vector<Case> closedFormCases();     ///< A
+std::vector<Case> scaleCases();          ///< B
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> mutantCases();         ///< N
 

@@ -23,6 +23,11 @@ using kernel::CrtTriangle;
 /// Embree's distances may differ from the shared test's in the last bits: what culls is given this much more reach.
 constexpr float kReachSlack = 1.0f + 1e-5f;
 
+/// Embree tests the boxes of user primitives without its robust mode's care: planes err by some 7 · 2^-24 of the coordinates that take part, whatever the
+/// scene's flags say. For rays that start within kNear of the scene (which lies within ±1) this holds what they touch, with room to spare.
+constexpr float kBoxPadding = 8 * CRT_BOX_PADDING;
+constexpr float kNear = 4.0f;
+
 #if RTC_VERSION_MAJOR >= 4
 using QueryContext = RTCRayQueryContext;
 void initContext(QueryContext* context) { rtcInitRayQueryContext(context); }
@@ -55,13 +60,12 @@ void anyHit(const RTCOccludedFunctionNArguments* arguments) {
         RTCRayN_tfar(arguments->ray, 1, 0) = -std::numeric_limits<float>::infinity();
 }
 
-/// Padded as the kernel's own boxes are: what the shared test accepts by rounding lies inside.
 void triangleBounds(const RTCBoundsFunctionArguments* arguments) {
     const CrtTriangle& triangle = static_cast<const CrtTriangle*>(arguments->geometryUserPtr)[arguments->primID];
     const auto bound = [&](std::uint32_t axis, float& lower, float& upper) {
         const float* p = triangle.p + 3 * axis;
-        lower = std::min({p[0], p[1], p[2]}) - CRT_BOX_PADDING;
-        upper = std::max({p[0], p[1], p[2]}) + CRT_BOX_PADDING;
+        lower = std::min({p[0], p[1], p[2]}) - kBoxPadding;
+        upper = std::max({p[0], p[1], p[2]}) + kBoxPadding;
     };
     RTCBounds& b = *arguments->bounds_o;
     bound(0, b.lower_x, b.upper_x);
@@ -128,8 +132,6 @@ Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t
     RTCDevice rtc = device.impl_->device;
     impl_->triangles = triangles;
     impl_->scene = rtcNewScene(rtc);
-    // Robust: a box that is touched is entered, whichever way Embree rounds.
-    rtcSetSceneFlags(impl_->scene, RTC_SCENE_FLAG_ROBUST);
     RTCGeometry geometry = rtcNewGeometry(rtc, RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(geometry, count);
     rtcSetGeometryUserData(geometry, const_cast<CrtTriangle*>(triangles));
@@ -147,6 +149,13 @@ Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t
 }
 
 Tracer::~Tracer() { rtcReleaseScene(impl_->scene); }
+
+bool Tracer::takes(const CrtRay& ray) {
+    using namespace kernel;
+    const vec3 o = abs3(ray.o), d = abs3(ray.d);
+    const bool near = o.x <= kNear && o.y <= kNear && o.z <= kNear;  // false for NaN
+    return near && d.x <= kNear && d.y <= kNear && d.z <= kNear;
+}
 
 CrtHit Tracer::closest(const CrtRay& ray) const {
     Query query = makeQuery(impl_->triangles, ray);

@@ -41,6 +41,8 @@ public:
     Tracer(const Tracer&) = delete;
     Tracer& operator=(const Tracer&) = delete;
 
+    /// Whether Embree is sure to find what this ray meets: not for rays from far outside the scene, and those that are none.
+    static bool takes(const kernel::CrtRay& ray);
     kernel::CrtHit closest(const kernel::CrtRay& ray) const;
     bool any(const kernel::CrtRay& ray) const;
 

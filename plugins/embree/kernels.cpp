@@ -6,14 +6,14 @@
 
 namespace crt::kernel {
 
-// A handful of triangles is tested eight at a time without Embree; its BVH begins to pay above that.
+// A handful of triangles is tested eight at a time without Embree; its BVH begins to pay above that. Rays that Embree does not take go through the blob's.
 CRT_FN CrtHit crt_trace_closest(const CrtContext* ctx, CrtRay ray) {
-    if (CRT_HAS(BVH) && ctx->tracer != nullptr) return ctx->tracer->closest(ray);
+    if (CRT_HAS(BVH) && ctx->tracer != nullptr && embree::Tracer::takes(ray)) return ctx->tracer->closest(ray);
     return crt_software_closest(ctx, ray);
 }
 
 CRT_FN int crt_trace_any(const CrtContext* ctx, CrtRay ray) {
-    if (CRT_HAS(BVH) && ctx->tracer != nullptr) return ctx->tracer->any(ray);
+    if (CRT_HAS(BVH) && ctx->tracer != nullptr && embree::Tracer::takes(ray)) return ctx->tracer->any(ray);
     return crt_software_any(ctx, ray);
 }
 

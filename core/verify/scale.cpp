@@ -1,0 +1,265 @@
+// Group B: scale and position. Lengths are normalised in double before anything is float (core/compile.cpp), so where a scene lies and how large it is must not
+// show; what remains is the ratio of sizes within a scene.
+#include "verify/probes.h"
+#include "verify/references.h"
+#include "verify/scenes.h"
+
+#include "kernel/features.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace crt::verify {
+namespace {
+
+constexpr std::uint32_t kNeeds = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_INDEPENDENT;
+
+Render samples(std::uint64_t count, std::uint64_t seed = 0) { return {.samples = count, .seed = seed}; }
+
+/// Mean radiance of `changed` over that of `original`, for eight seeds: the same random numbers, so that only what differs is seen.
+std::vector<double> ratios(Context& context, const Scene& original, const Scene& changed, std::uint64_t count) {
+    std::vector<double> all;
+    for (std::uint64_t seed = 1; seed <= 8; ++seed)
+        all.push_back(radiance(context.render(changed, samples(count, seed))) / radiance(context.render(original, samples(count, seed))));
+    return all;
+}
+
+void powersOfTwo(Context& context) {
+    Cube cube;
+    cube.emitting = "ceiling";
+    cube.integrator = "{max_depth: 5, roulette: false, nee: true}";
+    cube.film = "{resolution: [16, 16]}";
+    const std::pair<const char*, Scene> scenes[] = {{"square light", context.scene(squareOverFloor(1))}, {"cube", context.scene(yaml(cube))}};
+    for (const auto& [name, scene] : scenes) {
+        const Film here = context.render(scene, samples(4));
+        for (const int m : {-40, -20, -10, 10, 20, 40})
+            context.sameBits(fmt::format("{} times 2^{}", name, m), here, context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4)),
+                             "an absolute length survives somewhere: an epsilon, a smallest distance, a clamp");
+    }
+}
+
+void powersOfTen(Context& context) {
+    const Scene scene = litRoom(24, 1);
+    for (const int m : {-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6}) {
+        if (!context.atLeast(Level::Merge) && m % 3 != 0) continue;
+        context.equivalent(fmt::format("lit room times 10^{}", m), ratios(context, scene, moved(scene, std::pow(10.0, m), {}), 16), 1, 0.001);
+    }
+}
+
+void farAway(Context& context) {
+    const Scene scene = litRoom(24, 1);
+    for (int exponent = 0; exponent <= 8; ++exponent) {
+        if (!context.atLeast(Level::Merge) && exponent % 4 != 0) continue;
+        const double t = std::pow(10.0, exponent) * 1.0123456789;
+        context.equivalent(fmt::format("lit room moved by 10^{} of its size", exponent), ratios(context, scene, moved(scene, 1, {t, 0.7 * t, -0.3 * t}), 16), 1,
+                           0.001);
+    }
+}
+
+void embreesFarPlace(Context& context) {
+    const std::uint64_t rays = context.atLeast(Level::Nightly) ? 10000000 : context.atLeast(Level::Merge) ? 200000 : 16000;
+    for (const Place& place : {kPlaces[1], kPlaces[2]})
+        for (const Aim aim : {Aim::Vertex, Aim::Edge})
+            rareFailures(context, fmt::format("rays at {}, {}", name(aim), place.name),
+                         collect(rays, [&](std::uint64_t seed) { return missesOfAimedRays(context, aim, place, 64, seed); }), 1e-6,
+                         "far from the origin edges are no longer shared: are coordinates rounded to float before the scene is moved to its centre?");
+}
+
+/// A screw of 10⁻³ on the ground, under a lamp, in a world of 10⁶: the ground's mesh gets finer towards it.
+Scene screwOnGround(bool whole_world) {
+    Scene scene = emptyScene(24, 1, {0, 3e-3, -3e-3}, {0, 0, 0}, 0.25);
+    scene.integrator.nee = true;
+    scene.integrator.max_depth = 1;
+    Mesh ground;
+    const auto ring = [](double half) { return std::array<Vec3d, 4>{{{-half, 0, -half}, {-half, 0, half}, {half, 0, half}, {half, 0, -half}}}; };
+    const auto inner = ring(4e-3);
+    addQuad(ground, inner[0], inner[1], inner[2], inner[3]);
+    if (whole_world)
+        for (double half = 4e-3; half < 1e6; half *= 4) {
+            const auto a = ring(half), b = ring(4 * half);
+            for (std::size_t i = 0; i < 4; ++i) addQuad(ground, b[i], b[(i + 1) % 4], a[(i + 1) % 4], a[i]);
+        }
+    addObject(scene, std::move(ground), diffuse(0.5));
+    addObject(scene, boxMesh({-5e-4, 0, -5e-4}, {5e-4, 1e-3, 5e-4}), diffuse(0.5));
+    Mesh lamp;
+    addQuad(lamp, {-2e-3, 4e-3, -2e-3}, {2e-3, 4e-3, -2e-3}, {2e-3, 4e-3, 2e-3}, {-2e-3, 4e-3, 2e-3});
+    addObject(scene, std::move(lamp), diffuse(0), 1);
+    if (whole_world) addObject(scene, boxMesh({2, 0, 2}, {3, 1, 3}), diffuse(0.5));
+    return scene;
+}
+
+void mixedScale(Context& context) {
+    std::vector<double> all;
+    const Scene patch = screwOnGround(false), world = screwOnGround(true);
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+        const Film a = context.render(patch, samples(64, seed)), b = context.render(world, samples(64, seed));
+        all.push_back(radiance(b) / radiance(a));
+        if (seed > 1) continue;
+        // A shadow that came off its screw would show in the pixels at its foot.
+        double worst = 0;
+        for (std::uint32_t y = 0; y < 24; ++y)
+            for (std::uint32_t x = 0; x < 24; ++x) worst = std::max(worst, std::abs(radiance(b, x, y) - radiance(a, x, y)) / std::max(radiance(a, x, y), 0.01));
+        context.absolute("any pixel, with the same random numbers", worst, 0, 0.05,
+                         {{1, "the shadow is detached from the object, or lost: is the ray's offset that of the largest triangle?"}});
+    }
+    context.equivalent("screw of 1e-3 on a ground of 1e6, against the screw alone", all, 1, 0.005);
+}
+
+void layers(Context& context) {
+    const std::uint64_t rays = context.atLeast(Level::Merge) ? 800000 : 40000;
+    // Below 6e-6 of their size layers of a scene of that size begin to be skipped: docs/results/stability-offset-tightness.md.
+    for (const double gap : {1e-3, 1e-4, 1e-5, 8e-6})
+        rareFailures(context, fmt::format("layers {:g} of their size apart", gap),
+                     collect(rays, [&](std::uint64_t seed) { return skippedLayers(context, 1, gap, 1, 64, seed); }), 1e-5,
+                     "rays step over what is just in front: the offset by which they leave a surface is larger than its rounding asks for");
+}
+
+void hugeEmitter(Context& context) {
+    // pbrt-v4 #249: noisy there in single precision.
+    const std::string yaml = R"(crt: 1
+camera: {position: [0, 2, 0.5], target: [0, 0, 0], fov: 0.1}
+film: {resolution: [4, 4]}
+integrator: {max_depth: 1, roulette: false}
+materials: {floor: {type: diffuse, reflectance: 0.5}, lamp: {type: diffuse, reflectance: 0}}
+objects:
+  - {name: floor, mesh: {positions: [[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]], faces: [[0,1,2,3]]}, material: floor}
+  - {name: lamp, mesh: {positions: [[-1e7,9,-1e7],[1e7,9,-1e7],[0,9,1e7]], faces: [[0,1,2]]}, material: lamp, emission: {radiance: 1}}
+)";
+    const double factor = polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{-1e7, 9, -1e7}, {1e7, 9, -1e7}, {0, 9, 1e7}});
+    context.estimate("irradiance 9 below a triangle of 2e7", yaml, [](const Film& f) { return radiance(f); }, 0.5 * factor, 0.003,
+                     {.samples = 256, .most = 16384}, {{0, "the emitter is taken for an occluder of its own light, or never sampled"}});
+}
+
+void sizesOfASquare(Context& context) {
+    for (const double size : {1.0, 1e4, 1e8, 1e12, 1e30, 1e100, 1e-12, 1e-30, 1e-100}) {
+        Scene scene = emptyScene(16, 1, {0.1 * size, 2 * size, -size}, {0, 0, 0}, 0.1);
+        scene.integrator.max_depth = 1;
+        scene.environment = Environment{constantSpectrum(1)};
+        Mesh square;
+        addQuad(square, {-size, 0, -size}, {-size, 0, size}, {size, 0, size}, {size, 0, -size});
+        addObject(scene, std::move(square), diffuse(0.5));
+        Scene white = scene;
+        white.materials[0] = diffuse(1);
+        const double sky = radiance(context.render(white, samples(4)));
+        context.relative(fmt::format("square of {:g} under an even sky", size), radiance(context.render(scene, samples(4))) / sky, 0.5, 1e-5,
+                         {{0, "no ray reaches the square: an overflow, an underflow, or a largest or smallest length"}});
+    }
+}
+
+void extremeCoordinates(Context& context) {
+    const Scene scene = litRoom(16, 1);
+    const Film here = context.render(scene, samples(4));
+    // Embree takes coordinates of 1.844e18 and more for invalid; squares of lengths leave float at 1e19, double at 1e154.
+    for (const int m : {61, 100, 300, 480})
+        context.sameBits(fmt::format("lit room times 2^{}, {:.3g}", m, std::ldexp(1.0, m)), here,
+                         context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4)), "a length, area or squared length overflows before lengths are normalised");
+}
+
+void denormalCoordinates(Context& context) {
+    const Scene scene = litRoom(16, 1);
+    const Film here = context.render(scene, samples(4));
+    for (const int m : {-133, -149, -300, -480})
+        context.sameBits(fmt::format("lit room times 2^{}, {:.3g}", m, std::ldexp(1.0, m)), here,
+                         context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4)),
+                         "a length, area or squared length underflows before lengths are normalised");
+}
+
+}  // namespace
+
+std::vector<Case> scaleCases() {
+    return {
+        {.id = "B01",
+         .name = "scale-2",
+         .title = "A square light and a cube, scaled by 2^m, m = ±10, ±20, ±40",
+         .expected = "the same image",
+         .source = "powers of two round nothing",
+         .tolerance = "same bits",
+         .level = Level::Commit,
+         .needs = kNeeds,
+         .run = powersOfTwo},
+        {.id = "B02",
+         .name = "scale-10",
+         .title = "A lit room scaled by 10^m, m = −6 … 6",
+         .expected = "the same mean radiance, with the same random numbers",
+         .source = "radiance does not depend on the unit of length",
+         .tolerance = "± 0.1 %",
+         .level = Level::Commit,
+         .needs = kNeeds,
+         .run = powersOfTen},
+        {.id = "B03",
+         .name = "far-away",
+         .title = "A lit room moved along (1, 0.7, −0.3) by up to 1e8 of its size",
+         .expected = "the same mean radiance, with the same random numbers",
+         .source = "radiance does not depend on the origin; representable shifts, which give the same bits, are M02",
+         .tolerance = "± 0.1 %",
+         .level = Level::Commit,
+         .needs = kNeeds,
+         .run = farAway},
+        {.id = "B04",
+         .name = "embrees-far-place",
+         .title = "D01's rays at vertices and edges at (148376, 1234, −223423), alone and in a scene as large as that",
+         .expected = "no ray slips through a closed mesh",
+         .source = "topology; the place is that of Embree's own watertightness tests",
+         .tolerance = "rate of misses ≤ 1e-6",
+         .level = Level::Commit,
+         .needs = CRT_FEATURE_BVH | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_INDEPENDENT,
+         .run = embreesFarPlace},
+        {.id = "B05",
+         .name = "mixed-scale",
+         .title = "A screw of 1e-3 on a ground of 1e6 whose mesh gets finer towards it",
+         .expected = "the image of the screw on a small patch",
+         .source = "what is far away and dark does not matter",
+         .tolerance = "± 0.5 % in the mean, ± 5 % in any pixel with the same random numbers",
+         .level = Level::Commit,
+         .needs = kNeeds | CRT_FEATURE_BVH,
+         .run = mixedScale},
+        {.id = "B06",
+         .name = "thin-layers",
+         .title = "Parallel layers 1e-3, 1e-4, 1e-5 and 8e-6 of their size apart",
+         .expected = "a ray through the outer layer meets the inner one",
+         .source = "geometry; the limit is that of docs/results/stability-offset-tightness.md",
+         .tolerance = "rate of skipped layers ≤ 1e-5",
+         .level = Level::Commit,
+         .needs = CRT_FEATURE_BVH | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_AOV,
+         .run = layers},
+        {.id = "B07",
+         .name = "huge-emitter",
+         .title = "An emitting triangle of 2e7, 9 above the floor",
+         .expected = "Lambert's polygon formula in double",
+         .source = "Lambert 1760; the scene is pbrt-v4's issue 249",
+         .tolerance = "± 0.3 %",
+         .level = Level::Commit,
+         .needs = kNeeds,
+         .run = hugeEmitter},
+        {.id = "B08",
+         .name = "sizes-of-a-square",
+         .title = "One Lambertian square of 1e-100 … 1e100 under an even sky",
+         .expected = "half of the sky's radiance",
+         .source = "ρ·L for a convex body",
+         .tolerance = "1e-5",
+         .level = Level::Commit,
+         .needs = CRT_FEATURE_DIFFUSE | CRT_FEATURE_ENVIRONMENT,
+         .run = sizesOfASquare},
+        {.id = "B09",
+         .name = "huge-coordinates",
+         .title = "A lit room times 2^61 (2.3e18), 2^100, 2^300 and 2^480",
+         .expected = "normalised: the same image",
+         .source = "powers of two round nothing",
+         .tolerance = "same bits",
+         .level = Level::Commit,
+         .needs = kNeeds,
+         .run = extremeCoordinates},
+        {.id = "B10",
+         .name = "denormal-coordinates",
+         .title = "A lit room times 2^−133 (1e-40), 2^−149, 2^−300 and 2^−480",
+         .expected = "normalised: the same image",
+         .source = "powers of two round nothing",
+         .tolerance = "same bits",
+         .level = Level::Commit,
+         .needs = kNeeds,
+         .run = denormalCoordinates},
+    };
+}
+
+}  // namespace crt::verify
