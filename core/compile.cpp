@@ -6,6 +6,7 @@
 #include "kernel/layout.h"
 #include "kernel/surface.h"
 #include "log.h"
+#include "near_surfaces.h"
 
 #include <algorithm>
 #include <chrono>
@@ -706,7 +707,15 @@ private:
 
 }  // namespace
 
-CompiledScene compileScene(const Scene& scene, std::uint32_t aovs) { return Compiler(scene, aovs).run(); }
+CompiledScene compileScene(const Scene& scene, std::uint32_t aovs) {
+    CompiledScene compiled = Compiler(scene, aovs).run();
+    if (scene.integrator.type == IntegratorType::Path && scene.integrator.max_depth > 0)
+        if (const NearSurfaces found = findNearSurfaces(compiled); found.near > 0)
+            logWarning("{} of {} triangles looked at have another surface nearer than single precision can tell for triangles of this size (up to {:.3g} apart): light between "
+                       "them may be lost; divide the larger triangles there, or move the surfaces apart or together",
+                       found.near, found.asked, found.nearest_clearance);
+    return compiled;
+}
 
 std::string featureNames(std::uint64_t mask) {
     std::string names;

@@ -21,6 +21,7 @@
 #include "backend/crt_layout_hash.h"
 
 #include <algorithm>
+#include <cfenv>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -151,9 +152,25 @@ inline CrtDevice makeDevice(std::uint32_t index, const std::string& name, const 
     return device;
 }
 
+/// The rounding mode and treatment of subnormals that the kernel is written for, whatever the host's thread has set; put back at the end.
+class DefaultFloatEnvironment {
+public:
+    DefaultFloatEnvironment() noexcept {
+        std::fegetenv(&hosts_);
+        std::fesetenv(FE_DFL_ENV);
+    }
+    ~DefaultFloatEnvironment() { std::fesetenv(&hosts_); }
+    DefaultFloatEnvironment(const DefaultFloatEnvironment&) = delete;
+    DefaultFloatEnvironment& operator=(const DefaultFloatEnvironment&) = delete;
+
+private:
+    std::fenv_t hosts_;
+};
+
 /// Runs `body`, which returns a status, and lets no exception out: its text goes to `text`, its kind becomes the status.
 template <class Body>
 CrtStatus guarded(char* text, std::size_t text_size, Body&& body) noexcept {
+    const DefaultFloatEnvironment environment;
     try {
         return body();
     } catch (const PluginError& error) {

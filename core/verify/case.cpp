@@ -74,7 +74,7 @@ Verdict worst(const std::vector<Outcome>& outcomes) {
 const std::vector<Case>& registry() {
     static const std::vector<Case> cases = [] {
         std::vector<Case> all;
-        for (const auto group : {closedFormCases, scaleCases, stiffCases, mutantCases})
+        for (const auto group : {closedFormCases, scaleCases, geometryCases, rayCases, stiffCases, inputCases, backendCases, exactRelationCases, mutantCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

@@ -76,7 +76,12 @@ std::vector<const Case*> select(const std::vector<std::string>& words, Level lev
 /// Groups, each in a file of its own.
 std::vector<Case> closedFormCases();     ///< A
 std::vector<Case> scaleCases();          ///< B
+std::vector<Case> geometryCases();       ///< C
+std::vector<Case> rayCases();            ///< D
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> mutantCases();         ///< N
+std::vector<Case> inputCases();          ///< K
+std::vector<Case> backendCases();        ///< L
+std::vector<Case> exactRelationCases();  ///< M01 to M19
 
 }  // namespace crt::verify

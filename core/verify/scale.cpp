@@ -4,7 +4,9 @@
 #include "verify/references.h"
 #include "verify/scenes.h"
 
+#include "compile.h"
 #include "kernel/features.h"
+#include "log.h"
 
 #include <fmt/format.h>
 
@@ -66,16 +68,23 @@ void embreesFarPlace(Context& context) {
                          "far from the origin edges are no longer shared: are coordinates rounded to float before the scene is moved to its centre?");
 }
 
+/// What single precision cannot resolve is said, not passed over in silence.
+void warned(Context& context, const std::string& what, const Scene& scene) {
+    const int before = warningCount();
+    compileScene(scene, 0);
+    context.holds(what, warningCount() > before, "a warning at load", "geometry that cannot be resolved is rendered without a word");
+}
+
 /// A screw of 10⁻³ on the ground, under a lamp, in a world of 10⁶: the ground's mesh gets finer towards it.
-Scene screwOnGround(bool whole_world) {
+Scene screwOnGround(bool whole_world, bool one_quad = false) {
     Scene scene = emptyScene(24, 1, {0, 3e-3, -3e-3}, {0, 0, 0}, 0.25);
     scene.integrator.nee = true;
     scene.integrator.max_depth = 1;
     Mesh ground;
     const auto ring = [](double half) { return std::array<Vec3d, 4>{{{-half, 0, -half}, {-half, 0, half}, {half, 0, half}, {half, 0, -half}}}; };
-    const auto inner = ring(4e-3);
+    const auto inner = ring(one_quad ? 1e6 : 4e-3);
     addQuad(ground, inner[0], inner[1], inner[2], inner[3]);
-    if (whole_world)
+    if (whole_world && !one_quad)
         for (double half = 4e-3; half < 1e6; half *= 4) {
             const auto a = ring(half), b = ring(4 * half);
             for (std::size_t i = 0; i < 4; ++i) addQuad(ground, b[i], b[(i + 1) % 4], a[(i + 1) % 4], a[i]);
@@ -104,6 +113,7 @@ void mixedScale(Context& context) {
                          {{1, "the shadow is detached from the object, or lost: is the ray's offset that of the largest triangle?"}});
     }
     context.equivalent("screw of 1e-3 on a ground of 1e6, against the screw alone", all, 1, 0.005);
+    warned(context, "the ground as one quad of 2e6", screwOnGround(true, true));
 }
 
 void layers(Context& context) {
@@ -113,22 +123,35 @@ void layers(Context& context) {
         rareFailures(context, fmt::format("layers {:g} of their size apart", gap),
                      collect(rays, [&](std::uint64_t seed) { return skippedLayers(context, 1, gap, 1, 64, seed); }), 1e-5,
                      "rays step over what is just in front: the offset by which they leave a surface is larger than its rounding asks for");
+    for (const double gap : {3e-6, 1.5e-6}) {
+        Scene scene = emptyScene(4, 1, {0, 0, -3}, {0, 0, 0}, 0.3);
+        for (const double z : {0.0, gap}) {
+            Mesh square;
+            addQuad(square, {-0.9, -0.9, z}, {0.9, -0.9, z}, {0.9, 0.9, z}, {-0.9, 0.9, z});
+            addObject(scene, std::move(square), glass(1.5));
+        }
+        warned(context, fmt::format("layers of a glass {:g} apart, 1.8 wide", gap), scene);
+    }
 }
 
 void hugeEmitter(Context& context) {
-    // pbrt-v4 #249: noisy there in single precision.
-    const std::string yaml = R"(crt: 1
-camera: {position: [0, 2, 0.5], target: [0, 0, 0], fov: 0.1}
-film: {resolution: [4, 4]}
-integrator: {max_depth: 1, roulette: false}
-materials: {floor: {type: diffuse, reflectance: 0.5}, lamp: {type: diffuse, reflectance: 0}}
+    const auto scene = [](const char* half) {
+        return fmt::format(R"(crt: 1
+camera: {{position: [0, 2, 0.5], target: [0, 0, 0], fov: 0.1}}
+film: {{resolution: [4, 4]}}
+integrator: {{max_depth: 1, roulette: false}}
+materials: {{floor: {{type: diffuse, reflectance: 0.5}}, lamp: {{type: diffuse, reflectance: 0}}}}
 objects:
-  - {name: floor, mesh: {positions: [[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]], faces: [[0,1,2,3]]}, material: floor}
-  - {name: lamp, mesh: {positions: [[-1e7,9,-1e7],[1e7,9,-1e7],[0,9,1e7]], faces: [[0,1,2]]}, material: lamp, emission: {radiance: 1}}
-)";
+  - {{name: floor, mesh: {{positions: [[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]], faces: [[0,1,2,3]]}}, material: floor}}
+  - {{name: lamp, mesh: {{positions: [[-{0},9,-{0}],[{0},9,-{0}],[0,9,{0}]], faces: [[0,1,2]]}}, material: lamp, emission: {{radiance: 1}}}}
+)",
+                           half);
+    };
     const double factor = polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{-1e7, 9, -1e7}, {1e7, 9, -1e7}, {0, 9, 1e7}});
-    context.estimate("irradiance 9 below a triangle of 2e7", yaml, [](const Film& f) { return radiance(f); }, 0.5 * factor, 0.003,
+    context.estimate("irradiance 9 below a triangle of 2e7", scene("1e7"), [](const Film& f) { return radiance(f); }, 0.5 * factor, 0.003,
                      {.samples = 256, .most = 16384}, {{0, "the emitter is taken for an occluder of its own light, or never sampled"}});
+    // pbrt-v4's issue 249. The height of 9 is lost in the rounding of coordinates of 1e9.
+    warned(context, "9 below a triangle of 2e9", context.scene(scene("1e9")));
 }
 
 void sizesOfASquare(Context& context) {

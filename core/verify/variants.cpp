@@ -1,0 +1,100 @@
+#include "verify/variants.h"
+
+#include "kernel/path.h"
+#include "verify/shapes.h"
+
+#include <algorithm>
+
+namespace crt::verify {
+namespace {
+
+/// n(λ) of a strongly dispersive flint, roughly SF10: Cauchy's two terms.
+Spectrum flint() {
+    Spectrum s;
+    for (std::size_t i = 0; i < kSpectrumSize; ++i) {
+        const double um = (360 + static_cast<double>(i)) * 1e-3;
+        s[i] = 1.6995 + 0.01 / (um * um);
+    }
+    return s;
+}
+
+Scene richRoom(int resolution) {
+    Scene scene = litRoom(resolution, 1);
+    scene.integrator.roulette = true;
+    scene.integrator.max_depth = 10;
+    scene.environment = Environment{constantSpectrum(0.1)};
+    addObject(scene, boxMesh({0.0625, 0.5, 0.125}, {0.25, 0.75, 0.375}), glass(1.5));
+    Mesh gem = icosphere(1, 0.15, {0.65, 0.65, 0.3});
+    for (const Vec3d& p : gem.positions) gem.normals.push_back(unit(p - Vec3d{0.65, 0.65, 0.3}));
+    gem.normal_index = gem.triangles;
+    Material dispersive = glass(1.7);
+    dispersive.eta = flint();
+    addObject(scene, std::move(gem), std::move(dispersive));
+    Material metal;
+    metal.name = "metal";
+    metal.type = MaterialType::Conductor;
+    metal.eta = constantSpectrum(0.2);
+    metal.k = constantSpectrum(3.5);
+    addObject(scene, boxMesh({0.75, 0.03125, 0.25}, {0.9375, 0.1875, 0.4375}), std::move(metal));
+    return scene;
+}
+
+}  // namespace
+
+std::vector<Variant> variants(int resolution) {
+    std::vector<Variant> all;
+    const auto add = [&](const char* name, auto change) {
+        Scene scene = richRoom(resolution);
+        change(scene);
+        const std::uint64_t needs = compileScene(scene, kAllAovs).features;
+        all.push_back({name, std::move(scene), needs});
+    };
+    add("Sobol", [](Scene& s) { s.sampler.type = SamplerType::Sobol; });
+    add("tree, lens, gaussian filter", [](Scene& s) {
+        s.camera.aperture_radius = 0.03125;
+        s.camera.focus_distance = 1.5;
+        s.film.filter = PixelFilter::Gaussian;
+        s.film.filter_radius = 1.5;
+    });
+    add("boxes of objects, xorshift, Blackman-Harris filter, no light sampling", [](Scene& s) {
+        s.integrator.accelerator = Accelerator::Aabb;
+        s.integrator.nee = false;
+        s.sampler.type = SamplerType::XorShift;
+        s.sampler.seed = ~std::uint64_t{0};
+        s.film.filter = PixelFilter::BlackmanHarris;
+        s.film.filter_radius = 1.5;
+    });
+    add("no tree", [](Scene& s) {
+        s.objects.erase(s.objects.begin() + 5);  // the gem: few enough triangles are left
+        s.integrator.accelerator = Accelerator::None;
+    });
+    add("view of the normals", [](Scene& s) { s.integrator.type = IntegratorType::Normals; });
+    add("view of the boxes", [](Scene& s) { s.integrator.type = IntegratorType::Aabb; });
+    return all;
+}
+
+void forEachVariant(Context& context, int resolution, void (*ask)(Context&, const Variant&)) {
+    for (const Variant& v : variants(resolution)) {
+        if ((v.needs & ~context.backend().table->features) == 0)
+            ask(context, v);
+        else
+            context.notApplicable(v.name, "the backend was built without " + featureNames(v.needs & ~context.backend().table->features));
+    }
+}
+
+Film portableFilm(const Scene& scene, const Render& how) {
+    const CompiledScene compiled = compileScene(scene, how.aovs);
+    Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+    kernel::CrtContext context{};
+    context.blob = compiled.data();
+    context.scene = reinterpret_cast<const kernel::CrtScene*>(compiled.data());
+    for (std::uint32_t y = 0; y < compiled.height; ++y)
+        for (std::uint32_t x = 0; x < compiled.width; ++x) {
+            kernel::CrtRayCount rays{};
+            kernel::crt_render_pixel(&context, x, y, how.first_sample, static_cast<std::uint32_t>(how.samples), film.sums.data(),
+                                     reinterpret_cast<kernel::u64*>(film.counts.data()), film.primitives.empty() ? nullptr : film.primitives.data(), &rays);
+        }
+    return film;
+}
+
+}  // namespace crt::verify
