@@ -4,7 +4,7 @@ import os
 import pathlib
 import sys
 
-from . import accelerators, convergence, cpu_speed, leave_out, pictures, same_bits, start
+from . import accelerators, convergence, cpu_speed, leave_out, pictures, robustness, same_bits, stability, start
 from .program import Program, Failure
 
 COMMANDS = {
@@ -14,6 +14,8 @@ COMMANDS = {
     "leave-out": (leave_out, "what leaving features out of the kernel saves, bit by bit"),
     "accelerators": (accelerators, "loop, object boxes and BVH; from how many triangles on the BVH wins"),
     "convergence": (convergence, "error against time, Sobol against independent samples"),
+    "stability": (stability, "sweeps to where the arithmetic ends; --scenes names sweeps instead of scenes"),
+    "robustness": (robustness, "what the watertight triangle test and the offsets cost, and what they buy"),
     "pictures": (pictures, "all scenes as PNG in out/pictures, to look at; measures nothing"),
 }
 REPOSITORY = pathlib.Path(__file__).resolve().parents[2]

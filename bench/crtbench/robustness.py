@@ -1,0 +1,69 @@
+"""What robustness costs, and what it buys: the watertight triangle test against Möller and Trumbore's, offsets by each triangle's error bound against one fixed
+epsilon. The alternatives are patches of the kernel's texts in bench/alternatives, which OpenCL compiles at run time (CRT_KERNEL_DIR)."""
+import json
+import shutil
+import subprocess
+
+from . import stability
+from .program import Failure, Spread
+from .results import Results
+
+ALTERNATIVES = {"moeller_trumbore": "Möller–Trumbore", "fixed_epsilon": "fixed epsilon, 1e-4 of the scene"}
+SCENES = {"cornell_figure": 16, "cornell_dragon": 8}
+
+
+def measure(program, arguments):
+    if "opencl" not in program.backends(["opencl"])[0]:
+        raise Failure("the alternatives are compiled by the OpenCL backend, which has no device here")
+    size, runs = (32, 2) if arguments.tiny else (300, 7)
+    environments = {"crt": {}} | {name: {"CRT_KERNEL_DIR": str(patched_kernel(program, name))} for name in ALTERNATIVES}
+    results = Results(program, arguments, "robustness", "What robustness costs, and what it buys")
+    data = {"seconds": {}, "ratio": {}, "wrong": {}}
+
+    results.heading("Time")
+    results.paragraph(f"OpenCL, {size} × {size} pixels, {', '.join(f'{s} {n}' for s, n in SCENES.items())} samples per pixel, the tree of both scenes the same. Render seconds, median of {runs} interleaved "
+                      "runs, in brackets the least and the most; ratios are taken run by run.")
+    rows = []
+    for scene, spp in SCENES.items():
+        def render(environment, scene=scene, spp=spp):
+            return program.render(scene, "opencl", ["--spp", spp], settings=[f"film.resolution=[{size},{size}]", "outputs.0.aovs=[]"], environment=environment)
+
+        kept = program.interleaved({name: lambda e=e: render(e) for name, e in environments.items()}, runs)
+        seconds = {name: [r.value("seconds", "render") for r in done] for name, done in kept.items()}
+        data["seconds"][scene] = {name: Spread(s).json() for name, s in seconds.items()}
+        cells = [Spread(seconds["crt"]).text()]
+        for name in ALTERNATIVES:
+            ratio = Spread(c / a for c, a in zip(seconds["crt"], seconds[name]))
+            data["ratio"].setdefault(scene, {})[name] = ratio.json()
+            cells += [Spread(seconds[name]).text(), ratio.text()]
+        rows.append([scene, *cells])
+        print(rows[-1], flush=True)
+    results.table(["scene", "s, crt", *(text for title in ALTERNATIVES.values() for text in (f"s, {title}", "crt : it"))], rows)
+
+    results.heading("What each gets wrong")
+    results.paragraph("Rays of the sweeps of [stability-misses](stability-misses.md), [stability-offset-safety](stability-offset-safety.md) and [stability-offset-tightness]"
+                      "(stability-offset-tightness.md): how many slip through a closed mesh, meet the triangle that they leave, or step over a layer.")
+    for sweep, rays in (("misses", 2e5), ("offset-safety", 1e5), ("offset-tightness", 2e4)):
+        points = {name: sweep_with(program, sweep, rays / (50 if arguments.tiny else 1), environment) for name, environment in environments.items()}
+        data["wrong"][sweep] = points
+        stability.TABLES[sweep](results, {{"crt": "crt"}.get(name, ALTERNATIVES.get(name)): p for name, p in points.items()})
+    results.command("CRT_KERNEL_DIR=SCRATCH/moeller_trumbore crt render configs/cornell_dragon.yaml --backend opencl --spp 8 -o unseen.pfm")
+    results.data = data
+    results.write()
+
+
+def patched_kernel(program, name):
+    """A copy of the kernel's texts with one alternative in it."""
+    folder = program.scratch / name
+    shutil.copytree(program.repository / "core" / "kernel", folder / "core" / "kernel")
+    patch = program.repository / "bench" / "alternatives" / f"{name}.patch"
+    done = subprocess.run(["git", "apply", "--unsafe-paths", f"--directory={folder}", str(patch)], cwd=folder, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise Failure(f"{patch.name} does not fit the kernel any more: {done.stderr.strip()}")
+    return folder / "core" / "kernel"
+
+
+def sweep_with(program, sweep, rays, environment):
+    paths = {"CRT_BACKEND_PATH": f"{program.build / 'lib' / 'crt'}:{program.environment['CRT_BACKEND_PATH']}"}
+    output = program.start(["opencl", sweep, rays], program=program.build / "bin" / "stability_sweep", environment={**paths, **environment}).output
+    return [json.loads(line) for line in output.splitlines()]

@@ -1,0 +1,121 @@
+"""How far a backend's arithmetic carries: sweeps over sizes, gaps, places, fields of view and solid angles, each to where it ends. One page a
+sweep, stability-SWEEP.md, with every backend that runs here. Rays are counted, nothing is timed: it may run on a busy machine."""
+import json
+
+from .program import Failure
+from .results import Results
+
+SWEEPS = {
+    "misses": "Rays at vertices, edges and faces",
+    "offset-safety": "Offsets: how often a ray meets the triangle that it leaves",
+    "offset-tightness": "Offsets: how near a layer may be and still be seen",
+    "far": "Far from the origin",
+    "scale": "Scale",
+    "fov": "Field of view",
+    "solid-angle": "Solid angle of a light",
+}
+# Of each point of a sweep. Offset safety: 1e8 in all, over its 20 points.
+RAYS = {"misses": 1e6, "offset-safety": 5e6, "offset-tightness": 4e5, "far": 1e5, "scale": 1e5, "fov": 3e5, "solid-angle": 3e6}
+BACKENDS = ["cuda", "embree", "opencl"]
+
+
+def measure(program, arguments):
+    if not (program.build / "bin" / "stability_sweep").exists():
+        raise Failure("there is no stability_sweep in the build: it needs -DCRT_TESTS=ON")
+    sweeps = arguments.scenes or list(SWEEPS)
+    if unknown := set(sweeps) - set(SWEEPS):
+        raise Failure(f"no such sweep: {', '.join(sorted(unknown))}; there are {', '.join(SWEEPS)}")
+    usable, absent = program.backends(BACKENDS)
+    for sweep in sweeps:
+        rays = RAYS[sweep] / (100 if arguments.tiny else 1)
+        points = {backend: run(program, backend, sweep, rays) for backend in usable}
+        results = Results(program, arguments, f"stability-{sweep}", SWEEPS[sweep])
+        TABLES[sweep](results, points)
+        for backend, reason in absent.items():
+            results.paragraph(f"Not measured: `{backend}` ({reason}).")
+        for backend in usable:
+            results.command(f"{program.build}/bin/stability_sweep {backend} {sweep} {rays:.0e}")
+        results.data = {"points": points}
+        results.write()
+
+
+def run(program, backend, sweep, rays):
+    environment = {"CRT_BACKEND_PATH": f"{program.build / 'lib' / 'crt'}:{program.environment['CRT_BACKEND_PATH']}"}
+    output = program.start([backend, sweep, rays], program=program.build / "bin" / "stability_sweep", environment=environment).output
+    return [json.loads(line) for line in output.splitlines()]
+
+
+def count(point):
+    """Failures of rays; with none, what rate 99.9 % confidence leaves (Clopper and Pearson)."""
+    if point["failures"] == 0:
+        return f"0 of {point['rays']:.3g} (rate < {7.61 / point['rays']:.1g})" if point["rays"] else "no rays"
+    return f"{point['failures']} of {point['rays']:.3g} ({point['failures'] / point['rays']:.2g})"
+
+
+def by_point(results, points, keys, heads, cell):
+    """A row a point, a column a backend."""
+    backends = list(points)
+    rows = []
+    for same in zip(*points.values()):
+        rows.append([*(f"{same[0][k]:g}" if isinstance(same[0][k], (int, float)) else same[0][k] for k in keys), *(cell(p) for p in same)])
+    results.table([*heads, *backends], rows)
+
+
+def misses(results, points):
+    results.paragraph("A crumpled sheet covers the whole film, a vertex or an edge on every pixel's first ray: by continuity no ray can pass it. Failures are rays that do. "
+                      "Faces are aimed at by further, random samples of the same pixels.")
+    by_point(results, points, ("place", "aim"), ("place", "rays at"), count)
+
+
+def offset_safety(results, points):
+    results.paragraph("One triangle in a random place and pose, of random shape, in a scene that is 1 to 10⁶ times as large, so that its coordinates become coarse; rays scatter off it "
+                      "by the cosine. Failures meet the triangle that they have just left. Lengths in the author's units.")
+    by_point(results, points, ("size", "extent"), ("triangle's size", "scene's half extent : size"), count)
+    for backend, all_points in points.items():
+        rays, failures = (sum(p[k] for p in all_points) for k in ("rays", "failures"))
+        results.paragraph(f"`{backend}`, all together: {failures} of {rays:.3g}.")
+
+
+def offset_tightness(results, points):
+    results.paragraph("Two parallel squares of edge 1 and 2 in a random place and pose, `gap` apart, in a scene whose half extent is 1 (1.5 for the first rows) to 10⁴; rays pass through the first, "
+                      "whose index is 1. Failures do not meet the second. The last gap with hardly any failure is the limit that the manual gives.")
+    by_point(results, points, ("extent", "gap"), ("scene's half extent : size", "gap : size"), count)
+
+
+def relation(point):
+    if "refused" in point:
+        return f"refused: {point['refused']}"
+    same = "same bits" if point["pixels"] == 0 else f"{point['pixels']} of {point['of']} pixels differ"
+    return f"{same}; mean {point['mean']:+.2g}"
+
+
+def far(results, points):
+    results.paragraph("A lit room moved along (1, 0.7, −0.3) by many times its size, once by whole numbers, which double and the room's vertices (multiples of 2⁻⁸) hold exactly, once not. "
+                      "Against the room at the origin, with the same random numbers: pixels that differ in any bit, and the relative difference of the mean.")
+    for same in points.values():
+        for p in same:
+            p["how"] = "exactly" if p["representable"] else "rounded"
+    by_point(results, points, ("sizes", "how"), ("moved by … sizes", "shift"), relation)
+
+
+def scale(results, points):
+    results.paragraph("A lit room times 2^m and 10^m, against itself: pixels that differ in any bit, and the relative difference of the mean, with the same random numbers.")
+    for same in points.values():
+        for p in same:
+            p["factor"] = f"{p['base']}^{p['exponent']}"
+    by_point(results, points, ("factor",), ("times",), relation)
+
+
+def fov(results, points):
+    results.paragraph("Stripes two pixels wide exactly where the film's columns are, 128 × 128 pixels, the view along (1, 1, 1). Failures are rays that see the stripe of another column: what the rounding "
+                      "of directions to float costs, in rays.")
+    by_point(results, points, ("degrees",), ("field of view, degrees",), count)
+
+
+def solid_angle(results, points):
+    results.paragraph("A square light at height 1 over a floor, from 2 rad across to nothing: the irradiance below its centre against the closed form (Howell, B-4). Relative error, and its standard error "
+                      "from 16 seeds.")
+    by_point(results, points, ("half_edge", "solid_angle"), ("half edge", "solid angle, sr"), lambda p: f"{p['error']:+.2g} ± {p['standard_error']:.1g}")
+
+
+TABLES = {"misses": misses, "offset-safety": offset_safety, "offset-tightness": offset_tightness, "far": far, "scale": scale, "fov": fov, "solid-angle": solid_angle}
