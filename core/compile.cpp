@@ -201,7 +201,7 @@ private:
         }
         if (without_area > 0) {
             logWarning("{} triangle{} no area and will not be seen", without_area, without_area == 1 ? " has" : "s have");
-            measure(seen);
+            if (without_area < triangles_.size()) measure(seen);
         }
         positions_.resize(triangles_.size());
         for (std::size_t i = 0; i < triangles_.size(); ++i) {

@@ -90,8 +90,8 @@ def relation(point):
 
 
 def far(results, points):
-    results.paragraph("A lit room moved along (1, 0.7, −0.3) by many times its size, once by whole numbers, which double and the room's vertices (multiples of 2⁻⁸) hold exactly, once not. "
-                      "Against the room at the origin, with the same random numbers: pixels that differ in any bit, and the relative difference of the mean.")
+    results.paragraph("A lit room moved along (1, 0.7, −0.3) by many times its size: once with vertices that the sum in double holds exactly, once a third of it, which rounds. "
+                      "Against the same room at the origin, with the same random numbers: pixels that differ in any bit, and the relative difference of the mean.")
     for same in points.values():
         for p in same:
             p["how"] = "exactly" if p["representable"] else "rounded"

@@ -56,7 +56,7 @@ void addAnchors(Scene& scene, const Vec3d& centre, double half);
 Scene emptyScene(int resolution, std::uint64_t seed, const Vec3d& eye, const Vec3d& target, double tan_half_fov);
 
 /// A room, open towards the camera, with a lamp, a mirror block and a diffuse one: light sampling, scattering and tracing all take part. Coordinates are
-/// multiples of 2⁻⁸, and at most 1.
+/// multiples of 2⁻⁴, and at most 1.
 Scene litRoom(int resolution, std::uint64_t seed);
 
 /// The scene times `scale`, then moved by `shift`. Its objects must be placed without transforms.
