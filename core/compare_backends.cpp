@@ -208,7 +208,8 @@ std::string againstText(const BackendComparison& all, const BackendAgainst& b) {
     const auto line = [&text](const std::string& name, const std::string& value) { text += fmt::format("\n  {:<18}{}", name, value); };
     line("devices", fmt::format("{}; {}", b.device, all.reference_device));
     const std::uint64_t pixels = std::uint64_t{all.width} * all.height;
-    line(fmt::format("seed {}", all.seed), fmt::format("{}: {} of {} pixels differ", b.same_seed.same ? "same bits" : "OTHER BITS", b.same_seed.differing_pixels, pixels));
+    line(fmt::format("seed {}", all.seed),
+         fmt::format("{}: {} of {} pixels differ", b.same_seed.same ? "same bits" : "OTHER BITS", b.same_seed.differing_pixels, pixels));
     if (b.same_seed.first_difference) {
         const Difference& d = *b.same_seed.first_difference;
         line("first difference", fmt::format("pixel {},{} channel {}: {:.9g} and {:.9g}{}", d.x, d.y, d.channel, d.first, d.second,
@@ -219,16 +220,18 @@ std::string againstText(const BackendComparison& all, const BackendAgainst& b) {
     const stats::GateResult& g = b.other_seeds;
     for (std::size_t c = 0; c < g.channels.size(); ++c) {
         const auto& channel = g.channels[c];
-        line(fmt::format("mean {}", kColorNames[c]), fmt::format("{:+.3f} %, {:g} % interval [{:+.3f}, {:+.3f}] %, ±{:g} % allowed: {}", 100 * channel.relative,
-                                                   100 * all.gate.confidence, 100 * channel.relative_interval.lower, 100 * channel.relative_interval.upper,
-                                                   100 * all.gate.delta, stats::verdictName(channel.verdict)));
+        const stats::Interval& interval = channel.relative_interval;
+        line(fmt::format("mean {}", kColorNames[c]),
+             fmt::format("{:+.3f} %, {:g} % interval [{:+.3f}, {:+.3f}] %, ±{:g} % allowed: {}", 100 * channel.relative, 100 * all.gate.confidence,
+                         100 * interval.lower, 100 * interval.upper, 100 * all.gate.delta, stats::verdictName(channel.verdict)));
     }
     if (!g.channels.empty()) {
         const std::uint32_t across = (all.width + stats::kTileSide - 1) / stats::kTileSide;
         line("tiles of 8x8", familyText(g.tiles, placeText(g.tiles, across, stats::kTileSide)) +
                                  fmt::format("; their p-values are uniform with p {:.2g}", g.tile_uniformity_p));
         line("pixels", familyText(g.pixels, placeText(g.pixels, all.width, 1)));
-        line("largest value", fmt::format("carries {:.2g} % of the squared error ({:g} % allowed)", 100 * g.largest_share, 100 * all.gate.largest_share));
+        line("largest value",
+             fmt::format("carries {:.2g} % of the squared error ({:g} % allowed)", 100 * g.largest_share, 100 * all.gate.largest_share));
     }
     for (const std::string& reason : g.reasons) line("because", reason);
     if (b.samples_needed > 0) line("to decide", fmt::format("about --spp {} if they are equal (now {})", b.samples_needed, all.samples));

@@ -1,5 +1,5 @@
-/// `crt compare --backends`: do backends render the same scene to the same image? With one seed bit by bit, with other seeds by statistics, which also
-/// judge backends that never promised the same bits.
+/// `crt compare --backends`: do backends render the same scene to the same image? With one seed bit by bit, with other seeds by statistics,
+/// which also judge backends that never promised the same bits.
 #pragma once
 
 #include "compare.h"

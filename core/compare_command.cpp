@@ -39,7 +39,8 @@ void print(const CompareArguments& arguments, const std::string& text, const std
 
 int compareFiles(const CompareArguments& arguments) {
     if (arguments.second.empty())
-        throw Error(ErrorKind::Usage, fmt::format("there is nothing to compare '{}' with; name a second image, or backends with --backends", arguments.first));
+        throw Error(ErrorKind::Usage, fmt::format("there is nothing to compare '{}' with; name a second image, or backends with --backends",
+                                                  arguments.first));
     if (arguments.scene.seed || arguments.scene.crop || !arguments.scene.overrides.empty())
         throw Error(ErrorKind::Usage, "--set, --seed and --crop change a scene, and need --backends");
     const Image a = readImage(arguments.first), b = readImage(arguments.second);
@@ -60,7 +61,8 @@ int compareFiles(const CompareArguments& arguments) {
     print(arguments, comparisonText(comparison), comparisonJson(comparison));
     if (!arguments.difference_file.empty() && result.mismatch.empty()) writeDifference(arguments.difference_file, a, b);
     if (!arguments.map_file.empty()) {
-        if (!noise) throw Error(ErrorKind::Usage, "there is no z map of images that differ in size, lack R, G and B, or hold values that are not finite");
+        if (!noise)
+            throw Error(ErrorKind::Usage, "there is no z map of images that differ in size, lack R, G and B, or hold values that are not finite");
         writeZMap(arguments.map_file, *noise, a.width, a.height);
     }
     return result.same ? 0 : kDifferent;

@@ -33,8 +33,10 @@ NoisyImage exactly(const Image& image, const NoisyImage& like) {
     exact.channels = like.channels;
     const std::array<double, 3> weights = luminanceWeights(image);
     std::array<std::size_t, 3> at{};
-    for (std::size_t c = 0; c < 3; ++c)
-        at[c] = static_cast<std::size_t>(std::find(image.channels.begin(), image.channels.end(), std::array{"R", "G", "B"}[c]) - image.channels.begin());
+    for (std::size_t c = 0; c < 3; ++c) {
+        const auto found = std::find(image.channels.begin(), image.channels.end(), std::array{"R", "G", "B"}[c]);
+        at[c] = static_cast<std::size_t>(found - image.channels.begin());
+    }
     for (std::size_t p = 0; p < std::size_t{image.width} * image.height; ++p) {
         const float* pixel = &image.pixels[p * image.channels.size()];
         if (like.channels.size() == 1) {

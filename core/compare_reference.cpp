@@ -20,7 +20,8 @@ std::vector<float> colorValues(const Image& image) {
     for (std::size_t p = 0; p < std::size_t{image.width} * image.height; ++p)
         for (const char* name : {"R", "G", "B"}) {
             const auto found = std::find(image.channels.begin(), image.channels.end(), name);
-            if (found == image.channels.end()) throw Error(ErrorKind::Usage, "only images with channels R, G and B have an error against a reference");
+            if (found == image.channels.end())
+                throw Error(ErrorKind::Usage, "only images with channels R, G and B have an error against a reference");
             values.push_back(image.pixels[p * image.channels.size() + static_cast<std::size_t>(found - image.channels.begin())]);
         }
     return values;
@@ -55,8 +56,8 @@ struct Colors {
     std::optional<std::vector<float>> srgb;
 };
 
-ReferenceError errorAgainst(const Colors& test, const Colors& reference, const std::vector<Colors>& without_fold, std::uint32_t width, std::uint32_t height,
-                            bool display_referred) {
+ReferenceError errorAgainst(const Colors& test, const Colors& reference, const std::vector<Colors>& without_fold, std::uint32_t width,
+                            std::uint32_t height, bool display_referred) {
     ReferenceError error;
     error.metrics = stats::errorMetrics(test.values, reference.values);
     const bool looks = test.srgb && reference.srgb && error.metrics.valid();
@@ -112,7 +113,8 @@ std::vector<Colors> colorsWithoutFolds(const Image& reference) {
 ReferenceComparison compareWithReference(const Image& a, const Image& b, const Image& reference, bool display_referred) {
     for (const Image* image : {&a, &b})
         if (image->width != reference.width || image->height != reference.height)
-            throw Error(ErrorKind::Usage, fmt::format("the reference has {} x {} pixels and an image {} x {}; render one of them again", reference.width,
+            throw Error(ErrorKind::Usage, fmt::format("the reference has {} x {} pixels and an image {} x {}; render one of them again",
+                                                      reference.width,
                                                       reference.height, image->width, image->height));
     ReferenceComparison result;
     const Colors colors = colorsOf(reference);

@@ -38,7 +38,8 @@ std::string differenceText(const Difference& d) {
 }
 
 void addMetricLines(Lines& lines, const CompareResult& r) {
-    lines.add("largest", fmt::format("{} absolute, {} ulp; 99 % of the values are within {}", number(r.max_absolute), r.max_ulp, number(r.p99_absolute)));
+    lines.add("largest",
+              fmt::format("{} absolute, {} ulp; 99 % of the values are within {}", number(r.max_absolute), r.max_ulp, number(r.p99_absolute)));
     lines.add("RMSE", fmt::format("{} ({} of the mean{}), MSE {}", number(r.rmse), number(r.relative_rmse),
                                   r.tolerance > 0 ? fmt::format(", {} allowed", number(r.tolerance)) : "", number(r.mse)));
     lines.add("relMSE", number(r.relmse));
@@ -47,7 +48,8 @@ void addMetricLines(Lines& lines, const CompareResult& r) {
     lines.add("mean", fmt::format("{} and {}, ratio {:.9g}", number(r.mean[0]), number(r.mean[1]), r.mean_ratio));
     if (!r.looks) return;
     const Looks& l = *r.looks;
-    lines.add(l.high_range ? "HDR-FLIP" : "LDR-FLIP", std::isnan(l.flip_mean) ? "undefined: B is black" : number(l.flip_mean) + " (0 looks the same, 1 is the most)");
+    lines.add(l.high_range ? "HDR-FLIP" : "LDR-FLIP",
+              std::isnan(l.flip_mean) ? "undefined: B is black" : number(l.flip_mean) + " (0 looks the same, 1 is the most)");
     lines.add("Delta E 2000", fmt::format("mean {:.3g}, largest {:.3g} (about 1 can just be seen)", l.delta_e_mean, l.delta_e_max));
 }
 
@@ -136,7 +138,8 @@ void addReferenceLines(Lines& lines, const ReferenceComparison& r) {
     for (std::size_t i = 0; i < 2; ++i) {
         const ReferenceError& e = r.errors[i];
         if (!e.metrics.valid())
-            lines.add(i == 0 ? "A" : "B", fmt::format("void: {} values are not finite, {} in the reference", e.metrics.test.total(), e.metrics.reference.total()));
+            lines.add(i == 0 ? "A" : "B", fmt::format("void: {} values are not finite, {} in the reference", e.metrics.test.total(),
+                                                      e.metrics.reference.total()));
         for (const std::string& warning : e.warnings) lines.add(i == 0 ? "WARNING, A" : "WARNING, B", warning);
     }
     lines.add("", cell("A", kColumn) + cell("B", kColumn) + "A / B");
@@ -199,7 +202,8 @@ Json resultJson(const CompareResult& r) {
     json["not_finite"] = r.not_finite;
     json["metrics"] = nullptr;
     if (!r.metrics_valid) return json;
-    json["metrics"] = Json{{"max_absolute", r.max_absolute}, {"max_ulp", r.max_ulp}, {"p99_absolute", r.p99_absolute}, {"mse", r.mse}, {"rmse", r.rmse},
+    json["metrics"] = Json{{"max_absolute", r.max_absolute}, {"max_ulp", r.max_ulp}, {"p99_absolute", r.p99_absolute}, {"mse", r.mse},
+                           {"rmse", r.rmse},
                            {"relative_rmse", r.relative_rmse}, {"relmse", r.relmse}, {"mae", r.mae}, {"smape", r.smape}, {"mean", r.mean},
                            {"mean_ratio", r.mean_ratio}};
     if (r.looks) {
@@ -217,7 +221,8 @@ Lines resultLines(const CompareResult& r) {
     Lines lines(fmt::format("{}: {} of {} pixels differ ({})", verdictOf(r), r.differing_pixels, pixels, fmt::join(r.channels, ", ")));
     if (r.first_difference) lines.add("first difference", differenceText(*r.first_difference));
     if (!r.metrics_valid) {
-        lines.add("not finite", fmt::format("{} values in the first image, {} in the second: no metric means anything", r.not_finite[0], r.not_finite[1]));
+        lines.add("not finite", fmt::format("{} values in the first image, {} in the second: no metric means anything", r.not_finite[0],
+                                            r.not_finite[1]));
     } else if (r.differing_pixels > 0) {
         addMetricLines(lines, r);
     }

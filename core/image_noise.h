@@ -28,8 +28,8 @@ enum class NoiseOf { Color, Luminance };
 /// With NoiseOf::Color, from channels StdError.R, .G and .B, Variance.R, .G and .B, or folds. With NoiseOf::Luminance, from StdError.Y, Variance.Y or
 /// folds; the values are then the luminance of R, G and B by the image's primaries. Nothing when there is none of them, or they are not finite.
 ///
-/// StdError and Variance are of the pixel's mean, in the image's exposure. Their degrees of freedom are taken as 15, those of the 16 replicates that a
-/// render has: what was counted over more samples than that has tails that make up for it.
+/// StdError and Variance are of the pixel's mean, in the image's exposure. Their degrees of freedom are taken as 15, those of the 16 replicates that
+/// a render has: what was counted over more samples than that has tails that make up for it.
 std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what);
 
 /// One sentence when both images name the same seed in their metadata, so that they may share samples; else empty.

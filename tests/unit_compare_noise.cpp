@@ -153,7 +153,8 @@ TEST_CASE("a bias is found: in the mean, in a tile, in a pixel", "[compare-noise
     CHECK(in_pixel.pixels.worst / 3 == 7 * kWidth + 9);
     CHECK(in_pixel.z[(7 * kWidth + 9) * 3] > 10);
     const Image map = zMap(in_pixel, kWidth, kHeight);
-    CHECK(std::vector<float>(map.pixels.begin() + (7 * kWidth + 9) * 3, map.pixels.begin() + (7 * kWidth + 9) * 3 + 3) == std::vector<float>{1, 0, 0});
+    const auto color = map.pixels.begin() + (7 * kWidth + 9) * 3;
+    CHECK(std::vector<float>(color, color + 3) == std::vector<float>{1, 0, 0});
 }
 
 TEST_CASE("standard errors that are stated too small are seen in z", "[compare-noise]") {
@@ -190,7 +191,8 @@ TEST_CASE("errors against a reference: its variance is subtracted, and its choic
 
     // The spread, against that of references made anew.
     std::vector<double> means;
-    for (std::uint64_t seed = 10; seed < 60; ++seed) means.push_back(compareWithReference(a, a, withFolds(seed, reference_noise), true).errors[0].metrics.mean_ratio);
+    for (std::uint64_t seed = 10; seed < 60; ++seed)
+        means.push_back(compareWithReference(a, a, withFolds(seed, reference_noise), true).errors[0].metrics.mean_ratio);
     const double actual = std::sqrt(stats::summarize(means).variance);
     REQUIRE(of_a.mean_ratio.spread);
     CHECK(*of_a.mean_ratio.spread > actual / 2);

@@ -134,7 +134,8 @@ TEST_CASE("L*a*b* of linear sRGB", "[metrics]") {
     CHECK(labFromLinearSrgb({1, 1, 1}).lightness == Approx(100));
     CHECK(labFromLinearSrgb({1, 1, 1}).a == Approx(0).margin(1e-9));
     CHECK(labFromLinearSrgb({0, 0, 0}).lightness == Approx(0).margin(1e-12));
-    CHECK(labFromLinearSrgb({0.18418651851244416, 0.18418651851244416, 0.18418651851244416}).lightness == Approx(50).epsilon(1e-12));  // ((50 + 16)/116)³
+    constexpr double middle = 0.18418651851244416;  // ((50 + 16)/116)³
+    CHECK(labFromLinearSrgb({middle, middle, middle}).lightness == Approx(50).epsilon(1e-12));
     // sRGB's red, from the standard's XYZ of it: 53.24, 80.09, 67.20.
     const Lab red = labFromLinearSrgb({1, 0, 0});
     CHECK(red.lightness == Approx(53.24).margin(0.01));

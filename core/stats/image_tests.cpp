@@ -72,7 +72,8 @@ void judge(GateResult& result, const GateOptions& options) {
     // A few values that carry the answer make intervals too short and too long alike: neither verdict could be trusted.
     if (result.largest_share > options.largest_share) {
         fails = false;
-        because(undecided, fmt::format("one value carries {:.1f} % of all squared error: too few samples for its distribution", 100 * result.largest_share));
+        because(undecided, fmt::format("one value carries {:.1f} % of all squared error: too few samples for its distribution",
+                                       100 * result.largest_share));
     }
     result.verdict = fails ? Verdict::Fail : undecided ? Verdict::Inconclusive : Verdict::Pass;
 }

@@ -87,7 +87,8 @@ struct GateResult {
     };
     std::vector<Channel> channels;
     TestFamily tiles, pixels;        ///< Over channels too: `worst` is place · channels + channel.
-    double tile_uniformity_p = 1;    ///< That the tiles' p-values (of the middle channel, where there is noise) are uniform; to be read, not judged by.
+    /// That the tiles' p-values (of the middle channel, where there is noise) are uniform; to be read, not judged by.
+    double tile_uniformity_p = 1;
     double largest_share = 0;        ///< Of a or b, whichever is larger.
     std::uint64_t not_finite = 0;
     Verdict verdict = Verdict::Inconclusive;

@@ -81,8 +81,9 @@ std::vector<bool> holm(std::span<const double> p_values, double alpha);
 /// 1 − (1 − alpha)^(1/tests).
 double sidak(double alpha, std::uint64_t tests);
 
-/// Probability that independent p-values, uniform when nothing is wrong, lie as far from uniform as these, or farther (Kolmogorov 1933, corrected for
-/// finite counts as in Vrbik 2018: within 0.0031 of the exact probability from 8 values on, and below 0.1 never less than it). Needs a value; all in [0, 1].
+/// Probability that independent p-values, uniform when nothing is wrong, lie as far from uniform as these, or farther (Kolmogorov 1933,
+/// corrected for finite counts as in Vrbik 2018: within 0.0031 of the exact probability from 8 values on, and below 0.1 never less than it). Needs a
+/// value; all in [0, 1].
 double kolmogorovSmirnovUniform(std::span<const double> p_values);
 
 /// Of a probability, from successes among trials: never covers less than `confidence` (Clopper and Pearson 1934).
