@@ -137,7 +137,7 @@ std::vector<std::string> writtenOut(std::vector<std::string> arguments, const st
         }
         arguments.insert(arguments.begin(), "render");
     }
-    giveValue(arguments, "--resume", kCheckpointExtension, "auto");
+    if (arguments.front() == "render") giveValue(arguments, "--resume", kCheckpointExtension, "auto");
     if (arguments.front() == "compare") giveValue(arguments, "--json", ".json", "-");
     return arguments;
 }

@@ -1,6 +1,8 @@
 /// The command line: arguments → what one of job.h and commands.h takes → exit code. `--help` and `--version` open no backend and no library.
 #include "arguments.h"
 #include "commands.h"
+#include "converge/engine.h"
+#include "converge/reference.h"
 #include "error.h"
 #include "job.h"
 #include "log.h"
@@ -135,6 +137,8 @@ public:
         addInfo();
         addCompare();
         addMerge();
+        addConverge();
+        addReference();
         addVerify();
         addPlugins();
         addSchema();
@@ -359,6 +363,90 @@ private:
         merge->add_flag_callback("-q,--quiet", [this] { beQuiet(); }, "only warnings and errors");
     }
 
+    void addConverge() {
+        CLI::App* command = addCommand("converge", "measure error against run time; exit code 7 when a backend is wrong", [this] {
+            for (const std::string& file : converge_files_) {
+                SceneRequest scene = converge_scene_;
+                scene.file = file;
+                converge_.scenes.push_back(std::move(scene));
+            }
+            converge_.command = job_.command;
+            return converge::converge(converge_);
+        });
+        command->footer("\nRenders every scene with every backend and variant, again and again with other seeds, looks at 1, 2, 4 ... samples, and writes one\n"
+                        "page: error against seconds with its interval, efficiency, bias, whether the images' own error estimates hold, where the time goes.\n"
+                        "docs/error.md explains the terms.\n"
+                        "\nExamples:\n"
+                        "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60 -o out/converge\n"
+                        "  crt converge scene.yaml --vary sampler=sobol,independent --vary nee=true,false --reference ref.exr\n"
+                        "  crt converge configs/analytic/direct_light.yaml --reference 0.2394564705\n"
+                        "  crt converge a.yaml b.yaml c.yaml --time 10m -o out/night       then, cut short: the same with --resume\n");
+        command->add_option("SCENE", converge_files_, "scene files (YAML)")->required();
+        const char* group = "What is measured";
+        reader_.option(*command, "--backends", "X,Y", "of these; one that cannot run is left out and named (embree,opencl,cuda)",
+                       [this](const std::string& text) { converge_.backends = parseList(text, "--backends"); })
+            ->group(group);
+        reader_.repeatable(*command, "--vary", "KEY=A,B", "each value, and each combination: sampler, replicates, nee, roulette, depth, accelerator, filter,\n"
+                                                          "or any key of the scene; repeatable",
+                           [this](const std::string& text) { converge_.vary.push_back(converge::parseVary(text)); })
+            ->group(group);
+        reader_.repeatable(*command, "--reference", "FILE", "of 'crt reference', for the scene it is of; or a number, the luminance of every pixel; repeatable",
+                           [this](const std::string& text) { converge_.references.push_back(text); })
+            ->group(group);
+        reader_.option(*command, "--time", "DURATION", "for everything (60s)",
+                       [this](const std::string& text) { converge_.seconds = parseDuration(text, "--time"); })
+            ->group(group);
+        reader_.option(*command, "--replicates", "R", "seeds of each, at least (16); more where there is time",
+                       [this](const std::string& text) { converge_.replicates = smallCount(text, "--replicates", 2); })
+            ->group(group);
+        reader_.option(*command, "--max-spp", "N", "no more samples per pixel than this", [this](const std::string& text) {
+                    converge_.max_samples = parseCount(text, "--max-spp", 1);
+                })->group(group);
+        reader_.option(*command, "--resolution", "N", "longer side in pixels, where --set film.resolution does not say (128); 0: the scene's",
+                       [this](const std::string& text) { converge_.resolution = static_cast<int>(smallCount(text, "--resolution", 0)); })
+            ->group(group);
+        addSceneChanges(*command, converge_scene_, group);
+        group = "Where";
+        reader_.option(*command, "-d,--device", "NAME", "number or part of the name, as 'crt plugins' lists them (CRT_DEVICE)",
+                       [this](const std::string& text) { converge_.integrator.device = text; })
+            ->envname("CRT_DEVICE")
+            ->group(group);
+        reader_.option(*command, "-t,--threads", "N", "threads of the processor; 0 for all",
+                       [this](const std::string& text) { converge_.integrator.threads = smallCount(text, "--threads", 0); })
+            ->group(group);
+        reader_.option(*command, "-o,--output", "DIR", "folder for report.html, results and figures (converge)",
+                       [this](const std::string& text) { converge_.output = text; })
+            ->group(group);
+        command->add_flag("--resume", converge_.resume, "go on with the run in that folder")->group(group);
+        command->add_flag_callback("-q,--quiet", [this] { converge_.progress = ProgressMode::None; }, "no progress")->group(group);
+    }
+
+    void addReference() {
+        CLI::App* command = addCommand("reference", "render an independent reference for 'crt converge' and 'crt compare'",
+                                       [this] { return converge::makeReference(reference_); });
+        command->footer("\nAnother seed, independent samples, no roulette, and light sampling switched: as little as possible in common with what it will judge.\n"
+                        "The file holds the mean and eight independent eighths of it, from which its own error follows.\n"
+                        "\nExamples:\n"
+                        "  crt reference scene.yaml -o ref.exr --time 10m\n"
+                        "  crt reference scene.yaml -o ref.exr --spp 65536 --same-estimator --set film.resolution=[128,128]\n");
+        command->add_option("SCENE", reference_.scene.file, "scene file (YAML)")->required();
+        const char* group = "Options";
+        reader_.option(*command, "-o,--output", "FILE", ".exr", [this](const std::string& text) { reference_.output = text; })->required()->group(group);
+        reader_.option(*command, "--spp", "N", "samples per pixel, instead of --time",
+                       [this](const std::string& text) { reference_.samples = parseCount(text, "--spp", 8); })
+            ->group(group);
+        reader_.option(*command, "--time", "DURATION", "about this long (60s)",
+                       [this](const std::string& text) { reference_.seconds = parseDuration(text, "--time"); })
+            ->group(group);
+        command->add_flag("--same-estimator", reference_.same_estimator, "keep integrator.nee: much less noise in scenes with small lamps")->group(group);
+        reader_.option(*command, "-b,--backend", "NAME", "cuda, embree, opencl, another, a path of one, or auto (CRT_BACKEND)",
+                       [this](const std::string& text) { reference_.backend = text; })
+            ->envname("CRT_BACKEND")
+            ->group(group);
+        addSceneChanges(*command, reference_.scene, group);
+        command->add_flag_callback("-q,--quiet", [this] { reference_.progress = ProgressMode::None; }, "no progress")->group(group);
+    }
+
     void addVerify() {
         CLI::App* command = addCommand("verify", "render scenes whose answer is known; exit code 7 when a backend does not find it",
                                        [this] { return verify::verify(verify_); });
@@ -444,6 +532,10 @@ private:
     CompareArguments compare_;
     MergeArguments merge_;
     verify::Arguments verify_;
+    converge::ConvergeRequest converge_;
+    converge::ReferenceRequest reference_;
+    SceneRequest converge_scene_;          ///< What is changed in every scene of converge_.
+    std::vector<std::string> converge_files_;
     bool markdown_ = false;
 };
 

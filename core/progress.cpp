@@ -118,6 +118,8 @@ std::string bytesText(double bytes) {
 }
 
 std::string progressText(const ProgressState& state) {
+    if (!state.label.empty())
+        return fmt::format("{:3.0f} %  {}  {} left", std::floor(state.fraction() * 100), state.label, clockText(std::max(0.0, state.secondsLeft())));
     std::string text = fmt::format("{:3.0f} %  {:.0f}", std::floor(state.fraction() * 100), std::floor(state.samples));
     text += state.target > 0 ? fmt::format("/{} spp", state.target) : std::string(" spp");
     if (state.pathsPerSecond() > 0) text += "  " + rateText(state.pathsPerSecond(), "paths/s");

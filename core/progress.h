@@ -25,6 +25,7 @@ struct ProgressState {
     double elapsed_seconds = 0;      ///< Of this run.
     double time_limit_seconds = 0;   ///< 0: none.
     std::uint64_t pixels = 0;        ///< Of the crop window.
+    std::string label;               ///< In place of the samples, for work that is not one render.
     double target_error = 0;         ///< half_width_95 to stop at; 0: none.
     std::optional<ErrorEstimate> error;  ///< Of the image so far.
 

@@ -1,18 +1,14 @@
 #include "report.h"
 
+#include "host.h"
 #include "interrupt.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <sys/utsname.h>
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstring>
-#include <ctime>
-#include <fstream>
 #include <string_view>
 #include <thread>
 
@@ -20,38 +16,6 @@ namespace crt {
 namespace {
 
 using Json = nlohmann::ordered_json;  // In the order written here: the report is read by people too.
-
-/// The value of "key<spaces><separator> value" in a text file of such lines; empty when it is not there.
-std::string valueInFile(const char* path, std::string_view key, char separator) {
-    std::ifstream file(path);
-    for (std::string line; std::getline(file, line);) {
-        if (line.rfind(key, 0) != 0) continue;
-        const std::size_t at = line.find(separator);
-        if (at == std::string::npos) continue;
-        std::size_t first = at + 1, last = line.size();
-        const auto trimmed = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0 || c == '"'; };
-        while (first < last && trimmed(line[first])) ++first;
-        while (last > first && trimmed(line[last - 1])) --last;
-        return line.substr(first, last - first);
-    }
-    return {};
-}
-
-std::string operatingSystem() {
-    const std::string name = valueInFile("/etc/os-release", "PRETTY_NAME=", '=');
-    utsname system{};
-    if (uname(&system) != 0) return name;
-    const std::string kernel = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
-    return name.empty() ? kernel : fmt::format("{} ({})", name, kernel);
-}
-
-std::string utcNow() {
-    const std::time_t now = std::time(nullptr);
-    std::tm utc{};
-    gmtime_r(&now, &utc);
-    char text[sizeof "2000-01-01T00:00:00Z"];
-    return {text, std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc)};
-}
 
 /// JSON has no infinity and no NaN; what is unknown is null.
 Json knownOrNull(double value) { return std::isfinite(value) && value >= 0 ? Json(value) : Json(nullptr); }
@@ -73,26 +37,6 @@ const char* stopName(StopReason reason) {
 template <std::size_t N>
 std::string arrayText(const char (&text)[N]) {
     return {text, strnlen(text, N)};
-}
-
-}  // namespace
-
-std::vector<std::string> featureList(std::uint64_t mask) {
-    std::vector<std::string> names;
-    const std::string all = featureNames(mask);  // "bvh, diffuse"
-    for (std::size_t begin = 0; begin < all.size();) {
-        const std::size_t end = std::min(all.find(", ", begin), all.size());
-        names.push_back(all.substr(begin, end - begin));
-        begin = end + 2;
-    }
-    return names;
-}
-
-std::uint64_t peakHostMemory() {
-    const std::string text = valueInFile("/proc/self/status", "VmHWM:", ':');  // "12345 kB"
-    std::uint64_t kilobytes = 0;
-    std::from_chars(text.data(), text.data() + text.size(), kilobytes);
-    return kilobytes * 1024;
 }
 
 /// What the image knows of its own error (docs/error.md), relative to its mean luminance.
@@ -124,6 +68,19 @@ Json errorJson(const RunFacts& facts) {
     return json;
 }
 
+}  // namespace
+
+std::vector<std::string> featureList(std::uint64_t mask) {
+    std::vector<std::string> names;
+    const std::string all = featureNames(mask);  // "bvh, diffuse"
+    for (std::size_t begin = 0; begin < all.size();) {
+        const std::size_t end = std::min(all.find(", ", begin), all.size());
+        names.push_back(all.substr(begin, end - begin));
+        begin = end + 2;
+    }
+    return names;
+}
+
 std::string reportJson(const Scene& scene, const CompiledScene& compiled, const RunFacts& facts) {
     const CrtBackendReport& b = facts.backend;
     const double rays = static_cast<double>(b.closest_rays) + static_cast<double>(b.shadow_rays);
@@ -132,7 +89,7 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
 
     Json report;
     report["crt"] = {{"version", CRT_VERSION}, {"command", facts.command}, {"finished", utcNow()}};
-    report["host"] = {{"cpu", valueInFile("/proc/cpuinfo", "model name", ':')},
+    report["host"] = {{"cpu", processorName()},
                       {"os", operatingSystem()},
                       {"threads", std::thread::hardware_concurrency()}};
     report["backend"] = {{"name", facts.backend_name},       {"version", facts.backend_version},

@@ -60,7 +60,4 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
 /// featureNames(), one by one.
 std::vector<std::string> featureList(std::uint64_t mask);
 
-/// The most memory this process ever held, in bytes (VmHWM); 0 when the system does not tell.
-std::uint64_t peakHostMemory();
-
 }  // namespace crt

@@ -434,7 +434,10 @@ Judgement judge(const ConfigurationFit& fits, const ImageTests& tests, const Row
     if (tests.smallest_tile_p && *tests.smallest_tile_p < options.family_alpha)
         return say(Verdict::Fail, fmt::format("A tile differs from the reference (p = {:.1e} after Holm).", *tests.smallest_tile_p));
     if (tests.smallest_pixel_p && *tests.smallest_pixel_p < options.family_alpha)
-        return say(Verdict::Fail, fmt::format("A pixel differs from the reference (p = {:.1e} after Šidák).", *tests.smallest_pixel_p));
+        // No proof: where light is found by rare chance, a pixel's replicates may all have missed it and agree with each other on too little.
+        return say(Verdict::Inconclusive, fmt::format("A pixel differs from the reference (p = {:.1e} after Šidák), or its replicates are too few to be normal. "
+                                                      "More samples decide.",
+                                                      *tests.smallest_pixel_p));
     if (tests.variance_of_variance && !(*tests.variance_of_variance < 0.1))
         return say(Verdict::Inconclusive, fmt::format("The tail is too heavy for the error bar (VOV {:.2g}, trusted below 0.1).",
                                                       *tests.variance_of_variance));

@@ -1,0 +1,235 @@
+#include "converge/contestant.h"
+
+#include "backend/loader.h"
+#include "compile.h"
+#include "converge/fits.h"
+#include "error_estimate.h"
+#include "report.h"
+#include "stats/color_difference.h"
+#include "stats/flip.h"
+#include "stats/metrics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <numeric>
+
+namespace crt::converge {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+template <std::size_t N>
+std::string arrayText(const char (&text)[N]) {
+    return {text, strnlen(text, N)};
+}
+
+/// The reference's luminances, one for each pixel.
+std::vector<float> spread(const Reference& reference, std::size_t pixels) {
+    if (reference.luminance.size() == pixels) return reference.luminance;
+    return std::vector<float>(pixels, reference.luminance.front());
+}
+
+double loadAverage() {
+    double load = 0;
+    return getloadavg(&load, 1) == 1 ? load : 0;
+}
+
+std::optional<double> clockMhz() {
+    std::ifstream file("/proc/cpuinfo");
+    for (std::string line; std::getline(file, line);)
+        if (line.rfind("cpu MHz", 0) == 0) return std::strtod(line.c_str() + line.find(':') + 1, nullptr);
+    return std::nullopt;
+}
+
+}  // namespace
+
+Contestant::Contestant(Key key, Scene scene, const Reference* reference, const IntegratorOptions& options)
+    : scene_(std::move(scene)), seed_(scene_.sampler.seed), reference_(reference), tests_(1, 1, 3) {
+    configuration_.key = std::move(key);
+    const Clock::time_point start = Clock::now();
+    const LoadedBackend backend = loadBackend(configuration_.key.backend);
+    probeDevices(backend);  // Says better than a failing create() why there is none.
+    integrator_ = std::make_unique<Integrator>(backend, options);
+    before_first_sample_ = secondsSince(start) + scene_.parse_seconds;
+    configuration_.threads = options.threads;
+}
+
+void Contestant::describe(const CompiledScene& compiled, double setup_seconds) {
+    described_ = true;
+    before_first_sample_ += setup_seconds;
+    const CrtBackendReport report = integrator_->report();
+    Configuration& c = configuration_;
+    c.device = arrayText(report.device);
+    c.kernel = arrayText(report.kernel);
+    if (report.registers > 0) c.kernel += fmt::format(", {} registers", report.registers);
+    if (report.kernel_from_cache != 0) c.kernel += ", from the cache";
+    c.scene_file = scene_.file;
+    c.scene_hash = compiled.hash;
+    c.width = compiled.width;
+    c.height = compiled.height;
+    for (const std::string& feature : featureList(compiled.features)) c.kept.push_back({feature, "the scene needs it"});
+    for (const auto& [what, why] : compiled.left_out) c.left_out.push_back({what, why});
+    c.stages.parse = scene_.parse_seconds;
+    c.stages.build = compiled.compile_seconds + compiled.build_seconds + report.build_seconds;
+    c.stages.compile = report.compile_seconds + report.cache_seconds;
+    c.stages.upload = report.upload_seconds;
+    tests_ = stats::Replicates(compiled.width, compiled.height, 3);
+}
+
+/// What a film amounts to after so many samples.
+Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
+    Row row;
+    row.key = configuration_.key;
+    row.seed = scene_.sampler.seed;
+    row.replicate = replicate;
+    row.samples = film.samples.count();
+    row.invalid_samples = film.invalidSamples();
+    row.load_average = loadAverage();
+    row.cpu_clock_mhz = clockMhz();
+
+    const Image image = resolveImage(film, scene_, 0);
+    const std::array<double, 3> weights = luminanceWeights(scene_.film.color_space);
+    const std::size_t pixels = film.counts.size();
+    LookPlane luminance(pixels);
+    for (std::size_t p = 0; p < pixels; ++p) {
+        double y = 0;
+        for (std::size_t c = 0; c < 3; ++c) {
+            row.image_mean[c] += image.pixels[3 * p + c] / static_cast<double>(pixels);
+            y += weights[c] * image.pixels[3 * p + c];
+        }
+        luminance[p] = static_cast<float>(y);
+    }
+    const bool independent = scene_.sampler.type != SamplerType::Sobol;
+    if (const std::optional<ErrorEstimate> own = estimateError(film, ReplicateSet::All, independent); own && !own->is_bound)
+        row.predicted_relative_rmse = {own->relative_rmse, own->relative_rmse_95.lower, own->relative_rmse_95.upper};
+
+    if (reference_ != nullptr) {
+        const stats::ErrorMetrics m = stats::errorMetrics(luminance, spread(*reference_, pixels));
+        row.error = ErrorMetrics{m.mse, m.rmse, m.relative_rmse, m.relmse, m.smape, m.mae, m.max_absolute, {}, {}};
+        if (reference_->info.kind == ReferenceKind::Analytic) {
+            const double mean = std::accumulate(luminance.begin(), luminance.end(), 0.0) / static_cast<double>(pixels);
+            row.image_mean = {mean, mean, mean};
+        } else if (last && scene_.film.color_space == ColorSpace::LinearSrgb) {
+            const stats::RgbView test{image.pixels, image.width, image.height}, truth{reference_->rgb, image.width, image.height};
+            row.error->flip_mean = stats::flipHdr(test, truth).mean;
+            row.error->delta_e2000_mean = stats::deltaE2000(test, truth).mean;
+        }
+    }
+    if (last) {
+        std::vector<double> colors(image.pixels.begin(), image.pixels.end());
+        tests_.add(colors);
+        last_image_ = image;
+        last_error_ = {image.width, image.height, std::vector<float>(pixels)};
+        const LuminanceVariance variance(film);
+        const double mean = std::accumulate(luminance.begin(), luminance.end(), 0.0) / static_cast<double>(pixels);
+        const double exposure = std::exp2(scene_.film.exposure_ev);
+        for (std::uint32_t y = 0; y < image.height; ++y)
+            for (std::uint32_t x = 0; x < image.width; ++x)
+                last_error_.values[std::size_t{y} * image.width + x] = static_cast<float>(std::sqrt(variance(x, y)) * exposure / mean);
+    }
+    looks_[row.samples][replicate] = std::move(luminance);
+    return row;
+}
+
+bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
+                           const std::function<bool()>& stop) {
+    scene_.sampler.seed = seed_ + 1 + replicate;
+    const Clock::time_point setup = Clock::now();
+    const CompiledScene compiled = compileScene(scene_, 0);
+    integrator_->setScene(compiled);
+    if (!described_) describe(compiled, secondsSince(setup));
+    const Clock::time_point start = Clock::now();  // Compiling a kernel happens once, and must not cost the first replicate its samples.
+
+    const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
+    const CrtBackendReport before = integrator_->report();
+    const bool exploring = replicate == 0;
+    double wall = 0;
+    for (std::uint64_t done = 0, next = 1; done < most_samples; next *= 2) {
+        if (stop()) return false;
+        const Clock::time_point step = Clock::now();
+        integrator_->render({.first_sample = done, .sample_count = next - done});
+        const double step_seconds = secondsSince(step);
+        wall += step_seconds;
+        if (exploring && done == 0) configuration_.stages.first_sample = step_seconds;
+        done = next;
+        if (exploring) samples_reached_ = done;
+
+        Film film(shape);
+        integrator_->readFilm(film);
+        // The next doubling takes as long as all before it, and its look some more.
+        const bool last = done * 2 > most_samples || (exploring && secondsSince(start) + 2.2 * step_seconds > seconds);
+        Row row = look(film, replicate, last);
+        const CrtBackendReport now = integrator_->report();
+        row.render_wall_seconds = wall;
+        if (now.render_seconds > before.render_seconds) row.render_device_seconds = now.render_seconds - before.render_seconds;
+        row.seconds_before_first_sample = before_first_sample_;
+        row.paths = now.paths - (before.paths <= now.paths ? before.paths : 0);
+        row.closest_rays = now.closest_rays - std::min(before.closest_rays, now.closest_rays);
+        row.shadow_rays = now.shadow_rays - std::min(before.shadow_rays, now.shadow_rays);
+        if (last) row.stop_reason = "samples";
+        found(row);
+        if (last) break;
+    }
+    configuration_.stages.render_wall = wall;
+    seconds_of_last_ = secondsSince(start);
+    return true;
+}
+
+void Contestant::finish() {
+    Configuration& c = configuration_;
+    if (last_image_.pixels.empty()) return;
+    c.maps.samples = samples_reached_;
+    c.maps.image = last_image_;
+    c.maps.standard_error = last_error_;
+    if (reference_ == nullptr) return;
+
+    const std::size_t pixels = std::size_t{c.width} * c.height;
+    const std::vector<float> truth = spread(*reference_, pixels);
+    const LookPlane& luminance = looks_.at(samples_reached_).rbegin()->second;
+    const double mean = std::accumulate(truth.begin(), truth.end(), 0.0) / static_cast<double>(pixels);
+    c.maps.error = {c.width, c.height, std::vector<float>(pixels)};
+    c.maps.z = c.maps.error;
+    for (std::size_t p = 0; p < pixels; ++p) {
+        const double difference = (luminance[p] - truth[p]) / mean;
+        const double noise = std::hypot(last_error_.values[p], std::sqrt(reference_->info.mean_variance) / mean);
+        c.maps.error.values[p] = static_cast<float>(std::abs(difference));
+        c.maps.z.values[p] = noise > 0 ? static_cast<float>(difference / noise) : 0.0f;
+    }
+    if (reference_->fold_rgb.empty()) return;
+    if (scene_.film.color_space == ColorSpace::LinearSrgb)
+        c.maps.flip = {c.width, c.height,
+                       stats::flipHdr({last_image_.pixels, c.width, c.height}, {reference_->rgb, c.width, c.height}).error};
+    stats::Replicates eighths(c.width, c.height, 3);
+    for (const std::vector<double>& fold : reference_->fold_rgb) eighths.add(fold);
+    if (tests_.count() >= 2) c.tests = imageTestsOf(stats::gate(tests_, eighths));
+}
+
+void fillBetweenReplicates(std::vector<Row>& rows, const Key& key, const std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks) {
+    for (const auto& [samples, replicates] : looks) {
+        const auto count = static_cast<double>(replicates.size());
+        if (count < 2) continue;
+        std::vector<double> sum(replicates.begin()->second.size());
+        for (const auto& [replicate, plane] : replicates)
+            for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += plane[p];
+        for (Row& row : rows) {
+            if (!(row.key == key) || row.samples != samples) continue;
+            const auto found = replicates.find(row.replicate);
+            if (found == replicates.end()) continue;
+            double squares = 0;
+            for (std::size_t p = 0; p < sum.size(); ++p) {
+                const double mine = found->second[p], others = (sum[p] - mine) / (count - 1);
+                squares += (mine - others) * (mine - others);
+            }
+            row.between_replicates_mse = (count - 1) / count * squares / static_cast<double>(sum.size());
+        }
+    }
+}
+
+}  // namespace crt::converge

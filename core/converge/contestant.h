@@ -1,0 +1,63 @@
+/// One configuration at work: a scene variant on a backend, rendered progressively with one seed after another.
+#pragma once
+
+#include "backend/integrator.h"
+#include "converge/measurement.h"
+#include "converge/reference.h"
+#include "scene.h"
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace crt::converge {
+
+/// Luminances of one look, row-major.
+using LookPlane = std::vector<float>;
+
+class Contestant {
+public:
+    /// Loads the backend. Throws crt::Error when it cannot run.
+    Contestant(Key key, Scene scene, const Reference* reference, const IntegratorOptions& options);
+
+    /// Renders seed number `replicate` to N = 1, 2, 4 … and gives each look to `found`, until `most_samples`, or (on the first replicate) until the
+    /// next doubling would take the replicate beyond `seconds`. Returns false when `stop` said so.
+    bool replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
+                   const std::function<bool()>& stop);
+
+    const Key& key() const { return configuration_.key; }
+    Configuration& configuration() { return configuration_; }
+    std::uint64_t samplesReached() const { return samples_reached_; }
+    void setSamplesReached(std::uint64_t samples) { samples_reached_ = samples; }
+    double secondsOfLastReplicate() const { return seconds_of_last_; }
+    /// All looks so far, by samples and replicate.
+    std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks() { return looks_; }
+    /// Pictures of the last replicate, and tests of all against the reference's eighths.
+    void finish();
+
+private:
+    void describe(const CompiledScene& compiled, double setup_seconds);
+    Row look(const Film& film, std::uint32_t replicate, bool last);
+
+    Configuration configuration_;
+    Scene scene_;
+    std::uint64_t seed_;
+    const Reference* reference_;
+    std::unique_ptr<Integrator> integrator_;
+    double before_first_sample_ = 0;
+    double seconds_of_last_ = 0;
+    std::uint64_t samples_reached_ = 0;
+    bool described_ = false;
+    std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>> looks_;
+    stats::Replicates tests_;   ///< Colours at the most samples, one image a replicate.
+    Image last_image_;
+    Plane last_error_;          ///< The image's own standard error, relative to its mean.
+};
+
+/// What becomes known when replicates can be compared: (R − 1)/R · mean (I_r − mean of the others)², into the rows.
+void fillBetweenReplicates(std::vector<Row>& rows, const Key& key, const std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks);
+
+}  // namespace crt::converge

@@ -1,0 +1,243 @@
+#include "converge/reference.h"
+
+#include "atomic_file.h"
+#include "backend/loader.h"
+#include "compile.h"
+#include "converge/files.h"
+#include "image_io.h"
+#include "interrupt.h"
+#include "log.h"
+#include "sampling.h"
+#include "stats/statistics.h"
+#include "yaml_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+namespace crt::converge {
+namespace {
+
+/// Far from the seeds of `crt converge`, which follow the scene's one by one.
+constexpr std::uint64_t kReferenceSeedOffset = std::uint64_t{1} << 40;
+constexpr const char* kContentKey = "crt/referenceContent";
+constexpr const char* kEstimatorKey = "crt/referenceEstimator";
+
+std::string estimatorText(const Scene& scene) {
+    return fmt::format("independent samples, {} light sampling, no roulette, seed {}", scene.integrator.nee ? "with" : "no", scene.sampler.seed);
+}
+
+std::string metadataOf(const Image& image, const char* key) {
+    for (const auto& [name, value] : image.metadata)
+        if (name == key) return value;
+    return {};
+}
+
+/// Values of three channels of an image, or nothing when one is missing.
+std::vector<float> channelsOf(const Image& image, const std::array<std::string, 3>& names) {
+    std::array<std::size_t, 3> columns{};
+    for (std::size_t c = 0; c < 3; ++c) {
+        const auto found = std::find(image.channels.begin(), image.channels.end(), names[c]);
+        if (found == image.channels.end()) return {};
+        columns[c] = static_cast<std::size_t>(found - image.channels.begin());
+    }
+    const std::size_t pixels = std::size_t{image.width} * image.height;
+    std::vector<float> values(pixels * 3);
+    for (std::size_t p = 0; p < pixels; ++p)
+        for (std::size_t c = 0; c < 3; ++c) values[p * 3 + c] = image.pixels[p * image.channels.size() + columns[c]];
+    return values;
+}
+
+std::vector<float> luminanceOf(const std::vector<float>& rgb, const std::array<double, 3>& weights) {
+    std::vector<float> luminance(rgb.size() / 3);
+    for (std::size_t p = 0; p < luminance.size(); ++p)
+        luminance[p] = static_cast<float>(weights[0] * rgb[3 * p] + weights[1] * rgb[3 * p + 1] + weights[2] * rgb[3 * p + 2]);
+    return luminance;
+}
+
+/// Samples per fold that fit into the time, from the first ones.
+std::uint64_t affordable(double seconds_left, double seconds_per_sample) {
+    return static_cast<std::uint64_t>(std::clamp(seconds_left / seconds_per_sample, 1.0, 1e12));
+}
+
+}  // namespace
+
+std::array<double, 3> luminanceWeights(ColorSpace space) {
+    // Row Y of the inverse of XYZ → RGB, by Cramer's rule on its transpose: w · M = (0, 1, 0).
+    const Matrix3d m = xyzToRgb(space);
+    const auto minor = [&m](std::size_t r0, std::size_t r1) { return m[r0][0] * m[r1][2] - m[r0][2] * m[r1][0]; };
+    // Cofactors of column 1.
+    const std::array<double, 3> cofactors{-minor(1, 2), minor(0, 2), -minor(0, 1)};
+    // Y_row of M⁻¹: (M⁻¹)_{1j} = C_{j1}/det, with C_{j1} = (−1)^{j+1} det of M without row j and column 1.
+    const double det = m[0][1] * cofactors[0] + m[1][1] * cofactors[1] + m[2][1] * cofactors[2];
+    return {cofactors[0] / det, cofactors[1] / det, cofactors[2] / det};
+}
+
+Scene referenceScene(Scene scene, bool same_estimator) {
+    scene.sampler.type = SamplerType::Independent;
+    scene.sampler.replicates = 1;
+    scene.sampler.seed += kReferenceSeedOffset;
+    scene.integrator.roulette = false;
+    if (!same_estimator) scene.integrator.nee = !scene.integrator.nee;
+    return scene;
+}
+
+std::string hashOfContent(const Scene& scene) {
+    Scene canonical = scene;
+    canonical.sampler = {};
+    canonical.integrator.roulette = false;
+    canonical.integrator.nee = true;
+    canonical.integrator.accelerator = Accelerator::Bvh;
+    return compileScene(canonical, 0).hash;
+}
+
+int makeReference(const ReferenceRequest& request) {
+    Scene scene = loadScene(request.scene);
+    if (scene.integrator.type != IntegratorType::Path)
+        throw Error(ErrorKind::Usage, "a view has no noise and needs no reference: integrator.type must be path");
+    const std::string content = hashOfContent(scene);
+    scene = referenceScene(std::move(scene), request.same_estimator);
+    if (std::filesystem::path(request.output).extension() != ".exr")
+        throw Error(ErrorKind::Usage, fmt::format("a reference holds its eighths beside the image, which only EXR can: '{}' should end in .exr", request.output));
+    checkWritable(request.output);
+
+    LoadedBackend backend;
+    if (request.backend == "auto") {
+        std::vector<std::string> passed_over;
+        backend = chooseBackend(passed_over);
+    } else {
+        backend = loadBackend(request.backend);
+    }
+    Integrator integrator(backend, request.integrator);
+    const CompiledScene compiled = compileScene(scene, 0);
+    const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
+
+    const InterruptGuard interrupt;
+    Progress progress(request.progress);
+    ProgressState state;
+    state.pixels = std::uint64_t{shape.width} * shape.height;
+    const auto started = std::chrono::steady_clock::now();
+    const auto elapsed = [started] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count(); };
+
+    // Each eighth has samples of its own. The first also finds out how many fit into the time.
+    Film film(shape);
+    Image image;
+    std::vector<Image> folds;
+    std::uint64_t per_fold = request.samples / kFolds;
+    if (request.samples > 0 && per_fold == 0) throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
+    for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
+        integrator.setScene(compiled);
+        const std::uint64_t first = std::uint64_t{fold} << 44;
+        std::uint64_t done = 0;
+        for (std::uint64_t chunk = 1; per_fold == 0 || done < per_fold;) {
+            if (InterruptGuard::signalReceived() != 0) return 128 + InterruptGuard::signalReceived();
+            const double before = elapsed();
+            if (per_fold > 0) chunk = std::min(chunk, per_fold - done);
+            integrator.render({.first_sample = first + done, .sample_count = chunk});
+            done += chunk;
+            const double took = std::max(elapsed() - before, 1e-6);
+            state.elapsed_seconds = elapsed();
+            state.samples = static_cast<double>(fold * per_fold + done);
+            state.target = per_fold * kFolds;
+            if (request.samples == 0) state.time_limit_seconds = request.seconds;
+            progress.update(state);
+            if (per_fold == 0 && elapsed() > 0.04 * request.seconds)
+                per_fold = std::max(done, affordable(request.seconds / kFolds, took / static_cast<double>(chunk)));
+            if (took < 0.25) chunk *= 2;
+        }
+        Film part(shape);
+        integrator.readFilm(part);
+        if (part.invalidSamples() > 0)
+            throw Error(ErrorKind::Device, fmt::format("{} samples of the reference were NaN or infinite: it would be worth nothing", part.invalidSamples()));
+        folds.push_back(resolveImage(part, scene, 0));
+        film.add(part);
+    }
+    image = resolveImage(film, scene, 0);
+
+    Image file = image;
+    file.channels.clear();
+    file.pixels.clear();
+    file.channels = {"R", "G", "B"};
+    for (std::uint32_t fold = 0; fold < kFolds; ++fold)
+        for (const char* c : {"R", "G", "B"}) file.channels.push_back(fmt::format("Fold.{}.{}", fold, c));
+    const std::size_t pixels = std::size_t{image.width} * image.height;
+    for (std::size_t p = 0; p < pixels; ++p) {
+        for (std::size_t c = 0; c < 3; ++c) file.pixels.push_back(image.pixels[3 * p + c]);
+        for (const Image& fold : folds)
+            for (std::size_t c = 0; c < 3; ++c) file.pixels.push_back(fold.pixels[3 * p + c]);
+    }
+    file.metadata.emplace_back("Software", "crt " CRT_VERSION);
+    file.metadata.emplace_back(kContentKey, content);
+    file.metadata.emplace_back(kEstimatorKey, estimatorText(scene));
+    file.metadata.emplace_back("crt/backend", backend.name);
+    writeImage(request.output, OutputFormat::Exr, file);
+
+    const std::optional<ErrorEstimate> error = estimateError(film, ReplicateSet::All, true);
+    logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, film.samples.count(), kFolds, estimatorText(scene), durationText(elapsed()));
+    if (error) logInfo("its own {}", errorText(*error));
+    if (error && error->relative_rmse > 0.02)
+        logWarning("the reference is noisy itself; its variance is subtracted from errors, but more --time, or --same-estimator, makes them surer");
+    return 0;
+}
+
+Reference readReference(const std::string& text, const Scene& scene) {
+    Reference reference;
+    reference.info.scene = scene.file;
+    if (const Parsed<double> value = parseNumber(text); value.value) {
+        if (!(*value.value > 0)) throw Error(ErrorKind::Usage, fmt::format("--reference {}: a luminance above 0 is expected", text));
+        reference.info.kind = ReferenceKind::Analytic;
+        reference.info.estimator = fmt::format("closed form: every pixel has luminance {}", text);
+        reference.luminance = {static_cast<float>(*value.value)};
+        reference.info.image_mean.fill(*value.value);
+        return reference;
+    }
+    const Image image = readImage(text);
+    const std::string content = metadataOf(image, kContentKey);
+    if (content.empty())
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: make one with 'crt reference {} -o {}'", text, scene.file, text));
+    if (content != hashOfContent(scene))
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is a reference of another scene, or of this one with other settings or resolution", text));
+    reference.width = image.width;
+    reference.height = image.height;
+    reference.rgb = channelsOf(image, {"R", "G", "B"});
+    const std::array<double, 3> weights = luminanceWeights(scene.film.color_space);
+    reference.luminance = luminanceOf(reference.rgb, weights);
+    std::vector<std::vector<float>> folds;
+    for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
+        const std::vector<float> rgb = channelsOf(image, {fmt::format("Fold.{}.R", fold), fmt::format("Fold.{}.G", fold), fmt::format("Fold.{}.B", fold)});
+        if (rgb.empty()) throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: it lacks its eighths", text));
+        folds.push_back(luminanceOf(rgb, weights));
+        reference.fold_rgb.emplace_back(rgb.begin(), rgb.end());
+    }
+
+    ReferenceInfo& info = reference.info;
+    info.kind = ReferenceKind::Independent;
+    info.file = text;
+    info.hash = hashOfFile(text);
+    info.estimator = metadataOf(image, kEstimatorKey);
+    const Parsed<std::uint64_t> samples = parseUnsigned(metadataOf(image, "crt/spp"));
+    info.samples = samples.value.value_or(0);
+    const std::size_t pixels = reference.luminance.size();
+    double variance = 0, mean = 0;
+    for (std::size_t p = 0; p < pixels; ++p) {
+        std::array<double, kFolds> values{};
+        for (std::uint32_t fold = 0; fold < kFolds; ++fold) values[fold] = folds[fold][p];
+        variance += stats::summarize(values).variance / kFolds / static_cast<double>(pixels);
+        mean += reference.luminance[p] / static_cast<double>(pixels);
+    }
+    info.mean_variance = variance;
+    info.eightfold_spread = std::sqrt(variance) / mean;
+    for (std::size_t c = 0; c < 3; ++c) {
+        std::array<double, kFolds> means{};
+        for (std::uint32_t fold = 0; fold < kFolds; ++fold)
+            for (std::size_t p = 0; p < pixels; ++p) means[fold] += reference.fold_rgb[fold][3 * p + c] / static_cast<double>(pixels);
+        const stats::Summary summary = stats::summarize(means);
+        info.image_mean[c] = summary.mean;
+        info.image_mean_standard_error[c] = summary.standardError();
+    }
+    return reference;
+}
+
+}  // namespace crt::converge

@@ -1,0 +1,60 @@
+/// What errors are measured against: a number that is known, or a render that shares as little as possible with what it judges.
+///
+/// A reference file is an EXR with the mean in R, G, B and, in Fold.0.R … Fold.7.B, the means of eight independent eighths of its samples: its variance
+/// and the spread between eighths follow from them. Metadata say how it was made and of which scene.
+#pragma once
+
+#include "backend/integrator.h"
+#include "converge/measurement.h"
+#include "job.h"
+#include "progress.h"
+#include "scene.h"
+#include "stats/image_tests.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt::converge {
+
+inline constexpr std::uint32_t kFolds = 8;
+
+/// What `crt reference` is asked for.
+struct ReferenceRequest {
+    SceneRequest scene;
+    std::string backend = "auto";
+    IntegratorOptions integrator;
+    std::string output;
+    std::uint64_t samples = 0;      ///< Per pixel in all; 0: as many as `seconds` allow.
+    double seconds = 60;
+    bool same_estimator = false;    ///< Keep integrator.nee as the scene has it: less noise, less independence.
+    ProgressMode progress = ProgressMode::Auto;
+};
+
+/// Renders it and returns the exit code. Throws crt::Error.
+int makeReference(const ReferenceRequest& request);
+
+/// The scene as a reference renders it: independent samples, another seed, light sampling switched, no roulette.
+Scene referenceScene(Scene scene, bool same_estimator);
+
+/// Hash of what is to be seen, without how: two scenes with it have the same expected image.
+std::string hashOfContent(const Scene& scene);
+
+/// A reference in memory, of the film's size.
+struct Reference {
+    ReferenceInfo info;
+    std::uint32_t width = 0, height = 0;   ///< 0: one value for all pixels.
+    std::vector<float> rgb;                ///< [height][width][3]; empty with one value.
+    std::vector<float> luminance;          ///< [height][width]; one value when all pixels have it.
+    std::vector<std::vector<double>> fold_rgb;  ///< kFolds images, [height][width][3]; empty with one value.
+};
+
+/// "0.2394564705" is the luminance that every pixel has (a closed form); anything else a file of makeReference's, which must be of this scene. Throws
+/// crt::Error(Usage).
+Reference readReference(const std::string& text, const Scene& scene);
+
+/// Luminance of linear RGB in the scene's colour space.
+std::array<double, 3> luminanceWeights(ColorSpace space);
+
+}  // namespace crt::converge
