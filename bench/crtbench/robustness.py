@@ -43,7 +43,7 @@ def measure(program, arguments):
     results.heading("What each gets wrong")
     results.paragraph("Rays of the sweeps of [stability-misses](stability-misses.md), [stability-offset-safety](stability-offset-safety.md) and [stability-offset-tightness]"
                       "(stability-offset-tightness.md): how many slip through a closed mesh, meet the triangle that they leave, or step over a layer.")
-    for sweep, rays in (("misses", 2e5), ("offset-safety", 1e5), ("offset-tightness", 2e4)):
+    for sweep, rays in (("misses", 2e4), ("offset-safety", 4e4), ("offset-tightness", 4e3)):
         points = {name: sweep_with(program, sweep, rays / (50 if arguments.tiny else 1), environment) for name, environment in environments.items()}
         data["wrong"][sweep] = points
         stability.TABLES[sweep](results, {{"crt": "crt"}.get(name, ALTERNATIVES.get(name)): p for name, p in points.items()})

@@ -15,7 +15,7 @@ SWEEPS = {
     "solid-angle": "Solid angle of a light",
 }
 # Of each point of a sweep. Offset safety: 1e8 in all, over its 20 points.
-RAYS = {"misses": 1e6, "offset-safety": 5e6, "offset-tightness": 4e5, "far": 1e5, "scale": 1e5, "fov": 3e5, "solid-angle": 3e6}
+RAYS = {"misses": 2e5, "offset-safety": 5e6, "offset-tightness": 5e4, "far": 1e5, "scale": 1e5, "fov": 3e5, "solid-angle": 3e6}
 BACKENDS = ["cuda", "embree", "opencl"]
 
 
