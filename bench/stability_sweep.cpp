@@ -82,7 +82,8 @@ Difference difference(const Film& a, const Film& b) {
     return d;
 }
 
-void compareMoved(Context& context, const char* sweep, std::uint64_t rays, const std::string& fields, const Scene& scene, double scale, const Vec3d& shift) {
+void compareMoved(Context& context, const char* sweep, std::uint64_t rays, const std::string& fields, const Scene& scene, double scale,
+                  const Vec3d& shift) {
     const Render how = samplesOf(rays / (48 * 48));
     try {
         const Difference d = difference(context.render(scene, how), context.render(moved(scene, scale, shift), how));
@@ -176,8 +177,8 @@ void solidAngle(Context& context, std::uint64_t rays) {
 
 int main(int argc, char** argv) {
     const std::map<std::string, void (*)(Context&, std::uint64_t)> sweeps{
-        {"misses", misses}, {"offset-safety", offsetSafety}, {"offset-tightness", offsetTightness}, {"far", far},
-        {"scale", scale},   {"fov", fov},                    {"solid-angle", solidAngle}};
+        {"misses", misses}, {"offset-safety", offsetSafety}, {"offset-tightness", offsetTightness}, {"far", far}, {"scale", scale},
+        {"fov", fov},       {"solid-angle", solidAngle}};
     if (argc != 4 || !sweeps.contains(argv[2])) {
         std::fprintf(stderr, "stability_sweep BACKEND misses|offset-safety|offset-tightness|far|scale|fov|solid-angle RAYS\n");
         return 2;

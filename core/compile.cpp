@@ -711,8 +711,8 @@ CompiledScene compileScene(const Scene& scene, std::uint32_t aovs) {
     CompiledScene compiled = Compiler(scene, aovs).run();
     if (scene.integrator.type == IntegratorType::Path && scene.integrator.max_depth > 0)
         if (const NearSurfaces found = findNearSurfaces(compiled); found.near > 0)
-            logWarning("{} of {} triangles looked at have another surface nearer than single precision can tell for triangles of this size (up to {:.3g} apart): light between "
-                       "them may be lost; divide the larger triangles there, or move the surfaces apart or together",
+            logWarning("{} of {} triangles looked at have another surface nearer than single precision can tell for triangles of this size (up to {:.3g} "
+                       "apart): light between them may be lost; divide the larger triangles there, or move the surfaces apart or together",
                        found.near, found.asked, found.nearest_clearance);
     return compiled;
 }

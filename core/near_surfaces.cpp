@@ -34,7 +34,8 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
         if (dot3(normal, normal) == 0.0f) continue;  // no area
         ++found.asked;
         CrtRay ray;
-        ray.o = (crt_triangle_vertex(triangles + slot, 0) + crt_triangle_vertex(triangles + slot, 1) + crt_triangle_vertex(triangles + slot, 2)) * (1.0f / 3.0f);
+        ray.o = (crt_triangle_vertex(triangles + slot, 0) + crt_triangle_vertex(triangles + slot, 1) + crt_triangle_vertex(triangles + slot, 2)) *
+                (1.0f / 3.0f);
         const float touching = 16 * CRT_EPSILON * std::max({std::abs(ray.o.x), std::abs(ray.o.y), std::abs(ray.o.z)});
         for (const float side : {1.0f, -1.0f}) {
             // Begins beyond what touches, among it the triangle itself.

@@ -33,6 +33,8 @@ def main():
                              help="small images, few samples and runs: does the tool work? The numbers mean nothing and go to out/tiny")
         command.add_argument("--busy", type=float, default=0.05, metavar="SHARE",
                              help="a timed run is repeated when other processes took more than this share of the processor (0.05)")
+        if name == "stability":
+            command.add_argument("--times", type=float, default=1, metavar="N", help="so many times the rays of each point (1); 5 makes 1e8 of offset-safety")
         command.add_argument("--scenes", nargs="*", help="only these scenes, by name without .yaml")
     arguments = parser.parse_args()
     if arguments.tiny:

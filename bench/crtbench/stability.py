@@ -14,8 +14,8 @@ SWEEPS = {
     "fov": "Field of view",
     "solid-angle": "Solid angle of a light",
 }
-# Of each point of a sweep. Offset safety: 1e8 in all, over its 20 points.
-RAYS = {"misses": 2e5, "offset-safety": 5e6, "offset-tightness": 5e4, "far": 1e5, "scale": 1e5, "fov": 3e5, "solid-angle": 3e6}
+# Of each point of a sweep; `--times` multiplies them. Offset safety has 20 points.
+RAYS = {"misses": 2e5, "offset-safety": 1e6, "offset-tightness": 5e4, "far": 1e5, "scale": 1e5, "fov": 3e5, "solid-angle": 3e6}
 BACKENDS = ["cuda", "embree", "opencl"]
 
 
@@ -27,7 +27,7 @@ def measure(program, arguments):
         raise Failure(f"no such sweep: {', '.join(sorted(unknown))}; there are {', '.join(SWEEPS)}")
     usable, absent = program.backends(BACKENDS)
     for sweep in sweeps:
-        rays = RAYS[sweep] / (100 if arguments.tiny else 1)
+        rays = RAYS[sweep] * arguments.times / (100 if arguments.tiny else 1)
         points = {backend: run(program, backend, sweep, rays) for backend in usable}
         results = Results(program, arguments, f"stability-{sweep}", SWEEPS[sweep])
         TABLES[sweep](results, points)

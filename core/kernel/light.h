@@ -13,8 +13,8 @@ CRT_KERNEL_BEGIN
    fifth of the cost; above, its 1/r² and cosine make it noisy. The choice depends on the triangle and the point alone, so that sampling and pdf agree. */
 #define CRT_SOLID_ANGLE_THRESHOLD 0.3f
 
-/* A spherical triangle of nearly a hemisphere, seen from just under a large lamp, has angles of nearly π, whose sines are lost in rounding. Area sampling
-   is then noisy, but chance hits have nearly all the weight. */
+/* A spherical triangle of nearly a hemisphere, seen from just under a large lamp, has angles of nearly π, whose sines are lost in rounding. Area
+   sampling is then noisy, but chance hits have nearly all the weight. */
 #define CRT_SOLID_ANGLE_MAX 6.0f
 
 typedef struct CrtLightSample {

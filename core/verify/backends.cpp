@@ -1,4 +1,5 @@
-// Group L: floating point environment and backends. A backend is asked for the bits of crt's own portable build of the kernel, which is stricter than any tolerance.
+// Group L: floating point environment and backends. A backend is asked for the bits of crt's own portable build of the kernel, which is stricter
+// than any tolerance.
 #include "verify/context.h"
 #include "verify/shapes.h"
 #include "verify/variants.h"
@@ -15,7 +16,8 @@
 namespace crt::verify {
 namespace {
 
-constexpr const char* kRounds = "the backend rounds otherwise: contraction, a fast-math flag, its own division or square root, flushed subnormals, or another triangle test";
+constexpr const char* kRounds =
+    "the backend rounds otherwise: contraction, a fast-math flag, its own division or square root, flushed subnormals, or another triangle test";
 
 void shippedFlags(Context& context) {
     forEachVariant(context, 24, [](Context& c, const Variant& v) {
@@ -25,7 +27,8 @@ void shippedFlags(Context& context) {
 
 void randomNumbers(Context& context) {
     // A slanted plane at the far end of the view: the distance tells the two numbers that placed the sample.
-    for (const auto& [what, type] : {std::pair{"Sobol", SamplerType::Sobol}, {"independent", SamplerType::Independent}, {"xorshift", SamplerType::XorShift}}) {
+    for (const auto& [what, type] :
+         {std::pair{"Sobol", SamplerType::Sobol}, {"independent", SamplerType::Independent}, {"xorshift", SamplerType::XorShift}}) {
         const int resolution = context.atLeast(Level::Merge) ? 1000 : 100;
         Scene scene = emptyScene(resolution, 0x123456789abcdef0, {0, 0, 0}, {0, 0, 1}, 0.5);
         scene.sampler.type = type;
@@ -58,12 +61,14 @@ void radiances(Context& context) {
 void runToRun(Context& context) {
     const Scene scene = litRoom(64, 1);
     const Film first = context.render(scene, {.samples = 32});
-    for (int i = 0; i < 4; ++i) context.sameBits(fmt::format("run {}", i + 2), first, context.render(scene, {.samples = 32}), "sums depend on the order of the threads");
+    for (int i = 0; i < 4; ++i)
+        context.sameBits(fmt::format("run {}", i + 2), first, context.render(scene, {.samples = 32}), "sums depend on the order of the threads");
 }
 
 void lostDevices(Context& context) {
     context.notApplicable("a device lost, out of memory, out of time",
-                          "asked of the host with a plugin that fails on demand: 'a device that fails in the middle costs little' (tests/unit_running.cpp), tests/cli, and CUDA's "
+                          "asked of the host with a plugin that fails on demand: 'a device that fails in the middle costs little' "
+                          "(tests/unit_running.cpp), tests/cli, and CUDA's "
                           "own failures against a simulated driver (tests/unit_cuda_program.cpp)");
 }
 
@@ -116,19 +121,33 @@ void hostsEnvironment(Context& context) {
 }  // namespace
 
 std::vector<Case> backendCases() {
-    const auto row = [](const char* id, const char* case_name, const char* title, const char* expected, const char* source, std::uint64_t needs, void (*run)(Context&)) {
-        return Case{.id = id, .name = case_name, .title = title, .expected = expected, .source = source, .tolerance = "same bits", .level = Level::Commit, .needs = needs, .run = run};
+    const auto row = [](const char* id, const char* case_name, const char* title, const char* expected, const char* source, std::uint64_t needs,
+                        void (*run)(Context&)) {
+        return Case{.id = id,
+                    .name = case_name,
+                    .title = title,
+                    .expected = expected,
+                    .source = source,
+                    .tolerance = "same bits",
+                    .level = Level::Commit,
+                    .needs = needs,
+                    .run = run};
     };
     constexpr const char* kPortable = "crt's own portable build of the kernel";
     return {
-        row("L01", "shipped-flags", "Every feature, under the flags that the backend ships with", "the portable build's image, with all AOVs", kPortable, 0, shippedFlags),
-        row("L02", "random-numbers", "10^6 numbers of each sampler (10^4 on commits)", "the portable build's", kPortable, CRT_FEATURE_AOV, randomNumbers),
-        row("L03", "first-hits", "10^6 first hits on a sphere and a box: primitive, normal, distance", "the portable build's", kPortable, CRT_FEATURE_BVH | CRT_FEATURE_AOV, firstHits),
+        row("L01", "shipped-flags", "Every feature, under the flags that the backend ships with", "the portable build's image, with all AOVs",
+            kPortable, 0, shippedFlags),
+        row("L02", "random-numbers", "10^6 numbers of each sampler (10^4 on commits)", "the portable build's", kPortable, CRT_FEATURE_AOV,
+            randomNumbers),
+        row("L03", "first-hits", "10^6 first hits on a sphere and a box: primitive, normal, distance", "the portable build's", kPortable,
+            CRT_FEATURE_BVH | CRT_FEATURE_AOV, firstHits),
         row("L04", "radiances", "Every feature, the same seed", "the portable build's radiances", kPortable, 0, radiances),
-        row("L05", "run-to-run", "The same render five times", "the same image", "docs/architecture.md, Same bits", CRT_FEATURE_BVH | CRT_FEATURE_NEE, runToRun),
-        row("L06", "lost-devices", "A device that is lost, or out of memory or time", "a clean error, and what there was is kept", "docs/architecture.md, Exit codes", 0, lostDevices),
-        row("L07", "hosts-environment", "A host that rounds upwards, to zero, or flushes subnormals", "the same image", "the backend sets what it needs", CRT_FEATURE_BVH | CRT_FEATURE_NEE,
-            hostsEnvironment),
+        row("L05", "run-to-run", "The same render five times", "the same image", "docs/architecture.md, Same bits", CRT_FEATURE_BVH | CRT_FEATURE_NEE,
+            runToRun),
+        row("L06", "lost-devices", "A device that is lost, or out of memory or time", "a clean error, and what there was is kept",
+            "docs/architecture.md, Exit codes", 0, lostDevices),
+        row("L07", "hosts-environment", "A host that rounds upwards, to zero, or flushes subnormals", "the same image",
+            "the backend sets what it needs", CRT_FEATURE_BVH | CRT_FEATURE_NEE, hostsEnvironment),
     };
 }
 

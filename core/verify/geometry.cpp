@@ -1,4 +1,5 @@
-// Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a ray that leaks, or meets what it should not, shows.
+// Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a ray that leaks, or meets what it should
+// not, shows.
 #include "verify/probes.h"
 
 #include "kernel/features.h"
@@ -56,7 +57,8 @@ void withoutArea(Context& context) {
         addTriangle(mesh, a, b, c);
         addObject(more, std::move(mesh), diffuse(0.5), radiance_of_it);
         const int warnings = warningCount();
-        context.sameBits(what, clean, context.render(more, samples(4)), "a triangle without area is hit, sampled as a light, or decides where the scene's centre is");
+        context.sameBits(what, clean, context.render(more, samples(4)),
+                         "a triangle without area is hit, sampled as a light, or decides where the scene's centre is");
         context.holds(fmt::format("{}: said", what), warningCount() > warnings, "a warning", "triangles are left out silently");
     };
     with("a point", {0.5, 0.5, 0.5}, {0.5, 0.5, 0.5}, {0.5, 0.5, 0.5}, 0);
@@ -102,7 +104,8 @@ void slivers(Context& context) {
         if (hits.rays == 0)
             context.holds(fmt::format("1 : 1e{}", exponent), true, "no false hit", "", "thinner than rays hit");
         else
-            rareFailures(context, fmt::format("1 : 1e{}", exponent), hits, 1e-6, "a false hit far off the triangle: its distance is a quotient of roundings");
+            rareFailures(context, fmt::format("1 : 1e{}", exponent), hits, 1e-6,
+                         "a false hit far off the triangle: its distance is a quotient of roundings");
     }
 }
 
@@ -118,7 +121,8 @@ void duplicates(Context& context) {
     };
     const Film one = stack(1);
     for (const std::uint64_t copies : {std::uint64_t{2}, std::uint64_t{100}, byLevel(context, 1000, 10000, 100000)})
-        context.sameBits(fmt::format("{} copies", copies), one, stack(copies), "of equally near triangles not the first in the author's order is hit");
+        context.sameBits(fmt::format("{} copies", copies), one, stack(copies),
+                         "of equally near triangles not the first in the author's order is hit");
 }
 
 void coplanar(Context& context) {
@@ -140,7 +144,8 @@ void coplanar(Context& context) {
         if (ulps == 0)
             context.holds("in one plane", nearer == 0, "the first in the author's order", "ties are decided by the order of testing", note);
         else if (ulps == 32)
-            context.holds("32 ulp apart", first == 0, "always the nearer one", "the error of distances is larger than that of the triangle test", note);
+            context.holds("32 ulp apart", first == 0, "always the nearer one", "the error of distances is larger than that of the triangle test",
+                          note);
         else
             context.holds(fmt::format("{} ulp apart", ulps), first + nearer == 4096, "one of the two", "neither is hit", note);
     }
@@ -165,7 +170,8 @@ void touching(Context& context) {
             dark.integrator.max_depth = 0;
             worst = std::max(worst, worstRatio(context.render(scene, samples(16)), context.render(dark, samples(16)), furnace(0.5, 16)));
         }
-        context.absolute(fmt::format("{}: the worst pixel", what), worst, 0, 2e-6, {{0.01, "light leaks where two surfaces touch: a ray's offset carries it through both"}});
+        context.absolute(fmt::format("{}: the worst pixel", what), worst, 0, 2e-6,
+                         {{0.01, "light leaks where two surfaces touch: a ray's offset carries it through both"}});
     };
     ask("a sphere that touches the floor", icosphere(3, 0.25, {0.5, 0.25, 0.5}));
     ask("a box that stands on the floor, in a corner", boxMesh({0.5, 0, 0.5}, {1, 0.5, 1}));
@@ -215,7 +221,8 @@ void lightTightBox(Context& context) {
 }
 
 void cracks(Context& context) {
-    // Two squares side by side in a plane; where they meet, one has a vertex in the middle of the other's edge. Rays at a stretch of 1e-4 around it.
+    // Two squares side by side in a plane; where they meet, one has a vertex in the middle of the other's edge. Rays at a stretch of 1e-4 around
+    // it.
     const auto leaks = [&](double gap, double middle) {
         Scene scene = emptyScene(64, 1, {0.5, 0, -0.75}, {0.5, 0, 0.25}, 5e-5);
         scene.integrator.max_depth = 0;
@@ -237,7 +244,8 @@ void cracks(Context& context) {
     for (const double ulps : {4.0, 64.0}) {
         const double gap = ulps * 0x1p-24, expected = gap / 1e-4;
         const auto [rate, rays] = leaks(gap, 0);
-        context.absolute(fmt::format("a crack of {} ulp: share of rays that pass", ulps), rate, expected, 0.25 * expected + 5 * std::sqrt(expected / rays),
+        context.absolute(fmt::format("a crack of {} ulp: share of rays that pass", ulps), rate, expected,
+                         0.25 * expected + 5 * std::sqrt(expected / rays),
                          {{0, "a real crack is closed: are triangles enlarged, or edges tested with a tolerance?"}});
     }
 }
@@ -249,7 +257,8 @@ void nonManifold(Context& context) {
     for (int i = 0; i < 48; ++i) {  // a Möbius strip
         const auto rim = [&](int k, double side) {
             const double phi = k * 2 * 3.14159265358979 / 48, half = phi / 2;
-            return Vec3d{0.5 + (0.2 + side * 0.08 * std::cos(half)) * std::cos(phi), 0.3 + side * 0.08 * std::sin(half), 0.5 + (0.2 + side * 0.08 * std::cos(half)) * std::sin(phi)};
+            return Vec3d{0.5 + (0.2 + side * 0.08 * std::cos(half)) * std::cos(phi), 0.3 + side * 0.08 * std::sin(half),
+                         0.5 + (0.2 + side * 0.08 * std::cos(half)) * std::sin(phi)};
         };
         addQuad(mesh, rim(i, -1), rim(i + 1, -1), rim(i + 1, 1), rim(i, 1));
     }
@@ -266,8 +275,8 @@ void nonManifold(Context& context) {
     const Film film = context.render(open, samples(64));
     double brightest = 0;
     forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = std::max(brightest, radiance(film, x, y)); });
-    context.holds("the same of glass, which is open", film.invalidSamples() == 0 && std::isfinite(brightest), "finite, to its end", "a path without end, or NaN",
-                  fmt::format("brightest pixel {:.3g}", brightest));
+    context.holds("the same of glass, which is open", film.invalidSamples() == 0 && std::isfinite(brightest), "finite, to its end",
+                  "a path without end, or NaN", fmt::format("brightest pixel {:.3g}", brightest));
 }
 
 /// A block in the lit room, its faces turned round or not.
@@ -281,7 +290,8 @@ Scene blockIn(const Material& material, bool inwards, std::uint64_t seed) {
 std::vector<double> ratiosOfBlocks(Context& context, const Material& a, const Material& b, std::uint64_t count) {
     std::vector<double> all;
     for (std::uint64_t seed = 1; seed <= 8; ++seed)
-        all.push_back(radiance(context.render(blockIn(b, true, seed), samples(count))) / radiance(context.render(blockIn(a, false, seed), samples(count))));
+        all.push_back(radiance(context.render(blockIn(b, true, seed), samples(count))) /
+                      radiance(context.render(blockIn(a, false, seed), samples(count))));
     return all;
 }
 
@@ -307,9 +317,12 @@ Scene smoothBall(Vec3d (*normal_of)(const Vec3d&), double albedo) {
 void shadingNormals(Context& context) {
     // Up to 37° off on this ball; then tilted by up to 89°.
     const auto radial = +[](const Vec3d& p) { return p; };
-    const auto tilted = +[](const Vec3d& p) { return unit(p * std::cos(89 * 3.14159265 / 180) + unit(cross(p, {0.3, 0.5, 0.7})) * std::sin(89 * 3.14159265 / 180)); };
+    const auto tilted = +[](const Vec3d& p) {
+        return unit(p * std::cos(89 * 3.14159265 / 180) + unit(cross(p, {0.3, 0.5, 0.7})) * std::sin(89 * 3.14159265 / 180));
+    };
     for (const auto& [what, normals] : {std::pair{"20 faces, smooth", radial}, {"20 faces, normals tilted by 89 degrees", tilted}}) {
-        const Film film = context.render(smoothBall(normals, 0.8), samples(64, kAovPrimitive)), white = context.render(smoothBall(nullptr, 1), samples(64));
+        const Film film = context.render(smoothBall(normals, 0.8), samples(64, kAovPrimitive)),
+                   white = context.render(smoothBall(nullptr, 1), samples(64));
         double brightest = 0;
         forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) {
             if (film.primitives[static_cast<std::size_t>(y) * 48 + x] == CRT_NONE) return;
@@ -317,33 +330,62 @@ void shadingNormals(Context& context) {
         });
         // A pixel at the rim sees the sky as well.
         const double whole = radiance(film) / radiance(white);
-        context.holds(fmt::format("{}: energy", what), brightest <= 1 + 1e-6 && whole < 1 && film.invalidSamples() == 0, "no pixel brighter than the sky",
-                      "a shading normal makes light", fmt::format("brightest {:.6f}, mean {:.4f} of the sky", brightest, whole));
+        context.holds(fmt::format("{}: energy", what), brightest <= 1 + 1e-6 && whole < 1 && film.invalidSamples() == 0,
+                      "no pixel brighter than the sky", "a shading normal makes light",
+                      fmt::format("brightest {:.6f}, mean {:.4f} of the sky", brightest, whole));
     }
     // Inside its outline a pixel brings at most its reflectance.
-    const Film film = context.render([&] {
-        Scene scene = smoothBall(radial, 0.8);
-        scene.camera.tan_half_width = scene.camera.tan_half_height = 0.15;
-        return scene;
-    }(), samples(64));
-    const Film sky = context.render([&] {
-        Scene scene = smoothBall(nullptr, 1);
-        scene.camera.tan_half_width = scene.camera.tan_half_height = 0.15;
-        return scene;
-    }(), samples(64));
+    const Film film = context.render(
+        [&] {
+            Scene scene = smoothBall(radial, 0.8);
+            scene.camera.tan_half_width = scene.camera.tan_half_height = 0.15;
+            return scene;
+        }(),
+        samples(64));
+    const Film sky = context.render(
+        [&] {
+            Scene scene = smoothBall(nullptr, 1);
+            scene.camera.tan_half_width = scene.camera.tan_half_height = 0.15;
+            return scene;
+        }(),
+        samples(64));
     double brightest = 0;
     forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = std::max(brightest, radiance(film, x, y) / radiance(sky, x, y)); });
-    context.holds("20 faces, smooth: no more than the reflectance", brightest <= 0.8 * (1 + 1e-6), "≤ 0.8 in every pixel", "a shading normal makes light",
-                  fmt::format("brightest {:.6f}", brightest));
+    context.holds("20 faces, smooth: no more than the reflectance", brightest <= 0.8 * (1 + 1e-6), "≤ 0.8 in every pixel",
+                  "a shading normal makes light", fmt::format("brightest {:.6f}", brightest));
 }
 
 void oddNormals(Context& context) {
-    const Film flat = context.render(smoothBall(nullptr, 0.8), samples(4)), smooth = context.render(smoothBall(+[](const Vec3d& p) { return p; }, 0.8), samples(4));
+    const Film flat = context.render(smoothBall(nullptr, 0.8), samples(4)), smooth = context.render(smoothBall(
+                                                                                                        +[](const Vec3d&p) { return p; }, 0.8),
+                                                                                                    samples(4));
     const std::string physics = "a shading normal is used as it came: not normalised, not checked, or on the wrong side";
-    context.sameBits("zero: as flat", flat, context.render(smoothBall(+[](const Vec3d&) { return Vec3d{0, 0, 0}; }, 0.8), samples(4)), physics);
-    context.sameBits("NaN: as flat", flat, context.render(smoothBall(+[](const Vec3d&) { return Vec3d{kNone, 0, 1}; }, 0.8), samples(4)), physics);
-    context.sameBits("eight times as long: as of unit length", smooth, context.render(smoothBall(+[](const Vec3d& p) { return p * 8; }, 0.8), samples(4)), physics);
-    context.sameBits("on the other side: turned round", smooth, context.render(smoothBall(+[](const Vec3d& p) { return p * -1; }, 0.8), samples(4)), physics);
+    context.sameBits("zero: as flat", flat,
+                     context.render(smoothBall(
+                                        +[](const Vec3d&) {
+                                            return Vec3d{0, 0, 0};
+                                        },
+                                        0.8),
+                                    samples(4)),
+                     physics);
+    context.sameBits("NaN: as flat", flat,
+                     context.render(smoothBall(
+                                        +[](const Vec3d&) {
+                                            return Vec3d{kNone, 0, 1};
+                                        },
+                                        0.8),
+                                    samples(4)),
+                     physics);
+    context.sameBits("eight times as long: as of unit length", smooth,
+                     context.render(smoothBall(
+                                        +[](const Vec3d& p) { return p * 8; }, 0.8),
+                                    samples(4)),
+                     physics);
+    context.sameBits("on the other side: turned round", smooth,
+                     context.render(smoothBall(
+                                        +[](const Vec3d& p) { return p * -1; }, 0.8),
+                                    samples(4)),
+                     physics);
 }
 
 void insideOut(Context& context) {
@@ -389,11 +431,12 @@ void manyTriangles(Context& context) {
     }
     addObject(scene, std::move(mesh), diffuse(0.5));
     const CompiledScene compiled = compileScene(scene, 0);
-    context.absolute(fmt::format("{} triangles: bytes of the compiled scene per triangle", count), static_cast<double>(compiled.size_bytes) / static_cast<double>(count), 130, 40,
-                     {{400, "memory grows faster than the scene"}});
+    context.absolute(fmt::format("{} triangles: bytes of the compiled scene per triangle", count),
+                     static_cast<double>(compiled.size_bytes) / static_cast<double>(count), 130, 40, {{400, "memory grows faster than the scene"}});
     const Film tree = context.render(scene, samples(1, kFirstHit));
     scene.integrator.accelerator = Accelerator::None;
-    context.sameBits(fmt::format("{} triangles, 1024 rays: as without a tree", count), context.render(scene, samples(1, kFirstHit)), tree, "the tree loses a triangle");
+    context.sameBits(fmt::format("{} triangles, 1024 rays: as without a tree", count), context.render(scene, samples(1, kFirstHit)), tree,
+                     "the tree loses a triangle");
 }
 
 void fewTriangles(Context& context) {
@@ -407,7 +450,8 @@ void fewTriangles(Context& context) {
         addObject(scene, std::move(mesh), diffuse(0.5));
         const Film tree = context.render(scene, samples(2, kFirstHit));
         scene.integrator.accelerator = Accelerator::None;
-        context.sameBits(fmt::format("{} triangles", count), context.render(scene, samples(2, kFirstHit)), tree, "a tree of one leaf, or of none, is no tree");
+        context.sameBits(fmt::format("{} triangles", count), context.render(scene, samples(2, kFirstHit)), tree,
+                         "a tree of one leaf, or of none, is no tree");
     }
 }
 
@@ -419,41 +463,50 @@ std::vector<Case> geometryCases() {
     constexpr std::uint64_t kHits = CRT_FEATURE_BVH | CRT_FEATURE_AOV;
     const auto row = [](const char* id, const char* case_name, const char* title, const char* expected, const char* source, const char* tolerance,
                         std::uint64_t needs, void (*run)(Context&)) {
-        return Case{.id = id, .name = case_name, .title = title, .expected = expected, .source = source, .tolerance = tolerance, .level = Level::Commit,
-                    .needs = needs, .run = run};
+        return Case{.id = id,
+                    .name = case_name,
+                    .title = title,
+                    .expected = expected,
+                    .source = source,
+                    .tolerance = tolerance,
+                    .level = Level::Commit,
+                    .needs = needs,
+                    .run = run};
     };
     return {
-        row("C01", "without-area", "Triangles without area: points, lines, emitting ones, far outside", "the image without them, and a warning", "nobody can see them",
-            "same bits", kFurnace | CRT_FEATURE_NEE, withoutArea),
-        row("C02", "slivers", "Triangles of 1 : 1e3 … 1 : 1e8", "hits lie on their triangle", "geometry; Embree's issue 387", "rate of false hits ≤ 1e-6, off by more than 1e-5",
-            kHits, slivers),
-        row("C03", "duplicates", "A quad 2, 100 and up to 100,000 times", "the image of one; the first in the author's order is hit", "docs/architecture.md, Same bits",
-            "same bits, with primitives", kHits | CRT_FEATURE_DIFFUSE, duplicates),
-        row("C04", "coplanar", "Squares in one plane, and 1, 4 and 32 ulp apart", "the first; from 32 ulp on always the nearer", "docs/architecture.md, Same bits", "every ray",
-            kHits | CRT_FEATURE_AREA_LIGHT, coplanar),
-        row("C05", "touching", "A sphere on the floor, a box in a corner, boxes with a face in common, in a furnace", "E (1 − ρ^(k+1)) / (1 − ρ)", "geometric series",
-            "2e-6", kFurnace, touching),
-        row("C06", "thin-walls", "A bright sky around walls of 1e-3, 1e-4 and 1e-5", "inside exactly 0", "the room is closed", "exactly",
-            kSky, thinWalls),
-        row("C07", "light-tight-box", "A white box in odd poses under a bright sky; 1e9 paths at night", "no light inside", "the room is closed", "rate of leaks ≤ 7.7e-9",
-            kSky, lightTightBox),
-        row("C08", "cracks", "A vertex on another triangle's edge, exactly and 4 and 64 ulp off it", "no leak; as much as the crack is wide", "area of the crack", "± 25 %",
-            kSky, cracks),
-        row("C09", "non-manifold", "Edges of four faces, a Möbius strip, in a furnace; the same as open glass", "E (1 − ρ^(k+1)) / (1 − ρ); finite", "geometric series", "2e-6",
-            kFurnace | CRT_FEATURE_DIELECTRIC, nonManifold),
+        row("C01", "without-area", "Triangles without area: points, lines, emitting ones, far outside", "the image without them, and a warning",
+            "nobody can see them", "same bits", kFurnace | CRT_FEATURE_NEE, withoutArea),
+        row("C02", "slivers", "Triangles of 1 : 1e3 … 1 : 1e8", "hits lie on their triangle", "geometry; Embree's issue 387",
+            "rate of false hits ≤ 1e-6, off by more than 1e-5", kHits, slivers),
+        row("C03", "duplicates", "A quad 2, 100 and up to 100,000 times", "the image of one; the first in the author's order is hit",
+            "docs/architecture.md, Same bits", "same bits, with primitives", kHits | CRT_FEATURE_DIFFUSE, duplicates),
+        row("C04", "coplanar", "Squares in one plane, and 1, 4 and 32 ulp apart", "the first; from 32 ulp on always the nearer",
+            "docs/architecture.md, Same bits", "every ray", kHits | CRT_FEATURE_AREA_LIGHT, coplanar),
+        row("C05", "touching", "A sphere on the floor, a box in a corner, boxes with a face in common, in a furnace", "E (1 − ρ^(k+1)) / (1 − ρ)",
+            "geometric series", "2e-6", kFurnace, touching),
+        row("C06", "thin-walls", "A bright sky around walls of 1e-3, 1e-4 and 1e-5", "inside exactly 0", "the room is closed", "exactly", kSky,
+            thinWalls),
+        row("C07", "light-tight-box", "A white box in odd poses under a bright sky; 1e9 paths at night", "no light inside", "the room is closed",
+            "rate of leaks ≤ 7.7e-9", kSky, lightTightBox),
+        row("C08", "cracks", "A vertex on another triangle's edge, exactly and 4 and 64 ulp off it", "no leak; as much as the crack is wide",
+            "area of the crack", "± 25 %", kSky, cracks),
+        row("C09", "non-manifold", "Edges of four faces, a Möbius strip, in a furnace; the same as open glass", "E (1 − ρ^(k+1)) / (1 − ρ); finite",
+            "geometric series", "2e-6", kFurnace | CRT_FEATURE_DIELECTRIC, nonManifold),
         row("C10", "flipped-normals", "A diffuse block turned inside out; a glass one, of the inverse index", "the same image in the mean",
             "Lambertian surfaces have two sides; n to 1/n", "± 0.1 %", kFurnace | CRT_FEATURE_NEE | CRT_FEATURE_DIELECTRIC, flippedNormals),
-        row("C11", "shading-normals", "A smooth ball of 20 faces; normals tilted by 89 degrees", "no more light than the sky's, or than reflectance allows", "energy",
-            "1e-6", kSky | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_AOV, shadingNormals),
-        row("C12", "odd-normals", "Shading normals that are zero, NaN, too long, on the other side", "flat, flat, normalised, turned round", "docs/scene.md", "same bits",
-            kSky | CRT_FEATURE_SMOOTH_NORMALS, oddNormals),
-        row("C13", "inside-out", "A furnace seen through the back of its faces", "E (1 − ρ^(k+1)) / (1 − ρ)", "Lambertian surfaces have two sides", "2e-6", kFurnace, insideOut),
+        row("C11", "shading-normals", "A smooth ball of 20 faces; normals tilted by 89 degrees",
+            "no more light than the sky's, or than reflectance allows", "energy", "1e-6", kSky | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_AOV,
+            shadingNormals),
+        row("C12", "odd-normals", "Shading normals that are zero, NaN, too long, on the other side", "flat, flat, normalised, turned round",
+            "docs/scene.md", "same bits", kSky | CRT_FEATURE_SMOOTH_NORMALS, oddNormals),
+        row("C13", "inside-out", "A furnace seen through the back of its faces", "E (1 − ρ^(k+1)) / (1 − ρ)", "Lambertian surfaces have two sides",
+            "2e-6", kFurnace, insideOut),
         row("C14", "mirror-funnel", "A needle of mirrors, 1 : 1000, 1000 bounces", "ends; no pixel brighter than the sky", "energy", "1e-4",
             CRT_FEATURE_BVH | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ENVIRONMENT, mirrorFunnel),
-        row("C15", "many-triangles", "10^7 random triangles (20,000 on commits)", "some 130 bytes each; first hits as without a tree", "a tree only culls", "same bits",
-            kHits | CRT_FEATURE_BRUTE_FORCE, manyTriangles),
-        row("C16", "few-triangles", "0 to 5 triangles with a tree", "the image without one", "a tree only culls", "same bits", kSky | CRT_FEATURE_AOV | CRT_FEATURE_BRUTE_FORCE,
-            fewTriangles),
+        row("C15", "many-triangles", "10^7 random triangles (20,000 on commits)", "some 130 bytes each; first hits as without a tree",
+            "a tree only culls", "same bits", kHits | CRT_FEATURE_BRUTE_FORCE, manyTriangles),
+        row("C16", "few-triangles", "0 to 5 triangles with a tree", "the image without one", "a tree only culls", "same bits",
+            kSky | CRT_FEATURE_AOV | CRT_FEATURE_BRUTE_FORCE, fewTriangles),
     };
 }
 

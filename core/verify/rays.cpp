@@ -1,4 +1,5 @@
-// Group D: rays and traversal. Rays are those of cameras, known beforehand (probes.h); what they must meet is known by topology or by arithmetic in double.
+// Group D: rays and traversal. Rays are those of cameras, known beforehand (probes.h); what they must meet is known by topology or by arithmetic in
+// double.
 #include "verify/probes.h"
 
 #include "kernel/features.h"
@@ -24,13 +25,15 @@ std::uint64_t byLevel(const Context& context, std::uint64_t commit, std::uint64_
 void aimedRays(Context& context) {
     for (const Aim aim : {Aim::Vertex, Aim::Edge, Aim::Face}) {
         const std::uint64_t rays = byLevel(context, 16000, 200000, 10000000), per_vertex = aim == Aim::Face ? 16 : 1;
-        rareFailures(context, fmt::format("rays at {}", name(aim)),
-                     collect(rays, [&](std::uint64_t seed) { return missesOfAimedRays(context, aim, kPlaces[0], 64, seed, per_vertex); }), 1e-6,
-                     "rays slip through where triangles meet: is the sign of the edge functions not the same from both sides, or a candidate culled?");
+        rareFailures(
+            context, fmt::format("rays at {}", name(aim)),
+            collect(rays, [&](std::uint64_t seed) { return missesOfAimedRays(context, aim, kPlaces[0], 64, seed, per_vertex); }), 1e-6,
+            "rays slip through where triangles meet: is the sign of the edge functions not the same from both sides, or a candidate culled?");
     }
 }
 
-/// A wall across the view at z = 1, cut into `cells`² squares, whose edges and boxes' faces lie in the planes of constant x and y through the origin.
+/// A wall across the view at z = 1, cut into `cells`² squares, whose edges and boxes' faces lie in the planes of constant x and y through the
+/// origin.
 Mesh wall(int cells) {
     Mesh mesh;
     const auto at = [&](int i) { return 2.0 * i / cells - 1; };
@@ -72,7 +75,8 @@ Tally missesOfWall(Context& context, double width, double height, int axis, bool
 
 void raysInFaces(Context& context) {
     const std::string physics = "a box is culled that the ray runs along: 0·∞ in the slab test, a clamped reciprocal, or the sign of −0";
-    for (const auto& [what, width, height] : {std::tuple{"rays in the plane of the boxes' faces", 0.5, 0.0}, {"rays in two such planes, along an axis", 0.0, 0.0}}) {
+    for (const auto& [what, width, height] :
+         {std::tuple{"rays in the plane of the boxes' faces", 0.5, 0.0}, {"rays in two such planes, along an axis", 0.0, 0.0}}) {
         Tally all;
         for (int axis = 0; axis < 3; ++axis)
             for (const bool back : {false, true}) all += missesOfWall(context, width, height, axis, back);
@@ -157,13 +161,16 @@ void raysThatAreNone(Context& context) {
                           "no scene makes them; the kernel's tests ask ('rays that are none hit nothing, and end', tests/unit_kernel_rays.cpp)");
 }
 
-const char* const kTriangle = "crt: 1\ncamera: {{position: [0, 0, -3], target: [0, 0, 0], fov: 40}}\nfilm: {{resolution: [4, 4]}}\nenvironment: {{radiance: 1}}\n"
-                              "materials: {{m: {{type: diffuse, reflectance: 0.5}}}}\n"
-                              "objects: [{{material: m, mesh: {{positions: [[0, 0, 0], [1, 0, 0], [0, {}, 0]], faces: [[0, 1, 2]]}}}}]\n";
+const char* const kTriangle =
+    "crt: 1\ncamera: {{position: [0, 0, -3], target: [0, 0, 0], fov: 40}}\nfilm: {{resolution: [4, 4]}}\nenvironment: {{radiance: 1}}\n"
+    "materials: {{m: {{type: diffuse, reflectance: 0.5}}}}\n"
+    "objects: [{{material: m, mesh: {{positions: [[0, 0, 0], [1, 0, 0], [0, {}, 0]], faces: [[0, 1, 2]]}}}}]\n";
 
 void verticesThatAreNone(Context& context) {
-    for (const auto& [number, words] : {std::pair{".nan", "NaN and infinity have no place"}, {".inf", "NaN and infinity have no place"},
-                                        {"-.inf", "NaN and infinity have no place"}, {"1e999", "outside the range of a double"}})
+    for (const auto& [number, words] : {std::pair{".nan", "NaN and infinity have no place"},
+                                        {".inf", "NaN and infinity have no place"},
+                                        {"-.inf", "NaN and infinity have no place"},
+                                        {"1e999", "outside the range of a double"}})
         context.refused(fmt::format("a vertex at {}", number), fmt::format(fmt::runtime(kTriangle), number), words);
     const Film film = context.render(fmt::format(fmt::runtime(kTriangle), "1e30"));
     context.holds("a vertex at 1e30", film.invalidSamples() == 0, "accepted, finite", "an overflow");
@@ -185,7 +192,8 @@ Mesh soup(Dice& dice, int count, double least = -2.5, double most = -0.5) {
 constexpr std::uint32_t kFirstHit = kAovNormal | kAovDepth | kAovPrimitive;
 
 void occlusionAndClosest(Context& context) {
-    // Light sampling asks whether anything is in between, scattering what is nearest. Where only one of them brings light, both must bring the same.
+    // Light sampling asks whether anything is in between, scattering what is nearest. Where only one of them brings light, both must bring the
+    // same.
     const int count = context.atLeast(Level::Merge) ? 12 : 2;
     for (int i = 0; i < count; ++i) {
         Dice dice(static_cast<std::uint64_t>(i) + 1);
@@ -203,17 +211,21 @@ void occlusionAndClosest(Context& context) {
             const double by_scattering = radiance(context.render(scene, {.samples = n, .seed = seed}));
             ratio.push_back(radiance(context.render(light_sampling, {.samples = n, .seed = seed})) / by_scattering);
         }
-        context.equivalent(fmt::format("400 triangles, scene {}: light sampling over scattering", i), ratio, 1, static_cast<double>(byLevel(context, 40, 20, 5)) * 1e-3);
+        context.equivalent(fmt::format("400 triangles, scene {}: light sampling over scattering", i), ratio, 1,
+                           static_cast<double>(byLevel(context, 40, 20, 5)) * 1e-3);
     }
 }
 
 void bruteForceAndTree(Context& context) {
     Dice dice(9);
-    const std::pair<const char*, Mesh> meshes[] = {{"60 triangles", soup(dice, 60)}, {"2000 triangles", soup(dice, 2000)}, {"sphere of 1280", icosphere(3, 0.9, {0, 0, 0})},
+    const std::pair<const char*, Mesh> meshes[] = {{"60 triangles", soup(dice, 60)},
+                                                   {"2000 triangles", soup(dice, 2000)},
+                                                   {"sphere of 1280", icosphere(3, 0.9, {0, 0, 0})},
                                                    {"wall in the axes' planes", wall(16)}};
     for (const auto& [what, mesh] : meshes)
         for (const double distance : {0.05, 3.0, 1e4}) {
-            Scene scene = emptyScene(context.atLeast(Level::Merge) ? 320 : 64, 3, Vec3d{0.1, 0.2, -1} * distance, {0, 0, 0}, distance > 1 ? 1 / distance : 1);
+            Scene scene =
+                emptyScene(context.atLeast(Level::Merge) ? 320 : 64, 3, Vec3d{0.1, 0.2, -1} * distance, {0, 0, 0}, distance > 1 ? 1 / distance : 1);
             scene.integrator.max_depth = 0;
             addObject(scene, mesh, diffuse(0.5));
             const Film tree = context.render(scene, samples(1, kFirstHit));
@@ -253,29 +265,37 @@ void deepTree(Context& context) {
 std::vector<Case> rayCases() {
     const auto row = [](const char* id, const char* case_name, const char* title, const char* expected, const char* source, const char* tolerance,
                         std::uint64_t needs, void (*run)(Context&)) {
-        return Case{.id = id, .name = case_name, .title = title, .expected = expected, .source = source, .tolerance = tolerance, .level = Level::Commit,
-                    .needs = needs, .run = run};
+        return Case{.id = id,
+                    .name = case_name,
+                    .title = title,
+                    .expected = expected,
+                    .source = source,
+                    .tolerance = tolerance,
+                    .level = Level::Commit,
+                    .needs = needs,
+                    .run = run};
     };
     return {
         row("D01", "aimed-rays", "Rays at the vertices, edges and faces of crumpled sheets that cover the film", "none slips through", "topology",
             "rate of misses ≤ 1e-6 each", kNeeds, aimedRays),
         row("D02", "rays-in-faces", "Rays in the planes of boxes' faces, along all axes, components of ±0", "every ray meets the wall", "geometry",
             "rate of misses ≤ 1e-6", kNeeds, raysInFaces),
-        row("D03", "nearly-parallel", "Directions with components of 1e-10, 1e-20, 1e-38 and 1e-42", "every ray meets the wall", "geometry", "rate of misses ≤ 1e-6",
-            kNeeds, nearlyParallelRays),
+        row("D03", "nearly-parallel", "Directions with components of 1e-10, 1e-20, 1e-38 and 1e-42", "every ray meets the wall", "geometry",
+            "rate of misses ≤ 1e-6", kNeeds, nearlyParallelRays),
         row("D04", "grazing", "Rays at 1e-1 … 1e-7 rad to a mirror of 100 × 100 cells", "reflected to the sky, from a point of the floor", "geometry",
             "rate of false hits ≤ 1e-5", kNeeds | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AOV, grazingRays),
         row("D05", "starts-on-surfaces", "A camera in a face, on an edge, on a vertex", "segments are open: the surface is not met",
             "docs/decisions/0004-ray-offsets.md", "none of 1024 pixels", kNeeds | CRT_FEATURE_AREA_LIGHT, startsOnSurfaces),
-        row("D06", "rays-that-are-none", "Cameras that make rays of NaN or without direction", "refused", "docs/scene.md", "refused by name", 0, raysThatAreNone),
+        row("D06", "rays-that-are-none", "Cameras that make rays of NaN or without direction", "refused", "docs/scene.md", "refused by name", 0,
+            raysThatAreNone),
         row("D07", "vertices-that-are-none", "Vertices at NaN, ±infinity, 1e999; at 1e30", "refused; accepted", "docs/scene.md", "refused by name", 0,
             verticesThatAreNone),
         row("D08", "occlusion-and-closest", "Light sampling and chance hits in a thicket", "the same radiance", "both estimate the same integral",
             "± 4 %; ± 2 % before merges, ± 0.5 % at night", CRT_FEATURE_BVH | CRT_FEATURE_NEE | CRT_FEATURE_AREA_LIGHT, occlusionAndClosest),
         row("D09", "brute-force-and-tree", "First hits with and without a tree, from inside, outside and far away", "the same", "a tree only culls",
             "same bits, with depth, normal and primitive", CRT_FEATURE_BVH | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_AOV, bruteForceAndTree),
-        row("D10", "deep-tree", "2^20 nested triangles (2^12 on commits)", "rendered to its end, and as without a tree", "a tree only culls", "same bits",
-            CRT_FEATURE_BVH | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_AOV, deepTree),
+        row("D10", "deep-tree", "2^20 nested triangles (2^12 on commits)", "rendered to its end, and as without a tree", "a tree only culls",
+            "same bits", CRT_FEATURE_BVH | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_AOV, deepTree),
     };
 }
 

@@ -15,7 +15,8 @@
 namespace crt::verify {
 namespace {
 
-constexpr std::uint64_t kLitRoom = CRT_FEATURE_BVH | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_DIFFUSE | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
+constexpr std::uint64_t kLitRoom =
+    CRT_FEATURE_BVH | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_DIFFUSE | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
 
 Render samples(std::uint64_t count, std::uint32_t aovs = 0) { return {.samples = count, .aovs = aovs}; }
 
@@ -23,7 +24,8 @@ void scaling(Context& context) {
     const Scene scene = litRoom(24, 1);
     const Film here = context.render(scene, samples(4, kAovNormal | kAovPrimitive));
     for (const int m : {-40, -7, -1, 1, 13, 40})
-        context.sameBits(fmt::format("times 2^{}", m), here, context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4, kAovNormal | kAovPrimitive)),
+        context.sameBits(fmt::format("times 2^{}", m), here,
+                         context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4, kAovNormal | kAovPrimitive)),
                          "an absolute length survives somewhere: an epsilon, a smallest distance, a clamp");
 }
 
@@ -51,14 +53,16 @@ void permutation(Context& context) {
     };
     std::vector<double> ratios;
     for (std::uint64_t seed = 1; seed <= 8; ++seed)
-        ratios.push_back(radiance(context.render(permuted(litRoom(32, seed)), samples(64))) / radiance(context.render(litRoom(32, seed), samples(64))));
+        ratios.push_back(radiance(context.render(permuted(litRoom(32, seed)), samples(64))) /
+                         radiance(context.render(litRoom(32, seed), samples(64))));
     context.equivalent("x, y, z → z, x, y", ratios, 1, 0.01);
 }
 
 void triangleOrder(Context& context) {
     const Scene scene = litRoom(24, 1);
     Scene reversed = scene;
-    for (std::size_t i = 0; i + 1 < reversed.meshes.size(); ++i) std::reverse(reversed.meshes[i].triangles.begin(), reversed.meshes[i].triangles.end());
+    for (std::size_t i = 0; i + 1 < reversed.meshes.size(); ++i)
+        std::reverse(reversed.meshes[i].triangles.begin(), reversed.meshes[i].triangles.end());
     context.sameBits("triangles of every mesh but the lamp's backwards", context.render(scene, samples(4)), context.render(reversed, samples(4)),
                      "what is hit depends on the order of testing, beyond ties");
 }
@@ -67,7 +71,8 @@ void objectOrder(Context& context) {
     const Scene scene = litRoom(24, 1);
     Scene reversed = scene;
     std::reverse(reversed.objects.begin(), reversed.objects.end());
-    context.sameBits("objects backwards", context.render(scene, samples(4)), context.render(reversed, samples(4)), "what is hit depends on the order of testing, beyond ties");
+    context.sameBits("objects backwards", context.render(scene, samples(4)), context.render(reversed, samples(4)),
+                     "what is hit depends on the order of testing, beyond ties");
 }
 
 void vertexOrder(Context& context) {
@@ -104,7 +109,8 @@ integrator: {nee: false, max_depth: 3}
 film: {resolution: [16, 16]}
 camera: {fov: 40, target: [0, 0, 0], position: [0, 1, -3]}
 )";
-    context.sameBits("every mapping in another order", context.render(a, samples(4)), context.render(b, samples(4)), "the order of keys reaches the image");
+    context.sameBits("every mapping in another order", context.render(a, samples(4)), context.render(b, samples(4)),
+                     "the order of keys reaches the image");
 }
 
 void doubledEmission(Context& context) {
@@ -118,7 +124,8 @@ void doubledEmission(Context& context) {
         const std::size_t channel = i / 2 % one.shape().channels;
         one.sums[i] *= channel == 3 ? 4 : 2;  // the fourth holds squares
     }
-    context.sameBits("the lamp twice as bright: every sum doubled", one, two, "light is clamped, compressed or offset somewhere, or roulette looks at radiance");
+    context.sameBits("the lamp twice as bright: every sum doubled", one, two,
+                     "light is clamped, compressed or offset somewhere, or roulette looks at radiance");
 }
 
 void darkLight(Context& context) {
@@ -126,7 +133,8 @@ void darkLight(Context& context) {
     Scene more = scene;
     more.emissions.push_back({constantSpectrum(0), false});
     more.objects[2].emission = static_cast<std::int32_t>(more.emissions.size() - 1);
-    context.sameBits("a block that emits 0", context.render(scene, samples(4)), context.render(more, samples(4)), "a light without power takes part in the choice of lights");
+    context.sameBits("a block that emits 0", context.render(scene, samples(4)), context.render(more, samples(4)),
+                     "a light without power takes part in the choice of lights");
 }
 
 void hiddenObject(Context& context) {
@@ -141,7 +149,8 @@ void splitting(Context& context) {
     forEachVariant(context, 24, [](Context& c, const Variant& v) {
         const Film whole = c.render(v.scene, samples(4));
         for (const auto& [threads, tile] : {std::pair{1u, 1u}, {2u, 5u}, {7u, 16u}})
-            c.sameBits(fmt::format("{}: {} threads, tiles of {}", v.name, threads, tile), whole, c.render(v.scene, {.samples = 4, .threads = threads, .tile_size = tile}),
+            c.sameBits(fmt::format("{}: {} threads, tiles of {}", v.name, threads, tile), whole,
+                       c.render(v.scene, {.samples = 4, .threads = threads, .tile_size = tile}),
                        "pixels share state, or are summed in the order of the threads");
         Film crops = whole;
         for (const auto& [x0, y0, x1, y1] : {std::array{0, 0, 10, 24}, std::array{10, 0, 24, 7}, std::array{10, 7, 24, 24}}) {
@@ -153,29 +162,36 @@ void splitting(Context& context) {
                 std::copy_n(part.sums.begin() + static_cast<std::ptrdiff_t>(row * static_cast<std::size_t>(y - y0)), row,
                             crops.sums.begin() + static_cast<std::ptrdiff_t>(2u * whole.shape().channels * static_cast<std::size_t>(y * 24 + x0)));
         }
-        c.sameBits(fmt::format("{}: from three crops", v.name), whole, crops, "random numbers depend on the pixel's place in the crop instead of in the film");
+        c.sameBits(fmt::format("{}: from three crops", v.name), whole, crops,
+                   "random numbers depend on the pixel's place in the crop instead of in the film");
     });
 }
 
 void ranges(Context& context) {
     forEachVariant(context, 24, [](Context& c, const Variant& v) {
-        const auto part = [&](std::uint64_t first, std::uint64_t count) { return c.render(v.scene, {.samples = count, .first_sample = first, .aovs = kAllAovs}); };
+        const auto part = [&](std::uint64_t first, std::uint64_t count) {
+            return c.render(v.scene, {.samples = count, .first_sample = first, .aovs = kAllAovs});
+        };
         const Film whole = part(0, 12);
         Film merged = part(7, 5);
         merged.add(part(0, 2));
         merged.add(part(2, 5));
-        c.sameBits(fmt::format("{}: samples 7 to 12, 0 to 2 and 2 to 7", v.name), whole, merged, "a sample depends on those before it, or sums on their order");
+        c.sameBits(fmt::format("{}: samples 7 to 12, 0 to 2 and 2 to 7", v.name), whole, merged,
+                   "a sample depends on those before it, or sums on their order");
     });
 }
 
 void resuming(Context& context) {
-    context.notApplicable("killed and resumed", "asked of the program from outside: 'test_kill_then_resume_gives_the_same_bits' and 'test_ctrl_c_then_resume_gives_the_same_bits', "
-                                                "tests/cli/test_cli.py; M12 asks the same of the film");
+    context.notApplicable(
+        "killed and resumed",
+        "asked of the program from outside: 'test_kill_then_resume_gives_the_same_bits' and 'test_ctrl_c_then_resume_gives_the_same_bits', "
+        "tests/cli/test_cli.py; M12 asks the same of the film");
 }
 
 void twice(Context& context) {
     forEachVariant(context, 24, [](Context& c, const Variant& v) {
-        c.sameBits(v.name, c.render(v.scene, samples(8, kAllAovs)), c.render(v.scene, samples(8, kAllAovs)), "sums depend on the order of the threads, or state survives a render");
+        c.sameBits(v.name, c.render(v.scene, samples(8, kAllAovs)), c.render(v.scene, samples(8, kAllAovs)),
+                   "sums depend on the order of the threads, or state survives a render");
     });
 }
 
@@ -198,16 +214,18 @@ void meshForms(Context& context) {
     const TemporaryFolder folder;
     const std::string file = folder.write("ball.obj", obj);
     const auto scene = [&](const std::string& mesh, const std::string& more) {
-        return fmt::format("crt: 1\ncamera: {{position: [{0}, 1, {1}], target: [{0}, 0, {2}], fov: 40}}\nfilm: {{resolution: [24, 24]}}\nintegrator: {{max_depth: 3, nee: false}}\n"
-                           "environment: {{radiance: 1}}\nmaterials: {{m: {{type: diffuse, reflectance: 0.5}}}}\nobjects:\n  - {{name: a, {3}, material: m{4}}}\n",
-                           1e5 / 3, -1e5 / 7 - 3, -1e5 / 7, mesh, more);
+        return fmt::format(
+            "crt: 1\ncamera: {{position: [{0}, 1, {1}], target: [{0}, 0, {2}], fov: 40}}\nfilm: {{resolution: [24, 24]}}\nintegrator: {{max_depth: "
+            "3, nee: false}}\n"
+            "environment: {{radiance: 1}}\nmaterials: {{m: {{type: diffuse, reflectance: 0.5}}}}\nobjects:\n  - {{name: a, {3}, material: m{4}}}\n",
+            1e5 / 3, -1e5 / 7 - 3, -1e5 / 7, mesh, more);
     };
     const std::string in_scene = fmt::format("mesh: {{positions: [{}], faces: [{}]}}", positions, faces);
     const Film film = context.render(scene(in_scene, ""), samples(4, kAllAovs));
     context.sameBits("in an OBJ with 17 digits", film, context.render(scene(fmt::format("obj: '{}'", file), ""), samples(4, kAllAovs)),
                      "an OBJ's coordinates are read as float, or rounded twice");
-    context.sameBits("placed by a transform that does nothing", film, context.render(scene(in_scene, ", transform: [{translate: [0, 0, 0]}]"), samples(4, kAllAovs)),
-                     "an identity rounds");
+    context.sameBits("placed by a transform that does nothing", film,
+                     context.render(scene(in_scene, ", transform: [{translate: [0, 0, 0]}]"), samples(4, kAllAovs)), "an identity rounds");
 }
 
 void unusedThings(Context& context) {
@@ -216,8 +234,8 @@ void unusedThings(Context& context) {
     more.materials.push_back(glass(1.5));
     more.meshes.push_back(icosphere(1, 5, {9, 9, 9}));
     more.emissions.push_back({constantSpectrum(7), true});
-    context.sameBits("a material, a mesh and an emission that no object has", context.render(scene, samples(4, kAllAovs)), context.render(more, samples(4, kAllAovs)),
-                     "what is not used reaches the image");
+    context.sameBits("a material, a mesh and an emission that no object has", context.render(scene, samples(4, kAllAovs)),
+                     context.render(more, samples(4, kAllAovs)), "what is not used reaches the image");
 }
 
 void pruning(Context& context) {
@@ -233,7 +251,8 @@ void sideOutputs(Context& context) {
         std::uint64_t differing = 0;
         for (std::uint32_t y = 0; y < 24; ++y)
             for (std::uint32_t x = 0; x < 24; ++x)
-                for (std::uint32_t channel = 0; channel < CRT_CHANNELS_BASE; ++channel) differing += plain.mean(x, y, channel) != with.mean(x, y, channel);
+                for (std::uint32_t channel = 0; channel < CRT_CHANNELS_BASE; ++channel)
+                    differing += plain.mean(x, y, channel) != with.mean(x, y, channel);
         c.holds(fmt::format("{}: with and without AOVs", v.name), differing == 0, "same bits", "AOVs take random numbers, or change what is traced",
                 fmt::format("{} values differ", differing));
     });
@@ -253,8 +272,11 @@ void deeperThanPaths(Context& context) {
         return context.render(scene, samples(8));
     };
     const Film ended = at(3);
-    for (const int depth : {4, 64, 1000000}) context.sameBits(fmt::format("depth {} as 3", depth), ended, at(depth), "paths go on after they have left the scene, or the depth counts otherwise");
-    context.holds("depth 2 is another image", radiance(at(2)) != radiance(ended), "other bits", "the question is empty: no path has three reflections");
+    for (const int depth : {4, 64, 1000000})
+        context.sameBits(fmt::format("depth {} as 3", depth), ended, at(depth),
+                         "paths go on after they have left the scene, or the depth counts otherwise");
+    context.holds("depth 2 is another image", radiance(at(2)) != radiance(ended), "other bits",
+                  "the question is empty: no path has three reflections");
 }
 
 }  // namespace
@@ -262,19 +284,28 @@ void deeperThanPaths(Context& context) {
 std::vector<Case> exactRelationCases() {
     const auto row = [](const char* id, const char* case_name, const char* title, const char* source, std::uint64_t needs, void (*run)(Context&),
                         const char* expected = "the same image", const char* tolerance = "same bits") {
-        return Case{.id = id, .name = case_name, .title = title, .expected = expected, .source = source, .tolerance = tolerance, .level = Level::Commit,
-                    .needs = needs, .run = run};
+        return Case{.id = id,
+                    .name = case_name,
+                    .title = title,
+                    .expected = expected,
+                    .source = source,
+                    .tolerance = tolerance,
+                    .level = Level::Commit,
+                    .needs = needs,
+                    .run = run};
     };
     return {
         row("M01", "same-scaled", "A lit room times 2^m, m up to ±40", "powers of two round nothing", kLitRoom, scaling),
-        row("M02", "same-moved", "A lit room moved by up to 1e8 of its size, representably", "sums that are exact round nothing", kLitRoom, translation),
-        row("M03", "same-permuted", "Axes permuted, with the camera", "sums of three products round by their order: equal in the mean", kLitRoom, permutation, "the same mean",
-            "± 1 %"),
+        row("M02", "same-moved", "A lit room moved by up to 1e8 of its size, representably", "sums that are exact round nothing", kLitRoom,
+            translation),
+        row("M03", "same-permuted", "Axes permuted, with the camera", "sums of three products round by their order: equal in the mean", kLitRoom,
+            permutation, "the same mean", "± 1 %"),
         row("M04", "triangle-order", "Triangles in another order", "docs/architecture.md, Same bits", kLitRoom, triangleOrder),
         row("M05", "object-order", "Objects in another order", "docs/architecture.md, Same bits", kLitRoom, objectOrder),
         row("M06", "vertex-order", "Vertices numbered otherwise", "names are not geometry", kLitRoom, vertexOrder),
         row("M07", "key-order", "Keys of the scene file in another order", "YAML mappings have no order", 0, keyOrder),
-        row("M08", "doubled-emission", "The lamp twice as bright", "light is linear, and powers of two round nothing", kLitRoom, doubledEmission, "every pixel doubled"),
+        row("M08", "doubled-emission", "The lamp twice as bright", "light is linear, and powers of two round nothing", kLitRoom, doubledEmission,
+            "every pixel doubled"),
         row("M09", "dark-light", "A light without power added", "it brings nothing", kLitRoom, darkLight),
         row("M10", "hidden-object", "A black object added where no path comes", "it takes nothing", kLitRoom, hiddenObject),
         row("M11", "splitting", "Threads, tiles, crops", "docs/architecture.md, Same bits", 0, splitting),
@@ -285,7 +316,8 @@ std::vector<Case> exactRelationCases() {
         row("M16", "unused-things", "Materials, meshes and emissions that nobody uses", "nobody uses them", kLitRoom, unusedThings),
         row("M17", "pruning", "The kernel made for the scene, and the one that has everything", "docs/architecture.md, Same bits", 0, pruning),
         row("M18", "side-outputs", "With and without AOVs", "they only look", CRT_FEATURE_AOV, sideOutputs),
-        row("M19", "deeper-than-paths", "Depths beyond the longest path", "paths have ended", CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ENVIRONMENT, deeperThanPaths),
+        row("M19", "deeper-than-paths", "Depths beyond the longest path", "paths have ended", CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ENVIRONMENT,
+            deeperThanPaths),
     };
 }
 

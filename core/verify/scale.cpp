@@ -1,4 +1,5 @@
-// Group B: scale and position. Lengths are normalised in double before anything is float (core/compile.cpp), so where a scene lies and how large it is must not
+// Group B: scale and position. Lengths are normalised in double before anything is float (core/compile.cpp), so where a scene lies and how large it
+// is must not
 // show; what remains is the ratio of sizes within a scene.
 #include "verify/probes.h"
 #include "verify/references.h"
@@ -55,8 +56,8 @@ void farAway(Context& context) {
     for (int exponent = 0; exponent <= 8; ++exponent) {
         if (!context.atLeast(Level::Merge) && exponent % 4 != 0) continue;
         const double t = std::pow(10.0, exponent) / 3;
-        context.equivalent(fmt::format("lit room moved by 10^{} of its size", exponent), ratios(context, scene, moved(scene, 1, {t, 0.7 * t, -0.3 * t}), 16), 1,
-                           0.001);
+        context.equivalent(fmt::format("lit room moved by 10^{} of its size", exponent),
+                           ratios(context, scene, moved(scene, 1, {t, 0.7 * t, -0.3 * t}), 16), 1, 0.001);
     }
 }
 
@@ -109,7 +110,8 @@ void mixedScale(Context& context) {
         // A shadow that came off its screw would show in the pixels at its foot.
         double worst = 0;
         for (std::uint32_t y = 0; y < 24; ++y)
-            for (std::uint32_t x = 0; x < 24; ++x) worst = std::max(worst, std::abs(radiance(b, x, y) - radiance(a, x, y)) / std::max(radiance(a, x, y), 0.01));
+            for (std::uint32_t x = 0; x < 24; ++x)
+                worst = std::max(worst, std::abs(radiance(b, x, y) - radiance(a, x, y)) / std::max(radiance(a, x, y), 0.01));
         context.absolute("any pixel, with the same random numbers", worst, 0, 0.05,
                          {{1, "the shadow is detached from the object, or lost: is the ray's offset that of the largest triangle?"}});
     }
@@ -177,7 +179,8 @@ void extremeCoordinates(Context& context) {
     // Embree takes coordinates of 1.844e18 and more for invalid; squares of lengths leave float at 1e19, double at 1e154.
     for (const int m : {61, 100, 300, 480})
         context.sameBits(fmt::format("lit room times 2^{}, {:.3g}", m, std::ldexp(1.0, m)), here,
-                         context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4)), "a length, area or squared length overflows before lengths are normalised");
+                         context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4)),
+                         "a length, area or squared length overflows before lengths are normalised");
 }
 
 void denormalCoordinates(Context& context) {

@@ -92,7 +92,8 @@ Film portableFilm(const Scene& scene, const Render& how) {
         for (std::uint32_t x = 0; x < compiled.width; ++x) {
             kernel::CrtRayCount rays{};
             kernel::crt_render_pixel(&context, x, y, how.first_sample, static_cast<std::uint32_t>(how.samples), film.sums.data(),
-                                     reinterpret_cast<kernel::u64*>(film.counts.data()), film.primitives.empty() ? nullptr : film.primitives.data(), &rays);
+                                     reinterpret_cast<kernel::u64*>(film.counts.data()), film.primitives.empty() ? nullptr : film.primitives.data(),
+                                     &rays);
         }
     return film;
 }
