@@ -4,7 +4,7 @@ import os
 import pathlib
 import sys
 
-from . import accelerators, convergence, cpu_speed, leave_out, pictures, robustness, same_bits, stability, start
+from . import accelerators, calibration, convergence, cpu_speed, leave_out, pictures, power, robustness, same_bits, stability, start
 from .program import Program, Failure
 
 COMMANDS = {
@@ -16,6 +16,8 @@ COMMANDS = {
     "convergence": (convergence, "error against time, Sobol against independent samples"),
     "stability": (stability, "sweeps to where the arithmetic ends; --scenes names sweeps instead of scenes"),
     "robustness": (robustness, "what the watertight triangle test and the offsets cost, and what they buy"),
+    "calibration": (calibration, "does the error that an image states of itself hold? 400 repeats of each scene"),
+    "power": (power, "planted faults: how many seconds until a check finds each"),
     "pictures": (pictures, "all scenes as PNG in out/pictures, to look at; measures nothing"),
 }
 REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
