@@ -90,6 +90,12 @@ std::uint64_t nextTargetCheck(std::uint64_t samples) {
     return samples < kFirstCheck ? kFirstCheck : std::bit_floor(samples) * 2;
 }
 
+bool reachesTarget(const Film& film, double target) {
+    constexpr double kDecidingDegreesOfFreedom = CRT_REPLICATES / 2 - 1;
+    const std::optional<ErrorEstimate> error = estimateError(film, ReplicateSet::Even);
+    return error && error->degrees_of_freedom >= kDecidingDegreesOfFreedom && error->half_width_95 <= target;
+}
+
 std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& there) {
     std::vector<SampleRange> missing;
     std::uint64_t next = wanted.first;
@@ -123,8 +129,7 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
         if (plan.target_error <= 0 || resumed + result.rendered < check_at) return false;
         check_at = nextTargetCheck(resumed + result.rendered);
         if (!reader.current()) reader.read();
-        const std::optional<ErrorEstimate> error = estimateError(film, ReplicateSet::Even);
-        return error && error->half_width_95 <= plan.target_error;
+        return reachesTarget(film, plan.target_error);
     };
 
     // Why to stop before the samples are there; nothing while there is no reason.

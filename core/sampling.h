@@ -42,8 +42,13 @@ struct SamplingResult {
 };
 
 /// The target error is looked at when the film holds a power of two of samples, enough for two even and two odd replicates: looking all the time
-/// would stop at the luckiest moment. Only even replicates are asked, so that odd ones can judge the result (estimateError) without having chosen it.
+/// would stop at the luckiest moment.
 std::uint64_t nextTargetCheck(std::uint64_t samples);
+
+/// Whether half_width_95 is at most `target`. Only even replicates are asked, so that odd ones can judge the result (estimateError) without having
+/// chosen it. They are not believed with fewer degrees of freedom than one pixel has from 1024 samples on: two replicates of one pixel now and then agree by chance,
+/// and who stops whenever they do stops at bad images.
+bool reachesTarget(const Film& film, double target);
 
 /// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at most a small part of the run
 /// behind: a backend that failed cannot be asked for its film any more. The caller holds the InterruptGuard.

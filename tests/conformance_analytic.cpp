@@ -1,6 +1,9 @@
 // Scenes whose answer is known in closed form, or from deterministic quadrature.
 #include "conformance.h"
 
+#include "error_estimate.h"
+#include "stats/statistics.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
@@ -80,6 +83,30 @@ TEST_CASE("square light over a floor: rho times the form factor, 99.9 % interval
     requireMean(squareOverFloor(0), 0.2394564705, 0.003, 256);
     requireMean(squareOverFloor(1), 0.0843536644, 0.003, 256);
     requireMean(squareOverFloor(2), 0.0139237174, 0.003, 256);
+}
+
+TEST_CASE("the error that an image states of itself is its error: 60 seeds of the square light, Sobol and independent", "[analytic][error]") {
+    constexpr double kTruth = 0.2394564705;
+    constexpr int kSeeds = 60;
+    const char* sampler = GENERATE("sobol", "independent");
+    Run run;
+    run.samples = 1024;
+    int covered = 0;
+    double claimed = 0, squares = 0;
+    for (int seed = 1; seed <= kSeeds; ++seed) {
+        const crt::Scene scene = sceneFrom(squareOverFloor(0), {{"film.resolution", "[1,1]"}, {"sampler.type", sampler}, {"sampler.seed", std::to_string(seed)}});
+        run.aovs = crt::kAovReplicates;
+        const std::optional<crt::ErrorEstimate> error = crt::estimateError(render(backend(), scene, run));
+        REQUIRE(error);
+        covered += error->meanInterval(0.95).contains(kTruth);
+        claimed += error->mean_standard_error * error->mean_standard_error / kSeeds;
+        squares += (error->mean_luminance - kTruth) * (error->mean_luminance - kTruth) / kSeeds;
+    }
+    INFO(sampler << ": " << covered << " of " << kSeeds << " intervals hold the truth, predicted : actual error " << std::sqrt(claimed / squares));
+    CHECK(covered >= 49);  // Of 60 with probability 0.95 each, 48 or fewer turn up in one of 27,000 runs.
+    // The mean square of 60 errors over that of what 60 images with 15 degrees of freedom each claim, 99.99 % band.
+    CHECK(squares / claimed > crt::stats::fisherQuantile(0.00005, kSeeds, 15.0 * kSeeds));
+    CHECK(squares / claimed < crt::stats::fisherQuantile(0.99995, kSeeds, 15.0 * kSeeds));
 }
 
 TEST_CASE("unit cube with a glowing ceiling: every depth by deterministic quadrature, 99.9 % interval within 0.3 %", "[analytic]") {

@@ -11,7 +11,7 @@ from .program import Failure, children_seconds, significant
 from .results import Results
 
 LIMIT_SECONDS = 60
-SEEDS = [1, 2, 3]
+SEEDS = [1, 2]
 ROULETTE = ["integrator.roulette=true", "integrator.roulette_depth=1", "integrator.max_depth=64"]
 
 
@@ -76,8 +76,8 @@ def verify(program, fault, kernel):
 
     def read(_run):
         case = json.loads((folder / "verify.json").read_text())["cases"][0]
-        bad = next((o for o in case["outcomes"] if o["verdict"] != "PASS"), {})
-        return case["verdict"], " ".join(filter(None, [bad.get("physics"), bad.get("note")])) or bad.get("what", "")
+        bad = next((o for o in case["outcomes"] if o["verdict"] in ("FAIL", "INCONCLUSIVE")), {})
+        return case["verdict"].upper(), " ".join(filter(None, [bad.get("physics"), bad.get("note")])) or bad.get("what", "")
 
     return Check(program, ["verify", "--backend", "opencl", "--case", fault.case, "-q", "-o", folder], kernel, read)
 
