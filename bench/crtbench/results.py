@@ -13,6 +13,8 @@ import sys
 class Results:
     """Collects a page; nothing is written before write(), so that a measurement that breaks off leaves no half of a page."""
 
+    tool = "bench/run"
+
     def __init__(self, program, arguments, name, title):
         self.program, self.arguments, self.name = program, arguments, name
         self.lines = [f"# {title}", ""]
@@ -37,7 +39,7 @@ class Results:
 
     def write(self):
         facts = provenance(self.program)
-        facts["command"] = "bench/run " + shlex.join(
+        facts["command"] = self.tool + " " + shlex.join(
             self.program.plain(a) if not a.startswith(str(self.arguments.results)) else "RESULTS" for a in sys.argv[1:])
         facts["date"] = self.started.strftime("%Y-%m-%d %H:%M UTC")
         facts["load_at_start"] = self.load

@@ -1,0 +1,174 @@
+"""The Cornell box in crt and in Mitsuba 3: whether their images agree, and their error against time. One run, one machine, everything interleaved.
+
+The error of a setting with N samples is that between R renders with seeds of their own: the root of the mean over pixels of their variance in luminance,
+over the mean luminance. It needs no reference, is unbiased, and holds noise alone, so that a difference between the models cannot pass as one."""
+import json
+import math
+import time
+
+import numpy as np
+
+from . import peer_agreement, peer_scene
+from .peer_lines import ROULETTE_FROM, SCENE, Crt, Mitsuba, Worker
+from .results import Results
+
+SIZE, MAX_DEPTH, TARGET = 128, 16, 0.01
+SAMPLERS = ["independent", "stratified", "multijitter", "orthogonal", "ldsampler"]
+COUNTS = [4, 16, 64, 128, 256, 512, 1024]
+FEWEST_POOLED = 16  # Samples of a render that counts among the converged ones.
+HEADLINE_WEIGHT = 3  # Of the time for measuring; the other lines have 1.
+
+
+class Line:
+    """One contestant: for every number of samples its renders' costs and their images' error."""
+
+    def __init__(self, contestant, weight):
+        self.contestant, self.weight = contestant, weight
+        self.name = contestant.name
+        self.points, self.spent, self.share, self.open = [], 0.0, 0.0, True
+
+    def wants(self, spp):
+        """Whether `spp` still fits into this line's share, were it to cost in proportion to the last. Three points are needed in any case."""
+        if len(self.points) >= 3:
+            last = self.points[-1]
+            self.open = self.open and self.spent + last["elapsed"] * spp / last["asked"] <= self.share
+        return self.open
+
+
+def room_pixels(image):
+    """Those that do not see the lamp, nor does a neighbour: what sees it is many times brighter than anything that it lights."""
+    seen = image[:, :, 1] > 8 * image[:, :, 1].mean()
+    padded = np.pad(seen, 1)
+    height, width = seen.shape
+    return ~np.any([padded[r:r + height, c:c + width] for r in range(3) for c in range(3)], axis=0)
+
+
+def relative_error(images, room):
+    """Relative RMSE of one render from R of them, and its standard error by the jackknife over renders: {metric: (error, se)}. `error`: luminance of all pixels;
+    `error_xyz`: X, Y and Z of all pixels; `error_room`: luminance of the pixels `room`, over their mean."""
+    stack = np.array(images)
+    chosen = {"error": stack[..., 1], "error_xyz": stack, "error_room": stack[..., 1][:, room]}
+    return {name: jackknife(values) for name, values in chosen.items()}
+
+
+def jackknife(stack):
+    def error(images):
+        return math.sqrt(images.var(axis=0, ddof=1).mean()) / images.mean()
+
+    count = len(stack)
+    without = [error(np.delete(stack, r, axis=0)) for r in range(count)]
+    return error(stack), math.sqrt((count - 1) / count * sum((w - np.mean(without)) ** 2 for w in without))
+
+
+def measure_round(lines, spp, replicates, seed_base, room, pool_of):
+    """R renders of every line, all in turn."""
+    gathered = {line: {"costs": [], "images": [], "elapsed": 0.0} for line in lines}
+    for r in range(replicates):
+        for line in lines:
+            begin = time.perf_counter()
+            cost = line.contestant.render(spp, seed_base + 1000 * line.seed_block + r)
+            data = gathered[line]
+            data["elapsed"] += time.perf_counter() - begin
+            data["images"].append(cost.image)
+            data["costs"].append(cost)
+            if spp >= FEWEST_POOLED:
+                pool_of(line).add(cost.image, cost.spp)
+            cost.image = None
+    for line, data in gathered.items():
+        errors = relative_error(data["images"], room)
+        costs = data["costs"]
+        line.points.append({
+            "asked": spp, "spp": costs[0].spp, **{name: e for name, (e, _) in errors.items()},
+            **{f"{name}_se": se for name, (_, se) in errors.items()}, "elapsed": data["elapsed"],
+            "cpu_seconds": float(np.median([c.cpu for c in costs])), "render_seconds": float(np.median([c.render for c in costs])),
+            "others": float(np.median([c.others for c in costs])), "cpu_seconds_all": [c.cpu for c in costs], "render_seconds_all": [c.render for c in costs]})
+        line.spent += data["elapsed"]
+        p = line.points[-1]
+        print(f"{line.name:42} {p['spp']:5} spp  {100 * p['error']:6.2f} %  {p['cpu_seconds']:7.3f} cpu s  {p['render_seconds']:7.3f} s  others {p['others']:.0%}", flush=True)
+
+
+def seconds_to(points, key, target, metric="error"):
+    """(seconds, whether extrapolated, relative standard error): between points log-log; beyond them along the line through the last three."""
+    x, y = [math.log(p[metric]) for p in points], [math.log(p[key]) for p in points]
+    goal = math.log(target)
+    uncertain = 2 * max(p[f"{metric}_se"] / p[metric] for p in points[-2:])  # Time goes with the inverse square of error.
+    for i in range(1, len(points)):
+        if x[i] <= goal <= x[i - 1]:
+            part = (goal - x[i - 1]) / (x[i] - x[i - 1])
+            return math.exp(y[i - 1] + part * (y[i] - y[i - 1])), False, uncertain
+    slope, offset = np.polyfit(x[-3:], y[-3:], 1)
+    return math.exp(offset + slope * goal), True, uncertain
+
+
+def slope_of(points):
+    """Of log error over log samples, of the last three points."""
+    return float(np.polyfit([math.log(p["spp"]) for p in points[-3:]], [math.log(p["error"]) for p in points[-3:]], 1)[0])
+
+
+def tournament(worker, spp, replicates, room):
+    """Every sampler of Mitsuba with and without roulette: {(sampler, roulette): error² × CPU seconds}, least is best."""
+    scores = {}
+    for roulette in (False, True):
+        for sampler in SAMPLERS:
+            contestant = Mitsuba(worker, sampler, roulette)
+            costs = [contestant.render(spp, 5_000_000 + r) for r in range(replicates)]
+            error, _ = relative_error([c.image for c in costs], room)["error"]
+            cpu = float(np.median([c.cpu for c in costs]))
+            scores[sampler, roulette] = {"spp": costs[0].spp, "error": error, "cpu_seconds": cpu, "error2_seconds": error**2 * cpu}
+            print(f"{contestant.name:42} {costs[0].spp:5} spp  {100 * error:6.2f} %  {cpu:7.3f} cpu s  error² × s {error**2 * cpu:.3g}", flush=True)
+    return scores
+
+
+def measure(program, arguments):
+    begin = time.monotonic()
+    size = 32 if arguments.tiny else SIZE
+    results = Results(program, arguments, "peers", "crt and Mitsuba 3")
+    results.tool = "bench/peers"
+    scene = peer_scene.describe(program.repository / program.scene_file(SCENE), program.scratch, size, MAX_DEPTH)
+    setup = {"size": size, "max_depth": MAX_DEPTH, "mitsuba": str(program.scratch / "mitsuba.json")}
+    with open(setup["mitsuba"], "w") as file:
+        json.dump(scene, file)
+    crt_backends, _ = program.backends(["embree", "opencl", "cuda"])
+    variants = ["llvm_ad_spectral", "scalar_spectral"] + (["cuda_ad_spectral"] if "cuda" in crt_backends else [])
+    workers = {v: Worker(program, v, setup) for v in variants}
+    try:
+        return run(program, arguments, results, scene, setup, crt_backends, workers, begin)
+    finally:
+        for worker in workers.values():
+            worker.close()
+
+
+def run(program, arguments, results, scene, setup, crt_backends, workers, begin):
+    described = {v: w.ask({"do": "describe"}) for v, w in workers.items()}
+    llvm = workers["llvm_ad_spectral"]
+    room = room_pixels(Crt(program, crt_backends[0], 1, False, setup).render(64, 6_000_000).image)
+    scores = tournament(llvm, 16 if arguments.tiny else 64, 4, room)
+    best = {r: min((s for s in scores if s[1] == r), key=lambda s: scores[s]["error2_seconds"])[0] for r in (False, True)}
+    lines = [Line(Crt(program, b, n, False, setup), HEADLINE_WEIGHT if (b, n) == ("embree", 1) else 1) for b in crt_backends for n in (1, 16)]
+    lines += [Line(Crt(program, "embree", 1, True, setup), HEADLINE_WEIGHT), Line(Mitsuba(llvm, best[False], False), HEADLINE_WEIGHT),
+              Line(Mitsuba(llvm, best[True], True), HEADLINE_WEIGHT)]
+    lines += [Line(Mitsuba(w, best[True], True), 1) for v, w in workers.items() if v != "llvm_ad_spectral"]
+    for block, line in enumerate(lines, start=1):
+        line.seed_block = block
+        if isinstance(line.contestant, Crt):
+            line.contestant.render(4, 9_000_000)  # Fills caches.
+            line.contestant.learn_start(2)
+    starts = {}
+    for line in lines:
+        if line.weight == HEADLINE_WEIGHT or isinstance(line.contestant, Mitsuba) or line.contestant.replicates == 1:
+            starts[line.name] = {"cold": line.contestant.whole(16, True), "warm": [line.contestant.whole(16, False) for _ in range(3)]}
+
+    print(f"started after {time.monotonic() - begin:.0f} s", flush=True)
+    left = 0.92 * arguments.seconds - (time.monotonic() - begin)
+    for line in lines:
+        line.share = max(0.0, left) * line.weight / sum(other.weight for other in lines)
+    pools = {"crt": peer_agreement.Pool(), "Mitsuba": peer_agreement.Pool()}
+    for number, spp in enumerate(COUNTS, start=1):
+        going = [line for line in lines if line.wants(spp)]
+        if not going:
+            break
+        measure_round(going, spp, arguments.replicates, 10_000_000 * number, room, lambda line: pools["crt" if isinstance(line.contestant, Crt) else "Mitsuba"])
+    from . import peer_page
+    return peer_page.write(program, results, arguments, {
+        "setup": setup, "scene": scene, "described": described, "scores": scores, "best": best, "lines": lines, "starts": starts, "pools": pools,
+        "room": int(room.sum()), "target": TARGET, "roulette_from": ROULETTE_FROM})
