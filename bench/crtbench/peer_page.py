@@ -100,7 +100,7 @@ def timing_row(line, target, pixels):
 
 
 class Race:
-    """Who takes how long to the target, and the two that Done-when compares: the best of crt's Embree lines and of Mitsuba's on the processor."""
+    """Who takes how long to the target, and the best of crt's Embree lines and of Mitsuba's on the processor."""
 
     def __init__(self, lines, starts, target, pixels):
         self.rows = {line.name: timing_row(line, target, pixels) for line in lines}
@@ -165,13 +165,11 @@ def write_race(results, race, lines, arguments, roulette_from):
 def write_samplers(results, scores, roulette_from):
     results.heading("Mitsuba's samplers")
     results.paragraph(
-        "`llvm_ad_spectral`, 4 renders each; the least error² × time goes into the race, with and without roulette. Spectra are tables on a "
-        "regular grid, which "
-        "Mitsuba evaluates faster than irregular ones, and each material is one mesh. The scalar variant races with the sampler that was best with "
-        "roulette.")
-    results.table(["sampler", "roulette", "samples", "relative RMSE", "processor s", "error² × processor s"],
-                  [[sampler, f"from {roulette_from}" if roulette else "none", d["spp"], f"{100 * d['error']:.2f} %", significant(d["cpu_seconds"]),
-                    significant(d["error2_seconds"])] for (sampler, roulette), d in sorted(scores.items(), key=lambda item: item[1]["error2_seconds"])])
+        f"`llvm_ad_spectral`, 3 renders each, roulette from event {roulette_from}; the least error² × time goes into the race, in all variants, with and without "
+        "roulette. Spectra are tables on a regular grid, which Mitsuba evaluates faster than irregular ones, and each material is one mesh.")
+    results.table(["sampler", "samples", "relative RMSE", "processor s", "error² × processor s"],
+                  [[sampler, d["spp"], f"{100 * d['error']:.2f} %", significant(d["cpu_seconds"]), significant(d["error2_seconds"])]
+                   for sampler, d in sorted(scores.items(), key=lambda item: item[1]["error2_seconds"])])
 
 
 def write_points(results, lines):
@@ -200,7 +198,7 @@ def write(program, results, arguments, run):
     results.command(f"crt render configs/{SCENE}.yaml --backend embree --spp N --seed SEED " + " ".join(f"--set '{s}'" for s in settings) + " -o image.pfm")
     results.data = {
         "size": size, "target": run["target"], "factor": race.json(), "lines": race.rows, "start_wall_cpu": race.start, "agreement": found,
-        "samplers": [{"sampler": sampler, "roulette": roulette, **d} for (sampler, roulette), d in run["scores"].items()],
+        "samplers": run["scores"],
         "versions": {v: {k: d[k] for k in ("mitsuba", "drjit", "numpy", "python", "threads", "llvm")} for v, d in run["described"].items()}}
     write_pictures(program.repository / "out" / "peers", run["pools"])
     arguments.results.mkdir(parents=True, exist_ok=True)
@@ -247,8 +245,6 @@ def where_time_goes(results, rows, factor, room):
             "crt follows one path a "
             "thread, with eight triangles a test and four wavelengths as its vectors. This scene, of 38 triangles and one kind of material, where "
             "lanes hardly part, is the best case for wide "
-            "kernels. The scalar variant, a path at a time, is in the table above. *Noise*: in luminance over all pixels the lamp and its edges, "
-            "seen directly and a hundred times brighter than the walls, decide. There it counts how well the points of one pixel are stratified "
-            "over the pixel and over wavelengths, and Mitsuba's "
-            "density of wavelengths, close to ȳ, is made for luminance, while crt's x̄ + ȳ + z̄ shares the noise among X, Y and Z. The lines "
-            "without the lamp and for X, Y and Z show how much of it that is.")
+            "kernels. The scalar variant, a path at a time, is in the table above. *Noise*: the lamp and its edges, seen directly and a hundred times brighter than "
+            "the walls, weigh most in luminance over all pixels; what counts there is how evenly the points of one pixel lie over the pixel, and over wavelengths. The "
+            "rows without the lamp, and for X, Y and Z, show how much of it that is.")
