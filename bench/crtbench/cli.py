@@ -4,7 +4,7 @@ import os
 import pathlib
 import sys
 
-from . import accelerators, calibration, convergence, cpu_speed, leave_out, pictures, power, robustness, same_bits, stability, start
+from . import accelerators, calibration, cpu_speed, figure2, leave_out, pictures, power, robustness, same_bits, stability, start
 from .program import Program, Failure
 
 COMMANDS = {
@@ -13,7 +13,7 @@ COMMANDS = {
     "start": (start, "what it costs to begin: process, libraries, kernels"),
     "leave-out": (leave_out, "what leaving features out of the kernel saves, bit by bit"),
     "accelerators": (accelerators, "loop, object boxes and BVH; from how many triangles on the BVH wins"),
-    "convergence": (convergence, "error against time, Sobol against independent samples"),
+    "figure2": (figure2, "render time against samples per pixel, at 1440² and 2880²"),
     "stability": (stability, "sweeps to where the arithmetic ends; --scenes names sweeps instead of scenes"),
     "robustness": (robustness, "what the watertight triangle test and the offsets cost, and what they buy"),
     "calibration": (calibration, "does the error that an image states of itself hold? 400 repeats of each scene"),
@@ -37,6 +37,8 @@ def main():
                              help="a timed run is repeated when other processes took more than this share of the processor (0.05)")
         if name == "stability":
             command.add_argument("--times", type=float, default=1, metavar="N", help="so many times the rays of each point (1); 5 makes 1e8 of offset-safety")
+        if name == "figure2":
+            command.add_argument("--rows", help="measurements made on another machine, JSON Lines")
         command.add_argument("--scenes", nargs="*", help="only these scenes, by name without .yaml")
     arguments = parser.parse_args()
     if arguments.tiny:
