@@ -598,6 +598,12 @@ private:
             if (!std::isfinite(c.origin[k] + c.corner[k] + c.step_x[k] + c.step_y[k]))
                 throw Error(ErrorKind::Scene, "the camera is too far from the scene for single precision", camera.place);
         }
+        // Unit directions in single precision are 2^-24 apart; two of them a pixel is the least that tells pixels apart.
+        const double pixel = 2 * std::min(camera.tan_half_width / scene_.film.width, camera.tan_half_height / scene_.film.height);
+        if (pixel < std::ldexp(1.0, -23))
+            logWarning("a pixel is {:.2g} radians wide, finer than directions in single precision ({:.2g}): neighbouring pixels will repeat each other; "
+                       "use fewer pixels, a wider field of view, or a nearer camera",
+                       pixel, std::ldexp(1.0, -23));
         const Vec3d to_target = camera.target - camera.position;
         const double focus = camera.focus_distance > 0 ? camera.focus_distance : std::sqrt(dot(to_target, to_target));
         c.lens_radius = static_cast<float>(camera.aperture_radius * scale_);

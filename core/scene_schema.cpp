@@ -236,7 +236,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
                    {{KeyRule::Kind::ExactlyOne, {"metal", "eta"}}, {KeyRule::Kind::Together, {"eta", "k"}}}});
     all.push_back({"material/dielectric", "a dielectric material", "Smooth glass or water: reflects and refracts.",
                    {typeKey("dielectric"),
-                    {.name = "ior", .kind = Kind::Spectrum, .range = kPositive, .required = true,
+                    {.name = "ior", .kind = Kind::Spectrum, .range = {.min = 1e-3, .max = 1e3}, .required = true,
                      .doc = "Refractive index of the inside relative to the outside; inside is where normals point away from."}}});
 }
 

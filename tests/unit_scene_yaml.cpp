@@ -502,7 +502,7 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     CHECK_THAT(refused("spectra: {0.5: 1}\n"), Contains("'0.5' cannot name a spectrum"));
     CHECK_THAT(refused("spectra: {withe: 1, other: whte}\n"), Contains("there is no spectrum 'whte'") && Contains("did you mean 'withe'?"));
     CHECK_THAT(refused("materials: {m: {type: dielectric, ior: {rgb: [1, 1, 1]}}}\n"), Contains("a refractive index is not a colour"));
-    CHECK_THAT(refused("materials: {m: {type: dielectric, ior: 0}}\n"), Contains("'ior' of material 'm' is 0; it must be above 0"));
+    CHECK_THAT(refused("materials: {m: {type: dielectric, ior: 0}}\n"), Contains("'ior' of material 'm' is 0; it must be 0.001 to 1000"));
     CHECK_THAT(refused("materials: {m: {type: dielectric, ior: {sellmeier: {B: [-3, 0, 0], C: [0, 0, 0]}}}}\n"), Contains("Sellmeier"));
     CHECK_THAT(refused("materials: {m: {type: conductor, metal: Ax}}\n"), Contains("scene.yaml:2:41: error: expected one of") && Contains("did you mean 'A"));
     CHECK_THAT(refused("materials: {m: {type: conductor, metal: Au, eta: 1, k: 1}}\n"), Contains("'metal' and 'eta' in material 'm' exclude each other"));

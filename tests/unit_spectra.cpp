@@ -261,7 +261,17 @@ TEST_CASE("tables are linear inside and explicit outside", "[spectra]") {
     CHECK_THROWS_AS(tableSpectrum({360, 829}, {1, 3}, Outside::Error), Error);
     CHECK(at(tableSpectrum({300, 900}, {1, 1}, Outside::Error), 360) == 1);
     CHECK(tableSpectrum({500}, {.25}, Outside::Clamp) == constantSpectrum(.25));
-    CHECK(at(tableSpectrum({500.25, 500.75}, {1, 1}, Outside::Zero), 500) == 0);  // Between the grid's wavelengths.
+
+    // Finer than the grid: half a nanometre of 1 between two of them keeps its integral and its mean; no value leaves the table's range.
+    const Spectrum between = tableSpectrum({500.25, 500.75}, {1, 1}, Outside::Zero);
+    CHECK(at(between, 500) == Approx(0.25));
+    CHECK(at(between, 501) == Approx(0.25));
+    CHECK(at(between, 499) == 0);
+    const Spectrum line = tableSpectrum({588.28, 588.3, 588.32}, {0, 50, 0}, Outside::Zero);
+    CHECK(at(line, 588) + at(line, 589) == Approx(1));
+    CHECK(at(line, 589) == Approx(0.3));
+    CHECK(tableSpectrum({400, 410.5, 600}, {0.2, 0.2, 0.2}, Outside::Clamp).max() == Approx(0.2));
+    CHECK(tableSpectrum({400, 587.2, 587.21, 588.9, 588.91, 600}, {0, 0, 1, 1, 0, 0}, Outside::Clamp).max() <= 1);
 
     const double nan = std::numeric_limits<double>::quiet_NaN();
     CHECK_THROWS_AS(tableSpectrum({}, {}, Outside::Clamp), Error);

@@ -60,21 +60,22 @@ std::optional<Level> levelNamed(std::string_view text) {
 
 Verdict worst(const std::vector<Outcome>& outcomes) {
     if (outcomes.empty()) return Verdict::Fail;
-    // A case that does not apply in part has still been answered in the other part.
-    bool answered = false;
-    Verdict verdict = Verdict::Pass;
+    // What does not apply, or is refused, in part has still been answered in the other part.
+    bool passed = false;
+    Verdict verdict = Verdict::Pass, softest = Verdict::NotApplicable;
     for (const Outcome& o : outcomes) {
-        if (o.verdict == Verdict::NotApplicable) continue;
-        answered = true;
-        verdict = std::max(verdict, o.verdict);
+        if (failed(o.verdict)) verdict = std::max(verdict, o.verdict);
+        passed = passed || o.verdict == Verdict::Pass;
+        softest = std::min(softest, o.verdict);
     }
-    return answered ? verdict : Verdict::NotApplicable;
+    return failed(verdict) || passed ? verdict : softest;
 }
 
 const std::vector<Case>& registry() {
     static const std::vector<Case> cases = [] {
         std::vector<Case> all;
-        for (const auto group : {closedFormCases, scaleCases, geometryCases, rayCases, stiffCases, inputCases, backendCases, exactRelationCases, mutantCases})
+        for (const auto group : {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases, stiffCases, scatteringCases, colourCases,
+                                 accumulationCases, imageCases, inputCases, backendCases, exactRelationCases, mutantCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

@@ -75,13 +75,19 @@ std::vector<const Case*> select(const std::vector<std::string>& words, Level lev
 
 /// Groups, each in a file of its own.
 std::vector<Case> closedFormCases();     ///< A
+std::vector<Case> glassCases();          ///< A, the part about smooth interfaces
 std::vector<Case> scaleCases();          ///< B
 std::vector<Case> geometryCases();       ///< C
 std::vector<Case> rayCases();            ///< D
+std::vector<Case> lightCases();          ///< E
 std::vector<Case> stiffCases();          ///< F
-std::vector<Case> mutantCases();         ///< N
+std::vector<Case> scatteringCases();     ///< G
+std::vector<Case> colourCases();         ///< H
+std::vector<Case> accumulationCases();   ///< I
+std::vector<Case> imageCases();          ///< J
 std::vector<Case> inputCases();          ///< K
 std::vector<Case> backendCases();        ///< L
 std::vector<Case> exactRelationCases();  ///< M01 to M19
+std::vector<Case> mutantCases();         ///< N
 
 }  // namespace crt::verify

@@ -28,7 +28,24 @@ Verdict verdictOf(stats::Verdict verdict) {
     return Verdict::Inconclusive;
 }
 
-std::string percent(double delta) { return fmt::format("± {:g} %, 99.9 % interval", 100 * delta); }
+std::string tolerancePercent(double delta) { return fmt::format("± {:g} %, 99.9 % interval", 100 * delta); }
+
+Outcome equivalenceOutcome(const std::string& what, const std::vector<double>& replicates, double expected, double delta,
+                           const std::vector<Mistake>& mistakes) {
+    const stats::Interval interval = meanOf(replicates);
+    Outcome o;
+    o.what = what;
+    o.measured = interval.center();
+    o.expected = expected;
+    o.interval = interval;
+    o.tolerance = tolerancePercent(delta);
+    o.verdict = verdictOf(stats::equivalence(relativeTo(expected, interval), delta * std::abs(expected)));
+    if (o.verdict == Verdict::Fail) o.physics = diagnose(interval.center(), expected, interval.halfWidth(), mistakes);
+    if (o.verdict == Verdict::Inconclusive)
+        o.physics = fmt::format("the interval is ± {:.3g} % wide: the noise is larger than the budget of samples allows for",
+                                100 * interval.halfWidth() / std::abs(expected));
+    return o;
+}
 
 /// Differing pixels, as the floats that are written.
 std::uint64_t differingPixels(const Film& a, const Film& b) {
@@ -51,20 +68,31 @@ Context::Context(const LoadedBackend& backend, const IntegratorOptions& options,
 Scene Context::scene(const std::string& yaml, const std::vector<SceneOverride>& overrides) const { return parseScene(yaml, "case.yaml", ".", overrides); }
 
 Integrator& Context::integratorFor(const Render& how) {
-    auto& integrator = integrators_[{static_cast<int>(how.kernel), how.threads, how.tile_size}];
-    if (!integrator) {
-        IntegratorOptions options = options_;
-        options.kernel = how.kernel;
-        if (how.threads != 0) options.threads = how.threads;
-        options.tile_size = how.tile_size;
-        integrator = std::make_unique<Integrator>(backend_, options);
-    }
-    return *integrator;
+    const bool usual = how.kernel == CRT_KERNEL_LEAN && how.threads == 0 && how.tile_size == 0;
+    if (usual && usual_) return *usual_;
+    IntegratorOptions options = options_;
+    options.kernel = how.kernel;
+    if (how.threads != 0) options.threads = how.threads;
+    options.tile_size = how.tile_size;
+    // One at a time: a limit of threads holds for the process while its integrator lives.
+    usual_.reset();
+    unusual_.reset();
+    std::unique_ptr<Integrator>& place = usual ? usual_ : unusual_;
+    place = std::make_unique<Integrator>(backend_, options);
+    return *place;
 }
 
 Film Context::render(const std::string& yaml, const Render& how) { return render(scene(yaml), how); }
 
-Film Context::render(const Scene& original, const Render& how) {
+Film Context::render(const Scene& what, const Render& how) {
+    Film film = renderRaw(what, how);
+    if (const std::uint64_t invalid = film.invalidSamples(); invalid > 0)
+        holds("every sample is finite", false, "0 samples", "a division by zero, or a square root of a negative number, on the way",
+              fmt::format("{} samples were NaN or infinite", invalid));
+    return film;
+}
+
+Film Context::renderRaw(const Scene& original, const Render& how) {
     Scene with_seed;
     const Scene* what = &original;
     if (how.seed && *how.seed != original.sampler.seed) {
@@ -78,9 +106,7 @@ Film Context::render(const Scene& original, const Render& how) {
     integrator.render({.first_sample = how.first_sample, .sample_count = how.samples});
     Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
     integrator.readFilm(film);
-    if (const std::uint64_t invalid = film.invalidSamples(); invalid > 0)
-        holds("every sample is finite", false, "0 samples",
-              "a division by zero, or a square root of a negative number, on the way", fmt::format("{} samples were NaN or infinite", invalid));
+    report_ = integrator.report();
     return film;
 }
 
@@ -108,40 +134,42 @@ void Context::absolute(const std::string& what, double measured, double expected
 
 void Context::equivalent(const std::string& what, const std::vector<double>& replicates, double expected, double delta,
                          const std::vector<Mistake>& mistakes) {
-    const stats::Interval interval = meanOf(replicates);
-    Outcome o;
-    o.what = what;
-    o.measured = interval.center();
-    o.expected = expected;
-    o.interval = interval;
-    o.tolerance = percent(delta);
-    o.verdict = verdictOf(stats::equivalence(relativeTo(expected, interval), delta * std::abs(expected)));
-    if (o.verdict == Verdict::Fail) o.physics = diagnose(interval.center(), expected, interval.halfWidth(), mistakes);
-    if (o.verdict == Verdict::Inconclusive)
-        o.physics = fmt::format("the interval is ± {:.3g} % wide: the noise is larger than the budget of samples allows for",
-                                100 * interval.halfWidth() / std::abs(expected));
-    add(std::move(o));
+    add(equivalenceOutcome(what, replicates, expected, delta, mistakes));
+}
+
+Outcome Context::estimated(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
+                           const Effort& effort, const std::vector<Mistake>& mistakes) {
+    std::vector<Scene> parsed;
+    for (const std::string& text : scenes) parsed.push_back(scene(text));
+    const auto seeds = static_cast<std::size_t>(effort.seeds);
+    std::vector<std::vector<Film>> films(seeds);
+    std::vector<double> replicates(seeds);
+    for (std::uint64_t there = 0, wanted = effort.samples;; wanted = std::min(4 * wanted, effort.most)) {
+        for (std::size_t i = 0; i < seeds; ++i) {
+            for (std::size_t k = 0; k < parsed.size(); ++k) {
+                const Film more = render(parsed[k], {.samples = wanted - there, .first_sample = there, .seed = 1 + i});
+                if (there == 0)
+                    films[i].push_back(more);
+                else
+                    films[i][k].add(more);
+            }
+            replicates[i] = measure(films[i]);
+        }
+        there = wanted;
+        Outcome outcome = equivalenceOutcome(what, replicates, expected, delta, mistakes);
+        outcome.note = fmt::format("{} seeds × {} samples a pixel", seeds, there);
+        if (outcome.verdict != Verdict::Inconclusive || wanted >= effort.most) return outcome;
+    }
+}
+
+void Context::estimate(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
+                       const Effort& effort, const std::vector<Mistake>& mistakes) {
+    add(estimated(what, scenes, measure, expected, delta, effort, mistakes));
 }
 
 void Context::estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected, double delta, const Effort& effort,
                        const std::vector<Mistake>& mistakes) {
-    const Scene parsed = scene(yaml);
-    std::vector<Film> films;
-    std::vector<double> replicates(static_cast<std::size_t>(effort.seeds));
-    for (std::uint64_t there = 0, wanted = effort.samples;; wanted = std::min(4 * wanted, effort.most)) {
-        for (std::size_t i = 0; i < replicates.size(); ++i) {
-            Film more = render(parsed, {.samples = wanted - there, .first_sample = there, .seed = 1 + i});
-            if (there == 0)
-                films.push_back(std::move(more));
-            else
-                films[i].add(more);
-            replicates[i] = measure(films[i]);
-        }
-        there = wanted;
-        const stats::Verdict verdict = stats::equivalence(relativeTo(expected, meanOf(replicates)), delta * std::abs(expected));
-        if (verdict != stats::Verdict::Inconclusive || wanted >= effort.most) break;
-    }
-    equivalent(what, replicates, expected, delta, mistakes);
+    add(estimated(what, {yaml}, [&](const std::vector<Film>& films) { return measure(films.front()); }, expected, delta, effort, mistakes));
 }
 
 void Context::rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound, const std::string& physics) {

@@ -9,7 +9,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -40,8 +39,10 @@ struct Effort {
     int seeds = 16;
 };
 
-/// A number that is made of a film: the mean radiance, one pixel, a ratio.
+/// A number that is made of a film: the mean radiance, one pixel.
 using Measure = std::function<double(const Film&)>;
+/// A number that is made of the films of several scenes, rendered with the same seed: a ratio, a difference.
+using JointMeasure = std::function<double(const std::vector<Film>&)>;
 
 class Context {
 public:
@@ -56,6 +57,11 @@ public:
     Scene scene(const std::string& yaml, const std::vector<SceneOverride>& overrides = {}) const;
     Film render(const std::string& yaml, const Render& how = {});
     Film render(const Scene& scene, const Render& how = {});
+    /// The same for cases that ask for samples that are no numbers.
+    Film renderRaw(const Scene& scene, const Render& how = {});
+
+    /// Rays and paths of the last render.
+    const CrtBackendReport& report() const { return report_; }
 
     // Checks. Each adds an outcome.
     /// |measured − expected| ≤ relative · |expected|; where 0 is expected, exactly 0.
@@ -67,6 +73,11 @@ public:
     /// The same of `measure` over the films of several seeds, with as many samples as it takes.
     void estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected, double delta, const Effort& effort = {},
                   const std::vector<Mistake>& mistakes = {});
+    void estimate(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
+                  const Effort& effort = {}, const std::vector<Mistake>& mistakes = {});
+    /// The outcome of an estimate, for cases that keep only the worst of many.
+    Outcome estimated(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
+                      const Effort& effort, const std::vector<Mistake>& mistakes);
     /// The upper end of the 99.9 % Clopper–Pearson interval of the rate of failures is at most `bound`.
     void rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound, const std::string& physics);
     /// Every channel of every pixel the same, as the floats that are written.
@@ -87,7 +98,8 @@ private:
     const LoadedBackend& backend_;
     IntegratorOptions options_;
     Level level_;
-    std::map<std::tuple<int, unsigned, unsigned>, std::unique_ptr<Integrator>> integrators_;
+    std::unique_ptr<Integrator> usual_, unusual_;  ///< With the run's options; with a case's own.
+    CrtBackendReport report_{};
     std::vector<Outcome> outcomes_;
 };
 

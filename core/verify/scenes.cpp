@@ -35,4 +35,46 @@ objects:
                        x, integrator, half_side, radiance);
 }
 
+Stage::Stage(std::string camera, std::string integrator) {
+    set("camera", std::move(camera));
+    set("film", "{resolution: [4, 4]}");
+    set("integrator", std::move(integrator));
+}
+
+Stage& Stage::set(const std::string& key, const std::string& value) {
+    top_[key] = value;
+    return *this;
+}
+
+Stage& Stage::material(const std::string& name, const std::string& definition) {
+    materials_ += fmt::format("  {}: {}\n", name, definition);
+    return *this;
+}
+
+Stage& Stage::quad(const std::string& name, const std::string& corners, const std::string& material, const std::string& radiance) {
+    return mesh(name, corners, "[[0,1,2,3]]", material, radiance);
+}
+
+Stage& Stage::mesh(const std::string& name, const std::string& positions, const std::string& faces, const std::string& material,
+                   const std::string& radiance) {
+    objects_ += fmt::format("  - {{name: {}, mesh: {{positions: {}, faces: {}}}, material: {}{}}}\n", name, positions, faces, material,
+                            radiance.empty() ? "" : fmt::format(", emission: {{radiance: {}}}", radiance));
+    return *this;
+}
+
+Stage& Stage::box(const std::string& name, const Point& a, const Point& b, const std::string& material) {
+    std::string positions;
+    for (int i = 0; i < 8; ++i)
+        positions += fmt::format("{}[{},{},{}]", i == 0 ? "" : ",", (i & 1 ? b : a)[0], (i & 2 ? b : a)[1], (i & 4 ? b : a)[2]);
+    return mesh(name, "[" + positions + "]", "[[0,2,3,1],[4,5,7,6],[0,1,5,4],[2,6,7,3],[0,4,6,2],[1,3,7,5]]", material);
+}
+
+std::string Stage::yaml() const {
+    std::string text = "crt: 1\n";
+    for (const auto& [key, value] : top_) text += fmt::format("{}: {}\n", key, value);
+    if (!materials_.empty()) text += "materials:\n" + materials_;
+    if (!objects_.empty()) text += "objects:\n" + objects_;
+    return text;
+}
+
 }  // namespace crt::verify

@@ -1,6 +1,8 @@
 /// Scenes that many cases share, as YAML, so that a case can be copied out and rendered by hand (`crt verify -o DIR` keeps them).
 #pragma once
 
+#include <array>
+#include <map>
 #include <string>
 
 namespace crt::verify {
@@ -20,6 +22,29 @@ std::string yaml(const Cube& cube);
 /// A square light of side 1 at height 1 over a large Lambertian floor of reflectance 1, seen through a needle's eye at (x, 0, 0).
 std::string squareOverFloor(double x, const std::string& integrator = "{max_depth: 1, roulette: false}", double half_side = 0.5,
                             const std::string& radiance = "1");
+
+using Point = std::array<double, 3>;
+
+/// A scene put together piece by piece, as YAML.
+class Stage {
+public:
+    explicit Stage(std::string camera, std::string integrator = "{max_depth: 1, roulette: false}");
+    /// A further or another top-level key, as "environment", "{radiance: 1}".
+    Stage& set(const std::string& key, const std::string& value);
+    /// As "glass", "{type: dielectric, ior: 1.5}".
+    Stage& material(const std::string& name, const std::string& definition);
+    /// Four corners, counter-clockwise seen from the front. `radiance` empty: no light; "…, two_sided: true" is possible.
+    Stage& quad(const std::string& name, const std::string& corners, const std::string& material, const std::string& radiance = "");
+    Stage& mesh(const std::string& name, const std::string& positions, const std::string& faces, const std::string& material,
+                const std::string& radiance = "");
+    /// Axis-parallel box with outward normals.
+    Stage& box(const std::string& name, const Point& lower, const Point& upper, const std::string& material);
+    std::string yaml() const;
+
+private:
+    std::map<std::string, std::string> top_;
+    std::string materials_, objects_;
+};
 
 /// Needle's eyes on the cube's walls, for probes at a point.
 inline constexpr const char* kFloorCentre = "{position: [0.5, 0.5, 0.1], target: [0.5, 0, 0.5], fov: 0.01}";
