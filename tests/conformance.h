@@ -1,4 +1,4 @@
-/// What the conformance suite's files share: the backend under test, scenes, and confidence intervals.
+/// What the conformance suite's files share: the backend under test, and scenes.
 #pragma once
 
 #include "backend/integrator.h"
@@ -38,16 +38,5 @@ std::uint64_t differingPixels(const crt::Film& a, const crt::Film& b, bool all =
 
 /// Mean of Y over the film.
 double imageMean(const crt::Film& film);
-
-struct Interval {
-    double lower, upper;
-};
-
-/// 99.9 % Student interval of the mean of 16 independent replicates: t₁₅ at .9995 is 4.0728.
-Interval interval999(const std::vector<double>& sixteen);
-
-/// Equivalence, not failure to reject: the whole 99.9 % interval of the mean over 16 seeds lies within ±delta of `expected`.
-/// Renders scene(seed) 16 times with `samples` per pixel.
-void requireMean(const std::string& yaml, double expected, double delta, std::uint64_t samples);
 
 }  // namespace conformance

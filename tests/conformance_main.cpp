@@ -6,10 +6,8 @@
 #include "error.h"
 #include "log.h"
 
-#include <cmath>
 #include <cstdio>
 #include <memory>
-#include <numeric>
 
 namespace conformance {
 namespace {
@@ -67,28 +65,6 @@ double imageMean(const crt::Film& film) {
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
         for (std::uint32_t x = 0; x < film.shape().width; ++x) sum += film.mean(x, y, 1);
     return sum / (static_cast<double>(film.shape().width) * film.shape().height);
-}
-
-Interval interval999(const std::vector<double>& sixteen) {
-    REQUIRE(sixteen.size() == 16);
-    const double mean = std::accumulate(sixteen.begin(), sixteen.end(), 0.0) / 16;
-    double squares = 0;
-    for (const double x : sixteen) squares += (x - mean) * (x - mean);
-    const double half = 4.0728 * std::sqrt(squares / 15 / 16);
-    return {mean - half, mean + half};
-}
-
-void requireMean(const std::string& yaml, double expected, double delta, std::uint64_t samples) {
-    std::vector<double> means;
-    for (int seed = 1; seed <= 16; ++seed) {
-        Run run;
-        run.samples = samples;
-        means.push_back(imageMean(render(backend(), sceneFrom(yaml, {{"sampler.seed", std::to_string(seed)}}), run)));
-    }
-    const Interval i = interval999(means);
-    INFO("99.9 % interval [" << i.lower << ", " << i.upper << "], expected " << expected << " within " << 100 * delta << " %");
-    CHECK(i.lower > expected * (1 - delta));
-    CHECK(i.upper < expected * (1 + delta));
 }
 
 }  // namespace conformance

@@ -40,6 +40,12 @@ if(NOT output MATCHES "All tests passed")
   message(FATAL_ERROR "the out-of-tree backend was not tested:\n${output}")
 endif()
 
+# And physics, by the crt that was installed.
+run(${WORK_DIR}/moved/bin/crt verify --backend example --plugin-path ${WORK_DIR}/build --case furnace,square-light,fresnel,out-of-glass,prism,crops)
+if(NOT output MATCHES "6 pass")
+  message(FATAL_ERROR "crt verify did not pass the out-of-tree backend:\n${output}")
+endif()
+
 run(${CMAKE_COMMAND} --install ${WORK_DIR}/build --prefix ${WORK_DIR}/moved)
 run(${CMAKE_COMMAND} -E env --unset=CRT_BACKEND_PATH ${WORK_DIR}/moved/bin/crt plugins)
 expect_usable("${output}" "installed beside the other backends")

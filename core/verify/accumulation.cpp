@@ -66,7 +66,7 @@ void noisyPixel(Context& context) {
     const double expected = squareFormFactor(0, 0.5);
     // Independent numbers; the spread of a path, wavelengths and all, is measured on the way.
     const Film few = context.render(noisy("independent", "{resolution: [1, 1]}"), {.samples = 65536});
-    const double spread = std::sqrt(few.luminanceVariance(0, 0) * 65536) / expected;
+    const double spread = std::sqrt(pathVariance(few, 0, 0)) / expected;
     for (const int bits : {20, 24, 27}) {
         if (bits > 20 && !context.atLeast(Level::Merge)) continue;
         if (bits > 24 && !context.atLeast(Level::Nightly)) continue;
@@ -167,7 +167,7 @@ void draws(Context& context) {
         constexpr std::uint32_t dimensions = 6;
         std::vector<std::vector<double>> u(dimensions);
         for (std::uint32_t i = 0; i < count; ++i) {
-            CrtSampler s = crt_sampler_begin(kind, 7, 0, i, 3);
+            CrtSampler s = crt_sampler_begin(kind, 0, 7, 0, i, 3);
             for (std::uint32_t d = 0; d < dimensions; ++d) u[d].push_back(crt_sample_1d(&s, d));
         }
         for (std::uint32_t d = 0; d < dimensions; ++d) {
@@ -203,7 +203,7 @@ void sobol(Context& context) {
                 for (int k = 0; k <= m; ++k) {
                     std::vector<int> count(std::size_t{1} << m);
                     for (std::uint64_t i = 0; i < (1u << m); ++i) {
-                        CrtSampler s = crt_sampler_begin(CRT_SAMPLER_SOBOL, 1, 2, 77, first + i);
+                        CrtSampler s = crt_sampler_begin(CRT_SAMPLER_SOBOL, 0, 1, 2, 77, first + i);
                         const CrtRandom2 u = crt_sample_2d(&s, dimension);
                         const auto x = static_cast<std::size_t>(std::ldexp(u.x, k)), y = static_cast<std::size_t>(std::ldexp(u.y, m - k));
                         ++count[(x << (m - k)) + y];

@@ -256,6 +256,11 @@ double radiance(const Film& film) {
     return meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return radiance(film, x, y); });
 }
 
+double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y) {
+    const double mean = film.mean(x, y, 1);
+    return film.mean(x, y, 3) - mean * mean;
+}
+
 double luminance(const Film& film) {
     return meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return film.mean(x, y, 1); });
 }

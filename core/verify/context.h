@@ -108,6 +108,8 @@ private:
 double radiance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean over all pixels.
 double radiance(const Film& film);
+/// Variance of Y of one path of a pixel, from the film's second moment: right for independent samples.
+double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean of Y over all pixels.
 double luminance(const Film& film);
 

@@ -22,6 +22,8 @@ std::string suiteHtml(const SuiteResult& suite);
 
 /// `crt verify --list`
 std::string listText(const std::vector<const Case*>& cases);
+/// The row of a case in docs/stability.md, but for the figures that end it.
+std::string markdownRow(const Case& c);
 /// docs/stability.md: every case of the registry, with the figures of `suites` (verify.json texts) where they have any. Made, never written by hand.
 std::string registryMarkdown(const std::vector<std::string>& suites);
 

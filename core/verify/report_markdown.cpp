@@ -48,6 +48,10 @@ std::string figureOf(const Json& result) {
 
 }  // namespace
 
+std::string markdownRow(const Case& c) {
+    return fmt::format("| {} `{}` | {} | {} | {} | {} | {} |", c.id, c.name, cell(c.title), cell(c.expected), cell(c.source), cell(c.tolerance), name(c.level));
+}
+
 std::string registryMarkdown(const std::vector<std::string>& suites) {
     std::string text = kPreamble;
     std::vector<std::string> backends;
@@ -71,8 +75,7 @@ std::string registryMarkdown(const std::vector<std::string>& suites) {
             for (std::size_t i = 0; i < backends.size(); ++i) text += "---|";
             text += "\n";
         }
-        text += fmt::format("| {} `{}` | {} | {} | {} | {} | {} |", c.id, c.name, cell(c.title), cell(c.expected), cell(c.source), cell(c.tolerance),
-                            name(c.level));
+        text += markdownRow(c);
         for (const std::string& b : backends) text += fmt::format(" {} |", figures.count({b, c.id}) != 0 ? figures[{b, c.id}] : "–");
         text += "\n";
     }

@@ -707,6 +707,25 @@ class Light(CliTest):
         self.assertEqual(read_bytes(self.path("merged.pfm")), reference)
 
 
+class Verify(CliTest):
+    def test_wrong_physics_is_named(self):
+        run = self.crt("verify", "-b", "without_cosine", "--case", "square-light", "-o", "out", expect=7)
+        self.assertIn("one of the two cosines is missing", run.stdout)
+        with open(os.path.join(self.directory, "out", "verify.json"), encoding="utf-8") as file:
+            self.assertFalse(json.load(file)["passed"])
+        with open(os.path.join(self.directory, "out", "verify.html"), encoding="utf-8") as file:
+            self.assertIn("one of the two cosines is missing", file.read())
+
+    def test_right_physics_passes(self):
+        run = self.crt("verify", "-b", "example", "--case", "furnace,square-light")
+        self.assertIn("2 pass", run.stdout)
+
+    def test_case_misspelt(self):
+        self.assert_one_error(self.crt("verify", "--case", "furnance", expect=2), "furnace")
+
+    def test_list_names_cases(self):
+        self.assertIn("square-light", self.crt("verify", "--list").stdout)
+
 if __name__ == "__main__":
     if len(sys.argv) < 4:
         sys.exit(__doc__)

@@ -1,0 +1,101 @@
+// The suite of `crt verify` itself: its registry, its verdicts, its diagnoses, and that its expectations are right.
+#include "error.h"
+#include "verify/case.h"
+#include "verify/physics.h"
+#include "verify/references.h"
+#include "verify/report.h"
+
+#include <catch2/catch.hpp>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+using namespace crt;
+using namespace crt::verify;
+using Catch::Matchers::Contains;
+
+namespace {
+
+Outcome outcome(Verdict verdict) {
+    Outcome o;
+    o.verdict = verdict;
+    return o;
+}
+
+}  // namespace
+
+TEST_CASE("every case of the suite says what is asked, what is expected and from where", "[verify]") {
+    std::set<std::string> ids, names;
+    for (const Case& c : registry()) {
+        INFO(c.id << " " << c.name);
+        CHECK(ids.insert(c.id).second);
+        CHECK(names.insert(c.name).second);
+        CHECK(c.id.size() == 3);
+        CHECK_FALSE(groupTitle(c.group()).empty());
+        CHECK_FALSE((c.title.empty() || c.expected.empty() || c.source.empty() || c.tolerance.empty()));
+        CHECK(c.run != nullptr);
+    }
+    // Left out of no group: the list of the suite's plan.
+    for (const auto& [group, count] : {std::pair{'A', 18}, {'B', 10}, {'E', 14}, {'F', 10}, {'G', 10}, {'H', 11}, {'I', 14}, {'J', 8}})
+        for (int i = 1; i <= count; ++i) {
+            const std::string id = fmt::format("{}{:02}", group, i);
+            INFO(id);
+            CHECK(ids.count(id) == 1);
+        }
+}
+
+TEST_CASE("docs/stability.md is what the registry says", "[verify][docs]") {
+    std::ifstream in(CRT_SOURCE_DIR "/docs/stability.md");
+    const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    for (const Case& c : registry()) {
+        INFO("run crt verify --markdown, see the head of docs/stability.md; the row of " << c.id << " differs");
+        CHECK(text.find(markdownRow(c)) != std::string::npos);
+    }
+}
+
+TEST_CASE("cases are chosen by id, name, group and level", "[verify]") {
+    CHECK(select({"A03"}, Level::Commit).size() == 1);
+    CHECK(select({"furnace", "A03"}, Level::Commit).size() == 2);
+    CHECK(select({"H"}, Level::Merge).size() > select({"H"}, Level::Commit).size());
+    CHECK(select({}, Level::Nightly).size() == registry().size());
+    CHECK_THROWS_WITH(select({"furnance"}, Level::Commit), Contains("no case is called 'furnance'") && Contains("furnace"));
+}
+
+TEST_CASE("a case is as good as its worst outcome", "[verify]") {
+    CHECK(worst({}) == Verdict::Fail);
+    CHECK(worst({outcome(Verdict::Pass), outcome(Verdict::Inconclusive)}) == Verdict::Inconclusive);
+    CHECK(worst({outcome(Verdict::Fail), outcome(Verdict::Inconclusive)}) == Verdict::Fail);
+    CHECK(worst({outcome(Verdict::Pass), outcome(Verdict::Refused), outcome(Verdict::NotApplicable)}) == Verdict::Pass);
+    CHECK(worst({outcome(Verdict::Refused)}) == Verdict::Refused);
+    CHECK(worst({outcome(Verdict::NotApplicable)}) == Verdict::NotApplicable);
+    CHECK(failed(Verdict::Inconclusive));
+    CHECK_FALSE(failed(Verdict::Refused));
+}
+
+TEST_CASE("a wrong figure is traced to the mistake that gives it", "[verify]") {
+    const std::vector<Mistake> mistakes{{0.5, "a cosine is missing"}, {0.7, "something else"}};
+    CHECK(diagnose(0.503, 1, 0, mistakes) == "a cosine is missing");
+    CHECK_THAT(diagnose(3.1416, 1, 0, mistakes), Contains("division by pi missing"));
+    CHECK_THAT(diagnose(2, 1, 0, {}), Contains("counted twice"));
+    CHECK_THAT(diagnose(0, 1, 0, {}), Contains("black"));
+    CHECK_THAT(diagnose(1e-3, 0, 0, {}), Contains("leak"));
+    CHECK_THAT(diagnose(std::nan(""), 1, 0, {}), Contains("not a finite number"));
+}
+
+TEST_CASE("form factors agree by two formulas, and with published values", "[verify]") {
+    for (const double x : {0.0, 0.3, 1.0, 2.0, 20.0})
+        CHECK(squareFormFactor(x, 0.5) == Approx(polygonFormFactor({x, 0, 0}, {0, 1, 0}, {{-.5, 1, -.5}, {.5, 1, -.5}, {.5, 1, .5}, {-.5, 1, .5}})).epsilon(1e-12));
+    CHECK(squareFormFactor(0, 0.5) == Approx(.2394564705).epsilon(1e-9));
+    CHECK(squareFormFactor(20, 0.5) == Approx(1.982807681e-6).epsilon(1e-8));
+    CHECK(squareFormFactor(0, 5e-5) == Approx(3.18309885123e-9).epsilon(1e-10));
+    // The part of a wall below the horizon does not count: half of an upright square that straddles it.
+    CHECK(polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{1, -1, -1}, {1, 1, -1}, {1, 1, 1}, {1, -1, 1}}) ==
+          Approx(polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{1, 0, -1}, {1, 1, -1}, {1, 1, 1}, {1, 0, 1}})).epsilon(1e-12));
+    CHECK(fresnelDielectric(1, 1.5) == Approx(0.04).epsilon(1e-12));
+    CHECK(fresnelDielectric(0.5, 1.5) == Approx(0.089186713).epsilon(1e-8));
+    CHECK(fresnelDielectric(0.5, 1 / 1.5) == 1);
+    CHECK(planck_W_m3_sr(550, 5778) == Approx(2.5857643e13).epsilon(1e-7));
+}
