@@ -41,7 +41,7 @@ if(NOT output MATCHES "All tests passed")
 endif()
 
 # And physics, by the crt that was installed.
-run(${WORK_DIR}/moved/bin/crt verify --backend example --plugin-path ${WORK_DIR}/build --case furnace,square-light,fresnel,out-of-glass,prism,crops)
+run(${WORK_DIR}/moved/bin/crt verify --backend example --plugin-path ${WORK_DIR}/build --case furnace,square-light,reflectance,out-of-glass,prism,crops)
 if(NOT output MATCHES "6 pass")
   message(FATAL_ERROR "crt verify did not pass the out-of-tree backend:\n${output}")
 endif()

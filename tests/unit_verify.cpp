@@ -87,7 +87,7 @@ TEST_CASE("a wrong figure is traced to the mistake that gives it", "[verify]") {
 
 TEST_CASE("form factors agree by two formulas, and with published values", "[verify]") {
     for (const double x : {0.0, 0.3, 1.0, 2.0, 20.0})
-        CHECK(squareFormFactor(x, 0.5) == Approx(polygonFormFactor({x, 0, 0}, {0, 1, 0}, {{-.5, 1, -.5}, {.5, 1, -.5}, {.5, 1, .5}, {-.5, 1, .5}})).epsilon(1e-12));
+        CHECK(squareFormFactor(x, 0.5) == Approx(polygonFormFactor({x, 0, 0}, {0, 1, 0}, {{-.5, 1, -.5}, {.5, 1, -.5}, {.5, 1, .5}, {-.5, 1, .5}})).epsilon(1e-9));
     CHECK(squareFormFactor(0, 0.5) == Approx(.2394564705).epsilon(1e-9));
     CHECK(squareFormFactor(20, 0.5) == Approx(1.982807681e-6).epsilon(1e-8));
     CHECK(squareFormFactor(0, 5e-5) == Approx(3.18309885123e-9).epsilon(1e-10));

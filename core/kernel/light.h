@@ -13,8 +13,8 @@ CRT_KERNEL_BEGIN
    fifth of the cost; above, its 1/r² and cosine make it noisy. The choice depends on the triangle and the point alone, so that sampling and pdf agree. */
 #define CRT_SOLID_ANGLE_THRESHOLD 0.3f
 
-/* A spherical triangle of nearly a hemisphere, seen from just under a large lamp, has angles of nearly π, whose sines are lost in rounding. Area
-   sampling is then noisy, but chance hits have nearly all the weight. */
+/* A light seen as nearly a hemisphere is left to chance hits, which find it all but always. Its corners lie on the horizon, some across from each
+   other, and the arcs between them are hardly defined; area sampling would be noisy and weigh next to nothing. */
 #define CRT_SOLID_ANGLE_MAX 6.0f
 
 typedef struct CrtLightSample {
@@ -58,10 +58,12 @@ typedef struct CrtLightView {
     vec3 o, a, b, far; /* unit directions to the corners */
     f32 omega, omega_far;
     int usable; /* whether directions are to be sampled by solid angle */
+    int left_to_chance; /* not to be sampled at all */
 } CrtLightView;
 
 CRT_FN CrtLightView crt_light_view(CrtLightShape shape, f32 area, vec3 p) {
     CrtLightView v;
+    v.left_to_chance = 0;
     v.usable = crt_seen_large(shape, area, p);
     if (!v.usable) return v;
     v.o = normalize3(shape.o - p);
@@ -70,7 +72,8 @@ CRT_FN CrtLightView crt_light_view(CrtLightShape shape, f32 area, vec3 p) {
     v.far = normalize3(shape.o + shape.a + shape.b - p);
     v.omega = crt_solid_angle(v.o, v.a, v.b);
     v.omega_far = shape.parallelogram ? crt_solid_angle(v.far, v.b, v.a) : 0.0f;
-    v.usable = crt_max(v.omega, v.omega_far) < CRT_SOLID_ANGLE_MAX;
+    v.left_to_chance = !(v.omega + v.omega_far < CRT_SOLID_ANGLE_MAX);
+    v.usable = !v.left_to_chance;
     return v;
 }
 
@@ -125,6 +128,11 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
     s.reach = 0.0f;
     f32 cosine, distance;
     const CrtLightView view = crt_light_view(shape, emitter->area, p);
+    if (view.left_to_chance) {
+        s.point = p;
+        s.wi = normal;
+        return s;
+    }
     if (view.usable) {
         const f32 omega = view.omega + view.omega_far;
         const f32 split = view.omega / omega;
@@ -165,6 +173,7 @@ CRT_FN f32 crt_light_pdf(const CrtContext *ctx, u32 emitter_index, vec3 p, vec3 
     CRT_GLOBAL const CrtEmitter *emitter = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + emitter_index;
     const CrtLightShape shape = crt_light_shape(ctx, emitter);
     const CrtLightView view = crt_light_view(shape, emitter->area, p);
+    if (view.left_to_chance) return 0.0f;
     if (view.usable) {
         const f32 omega = view.omega + view.omega_far;
         return omega > 0.0f ? emitter->choice_probability / omega : 0.0f;
