@@ -70,6 +70,8 @@ def main():
     parser.add_argument("--python", help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in out/peers-venv")
     parser.add_argument("--seconds", type=float, default=600, help="about how long all of it may take, without making environments (600)")
     parser.add_argument("--replicates", type=int, default=8, help="renders with seeds of their own for each number of samples (8)")
+    parser.add_argument("--samplers", nargs="+", default=["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
+                        help="Mitsuba's samplers of which the best is taken (all five)")
     parser.add_argument("--busy", type=float, default=0.05, metavar="SHARE", help="what share others may take of the processor before a wall time is marked (0.05)")
     parser.add_argument("--tiny", action="store_true", help="small and short: does the tool work? Goes to out/tiny")
     arguments = parser.parse_args()

@@ -13,7 +13,6 @@ from .peer_lines import ROULETTE_FROM, SCENE, Crt, Mitsuba, Worker
 from .results import Results
 
 SIZE, MAX_DEPTH, TARGET = 128, 16, 0.01
-SAMPLERS = ["independent", "stratified", "multijitter", "orthogonal", "ldsampler"]
 COUNTS = [4, 16, 64, 128, 256, 512, 1024]
 FEWEST_POOLED = 16  # Samples of a render that counts among the converged ones.
 HEADLINE_WEIGHT, MATCHED_WEIGHT = 4, 2  # Of the time for measuring: with roulette, and without; the other lines have 1.
@@ -105,10 +104,10 @@ def slope_of(points):
     return float(np.polyfit([math.log(p["spp"]) for p in points[-3:]], [math.log(p["error"]) for p in points[-3:]], 1)[0])
 
 
-def tournament(worker, spp, replicates, room):
-    """Every sampler of Mitsuba: {sampler: error² × CPU seconds, …}, least is best. With roulette, the cheaper way."""
+def tournament(worker, samplers, spp, replicates, room):
+    """Samplers of Mitsuba: {sampler: error² × CPU seconds, …}, least is best. With roulette, the cheaper way."""
     scores = {}
-    for sampler in SAMPLERS:
+    for sampler in samplers:
         contestant = Mitsuba(worker, sampler, True)
         costs = [contestant.render(spp, 5_000_000 + r) for r in range(replicates)]
         error, _ = relative_error([c.image for c in costs], room)["error"]
@@ -141,7 +140,7 @@ def run(program, arguments, results, scene, setup, crt_backends, workers, begin)
     described = {v: w.ask({"do": "describe"}) for v, w in workers.items()}
     llvm = workers["llvm_ad_spectral"]
     room = room_pixels(Crt(program, crt_backends[0], 1, False, setup).render(64, 6_000_000).image)
-    scores = tournament(llvm, 64 if arguments.tiny else 256, 3, room)
+    scores = tournament(llvm, arguments.samplers, 64 if arguments.tiny else 256, 3, room)
     best = min(scores, key=lambda sampler: scores[sampler]["error2_seconds"])
     lines = [Line(Crt(program, b, n, False, setup), MATCHED_WEIGHT if (b, n) == ("embree", 1) else 1) for b in crt_backends for n in (1, 16)]
     lines += [Line(Crt(program, "embree", 1, True, setup), HEADLINE_WEIGHT), Line(Mitsuba(llvm, best, False), MATCHED_WEIGHT),
