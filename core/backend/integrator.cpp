@@ -331,7 +331,11 @@ void Integrator::readFilm(Film& film) {
     self.check(self.call("read_film", [&] { return self.table.read_film(self.table.state, &view); }));
     part.samples = self.coverage.ranges();
     self.checkContents(part);
-    film.add(part);
+    // Into an empty film nothing need be added.
+    if (film.samples.count() == 0)
+        film = std::move(part);
+    else
+        film.add(part);
 }
 
 CrtBackendReport Integrator::report() {
