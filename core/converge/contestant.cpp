@@ -138,14 +138,26 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     return row;
 }
 
+/// What only the very first sample pays, such as an OpenCL driver that makes machine code late, belongs to the start and not to a replicate.
+void Contestant::warmUp(const CompiledScene& compiled) {
+    const Clock::time_point start = Clock::now();
+    integrator_->render({.first_sample = 0, .sample_count = 1});
+    configuration_.stages.first_sample = secondsSince(start);
+    before_first_sample_ += configuration_.stages.first_sample;
+    integrator_->setScene(compiled);  // An empty film again.
+}
+
 bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
                            const std::function<bool()>& stop) {
     scene_.sampler.seed = seed_ + 1 + replicate;
     const Clock::time_point setup = Clock::now();
     const CompiledScene compiled = compileScene(scene_, 0);
     integrator_->setScene(compiled);
-    if (!described_) describe(compiled, secondsSince(setup));
-    const Clock::time_point start = Clock::now();  // Compiling a kernel happens once, and must not cost the first replicate its samples.
+    if (!described_) {
+        describe(compiled, secondsSince(setup));
+        warmUp(compiled);
+    }
+    const Clock::time_point start = Clock::now();
 
     const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
     const CrtBackendReport before = integrator_->report();
@@ -157,7 +169,6 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
         integrator_->render({.first_sample = done, .sample_count = next - done});
         const double step_seconds = secondsSince(step);
         wall += step_seconds;
-        if (exploring && done == 0) configuration_.stages.first_sample = step_seconds;
         done = next;
         if (exploring) samples_reached_ = done;
 

@@ -40,6 +40,7 @@ public:
 
 private:
     void describe(const CompiledScene& compiled, double setup_seconds);
+    void warmUp(const CompiledScene& compiled);
     Row look(const Film& film, std::uint32_t replicate, bool last);
 
     Configuration configuration_;
