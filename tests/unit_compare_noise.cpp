@@ -161,7 +161,7 @@ TEST_CASE("standard errors that are stated too small are seen in z", "[compare-n
     CHECK(compareNoise(withStandardError(1, 1, kNoise / 2), withStandardError(2, 1, kNoise / 2)).rms_z == Approx(2).margin(0.1));
 }
 
-TEST_CASE("images of one seed, and without noise, are not judged; one that knows its noise is enough", "[compare-noise]") {
+TEST_CASE("images of one seed, and without noise, are not judged, and one that knows its noise is enough", "[compare-noise]") {
     CHECK_THAT(compareNoise(withStandardError(1), withStandardError(1)).unknown, Contains("seed 1"));
     Image plain = blank({"R", "G", "B"}, "9");
     plain.pixels.assign(std::size_t{3} * kWidth * kHeight, 2.0f);

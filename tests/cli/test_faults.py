@@ -78,7 +78,7 @@ class SmallDisk(CliTest):
     def setUp(self):
         super().setUp()
         os.mkdir(self.path("disk"))
-        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=192k", "crt-test", self.path("disk")], check=True)
+        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=768k", "crt-test", self.path("disk")], check=True)
         self.addCleanup(subprocess.run, ["umount", "-l", self.path("disk")], check=False)
 
     def fill(self):
@@ -210,7 +210,8 @@ class LostGpu(CliTest):
 
     def test_memory_that_does_not_suffice(self):
         # 7000 x 7000 pixels: sums of 3 GB on a device of one.
-        run = self.crt("scene.yaml", "-b", "cuda", "-o", "a.pfm", "--set", "film.resolution=[7000,7000]", "--spp", "1", expect=5, **self.gpu)
+        run = self.crt("scene.yaml", "-b", "cuda", "-o", "a.pfm", "--set", "film.resolution=[7000,7000]", "--set", "sampler.replicates=1", "--spp", "1",
+                       expect=5, **self.gpu)
         self.assert_one_error(run, "the film needs 3136.0 MB", "MB free")
 
 
