@@ -85,12 +85,12 @@ void addMetadata(ImageSpec& spec, const CrtImageText* metadata, std::uint32_t co
 
 /// A file for OpenImageIO to write to that remembers the first failure. Left to itself the library writes through a buffer, and what the last flush
 /// of it could not write, on a full disk, it does not say: the image would be cut off in silence.
-class CheckedFile : public OIIO::Filesystem::IOProxy {
+class CheckedFile final : public OIIO::Filesystem::IOProxy {
 public:
     explicit CheckedFile(const char* path) : IOProxy(path, Write), descriptor_(::open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
         if (descriptor_ < 0) error_number_ = errno;
     }
-    ~CheckedFile() override { close(); }
+    ~CheckedFile() override { CheckedFile::close(); }
     CheckedFile(const CheckedFile&) = delete;
     CheckedFile& operator=(const CheckedFile&) = delete;
 

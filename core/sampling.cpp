@@ -91,7 +91,8 @@ std::uint64_t nextTargetCheck(std::uint64_t samples) {
 }
 
 bool reachesTarget(const Film& film, double target) {
-    constexpr double kDecidingDegreesOfFreedom = CRT_REPLICATES / 2 - 1;
+    constexpr unsigned kDecidingReplicates = CRT_REPLICATES / 2;
+    constexpr double kDecidingDegreesOfFreedom = kDecidingReplicates - 1;
     const std::optional<ErrorEstimate> error = estimateError(film, ReplicateSet::Even);
     return error && error->degrees_of_freedom >= kDecidingDegreesOfFreedom && error->half_width_95 <= target;
 }
