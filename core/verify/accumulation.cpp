@@ -254,10 +254,6 @@ void noClamping(Context& context) {
 }  // namespace
 
 std::vector<Case> accumulationCases() {
-    const auto row = [](const char* id, const char* name, const char* title, const char* expected, const char* source, const char* tolerance, Level level,
-                        std::uint64_t needs, void (*run)(Context&)) {
-        return Case{.id = id, .name = name, .title = title, .expected = expected, .source = source, .tolerance = tolerance, .level = level, .needs = needs, .run = run};
-    };
     constexpr std::uint64_t samplers = kDirectLight | CRT_FEATURE_SOBOL | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_XORSHIFT;
     return {
         row("I01", "constant-pixel", "2^10 and 2^20 samples of a constant (2^24 and 2^25 at merge, 2^27 at night)", "the constant", "a float sum stands still at 2^24", "1e-6", Level::Commit,

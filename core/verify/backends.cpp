@@ -121,32 +121,22 @@ void hostsEnvironment(Context& context) {
 }  // namespace
 
 std::vector<Case> backendCases() {
-    const auto row = [](const char* id, const char* case_name, const char* title, const char* expected, const char* source, std::uint64_t needs,
-                        void (*run)(Context&)) {
-        return Case{.id = id,
-                    .name = case_name,
-                    .title = title,
-                    .expected = expected,
-                    .source = source,
-                    .tolerance = "same bits",
-                    .level = Level::Commit,
-                    .needs = needs,
-                    .run = run};
-    };
+    const auto sameBits = [](const char* id, const char* case_name, const char* title, const char* expected, const char* source, std::uint64_t needs,
+                             void (*run)(Context&)) { return row(id, case_name, title, expected, source, "same bits", Level::Commit, needs, run); };
     constexpr const char* kPortable = "crt's own portable build of the kernel";
     return {
-        row("L01", "shipped-flags", "Every feature, under the flags that the backend ships with", "the portable build's image, with all AOVs",
+        sameBits("L01", "shipped-flags", "Every feature, under the flags that the backend ships with", "the portable build's image, with all AOVs",
             kPortable, 0, shippedFlags),
-        row("L02", "random-numbers", "10^6 numbers of each sampler (10^4 on commits)", "the portable build's", kPortable, CRT_FEATURE_AOV,
+        sameBits("L02", "random-numbers", "10^6 numbers of each sampler (10^4 on commits)", "the portable build's", kPortable, CRT_FEATURE_AOV,
             randomNumbers),
-        row("L03", "first-hits", "10^6 first hits on a sphere and a box: primitive, normal, distance", "the portable build's", kPortable,
+        sameBits("L03", "first-hits", "10^6 first hits on a sphere and a box: primitive, normal, distance", "the portable build's", kPortable,
             CRT_FEATURE_BVH | CRT_FEATURE_AOV, firstHits),
-        row("L04", "radiances", "Every feature, the same seed", "the portable build's radiances", kPortable, 0, radiances),
-        row("L05", "run-to-run", "The same render five times", "the same image", "docs/architecture.md, Same bits", CRT_FEATURE_BVH | CRT_FEATURE_NEE,
-            runToRun),
-        row("L06", "lost-devices", "A device that is lost, or out of memory or time", "a clean error, and what there was is kept",
+        sameBits("L04", "radiances", "Every feature, the same seed", "the portable build's radiances", kPortable, 0, radiances),
+        sameBits("L05", "run-to-run", "The same render five times", "the same image", "docs/architecture.md, Same bits",
+            CRT_FEATURE_BVH | CRT_FEATURE_NEE, runToRun),
+        sameBits("L06", "lost-devices", "A device that is lost, or out of memory or time", "a clean error, and what there was is kept",
             "docs/architecture.md, Exit codes", 0, lostDevices),
-        row("L07", "hosts-environment", "A host that rounds upwards, to zero, or flushes subnormals", "the same image",
+        sameBits("L07", "hosts-environment", "A host that rounds upwards, to zero, or flushes subnormals", "the same image",
             "the backend sets what it needs", CRT_FEATURE_BVH | CRT_FEATURE_NEE, hostsEnvironment),
     };
 }

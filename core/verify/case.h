@@ -55,6 +55,12 @@ struct Case {
     char group() const { return id.front(); }
 };
 
+/// A row for tables that say much in little space, its members in their order.
+inline Case row(const char* id, const char* name, const char* title, const char* expected, const char* source, const char* tolerance, Level level,
+                std::uint64_t needs, void (*run)(Context&)) {
+    return {id, name, title, expected, source, tolerance, level, needs, run};
+}
+
 /// "A": "Closed forms".
 std::string_view groupTitle(char group);
 const char* name(Level level);

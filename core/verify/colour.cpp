@@ -248,10 +248,6 @@ void tables(Context& context) {
 }  // namespace
 
 std::vector<Case> colourCases() {
-    const auto row = [](const char* id, const char* name, const char* title, const char* expected, const char* source, const char* tolerance, Level level,
-                        std::uint64_t needs, void (*run)(Context&)) {
-        return Case{.id = id, .name = name, .title = title, .expected = expected, .source = source, .tolerance = tolerance, .level = level, .needs = needs, .run = run};
-    };
     constexpr std::uint64_t patch = CRT_FEATURE_DIFFUSE | CRT_FEATURE_ENVIRONMENT;
     constexpr std::uint64_t glass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ENVIRONMENT;
     return {

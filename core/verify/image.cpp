@@ -171,10 +171,6 @@ void brightFiles(Context& context) {
 }  // namespace
 
 std::vector<Case> imageCases() {
-    const auto row = [](const char* id, const char* name, const char* title, const char* expected, const char* source, const char* tolerance, Level level,
-                        std::uint64_t needs, void (*run)(Context&)) {
-        return Case{.id = id, .name = name, .title = title, .expected = expected, .source = source, .tolerance = tolerance, .level = level, .needs = needs, .run = run};
-    };
     constexpr std::uint64_t rooms = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_DIELECTRIC;
     return {
         row("J01", "film-sizes", "Films of 1 × 1, 1 × 64, 64 × 1; corners of 16384² and 46340² pixels; 46341²", "every pixel; the last is refused", "2^31 pixels; docs/scene.md", "exactly; ± 0.05", Level::Commit,

@@ -125,24 +125,17 @@ void sizes(Context& context) {
 }  // namespace
 
 std::vector<Case> inputCases() {
-    const auto row = [](const char* id, const char* case_name, const char* title, const char* expected, void (*run)(Context&)) {
-        return Case{.id = id,
-                    .name = case_name,
-                    .title = title,
-                    .expected = expected,
-                    .source = "docs/scene.md",
-                    .tolerance = "the message; same bits where it is borne",
-                    .level = Level::Commit,
-                    .needs = 0,
-                    .run = run};
+    const auto spelling = [](const char* id, const char* case_name, const char* title, const char* expected, void (*run)(Context&)) {
+        return row(id, case_name, title, expected, "docs/scene.md", "the message; same bits where it is borne", Level::Commit, 0, run);
     };
     return {
-        row("K01", "numbers", "NaN, infinity, 1e999, -nan(ind), commas, hexadecimal, quotes", "refused by place", numbers),
-        row("K02", "spellings", "CRLF, byte order mark, no last newline", "the same image", spellings),
-        row("K03", "mesh-files", "OBJ: numbers, indices, corners, missing normals; other spellings", "refused by line; the same image", meshFiles),
-        row("K04", "keys", "Unknown, doubled and wrong keys; no YAML; nothing", "refused by place", keys),
-        row("K05", "files", "Meshes that are missing or directories", "refused by name", files),
-        row("K06", "sizes", "Films of 0 and 2^32 pixels, indices beyond 32 bits", "refused before memory is asked for", sizes),
+        spelling("K01", "numbers", "NaN, infinity, 1e999, -nan(ind), commas, hexadecimal, quotes", "refused by place", numbers),
+        spelling("K02", "spellings", "CRLF, byte order mark, no last newline", "the same image", spellings),
+        spelling("K03", "mesh-files", "OBJ: numbers, indices, corners, missing normals; other spellings", "refused by line; the same image",
+            meshFiles),
+        spelling("K04", "keys", "Unknown, doubled and wrong keys; no YAML; nothing", "refused by place", keys),
+        spelling("K05", "files", "Meshes that are missing or directories", "refused by name", files),
+        spelling("K06", "sizes", "Films of 0 and 2^32 pixels, indices beyond 32 bits", "refused before memory is asked for", sizes),
     };
 }
 

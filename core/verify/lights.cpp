@@ -263,10 +263,6 @@ void enormousPdf(Context& context) {
 }  // namespace
 
 std::vector<Case> lightCases() {
-    const auto row = [](const char* id, const char* name, const char* title, const char* expected, const char* source, const char* tolerance, Level level,
-                        std::uint64_t needs, void (*run)(Context&)) {
-        return Case{.id = id, .name = name, .title = title, .expected = expected, .source = source, .tolerance = tolerance, .level = level, .needs = needs, .run = run};
-    };
     return {
         row("E01", "brightness", "A03 with a radiance of 2^±100 and 1e±30", "every sum scaled alike", "linearity of light", "exactly; 1e-6", Level::Commit,
             kDirectLight, brightness),

@@ -263,39 +263,29 @@ void deepTree(Context& context) {
 }  // namespace
 
 std::vector<Case> rayCases() {
-    const auto row = [](const char* id, const char* case_name, const char* title, const char* expected, const char* source, const char* tolerance,
-                        std::uint64_t needs, void (*run)(Context&)) {
-        return Case{.id = id,
-                    .name = case_name,
-                    .title = title,
-                    .expected = expected,
-                    .source = source,
-                    .tolerance = tolerance,
-                    .level = Level::Commit,
-                    .needs = needs,
-                    .run = run};
-    };
     return {
         row("D01", "aimed-rays", "Rays at the vertices, edges and faces of crumpled sheets that cover the film", "none slips through", "topology",
-            "rate of misses ≤ 1e-6 each", kNeeds, aimedRays),
+            "rate of misses ≤ 1e-6 each", Level::Commit, kNeeds, aimedRays),
         row("D02", "rays-in-faces", "Rays in the planes of boxes' faces, along all axes, components of ±0", "every ray meets the wall", "geometry",
-            "rate of misses ≤ 1e-6", kNeeds, raysInFaces),
+            "rate of misses ≤ 1e-6", Level::Commit, kNeeds, raysInFaces),
         row("D03", "nearly-parallel", "Directions with components of 1e-10, 1e-20, 1e-38 and 1e-42", "every ray meets the wall", "geometry",
-            "rate of misses ≤ 1e-6", kNeeds, nearlyParallelRays),
+            "rate of misses ≤ 1e-6", Level::Commit, kNeeds, nearlyParallelRays),
         row("D04", "grazing", "Rays at 1e-1 … 1e-7 rad to a mirror of 100 × 100 cells", "reflected to the sky, from a point of the floor", "geometry",
-            "rate of false hits ≤ 1e-5", kNeeds | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AOV, grazingRays),
+            "rate of false hits ≤ 1e-5", Level::Commit, kNeeds | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AOV, grazingRays),
         row("D05", "starts-on-surfaces", "A camera in a face, on an edge, on a vertex", "segments are open: the surface is not met",
-            "docs/decisions/0004-ray-offsets.md", "none of 1024 pixels", kNeeds | CRT_FEATURE_AREA_LIGHT, startsOnSurfaces),
-        row("D06", "rays-that-are-none", "Cameras that make rays of NaN or without direction", "refused", "docs/scene.md", "refused by name", 0,
-            raysThatAreNone),
-        row("D07", "vertices-that-are-none", "Vertices at NaN, ±infinity, 1e999; at 1e30", "refused; accepted", "docs/scene.md", "refused by name", 0,
-            verticesThatAreNone),
+            "docs/decisions/0004-ray-offsets.md", "none of 1024 pixels", Level::Commit, kNeeds | CRT_FEATURE_AREA_LIGHT, startsOnSurfaces),
+        row("D06", "rays-that-are-none", "Cameras that make rays of NaN or without direction", "refused", "docs/scene.md", "refused by name",
+            Level::Commit, 0, raysThatAreNone),
+        row("D07", "vertices-that-are-none", "Vertices at NaN, ±infinity, 1e999; at 1e30", "refused; accepted", "docs/scene.md", "refused by name",
+            Level::Commit, 0, verticesThatAreNone),
         row("D08", "occlusion-and-closest", "Light sampling and chance hits in a thicket", "the same radiance", "both estimate the same integral",
-            "± 4 %; ± 2 % before merges, ± 0.5 % at night", CRT_FEATURE_BVH | CRT_FEATURE_NEE | CRT_FEATURE_AREA_LIGHT, occlusionAndClosest),
+            "± 4 %; ± 2 % before merges, ± 0.5 % at night", Level::Commit, CRT_FEATURE_BVH | CRT_FEATURE_NEE | CRT_FEATURE_AREA_LIGHT,
+            occlusionAndClosest),
         row("D09", "brute-force-and-tree", "First hits with and without a tree, from inside, outside and far away", "the same", "a tree only culls",
-            "same bits, with depth, normal and primitive", CRT_FEATURE_BVH | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_AOV, bruteForceAndTree),
+            "same bits, with depth, normal and primitive", Level::Commit, CRT_FEATURE_BVH | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_AOV,
+            bruteForceAndTree),
         row("D10", "deep-tree", "2^20 nested triangles (2^12 on commits)", "rendered to its end, and as without a tree", "a tree only culls",
-            "same bits", CRT_FEATURE_BVH | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_AOV, deepTree),
+            "same bits", Level::Commit, CRT_FEATURE_BVH | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_AOV, deepTree),
     };
 }
 

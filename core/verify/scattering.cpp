@@ -245,10 +245,6 @@ void roughLimit(Context& context) { context.notApplicable("roughness that goes t
 }  // namespace
 
 std::vector<Case> scatteringCases() {
-    const auto row = [](const char* id, const char* name, const char* title, const char* expected, const char* source, const char* tolerance, Level level,
-                        std::uint64_t needs, void (*run)(Context&)) {
-        return Case{.id = id, .name = name, .title = title, .expected = expected, .source = source, .tolerance = tolerance, .level = level, .needs = needs, .run = run};
-    };
     constexpr std::uint64_t light = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT;
     constexpr std::uint64_t sky = CRT_FEATURE_ENVIRONMENT;
     return {
