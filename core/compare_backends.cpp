@@ -13,7 +13,6 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 
 namespace crt {
 namespace {
@@ -72,10 +71,7 @@ public:
     }
 
     std::uint64_t invalidSamples() const { return invalid_; }
-    std::string device() {
-        const CrtBackendReport report = integrator_.report();
-        return {report.device, strnlen(report.device, sizeof report.device)};
-    }
+    std::string device() { return arrayText(integrator_.report().device); }
 
 private:
     Integrator integrator_;

@@ -14,7 +14,6 @@
 
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <set>
 
@@ -109,19 +108,6 @@ SamplingPlan planSamples(const Job& job, const Scene& scene, const Film& film, c
     plan.target = film.samples.count();
     for (const auto& [first, end] : plan.ranges) plan.target += end - first;
     return plan;
-}
-
-LoadedBackend openBackend(const std::string& name) {
-    if (name != "auto") return loadBackend(name);
-    std::vector<std::string> passed_over;
-    LoadedBackend backend = chooseBackend(passed_over);
-    for (const std::string& reason : passed_over) logInfo("{}", reason);
-    return backend;
-}
-
-template <std::size_t N>
-std::string arrayText(const char (&text)[N]) {
-    return {text, strnlen(text, N)};
 }
 
 /// A plugin may leave out what is only for humans.

@@ -1,5 +1,6 @@
 #include "report.h"
 
+#include "backend/loader.h"
 #include "host.h"
 #include "interrupt.h"
 
@@ -8,8 +9,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <string_view>
 #include <thread>
 
 namespace crt {
@@ -31,12 +30,6 @@ const char* stopName(StopReason reason) {
         case StopReason::Failed: break;
     }
     return "failed";
-}
-
-/// A plugin fills fixed arrays, not necessarily up to a terminator.
-template <std::size_t N>
-std::string arrayText(const char (&text)[N]) {
-    return {text, strnlen(text, N)};
 }
 
 /// What the image knows of its own error (docs/error.md), relative to its mean luminance.

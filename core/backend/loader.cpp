@@ -299,6 +299,14 @@ LoadedBackend chooseBackend(std::vector<std::string>& reasons) {
     refuse("no backend can run here:" + all);
 }
 
+LoadedBackend openBackend(const std::string& name) {
+    if (name != "auto") return loadBackend(name);
+    std::vector<std::string> passed_over;
+    LoadedBackend backend = chooseBackend(passed_over);
+    for (const std::string& reason : passed_over) logInfo("{}", reason);
+    return backend;
+}
+
 CrtHost makeHost(bool use_cache) {
     CrtHost host{};
     host.struct_size = sizeof(CrtHost);

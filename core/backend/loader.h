@@ -3,6 +3,8 @@
 
 #include "backend/crt_backend.h"
 
+#include <cstddef>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -41,6 +43,15 @@ std::vector<BackendStatus> listBackends();
 
 /// Picks a backend for `auto`: cuda, embree, opencl in that order, the first with a device. `reasons` gets a line for each one passed over.
 LoadedBackend chooseBackend(std::vector<std::string>& reasons);
+
+/// What --backend asks for: the one of that name, or for "auto" what chooseBackend picks, with a line in the log for each one passed over.
+LoadedBackend openBackend(const std::string& name);
+
+/// Text of a fixed array that a plugin filled, not necessarily up to a terminator.
+template <std::size_t N>
+std::string arrayText(const char (&text)[N]) {
+    return {text, strnlen(text, N)};
+}
 
 /// The host table given to every plugin: log, kernel sources, cache directory ($CRT_CACHE_DIR, $XDG_CACHE_HOME/crt, ~/.cache/crt).
 /// `use_cache` false leaves cache_directory null.

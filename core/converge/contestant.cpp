@@ -15,7 +15,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <numeric>
 
@@ -24,11 +23,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-template <std::size_t N>
-std::string arrayText(const char (&text)[N]) {
-    return {text, strnlen(text, N)};
-}
 
 /// The reference's luminances, one for each pixel.
 std::vector<float> spread(const Reference& reference, std::size_t pixels) {

@@ -103,13 +103,7 @@ int makeReference(const ReferenceRequest& request) {
         throw Error(ErrorKind::Usage, fmt::format("a reference holds its eighths beside the image, which only EXR can: '{}' should end in .exr", request.output));
     checkWritable(request.output);
 
-    LoadedBackend backend;
-    if (request.backend == "auto") {
-        std::vector<std::string> passed_over;
-        backend = chooseBackend(passed_over);
-    } else {
-        backend = loadBackend(request.backend);
-    }
+    const LoadedBackend backend = openBackend(request.backend);
     Integrator integrator(backend, request.integrator);
     const CompiledScene compiled = compileScene(scene, 0);
     const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};

@@ -41,14 +41,6 @@ void lookFirstIn(const std::string& directory) {
     setenv("CRT_BACKEND_PATH", path.c_str(), 1);
 }
 
-LoadedBackend open(const std::string& wanted) {
-    if (wanted != "auto") return loadBackend(wanted);
-    std::vector<std::string> reasons;
-    LoadedBackend chosen = chooseBackend(reasons);
-    for (const std::string& reason : reasons) logDebug("{}", reason);
-    return chosen;
-}
-
 std::string readText(const std::string& file) {
     std::ifstream in(file, std::ios::binary);
     if (!in) throw Error(ErrorKind::Usage, fmt::format("cannot open '{}'", file));
@@ -110,7 +102,7 @@ int verify(const Arguments& arguments) {
         if (error) throw Error(ErrorKind::Output, fmt::format("cannot make the directory '{}': {}", arguments.output, error.message()));
     }
     if (!arguments.plugin_path.empty()) lookFirstIn(arguments.plugin_path);
-    const LoadedBackend backend = open(arguments.backend);
+    const LoadedBackend backend = openBackend(arguments.backend);
     // Cases warn about scenes that are odd on purpose.
     setLogLevel(LogLevel::Error);
 
