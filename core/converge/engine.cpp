@@ -2,7 +2,6 @@
 
 #include "arguments.h"
 #include "atomic_file.h"
-#include "backend/loader.h"
 #include "converge/contestant.h"
 #include "converge/files.h"
 #include "converge/fits.h"
@@ -10,8 +9,6 @@
 #include "host.h"
 #include "interrupt.h"
 #include "log.h"
-#include "report.h"
-#include "scene_schema.h"
 #include "yaml_reader.h"
 
 #include <fmt/format.h>
@@ -19,10 +16,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
+#include <memory>
 #include <thread>
 
 namespace crt::converge {

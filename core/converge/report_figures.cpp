@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace crt::converge {
 namespace {
@@ -42,6 +43,13 @@ std::string tip(const Subject& subject, const Point& point, const std::string& w
 
 PlotLine lineOf(const Subject& subject) { return {subject.label(), subject.style, {}, std::nullopt, std::nullopt}; }
 
+/// The level that the error will not fall below, where the fit found one.
+std::optional<double> floorOf(const Subject& subject) {
+    const ConfigurationFit& fit = *subject.fit;
+    if (!fit.fitted || !fit.error.flattening) return std::nullopt;
+    return std::sqrt(fit.error.floor().value);
+}
+
 Plot errorAgainstTime(const Subjects& subjects, const Analysis& analysis, const std::string& scene) {
     Plot plot;
     plot.title = "Error against time, " + scene;
@@ -57,10 +65,8 @@ Plot errorAgainstTime(const Subjects& subjects, const Analysis& analysis, const 
             line.points.push_back({point.seconds.value, e.value, e.low, e.high,
                                    tip(subject, point, percentText(e) + " after " + secondsText(point.seconds.value))});
         }
-        if (subject.fit->fitted) {
-            if (subject.fit->time.start() > 0) line.x_mark = subject.fit->time.start();
-            if (subject.fit->error.flattening) line.floor = std::sqrt(subject.fit->error.floor().value);
-        }
+        if (subject.fit->fitted && subject.fit->time.start() > 0) line.x_mark = subject.fit->time.start();
+        line.floor = floorOf(subject);
         plot.lines.push_back(std::move(line));
     }
     return plot;
@@ -80,7 +86,7 @@ Plot errorAgainstSamples(const Subjects& subjects, const std::string& scene) {
             const Estimate& e = point.relative_rmse;
             line.points.push_back({static_cast<double>(point.samples), e.value, e.low, e.high, tip(subject, point, percentText(e))});
         }
-        if (subject.fit->fitted && subject.fit->error.flattening) line.floor = std::sqrt(subject.fit->error.floor().value);
+        line.floor = floorOf(subject);
         plot.lines.push_back(std::move(line));
     }
     return plot;

@@ -20,7 +20,6 @@ CRT_KERNEL_BEGIN
 CRT_FN f32 crt_min(f32 a, f32 b) { return a < b ? a : b; }
 CRT_FN f32 crt_max(f32 a, f32 b) { return a > b ? a : b; }
 CRT_FN f32 crt_clamp(f32 x, f32 lo, f32 hi) { return x < lo ? lo : (x > hi ? hi : x); }
-CRT_FN u32 crt_min_u32(u32 a, u32 b) { return a < b ? a : b; }
 
 CRT_FN f32 dot3(vec3 a, vec3 b) { return V3X(a) * V3X(b) + V3Y(a) * V3Y(b) + V3Z(a) * V3Z(b); }
 
