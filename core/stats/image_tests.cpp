@@ -50,7 +50,7 @@ GateResult::Channel compareMeans(const Summary& a, const Summary& b, const GateO
 double tileUniformity(const Replicates& a, const Replicates& b, const std::vector<double>& tile_p) {
     const std::uint32_t channels = a.channels(), middle = channels / 2;
     std::vector<double> p;
-    for (std::size_t tile = 0; tile < tile_p.size() / channels; ++tile)
+    for (std::size_t tile = 0; tile < a.tiles(); ++tile)
         if (a.tileMean(tile, middle).variance + b.tileMean(tile, middle).variance > 0) p.push_back(tile_p[tile * channels + middle]);
     return p.empty() ? 1 : kolmogorovSmirnovUniform(p);
 }
@@ -117,14 +117,14 @@ TestFamily sidakFamily(std::span<const double> p_values, double alpha) {
 
 Replicates::Replicates(std::uint32_t width, std::uint32_t height, std::uint32_t channels)
     : width_(width), height_(height), channels_(channels), pixels_(std::size_t{width} * height * channels), image_means_(channels),
-      tile_means_(std::size_t{tilesAcross()} * tilesDown() * channels) {}
+      tile_means_(tiles() * channels) {}
 
 void Replicates::add(std::span<const double> image) {
     if (image.size() != pixels_.size()) throw Error(ErrorKind::Internal, "a replicate has another size than those before it");
     ++count_;
     const double n = static_cast<double>(count_);
     std::vector<double> tile_sums(tile_means_.size(), 0.0), image_sums(channels_, 0.0);
-    std::vector<std::uint32_t> tile_pixels(tile_means_.size() / channels_, 0);
+    std::vector<std::uint32_t> tile_pixels(tiles(), 0);
     for (std::uint32_t y = 0; y < height_; ++y)
         for (std::uint32_t x = 0; x < width_; ++x) {
             const std::size_t pixel = std::size_t{y} * width_ + x;
@@ -179,7 +179,7 @@ GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& opt
     for (std::uint32_t c = 0; c < channels; ++c) result.channels.push_back(compareMeans(a.imageMean(c), b.imageMean(c), options));
 
     std::vector<double> p;
-    for (std::size_t tile = 0; tile < std::size_t{a.tilesAcross()} * a.tilesDown(); ++tile)
+    for (std::size_t tile = 0; tile < a.tiles(); ++tile)
         for (std::uint32_t c = 0; c < channels; ++c) p.push_back(equalityP(meanOf(a.tileMean(tile, c)), meanOf(b.tileMean(tile, c))));
     result.tiles = holmFamily(p, alpha);
     result.tile_uniformity_p = tileUniformity(a, b, p);

@@ -50,6 +50,7 @@ public:
     std::uint32_t channels() const { return channels_; }
     std::uint32_t tilesAcross() const { return (width_ + kTileSide - 1) / kTileSide; }
     std::uint32_t tilesDown() const { return (height_ + kTileSide - 1) / kTileSide; }
+    std::size_t tiles() const { return std::size_t{tilesAcross()} * tilesDown(); }
     std::uint64_t count() const { return count_; }
     std::uint64_t notFinite() const { return not_finite_; }
 
