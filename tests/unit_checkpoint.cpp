@@ -1,6 +1,7 @@
 // Checkpoint files: bit for bit there and back, and every kind of damage its own sentence.
 #include "checkpoint.h"
 #include "log.h"
+#include "verify/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 
@@ -13,25 +14,12 @@
 
 using namespace crt;
 using Catch::Matchers::Contains;
+using crt::verify::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
 
 const FilmIdentity kIdentity{"0123456789abcdef0123456789abcdef", "0.1.0"};
-
-struct TemporaryDirectory {
-    fs::path path;
-    TemporaryDirectory() : path(fs::temp_directory_path() / ("crt_checkpoint_" + std::to_string(::getpid()))) {
-        fs::remove_all(path);
-        fs::create_directories(path);
-    }
-    ~TemporaryDirectory() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-    }
-    std::string operator/(const char* name) const { return (path / name).string(); }
-    std::size_t fileCount() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), fs::directory_iterator())); }
-};
 
 Film randomFilm(FilmShape shape, SampleRange range, std::uint32_t seed) {
     Film film(shape);
@@ -63,7 +51,7 @@ constexpr FilmShape kShape{3, 5, 8, kAovNormal | kAovDepth | kAovPrimitive};
 }  // namespace
 
 TEST_CASE("a checkpoint comes back bit for bit", "[checkpoint]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     Film film = randomFilm(kShape, {100, 164}, 1);
     film.samples.add({1024, 2048});
     film.sums[0] = -0.0;
@@ -87,7 +75,7 @@ TEST_CASE("a checkpoint comes back bit for bit", "[checkpoint]") {
 }
 
 TEST_CASE("films without samples or ids are checkpoints too", "[checkpoint]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
     const FilmShape shape{4, 4, 4, 0};
     writeCheckpoint(path, Film(shape), {kIdentity.scene_hash, ""});
@@ -99,7 +87,7 @@ TEST_CASE("films without samples or ids are checkpoints too", "[checkpoint]") {
 
 // Found by fuzzing: with no pixels a row any number of rows fits the file's size, and whatever walked them ran for a minute.
 TEST_CASE("a checkpoint of a film with an impossible side is refused", "[checkpoint]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
     for (const FilmShape shape : {FilmShape{0, 0x81000000u, 4, 0}, FilmShape{0x81000000u, 0, 4, 0}, FilmShape{0, 0, 4, 0}, FilmShape{65536, 1, 4, 0}}) {
         writeCheckpoint(path, Film(shape), kIdentity);
@@ -108,7 +96,7 @@ TEST_CASE("a checkpoint of a film with an impossible side is refused", "[checkpo
 }
 
 TEST_CASE("the format is what checkpoint.h says", "[checkpoint]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
     Film film({1, 1, 4, 0});
     film.sums[0] = 1.5;
@@ -134,7 +122,7 @@ TEST_CASE("the format is what checkpoint.h says", "[checkpoint]") {
 }
 
 TEST_CASE("a truncated checkpoint is refused wherever it ends", "[checkpoint]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
     writeCheckpoint(path, randomFilm(kShape, {0, 64}, 2), kIdentity);
     const std::string whole = slurp(path);
@@ -152,7 +140,7 @@ TEST_CASE("a truncated checkpoint is refused wherever it ends", "[checkpoint]") 
 }
 
 TEST_CASE("a checkpoint with any byte changed is refused", "[checkpoint]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
     writeCheckpoint(path, randomFilm(kShape, {0, 64}, 3), kIdentity);
     const std::string whole = slurp(path);
@@ -179,7 +167,7 @@ TEST_CASE("a checkpoint with any byte changed is refused", "[checkpoint]") {
 }
 
 TEST_CASE("what is wrong with a checkpoint is said", "[checkpoint]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
     writeCheckpoint(path, randomFilm(kShape, {0, 64}, 4), kIdentity);
     const std::string whole = slurp(path);
@@ -194,7 +182,7 @@ TEST_CASE("what is wrong with a checkpoint is said", "[checkpoint]") {
     CHECK_THROWS_WITH(readCheckpoint(with(35, 0x7f)), Contains("damaged: its header"));  // Two thousand million pixels wide.
     CHECK_THROWS_WITH(readCheckpoint(with(whole.size() / 2, static_cast<char>(~whole[whole.size() / 2]))), Contains("checksum"));
     CHECK_THROWS_WITH(readCheckpoint(directory / "absent.crtfilm"), Contains("absent.crtfilm") && Contains("No such file"));
-    CHECK_THROWS_AS(readCheckpoint(directory.path.string()), Error);
+    CHECK_THROWS_AS(readCheckpoint(directory.path()), Error);
 }
 
 TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpoint]") {
@@ -207,12 +195,12 @@ TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpo
     requireSameScene("a.crtfilm", {kIdentity.scene_hash, "0.0.9"}, kIdentity);
     CHECK(warningCount() == warnings + 1);
     setLogLevel(LogLevel::Info);
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     CHECK_THROWS_AS(writeCheckpoint(directory / "x.crtfilm", Film({1, 1, 4, 0}), {"no hash", "0.1.0"}), Error);
 }
 
 TEST_CASE("a checkpoint that cannot be written is an output error and leaves the old one", "[checkpoint]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const Film film = randomFilm(kShape, {0, 8}, 5);
     try {
         writeCheckpoint(directory / "no/such/part.crtfilm", film, kIdentity);
@@ -221,19 +209,19 @@ TEST_CASE("a checkpoint that cannot be written is an output error and leaves the
         CHECK(error.kind() == ErrorKind::Output);
         CHECK_THAT(error.what(), Contains("does not exist"));
     }
-    CHECK_THROWS_WITH(writeCheckpoint(directory.path.string(), film, kIdentity), Contains("is a directory"));
+    CHECK_THROWS_WITH(writeCheckpoint(directory.path(), film, kIdentity), Contains("is a directory"));
     CHECK_THROWS_WITH(writeCheckpoint("/dev/full", film, kIdentity), Contains("not a regular file"));
 
     // Through a symbolic link the target is replaced and the link stays.
     writeCheckpoint(directory / "real.crtfilm", film, kIdentity);
-    fs::create_symlink("real.crtfilm", directory.path / "link.crtfilm");
+    fs::create_symlink("real.crtfilm", directory / "link.crtfilm");
     writeCheckpoint(directory / "link.crtfilm", randomFilm(kShape, {0, 16}, 6), kIdentity);
-    CHECK(fs::is_symlink(directory.path / "link.crtfilm"));
+    CHECK(fs::is_symlink(directory / "link.crtfilm"));
     CHECK(readCheckpoint(directory / "real.crtfilm").first.samples.count() == 16);
 }
 
 TEST_CASE("merging partial films gives one film whatever the order", "[checkpoint]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string a = directory / "a.crtfilm", b = directory / "b.crtfilm", c = directory / "c.crtfilm";
     writeCheckpoint(a, randomFilm(kShape, {0, 64}, 7), kIdentity);
     writeCheckpoint(b, randomFilm(kShape, {64, 128}, 8), kIdentity);

@@ -6,6 +6,7 @@
 #include "converge/svg_plot.h"
 #include "error.h"
 #include "synthetic_run.h"
+#include "verify/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
@@ -15,27 +16,15 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <unistd.h>
 #include <vector>
 
 using namespace crt;
 using namespace crt::converge;
 using Catch::Matchers::Contains;
+using crt::verify::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// A folder of this test, gone afterwards.
-class Folder {
-public:
-    explicit Folder(const std::string& name) : path_(fs::temp_directory_path() / (name + std::to_string(::getpid()))) { fs::create_directories(path_); }
-    ~Folder() { fs::remove_all(path_); }
-    std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-    std::string text() const { return path_.string(); }
-
-private:
-    fs::path path_;
-};
 
 std::string readText(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
@@ -213,7 +202,7 @@ std::vector<Row> fewRows() {
 }  // namespace
 
 TEST_CASE("rows come back from results.jsonl with every bit", "[converge]") {
-    const Folder folder("crt-results-");
+    const TemporaryFolder folder;
     const std::vector<Row> rows = fewRows();
     {
         ResultsLog log(folder / "results.jsonl");
@@ -226,7 +215,7 @@ TEST_CASE("rows come back from results.jsonl with every bit", "[converge]") {
 }
 
 TEST_CASE("a row appended again replaces the earlier one in its place", "[converge]") {
-    const Folder folder("crt-results-");
+    const TemporaryFolder folder;
     std::vector<Row> rows = fewRows();
     ResultsLog log(folder / "results.jsonl");
     for (const Row& row : rows) log.append(row);
@@ -238,7 +227,7 @@ TEST_CASE("a row appended again replaces the earlier one in its place", "[conver
 }
 
 TEST_CASE("a torn last line is left out, and cut off before the next row", "[converge]") {
-    const Folder folder("crt-results-");
+    const TemporaryFolder folder;
     const std::string path = folder / "results.jsonl";
     const std::vector<Row> rows = fewRows();
     { ResultsLog(path).append(rows[0]); }
@@ -254,7 +243,7 @@ TEST_CASE("a torn last line is left out, and cut off before the next row", "[con
 }
 
 TEST_CASE("numbers that are none survive as null, and void their row", "[converge]") {
-    const Folder folder("crt-results-");
+    const TemporaryFolder folder;
     Row row = fewRows()[0];
     row.error->mse = std::numeric_limits<double>::infinity();
     { ResultsLog(folder / "results.jsonl").append(row); }
@@ -265,7 +254,7 @@ TEST_CASE("numbers that are none survive as null, and void their row", "[converg
 }
 
 TEST_CASE("results.csv has as many fields in each line as in its header", "[converge]") {
-    const Folder folder("crt-csv-");
+    const TemporaryFolder folder;
     writeCsv(folder / "results.csv", fewRows());
     std::ifstream file(folder / "results.csv");
     std::size_t columns = 0, lines = 0;
@@ -285,7 +274,7 @@ TEST_CASE("results.csv has as many fields in each line as in its header", "[conv
 }
 
 TEST_CASE("the manifest has size and hash of every file", "[converge]") {
-    const Folder folder("crt-manifest-");
+    const TemporaryFolder folder;
     writeText(folder / "empty.txt", "");
     writeText(folder / "a.txt", "a");
     writeManifest(folder / "manifest.json", syntheticStudy(), {"empty.txt", "a.txt"});
@@ -319,8 +308,8 @@ TEST_CASE("markup in names is escaped", "[converge]") {
     Run run = syntheticStudy();
     for (Configuration& c : run.configurations) c.key.scene = "<b>&\"";
     for (Row& row : run.rows) row.key.scene = "<b>&\"";
-    const Folder folder("crt-escape-");
-    writeReport(folder.text(), run, analyze(run));
+    const TemporaryFolder folder;
+    writeReport(folder.path(), run, analyze(run));
     const std::string html = readText(folder / "report.html");
     CHECK(html.find("<b>&") == std::string::npos);
     CHECK(whyNotWellFormed(html) == "");
@@ -329,8 +318,8 @@ TEST_CASE("markup in names is escaped", "[converge]") {
 TEST_CASE("the report is one well-formed page without requests, and leaves nothing out", "[converge]") {
     // To look at: CRT_REPORT_FIXTURE=out/fixture unit_tests "[converge]"
     const char* kept = std::getenv("CRT_REPORT_FIXTURE");
-    const Folder temporary("crt-report-");
-    const std::string folder = kept ? kept : temporary.text();
+    const TemporaryFolder temporary;
+    const std::string folder = kept ? kept : temporary.path();
     fs::create_directories(folder);
     const Run run = syntheticStudy();
     const Analysis analysis = analyze(run);
@@ -408,8 +397,8 @@ TEST_CASE("findings say who is first, what is wrong and what is missing", "[conv
 TEST_CASE("a run without rows still makes a report", "[converge]") {
     Run run = syntheticStudy();
     run.rows.clear();
-    const Folder folder("crt-empty-");
-    writeReport(folder.text(), run, analyze(run));
+    const TemporaryFolder folder;
+    writeReport(folder.path(), run, analyze(run));
     CHECK(whyNotWellFormed(readText(folder / "report.html")) == "");
     writeSummary(folder / "summary.json", run, analyze(run));
     CHECK(nlohmann::json::parse(readText(folder / "summary.json"))["fits"].size() == 13);
@@ -426,9 +415,9 @@ TEST_CASE("few replicates, few looks and no reference make a report with what th
             Run run = syntheticRun(what, 1);
             if (replicates == 1)
                 for (Row& row : run.rows) row.between_replicates_mse.reset();
-            const Folder folder("crt-few-");
+            const TemporaryFolder folder;
             const Analysis analysis = analyze(run);
-            for (const std::string& file : writeReport(folder.text(), run, analysis)) {
+            for (const std::string& file : writeReport(folder.path(), run, analysis)) {
                 INFO(file);
                 const std::string text = readText(folder / file);
                 CHECK(whyNotWellFormed(text) == "");
@@ -440,7 +429,7 @@ TEST_CASE("few replicates, few looks and no reference make a report with what th
 }
 
 TEST_CASE("the summary has the fits of every configuration", "[converge]") {
-    const Folder folder("crt-summary-");
+    const TemporaryFolder folder;
     const Run run = syntheticStudy();
     writeSummary(folder / "summary.json", run, analyze(run));
     const nlohmann::json summary = nlohmann::json::parse(readText(folder / "summary.json"));

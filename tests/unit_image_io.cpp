@@ -2,6 +2,7 @@
 #include "error.h"
 #include "image_io.h"
 #include "log.h"
+#include "verify/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 
@@ -16,24 +17,10 @@
 
 using namespace crt;
 using Catch::Matchers::Contains;
+using crt::verify::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct TemporaryDirectory {
-    fs::path path;
-    explicit TemporaryDirectory(const fs::path& in = fs::temp_directory_path()) : path(in / ("crt_image_" + std::to_string(::getpid()))) {
-        fs::remove_all(path);
-        fs::create_directories(path);
-    }
-    ~TemporaryDirectory() {
-        std::error_code ignored;
-        fs::permissions(path, fs::perms::owner_all, ignored);
-        fs::remove_all(path, ignored);
-    }
-    std::string operator/(const char* name) const { return (path / name).string(); }
-    std::size_t fileCount() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), fs::directory_iterator())); }
-};
 
 std::string slurp(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
@@ -99,7 +86,7 @@ TEST_CASE("the extension says the format", "[image_io]") {
 }
 
 TEST_CASE("a PFM is its header and little-endian floats, bottom row first", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "image.pfm";
     Image image = rgbImage(1, 2, {1, 2, 3, 4, 5, 6});
     image.channels = {"R", "G", "B"};
@@ -126,7 +113,7 @@ TEST_CASE("a PFM is its header and little-endian floats, bottom row first", "[im
 }
 
 TEST_CASE("PFM variants of other programs are read", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "image.pfm";
     spit(path, std::string("PF 1 1 1.0 ") + std::string("\x3f\x80\0\0\x40\0\0\0\x40\x40\0\0", 12));
     CHECK(readImage(path).pixels == std::vector<float>{1, 2, 3});
@@ -135,7 +122,7 @@ TEST_CASE("PFM variants of other programs are read", "[image_io]") {
 }
 
 TEST_CASE("a PPM is 8-bit sRGB", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const Quiet quiet;
     const std::string path = directory / "image.ppm";
     // Linear 0.2140 is sRGB 0.5: code 127.5, which rounds up.
@@ -201,7 +188,7 @@ TEST_CASE("8-bit images of other colour spaces are converted to sRGB", "[image_i
 }
 
 TEST_CASE("an EXR keeps every plane, type, number and word", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "image.exr";
     const Image image = fullImage();
     writeImage(path, OutputFormat::Exr, image);
@@ -243,20 +230,20 @@ TEST_CASE("an EXR keeps every plane, type, number and word", "[image_io]") {
 }
 
 TEST_CASE("an EXR says nothing that the caller did not", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "image.exr";
     writeImage(path, OutputFormat::Exr, rgbImage(1, 1, {1, 2, 3}));
     const std::string bytes = slurp(path);
     // Who, where and how are private unless they were handed in, and the same image is the same file.
     CHECK(metadataValue(readImage(path), "DateTime").empty());
-    CHECK(bytes.find(directory.path.string()) == std::string::npos);
+    CHECK(bytes.find(directory.path()) == std::string::npos);
     CHECK(bytes.find("HostComputer") == std::string::npos);
     writeImage(path, OutputFormat::Exr, rgbImage(1, 1, {1, 2, 3}));
     CHECK(slurp(path) == bytes);
 }
 
 TEST_CASE("a PNG is 8-bit sRGB with its metadata", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "image.png";
     Image image = rgbImage(2, 1, {0, 0.25f, 1, 0.5f, 0.75f, 0.125f});
     image.metadata = {{"Software", "crt 0.1.0"}, {"crt/spp", "64"}};
@@ -274,7 +261,7 @@ TEST_CASE("a PNG is 8-bit sRGB with its metadata", "[image_io]") {
 }
 
 TEST_CASE("damaged images are refused with a sentence", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "image.bad";
     const auto refused = [&](const std::string& bytes, const char* words) {
         spit(path, bytes);
@@ -298,7 +285,7 @@ TEST_CASE("damaged images are refused with a sentence", "[image_io]") {
     refused("P6", "width");
     refused("this is text, not an image", "");
     CHECK_THROWS_WITH(readImage(directory / "absent.pfm"), Contains("absent.pfm") && Contains("No such file"));
-    CHECK_THROWS_WITH(readImage(directory.path.string()), Contains("is a directory"));
+    CHECK_THROWS_WITH(readImage(directory.path()), Contains("is a directory"));
 
     const std::string exr = directory / "image.exr";
     writeImage(exr, OutputFormat::Exr, fullImage());
@@ -309,7 +296,7 @@ TEST_CASE("damaged images are refused with a sentence", "[image_io]") {
 
 // Found by fuzzing. A file of no known format went through all of OpenImageIO's readers; a header could ask for any amount of memory.
 TEST_CASE("files of other formats and headers beyond the file's size are refused", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const std::string path = directory / "image";
     spit(path, "GIF89a, which OpenImageIO would read");
     CHECK_THROWS_WITH(readImage(path), Contains("no EXR, PNG"));
@@ -332,7 +319,7 @@ TEST_CASE("files of other formats and headers beyond the file's size are refused
 }
 
 TEST_CASE("an image that lacks what it must have is refused", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     for (const OutputFormat format : {OutputFormat::Exr, OutputFormat::Png, OutputFormat::Ppm, OutputFormat::Pfm}) {
         Image grey = rgbImage(1, 1, {1, 1, 1});
         grey.channels = {"X", "Y", "Z"};
@@ -344,13 +331,13 @@ TEST_CASE("an image that lacks what it must have is refused", "[image_io]") {
 }
 
 TEST_CASE("unwritable outputs are found before anything is rendered", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     CHECK_NOTHROW(checkWritable(directory / "image.exr"));
     CHECK(directory.fileCount() == 0);
     CHECK_NOTHROW(checkWritable(directory / "out/image.exr"));
-    CHECK(fs::is_directory(directory.path / "out"));
+    CHECK(fs::is_directory(directory / "out"));
     CHECK_THROWS_WITH(checkWritable(directory / "one/two/image.exr"), Contains("one/two") && Contains("exists"));
-    CHECK_FALSE(fs::exists(directory.path / "one"));
+    CHECK_FALSE(fs::exists(directory / "one"));
     CHECK_THROWS_WITH(checkWritable(directory / "out"), Contains("is a directory"));
     CHECK_THROWS_WITH(checkWritable("/dev/null"), Contains("not a regular file"));
     CHECK_THROWS_AS(checkWritable(""), Error);
@@ -361,7 +348,7 @@ TEST_CASE("unwritable outputs are found before anything is rendered", "[image_io
     CHECK(slurp(directory / "file") == "x");
 
     if (::geteuid() != 0) {  // Permissions do not bind root.
-        fs::permissions(directory.path, fs::perms::owner_read | fs::perms::owner_exec);
+        fs::permissions(directory.path(), fs::perms::owner_read | fs::perms::owner_exec);
         CHECK_THROWS_WITH(checkWritable(directory / "image.exr"), Contains("Permission denied"));
     }
     // Nobody, root included, may create files here.
@@ -377,7 +364,7 @@ TEST_CASE("unwritable outputs are found before anything is rendered", "[image_io
 }
 
 TEST_CASE("files get the permissions that the umask says", "[image_io]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     const mode_t before = ::umask(027);
     writeImage(directory / "image.pfm", OutputFormat::Pfm, rgbImage(1, 1, {1, 1, 1}));
     ::umask(before);
@@ -389,7 +376,7 @@ TEST_CASE("files get the permissions that the umask says", "[image_io]") {
 TEST_CASE("PFM and PPM load no image library", "[image_io]") { CHECK(runAlone(thisProgram(), "[image-io-alone]")); }
 
 TEST_CASE("(in a process of its own) PFM and PPM load no image library", "[.][image-io-alone]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     REQUIRE_FALSE(mapsOpenImageIO());
     writeImage(directory / "image.pfm", OutputFormat::Pfm, rgbImage(1, 1, {1, 1, 1}));
     writeImage(directory / "image.ppm", OutputFormat::Ppm, rgbImage(1, 1, {1, 1, 1}));
@@ -402,15 +389,15 @@ TEST_CASE("(in a process of its own) PFM and PPM load no image library", "[.][im
 
 TEST_CASE("without the image module EXR and PNG are refused and the rest works", "[image_io]") {
     // The module is looked for beside the program, so a program elsewhere does not find it. A link, because the program is large.
-    const TemporaryDirectory directory(fs::path(thisProgram()).parent_path());
-    fs::create_directories(directory.path / "bin");
+    const TemporaryFolder directory(fs::path(thisProgram()).parent_path());
+    fs::create_directories(directory / "bin");
     const std::string program = directory / "bin/tests";
     fs::create_hard_link(thisProgram(), program);
     CHECK(runAlone(program, "[image-io-no-module]", "CRT_BACKEND_PATH="));
 }
 
 TEST_CASE("(in a process of its own) without the image module", "[.][image-io-no-module]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     for (const OutputFormat format : {OutputFormat::Exr, OutputFormat::Png}) {
         try {
             writeImage(directory / "image", format, rgbImage(1, 1, {1, 1, 1}));

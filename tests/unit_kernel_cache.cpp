@@ -1,20 +1,20 @@
 // The kernel cache: it finds what was stored, and nothing that happens to its directory makes it fail or lie.
 #include "backend/kernel_cache.h"
+#include "verify/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <thread>
 
 using crt::plugin::KernelCache;
+using crt::verify::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
@@ -23,19 +23,10 @@ using Bytes = std::vector<unsigned char>;
 
 /// A cache in an empty directory that goes away.
 struct Fixture {
-    fs::path directory;
+    TemporaryFolder directory;
 
-    Fixture() {
-        std::string pattern = (fs::temp_directory_path() / ("crt-cache-" + std::string(6, 'X'))).string();
-        REQUIRE(::mkdtemp(pattern.data()) != nullptr);
-        directory = pattern;
-    }
-    ~Fixture() {
-        std::error_code ignored;
-        fs::remove_all(directory, ignored);
-    }
-    KernelCache cache(std::uint64_t max_bytes = KernelCache::kDefaultMaxBytes) const { return KernelCache(directory.c_str(), max_bytes); }
-    std::size_t files() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(directory), {})); }
+    KernelCache cache(std::uint64_t max_bytes = KernelCache::kDefaultMaxBytes) const { return KernelCache(directory.path().c_str(), max_bytes); }
+    std::size_t files() const { return directory.fileCount(); }
 };
 
 Bytes bytes(std::size_t size, unsigned char first) {
@@ -201,5 +192,5 @@ TEST_CASE("many writers and readers share a directory", "[cache]") {
     CHECK(torn == 0);
     CHECK(hits > 0);
     CHECK(fixture.files() <= kernels);
-    for (const fs::directory_entry& file : fs::directory_iterator(fixture.directory)) CHECK(file.path().extension() == ".crtkernel");
+    for (const fs::directory_entry& file : fs::directory_iterator(fixture.directory.path())) CHECK(file.path().extension() == ".crtkernel");
 }

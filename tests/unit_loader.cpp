@@ -3,18 +3,19 @@
 #include "backend/kernel_source.h"
 #include "backend/loader.h"
 #include "error.h"
+#include "verify/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <optional>
 
 using namespace crt;
 using Catch::Matchers::Contains;
+using crt::verify::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
@@ -39,25 +40,6 @@ private:
     std::optional<std::string> old_;
 };
 
-/// An empty directory that goes away.
-class TemporaryDirectory {
-public:
-    TemporaryDirectory() {
-        std::string pattern = (fs::temp_directory_path() / ("crt-loader-" + std::string(6, 'X'))).string();
-        REQUIRE(::mkdtemp(pattern.data()) != nullptr);
-        path_ = pattern;
-    }
-    ~TemporaryDirectory() {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    const fs::path& path() const { return path_; }
-    void write(const std::string& name, const std::string& text) const { std::ofstream(path_ / name) << text; }
-
-private:
-    fs::path path_;
-};
-
 /// The sentence with which loading (and probing) a backend is refused; empty when it is not.
 std::string refusal(const std::string& name) {
     const ScopedVariable path("CRT_BACKEND_PATH", CRT_FAKE_PLUGIN_DIR);
@@ -79,12 +61,12 @@ TEST_CASE("a plugin that is not there", "[loader]") {
     CHECK_THAT(refusal(""), Contains("the backend has no name"));
 
     // A name that crt knows is not a spelling mistake.
-    const TemporaryDirectory empty;
-    const ScopedVariable path("CRT_BACKEND_PATH", empty.path().string());
+    const TemporaryFolder empty;
+    const ScopedVariable path("CRT_BACKEND_PATH", empty.path());
     try {
         loadBackend("cuda");
     } catch (const Error& error) {
-        CHECK_THAT(error.what(), Contains("backend 'cuda' is not installed: no crt_backend_cuda.so in " + empty.path().string()));
+        CHECK_THAT(error.what(), Contains("backend 'cuda' is not installed: no crt_backend_cuda.so in " + empty.path()));
         CHECK_THAT(error.what(), !Contains("did you mean"));
     }
 }
@@ -92,10 +74,10 @@ TEST_CASE("a plugin that is not there", "[loader]") {
 TEST_CASE("a plugin that cannot be opened", "[loader]") {
     CHECK_THAT(refusal("missing_library"), Contains("cannot be opened") && Contains("libcrt_absent.so.1: cannot open shared object file"));
 
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     directory.write("crt_backend_text.so", "this is not a library\n");
-    fs::create_symlink("/nowhere", directory.path() / "crt_backend_dangling.so");
-    const ScopedVariable path("CRT_BACKEND_PATH", directory.path().string());
+    fs::create_symlink("/nowhere", directory / "crt_backend_dangling.so");
+    const ScopedVariable path("CRT_BACKEND_PATH", directory.path());
     CHECK_THROWS_WITH(loadBackend("text"), Contains("cannot be opened") && Contains("file too short"));
     CHECK_THROWS_WITH(loadBackend("dangling"), Contains("cannot be opened"));
 }
@@ -170,29 +152,29 @@ TEST_CASE("the list of backends has the known ones, the found ones and every rea
 }
 
 TEST_CASE("the kernel cache directory", "[loader]") {
-    const TemporaryDirectory base;
+    const TemporaryFolder base;
     const ScopedVariable crt_dir("CRT_CACHE_DIR", std::nullopt);
-    const ScopedVariable xdg("XDG_CACHE_HOME", (base.path() / "xdg").string());
-    const ScopedVariable home("HOME", (base.path() / "home").string());
+    const ScopedVariable xdg("XDG_CACHE_HOME", base / "xdg");
+    const ScopedVariable home("HOME", base / "home");
 
     CHECK(makeHost(false).cache_directory == nullptr);
     REQUIRE(makeHost(true).cache_directory != nullptr);
-    CHECK(makeHost(true).cache_directory == (base.path() / "xdg/crt").string());
+    CHECK(makeHost(true).cache_directory == base / "xdg/crt");
     // What is cached is run: nobody else may write there.
-    CHECK((fs::status(base.path() / "xdg/crt").permissions() & fs::perms::all) == fs::perms::owner_all);
+    CHECK((fs::status(base / "xdg/crt").permissions() & fs::perms::all) == fs::perms::owner_all);
     {
         const ScopedVariable relative("XDG_CACHE_HOME", "relative");
-        CHECK(makeHost(true).cache_directory == (base.path() / "home/.cache/crt").string());
+        CHECK(makeHost(true).cache_directory == base / "home/.cache/crt");
     }
     {
-        const ScopedVariable own("CRT_CACHE_DIR", (base.path() / "own/deep").string());
-        CHECK(makeHost(true).cache_directory == (base.path() / "own/deep").string());
+        const ScopedVariable own("CRT_CACHE_DIR", base / "own/deep");
+        CHECK(makeHost(true).cache_directory == base / "own/deep");
     }
     {
         base.write("file", "in the way");
-        const ScopedVariable unusable("CRT_CACHE_DIR", (base.path() / "file").string());
+        const ScopedVariable unusable("CRT_CACHE_DIR", base / "file");
         CHECK(makeHost(true).cache_directory == nullptr);
-        const ScopedVariable below("CRT_CACHE_DIR", (base.path() / "file/below").string());
+        const ScopedVariable below("CRT_CACHE_DIR", base / "file/below");
         CHECK(makeHost(true).cache_directory == nullptr);
     }
 }
@@ -261,22 +243,22 @@ TEST_CASE("expanding includes", "[loader]") {
 }
 
 TEST_CASE("CRT_KERNEL_DIR replaces the embedded sources", "[loader]") {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     for (const char* header : {"layout.h", "features.h", "dialect.h"}) {
         fs::copy(fs::path(CRT_SOURCE_DIR) / "core/kernel" / header, directory.path());
     }
     directory.write("path.h", "#include \"layout.h\"\nint changed;\n");
-    const ScopedVariable kernels("CRT_KERNEL_DIR", directory.path().string());
+    const ScopedVariable kernels("CRT_KERNEL_DIR", directory.path());
     REQUIRE(kernelSource("path.h") != nullptr);
     CHECK_THAT(kernelSource("path.h"), Contains("int changed;") && Contains("typedef struct CrtScene"));
     // All or nothing: what is not there is not taken from the program.
     CHECK(kernelSource("bsdf.h") == nullptr);
 
     // A layout of another build would misread the scene. Another directory, because texts once handed out stay.
-    const TemporaryDirectory other;
+    const TemporaryFolder other;
     fs::copy(directory.path(), other.path(), fs::copy_options::recursive);
     other.write("layout.h", "struct Changed;\n");
-    const ScopedVariable changed("CRT_KERNEL_DIR", other.path().string());
+    const ScopedVariable changed("CRT_KERNEL_DIR", other.path());
     CHECK_THROWS_WITH(kernelSource("path.h"), Contains("holds another layout.h than this crt was built with"));
     const CrtHost host = makeHost(false);
     CHECK(host.kernel_source(host.user, "path.h") == nullptr);

@@ -2,40 +2,18 @@
 #include "error.h"
 #include "log.h"
 #include "mesh_io.h"
+#include "verify/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 
-#include <unistd.h>
-
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
 using namespace crt;
 using Catch::Contains;
+using crt::verify::TemporaryFolder;
 
 namespace {
-
-/// A folder that goes away with the test.
-class Folder {
-public:
-    Folder() : path_(std::filesystem::temp_directory_path() / ("crt_unit_mesh_io_" + std::to_string(::getpid()))) {
-        std::filesystem::create_directories(path_);
-    }
-    ~Folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    std::string write(const std::string& name, const std::string& text) const {
-        const std::string path = (path_ / name).string();
-        std::ofstream(path, std::ios::binary) << text;
-        return path;
-    }
-    std::string path() const { return path_.string(); }
-
-private:
-    std::filesystem::path path_;
-};
 
 /// Counts warnings while it lives, and keeps them off the terminal.
 class Warnings {
@@ -49,19 +27,19 @@ private:
 };
 
 LoadedMesh loadText(const std::string& text, bool use_mtl = true) {
-    const Folder folder;
+    const TemporaryFolder folder;
     return loadObj(folder.write("mesh.obj", text), use_mtl);
 }
 
 /// Loads an OBJ with a square, all of it in material "m" of the MTL given.
 LoadedMesh loadMaterial(const std::string& statements) {
-    const Folder folder;
+    const TemporaryFolder folder;
     folder.write("mesh.mtl", "# a comment\nnewmtl m\n" + statements);
     return loadObj(folder.write("mesh.obj", "mtllib mesh.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl m\nf 1 2 3 4\n"), true);
 }
 
 void checkRefused(const std::string& text, int line, const char* words) {
-    const Folder folder;
+    const TemporaryFolder folder;
     const std::string path = folder.write("mesh.obj", text);
     CAPTURE(text);
     try {
@@ -240,13 +218,13 @@ TEST_CASE("bad meshes are refused with their line", "[mesh_io]") {
     }
     checkRefused("mtllib missing.mtl\n" + kTriangle + "f 1 2 3\n", 1, "missing.mtl");
 
-    const Folder folder;
+    const TemporaryFolder folder;
     CHECK_THROWS_WITH(loadObj(folder.path(), true), Contains("directory"));
     CHECK_THROWS_WITH(loadObj(folder.path() + "/none.obj", true), Contains("cannot open"));
 }
 
 TEST_CASE("material files are found, shared and may be ignored", "[mesh_io]") {
-    const Folder folder;
+    const TemporaryFolder folder;
     const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
     folder.write("my colours.mtl", "newmtl unused\nKd 1 1 1\nnewmtl  red one \nKd 1 0 0\n\nnewmtl lamp\nKd 0 0 0\nKe 4 4 4");
     const std::string obj = folder.write(
@@ -350,7 +328,7 @@ TEST_CASE("MTL materials map onto ours", "[mesh_io][mtl]") {
 }
 
 TEST_CASE("crt_reflectance names a measured spectrum beside the MTL", "[mesh_io][mtl]") {
-    const Folder folder;
+    const TemporaryFolder folder;
     folder.write("paint.spd", "400 0.1\n700 0.7\n");
     folder.write("wrong.spd", "400 0.1\n700 1.7\n");
     folder.write("mesh.mtl", "newmtl m\nKd 1 0 0\ncrt_reflectance paint.spd\nnewmtl w\ncrt_reflectance\twrong.spd\n");

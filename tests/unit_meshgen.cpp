@@ -1,9 +1,8 @@
 // The generated meshes: exactly the promised triangles, closed, right side out, and the same bytes from every run.
 #include "mesh_io.h"
+#include "verify/temporary_folder.h"
 
 #include <catch2/catch.hpp>
-
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -143,13 +142,11 @@ TEST_CASE("the dragon is an uneven load", "[meshgen]") {
 }
 
 TEST_CASE("every run writes the same bytes", "[meshgen]") {
-    const std::filesystem::path folder =
-        std::filesystem::temp_directory_path() / ("crt_unit_meshgen_" + std::to_string(::getpid()));
-    const std::string command = std::string("'") + CRT_BUILD_DIR + "/bin/crt-meshgen' '" + folder.string() + "'";
+    const crt::verify::TemporaryFolder folder;
+    const std::string command = std::string("'") + CRT_BUILD_DIR + "/bin/crt-meshgen' '" + folder.path() + "'";
     REQUIRE(std::system(command.c_str()) == 0);
     for (const Expected& e : kExpected) {
         CAPTURE(e.file);
         CHECK((slurp(folder / e.file) == slurp(kMeshes + e.file)));
     }
-    std::filesystem::remove_all(folder);
 }

@@ -2,43 +2,21 @@
 #include "log.h"
 #include "scene_schema.h"
 #include "scene_yaml.h"
+#include "verify/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
-#include <unistd.h>
-
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 
 using namespace crt;
 using Catch::Contains;
+using crt::verify::TemporaryFolder;
 
 namespace {
-
-/// A folder that goes away with the test.
-class Folder {
-public:
-    Folder() : path_(std::filesystem::temp_directory_path() / ("crt_unit_scene_yaml_" + std::to_string(::getpid()))) {
-        std::filesystem::create_directories(path_);
-    }
-    ~Folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    std::string write(const std::string& name, const std::string& text) const {
-        const std::string path = (path_ / name).string();
-        std::ofstream(path, std::ios::binary) << text;
-        return path;
-    }
-    std::string path() const { return path_.string(); }
-
-private:
-    std::filesystem::path path_;
-};
 
 /// Keeps warnings off the terminal while it lives. They are counted all the same.
 struct Quiet {
@@ -232,7 +210,7 @@ TEST_CASE("one name means a reflectance to a wall and a light to a lamp", "[scen
 }
 
 TEST_CASE("spectrum files are found beside the scene", "[scene_yaml]") {
-    const Folder folder;
+    const TemporaryFolder folder;
     folder.write("lamp.spd", "400 1\n700 3\n");
     folder.write("whole.csv", "nm,value\n360,1\n830,1\n");
     const std::string path = folder.write("scene.yaml", "crt: 1\nenvironment: {radiance: {file: lamp.spd, outside: zero}}\n");
@@ -289,7 +267,7 @@ TEST_CASE("placements multiply in the order they are written", "[scene_yaml]") {
 }
 
 TEST_CASE("an OBJ named twice is loaded once", "[scene_yaml][mtl]") {
-    const Folder folder;
+    const TemporaryFolder folder;
     folder.write("plain.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     const Scene scene = parse(kGrey + "objects: [{obj: plain.obj, material: grey}, {obj: ./plain.obj, material: grey}]", {}, folder.path());
     CHECK(scene.meshes.size() == 1);
@@ -299,7 +277,7 @@ TEST_CASE("an OBJ named twice is loaded once", "[scene_yaml][mtl]") {
 }
 
 TEST_CASE("materials of an OBJ can be kept, replaced or ignored", "[scene_yaml][mtl]") {
-    const Folder folder;
+    const TemporaryFolder folder;
     folder.write("two.mtl", "newmtl body\nKd 0.5 0.5 0.5\nnewmtl Lamp.001\nKd 0 0 0\nKe 2 2 2\n");
     folder.write("two.obj", "mtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl body\nf 1 2 3\nusemtl Lamp.001\nf 3 2 1\n");
     const Scene kept = parse("objects: [{obj: two.obj}, {obj: two.obj, material: from_mtl}]", {}, folder.path());
@@ -343,7 +321,7 @@ TEST_CASE("aliases are welcome, a byte order mark and CRLF are borne", "[scene_y
 // ---- Bad files -------------------------------------------------------------------------------------------------------
 
 TEST_CASE("files that are not there or not text", "[scene_yaml][refused]") {
-    const Folder folder;
+    const TemporaryFolder folder;
     CHECK_THROWS_WITH(loadScene(folder.path() + "/none.yaml"), Contains("none.yaml: error: cannot be opened: No such file"));
     CHECK_THROWS_WITH(loadScene(folder.path()), Contains("this is a directory"));
     CHECK_THROWS_WITH(loadScene(folder.write("empty.yaml", "")), Contains("empty.yaml: error: there is nothing in this file; a scene begins with 'crt: 1'"));

@@ -2,20 +2,18 @@
 #include "error.h"
 #include "spectra.h"
 #include "spectra_data.h"
+#include "verify/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 
-#include <unistd.h>
-
 #include <cmath>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <limits>
 #include <span>
 #include <tuple>
 
 using namespace crt;
+using crt::verify::TemporaryFolder;
 
 namespace {
 
@@ -48,31 +46,15 @@ Vec3d underD65(Spectrum reflectance) {
     return multiply(xyzToRgb(ColorSpace::LinearSrgb), spectrumToXyz(reflectance));
 }
 
-/// A file in the temporary directory that goes away with the test.
-class TemporaryFile {
-public:
-    explicit TemporaryFile(const std::string& text)
-        : path_((std::filesystem::temp_directory_path() / ("crt_unit_spectra_" + std::to_string(::getpid()) + ".spd")).string()) {
-        std::ofstream(path_, std::ios::binary) << text;
-    }
-    ~TemporaryFile() {
-        std::error_code ignored;
-        std::filesystem::remove(path_, ignored);
-    }
-    const std::string& path() const { return path_; }
-
-private:
-    std::string path_;
-};
-
 /// Sentence of the scene error that reading `text` as a spectrum file gives, and the line it points to.
 std::pair<std::string, int> fileError(const std::string& text, Outside outside = Outside::Clamp) {
-    const TemporaryFile file(text);
+    const TemporaryFolder folder;
+    const std::string file = folder.write("spectrum.spd", text);
     try {
-        readSpectrumFile(file.path(), outside);
+        readSpectrumFile(file, outside);
     } catch (const Error& e) {
         CHECK(e.kind() == ErrorKind::Scene);
-        CHECK(e.place().file == file.path());
+        CHECK(e.place().file == file);
         return {e.what(), e.place().line};
     }
     return {"no error", -1};
@@ -288,8 +270,8 @@ TEST_CASE("spectrum files are read as people write them", "[spectra]") {
                              "# measured\r\n400\t0.1\r\n\r\n500.5 \t 0.2 # middle\r\n700 +0.3\r\n",
                              "\xEF\xBB\xBFnm;value\n400;0.1\n 500.5 ; 0.2\n700; 0.3"}) {
         CAPTURE(text);
-        const TemporaryFile file(text);
-        CHECK(readSpectrumFile(file.path(), Outside::Clamp) == expected);
+        const TemporaryFolder folder;
+        CHECK(readSpectrumFile(folder.write("spectrum.spd", text), Outside::Clamp) == expected);
     }
 }
 
