@@ -1,12 +1,15 @@
 #include "compile.h"
 
+#include "blob_writer.h"
 #include "bvh_build.h"
 #include "distributions.h"
+#include "flatten.h"
 #include "kernel/features.h"
 #include "kernel/layout.h"
 #include "kernel/surface.h"
 #include "log.h"
 #include "near_surfaces.h"
+#include "vec3d.h"
 
 #include <algorithm>
 #include <chrono>
@@ -15,7 +18,6 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <span>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -23,15 +25,9 @@
 namespace crt {
 namespace {
 
-using kernel::CrtSpan;
-
 /// Up to this many triangles `auto` takes the brute-force loop. A choice, not yet a measurement: `bench/run accelerators` finds the crossover.
 constexpr std::size_t kBruteForceTriangles = 64;
 
-Vec3d operator-(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec3d operator*(const Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 /// By a power of two first, so that no square overflows or vanishes.
 Vec3d normalise(const Vec3d& v) {
     int exponent = 0;
@@ -39,60 +35,6 @@ Vec3d normalise(const Vec3d& v) {
     const Vec3d near_one = v * std::ldexp(1.0, -exponent);
     return near_one * (1.0 / std::sqrt(dot(near_one, near_one)));
 }
-
-Vec3d transformPoint(const Matrix4d& m, const Vec3d& p) {
-    return {m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
-            m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]};
-}
-
-/// Rows of the cofactor matrix of the linear part: transforms normals, and its sign is that of the determinant.
-Matrix3d cofactors(const Matrix4d& m) {
-    const Vec3d a{m[0], m[1], m[2]}, b{m[4], m[5], m[6]}, c{m[8], m[9], m[10]};
-    return {cross(b, c), cross(c, a), cross(a, b)};
-}
-
-/// One placed triangle, world space, author's units.
-struct FlatTriangle {
-    std::array<Vec3d, 3> positions;
-    std::array<Vec3d, 3> normals{};
-    bool smooth = false;
-    std::int32_t material = -1;
-    std::int32_t emission = -1;
-    std::uint32_t object = 0;
-};
-
-/// The blob while it grows: arrays are appended, each on a 64-byte boundary.
-class BlobWriter {
-public:
-    BlobWriter() : bytes_(sizeof(kernel::CrtScene)) {}
-
-    template <class T>
-    CrtSpan append(std::span<const T> items) {
-        if (items.empty()) return {0, 0};
-        bytes_.resize((bytes_.size() + 63) / 64 * 64);
-        const std::size_t offset = bytes_.size();
-        // 64 GiB is what offsets of 16 bytes in 32 bits reach.
-        if ((offset + items.size_bytes()) / 16 > std::numeric_limits<std::uint32_t>::max())
-            throw Error(ErrorKind::Scene, "the scene is too large: its compiled form exceeds 64 GiB");
-        bytes_.resize(offset + items.size_bytes());
-        std::memcpy(bytes_.data() + offset, items.data(), items.size_bytes());
-        return {static_cast<std::uint32_t>(offset / 16), static_cast<std::uint32_t>(items.size())};
-    }
-
-    template <class T>
-    CrtSpan append(const std::vector<T>& items) {
-        return append(std::span<const T>(items));
-    }
-
-    std::vector<unsigned char> finish(const kernel::CrtScene& header) {
-        std::memcpy(bytes_.data(), &header, sizeof(header));
-        bytes_.resize((bytes_.size() + 63) / 64 * 64);
-        return std::move(bytes_);
-    }
-
-private:
-    std::vector<unsigned char> bytes_;
-};
 
 /// Spectra by value: equal ones share a table.
 class SpectrumTable {
@@ -125,7 +67,6 @@ public:
     CompiledScene run() {
         const auto start = std::chrono::steady_clock::now();
         flatten();
-        normaliseLengths();
         chooseAccelerator();
         writeGeometry();
         writeEmitters();
@@ -147,110 +88,10 @@ private:
     bool scatters() const { return isPath() && scene_.integrator.max_depth > 0; }
 
     void flatten() {
-        for (std::size_t o = 0; o < scene_.objects.size(); ++o) {
-            const Object& object = scene_.objects[o];
-            const Mesh& mesh = scene_.meshes[object.mesh];
-            for (const Matrix4d& transform : object.transforms) flattenPlacement(object, mesh, transform);
-        }
-        if (triangles_.size() >= (1u << 28))
-            throw Error(ErrorKind::Scene, "the scene is too large: more than 268 million triangles");
-        for (const FlatTriangle& t : triangles_)
-            for (const Vec3d& p : t.positions)
-                for (const double x : p)
-                    if (!std::isfinite(x)) throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity", scene_.objects[t.object].place);
-    }
-
-    void flattenPlacement(const Object& object, const Mesh& mesh, const Matrix4d& transform) {
-        const Matrix3d normal_matrix = cofactors(transform);
-        const Vec3d first_row{transform[0], transform[1], transform[2]};
-        // A mirroring transform turns the order of vertices round; turning it back keeps the outside outside.
-        const bool mirrored = dot(first_row, normal_matrix[0]) < 0;
-        for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-            FlatTriangle t;
-            t.object = placements_;
-            t.material = !mesh.material.empty() && mesh.material[i] >= 0 ? mesh.material[i] : object.material;
-            t.emission = !mesh.emission.empty() && mesh.emission[i] >= 0 ? mesh.emission[i] : object.emission;
-            t.smooth = !mesh.normal_index.empty() &&
-                       std::all_of(mesh.normal_index[i].begin(), mesh.normal_index[i].end(), [](std::uint32_t n) { return n != kNoNormal; });
-            for (std::size_t k = 0; k < 3; ++k) {
-                const std::size_t from = mirrored && k > 0 ? 3 - k : k;
-                t.positions[k] = transformPoint(transform, mesh.positions[mesh.triangles[i][from]]);
-                if (t.smooth) {
-                    const Vec3d n = multiply(normal_matrix, mesh.normals[mesh.normal_index[i][from]]);
-                    const double length = std::sqrt(dot(n, n));
-                    if (length > 0 && std::isfinite(length))
-                        t.normals[k] = n * ((mirrored ? -1.0 : 1.0) / length);
-                    else
-                        t.smooth = false;
-                }
-            }
-            triangles_.push_back(t);
-        }
-        ++placements_;
-    }
-
-    /// Centre and power-of-two scale in double, so that far-away and huge or tiny scenes lose nothing in float, and moving or scaling
-    /// a scene by representable amounts gives the same bits. Triangles without area have no part in it: nobody sees them.
-    void normaliseLengths() {
-        std::vector<bool> seen(triangles_.size(), true);
-        measure(seen);
-        std::uint64_t without_area = 0;
-        for (std::size_t i = 0; i < triangles_.size(); ++i) {
-            seen[i] = hasArea(normalised(i));
-            without_area += seen[i] ? 0 : 1;
-        }
-        if (without_area > 0) {
-            logWarning("{} triangle{} no area and will not be seen", without_area, without_area == 1 ? " has" : "s have");
-            if (without_area < triangles_.size()) measure(seen);
-        }
-        positions_.resize(triangles_.size());
-        for (std::size_t i = 0; i < triangles_.size(); ++i) {
-            std::array<Vec3d, 3> p = normalised(i);
-            // Rounded to float, three points of one line make a sliver that can be hit; one point cannot.
-            if (!seen[i]) p[0] = p[1] = p[2] = {};
-            for (std::size_t v = 0; v < 3; ++v)
-                for (std::size_t k = 0; k < 3; ++k) positions_[i][3 * k + v] = static_cast<float>(p[v][k]);
-        }
-    }
-
-    /// Sets centre and scale by the bounding box of the triangles that are `seen`.
-    void measure(const std::vector<bool>& seen) {
-        constexpr double inf = std::numeric_limits<double>::infinity();
-        Vec3d lower{inf, inf, inf}, upper{-inf, -inf, -inf};
-        for (std::size_t i = 0; i < triangles_.size(); ++i) {
-            if (!seen[i]) continue;
-            for (const Vec3d& p : triangles_[i].positions)
-                for (std::size_t k = 0; k < 3; ++k) {
-                    lower[k] = std::min(lower[k], p[k]);
-                    upper[k] = std::max(upper[k], p[k]);
-                }
-        }
-        out_.centre = {};
-        out_.scale_exponent = 0;
-        double half_extent = 0;
-        for (std::size_t k = 0; k < 3 && lower[k] <= upper[k]; ++k) {
-            out_.centre[k] = lower[k] + (upper[k] - lower[k]) / 2;
-            half_extent = std::max(half_extent, (upper[k] - lower[k]) / 2);
-        }
-        if (half_extent > 0) {
-            int exponent = 0;
-            std::frexp(half_extent, &exponent);
-            out_.scale_exponent = -exponent;  // half_extent · 2^-exponent is in [½, 1)
-        }
-        scale_ = std::ldexp(1.0, out_.scale_exponent);
-    }
-
-    /// Corners of triangle i, centred and scaled.
-    std::array<Vec3d, 3> normalised(std::size_t i) const {
-        std::array<Vec3d, 3> p;
-        for (std::size_t v = 0; v < 3; ++v) p[v] = (triangles_[i].positions[v] - out_.centre) * scale_;
-        return p;
-    }
-
-    /// Coordinates within ±1. Higher over its edges than rounding in double makes three points of a line.
-    static bool hasArea(const std::array<Vec3d, 3>& p) {
-        const Vec3d a = p[1] - p[0], b = p[2] - p[0], n = cross(a, b);
-        return dot(n, n) > 1e-30 * std::max(dot(a, a), dot(b, b));
+        flat_ = flattenScene(scene_);
+        out_.centre = flat_.centre;
+        out_.scale_exponent = flat_.scale_exponent;
+        scale_ = std::ldexp(1.0, flat_.scale_exponent);
     }
 
     void chooseAccelerator() {
@@ -259,16 +100,16 @@ private:
             case Accelerator::Aabb: header_.accelerator = CRT_ACCELERATOR_AABB; break;
             case Accelerator::None: header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE; break;
             case Accelerator::Auto:
-                header_.accelerator = triangles_.size() <= kBruteForceTriangles ? CRT_ACCELERATOR_BRUTE_FORCE : CRT_ACCELERATOR_BVH;
+                header_.accelerator = flat_.triangles.size() <= kBruteForceTriangles ? CRT_ACCELERATOR_BRUTE_FORCE : CRT_ACCELERATOR_BVH;
         }
         // Nothing to find, or, in the view of the boxes, nobody who looks.
-        if (triangles_.empty() || scene_.integrator.type == IntegratorType::Aabb) header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;
+        if (flat_.triangles.empty() || scene_.integrator.type == IntegratorType::Aabb) header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;
     }
 
     TriangleBounds boundsOf(std::size_t i) const {
         TriangleBounds b{};
         for (std::size_t k = 0; k < 3; ++k) {
-            const float* p = &positions_[i][3 * k];
+            const float* p = &flat_.positions[i][3 * k];
             b.lower[k] = std::min({p[0], p[1], p[2]});
             b.upper[k] = std::max({p[0], p[1], p[2]});
         }
@@ -276,7 +117,7 @@ private:
     }
 
     void writeGeometry() {
-        const std::size_t count = triangles_.size();
+        const std::size_t count = flat_.triangles.size();
         std::vector<std::uint32_t> order(count);
         for (std::size_t i = 0; i < count; ++i) order[i] = static_cast<std::uint32_t>(i);
         if (header_.accelerator == CRT_ACCELERATOR_BVH) {
@@ -294,7 +135,7 @@ private:
         for (std::size_t slot = 0; slot < count; ++slot) {
             const std::uint32_t id = order[slot];
             slot_of_[id] = static_cast<std::uint32_t>(slot);
-            std::copy(positions_[id].begin(), positions_[id].end(), slots[slot].p);
+            std::copy(flat_.positions[id].begin(), flat_.positions[id].end(), slots[slot].p);
             slots[slot].id = id;
         }
         header_.triangles = blob_.append(slots);
@@ -344,7 +185,7 @@ private:
         return length > 0 ? n * (1 / length) : Vec3d{};
     }
 
-    Vec3d vertexOf(std::size_t i, std::size_t v) const { return {positions_[i][v], positions_[i][3 + v], positions_[i][6 + v]}; }
+    Vec3d vertexOf(std::size_t i, std::size_t v) const { return {flat_.positions[i][v], flat_.positions[i][3 + v], flat_.positions[i][6 + v]}; }
 
     /// Whether triangle i can come between two points of the scene: not if the whole scene lies on one side of its plane, as it does for the walls of
     /// a convex room.
@@ -352,7 +193,7 @@ private:
         const Vec3d o = vertexOf(i, 0);
         const Vec3d n = cross(vertexOf(i, 1) - o, vertexOf(i, 2) - o);
         bool above = false, below = false;
-        for (std::size_t j = 0; j < positions_.size() && !(above && below); ++j)
+        for (std::size_t j = 0; j < flat_.positions.size() && !(above && below); ++j)
             for (std::size_t v = 0; v < 3; ++v) {
                 const double d = dot(n, vertexOf(j, v) - o);
                 above = above || d > 0;
@@ -379,13 +220,13 @@ private:
 
     /// Boxes of the objects, for the paper's culling and for the bounding-box view; triangles of an object are adjacent unless a BVH moved them.
     void writeObjects() {
-        out_.objects = placements_;
+        out_.objects = flat_.placements;
         const bool needed = header_.accelerator == CRT_ACCELERATOR_AABB || scene_.integrator.type == IntegratorType::Aabb;
         if (!needed) return;
         std::vector<kernel::CrtObject> objects;
-        for (std::size_t i = 0; i < triangles_.size(); ++i) {
+        for (std::size_t i = 0; i < flat_.triangles.size(); ++i) {
             const TriangleBounds b = boundsOf(i);
-            if (i == 0 || triangles_[i].object != triangles_[i - 1].object) {
+            if (i == 0 || flat_.triangles[i].object != flat_.triangles[i - 1].object) {
                 kernel::CrtObject object{};
                 for (std::size_t k = 0; k < 3; ++k) {
                     object.lower[k] = std::numeric_limits<float>::infinity();
@@ -405,7 +246,7 @@ private:
     }
 
     double areaOf(std::size_t i) const {
-        const auto& p = positions_[i];
+        const auto& p = flat_.positions[i];
         const Vec3d a{p[0], p[3], p[6]}, b{p[1], p[4], p[7]}, c{p[2], p[5], p[8]};
         const Vec3d n = cross(b - a, c - a);
         return 0.5 * std::sqrt(dot(n, n));
@@ -413,8 +254,9 @@ private:
 
     /// If triangles i and i + 1 emit alike and make a parallelogram, as the halves of a quad do: the corner of triangle i across from their common edge.
     std::optional<std::uint32_t> parallelogramCorner(std::size_t i) const {
-        if (i + 1 >= triangles_.size() || triangles_[i + 1].object != triangles_[i].object || triangles_[i + 1].emission != triangles_[i].emission)
-            return std::nullopt;
+        if (i + 1 >= flat_.triangles.size()) return std::nullopt;
+        const FlatTriangle &one = flat_.triangles[i], &next = flat_.triangles[i + 1];
+        if (next.object != one.object || next.emission != one.emission) return std::nullopt;
         for (std::size_t corner = 0; corner < 3; ++corner) {
             const Vec3d o = vertexOf(i, corner), a = vertexOf(i, (corner + 1) % 3), b = vertexOf(i, (corner + 2) % 3);
             const Vec3d across{a[0] + b[0] - o[0], a[1] + b[1] - o[1], a[2] + b[2] - o[2]};
@@ -430,13 +272,13 @@ private:
     }
 
     void writeEmitters() {
-        emitter_of_.assign(triangles_.size(), CRT_NONE);
+        emitter_of_.assign(flat_.triangles.size(), CRT_NONE);
         if (!isPath()) return;
         std::vector<kernel::CrtEmitter> emitters;
         std::vector<double> power;
-        for (std::size_t i = 0; i < triangles_.size(); ++i) {
-            if (triangles_[i].emission < 0) continue;
-            const Emission& emission = scene_.emissions[static_cast<std::size_t>(triangles_[i].emission)];
+        for (std::size_t i = 0; i < flat_.triangles.size(); ++i) {
+            if (flat_.triangles[i].emission < 0) continue;
+            const Emission& emission = scene_.emissions[static_cast<std::size_t>(flat_.triangles[i].emission)];
             if (!(emission.radiance.max() > 0)) continue;
             double area = areaOf(i);
             if (!(area > 0)) continue;
@@ -470,12 +312,12 @@ private:
     }
 
     void writeMaterials() {
-        std::vector<kernel::CrtPrimitive> primitives(triangles_.size());
+        std::vector<kernel::CrtPrimitive> primitives(flat_.triangles.size());
         std::vector<kernel::CrtNormals> normals;
         std::vector<bool> used(scene_.materials.size(), false);
         bool fallback_used = false;
-        for (std::size_t i = 0; i < triangles_.size(); ++i) {
-            const FlatTriangle& t = triangles_[i];
+        for (std::size_t i = 0; i < flat_.triangles.size(); ++i) {
+            const FlatTriangle& t = flat_.triangles[i];
             kernel::CrtPrimitive& p = primitives[i];
             const bool known = t.material >= 0 && static_cast<std::size_t>(t.material) < scene_.materials.size();
             if (known)
@@ -660,11 +502,11 @@ private:
         const auto has = [&](std::uint32_t feature) { return (out_.features & feature) != 0; };
         if (header_.accelerator != CRT_ACCELERATOR_BVH)
             left_out("BVH", scene_.integrator.accelerator == Accelerator::Auto
-                                ? fmt::format("{} triangles: testing all of them is faster (up to {})", triangles_.size(), kBruteForceTriangles)
+                                ? fmt::format("{} triangles: testing all of them is faster (up to {})", flat_.triangles.size(), kBruteForceTriangles)
                                 : std::string("integrator.accelerator asks for another"));
-        if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders_ < triangles_.size())
-            left_out("shadow tests", fmt::format("{} of {} triangles have the whole scene on one side and cannot come between", triangles_.size() - occluders_,
-                                                 triangles_.size()));
+        if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders_ < flat_.triangles.size())
+            left_out("shadow tests", fmt::format("{} of {} triangles have the whole scene on one side and cannot come between",
+                                                 flat_.triangles.size() - occluders_, flat_.triangles.size()));
         if (!has(CRT_FEATURE_CONDUCTOR)) left_out("mirror and conductor", "no surface uses them");
         if (!has(CRT_FEATURE_DIELECTRIC)) left_out("dielectric", "no surface uses it");
         if (!has(CRT_FEATURE_DISPERSION)) left_out("hero wavelength selection", "no index of refraction depends on wavelength");
@@ -689,7 +531,7 @@ private:
     void finish() {
         const std::vector<unsigned char> bytes = blob_.finish(header_);
         out_.size_bytes = bytes.size();
-        out_.triangles = triangles_.size();
+        out_.triangles = flat_.triangles.size();
         out_.blob.resize(bytes.size() / sizeof(CompiledScene::Line));
         std::memcpy(out_.blob.data(), bytes.data(), bytes.size());
         const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
@@ -701,12 +543,10 @@ private:
     kernel::CrtScene header_{};
     BlobWriter blob_;
     SpectrumTable spectra_;
-    std::vector<FlatTriangle> triangles_;
-    std::vector<std::array<float, 9>> positions_;  ///< x of three vertices, y, z; normalised.
+    FlatScene flat_;
     std::vector<std::uint32_t> slot_of_;           ///< By primitive id.
     std::vector<std::uint32_t> emitter_of_;
     std::size_t occluders_ = 0;
-    std::uint32_t placements_ = 0;
     double scale_ = 1;
     bool has_diffuse_ = false, has_conductor_ = false, has_dielectric_ = false, has_dispersion_ = false;
 };

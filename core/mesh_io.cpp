@@ -2,12 +2,13 @@
 
 #include "error.h"
 #include "log.h"
+#include "triangulate.h"
+#include "vec3d.h"
 
 // The loader is compiled into this one file, in double: Debian's two shared builds of it, float and double, export the
 // same symbols, so that linking the wrong one would go unnoticed.
 #define TINYOBJLOADER_IMPLEMENTATION
-#define TINYOBJLOADER_USE_DOUBLE
-#include <tiny_obj_loader.h>
+#include "mtl_material.h"
 
 #include <fmt/format.h>
 
@@ -126,13 +127,6 @@ struct Face {
     int line;
 };
 
-/// Where a material stands and which statements it has; tinyobjloader keeps only values, and a default looks like any other.
-struct MaterialSource {
-    std::string file;
-    int line = 0;
-    std::set<std::string, std::less<>> statements;
-};
-
 /// What the OBJ says, before indices are checked: a face may name vertices that follow it.
 struct ObjContents {
     std::vector<Vec3d> positions;
@@ -140,7 +134,7 @@ struct ObjContents {
     std::vector<Corner> corners;
     std::vector<Face> faces;
     std::vector<tinyobj::material_t> materials;
-    std::vector<MaterialSource> material_sources;  ///< Parallel to `materials`.
+    std::vector<MtlSource> material_sources;  ///< Parallel to `materials`.
     std::vector<std::string> files;
 };
 
@@ -184,7 +178,7 @@ private:
         for (std::string warning; std::getline(each, warning);) logWarning("{}: {}", path, warning);
 
         // tinyobjloader pushes one material for each newmtl, and one without a name for a file that has none.
-        std::vector<MaterialSource> sources;
+        std::vector<MtlSource> sources;
         LineSource again(text);
         std::istream stream_again(&again);
         for (std::string line; std::getline(stream_again, line);) {
@@ -192,11 +186,13 @@ private:
             const std::string_view keyword = nextField(rest);
             if (keyword == "newmtl") {
                 if (trimmed(rest).empty()) fail("newmtl needs a name", path, again.lineNumber());
-                sources.push_back({path, again.lineNumber(), {}});
+                sources.push_back({path, again.lineNumber(), {}, {}});
             }
-            if (!sources.empty() && !keyword.empty() && !keyword.starts_with('#')) sources.back().statements.emplace(keyword);
+            if (sources.empty() || keyword.empty() || keyword.starts_with('#')) continue;
+            const bool is_first = sources.back().statements.emplace(keyword).second;
+            if (is_first && keyword == "crt_reflectance") sources.back().measured_reflectance = trimmed(rest);
         }
-        sources.resize(materials.size() - obj_.material_sources.size(), MaterialSource{path, 0, {}});
+        sources.resize(materials.size() - obj_.material_sources.size(), MtlSource{path, 0, {}, {}});
         std::move(sources.begin(), sources.end(), std::back_inserter(obj_.material_sources));
     }
 
@@ -326,244 +322,21 @@ void checkIndices(const ObjContents& obj, const std::string& path) {
         }
 }
 
-Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 double maxAbs(const Vec3d& v) { return std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}); }
-double length(const Vec3d& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 /// No area beyond what rounding the coordinates to double can make up: collinear points seldom give exactly zero.
 bool isDegenerate(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
-    const double scale = std::max(maxAbs(minus(b, a)), maxAbs(minus(c, a)));
+    const double scale = std::max(maxAbs(b - a), maxAbs(c - a));
     if (!(scale > 0.0)) return true;
     // Edges of size one, so that neither a mesh in metres nor one in parsecs overflows.
     const auto edge = [&](const Vec3d& to) {
-        Vec3d e = minus(to, a);
+        Vec3d e = to - a;
         for (double& x : e) x /= scale;
         return e;
     };
     const double coordinate = std::max({maxAbs(a), maxAbs(b), maxAbs(c)}) / scale;
     return length(cross(edge(b), edge(c))) <= 4.0 * std::numeric_limits<double>::epsilon() * (1.0 + coordinate);
 }
-
-/// Splits polygons into triangles. Convex ones become a fan from their first corner, which keeps the diagonal of a quad
-/// predictable; the others lose one ear after the other.
-class Triangulator {
-public:
-    /// Corner numbers (0 … n−1) of the triangles, three each. A polygon that crosses itself is fanned and counted.
-    const std::vector<std::array<std::uint32_t, 3>>& split(const ObjContents& obj, const Face& face) {
-        triangles_.clear();
-        const std::uint32_t n = face.corner_count;
-        if (n == 3) {
-            triangles_.push_back({0, 1, 2});
-            return triangles_;
-        }
-        project(obj, face);
-        bool convex = true;
-        for (std::uint32_t i = 0; i < n && convex; ++i) convex = turn(i, (i + 1) % n, (i + 2) % n) >= 0.0;
-
-        ring_.resize(n);
-        for (std::uint32_t i = 0; i < n; ++i) ring_[i] = i;
-        while (!convex && ring_.size() > 3 && cutEar()) {}
-        if (!convex && ring_.size() > 3) ++crossing_;
-        for (std::size_t i = 1; i + 1 < ring_.size(); ++i) triangles_.push_back({ring_[0], ring_[i], ring_[i + 1]});
-        return triangles_;
-    }
-
-    std::uint64_t crossingPolygons() const { return crossing_; }
-
-private:
-    /// Into the coordinate plane the polygon faces most, counter-clockwise.
-    void project(const ObjContents& obj, const Face& face) {
-        const auto at = [&](std::uint32_t i) -> const Vec3d& {
-            return obj.positions[static_cast<std::size_t>(obj.corners[face.first_corner + i % face.corner_count].position)];
-        };
-        // Newell's normal, about the first corner: the same for flat and for warped polygons, and far from the origin.
-        Vec3d normal{};
-        for (std::uint32_t i = 1; i + 1 < face.corner_count; ++i) {
-            const Vec3d twice_area = cross(minus(at(i), at(0)), minus(at(i + 1), at(0)));
-            for (int k = 0; k < 3; ++k) normal[k] += twice_area[k];
-        }
-        int axis = 0;
-        for (int k = 1; k < 3; ++k)
-            if (std::abs(normal[k]) > std::abs(normal[axis])) axis = k;
-        int u = (axis + 1) % 3, v = (axis + 2) % 3;
-        if (normal[axis] < 0.0) std::swap(u, v);
-        points_.resize(face.corner_count);
-        for (std::uint32_t i = 0; i < face.corner_count; ++i) {
-            const Vec3d p = minus(at(i), at(0));
-            points_[i] = {p[u], p[v]};
-        }
-    }
-
-    /// Twice the signed area of three corners; positive is a left turn.
-    double turn(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
-        const auto [ax, ay] = points_[a];
-        return (points_[b][0] - ax) * (points_[c][1] - ay) - (points_[b][1] - ay) * (points_[c][0] - ax);
-    }
-
-    /// Removes one corner whose triangle holds no other. False when there is none.
-    bool cutEar() {
-        const std::size_t n = ring_.size();
-        for (std::size_t i = 0; i < n; ++i) {
-            const std::uint32_t a = ring_[(i + n - 1) % n], b = ring_[i], c = ring_[(i + 1) % n];
-            if (turn(a, b, c) <= 0.0) continue;
-            const bool empty = std::none_of(ring_.begin(), ring_.end(), [&](std::uint32_t p) {
-                return p != a && p != b && p != c && points_[p] != points_[a] && points_[p] != points_[b] &&
-                       points_[p] != points_[c] && turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0;
-            });
-            if (!empty) continue;
-            triangles_.push_back({a, b, c});
-            ring_.erase(ring_.begin() + static_cast<std::ptrdiff_t>(i));
-            return true;
-        }
-        return false;
-    }
-
-    std::vector<std::array<double, 2>> points_;
-    std::vector<std::uint32_t> ring_;
-    std::vector<std::array<std::uint32_t, 3>> triangles_;
-    std::uint64_t crossing_ = 0;
-};
-
-using MtlColour = const tinyobj::real_t (&)[3];
-
-/// MTL colours are numbers between 0 and 1 that come out of colour pickers: sRGB-encoded by habit, and read as such.
-Vec3d linearColour(MtlColour encoded) {
-    Vec3d rgb;
-    for (int i = 0; i < 3; ++i) rgb[i] = srgbToLinear(std::clamp(encoded[i], 0.0, 1.0));
-    return rgb;
-}
-
-/// Ke goes beyond 1 where an exporter multiplied it by a strength: the colour is decoded, the strength stays linear.
-Vec3d linearEmission(MtlColour encoded) {
-    const double strength = std::max({1.0, encoded[0], encoded[1], encoded[2]});
-    Vec3d rgb;
-    for (int i = 0; i < 3; ++i) rgb[i] = strength * srgbToLinear(std::max(0.0, encoded[i]) / strength);
-    return rgb;
-}
-
-double brightest(MtlColour c) { return std::max({c[0], c[1], c[2]}); }
-
-bool inRange(MtlColour c) {
-    return std::all_of(std::begin(c), std::end(c), [](double x) { return x >= 0.0 && x <= 1.0; });
-}
-
-/// An MTL material as one of ours, by these rules, the first that fits:
-///
-///  1. d < 1 (Tr > 0) or illum 4, 6, 7, 9: Dielectric, smooth and clear, index Ni or 1.5. Ni alone says nothing: Blender
-///     writes it for everything.
-///  2. Pm ≥ 0.5: Mirror with reflectance Kd. illum 3 or 5 with Kd ≤ 0.1 and a Ks: Mirror with reflectance Ks.
-///  3. Diffuse with reflectance Kd (black when there is none).
-///
-/// `crt_reflectance file.spd` replaces Kd or Ks of 2 and 3 by a measured spectrum. Ke, if not black, becomes the radiance of
-/// a one-sided emitter. Ka is ignored. Whatever is lost on the way (roughness, gloss, partial transparency, textures) is
-/// named in one warning.
-class MaterialMapper {
-public:
-    MaterialMapper(const tinyobj::material_t& mtl, const MaterialSource& source, LoadedMesh& out)
-        : mtl_(mtl), source_(source), out_(out) {}
-
-    Material material() {
-        for (const double x : {mtl_.diffuse[0], mtl_.diffuse[1], mtl_.diffuse[2], mtl_.specular[0], mtl_.specular[1],
-                               mtl_.specular[2], mtl_.emission[0], mtl_.emission[1], mtl_.emission[2], mtl_.dissolve, mtl_.ior,
-                               mtl_.shininess, mtl_.roughness, mtl_.metallic})
-            if (!std::isfinite(x)) refuse("a number that is not finite");
-
-        Material m;
-        m.name = mtl_.name;
-        m.place = {source_.file, source_.line};
-        const bool glass = mtl_.dissolve < 1.0 || mtl_.illum == 4 || mtl_.illum == 6 || mtl_.illum == 7 || mtl_.illum == 9;
-        const bool metallic = mtl_.metallic >= 0.5;
-        const bool polished = (mtl_.illum == 3 || mtl_.illum == 5) && brightest(mtl_.diffuse) <= 0.1 &&
-                              brightest(mtl_.specular) > 0.0;
-        if (glass)
-            dielectric(m);
-        else if (metallic || polished)
-            mirror(m, metallic);
-        else
-            diffuse(m);
-        if (!mtl_.diffuse_texname.empty() || !mtl_.specular_texname.empty() || !mtl_.emissive_texname.empty() ||
-            !mtl_.alpha_texname.empty() || !mtl_.bump_texname.empty() || !mtl_.normal_texname.empty() ||
-            !mtl_.roughness_texname.empty() || !mtl_.metallic_texname.empty())
-            lost_.push_back("its textures are left out");
-        if (!lost_.empty())
-            logWarning("{}:{}: material '{}' is approximated: {}", source_.file, source_.line, mtl_.name, fmt::join(lost_, "; "));
-        return m;
-    }
-
-    std::optional<Emission> emission() const {
-        if (!(brightest(mtl_.emission) > 0.0)) return std::nullopt;
-        return Emission{rgbEmission(linearEmission(mtl_.emission)), false};
-    }
-
-private:
-    bool has(const char* statement) const { return source_.statements.contains(statement); }
-
-    [[noreturn]] void refuse(const std::string& what) const {
-        fail(fmt::format("material '{}' has {}", mtl_.name, what), source_.file, source_.line);
-    }
-
-    void dielectric(Material& m) {
-        m.type = MaterialType::Dielectric;
-        const double index = has("Ni") ? mtl_.ior : 1.5;
-        if (!(index > 0.0)) refuse(fmt::format("a refractive index Ni of {}", index));
-        m.eta = constantSpectrum(index);
-        if (mtl_.dissolve > 0.0 && mtl_.dissolve < 1.0) lost_.push_back(fmt::format("d = {:g} becomes clear glass", mtl_.dissolve));
-        if (has("Tf") && !(mtl_.transmittance[0] == 1.0 && mtl_.transmittance[1] == 1.0 && mtl_.transmittance[2] == 1.0))
-            lost_.push_back("the filter colour Tf is left out");
-        if (mtl_.unknown_parameter.contains("crt_reflectance")) lost_.push_back("glass has no crt_reflectance");
-        smooth();
-    }
-
-    void mirror(Material& m, bool metallic) {
-        m.type = MaterialType::Mirror;
-        m.reflectance = reflectance(metallic ? mtl_.diffuse : mtl_.specular, metallic ? "Kd" : "Ks");
-        if (metallic && mtl_.metallic < 1.0) lost_.push_back(fmt::format("metalness {:g} is taken as 1", mtl_.metallic));
-        smooth();
-    }
-
-    void diffuse(Material& m) {
-        m.type = MaterialType::Diffuse;
-        m.reflectance = reflectance(mtl_.diffuse, "Kd");
-        if (mtl_.metallic > 0.0) lost_.push_back(fmt::format("metalness {:g} is taken as 0", mtl_.metallic));
-        // illum 0 and 1 say that there is no highlight, whatever Ks holds.
-        if (mtl_.illum >= 2 && brightest(mtl_.specular) > 0.0)
-            lost_.push_back(fmt::format("its gloss (Ks{}) is left out",
-                                        roughness() ? fmt::format(", roughness {:.2g}", *roughness()) : ""));
-    }
-
-    /// Pr, or what Blender's exporter makes of roughness in Ns = 1000 (1 − roughness)².
-    std::optional<double> roughness() const {
-        if (has("Pr")) return mtl_.roughness;
-        if (has("Ns")) return 1.0 - std::sqrt(std::clamp(mtl_.shininess / 1000.0, 0.0, 1.0));
-        return std::nullopt;
-    }
-
-    void smooth() {
-        constexpr double kVisible = 0.05;
-        if (roughness().value_or(0.0) > kVisible) lost_.push_back(fmt::format("roughness {:.2g} is taken as 0", *roughness()));
-    }
-
-    Spectrum reflectance(MtlColour colour, const char* name) {
-        if (const auto measured = mtl_.unknown_parameter.find("crt_reflectance"); measured != mtl_.unknown_parameter.end()) {
-            const std::string path =
-                (std::filesystem::path(source_.file).parent_path() / std::filesystem::path(trimmed(measured->second))).string();
-            const Spectrum s = readSpectrumFile(path, Outside::Clamp);
-            if (s.min() < 0.0 || s.max() > 1.0) fail("a reflectance must lie in [0, 1]", path);
-            if (std::find(out_.files.begin(), out_.files.end(), path) == out_.files.end()) out_.files.push_back(path);
-            return s;
-        }
-        if (!inRange(colour)) lost_.push_back(fmt::format("{} is clamped to [0, 1]", name));
-        return rgbReflectance(linearColour(colour));
-    }
-
-    const tinyobj::material_t& mtl_;
-    const MaterialSource& source_;
-    LoadedMesh& out_;
-    std::vector<std::string> lost_;
-};
 
 }  // namespace
 
@@ -592,17 +365,20 @@ LoadedMesh loadObj(const std::string& path, bool use_mtl) {
     std::vector<std::int32_t> emission_index(obj.materials.size(), -1);
     const auto useMaterial = [&](std::size_t mtl) {
         if (material_index[mtl] >= 0) return;
-        MaterialMapper mapper(obj.materials[mtl], obj.material_sources[mtl], out);
+        const MtlMaterial mapped = mapMtlMaterial(obj.materials[mtl], obj.material_sources[mtl]);
         material_index[mtl] = static_cast<std::int32_t>(out.materials.size());
-        out.materials.push_back(mapper.material());
-        if (std::optional<Emission> emission = mapper.emission()) {
+        out.materials.push_back(mapped.material);
+        if (mapped.emission) {
             emission_index[mtl] = static_cast<std::int32_t>(out.emissions.size());
-            out.emissions.push_back(*emission);
+            out.emissions.push_back(*mapped.emission);
         }
+        const std::string& spectrum = mapped.spectrum_file;
+        if (!spectrum.empty() && std::find(out.files.begin(), out.files.end(), spectrum) == out.files.end()) out.files.push_back(spectrum);
     };
 
     Mesh& mesh = out.mesh;
     Triangulator triangulator;
+    std::vector<Vec3d> polygon;
     std::uint64_t flat_faces = 0;
     bool any_smooth = false;
     for (const Face& face : obj.faces) {
@@ -614,7 +390,10 @@ LoadedMesh loadObj(const std::string& path, bool use_mtl) {
             emission = emission_index[mtl];
         }
         bool lost_normal = false;
-        for (const auto& triangle : triangulator.split(obj, face)) {
+        polygon.clear();
+        for (std::uint32_t i = 0; i < face.corner_count; ++i)
+            polygon.push_back(obj.positions[static_cast<std::size_t>(obj.corners[face.first_corner + i].position)]);
+        for (const PolygonTriangle& triangle : triangulator.split(polygon)) {
             std::array<std::uint32_t, 3> position, normal;
             bool smooth = true;
             for (int k = 0; k < 3; ++k) {

@@ -2,6 +2,7 @@
 
 #include "log.h"
 #include "mesh_io.h"
+#include "vec3d.h"
 
 #include <fmt/format.h>
 
@@ -22,11 +23,6 @@ Matrix4d multiply(const Matrix4d& a, const Matrix4d& b) {
     return m;
 }
 
-Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 bool isZero(const Vec3d& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
 bool allFinite(const Matrix4d& m) { return std::all_of(m.begin(), m.end(), [](double v) { return std::isfinite(v); }); }
 
@@ -282,7 +278,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
         areas.clear();
         Vec3d sum{};
         for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
-            areas.push_back(cross(minus(mesh.positions[polygon[i]], apex), minus(mesh.positions[polygon[i + 1]], apex)));
+            areas.push_back(cross(mesh.positions[polygon[i]] - apex, mesh.positions[polygon[i + 1]] - apex));
             for (std::size_t c = 0; c < 3; ++c) sum[c] += areas.back()[c];
         }
         constexpr double kRounding = 1e-9;

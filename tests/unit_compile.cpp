@@ -303,6 +303,18 @@ TEST_CASE("lengths are moved and scaled exactly", "[compile]") {
 TEST_CASE("what cannot be flattened is refused", "[compile]") {
     CHECK_THROWS_AS(changed([](Scene& s) { s.objects[0].transforms[0][0] = 1e308 * 10; }), crt::Error);
     CHECK_THROWS_AS(changed([](Scene& s) { s.camera.position = {1e60, 0, 0}; }), crt::Error);
+
+    // The object's place is named, whichever of its transforms is to blame.
+    Scene scene = litFloor();
+    scene.objects[1].place = {"scene.yaml", 7};
+    scene.objects[1].transforms.resize(5, crt::kIdentity4d);
+    scene.objects[1].transforms[4][0] = 1e308 * 10;
+    try {
+        compiled(scene);
+        FAIL("compiled");
+    } catch (const crt::Error& error) {
+        CHECK(error.place().line == 7);
+    }
 }
 
 TEST_CASE("shares of 2^32 are proportional, at least one each, and all of it", "[compile]") {

@@ -1,5 +1,7 @@
 #include "verify/references.h"
 
+#include "vec3d.h"
+
 #include <boost/math/quadrature/gauss.hpp>
 
 #include <algorithm>
@@ -10,13 +12,6 @@ namespace crt::verify {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-Vec3d operator-(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec3d operator+(const Vec3d& a, const Vec3d& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-Vec3d operator*(const Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-double length(const Vec3d& v) { return std::sqrt(dot(v, v)); }
 
 /// Of a polygon around the point, what lies on the side of the normal (Sutherland and Hodgman 1974, one plane).
 std::vector<Vec3d> aboveHorizon(const std::vector<Vec3d>& polygon, const Vec3d& normal) {

@@ -8,7 +8,6 @@
 
 namespace crt::verify {
 
-double length(const Vec3d& a) { return std::sqrt(dot(a, a)); }
 Vec3d unit(const Vec3d& a) { return a * (1 / length(a)); }
 Vec3d roundToFloat(const Vec3d& a) { return {static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2])}; }
 

@@ -2,18 +2,17 @@
 #pragma once
 
 #include "scene.h"
+#include "vec3d.h"
 
 #include <cstdint>
 #include <random>
 
 namespace crt::verify {
 
-inline Vec3d operator+(const Vec3d& a, const Vec3d& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-inline Vec3d operator-(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline Vec3d operator*(const Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-inline double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline Vec3d cross(const Vec3d& a, const Vec3d& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-double length(const Vec3d& a);
+// Named here, so that operators of other types in this namespace do not hide them.
+using crt::operator+;
+using crt::operator-;
+using crt::operator*;
 Vec3d unit(const Vec3d& a);
 /// Each coordinate rounded to float, as the kernel will see it.
 Vec3d roundToFloat(const Vec3d& a);
