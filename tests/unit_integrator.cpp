@@ -196,7 +196,7 @@ TEST_CASE("what goes wrong in a backend arrives as an error of its kind", "[inte
 
     CompiledScene wrong = makeScene(4, 4);
     wrong.blob[0].bytes[0] ^= 1;
-    CHECK(kindOfFailure([&] { integrator.setScene(wrong); }, "magic") == ErrorKind::Internal);
+    CHECK(kindOfFailure([&] { integrator.setScene(wrong); }, "does not begin with a scene") == ErrorKind::Internal);
 }
 
 TEST_CASE("samples that are not a number are dropped and counted", "[integrator]") {

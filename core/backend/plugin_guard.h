@@ -15,10 +15,13 @@
 /// Any of these may throw: PluginError for a failure with a status and a sentence of its own, std::bad_alloc, or anything. The table
 /// made here turns every exception into a status and a message, so that none crosses the border. It also looks after struct_size in
 /// both directions: the class always sees whole structs of the headers it was compiled with, and the host's are never overrun.
+/// And the class only sees calls that make sense: setScene with a blob that begins with a scene, render of a rectangle within that scene's
+/// film, readFilm into a view of its size.
 #pragma once
 
 #include "backend/crt_backend.h"
 #include "backend/crt_layout_hash.h"
+#include "kernel/layout.h"
 
 #include <algorithm>
 #include <cfenv>
@@ -223,38 +226,58 @@ private:
         if (state == nullptr) return CRT_INVALID_ARGUMENT;
         IntegratorVerbs& self = from(state);
         self.error_[0] = '\0';
-        return guarded(self.error_, sizeof(self.error_), [&]() -> CrtStatus { return body(self.integrator_); });
+        return guarded(self.error_, sizeof(self.error_), [&]() -> CrtStatus { return body(self); });
     }
 
     static CrtStatus setScene(CrtIntegratorState* state, const CrtSceneBlob* scene) noexcept {
-        return verb(state, [&](I& integrator) {
+        return verb(state, [&](IntegratorVerbs& self) {
             const CrtSceneBlob blob = readSized(scene, "the scene");
             if (blob.data == nullptr || reinterpret_cast<std::uintptr_t>(blob.data) % 64 != 0) {
                 throw PluginError(CRT_INVALID_ARGUMENT, "the scene's data is null or not aligned to 64 bytes");
             }
-            integrator.setScene(blob);
+            const auto& header = *static_cast<const kernel::CrtScene*>(blob.data);
+            if (blob.size_bytes < sizeof header || header.magic != CRT_SCENE_MAGIC) {
+                throw PluginError(CRT_INVALID_ARGUMENT, "the scene blob does not begin with a scene");
+            }
+            self.film_ = FilmShape{};  // until the integrator has the new scene as a whole
+            self.integrator_.setScene(blob);
+            self.film_ = {header.width, header.height, header.channels, (header.aovs & CRT_AOV_PRIMITIVE) != 0};
             return CRT_OK;
         });
     }
     static CrtStatus render(CrtIntegratorState* state, const CrtRenderRange* range) noexcept {
-        return verb(state, [&](I& integrator) { return integrator.render(readSized(range, "the range")) ? CRT_OK : CRT_CANCELLED; });
+        return verb(state, [&](IntegratorVerbs& self) {
+            const CrtRenderRange r = readSized(range, "the range");
+            if (self.film_.channels == 0) throw PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
+            if (r.x0 > r.x1 || r.y0 > r.y1 || r.x1 > self.film_.width || r.y1 > self.film_.height) {
+                throw PluginError(CRT_INVALID_ARGUMENT, "the range's rectangle is not within the film");
+            }
+            return self.integrator_.render(r) ? CRT_OK : CRT_CANCELLED;
+        });
     }
     static CrtStatus readFilm(CrtIntegratorState* state, const CrtFilmView* film) noexcept {
-        return verb(state, [&](I& integrator) {
+        return verb(state, [&](IntegratorVerbs& self) {
             const CrtFilmView view = readSized(film, "the film view");
             if (view.sums == nullptr || view.counts == nullptr) {
                 throw PluginError(CRT_INVALID_ARGUMENT, "the film view has no sums or no counts");
             }
-            integrator.readFilm(view);
+            if (self.film_.channels == 0) throw PluginError(CRT_INVALID_ARGUMENT, "read_film was called before set_scene");
+            if (view.width != self.film_.width || view.height != self.film_.height || view.channels != self.film_.channels) {
+                throw PluginError(CRT_INVALID_ARGUMENT, "the film view is not of the scene's size");
+            }
+            if (view.primitives != nullptr && !self.film_.primitives) {
+                throw PluginError(CRT_INVALID_ARGUMENT, "the film view wants primitives, for which the scene does not ask");
+            }
+            self.integrator_.readFilm(view);
             return CRT_OK;
         });
     }
     static CrtStatus getReport(CrtIntegratorState* state, CrtBackendReport* report) noexcept {
-        return verb(state, [&](I& integrator) {
+        return verb(state, [&](IntegratorVerbs& self) {
             requireSized(report, "the report to fill");
             CrtBackendReport full{};
             full.struct_size = sizeof(CrtBackendReport);
-            integrator.report(full);
+            self.integrator_.report(full);
             full.struct_size = sizeof(CrtBackendReport);
             writeSized(report, full);
             return CRT_OK;
@@ -266,7 +289,14 @@ private:
         if (state != nullptr) delete &from(state);
     }
 
+    /// Of the scene that the integrator has; no channels before there is one.
+    struct FilmShape {
+        std::uint32_t width = 0, height = 0, channels = 0;
+        bool primitives = false;
+    };
+
     I integrator_;
+    FilmShape film_;
     char error_[1024] = {};  // fixed, so that "out of memory" needs no memory
 };
 

@@ -8,9 +8,8 @@
 namespace {
 
 using crt::plugin::Host;
-using crt::plugin::PluginError;
 
-// What `crt plugins` lists. A backend that finds nothing to run on throws PluginError(CRT_NO_DEVICE, "why").
+// What `crt plugins` lists. A backend that finds nothing to run on throws crt::plugin::PluginError(CRT_NO_DEVICE, "why").
 std::vector<CrtDevice> listDevices(const Host&) {
     // The score decides between devices and tells how much is to be expected: a CPU about its number of threads.
     return {crt::plugin::makeDevice(0, "portable C++, one thread", "", 0, 1.0)};
@@ -37,10 +36,6 @@ public:
     // Adds samples to the film. In which order, on how many threads, in what pieces: that is the backend's own affair, because the value
     // of a sample depends on the scene, the pixel and its number alone.
     bool render(const CrtRenderRange& range) {
-        if (scene_.empty()) throw PluginError(CRT_INVALID_ARGUMENT, "there is no scene to render");
-        if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 > header().width || range.y1 > header().height) {
-            throw PluginError(CRT_INVALID_ARGUMENT, "the rectangle is none, or leaves the film");
-        }
         const auto start = std::chrono::steady_clock::now();
         const crt::kernel::CrtContext context{blob(), &header()};
         for (std::uint32_t y = range.y0; y < range.y1; ++y) {
@@ -65,9 +60,6 @@ public:
     }
 
     void readFilm(const CrtFilmView& film) {
-        if (scene_.empty() || film.width != header().width || film.height != header().height || film.channels != header().channels) {
-            throw PluginError(CRT_INVALID_ARGUMENT, "the film has another shape than the scene");
-        }
         std::copy(sums_.begin(), sums_.end(), film.sums);
         std::copy(counts_.begin(), counts_.end(), film.counts);
         if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);

@@ -9,8 +9,6 @@
 
 namespace crt::cuda {
 
-using plugin::PluginError;
-
 namespace {
 
 constexpr double kLaunchSeconds = 0.03;
@@ -79,8 +77,6 @@ void CudaIntegrator::noteMemory() {
 void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     context_.makeCurrent();
     const auto& scene = *static_cast<const kernel::CrtScene*>(blob.data);
-    if (blob.size_bytes < sizeof scene || scene.magic != CRT_SCENE_MAGIC)
-        throw PluginError(CRT_INVALID_ARGUMENT, "the scene blob does not begin with a scene");
 
     // The old film goes first: two need not fit side by side. Until all of the new one is there, there is no scene.
     blob_ = Memory();
@@ -158,10 +154,6 @@ double CudaIntegrator::launch(const Launch& launch) {
 }
 
 bool CudaIntegrator::render(const CrtRenderRange& range) {
-    if (blob_.bytes() == 0) throw PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
-    if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 > scene_.width || range.y1 > scene_.height)
-        throw PluginError(CRT_INVALID_ARGUMENT, "the range's rectangle is not within the film");
-
     context_.makeCurrent();
     pacer_.begin(range, tile_size_);
     if (host_.cancelled(0.0)) return false;
@@ -176,18 +168,10 @@ bool CudaIntegrator::render(const CrtRenderRange& range) {
 }
 
 void CudaIntegrator::readFilm(const CrtFilmView& film) {
-    if (blob_.bytes() == 0) throw PluginError(CRT_INVALID_ARGUMENT, "read_film was called before set_scene");
-    if (film.width != scene_.width || film.height != scene_.height || film.channels != scene_.channels)
-        throw PluginError(CRT_INVALID_ARGUMENT, "the film view is not of the scene's size");
-
     context_.makeCurrent();
     film_.sums.download(film.sums);
     film_.counts.download(film.counts);
-    if (film.primitives == nullptr) return;
-    if (film_.primitives.bytes() != 0)
-        film_.primitives.download(film.primitives);
-    else
-        std::fill_n(film.primitives, std::size_t{film.width} * film.height, CRT_NONE);
+    if (film.primitives != nullptr) film_.primitives.download(film.primitives);
 }
 
 void CudaIntegrator::report(CrtBackendReport& report) {

@@ -66,9 +66,6 @@ void OpenClIntegrator::fill(const Buffer& buffer, std::uint64_t bytes, cl_uint p
 
 void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     const auto& scene = *static_cast<const kernel::CrtScene*>(blob.data);
-    if (blob.size_bytes < sizeof scene || scene.magic != CRT_SCENE_MAGIC)
-        throw PluginError(CRT_INVALID_ARGUMENT, "the scene blob does not begin with a scene");
-
     const std::uint32_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
     if (!program_.render || program_.features != features) {
         const double compile_seconds = program_.compile_seconds, cache_seconds = program_.cache_seconds;
@@ -80,7 +77,6 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     // The old film goes first: two need not fit side by side.
     for (Buffer* buffer : {&scene_, &sums_, &counts_, &primitives_, &rays_}) *buffer = Buffer();
     allocated_bytes_ = 0;
-    width_ = height_ = channels_ = 0;
     const double start = now();
     const std::uint64_t pixels = std::uint64_t{scene.width} * scene.height;
     const std::uint64_t sums_bytes = pixels * scene.channels * 2 * sizeof(cl_double);
@@ -103,9 +99,6 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     setArgument(program_.render.get(), 2, counts_.get());
     setArgument(program_.render.get(), 3, primitives_.get());
     setArgument(program_.render.get(), 4, rays_.get());
-    width_ = scene.width;
-    height_ = scene.height;
-    channels_ = scene.channels;
     paths_ = 0;
 }
 
@@ -134,10 +127,6 @@ double OpenClIntegrator::launch(const Launch& launch) {
 }
 
 bool OpenClIntegrator::render(const CrtRenderRange& range) {
-    if (!scene_) throw PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
-    if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 > width_ || range.y1 > height_)
-        throw PluginError(CRT_INVALID_ARGUMENT, "the range's rectangle is not within the film");
-
     pacer_.begin(range, tile_size_);
     if (host_.cancelled(0.0)) return false;
     for (Launch next; pacer_.next(next);) {
@@ -151,22 +140,13 @@ bool OpenClIntegrator::render(const CrtRenderRange& range) {
 }
 
 void OpenClIntegrator::readFilm(const CrtFilmView& film) {
-    if (!scene_) throw PluginError(CRT_INVALID_ARGUMENT, "read_film was called before set_scene");
-    if (film.width != width_ || film.height != height_ || film.channels != channels_)
-        throw PluginError(CRT_INVALID_ARGUMENT, "the film view is not of the scene's size");
-
-    const std::size_t pixels = std::size_t{width_} * height_;
+    const std::size_t pixels = std::size_t{film.width} * film.height;
     const auto read = [&](const Buffer& buffer, std::size_t bytes, void* to) {
         check(clEnqueueReadBuffer(session_.queue.get(), buffer.get(), CL_TRUE, 0, bytes, to, 0, nullptr, nullptr), "reading the film back");
     };
-    read(sums_, pixels * channels_ * 2 * sizeof(double), film.sums);
+    read(sums_, pixels * film.channels * 2 * sizeof(double), film.sums);
     read(counts_, pixels * sizeof(std::uint64_t), film.counts);
-    if (film.primitives != nullptr) {
-        if (primitives_)
-            read(primitives_, pixels * sizeof(std::uint32_t), film.primitives);
-        else
-            std::fill_n(film.primitives, pixels, CRT_NONE);
-    }
+    if (film.primitives != nullptr) read(primitives_, pixels * sizeof(std::uint32_t), film.primitives);
 }
 
 void OpenClIntegrator::report(CrtBackendReport& report) {

@@ -37,7 +37,6 @@ private:
 
     Program program_;
     Buffer scene_, sums_, counts_, primitives_, rays_;
-    std::uint32_t width_ = 0, height_ = 0, channels_ = 0;
     std::uint64_t allocated_bytes_ = 0, peak_bytes_ = 0;
     double upload_seconds_ = 0, render_seconds_ = 0;
     std::uint64_t paths_ = 0;

@@ -16,7 +16,6 @@
 namespace crt::cuda_on_host {
 namespace {
 
-using plugin::PluginError;
 
 std::vector<CrtDevice> probeDevices(const plugin::Host&) {
     const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
@@ -34,13 +33,8 @@ public:
 
     void setScene(const CrtSceneBlob& blob) {
         const auto& scene = *static_cast<const kernel::CrtScene*>(blob.data);
-        if (blob.size_bytes < sizeof scene || scene.magic != CRT_SCENE_MAGIC)
-            throw PluginError(CRT_INVALID_ARGUMENT, "the scene blob does not begin with a scene");
         blob_.resize((blob.size_bytes + sizeof(Line) - 1) / sizeof(Line));
         std::memcpy(blob_.data(), blob.data, blob.size_bytes);
-        width_ = scene.width;
-        height_ = scene.height;
-        channels_ = scene.channels;
         film_ = HostFilm(1, scene);
         slices_ = HostFilm(kSlices, scene);
         rays_.assign(2 * rayCounterPairs(), 0);
@@ -48,9 +42,6 @@ public:
     }
 
     bool render(const CrtRenderRange& range) {
-        if (blob_.empty()) throw PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
-        if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 > width_ || range.y1 > height_)
-            throw PluginError(CRT_INVALID_ARGUMENT, "the range's rectangle is not within the film");
         pacer_.begin(range, tile_size_);
         if (host_.cancelled(0.0)) return false;
         for (Launch launch; pacer_.next(launch);) {
@@ -72,15 +63,9 @@ public:
     }
 
     void readFilm(const CrtFilmView& film) {
-        if (film.width != width_ || film.height != height_ || film.channels != channels_)
-            throw PluginError(CRT_INVALID_ARGUMENT, "the film view is not of the scene's size");
         std::copy(film_.sums.begin(), film_.sums.end(), film.sums);
         std::copy(film_.counts.begin(), film_.counts.end(), film.counts);
-        if (film.primitives == nullptr) return;
-        if (film_.primitives.empty())
-            std::fill_n(film.primitives, film_.counts.size(), CRT_NONE);
-        else
-            std::copy(film_.primitives.begin(), film_.primitives.end(), film.primitives);
+        if (film.primitives != nullptr) std::copy(film_.primitives.begin(), film_.primitives.end(), film.primitives);
     }
 
     void report(CrtBackendReport& report) {
@@ -122,7 +107,6 @@ private:
     unsigned threads_;
     LaunchPacer pacer_{0.05, 4096, 8};
     std::vector<Line> blob_;
-    std::uint32_t width_ = 0, height_ = 0, channels_ = 0;
     HostFilm film_, slices_;
     std::vector<std::uint64_t> rays_;
     double render_seconds_ = 0;
