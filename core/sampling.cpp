@@ -49,7 +49,10 @@ private:
 class FilmReader {
 public:
     FilmReader(Integrator& integrator, Film& film, bool independent_samples)
-        : integrator_(integrator), film_(film), independent_samples_(independent_samples), read_seconds_(static_cast<double>(film.sums.size() * sizeof(double)) / kReadBytesPerSecond) {
+        : integrator_(integrator),
+          film_(film),
+          independent_samples_(independent_samples),
+          read_seconds_(static_cast<double>(film.sums.size() * sizeof(double)) / kReadBytesPerSecond) {
         // A film that begins empty need not be kept twice.
         if (film.samples.count() > 0) before_ = film;
     }
@@ -57,9 +60,16 @@ public:
     /// film = what was there before + what the device has by now.
     void read() {
         const Clock::time_point start = Clock::now();
-        Film fresh = before_ ? *before_ : Film(film_.shape());
-        integrator_.readFilm(fresh);
-        film_ = std::move(fresh);
+        if (film_.samples.count() == 0) {
+            integrator_.readFilm(film_);
+        } else {
+            // Beside the last one, which must stay whole should the device fail now.
+            if (!next_) next_.emplace(film_.shape());
+            next_->samples = SampleRanges();
+            integrator_.readFilm(*next_);
+            if (before_) next_->add(*before_);
+            std::swap(film_, *next_);
+        }
         error_ = estimateError(film_, ReplicateSet::All, independent_samples_);
         read_seconds_ = secondsSince(start);
         read_at_ = Clock::now();
@@ -76,7 +86,7 @@ private:
     Integrator& integrator_;
     Film& film_;
     bool independent_samples_;
-    std::optional<Film> before_;
+    std::optional<Film> before_, next_;
     double read_seconds_;
     std::optional<ErrorEstimate> error_;
     Clock::time_point read_at_ = Clock::now();

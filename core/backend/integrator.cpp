@@ -203,13 +203,29 @@ struct Integrator::Impl {
         const std::uint64_t asked = part.samples.count();
         for (std::size_t pixel = 0; pixel < part.counts.size(); ++pixel) {
             const double* const sums = &part.sums[pixel * channels * 2];
-            const bool finite = std::all_of(sums, sums + channels * std::size_t{2}, [](double v) { return std::isfinite(v); });
+            bool finite = true;  // Without a way out of the loop, so that it becomes one of vectors: films have hundreds of millions of sums.
+            for (std::size_t i = 0; i < channels * std::size_t{2}; ++i) finite &= std::isfinite(sums[i]);
             if (finite && part.counts[pixel] <= asked) continue;
             throw Error(ErrorKind::Internal,
                         fmt::format("backend '{}' broke the contract: pixel {},{} of its film {}; what was rendered before is kept", backend.name, pixel % width,
                                     pixel / width,
                                     finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked) : "is not a number"));
         }
+    }
+
+    /// film = what the backend's film holds; when that fails, anything.
+    void fill(Film& film) {
+        CrtFilmView view{};
+        view.struct_size = sizeof(view);
+        view.width = width;
+        view.height = height;
+        view.channels = channels;
+        view.sums = film.sums.data();
+        view.counts = film.counts.data();
+        view.primitives = film.primitives.empty() ? nullptr : film.primitives.data();
+        check(call("read_film", [&] { return table.read_film(table.state, &view); }));
+        film.samples = coverage.ranges();
+        checkContents(film);
     }
 
     static std::int32_t onProgress(void* user, double done) noexcept {
@@ -319,23 +335,19 @@ void Integrator::readFilm(Film& film) {
         throw Error(ErrorKind::Internal, "readFilm was given a film of another shape than the scene's");
     }
 
-    Film part(shape);
-    CrtFilmView view{};
-    view.struct_size = sizeof(view);
-    view.width = self.width;
-    view.height = self.height;
-    view.channels = self.channels;
-    view.sums = part.sums.data();
-    view.counts = part.counts.data();
-    view.primitives = part.primitives.empty() ? nullptr : part.primitives.data();
-    self.check(self.call("read_film", [&] { return self.table.read_film(self.table.state, &view); }));
-    part.samples = self.coverage.ranges();
-    self.checkContents(part);
-    // Into an empty film nothing need be added.
-    if (film.samples.count() == 0)
-        film = std::move(part);
-    else
+    if (film.samples.count() > 0) {
+        Film part(shape);
+        self.fill(part);
         film.add(part);
+        return;
+    }
+    // Films are large: into an empty one nothing need be added, so it is filled where it lies.
+    try {
+        self.fill(film);
+    } catch (...) {
+        film = Film(shape);
+        throw;
+    }
 }
 
 CrtBackendReport Integrator::report() {

@@ -42,7 +42,8 @@ public:
     /// Adds a range to the backend's film. `progress` gets [0,1] and returns true to cancel. Returns false when cancelled.
     bool render(const RenderRange& range, const std::function<bool(double)>& progress = {});
 
-    /// Adds what the backend's film holds to `film` (which has this scene's shape).
+    /// Adds what the backend's film holds to `film` (which has this scene's shape; without samples, its contents do not matter). A film that
+    /// has samples is left alone when that fails; one without is empty then.
     void readFilm(Film& film);
 
     CrtBackendReport report();
