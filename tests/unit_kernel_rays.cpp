@@ -5,11 +5,11 @@
 
 #include "bvh_build.h"
 #include "mesh_io.h"
+#include "verify/shapes.h"
 
 #include <algorithm>
 #include <array>
 #include <cfloat>
-#include <map>
 #include <numeric>
 #include <string>
 
@@ -17,47 +17,13 @@ using namespace kernel_test;
 using crt::Accelerator;
 using crt::Mesh;
 using crt::Vec3d;
+using crt::verify::addTriangle;
+using crt::verify::icosphere;
 
 namespace {
 
 /// Embree's own far place for such tests: nothing is round there.
 constexpr Vec3d kFarPlace{148376, 1234, -223423};
-
-/// A geodesic sphere of 20·4^level triangles, outside out.
-Mesh icosphere(int level, double radius, const Vec3d& centre) {
-    const double g = (1 + std::sqrt(5.0)) / 2;
-    std::vector<Vec3d> points{{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g},
-                              {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
-    std::vector<std::array<std::uint32_t, 3>> faces{{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                                                    {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8},
-                                                    {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
-    for (Vec3d& p : points) p = unit(p);
-    for (; level > 0; --level) {
-        std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
-        const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-            const auto [where, is_new] = middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(points.size()));
-            if (is_new) points.push_back(unit(plus(points[a], points[b])));
-            return where->second;
-        };
-        std::vector<std::array<std::uint32_t, 3>> finer;
-        for (const auto& [a, b, c] : faces) {
-            const std::uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
-            finer.insert(finer.end(), {{a, ab, ca}, {b, bc, ab}, {c, ca, bc}, {ab, bc, ca}});
-        }
-        faces = std::move(finer);
-    }
-    Mesh mesh;
-    // Rounded to float, as a file of such a mesh would be.
-    for (const Vec3d& p : points) mesh.positions.push_back(toDouble(toFloat(plus(centre, times(p, radius)))));
-    mesh.triangles = std::move(faces);
-    return mesh;
-}
-
-void addTriangle(Mesh& mesh, const Vec3d& a, const Vec3d& b, const Vec3d& c) {
-    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-    mesh.positions.insert(mesh.positions.end(), {a, b, c});
-    mesh.triangles.push_back({first, first + 1, first + 2});
-}
 
 /// Triangles of all sizes and shapes, anywhere within ±1.
 Mesh soup(Random& random, std::uint32_t count) {
