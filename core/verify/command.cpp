@@ -47,7 +47,8 @@ std::string readText(const std::string& file) {
     return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-/// The line on a terminal that tells which case runs and how long the rest will take.
+/// The line on a terminal that tells which case runs, and since when. Cases take from a millisecond to a minute: what is left cannot be told from what
+/// is done.
 class Line {
 public:
     Line(std::size_t cases, bool quiet) : cases_(cases), shown_(!quiet && isatty(STDERR_FILENO) != 0) {}
@@ -55,9 +56,7 @@ public:
     void before(const Case& next, std::size_t index) {
         if (!shown_) return;
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-        std::string left;
-        if (index > 0) left = fmt::format(", about {} left", clockText(seconds / static_cast<double>(index) * static_cast<double>(cases_ - index)));
-        fmt::print(stderr, "\r\033[K  {} of {}: {} {}{}", index + 1, cases_, next.id, next.title, left);
+        fmt::print(stderr, "\r\033[K  {} of {}, {} so far: {} {}", index + 1, cases_, clockText(seconds), next.id, next.title);
         std::fflush(stderr);
     }
     void clear() {

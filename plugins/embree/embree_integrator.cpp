@@ -61,7 +61,7 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
 
     if ((scene().features & CRT_FEATURE_BVH) != 0) {
         const auto start = Clock::now();
-        if (!device_) device_ = std::make_unique<Device>(threads_);
+        if (!device_) device_ = std::make_unique<Device>();
         const auto* triangles = CRT_ARRAY(kernel::CrtTriangle, blob(), scene().triangles);
         arena_.execute([&] { tracer_ = std::make_unique<Tracer>(*device_, triangles, scene().triangle_count); });
         build_seconds_ = secondsSince(start);

@@ -112,9 +112,9 @@ struct Device::Impl {
     RTCDevice device = nullptr;
 };
 
-Device::Device(unsigned threads) : impl_(new Impl) {
-    const std::string config = "threads=" + std::to_string(threads);
-    impl_->device = rtcNewDevice(config.c_str());
+Device::Device() : impl_(new Impl) {
+    // No "threads=": Embree would limit the whole process to that many, and to the number of processors. The caller's limit holds for it as well.
+    impl_->device = rtcNewDevice(nullptr);
     if (impl_->device == nullptr) throw plugin::PluginError(CRT_NO_DEVICE, errorText(nullptr, "Embree could not be started"));
 }
 

@@ -18,8 +18,8 @@ namespace crt::embree {
 /// One Embree device; its scenes must not outlive it.
 class Device {
 public:
-    /// Throws PluginError(CRT_NO_DEVICE) with Embree's reason.
-    explicit Device(unsigned threads);
+    /// It works with as many threads as TBB may use. Throws PluginError(CRT_NO_DEVICE) with Embree's reason.
+    Device();
     ~Device();
     Device(const Device&) = delete;
     Device& operator=(const Device&) = delete;
