@@ -706,6 +706,11 @@ class Light(CliTest):
         self.crt("merge", "--scene", "scene.yaml", "-o", "merged.pfm", "a.crtfilm", "b.crtfilm")
         self.assertEqual(read_bytes(self.path("merged.pfm")), reference)
 
+    def test_more_threads_than_processors(self):
+        """Of seven threads all work: a library that allows fewer says so on stderr."""
+        run = self.crt("verify", "-b", self.backend, "--case", "splitting", "-q")
+        self.assertEqual(run.stderr, "")
+
 
 class Verify(CliTest):
     def test_wrong_physics_is_named(self):
