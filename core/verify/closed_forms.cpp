@@ -367,8 +367,67 @@ void quarterOfTheFilm(Context& context) {
     context.relative("the other pixels", outside, 0, 0, {{1, "light beside the lamp's pixels: is the pixel grid shifted by half a pixel?"}});
 }
 
-void imageEnvironment(Context& context) {
-    context.notApplicable("a floor under L(ω) = 1 + z/2 + z²/4", "crt has constant environments only; there is no image or function to look up");
+/// A closed dome around the origin of 16 bands of latitude, each of 16 flat facets and of one radiance, that of 1 + y/2 + y²/4 in its middle.
+class BandedSky {
+public:
+    static double radianceAt(double height) { return 1 + height / 2 + height * height / 4; }
+    static double radianceOf(int band) { return radianceAt(std::cos((band + 0.5) * kPi / kBands)); }
+
+    void addTo(Stage& stage) const {
+        for (int band = 0; band < kBands; ++band) {
+            std::string positions, faces;
+            for (int side = 0; side < kSides; ++side) {
+                for (const Vec3d& v : facet(band, side)) positions += fmt::format("{}[{:.9g},{:.9g},{:.9g}]", positions.empty() ? "" : ",", v[0], v[1], v[2]);
+                faces += fmt::format("{}[{},{},{},{}]", side == 0 ? "" : ",", 4 * side, 4 * side + 1, 4 * side + 2, 4 * side + 3);
+            }
+            stage.mesh(fmt::format("band{}", band), "[" + positions + "]", "[" + faces + "]", "black", fmt::format("{:.17g}, two_sided: true", radianceOf(band)));
+        }
+    }
+    /// Irradiance over π at the origin.
+    double irradiance(const Vec3d& normal) const {
+        double sum = 0;
+        for (int band = 0; band < kBands; ++band)
+            for (int side = 0; side < kSides; ++side) sum += radianceOf(band) * polygonFormFactor({0, 0, 0}, normal, facet(band, side));
+        return sum;
+    }
+
+private:
+    static constexpr int kBands = 16, kSides = 16;
+
+    static std::vector<Vec3d> facet(int band, int side) {
+        const auto at = [](int row, int column) {
+            const double polar = row * kPi / kBands, azimuth = 2 * kPi * (column % kSides) / kSides;
+            return Vec3d{10 * std::sin(polar) * std::cos(azimuth), 10 * std::cos(polar), 10 * std::sin(polar) * std::sin(azimuth)};
+        };
+        return {at(band, side), at(band, side + 1), at(band + 1, side + 1), at(band + 1, side)};
+    }
+};
+
+void directionalSky(Context& context) {
+    // An environment is constant (an image is refused); a sky that varies is a dome of lamps. A furnace is blind to wrong directions, this is not.
+    context.refused("an image as the environment", "crt: 1\nenvironment: {radiance: {image: sky.exr}}\n", "unknown key 'image'");
+    const BandedSky sky;
+    struct Facing {
+        const char* name;
+        Vec3d normal;
+        const char* eye;
+        const char* receiver;
+        double limit;  ///< ½/π ∫ (1 + y/2 + y²/4) cos⁺ dω
+    };
+    constexpr const char* level = "[[-0.1,0,-0.1],[-0.1,0,0.1],[0.1,0,0.1],[0.1,0,-0.1]]";
+    for (const Facing& f : {Facing{"up", {0, 1, 0}, "[0.2, 0.5, 0.1]", level, 0.7291666667},
+                            {"down", {0, -1, 0}, "[0.2, -0.5, 0.1]", level, 0.3958333333},
+                            {"sideways", {1, 0, 0}, "[0.5, 0.2, 0.1]", "[[0,-0.1,-0.1],[0,0.1,-0.1],[0,0.1,0.1],[0,-0.1,0.1]]", 0.53125}}) {
+        const double expected = 0.5 * sky.irradiance(f.normal);
+        context.relative(fmt::format("{}: bands against the integral over the hemisphere", f.name), expected, f.limit, 0.005);
+        for (const bool nee : {false, true}) {
+            Stage stage(fmt::format("{{position: {}, target: [0, 0, 0], up: [0, 0, 1], fov: 0.01}}", f.eye), fmt::format("{{max_depth: 1, roulette: false, nee: {}}}", nee));
+            stage.material("grey", "{type: diffuse, reflectance: 0.5}").material("black", "{type: diffuse, reflectance: 0}").quad("receiver", f.receiver, "grey");
+            sky.addTo(stage);
+            context.estimate(fmt::format("{}{}", f.name, nee ? ", with light sampling" : ""), stage.yaml(), meanRadiance, expected, 0.001, {.samples = 1024, .most = 16384},
+                             {{0.5, "the sky's mean: is every direction given the same radiance?"}});
+        }
+    }
 }
 
 }  // namespace
@@ -475,13 +534,14 @@ std::vector<Case> closedFormCases() {
          .needs = CRT_FEATURE_AREA_LIGHT,
          .run = quarterOfTheFilm},
         {.id = "A18",
-         .name = "image-environment",
-         .title = "A floor under an environment that varies with direction",
-         .expected = "0.7291666667 for albedo ½ under 1 + z/2 + z²/4",
-         .source = "integral over the hemisphere",
-         .tolerance = "not asked: crt has constant environments only",
+         .name = "directional-sky",
+         .title = "Albedo ½ under a sky of 1 + y/2 + y²/4, made of 16 bands of lamps, facing up, down and sideways; an image as the environment",
+         .expected = "0.7291666667, 0.3958333333, 0.53125 but for the bands; the image is refused",
+         .source = "integral over the hemisphere; Lambert's polygon formula for the bands",
+         .tolerance = "± 0.1 %; bands ± 0.5 %",
          .level = Level::Commit,
-         .run = imageEnvironment},
+         .needs = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE,
+         .run = directionalSky},
     };
 }
 

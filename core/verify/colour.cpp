@@ -231,7 +231,48 @@ void needlessDispersion(Context& context) {
     }
 }
 
-void spectralBins(Context& context) { context.notApplicable("periodic patterns over 64 spectral bins", "crt writes XYZ, sRGB and ACEScg; there is no output of spectral bins"); }
+/// Σ over lags of the squared autocorrelation: χ² with `lags` degrees of freedom for independent residuals (Ljung and Box 1978).
+double ljungBox(const std::vector<double>& residuals, std::size_t lags) {
+    const auto n = static_cast<double>(residuals.size());
+    double variance = 0, q = 0;
+    for (const double r : residuals) variance += r * r;
+    for (std::size_t lag = 1; lag <= lags; ++lag) {
+        double covariance = 0;
+        for (std::size_t i = lag; i < residuals.size(); ++i) covariance += residuals[i] * residuals[i - lag];
+        q += covariance * covariance / (variance * variance) / (n - static_cast<double>(lag));
+    }
+    return n * (n + 2) * q;
+}
+
+void spectralBins(Context& context) {
+    // There is no output of spectral bins (refused), but a world that glows in one bin alone is one: 64 bins of 5 nm from 390 to 710 nm, each with random
+    // numbers of its own. Four wavelengths a path that were placed or weighed unequally would show as a pattern over the bins.
+    context.refused("spectral bins as the film's colour space", "crt: 1\nfilm: {color_space: spectral}\n", "expected one of srgb, acescg, xyz");
+    constexpr int bins = 64, seeds = 16;
+    std::vector<double> residuals;
+    double worst = 0;
+    for (int bin = 0; bin < bins; ++bin) {
+        const int from = 390 + 5 * bin;
+        const auto glow = [&](double nm) { return std::clamp(std::min(nm - from, from + 5 - nm), 0.0, 1.0); };
+        const Vec3d xyz = integrate(glow, from, from + 5);
+        const std::string yaml = fmt::format("crt: 1\nfilm: {{resolution: [4, 4]}}\nsampler: {{type: independent}}\n"
+                                             "environment: {{radiance: {{table: {{nm: [{}, {}, {}, {}], value: [0, 1, 1, 0]}}, outside: zero}}}}\n",
+                                             from, from + 1, from + 4, from + 5);
+        std::vector<double> ratios;
+        for (int seed = 0; seed < seeds; ++seed) {
+            const Vec3d found = xyzOf(context.render(yaml, {.samples = 4096, .seed = 1 + static_cast<std::uint64_t>(seeds * bin + seed)}));
+            ratios.push_back((found[0] + found[1] + found[2]) / (xyz[0] + xyz[1] + xyz[2]));
+        }
+        const stats::Summary summary = stats::summarize(ratios);
+        residuals.push_back((summary.mean - 1) / summary.standardError());
+        worst = std::abs(residuals.back()) > std::abs(worst) ? residuals.back() : worst;
+    }
+    const double limit = stats::studentQuantile(1 - stats::sidak(1e-3, bins) / 2, seeds - 1);
+    context.absolute("the worst bin, in standard errors of its mean", worst, 0, limit);
+    const double pattern = ljungBox(residuals, 10), critical = stats::chiSquaredQuantile(1 - 1e-3, 10);
+    context.holds("no pattern over the bins: Ljung and Box, 10 lags", pattern < critical, fmt::format("below {:.1f}, p = 1e-3", critical),
+                  "errors repeat over the spectrum: are four wavelengths a path placed or weighed unequally?", fmt::format("{:.1f}", pattern));
+}
 
 void tables(Context& context) {
     const auto with = [](const char* table) { return lamp(fmt::format("{{table: {{{}}}}}", table)); };
@@ -265,7 +306,8 @@ std::vector<Case> colourCases() {
             "± 0.5 %", Level::Merge, glass | CRT_FEATURE_DISPERSION, heroWavelength),
         row("H09", "needless-dispersion", "A constant index written as a table or a formula", "the image of the number 1.5, by a kernel without dispersion", "–", "same bits",
             Level::Commit, glass, needlessDispersion),
-        row("H10", "spectral-bins", "Residuals over spectral bins", "no period of four", "pbrt-v4 #424", "not asked", Level::Commit, 0, spectralBins),
+        row("H10", "spectral-bins", "Worlds that glow in one of 64 bins of 5 nm; an output of spectral bins", "each bin's power, errors without a pattern; the output is refused",
+            "quadrature of 0.01 nm; pbrt-v4 #424", "p > 1e-3", Level::Merge, CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_INDEPENDENT, spectralBins),
         row("H11", "tables", "Tables that end early, are unsorted, have one sample, reach beyond 360 to 830 nm", "refused, or as documented", "docs/scene.md", "same bits", Level::Commit,
             kLamp, tables),
     };

@@ -20,7 +20,12 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kDegree = kPi / 180;
 constexpr const char* kOnce = "{max_depth: 1, roulette: false}";
-constexpr const char* kNoRough = "crt has no rough surfaces";
+/// Surfaces are smooth or Lambertian (docs/scene.md): a roughness is refused, not ignored.
+void roughnessIsRefused(Context& context, const std::string& material, std::initializer_list<double> roughnesses) {
+    for (const double roughness : roughnesses)
+        context.refused(fmt::format("{} of roughness {:g}", material, roughness),
+                        fmt::format("crt: 1\nmaterials: {{rough: {{type: {}, roughness: {:g}}}}}\n", material, roughness), "unknown key 'roughness'");
+}
 
 double meanRadiance(const Film& film) { return radiance(film); }
 
@@ -60,7 +65,8 @@ void lambertDirections(Context& context) {
     const double limit = stats::chiSquaredQuantile(1 - 1e-3, static_cast<double>(counts.size()) - 1);
     context.holds("χ² of directions over 72 cells of the dome", chi_squared < limit, fmt::format("below {:.1f}, p = 1e-3", limit),
                   "directions are not distributed as the cosine: what is sampled and what is divided by are two distributions", fmt::format("χ² = {:.1f}", chi_squared));
-    context.notApplicable("rough surfaces, roughness 1 to 1e-4", kNoRough);
+    for (const char* material : {"conductor, metal: Ag", "dielectric, ior: 1.5", "mirror, reflectance: 1", "diffuse, reflectance: 1"})
+        roughnessIsRefused(context, material, {1, 0.5, 0.1, 1e-2, 1e-3, 1e-4});
 }
 
 void viewAngles(Context& context) {
@@ -239,8 +245,14 @@ void albedoRange(Context& context) {
     context.refused("albedo NaN", scene(".nan"), "reflectance");
 }
 
-void roughPeak(Context& context) { context.notApplicable("the GGX distribution near its peak, in double against single precision", kNoRough); }
-void roughLimit(Context& context) { context.notApplicable("roughness that goes to 0 against a mirror", kNoRough); }
+void roughPeak(Context& context) { roughnessIsRefused(context, "conductor, metal: Ag", {1e-3, 3e-4, 1e-4}); }
+
+void roughLimit(Context& context) {
+    roughnessIsRefused(context, "conductor, eta: 1.5, k: 0", {1e-4});
+    roughnessIsRefused(context, "dielectric, ior: 1.5", {1e-4});
+    for (const char* type : {"rough_conductor", "rough_dielectric", "ggx"})
+        context.refused(fmt::format("a material of type {}", type), fmt::format("crt: 1\nmaterials: {{rough: {{type: {}}}}}\n", type), "diffuse, mirror, conductor, dielectric");
+}
 
 }  // namespace
 
@@ -248,7 +260,8 @@ std::vector<Case> scatteringCases() {
     constexpr std::uint64_t light = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT;
     constexpr std::uint64_t sky = CRT_FEATURE_ENVIRONMENT;
     return {
-        row("G01", "cosine-law", "Scattered directions of a diffuse surface, counted in 72 cells of a dome", "shares by Lambert's formula", "Lambert's formula; χ²", "p > 1e-3",
+        row("G01", "cosine-law", "Scattered directions of a diffuse surface, counted in 72 cells of a dome; a roughness of 1 to 1e-4", "shares by Lambert's formula; roughness is refused", "Lambert's formula; χ²",
+            "p > 1e-3",
             Level::Merge, light | CRT_FEATURE_INDEPENDENT, lambertDirections),
         row("G02", "pdf", "A white floor in a glowing room, with and without light sampling", "1: the weights of both techniques add up", "normalisation", "± 0.1 %", Level::Commit,
             light | CRT_FEATURE_NEE, pdfIntegrates),
@@ -256,8 +269,9 @@ std::vector<Case> scatteringCases() {
             "conservation of energy; Fresnel's equations in complex double", "2e-6; 1e-5", Level::Commit, sky | CRT_FEATURE_DIFFUSE | CRT_FEATURE_CONDUCTOR, whiteFurnaces),
         row("G04", "reciprocity", "A ray into glass and the same way back, at four angles", "n⁴ between the two", "f(i,o)/nᵢ² = f(o,i)/nₒ²", "1e-4", Level::Commit,
             CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT, reciprocity),
-        row("G05", "rough-peak", "A microfacet distribution at roughness 1e-4", "double precision's value", "–", "not asked", Level::Commit, 0, roughPeak),
-        row("G06", "rough-limit", "Roughness that goes to 0", "the mirror", "–", "not asked", Level::Commit, 0, roughLimit),
+        row("G05", "rough-peak", "A metal of roughness 1e-3 to 1e-4, where microfacet distributions lose their precision", "refused: there are no rough surfaces", "docs/scene.md", "refused",
+            Level::Commit, 0, roughPeak),
+        row("G06", "rough-limit", "Roughness that goes to 0; rough materials", "refused: there are no rough surfaces", "docs/scene.md", "refused", Level::Commit, 0, roughLimit),
         row("G07", "indices", "A clear cube of n = 1, 1 + 1e-7, 1.001, 1.5, 2.4, 100, 1000 in a constant environment", "it vanishes; for n = 1 to the bit; 10000 is refused",
             "conservation of radiance over n²", "2e-4 in every pixel; same bits", Level::Commit, sky | CRT_FEATURE_DIELECTRIC, indices),
         row("G08", "extreme-numbers", "Random numbers at the ends of their range in every scattering routine", "finite, or rejected", "a pdf of 0 becomes NaN (pbrt-v4 #313)",
