@@ -33,9 +33,13 @@ class KilledAtAnyMoment(CliTest):
         resumed_before, while_writing = 0, 0
         for round_number in range(self.ROUNDS):
             resume = ["--resume", "c.crtfilm"] if round_number else []
+            before = self.identity("c.crtfilm")
             process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", *resume, *self.BIG)
             self.assertIn("fake on pattern", self.line_with(process, "fake on pattern"))
-            time.sleep(random.uniform(0.0, 0.25) + (0.5 if round_number == 0 else 0.05))
+            # Every other round has time for a checkpoint, however slow the machine or the build; the others may die before their first.
+            if round_number % 2 == 0:
+                self.wait_until(lambda: self.identity("c.crtfilm") != before)
+            time.sleep(random.uniform(0.0, 0.25))
             process.kill()
             process.communicate()
             leftovers = glob.glob(self.path("c.crtfilm.*.tmp"))
@@ -48,8 +52,22 @@ class KilledAtAnyMoment(CliTest):
             resumed = self.report("r.json")["samples"]["resumed"]
             self.assertGreaterEqual(resumed, resumed_before, "samples that were saved are gone")
             resumed_before = resumed
-        self.assertGreater(resumed_before, self.ROUNDS)
+        self.assertGreater(resumed_before, self.ROUNDS // 2)
         self.assertGreater(while_writing, 0, "no kill came while a file was being written")
+
+    def identity(self, name):
+        """Of the file that has this name now, or None."""
+        try:
+            status = os.stat(self.path(name))
+        except FileNotFoundError:
+            return None
+        return status.st_ino, status.st_mtime_ns
+
+    def wait_until(self, condition, seconds=60):
+        end = time.monotonic() + seconds
+        while not condition():
+            self.assertLess(time.monotonic(), end, "waited in vain")
+            time.sleep(0.001)
 
     def line_with(self, process, words):
         for line in process.stderr:
@@ -238,7 +256,9 @@ class SignalStorm(CliTest):
         while process.poll() is None and time.monotonic() < end:
             process.send_signal(random.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP)))
         process.communicate(timeout=10)
-        self.assertIn(process.returncode, (130, 143, 129))
+        # By itself, or, when all is done and signals have their usual meaning again, by the last signal; a shell says 128 + n in both cases.
+        code = process.returncode if process.returncode >= 0 else 128 - process.returncode
+        self.assertIn(code, (130, 143, 129))
         self.crt("scene.yaml", "-b", "fake", "--spp", "1", "-o", "b.pfm", "--resume", "c.crtfilm", "--checkpoint", "d.crtfilm")
         self.assertGreaterEqual(self.report("b.report.json")["samples"]["resumed"], 8)
 
