@@ -216,13 +216,14 @@ std::string rules(const Plot& plot, const Ruler& y) {
 
 /// Band, floor, line and markers of one series.
 std::string curve(const Plot& plot, const PlotLine& series, const Ruler& x, const Ruler& y) {
-    std::string upper, lower, path, markers, svg;
+    std::string upper, path, markers, svg;
+    std::vector<std::string> lower;  // From left to right; the band's outline goes back along it.
     for (const PlotPoint& point : series.points) {
         if (!drawable(point, plot)) continue;
         const double at = x.at(point.x);
         const bool bounded = std::isfinite(point.low) && std::isfinite(point.high);
         upper += fmt::format("{},{} ", length(at), length(y.at(bounded ? point.high : point.y)));
-        lower = fmt::format("{},{} ", length(at), length(y.at(bounded ? point.low : point.y))) + lower;
+        lower.push_back(fmt::format("{},{} ", length(at), length(y.at(bounded ? point.low : point.y))));
         path += fmt::format("{}{} {}", path.empty() ? "M" : "L", length(at), length(y.at(point.y)));
         markers += marker(series.style, at, y.at(point.y), point.text);
     }
@@ -232,7 +233,8 @@ std::string curve(const Plot& plot, const PlotLine& series, const Ruler& x, cons
     if (series.x_mark && x.contains(*series.x_mark))
         svg += line(x.at(*series.x_mark), kTop + kPlotHeight - 9, x.at(*series.x_mark), kTop + kPlotHeight + 3, fmt::format("mark {}", colour));
     if (path.empty()) return svg;
-    svg += fmt::format("<polygon points=\"{}{}\" class=\"band {}\"/>\n", upper, lower, colour);
+    std::reverse(lower.begin(), lower.end());
+    svg += fmt::format("<polygon points=\"{}{}\" class=\"band {}\"/>\n", upper, fmt::join(lower, ""), colour);
     svg += fmt::format("<path d=\"{}\" class=\"s {} {}\"/>\n", path, colour, dashClass(series.style));
     return svg + markers;
 }
