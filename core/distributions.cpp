@@ -43,15 +43,16 @@ double blackmanHarris(double x, double radius) {
 
 }  // namespace
 
+// (x̄ + ȳ + z̄)^0.4: docs/decisions/0008-wavelengths.md says why not x̄ + ȳ + z̄ itself.
 std::vector<float> wavelengthTable(std::size_t cells) {
     const auto& cie = cieObserver();
     const auto density = [&](double wavelength_nm) {
         const double position = std::clamp(wavelength_nm - kWavelengthMin_nm, 0.0, static_cast<double>(kSpectrumSize - 1));
         const auto i = std::min(static_cast<std::size_t>(position), static_cast<std::size_t>(kSpectrumSize - 2));
         const double f = position - static_cast<double>(i);
-        double sum = 1e-3;  // against a density of about 2 at the peak
+        double sum = 0;
         for (const Spectrum& s : cie) sum += s[i] + f * (s[i + 1] - s[i]);
-        return sum;
+        return std::pow(sum, 0.4);
     };
     return toFloat(inverseDistribution(density, kWavelengthMin_nm, kWavelengthMax_nm, 4 * (kSpectrumSize - 1), cells));
 }

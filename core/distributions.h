@@ -8,8 +8,8 @@
 
 namespace crt {
 
-/// cells + 1 wavelengths in nm, 360 … 830, increasing: the inverse of a distribution whose density follows x̄ + ȳ + z̄, with a
-/// small constant so that no wavelength is out of reach. Linear between nodes, so each cell has the density 1/(cells·Δλ) exactly.
+/// cells + 1 wavelengths in nm, 360 … 830, increasing: the inverse of a distribution whose density follows (x̄ + ȳ + z̄)^0.4
+/// (docs/decisions/0008-wavelengths.md). Linear between nodes, so each cell has the density 1/(cells·Δλ) exactly.
 std::vector<float> wavelengthTable(std::size_t cells);
 
 /// cells + 1 offsets from the pixel centre, in pixels: the inverse of the distribution proportional to the film's filter along one axis.

@@ -355,6 +355,38 @@ TEST_CASE("shares of 2^32 are proportional, at least one each, and all of it", "
     check(classes);
 }
 
+TEST_CASE("four wavelengths of one path nearly integrate a smooth spectrum by themselves", "[compile]") {
+    const std::vector<float> nodes = crt::wavelengthTable(CRT_WAVELENGTH_TABLE);
+    const auto& cie = crt::cieObserver();
+    const auto at = [](const crt::Spectrum& s, double nm) {
+        const auto i = std::min(static_cast<std::size_t>(nm - 360), static_cast<std::size_t>(crt::kSpectrumSize - 2));
+        return s[i] + (nm - 360 - static_cast<double>(i)) * (s[i + 1] - s[i]);
+    };
+    // Relative standard deviation, over the comb's position, of X, Y or Z of light whose spectrum rises in a straight line from `blue` to `red`.
+    const auto deviation = [&](const crt::Spectrum& observer, double blue, double red) {
+        double sum = 0, squares = 0;
+        const std::size_t combs = CRT_WAVELENGTH_TABLE / 4;
+        for (std::size_t i = 0; i < combs; ++i) {
+            double value = 0;
+            for (std::size_t tooth = 0; tooth < 4; ++tooth) {
+                const std::size_t cell = tooth * combs + i;
+                const double width = nodes[cell + 1] - nodes[cell], nm = nodes[cell] + 0.5 * width;
+                value += at(observer, nm) * (blue + (red - blue) * (nm - 360) / 470) * width;
+            }
+            sum += value;
+            squares += value * value;
+        }
+        const double mean = sum / static_cast<double>(combs);
+        return std::sqrt(squares / static_cast<double>(combs) - mean * mean) / mean;
+    };
+    // A density proportional to x̄ + ȳ + z̄ has .107, .159 and .249 of white.
+    for (const double red : {0.2, 1.0, 5.0}) {
+        CHECK(deviation(cie[0], 1, red) < 0.06);
+        CHECK(deviation(cie[1], 1, red) < 0.06);
+        CHECK(deviation(cie[2], 1, red) < 0.10);
+    }
+}
+
 TEST_CASE("wavelength and filter tables are monotone, complete, and distributed as they say", "[compile]") {
     const std::vector<float> wavelengths = crt::wavelengthTable(CRT_WAVELENGTH_TABLE);
     REQUIRE(wavelengths.size() == CRT_WAVELENGTH_TABLE + 1);
@@ -362,20 +394,26 @@ TEST_CASE("wavelength and filter tables are monotone, complete, and distributed 
     CHECK(wavelengths.back() == 830);
     for (std::size_t i = 1; i < wavelengths.size(); ++i)
         if (!(wavelengths[i] > wavelengths[i - 1])) FAIL("wavelengths stand still at " << i);
-    // Each cell holds the same part of x̄ + ȳ + z̄ + .001.
+    // Each cell holds the same part of (x̄ + ȳ + z̄)^0.4.
     const auto& cie = crt::cieObserver();
+    const auto density = [&](int nm) {
+        const auto k = static_cast<std::size_t>(nm - 360);
+        return std::pow(cie[0][k] + cie[1][k] + cie[2][k], 0.4);
+    };
     const auto cumulative = [&](double nm) {
         double sum = 0;
         for (int i = 360; i < 830; ++i) {
-            const auto k = static_cast<std::size_t>(i - 360);
-            const double a = cie[0][k] + cie[1][k] + cie[2][k] + 1e-3, b = cie[0][k + 1] + cie[1][k + 1] + cie[2][k + 1] + 1e-3;
             const double part = std::clamp(nm - i, 0.0, 1.0);
-            sum += part * (a + 0.5 * part * (b - a));
+            sum += part * (density(i) + 0.5 * part * (density(i + 1) - density(i)));
         }
         return sum;
     };
     const double all = cumulative(830);
     for (std::size_t i = 0; i <= CRT_WAVELENGTH_TABLE; i += 16) CHECK(cumulative(wavelengths[i]) / all == Approx(static_cast<double>(i) / CRT_WAVELENGTH_TABLE).margin(2e-4));
+
+    // Density is constant in a cell: where x̄ falls to half within 10 nm a wide one would be a spike in the integrand.
+    for (std::size_t i = 1; i < wavelengths.size(); ++i)
+        if (wavelengths[i] < 780 && wavelengths[i] - wavelengths[i - 1] > 12) FAIL("a cell of " << wavelengths[i] - wavelengths[i - 1] << " nm at " << wavelengths[i]);
 
     crt::FilmSettings film;
     CHECK(crt::filterTable(film, CRT_FILTER_TABLE).empty());  // the pixel itself

@@ -61,7 +61,7 @@ CRT_FN f32 crt_lambert(f32 cos_s) { return cos_s * CRT_INV_PI; }
 CRT_FN CrtScatter crt_sample_diffuse(vec4 reflectance, vec3 ns, vec3 ng, CrtRandom2 u) {
     CrtScatter s;
     const CrtRandom2 disk = crt_concentric_disk(u);
-    const f32 z = crt_sqrt(crt_max(0.0f, 1.0f - disk.x * disk.x - disk.y * disk.y));
+    const f32 z = crt_sqrt(crt_max(0.0f, crt_fma(-disk.x, disk.x, crt_fma(-disk.y, disk.y, 1.0f))));
     s.wi = crt_to_world(crt_frame(ns), make_vec3(disk.x, disk.y, z)); /* unit to 4 ulp */
     s.weight = reflectance;
     s.pdf = crt_lambert(crt_max(dot3(s.wi, ns), 0.0f));

@@ -52,8 +52,7 @@ CRT_FN CrtRay crt_camera_ray(const CrtContext *ctx, CrtSampler *sampler, u32 pix
     }
     CrtRay ray;
     ray.o = crt_load3(camera->origin);
-    ray.d = crt_load3(camera->corner) + crt_load3(camera->step_x) * ((f32)pixel_x + dx) +
-            crt_load3(camera->step_y) * ((f32)pixel_y + dy);
+    ray.d = crt_fma3(crt_load3(camera->step_x), (f32)pixel_x + dx, crt_fma3(crt_load3(camera->step_y), (f32)pixel_y + dy, crt_load3(camera->corner)));
     if (CRT_HAS(LENS) && camera->lens_radius > 0.0f) {
         const CrtRandom2 lens = crt_concentric_disk(crt_sample_2d(sampler, CRT_DIM_LENS));
         const vec3 shift = (crt_load3(camera->lens_x) * lens.x + crt_load3(camera->lens_y) * lens.y) * camera->lens_radius;

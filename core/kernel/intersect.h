@@ -64,12 +64,12 @@ CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShe
     const f32 az = pz[0] - ray.oz;
     const f32 bz = pz[1] - ray.oz;
     const f32 cz = pz[2] - ray.oz;
-    const f32 ax = (px[0] - ray.ox) - ray.sx * az;
-    const f32 bx = (px[1] - ray.ox) - ray.sx * bz;
-    const f32 cx = (px[2] - ray.ox) - ray.sx * cz;
-    const f32 ay = (py[0] - ray.oy) - ray.sy * az;
-    const f32 by = (py[1] - ray.oy) - ray.sy * bz;
-    const f32 cy = (py[2] - ray.oy) - ray.sy * cz;
+    const f32 ax = crt_fma(-ray.sx, az, px[0] - ray.ox);
+    const f32 bx = crt_fma(-ray.sx, bz, px[1] - ray.ox);
+    const f32 cx = crt_fma(-ray.sx, cz, px[2] - ray.ox);
+    const f32 ay = crt_fma(-ray.sy, az, py[0] - ray.oy);
+    const f32 by = crt_fma(-ray.sy, bz, py[1] - ray.oy);
+    const f32 cy = crt_fma(-ray.sy, cz, py[2] - ray.oy);
     const f32 u = crt_difference_of_products(cx, by, cy, bx);
     const f32 v = crt_difference_of_products(ax, cy, ay, cx);
     const f32 w = crt_difference_of_products(bx, ay, by, ax);
@@ -77,10 +77,7 @@ CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShe
     const f32 det = u + v + w;
     if (det == 0.0f) return 0;
     const f32 inverse_det = 1.0f / det;
-    const f32 sa = ray.sz * az;
-    const f32 sb = ray.sz * bz;
-    const f32 sc = ray.sz * cz;
-    const f32 t = (u * sa + v * sb + w * sc) * inverse_det;
+    const f32 t = crt_fma(u, az, crt_fma(v, bz, w * cz)) * ray.sz * inverse_det;
     if (!(t > 0.0f) || !(t < limit)) return 0;
 
     hit->t = t;
@@ -134,9 +131,9 @@ CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtRay ray, f32
     const vec8 dx = splat8(V3X(ray.d)), dy = splat8(V3Y(ray.d)), dz = splat8(V3Z(ray.d));
     const vec8 h = crt_fma8(crt_load8(row), ox, crt_fma8(crt_load8(row + 8), oy, crt_fma8(crt_load8(row + 16), oz, crt_load8(row + 24))));
     const vec8 n = crt_fma8(crt_load8(row), dx, crt_fma8(crt_load8(row + 8), dy, crt_load8(row + 16) * dz));
-    const vec8 x = ox * n - h * dx;
-    const vec8 y = oy * n - h * dy;
-    const vec8 z = oz * n - h * dz;
+    const vec8 x = crt_fma8(ox, n, -h * dx);
+    const vec8 y = crt_fma8(oy, n, -h * dy);
+    const vec8 z = crt_fma8(oz, n, -h * dz);
     const vec8 inside = crt_min8(crt_flip8(crt_row8(row + 32, x, y, z, n), crt_sign8(n)),
                         crt_min8(crt_flip8(crt_row8(row + 64, x, y, z, n), crt_sign8(n)), crt_flip8(crt_row8(row + 96, x, y, z, n), crt_sign8(n))));
     const vec8 t = crt_flip8(-h, crt_sign8(n)); /* times |n| */

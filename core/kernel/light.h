@@ -145,7 +145,7 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
         }
         cosine = -dot3(normal, s.wi);
         distance = -dot3(normal, shape.o - p) / cosine;
-        s.point = p + s.wi * distance;
+        s.point = crt_fma3(s.wi, distance, p);
         if (distance > 0.0f && omega > 0.0f) s.pdf = emitter->choice_probability / omega;
     } else {
         if (!shape.parallelogram) { /* uniform in the triangle */
@@ -153,7 +153,7 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
             u.x = root * (1.0f - u.y);
             u.y = root * u.y;
         }
-        s.point = shape.o + shape.a * u.x + shape.b * u.y;
+        s.point = crt_fma3(shape.a, u.x, crt_fma3(shape.b, u.y, shape.o));
         const vec3 d = s.point - p;
         const f32 distance2 = dot3(d, d);
         distance = crt_sqrt(distance2);

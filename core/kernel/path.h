@@ -251,49 +251,83 @@ CRT_FN void crt_add_aovs(const CrtContext *ctx, const CrtPath *path, CRT_GLOBAL 
     if (scene->depth_channel != 0u) crt_film_add(pixel + 2u * scene->depth_channel, (f64)path->first.depth);
 }
 
-/*
- * ADDS samples [first_sample, first_sample + sample_count) of pixel (x, y) of the crop window to the film: `sums`, `counts` and `primitives` as in
- * CrtFilmView, for the whole film; `primitives` may be null. Adds to *rays.
- */
+/* A pixel of the crop window, some of whose samples are being taken: their sums go to its place in the film. */
+typedef struct CrtPixelWork {
+    u32 x, y;
+    u64 first_sample;
+    u32 sample_count;
+    u32 done, valid;           /* samples: so far; and of these, finite ones */
+    int alive;                 /* `path` has not ended */
+    CRT_GLOBAL f64 *pairs;     /* the pixel's channels */
+    CRT_GLOBAL u64 *count;
+    CRT_GLOBAL u32 *primitive; /* may be null */
+    CrtPath path;
+} CrtPixelWork;
+
+/* `sums`, `counts` and `primitives` as in CrtFilmView, for the whole film; `primitives` may be null. */
+CRT_FN CrtPixelWork crt_pixel_begin(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count, CRT_GLOBAL f64 *sums,
+                                    CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives) {
+    const u64 pixel = (u64)y * ctx->scene->width + x;
+    CrtPixelWork work;
+    work.x = x;
+    work.y = y;
+    work.first_sample = first_sample;
+    work.sample_count = sample_count;
+    work.done = work.valid = 0u;
+    work.alive = 0;
+    work.pairs = sums + pixel * ctx->scene->channels * 2u;
+    work.count = counts + pixel;
+    work.primitive = primitives;
+    if (primitives != 0) work.primitive += pixel;
+    return work;
+}
+
+/* Adds the sample whose path has ended. One that is not finite is not counted either. */
+CRT_FN void crt_add_sample(const CrtContext *ctx, CrtPixelWork *work, vec4 xyz) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    CRT_GLOBAL f64 *pairs = work->pairs;
+    if (crt_is_finite(V4X(xyz)) && crt_is_finite(V4Y(xyz)) && crt_is_finite(V4Z(xyz))) {
+        const f64 luminance = (f64)V4Y(xyz);
+        crt_film_add(pairs + 0, (f64)V4X(xyz));
+        crt_film_add(pairs + 2, luminance);
+        crt_film_add(pairs + 4, (f64)V4Z(xyz));
+        crt_film_add(pairs + 6, luminance * luminance);
+        if (CRT_HAS(REPLICATES) && scene->replicate_channel != 0u)
+            crt_film_add(pairs + 2u * (scene->replicate_channel + crt_replicate(work->first_sample + work->done)), luminance);
+        if (CRT_HAS(AOV)) {
+            if (scene->channels > CRT_CHANNELS_BASE) crt_add_aovs(ctx, &work->path, pairs);
+            if (work->primitive != 0 && work->valid == 0u && *work->count == 0u) *work->primitive = work->path.first.primitive;
+        }
+        work->valid += 1u;
+    }
+    work->done += 1u;
+}
+
+/* Takes the pixel one vertex further, into its next sample where a path has ended. Returns 0 when the last sample is done. */
+CRT_FN int crt_pixel_vertex(const CrtContext *ctx, CrtPixelWork *work, CrtRayCount *rays) {
+    if (work->done >= work->sample_count) return 0;
+    if (!work->alive) work->path = crt_path_begin(ctx, work->x, work->y, work->first_sample + work->done);
+    vec4 xyz = splat4(0.0f);
+    if (CRT_HAS(VIEW) && ctx->scene->view != CRT_VIEW_PATH) {
+        xyz = crt_view(ctx, &work->path, rays);
+    } else {
+        work->alive = crt_path_vertex(ctx, &work->path, rays);
+        if (work->alive) return 1;
+        xyz = crt_to_xyz(ctx, work->path.wavelengths, work->path.radiance);
+    }
+    crt_add_sample(ctx, work, xyz);
+    return 1;
+}
+
+CRT_FN void crt_pixel_end(CrtPixelWork *work) { *work->count += work->valid; }
+
+/* ADDS samples [first_sample, first_sample + sample_count) of pixel (x, y) of the crop window to the film, and rays to *rays. One flat loop over the
+   vertices of all samples, so that on a GPU a lane whose path has ended begins its next sample while others go on bouncing. */
 CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count, CRT_GLOBAL f64 *sums,
                              CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives, CrtRayCount *rays) {
-    CRT_GLOBAL const CrtScene *scene = ctx->scene;
-    const u64 pixel = (u64)y * scene->width + x;
-    CRT_GLOBAL f64 *pairs = sums + pixel * scene->channels * 2u;
-    u32 valid = 0u;
-    u32 done = 0u;
-    int alive = 0;
-    CrtPath path;
-    while (done < sample_count) {
-        /* One flat loop, so that on a GPU a lane whose path has ended begins its next sample while others go on bouncing. */
-        if (!alive) path = crt_path_begin(ctx, x, y, first_sample + done);
-        vec4 xyz = splat4(0.0f);
-        if (CRT_HAS(VIEW) && scene->view != CRT_VIEW_PATH) {
-            xyz = crt_view(ctx, &path, rays);
-            alive = 0;
-        } else {
-            alive = crt_path_vertex(ctx, &path, rays);
-            if (!alive) xyz = crt_to_xyz(ctx, path.wavelengths, path.radiance);
-        }
-        if (!alive) {
-            if (crt_is_finite(V4X(xyz)) && crt_is_finite(V4Y(xyz)) && crt_is_finite(V4Z(xyz))) {
-                const f64 luminance = (f64)V4Y(xyz);
-                crt_film_add(pairs + 0, (f64)V4X(xyz));
-                crt_film_add(pairs + 2, luminance);
-                crt_film_add(pairs + 4, (f64)V4Z(xyz));
-                crt_film_add(pairs + 6, luminance * luminance);
-                if (CRT_HAS(REPLICATES) && scene->replicate_channel != 0u)
-                    crt_film_add(pairs + 2u * (scene->replicate_channel + crt_replicate(first_sample + done)), luminance);
-                if (CRT_HAS(AOV)) {
-                    if (scene->channels > CRT_CHANNELS_BASE) crt_add_aovs(ctx, &path, pairs);
-                    if (primitives != 0 && valid == 0u && counts[pixel] == 0u) primitives[pixel] = path.first.primitive;
-                }
-                valid += 1u;
-            }
-            done += 1u;
-        }
-    }
-    counts[pixel] += valid;
+    CrtPixelWork work = crt_pixel_begin(ctx, x, y, first_sample, sample_count, sums, counts, primitives);
+    while (crt_pixel_vertex(ctx, &work, rays)) continue;
+    crt_pixel_end(&work);
 }
 
 CRT_KERNEL_END

@@ -32,7 +32,7 @@ CRT_FN f32 crt_wavelength(const CrtContext *ctx, f32 u, f32 *inverse_pdf) {
     const f32 lower = table[cell];
     const f32 step = table[cell + 1u] - lower;
     *inverse_pdf = step * (f32)CRT_WAVELENGTH_TABLE;
-    return lower + (x - (f32)cell) * step - CRT_WAVELENGTH_MIN_NM;
+    return crt_fma(x - (f32)cell, step, lower) - CRT_WAVELENGTH_MIN_NM;
 }
 
 /* One stratified number places all four, (u + i)/4: each in its own quarter of the distribution. */
@@ -51,7 +51,7 @@ CRT_FN CrtWavelengths crt_sample_wavelengths(const CrtContext *ctx, f32 u) {
 CRT_FN f32 crt_lookup(CRT_GLOBAL const f32 *table, f32 position) {
     const u32 i = (u32)position;
     const f32 a = table[i];
-    return a + (position - (f32)i) * (table[i + 1u] - a);
+    return crt_fma(position - (f32)i, table[i + 1u] - a, a);
 }
 
 /* A spectrum of the scene at the path's wavelengths, linear between nanometres. */

@@ -57,7 +57,7 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
         b2 *= scale;
     }
     CrtSurface s;
-    s.p = crt_triangle_vertex(triangle, 0u) * b0 + crt_triangle_vertex(triangle, 1u) * b1 + crt_triangle_vertex(triangle, 2u) * b2;
+    s.p = crt_fma3(crt_triangle_vertex(triangle, 0u), b0, crt_fma3(crt_triangle_vertex(triangle, 1u), b1, crt_triangle_vertex(triangle, 2u) * b2));
     s.ng = crt_load3(face->normal);
     s.clearance = face->clearance;
     s.ns = s.ng;
@@ -80,7 +80,7 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
 
 /* Origin of a ray leaving p on the side of direction w. No absolute epsilon: the clearance is the triangle's. */
 CRT_FN vec3 crt_offset_origin(vec3 p, f32 clearance, vec3 normal, vec3 w) {
-    return p + normal * (dot3(w, normal) < 0.0f ? -clearance : clearance);
+    return crt_fma3(normal, dot3(w, normal) < 0.0f ? -clearance : clearance, p);
 }
 
 CRT_KERNEL_END

@@ -103,8 +103,8 @@ private:
     std::vector<Outcome> outcomes_;
 };
 
-/// Radiance of one pixel for light without colour: (X + Y + Z) over what radiance 1 gives. Wavelengths are drawn in proportion to x̄ + ȳ + z̄, so
-/// that this sum, unlike Y, hardly varies with them.
+/// Radiance of one pixel for light without colour: (X + Y + Z) over what radiance 1 gives. Over the wavelengths of a path that sum varies less
+/// than each of X, Y and Z.
 double radiance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean over all pixels.
 double radiance(const Film& film);

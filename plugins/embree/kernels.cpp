@@ -20,18 +20,39 @@ CRT_FN int crt_trace_any(const CrtContext* ctx, CrtRay ray) {
 }  // namespace crt::kernel
 
 namespace crt::embree {
+namespace {
+
+using namespace kernel;
+
+// Not inlined, so that two pixels can take turns without the kernel being there twice.
+[[gnu::noinline]] bool advance(const CrtContext& ctx, CrtPixelWork& work, CrtRayCount& rays) { return crt_pixel_vertex(&ctx, &work, &rays) != 0; }
+
+// Two pixels in turn, vertex by vertex: a path is one long chain of dependent operations, and while it waits the processor works on the other's.
+void renderPair(const CrtContext& ctx, CrtPixelWork a, CrtPixelWork b, CrtRayCount& rays) {
+    while (advance(ctx, a, rays) && advance(ctx, b, rays)) continue;
+    while (advance(ctx, a, rays)) continue;
+    while (advance(ctx, b, rays)) continue;
+    crt_pixel_end(&a);
+    crt_pixel_end(&b);
+}
+
+}  // namespace
 
 RayTotals CRT_EMBREE_ENTRY(const TileJob& job) {
-    using namespace kernel;
     CrtContext ctx;
     ctx.blob = job.blob;
     ctx.scene = reinterpret_cast<const CrtScene*>(job.blob);
     ctx.tracer = job.tracer;
+    const auto pixel = [&](std::uint32_t x, std::uint32_t y) {
+        return crt_pixel_begin(&ctx, x, y, job.first_sample, job.sample_count, job.sums, job.counts, job.primitives);
+    };
     RayTotals totals;
     for (std::uint32_t y = job.y0; y < job.y1; ++y) {
-        for (std::uint32_t x = job.x0; x < job.x1; ++x) {
+        for (std::uint32_t x = job.x0; x < job.x1; x += 2) {
             CrtRayCount rays{0, 0};
-            crt_render_pixel(&ctx, x, y, job.first_sample, job.sample_count, job.sums, job.counts, job.primitives, &rays);
+            CrtPixelWork none = pixel(x, y);
+            none.sample_count = 0;
+            renderPair(ctx, pixel(x, y), x + 1 < job.x1 ? pixel(x + 1, y) : none, rays);
             totals.closest += rays.closest;
             totals.shadow += rays.shadow;
         }
