@@ -278,7 +278,11 @@ double observer(double nm) {
 class BandShare {
 public:
     explicit BandShare(const Band& band) : band_(band), below_{0} {
-        for (double nm = band.lower_nm() + kStep_nm / 2; nm < band.upper_nm(); nm += kStep_nm) below_.push_back(below_.back() + band.at(nm) * observer(nm));
+        const long steps = std::lround((band.upper_nm() - band.lower_nm()) / kStep_nm);
+        for (long step = 0; step < steps; ++step) {
+            const double nm = band.lower_nm() + (static_cast<double>(step) + 0.5) * kStep_nm;
+            below_.push_back(below_.back() + band.at(nm) * observer(nm));
+        }
     }
     double quantile_nm(double share) const {
         const double wanted = std::clamp(share, 0.0, 1.0) * below_.back();
