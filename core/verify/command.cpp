@@ -59,7 +59,7 @@ public:
         fmt::print(stderr, "\r\033[K  {} of {}, {} so far: {} {}", index + 1, cases_, clockText(seconds), next.id, next.title);
         std::fflush(stderr);
     }
-    void clear() {
+    void clear() const {
         if (shown_) fmt::print(stderr, "\r\033[K");
     }
 

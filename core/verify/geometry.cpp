@@ -160,7 +160,7 @@ Scene evenRoom(std::uint64_t seed) {
 }
 
 void touching(Context& context) {
-    const auto ask = [&](const char* what, Mesh mesh) {
+    const auto ask = [&](const char* what, const Mesh& mesh) {
         double worst = 0;
         const std::uint64_t seeds = byLevel(context, 2, 16, 64);
         for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
