@@ -112,14 +112,33 @@ TEST_CASE("broken calls get a status and a sentence, never a crash", "[abi]") {
         CHECK(std::strlen(raw.integrator.last_error(raw.integrator.state)) > 5);
     };
     refused(raw.render(0, 0, 1, 1, 0, 1));  // before set_scene
+    const crt::CompiledScene compiled = crt::compileScene(sceneFrom(kScene), 0);
+    std::vector<double> sums(16 * 12 * compiled.channels * 2);
+    std::vector<std::uint64_t> counts(16 * 12);
+    std::vector<std::uint32_t> primitives(16 * 12);
+    CrtFilmView view{};
+    view.struct_size = sizeof(view);
+    view.width = 16;
+    view.height = 12;
+    view.channels = compiled.channels;
+    view.sums = sums.data();
+    view.counts = counts.data();
+    const auto read = [&] { return raw.integrator.read_film(raw.integrator.state, &view); };
+    refused(read());  // before set_scene, too
     refused(raw.integrator.set_scene(raw.integrator.state, nullptr));
     refused(raw.integrator.render(raw.integrator.state, nullptr));
     refused(raw.integrator.read_film(raw.integrator.state, nullptr));
     refused(raw.integrator.get_report(raw.integrator.state, nullptr));
-    const crt::CompiledScene compiled = crt::compileScene(sceneFrom(kScene), 0);
     REQUIRE(raw.setScene(compiled) == CRT_OK);
     refused(raw.render(0, 0, 17, 12, 0, 1));
     refused(raw.render(5, 0, 4, 12, 0, 1));
+    view.primitives = primitives.data();  // which the scene does not ask for
+    refused(read());
+    view.primitives = nullptr;
+    view.width = 15;
+    refused(read());
+    view.width = 16;
+    REQUIRE(read() == CRT_OK);
     CrtSceneBlob tiny{};
     tiny.struct_size = 4;
     refused(raw.integrator.set_scene(raw.integrator.state, &tiny));
