@@ -36,6 +36,8 @@ def read_pfm(path):
 class Crt:
     """crt, a process for every image."""
 
+    unit = 1.0
+
     def __init__(self, program, backend, replicates, roulette, setup):
         self.program, self.backend, self.replicates, self.roulette, self.setup = program, backend, replicates, roulette, setup
         self.name = f"crt {backend}, {replicates} sequence{'s' if replicates > 1 else ''}" + (", roulette" if roulette else "")
@@ -105,8 +107,9 @@ class Worker:
 
 
 class Mitsuba:
-    def __init__(self, worker, sampler, roulette):
-        self.worker, self.sampler, self.roulette = worker, sampler, roulette
+    def __init__(self, worker, sampler, roulette, unit):
+        """`unit`: what the tables of the observer make of Mitsuba's pixels over crt's."""
+        self.worker, self.sampler, self.roulette, self.unit = worker, sampler, roulette, unit
         self.name = f"Mitsuba {worker.variant.removesuffix('_spectral')}, {sampler}" + (", roulette" if roulette else "")
 
     def request(self, spp, seed, image=None):

@@ -11,6 +11,7 @@ from .peers import seconds_to, slope_of
 
 
 METRICS = {"error": "luminance, all pixels", "error_xyz": "X, Y and Z, all pixels", "error_room": "luminance, without the lamp"}
+SPREAD = {"spread": "luminance, between seeds"}
 
 
 def percent(value, digits=2):
@@ -83,7 +84,7 @@ def write_agreement(results, found, described):
     results.paragraph(
         "Left as differences: the observer's tables (5 nm against 1 nm) and the constant k, both above. Hero wavelengths: both place four by one "
         "stratified "
-        "number, crt distributed as x̄ + ȳ + z̄, Mitsuba as sech² around 538 nm (Radziszewski et al.); that changes noise and no mean. Roulette: "
+        "number, crt distributed as (x̄ + ȳ + z̄)^0.4, Mitsuba as sech² around 538 nm (Radziszewski et al.); that changes noise and no mean. Roulette: "
         "crt survives with "
         "the largest of four throughputs, at least 0.05; Mitsuba with the same, at most 0.95; again noise alone. Rays leave surfaces by a fixed "
         "relative offset in "
@@ -130,7 +131,7 @@ class Race:
                 "with_warm_start": self.factor_with_start("warm"), "with_cold_start": self.factor_with_start("cold")}
 
 
-def write_race(results, race, lines, arguments, roulette_from):
+def write_race(results, race, lines, arguments, roulette_from, reference):
     def seconds(name, key="cpu_to_target"):
         return significant(race.rows[name][key]) + ("*" if race.rows[name]["extrapolated"] else "")
 
@@ -160,10 +161,9 @@ def write_race(results, race, lines, arguments, roulette_from):
         "run; warm the "
         "median of three. * = beyond what was measured, along the last three points. ± is 95 %, from the jackknife over replicates.")
     results.paragraph(
-        f"The error is that between {arguments.replicates} renders with different seeds: √(mean over pixels of the variance of Y) / mean Y. It "
-        f"holds noise and no "
-        "bias, so it asks each program how far it is from what it converges to itself; the bias is the last section but one. All pixels count, the "
-        "lamp's edge too. "
+        f"The error is √(mean of (Y − Y of the reference)² over all pixels and {arguments.replicates} renders with different seeds, less the reference's variance) / "
+        f"mean Y; the reference has {reference.samples} samples per pixel by crt with other seeds, and is itself within {100 * reference.error:.2f} %. Mitsuba's pixels "
+        "are divided by what the tables of the observer account for (last section but one). All pixels count, the lamp's edge too. "
         f"Roulette, where named, may end a path after its scattering event {roulette_from} in both programs; otherwise there is none. “1 sequence” "
         f"is "
         "`sampler.replicates: 1`, “16 sequences” the default, from which an image knows its own error.")
@@ -174,15 +174,17 @@ def write_samplers(results, scores, roulette_from):
     results.paragraph(
         f"`llvm_ad_spectral`, 3 renders each, roulette from event {roulette_from}; the least error² × time goes into the race, in all variants, with and without "
         "roulette. Spectra are tables on a regular grid, which Mitsuba evaluates faster than irregular ones, and each material is one mesh.")
-    results.table(["sampler", "samples", "relative RMSE", "processor s", "error² × processor s"],
-                  [[sampler, d["spp"], f"{100 * d['error']:.2f} %", significant(d["cpu_seconds"]), significant(d["error2_seconds"])]
+    results.table(["sampler", "samples", "relative RMSE", "spread between seeds", "processor s", "error² × processor s"],
+                  [[sampler, d["spp"], f"{100 * d['error']:.2f} %", f"{100 * d['spread']:.2f} %", significant(d["cpu_seconds"]), significant(d["error2_seconds"])]
                    for sampler, d in sorted(scores.items(), key=lambda item: item[1]["error2_seconds"])])
+    results.paragraph("Where the error is larger than the spread between seeds, all seeds have an error in common, which averaging renders does not remove: who measures noise by repeating "
+                      "renders does not see it.")
 
 
 def write_points(results, lines):
     results.heading("Every point")
-    results.table(["", "samples", *METRICS.values(), "processor s", "wall s", "others"],
-                  [[line.name, p["spp"], *(f"{100 * p[m]:.3f} ± {196 * p[m + '_se']:.3f} %" for m in METRICS), significant(p["cpu_seconds"]),
+    results.table(["", "samples", *METRICS.values(), *SPREAD.values(), "processor s", "wall s", "others"],
+                  [[line.name, p["spp"], *(f"{100 * p[m]:.3f} ± {196 * p[m + '_se']:.3f} %" for m in (*METRICS, *SPREAD)), significant(p["cpu_seconds"]),
                     significant(p["render_seconds"]), f"{p['others']:.0%}"] for line in lines for p in line.points])
 
 
@@ -196,8 +198,8 @@ def write(program, results, arguments, run):
         f"agree, and how long each "
         "takes to a relative RMSE of 1 % in luminance. Same machine, same run, all threads, everything interleaved.")
     results.lines += ["![Error against processor seconds](peers.svg)", ""]
-    write_race(results, race, lines, arguments, run["roulette_from"])
-    where_time_goes(results, race.rows, race.factor, run["room"])
+    write_race(results, race, lines, arguments, run["roulette_from"], run["reference"])
+    where_time_goes(results, race.rows, race.factor, int(run["reference"].room.sum()))
     write_samplers(results, run["scores"], run["roulette_from"])
     write_agreement(results, found, version)
     write_points(results, lines)

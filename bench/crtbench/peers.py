@@ -1,7 +1,8 @@
 """The Cornell box in crt and in Mitsuba 3: whether their images agree, and their error against time. One run, one machine, everything interleaved.
 
-The error of a setting with N samples is that between R renders with seeds of their own: the root of the mean over pixels of their variance in luminance,
-over the mean luminance. It needs no reference, is unbiased, and holds noise alone, so that a difference between the models cannot pass as one."""
+The error of a setting with N samples is the root of the mean over pixels and renders of the squared difference in luminance from a converged image, over
+the mean luminance; the converged image's own variance is taken off. The spread between seeds would need no reference, but it is blind to what all seeds have in
+common, and a low-discrepancy sampler that is scrambled alike for every seed has much of its error there."""
 import json
 import math
 import time
@@ -14,6 +15,7 @@ from .results import Results
 
 SIZE, MAX_DEPTH, TARGET = 128, 16, 0.01
 COUNTS = [4, 16, 64, 128, 256, 512, 1024]
+REFERENCE_RENDERS, REFERENCE_SAMPLES = 8, 1024
 FEWEST_POOLED = 16  # Samples of a render that counts among the converged ones.
 HEADLINE_WEIGHT, MATCHED_WEIGHT = 4, 2  # Of the time for measuring: with roulette, and without; the other lines have 1.
 
@@ -42,24 +44,41 @@ def room_pixels(image):
     return ~np.any([padded[r:r + height, c:c + width] for r in range(3) for c in range(3)], axis=0)
 
 
-def relative_error(images, room):
-    """Relative RMSE of one render from R of them, and its standard error by the jackknife over renders: {metric: (error, se)}. `error`: luminance of all pixels;
-    `error_xyz`: X, Y and Z of all pixels; `error_room`: luminance of the pixels `room`, over their mean."""
-    stack = np.array(images)
-    chosen = {"error": stack[..., 1], "error_xyz": stack, "error_room": stack[..., 1][:, room]}
-    return {name: jackknife(values) for name, values in chosen.items()}
+class Reference:
+    """A converged image, the mean of renders by crt with seeds that nothing else has, and the variance of that mean in every pixel."""
+
+    def __init__(self, contestant, samples):
+        images = np.array([contestant.render(samples, 70_000_000 + r).image for r in range(REFERENCE_RENDERS)])
+        self.samples = REFERENCE_RENDERS * samples
+        self.mean = images.mean(axis=0)
+        self.variance = images.var(axis=0, ddof=1) / REFERENCE_RENDERS
+        self.room = room_pixels(self.mean)
+        self.error = math.sqrt(self.variance[..., 1].mean()) / self.mean[..., 1].mean()
 
 
-def jackknife(stack):
-    def error(images):
-        return math.sqrt(images.var(axis=0, ddof=1).mean()) / images.mean()
+def relative_error(images, unit, reference):
+    """Relative RMSE of one render from R of them, and its standard error by the jackknife over renders: {metric: (error, se)}. `unit`: what their pixels are
+    divided by. `error`: luminance of all pixels; `error_xyz`: X, Y and Z of all pixels; `error_room`: luminance of the pixels that see no lamp, over
+    their mean; `spread`: luminance of all pixels, about the renders' own mean."""
+    stack, room = np.array(images) / unit, reference.room
 
-    count = len(stack)
-    without = [error(np.delete(stack, r, axis=0)) for r in range(count)]
-    return error(stack), math.sqrt((count - 1) / count * sum((w - np.mean(without)) ** 2 for w in without))
+    def against(values, truth, variance):
+        squares = ((values - truth) ** 2).reshape(len(values), -1).mean(axis=1)
+        return jackknife(squares, lambda kept: math.sqrt(max(0.0, kept.mean() - variance.mean())) / truth.mean())
+
+    mean, variance = reference.mean, reference.variance
+    return {"error": against(stack[..., 1], mean[..., 1], variance[..., 1]), "error_xyz": against(stack, mean, variance),
+            "error_room": against(stack[..., 1][:, room], mean[..., 1][room], variance[..., 1][room]),
+            "spread": jackknife(stack[..., 1], lambda kept: math.sqrt(kept.var(axis=0, ddof=1).mean()) / kept.mean())}
 
 
-def measure_round(lines, spp, replicates, seed_base, room, pool_of):
+def jackknife(values, estimate):
+    count = len(values)
+    without = [estimate(np.delete(values, r, axis=0)) for r in range(count)]
+    return estimate(values), math.sqrt((count - 1) / count * sum((w - np.mean(without)) ** 2 for w in without))
+
+
+def measure_round(lines, spp, replicates, seed_base, reference, pool_of):
     """R renders of every line, all in turn."""
     gathered = {line: {"costs": [], "images": [], "elapsed": 0.0} for line in lines}
     for r in range(replicates):
@@ -74,7 +93,7 @@ def measure_round(lines, spp, replicates, seed_base, room, pool_of):
                 pool_of(line).add(cost.image, cost.spp)
             cost.image = None
     for line, data in gathered.items():
-        errors = relative_error(data["images"], room)
+        errors = relative_error(data["images"], line.contestant.unit, reference)
         costs = data["costs"]
         line.points.append({
             "asked": spp, "spp": costs[0].spp, **{name: e for name, (e, _) in errors.items()},
@@ -83,11 +102,14 @@ def measure_round(lines, spp, replicates, seed_base, room, pool_of):
             "others": float(np.median([c.others for c in costs])), "cpu_seconds_all": [c.cpu for c in costs], "render_seconds_all": [c.render for c in costs]})
         line.spent += data["elapsed"]
         p = line.points[-1]
-        print(f"{line.name:42} {p['spp']:5} spp  {100 * p['error']:6.2f} %  {p['cpu_seconds']:7.3f} cpu s  {p['render_seconds']:7.3f} s  others {p['others']:.0%}", flush=True)
+        print(f"{line.name:42} {p['spp']:5} spp  {100 * p['error']:6.2f} %  spread {100 * p['spread']:6.2f} %  {p['cpu_seconds']:7.3f} cpu s  {p['render_seconds']:7.3f} s  others {p['others']:.0%}", flush=True)
 
 
 def seconds_to(points, key, target, metric="error"):
     """(seconds, whether extrapolated, relative standard error): between points log-log; beyond them along the line through the last three."""
+    points = [p for p in points if p[metric] > 0 and p[key] > 0]  # Of the smallest images, a start may have cost more than all.
+    if len(points) < 2:
+        return math.nan, True, math.nan
     x, y = [math.log(p[metric]) for p in points], [math.log(p[key]) for p in points]
     goal = math.log(target)
     uncertain = 2 * max(p[f"{metric}_se"] / p[metric] for p in points[-2:])  # Time goes with the inverse square of error.
@@ -104,16 +126,17 @@ def slope_of(points):
     return float(np.polyfit([math.log(p["spp"]) for p in points[-3:]], [math.log(p["error"]) for p in points[-3:]], 1)[0])
 
 
-def tournament(worker, samplers, spp, replicates, room):
+def tournament(worker, unit, samplers, spp, replicates, reference):
     """Samplers of Mitsuba: {sampler: error² × CPU seconds, …}, least is best. With roulette, the cheaper way."""
     scores = {}
     for sampler in samplers:
-        contestant = Mitsuba(worker, sampler, True)
+        contestant = Mitsuba(worker, sampler, True, unit)
         costs = [contestant.render(spp, 5_000_000 + r) for r in range(replicates)]
-        error, _ = relative_error([c.image for c in costs], room)["error"]
+        errors = relative_error([c.image for c in costs], unit, reference)
+        error, spread = errors["error"][0], errors["spread"][0]
         cpu = float(np.median([c.cpu for c in costs]))
-        scores[sampler] = {"spp": costs[0].spp, "error": error, "cpu_seconds": cpu, "error2_seconds": error**2 * cpu}
-        print(f"{contestant.name:42} {costs[0].spp:5} spp  {100 * error:6.2f} %  {cpu:7.3f} cpu s  error² × s {error**2 * cpu:.3g}", flush=True)
+        scores[sampler] = {"spp": costs[0].spp, "error": error, "spread": spread, "cpu_seconds": cpu, "error2_seconds": error**2 * cpu}
+        print(f"{contestant.name:42} {costs[0].spp:5} spp  {100 * error:6.2f} %  spread {100 * spread:6.2f} %  {cpu:7.3f} cpu s  error² × s {error**2 * cpu:.3g}", flush=True)
     return scores
 
 
@@ -139,13 +162,15 @@ def measure(program, arguments):
 def run(program, arguments, results, scene, setup, crt_backends, workers, begin):
     described = {v: w.ask({"do": "describe"}) for v, w in workers.items()}
     llvm = workers["llvm_ad_spectral"]
-    room = room_pixels(Crt(program, crt_backends[0], 1, False, setup).render(64, 6_000_000).image)
-    scores = tournament(llvm, arguments.samplers, 64 if arguments.tiny else 256, 3, room)
+    unit = peer_agreement.predicted_ratios(program.repository, described["llvm_ad_spectral"], scene)["mitsuba_over_crt_xyz_by_reflections"][1][1]
+    reference = Reference(Crt(program, "embree", 1, False, setup), REFERENCE_SAMPLES)
+    print(f"reference of {reference.samples} samples: {100 * reference.error:.2f} % itself, which is taken off", flush=True)
+    scores = tournament(llvm, unit, arguments.samplers, 64 if arguments.tiny else 256, 3, reference)
     best = min(scores, key=lambda sampler: scores[sampler]["error2_seconds"])
     lines = [Line(Crt(program, b, n, False, setup), MATCHED_WEIGHT if (b, n) == ("embree", 1) else 1) for b in crt_backends for n in (1, 16)]
-    lines += [Line(Crt(program, "embree", 1, True, setup), HEADLINE_WEIGHT), Line(Mitsuba(llvm, best, False), MATCHED_WEIGHT),
-              Line(Mitsuba(llvm, best, True), HEADLINE_WEIGHT)]
-    lines += [Line(Mitsuba(w, best, True), 1) for v, w in workers.items() if v != "llvm_ad_spectral"]
+    lines += [Line(Crt(program, "embree", 1, True, setup), HEADLINE_WEIGHT), Line(Mitsuba(llvm, best, False, unit), MATCHED_WEIGHT),
+              Line(Mitsuba(llvm, best, True, unit), HEADLINE_WEIGHT)]
+    lines += [Line(Mitsuba(w, best, True, unit), 1) for v, w in workers.items() if v != "llvm_ad_spectral"]
     for block, line in enumerate(lines, start=1):
         line.seed_block = block
         if isinstance(line.contestant, Crt):
@@ -165,8 +190,8 @@ def run(program, arguments, results, scene, setup, crt_backends, workers, begin)
         going = [line for line in lines if line.wants(spp)]
         if not going:
             break
-        measure_round(going, spp, arguments.replicates, 10_000_000 * number, room, lambda line: pools["crt" if isinstance(line.contestant, Crt) else "Mitsuba"])
+        measure_round(going, spp, arguments.replicates, 10_000_000 * number, reference, lambda line: pools["crt" if isinstance(line.contestant, Crt) else "Mitsuba"])
     from . import peer_page
     return peer_page.write(program, results, arguments, {
         "setup": setup, "scene": scene, "described": described, "scores": scores, "lines": lines, "starts": starts, "pools": pools,
-        "room": int(room.sum()), "target": TARGET, "roulette_from": ROULETTE_FROM})
+        "reference": reference, "target": TARGET, "roulette_from": ROULETTE_FROM})
