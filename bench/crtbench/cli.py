@@ -37,7 +37,7 @@ def main():
                              help="a timed run is repeated when other processes took more than this share of the processor (0.05)")
         if name == "stability":
             command.add_argument("--times", type=float, default=1, metavar="N", help="so many times the rays of each point (1); 5 makes 1e8 of offset-safety")
-        if name == "figure2":
+        if name in ("figure2", "stability"):
             command.add_argument("--rows", help="measurements made on another machine, JSON Lines")
         command.add_argument("--scenes", nargs="*", help="only these scenes, by name without .yaml")
     arguments = parser.parse_args()

@@ -1,6 +1,8 @@
 """How far a backend's arithmetic carries: sweeps over sizes, gaps, places, fields of view and solid angles, each to where it ends. One page a
-sweep, stability-SWEEP.md, with every backend that runs here. Rays are counted, nothing is timed: it may run on a busy machine."""
+sweep, stability-SWEEP.md, with every backend that runs here. Rays are counted, nothing is timed: it may run on a busy machine. --rows takes what
+stability_sweep printed on other machines, with the backend's name added to each line ("backend")."""
 import json
+import pathlib
 
 from .program import Failure
 from .results import Results
@@ -25,15 +27,23 @@ def measure(program, arguments):
     sweeps = arguments.scenes or list(SWEEPS)
     if unknown := set(sweeps) - set(SWEEPS):
         raise Failure(f"no such sweep: {', '.join(sorted(unknown))}; there are {', '.join(SWEEPS)}")
+    elsewhere = {}
+    for line in pathlib.Path(arguments.rows).read_text().splitlines() if arguments.rows else ():
+        row = json.loads(line)
+        elsewhere.setdefault(row.pop("sweep"), {}).setdefault(row.pop("backend"), []).append(row)
     usable, absent = program.backends(BACKENDS)
     for sweep in sweeps:
         rays = RAYS[sweep] * arguments.times / (100 if arguments.tiny else 1)
-        points = {backend: run(program, backend, sweep, rays) for backend in usable}
+        given = elsewhere.get(sweep, {})
+        points = {backend: given.get(backend) or run(program, backend, sweep, rays) for backend in BACKENDS if backend in given or backend in usable}
         results = Results(program, arguments, f"stability-{sweep}", SWEEPS[sweep])
         TABLES[sweep](results, points)
         for backend, reason in absent.items():
-            results.paragraph(f"Not measured: `{backend}` ({reason}).")
-        for backend in usable:
+            if backend not in points:
+                results.paragraph(f"Not measured: `{backend}` ({reason}).")
+        if given:
+            results.paragraph(f"Measured on another machine, by the same command: {', '.join(f'`{b}`' for b in given)}.")
+        for backend in points:
             results.command(f"{program.build}/bin/stability_sweep {backend} {sweep} {rays:.0e}")
         results.data = {"points": points}
         results.write()
