@@ -87,7 +87,8 @@ Scene screwOnGround(bool whole_world, bool one_quad = false) {
     const auto inner = ring(one_quad ? 1e6 : 4e-3);
     addQuad(ground, inner[0], inner[1], inner[2], inner[3]);
     if (whole_world && !one_quad)
-        for (double half = 4e-3; half < 1e6; half *= 4) {
+        for (int step = 0; step < 14; ++step) {  // each four times as wide as the one before, beyond 1e6
+            const double half = std::ldexp(4e-3, 2 * step);
             const auto a = ring(half), b = ring(4 * half);
             for (std::size_t i = 0; i < 4; ++i) addQuad(ground, b[i], b[(i + 1) % 4], a[(i + 1) % 4], a[i]);
         }

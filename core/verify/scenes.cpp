@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <utility>
 
 namespace crt::verify {
 
@@ -35,10 +34,10 @@ objects:
                        x, integrator, half_side, radiance);
 }
 
-Stage::Stage(std::string camera, std::string integrator) {
-    set("camera", std::move(camera));
+Stage::Stage(const std::string& camera, const std::string& integrator) {
+    set("camera", camera);
     set("film", "{resolution: [4, 4]}");
-    set("integrator", std::move(integrator));
+    set("integrator", integrator);
 }
 
 Stage& Stage::set(const std::string& key, const std::string& value) {

@@ -28,7 +28,7 @@ using Point = std::array<double, 3>;
 /// A scene put together piece by piece, as YAML.
 class Stage {
 public:
-    explicit Stage(std::string camera, std::string integrator = "{max_depth: 1, roulette: false}");
+    explicit Stage(const std::string& camera, const std::string& integrator = "{max_depth: 1, roulette: false}");
     /// A further or another top-level key, as "environment", "{radiance: 1}".
     Stage& set(const std::string& key, const std::string& value);
     /// As "glass", "{type: dielectric, ior: 1.5}".
