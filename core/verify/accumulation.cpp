@@ -249,7 +249,6 @@ std::string rareReflection(double radiance) {
     const double r = std::sqrt(std::ldexp(1.0, -17));
     return Stage("{position: [0, 0, 1], target: [0, 0, 0], fov: 0.0001}", "{max_depth: 1, roulette: false}")
         .set("film", "{resolution: [2, 2]}")
-        .set("sampler", "{type: sobol, replicates: 1}")
         .material("glass", fmt::format("{{type: dielectric, ior: {:.17g}}}", (1 + r) / (1 - r)))
         .material("black", "{type: diffuse, reflectance: 0}")
         .quad("interface", "[[-1,-1,0],[1,-1,0],[1,1,0],[-1,1,0]]", "glass")

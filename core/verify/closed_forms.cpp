@@ -203,8 +203,8 @@ void mirrorWall(Context& context) {
                          {{expected / 2, "half of the image is missing: is what a mirror shows weighted against light sampling, which cannot find it?"}});
     };
     ask(0.75, 0.01, {.samples = 4096, .most = 65536});
-    if (context.atLeast(Level::Merge)) ask(0.75, 0.003, {.samples = 65536, .most = 262144});
-    if (context.atLeast(Level::Merge)) ask(2, 0.02, {.samples = 65536, .most = 262144});
+    if (context.atLeast(Level::Merge)) ask(0.75, 0.003, {.samples = 16384, .most = 262144});
+    if (context.atLeast(Level::Merge)) ask(2, 0.02, {.samples = 16384, .most = 262144});
     if (context.atLeast(Level::Nightly)) ask(2, 0.003, {.samples = 262144, .most = 8388608});
 }
 
@@ -264,7 +264,7 @@ void glowingCeiling(Context& context) {
             const bool cheap = (p.camera == kFloorQuarter && depth == 2) || (p.camera == kWallCentre && depth == 10);
             if (!context.atLeast(Level::Merge) && !cheap) continue;
             context.estimate(fmt::format("{}, depth {}", p.where, depth), scene(p.camera, fmt::format("{{max_depth: {}, roulette: false}}", depth)), meanRadiance,
-                             expected, 0.002, {.samples = 4096, .most = 16384});
+                             expected, 0.002, {.samples = 1024, .most = 16384});
         }
     }
     if (!context.atLeast(Level::Merge)) return;
@@ -317,7 +317,7 @@ void energyBalance(Context& context) {
             }
         return kPi * sum;
     };
-    context.estimate("flux absorbed by walls and lamp", scenes, absorbed, kPi * 0.4 * 0.4, 0.003, {.samples = 512, .most = 1024});
+    context.estimate("flux absorbed by walls and lamp", scenes, absorbed, kPi * 0.4 * 0.4, 0.003, {.samples = 128, .most = 1024});
 }
 
 void lambertianBody(Context& context) {

@@ -307,7 +307,6 @@ void prism(Context& context) {
         const double h = std::sqrt(0.75);
         return Stage(fmt::format("{{position: [{:.17g},{:.17g},0], target: [{:.17g},{:.17g},0], up: [0,0,-1], {}}}", eye.x, eye.y, p.entry.x, p.entry.y, kBeam),
                      "{max_depth: 2, roulette: false}")
-            .set("sampler", "{type: sobol, replicates: 1}")
             .material("glass", "{type: dielectric, ior: {glass: N-BK7}}")
             .material("black", "{type: diffuse, reflectance: 0}")
             .mesh("prism", fmt::format("[[-0.5,0,-1],[0.5,0,-1],[0,{0:.17g},-1],[-0.5,0,1],[0.5,0,1],[0,{0:.17g},1]]", h),

@@ -140,7 +140,11 @@ void Context::equivalent(const std::string& what, const std::vector<double>& rep
 Outcome Context::estimated(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
                            const Effort& effort, const std::vector<Mistake>& mistakes) {
     std::vector<Scene> parsed;
-    for (const std::string& text : scenes) parsed.push_back(scene(text));
+    for (const std::string& text : scenes) {
+        parsed.push_back(scene(text));
+        // The error comes from the spread over seeds. Replicates within the film would only cost the samples their stratification.
+        if (parsed.back().sampler.replicates == 0) parsed.back().sampler.replicates = 1;
+    }
     const auto seeds = static_cast<std::size_t>(effort.seeds);
     std::vector<std::vector<Film>> films(seeds);
     std::vector<double> replicates(seeds);

@@ -70,7 +70,8 @@ public:
     /// Equivalence: the 99.9 % Student interval of the mean of `replicates` lies within ±delta · expected.
     void equivalent(const std::string& what, const std::vector<double>& replicates, double expected, double delta,
                     const std::vector<Mistake>& mistakes = {});
-    /// The same of `measure` over the films of several seeds, with as many samples as it takes.
+    /// The same of `measure` over the films of several seeds, with as many samples as it takes. A scene that does not name a number of replicates gets
+    /// one sequence.
     void estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected, double delta, const Effort& effort = {},
                   const std::vector<Mistake>& mistakes = {});
     void estimate(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
