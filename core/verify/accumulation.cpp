@@ -260,10 +260,11 @@ void noClamping(Context& context) {
     // One path in 2^17 brings 2^17: nothing may cut it down. One stratified number decides which, so that of 2^18 samples it is two; to know the share of
     // chance hits on a small lamp as well would take 1e10.
     const std::uint64_t samples = std::uint64_t{1} << 18;
-    context.estimate("fireflies keep their value", rareReflection(std::ldexp(1.0, 17)), meanRadiance, 1, 0.05, {.samples = samples, .most = 4 * samples},
-                     {{0, "values are clamped"}});
+    context.estimate("fireflies keep their value", rareReflection(std::ldexp(1.0, 17)), meanRadiance, 1, 0.05,
+                     {.samples = samples, .most = 4 * samples}, {{0, "values are clamped"}});
     // Whatever is cut at some value, and be it above 2^17, is not proportional to the lamp.
-    const Film dim = context.render(rareReflection(1), {.samples = samples}), bright = context.render(rareReflection(std::ldexp(1.0, 60)), {.samples = samples});
+    const Film dim = context.render(rareReflection(1), {.samples = samples}),
+               bright = context.render(rareReflection(std::ldexp(1.0, 60)), {.samples = samples});
     bool proportional = radiance(dim) > 0;
     for (std::uint32_t y = 0; y < dim.shape().height; ++y)
         for (std::uint32_t x = 0; x < dim.shape().width; ++x)
@@ -276,25 +277,32 @@ void noClamping(Context& context) {
 std::vector<Case> accumulationCases() {
     constexpr std::uint64_t samplers = kDirectLight | CRT_FEATURE_SOBOL | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_XORSHIFT;
     return {
-        row("I01", "constant-pixel", "2^10 and 2^20 samples of a constant (2^24 and 2^25 at merge, 2^27 at night)", "the constant", "a float sum stands still at 2^24", "1e-6", Level::Commit,
-            CRT_FEATURE_VIEW, constantPixel),
-        row("I02", "noisy-pixel", "2^20 independent samples of A03 (2^24 at merge, 2^27 at night)", "0.2394564705", "rectangle formula", "4σ/√n + 1e-6", Level::Commit,
-            kDirectLight | CRT_FEATURE_INDEPENDENT, noisyPixel),
-        row("I03", "high-indices", "Samples around number 2^31, 2^32, 2^40 and 2^52", "A03, by other samples than the first", "rectangle formula", "2 %", Level::Commit, samplers, highIndices),
-        row("I04", "merging", "Ranges of samples rendered apart and merged in any order", "the whole", "–", "same bits", Level::Commit, samplers, merging),
-        row("I05", "threads-and-tiles", "1, 2, 7 and 64 threads; tiles of 1, 8, 13 and 128", "one image", "–", "same bits", Level::Commit, kDirectLight, threadsAndTiles),
+        row("I01", "constant-pixel", "2^10 and 2^20 samples of a constant (2^24 and 2^25 at merge, 2^27 at night)", "the constant",
+            "a float sum stands still at 2^24", "1e-6", Level::Commit, CRT_FEATURE_VIEW, constantPixel),
+        row("I02", "noisy-pixel", "2^20 independent samples of A03 (2^24 at merge, 2^27 at night)", "0.2394564705", "rectangle formula",
+            "4σ/√n + 1e-6", Level::Commit, kDirectLight | CRT_FEATURE_INDEPENDENT, noisyPixel),
+        row("I03", "high-indices", "Samples around number 2^31, 2^32, 2^40 and 2^52", "A03, by other samples than the first", "rectangle formula",
+            "2 %", Level::Commit, samplers, highIndices),
+        row("I04", "merging", "Ranges of samples rendered apart and merged in any order", "the whole", "–", "same bits", Level::Commit, samplers,
+            merging),
+        row("I05", "threads-and-tiles", "1, 2, 7 and 64 threads; tiles of 1, 8, 13 and 128", "one image", "–", "same bits", Level::Commit,
+            kDirectLight, threadsAndTiles),
         row("I06", "seeds", "Seeds 0, 1, 2^32 and 2^63 − 1", "A03, with different noise", "rectangle formula", "2 %", Level::Commit, samplers, seeds),
         row("I07", "neighbours", "Noise of neighbouring pixels", "uncorrelated", "–", "|r| < 4/√n", Level::Commit, samplers, neighbours),
         row("I08", "streams", "Noise of neighbouring seeds", "uncorrelated", "numpy #16313", "|r| < 4/√n", Level::Commit, samplers, streams),
-        row("I09", "draws", "The numbers of 131072 pixels in six dimensions of every sampler", "uniform and uncorrelated", "Kolmogorov and Smirnov", "p > 1e-4 over all tests", Level::Commit, 0,
-            draws),
-        row("I10", "residuals", "Noise of two seeds, and of two ranges of samples", "uncorrelated", "–", "|r| < 4/√n", Level::Commit, samplers, residuals),
-        row("I11", "sobol", "Elementary intervals of Sobol points, also beyond 2^32 and in dimension 4001; prefixes of 3, 100 and 1000", "one point in each; unbiased",
-            "Sobol', Owen", "exactly; ± 1 %", Level::Commit, kDirectLight | CRT_FEATURE_SOBOL, sobol),
-        row("I12", "coverage", "95 % intervals of 400 pixels from 16 scrambles each", "cover the truth in 90 to 98 %", "Student", "0.94 ± 0.04", Level::Commit, samplers, coverage),
-        row("I13", "infinite-samples", "Radiance 1e37, which rare wavelengths weigh beyond single precision", "infinite samples are dropped and counted", "–", "finite", Level::Commit, kDirectLight, infiniteSamples),
-        row("I14", "no-clamping", "One path in 2^17 that brings 2^17, and a lamp 2^60 times as bright", "mean 1; the image times 2^60", "Fresnel's equations; powers of two round nothing", "± 5 %; same bits", Level::Merge,
-            CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT, noClamping),
+        row("I09", "draws", "The numbers of 131072 pixels in six dimensions of every sampler", "uniform and uncorrelated", "Kolmogorov and Smirnov",
+            "p > 1e-4 over all tests", Level::Commit, 0, draws),
+        row("I10", "residuals", "Noise of two seeds, and of two ranges of samples", "uncorrelated", "–", "|r| < 4/√n", Level::Commit, samplers,
+            residuals),
+        row("I11", "sobol", "Elementary intervals of Sobol points, also beyond 2^32 and in dimension 4001; prefixes of 3, 100 and 1000",
+            "one point in each; unbiased", "Sobol', Owen", "exactly; ± 1 %", Level::Commit, kDirectLight | CRT_FEATURE_SOBOL, sobol),
+        row("I12", "coverage", "95 % intervals of 400 pixels from 16 scrambles each", "cover the truth in 90 to 98 %", "Student", "0.94 ± 0.04",
+            Level::Commit, samplers, coverage),
+        row("I13", "infinite-samples", "Radiance 1e37, which rare wavelengths weigh beyond single precision",
+            "infinite samples are dropped and counted", "–", "finite", Level::Commit, kDirectLight, infiniteSamples),
+        row("I14", "no-clamping", "One path in 2^17 that brings 2^17, and a lamp 2^60 times as bright", "mean 1; the image times 2^60",
+            "Fresnel's equations; powers of two round nothing", "± 5 %; same bits", Level::Merge, CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT,
+            noClamping),
     };
 }
 

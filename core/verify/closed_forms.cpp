@@ -263,8 +263,8 @@ void glowingCeiling(Context& context) {
         for (const auto& [depth, expected] : depths) {
             const bool cheap = (p.camera == kFloorQuarter && depth == 2) || (p.camera == kWallCentre && depth == 10);
             if (!context.atLeast(Level::Merge) && !cheap) continue;
-            context.estimate(fmt::format("{}, depth {}", p.where, depth), scene(p.camera, fmt::format("{{max_depth: {}, roulette: false}}", depth)), meanRadiance,
-                             expected, 0.002, {.samples = 1024, .most = 16384});
+            context.estimate(fmt::format("{}, depth {}", p.where, depth), scene(p.camera, fmt::format("{{max_depth: {}, roulette: false}}", depth)),
+                             meanRadiance, expected, 0.002, {.samples = 1024, .most = 16384});
         }
     }
     if (!context.atLeast(Level::Merge)) return;
@@ -377,10 +377,12 @@ public:
         for (int band = 0; band < kBands; ++band) {
             std::string positions, faces;
             for (int side = 0; side < kSides; ++side) {
-                for (const Vec3d& v : facet(band, side)) positions += fmt::format("{}[{:.9g},{:.9g},{:.9g}]", positions.empty() ? "" : ",", v[0], v[1], v[2]);
+                for (const Vec3d& v : facet(band, side))
+                    positions += fmt::format("{}[{:.9g},{:.9g},{:.9g}]", positions.empty() ? "" : ",", v[0], v[1], v[2]);
                 faces += fmt::format("{}[{},{},{},{}]", side == 0 ? "" : ",", 4 * side, 4 * side + 1, 4 * side + 2, 4 * side + 3);
             }
-            stage.mesh(fmt::format("band{}", band), "[" + positions + "]", "[" + faces + "]", "black", fmt::format("{:.17g}, two_sided: true", radianceOf(band)));
+            stage.mesh(fmt::format("band{}", band), "[" + positions + "]", "[" + faces + "]", "black",
+                       fmt::format("{:.17g}, two_sided: true", radianceOf(band)));
         }
     }
     /// Irradiance over π at the origin.
@@ -421,11 +423,14 @@ void directionalSky(Context& context) {
         const double expected = 0.5 * sky.irradiance(f.normal);
         context.relative(fmt::format("{}: bands against the integral over the hemisphere", f.name), expected, f.limit, 0.005);
         for (const bool nee : {false, true}) {
-            Stage stage(fmt::format("{{position: {}, target: [0, 0, 0], up: [0, 0, 1], fov: 0.01}}", f.eye), fmt::format("{{max_depth: 1, roulette: false, nee: {}}}", nee));
-            stage.material("grey", "{type: diffuse, reflectance: 0.5}").material("black", "{type: diffuse, reflectance: 0}").quad("receiver", f.receiver, "grey");
+            Stage stage(fmt::format("{{position: {}, target: [0, 0, 0], up: [0, 0, 1], fov: 0.01}}", f.eye),
+                        fmt::format("{{max_depth: 1, roulette: false, nee: {}}}", nee));
+            stage.material("grey", "{type: diffuse, reflectance: 0.5}")
+                .material("black", "{type: diffuse, reflectance: 0}")
+                .quad("receiver", f.receiver, "grey");
             sky.addTo(stage);
-            context.estimate(fmt::format("{}{}", f.name, nee ? ", with light sampling" : ""), stage.yaml(), meanRadiance, expected, 0.001, {.samples = 1024, .most = 16384},
-                             {{0.5, "the sky's mean: is every direction given the same radiance?"}});
+            context.estimate(fmt::format("{}{}", f.name, nee ? ", with light sampling" : ""), stage.yaml(), meanRadiance, expected, 0.001,
+                             {.samples = 1024, .most = 16384}, {{0.5, "the sky's mean: is every direction given the same radiance?"}});
         }
     }
 }

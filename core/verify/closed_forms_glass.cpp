@@ -305,14 +305,16 @@ void prism(Context& context) {
         const Vec2 from = p.screen + p.along * edge, to = p.screen + p.along * 0.4;
         const Vec2 eye = p.entry + p.axis * -2.0;
         const double h = std::sqrt(0.75);
-        return Stage(fmt::format("{{position: [{:.17g},{:.17g},0], target: [{:.17g},{:.17g},0], up: [0,0,-1], {}}}", eye.x, eye.y, p.entry.x, p.entry.y, kBeam),
+        return Stage(fmt::format("{{position: [{:.17g},{:.17g},0], target: [{:.17g},{:.17g},0], up: [0,0,-1], {}}}", eye.x, eye.y, p.entry.x,
+                                 p.entry.y, kBeam),
                      "{max_depth: 2, roulette: false}")
             .material("glass", "{type: dielectric, ior: {glass: N-BK7}}")
             .material("black", "{type: diffuse, reflectance: 0}")
             .mesh("prism", fmt::format("[[-0.5,0,-1],[0.5,0,-1],[0,{0:.17g},-1],[-0.5,0,1],[0.5,0,1],[0,{0:.17g},1]]", h),
                   "[[0,2,1],[3,4,5],[0,1,4,3],[1,2,5,4],[2,0,3,5]]", "glass")
             .quad("lamp",
-                  fmt::format("[[{0:.17g},{1:.17g},-0.1],[{2:.17g},{3:.17g},-0.1],[{2:.17g},{3:.17g},0.1],[{0:.17g},{1:.17g},0.1]]", from.x, from.y, to.x, to.y),
+                  fmt::format("[[{0:.17g},{1:.17g},-0.1],[{2:.17g},{3:.17g},-0.1],[{2:.17g},{3:.17g},0.1],[{0:.17g},{1:.17g},0.1]]", from.x, from.y,
+                              to.x, to.y),
                   "black", Band(line_nm).yaml() + ", two_sided: true")
             .yaml();
     };
@@ -320,7 +322,11 @@ void prism(Context& context) {
         const char* name;
         double nm, deviation;
     };
-    for (const Line& line : {Line{"d", 587.5618, 38.6466985}, {"F", 486.1327, 39.1390498}, {"C", 656.2725, 38.4293164}, {"400 nm", 400, 39.8956926}, {"700 nm", 700, 38.3192326}}) {
+    for (const Line& line : {Line{"d", 587.5618, 38.6466985},
+                             {"F", 486.1327, 39.1390498},
+                             {"C", 656.2725, 38.4293164},
+                             {"400 nm", 400, 39.8956926},
+                             {"700 nm", 700, 38.3192326}}) {
         if (line.nm != 587.5618 && !context.atLeast(Level::Merge)) continue;
         const double index = sellmeierBk7(line.nm);
         context.absolute(fmt::format("{}: deviation by Snell's law, degrees", line.name), p.deviation(index), line.deviation, 1e-6);
@@ -349,7 +355,8 @@ std::vector<Case> glassCases() {
          .run = clearBody},
         {.id = "A11",
          .name = "reflectance",
-         .title = "Reflectance of an interface: 0°, Brewster's angle, 60°, 89.9°, the critical angle, diffuse light (from merge on); n = 1.5, 2.4, 100",
+         .title =
+             "Reflectance of an interface: 0°, Brewster's angle, 60°, 89.9°, the critical angle, diffuse light (from merge on); n = 1.5, 2.4, 100",
          .expected = "0.04, 0.073964497, 0.089186713, 0.98991188, exactly 1 beyond 41.810315°; 0.16955017, 0.96078816",
          .source = "Fresnel's equations; diffuse averages by quadrature",
          .tolerance = "± 1e-6 without variance, ± 0.1 % with; 2e-6 for total reflection",

@@ -101,7 +101,8 @@ void sodium(Context& context) {
     const Image image = resolveImage(film, scene, 0);
     const double scale = cieYIntegral();
     const Vec3d xyz = integrate([](double nm) { return std::max(0.0, 1 - std::abs(nm - 589)); }, 588, 590, 0.01);
-    constexpr std::array<Vec3d, 3> kToSrgb{{{3.2409699, -1.5373832, -0.4986108}, {-0.9692436, 1.8759675, 0.0415551}, {0.0556301, -0.2039770, 1.0569715}}};
+    constexpr std::array<Vec3d, 3> kToSrgb{
+        {{3.2409699, -1.5373832, -0.4986108}, {-0.9692436, 1.8759675, 0.0415551}, {0.0556301, -0.2039770, 1.0569715}}};
     for (std::size_t c = 0; c < 3; ++c) {
         const double expected = (kToSrgb[c][0] * xyz[0] + kToSrgb[c][1] * xyz[1] + kToSrgb[c][2] * xyz[2]) * scale;
         context.absolute(fmt::format("linear sRGB {} of a unit line", "RGB"[c]), image.pixels[c] * scale, expected, 0.001,
@@ -259,9 +260,10 @@ void spectralBins(Context& context) {
         const int from = 390 + 5 * bin;
         const auto glow = [&](double nm) { return std::clamp(std::min(nm - from, from + 5 - nm), 0.0, 1.0); };
         const Vec3d xyz = integrate(glow, from, from + 5);
-        const std::string yaml = fmt::format("crt: 1\nfilm: {{resolution: [4, 4]}}\nsampler: {{type: independent}}\n"
-                                             "environment: {{radiance: {{table: {{nm: [{}, {}, {}, {}], value: [0, 1, 1, 0]}}, outside: zero}}}}\n",
-                                             from, from + 1, from + 4, from + 5);
+        const std::string yaml = fmt::format(
+            "crt: 1\nfilm: {{resolution: [4, 4]}}\nsampler: {{type: independent}}\n"
+            "environment: {{radiance: {{table: {{nm: [{}, {}, {}, {}], value: [0, 1, 1, 0]}}, outside: zero}}}}\n",
+            from, from + 1, from + 4, from + 5);
         std::vector<double> ratios;
         for (int seed = 0; seed < seeds; ++seed) {
             const Vec3d found = xyzOf(context.render(yaml, {.samples = 4096, .seed = 1 + static_cast<std::uint64_t>(seeds * bin + seed)}));
@@ -296,24 +298,30 @@ std::vector<Case> colourCases() {
     constexpr std::uint64_t patch = CRT_FEATURE_DIFFUSE | CRT_FEATURE_ENVIRONMENT;
     constexpr std::uint64_t glass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ENVIRONMENT;
     return {
-        row("H01", "lines", "A line at 589 nm of half width 10, 5 and 1 nm, 4096 samples", "its luminance", "quadrature of 0.01 nm", "± 0.2 %", Level::Commit, kLamp, spectralLines),
-        row("H02", "lines-off-grid", "Lines of half width 0.4 to 0.005 nm, on the 1 nm grid and off it", "their power and mean wavelength", "area of a triangle",
-            "1e-4; ± 0.001 nm; Y ± 0.2 %", Level::Commit, kLamp, linesOffTheGrid),
-        row("H03", "sodium", "A line at 589 nm in the file", "x, y = 0.5690, 0.4303; linear sRGB 2.116, 0.456, −0.099 times its power", "CIE 1931 table, quadrature of 0.01 nm; IEC 61966-2-1",
-            "± 0.002; ± 0.001", Level::Commit, kLamp, sodium),
-        row("H04", "fluorescent", "F11, and F11 read off every 5, 10 and 20 nm", "XYZ", "trapezoids of 0.1 nm", "1e-3", Level::Commit, kLamp, fluorescent),
-        row("H05", "metamers", "Two reflectances that are one under D65 and two under a line at 589 nm", "no colour difference; the ratio of reflectances at 589 nm",
-            "orthogonal to D65 times the observer", "ΔE*ab < 0.1; ± 0.3 %", Level::Commit, patch, metamers),
-        row("H06", "lasers", "Lines at 450, 532 and 638 nm", "chromaticities of the spectral locus", "CIE 1931 table", "± 0.002", Level::Commit, kLamp, lasers),
-        row("H07", "equal-energy", "Radiance 1 at all wavelengths", "X, Y, Z of the tables' integrals", "CIE 15, 1 nm tables", "1e-5; 1e-4 for the tables", Level::Commit, kLamp, equalEnergy),
-        row("H08", "hero-wavelength", "A clear dispersive cube in the light of illuminant A: N-BK7, diamond, hardly any dispersion", "the bare light's X, Y and Z", "conservation of radiance",
-            "± 0.5 %", Level::Merge, glass | CRT_FEATURE_DISPERSION, heroWavelength),
-        row("H09", "needless-dispersion", "A constant index written as a table or a formula", "the image of the number 1.5, by a kernel without dispersion", "–", "same bits",
-            Level::Commit, glass, needlessDispersion),
-        row("H10", "spectral-bins", "Worlds that glow in one of 64 bins of 5 nm; an output of spectral bins", "each bin's power, errors without a pattern; the output is refused",
-            "quadrature of 0.01 nm; pbrt-v4 #424", "p > 1e-3", Level::Merge, CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_INDEPENDENT, spectralBins),
-        row("H11", "tables", "Tables that end early, are unsorted, have one sample, reach beyond 360 to 830 nm", "refused, or as documented", "docs/scene.md", "same bits", Level::Commit,
-            kLamp, tables),
+        row("H01", "lines", "A line at 589 nm of half width 10, 5 and 1 nm, 4096 samples", "its luminance", "quadrature of 0.01 nm", "± 0.2 %",
+            Level::Commit, kLamp, spectralLines),
+        row("H02", "lines-off-grid", "Lines of half width 0.4 to 0.005 nm, on the 1 nm grid and off it", "their power and mean wavelength",
+            "area of a triangle", "1e-4; ± 0.001 nm; Y ± 0.2 %", Level::Commit, kLamp, linesOffTheGrid),
+        row("H03", "sodium", "A line at 589 nm in the file", "x, y = 0.5690, 0.4303; linear sRGB 2.116, 0.456, −0.099 times its power",
+            "CIE 1931 table, quadrature of 0.01 nm; IEC 61966-2-1", "± 0.002; ± 0.001", Level::Commit, kLamp, sodium),
+        row("H04", "fluorescent", "F11, and F11 read off every 5, 10 and 20 nm", "XYZ", "trapezoids of 0.1 nm", "1e-3", Level::Commit, kLamp,
+            fluorescent),
+        row("H05", "metamers", "Two reflectances that are one under D65 and two under a line at 589 nm",
+            "no colour difference; the ratio of reflectances at 589 nm", "orthogonal to D65 times the observer", "ΔE*ab < 0.1; ± 0.3 %",
+            Level::Commit, patch, metamers),
+        row("H06", "lasers", "Lines at 450, 532 and 638 nm", "chromaticities of the spectral locus", "CIE 1931 table", "± 0.002", Level::Commit,
+            kLamp, lasers),
+        row("H07", "equal-energy", "Radiance 1 at all wavelengths", "X, Y, Z of the tables' integrals", "CIE 15, 1 nm tables",
+            "1e-5; 1e-4 for the tables", Level::Commit, kLamp, equalEnergy),
+        row("H08", "hero-wavelength", "A clear dispersive cube in the light of illuminant A: N-BK7, diamond, hardly any dispersion",
+            "the bare light's X, Y and Z", "conservation of radiance", "± 0.5 %", Level::Merge, glass | CRT_FEATURE_DISPERSION, heroWavelength),
+        row("H09", "needless-dispersion", "A constant index written as a table or a formula",
+            "the image of the number 1.5, by a kernel without dispersion", "–", "same bits", Level::Commit, glass, needlessDispersion),
+        row("H10", "spectral-bins", "Worlds that glow in one of 64 bins of 5 nm; an output of spectral bins",
+            "each bin's power, errors without a pattern; the output is refused", "quadrature of 0.01 nm; pbrt-v4 #424", "p > 1e-3", Level::Merge,
+            CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_INDEPENDENT, spectralBins),
+        row("H11", "tables", "Tables that end early, are unsorted, have one sample, reach beyond 360 to 830 nm", "refused, or as documented",
+            "docs/scene.md", "same bits", Level::Commit, kLamp, tables),
     };
 }
 

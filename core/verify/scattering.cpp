@@ -251,7 +251,8 @@ void roughLimit(Context& context) {
     roughnessIsRefused(context, "conductor, eta: 1.5, k: 0", {1e-4});
     roughnessIsRefused(context, "dielectric, ior: 1.5", {1e-4});
     for (const char* type : {"rough_conductor", "rough_dielectric", "ggx"})
-        context.refused(fmt::format("a material of type {}", type), fmt::format("crt: 1\nmaterials: {{rough: {{type: {}}}}}\n", type), "diffuse, mirror, conductor, dielectric");
+        context.refused(fmt::format("a material of type {}", type), fmt::format("crt: 1\nmaterials: {{rough: {{type: {}}}}}\n", type),
+                        "diffuse, mirror, conductor, dielectric");
 }
 
 }  // namespace
@@ -260,27 +261,31 @@ std::vector<Case> scatteringCases() {
     constexpr std::uint64_t light = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT;
     constexpr std::uint64_t sky = CRT_FEATURE_ENVIRONMENT;
     return {
-        row("G01", "cosine-law", "Scattered directions of a diffuse surface, counted in 72 cells of a dome; a roughness of 1 to 1e-4", "shares by Lambert's formula; roughness is refused", "Lambert's formula; χ²",
-            "p > 1e-3",
-            Level::Merge, light | CRT_FEATURE_INDEPENDENT, lambertDirections),
-        row("G02", "pdf", "A white floor in a glowing room, with and without light sampling", "1: the weights of both techniques add up", "normalisation", "± 0.1 %", Level::Commit,
-            light | CRT_FEATURE_NEE, pdfIntegrates),
-        row("G03", "white-furnace", "A flat surface in a constant environment at 0°, 60° and 89.9°: diffuse, mirror, conductor", "1, 1, Fresnel's reflectance for n + ik",
-            "conservation of energy; Fresnel's equations in complex double", "2e-6; 1e-5", Level::Commit, sky | CRT_FEATURE_DIFFUSE | CRT_FEATURE_CONDUCTOR, whiteFurnaces),
-        row("G04", "reciprocity", "A ray into glass and the same way back, at four angles", "n⁴ between the two", "f(i,o)/nᵢ² = f(o,i)/nₒ²", "1e-4", Level::Commit,
-            CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT, reciprocity),
-        row("G05", "rough-peak", "A metal of roughness 1e-3 to 1e-4, where microfacet distributions lose their precision", "refused: there are no rough surfaces", "docs/scene.md", "refused",
-            Level::Commit, 0, roughPeak),
-        row("G06", "rough-limit", "Roughness that goes to 0; rough materials", "refused: there are no rough surfaces", "docs/scene.md", "refused", Level::Commit, 0, roughLimit),
-        row("G07", "indices", "A clear cube of n = 1, 1 + 1e-7, 1.001, 1.5, 2.4, 100, 1000 in a constant environment", "it vanishes; for n = 1 to the bit; 10000 is refused",
-            "conservation of radiance over n²", "2e-4 in every pixel; same bits", Level::Commit, sky | CRT_FEATURE_DIELECTRIC, indices),
-        row("G08", "extreme-numbers", "Random numbers at the ends of their range in every scattering routine", "finite, or rejected", "a pdf of 0 becomes NaN (pbrt-v4 #313)",
-            "none", Level::Commit, 0, extremeNumbers),
-        row("G09", "below-one", "Words to numbers", "above 0, below 1, mean ½, mean square ⅓", "arithmetic", "1e-9", Level::Commit, 0, wordsToNumbers),
-        row("G10", "albedo-range", "Albedo 0, 1, 1 + 1e-7, negative, NaN", "black; all of the light; the others are refused", "docs/scene.md", "exactly; 2e-6", Level::Commit,
-            sky | CRT_FEATURE_DIFFUSE, albedoRange),
-        row("G11", "view-angles", "A03 seen from 30° to 89.9° off the normal, from above and from below", "0.2394564705 always", "Lambert's law has no angle of view", "± 0.2 %",
-            Level::Commit, light | CRT_FEATURE_NEE, viewAngles),
+        row("G01", "cosine-law", "Scattered directions of a diffuse surface, counted in 72 cells of a dome; a roughness of 1 to 1e-4",
+            "shares by Lambert's formula; roughness is refused", "Lambert's formula; χ²", "p > 1e-3", Level::Merge, light | CRT_FEATURE_INDEPENDENT,
+            lambertDirections),
+        row("G02", "pdf", "A white floor in a glowing room, with and without light sampling", "1: the weights of both techniques add up",
+            "normalisation", "± 0.1 %", Level::Commit, light | CRT_FEATURE_NEE, pdfIntegrates),
+        row("G03", "white-furnace", "A flat surface in a constant environment at 0°, 60° and 89.9°: diffuse, mirror, conductor",
+            "1, 1, Fresnel's reflectance for n + ik", "conservation of energy; Fresnel's equations in complex double", "2e-6; 1e-5", Level::Commit,
+            sky | CRT_FEATURE_DIFFUSE | CRT_FEATURE_CONDUCTOR, whiteFurnaces),
+        row("G04", "reciprocity", "A ray into glass and the same way back, at four angles", "n⁴ between the two", "f(i,o)/nᵢ² = f(o,i)/nₒ²", "1e-4",
+            Level::Commit, CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT, reciprocity),
+        row("G05", "rough-peak", "A metal of roughness 1e-3 to 1e-4, where microfacet distributions lose their precision",
+            "refused: there are no rough surfaces", "docs/scene.md", "refused", Level::Commit, 0, roughPeak),
+        row("G06", "rough-limit", "Roughness that goes to 0; rough materials", "refused: there are no rough surfaces", "docs/scene.md", "refused",
+            Level::Commit, 0, roughLimit),
+        row("G07", "indices", "A clear cube of n = 1, 1 + 1e-7, 1.001, 1.5, 2.4, 100, 1000 in a constant environment",
+            "it vanishes; for n = 1 to the bit; 10000 is refused", "conservation of radiance over n²", "2e-4 in every pixel; same bits",
+            Level::Commit, sky | CRT_FEATURE_DIELECTRIC, indices),
+        row("G08", "extreme-numbers", "Random numbers at the ends of their range in every scattering routine", "finite, or rejected",
+            "a pdf of 0 becomes NaN (pbrt-v4 #313)", "none", Level::Commit, 0, extremeNumbers),
+        row("G09", "below-one", "Words to numbers", "above 0, below 1, mean ½, mean square ⅓", "arithmetic", "1e-9", Level::Commit, 0,
+            wordsToNumbers),
+        row("G10", "albedo-range", "Albedo 0, 1, 1 + 1e-7, negative, NaN", "black; all of the light; the others are refused", "docs/scene.md",
+            "exactly; 2e-6", Level::Commit, sky | CRT_FEATURE_DIFFUSE, albedoRange),
+        row("G11", "view-angles", "A03 seen from 30° to 89.9° off the normal, from above and from below", "0.2394564705 always",
+            "Lambert's law has no angle of view", "± 0.2 %", Level::Commit, light | CRT_FEATURE_NEE, viewAngles),
     };
 }
 
