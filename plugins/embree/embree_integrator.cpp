@@ -83,9 +83,6 @@ std::uint32_t EmbreeIntegrator::tileSize(const CrtRenderRange& range) const {
 }
 
 bool EmbreeIntegrator::render(const CrtRenderRange& range) {
-    if (program_ == nullptr) throw plugin::PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
-    if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 > scene().width || range.y1 > scene().height)
-        throw plugin::PluginError(CRT_INVALID_ARGUMENT, "the rectangle to render is not within the film");
     const auto start = Clock::now();
     const std::uint32_t size = tileSize(range);
     const std::uint32_t columns = (range.x1 - range.x0 + size - 1) / size;
@@ -136,8 +133,6 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
 }
 
 void EmbreeIntegrator::readFilm(const CrtFilmView& film) {
-    if (program_ == nullptr || film.width != scene().width || film.height != scene().height || film.channels != scene().channels)
-        throw plugin::PluginError(CRT_INVALID_ARGUMENT, "the film view has another shape than the scene's film");
     std::copy(sums_.begin(), sums_.end(), film.sums);
     std::copy(counts_.begin(), counts_.end(), film.counts);
     if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);
