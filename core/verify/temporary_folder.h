@@ -20,7 +20,7 @@ class TemporaryFolder {
 public:
     /// Throws crt::Error(Output) when `parent` takes no folder.
     explicit TemporaryFolder(const std::filesystem::path& parent = std::filesystem::temp_directory_path()) {
-        std::string pattern = (parent / "crt-XXXXXX").string();
+        std::string pattern = (parent / ("crt-" + std::string(6, 'X'))).string();  // mkdtemp puts its own six letters for the last six.
         if (::mkdtemp(pattern.data()) == nullptr)
             throw Error(ErrorKind::Output, fmt::format("cannot make a folder in '{}': {}", parent.string(), std::strerror(errno)));
         path_ = pattern;

@@ -6,24 +6,23 @@
 
 namespace {
 
-const crt::fuzz::Directory& directory() {
-    static const crt::fuzz::Directory place = [] {
-        const crt::fuzz::Directory d;
-        d.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
-        d.write("a.mtl", "newmtl m\nKd .5 .5 .5\nKe 1 1 1\n");
-        d.write("a.spd", "300 0.2\n900 0.8\n");
-        return d;
-    }();
-    return place;
-}
+/// Where the scene file is said to lie.
+struct Neighbours : crt::fuzz::Directory {
+    Neighbours() {
+        write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
+        write("a.mtl", "newmtl m\nKd .5 .5 .5\nKe 1 1 1\n");
+        write("a.spd", "300 0.2\n900 0.8\n");
+    }
+};
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace crt;
+    static const Neighbours neighbours;
     const std::string text(reinterpret_cast<const char*>(data), size);
     fuzz::expectRefusalOrSuccess(ErrorKind::Scene, [&] {
-        const Scene scene = parseScene(text, "scene.yaml", directory().path());
+        const Scene scene = parseScene(text, "scene.yaml", neighbours.path());
         const CompiledScene compiled = compileScene(scene, kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive);
         if (compiled.hash.size() != 32 || compiled.size_bytes > compiled.blob.size() * sizeof(CompiledScene::Line))
             fuzz::finding("compiled scene", "is not what its sizes say");

@@ -3,13 +3,13 @@
 
 #include "error.h"
 #include "log.h"
+#include "verify/temporary_folder.h"
 
-#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -39,20 +39,15 @@ void expectRefusalOrSuccess(ErrorKind refusal, Body&& body) {
     }
 }
 
-/// A directory in memory where this process keeps the files of one run; left to the system's cleaning, being a few kilobytes.
+/// A directory, in memory where there is one, where this process keeps the files of one run.
 class Directory {
 public:
-    Directory() {
+    Directory() : folder_(::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm") : std::filesystem::temp_directory_path()) {
         setLogLevel(LogLevel::Off);
-        for (const char* parent : {"/dev/shm", "/tmp"}) {
-            path_ = std::string(parent) + "/crt-fuzz-XXXXXX";
-            if (::mkdtemp(path_.data()) != nullptr) return;
-        }
-        finding("no place for files", std::strerror(errno));
     }
 
-    std::string file(const char* name) const { return path_ + "/" + name; }
-    const std::string& path() const { return path_; }
+    std::string file(const char* name) const { return folder_ / name; }
+    std::string path() const { return folder_.path(); }
 
     /// Overwrites a file and returns its path.
     std::string write(const char* name, const void* bytes, std::size_t size) const {
@@ -65,7 +60,7 @@ public:
     std::string write(const char* name, std::string_view text) const { return write(name, text.data(), text.size()); }
 
 private:
-    std::string path_;
+    verify::TemporaryFolder folder_;
 };
 
 }  // namespace crt::fuzz
