@@ -259,7 +259,7 @@ private:
         if (next.object != one.object || next.emission != one.emission) return std::nullopt;
         for (std::size_t corner = 0; corner < 3; ++corner) {
             const Vec3d o = vertexOf(i, corner), a = vertexOf(i, (corner + 1) % 3), b = vertexOf(i, (corner + 2) % 3);
-            const Vec3d across{a[0] + b[0] - o[0], a[1] + b[1] - o[1], a[2] + b[2] - o[2]};
+            const Vec3d across = a + b - o;
             for (std::size_t v = 0; v < 3; ++v) {
                 // Turned the same way round: across, b, a.
                 const Vec3d gap = vertexOf(i + 1, v) - across;

@@ -329,8 +329,8 @@ private:
     void addBackendComparison(CLI::App& compare) {
         const char* group = kBackendGroup;
         BackendComparisonOptions& options = compare_.backends;
-        CLI::Option* backends = reader_.option(compare, "--backends", "X,Y",
-                                               "render scene A with each; the last is what the others are compared with", [&options](const std::string& text) { options.backends = parseList(text, "--backends"); });
+        CLI::Option* backends = reader_.option(compare, "--backends", "X,Y", "render scene A with each; the last is what the others are compared with",
+                                               [&options](const std::string& text) { options.backends = parseList(text, "--backends"); });
         backends->group(group);
         reader_.option(compare, "--spp", "N", "samples per pixel of each render (so many that all replicates have the scene's)",
                        [&options](const std::string& text) { options.samples = parseCount(text, "--spp", 1); })

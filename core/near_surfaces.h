@@ -13,9 +13,8 @@ struct NearSurfaces {
     double nearest_clearance = 0;  ///< The largest clearance that was too large for its neighbour, in the author's units.
 };
 
-/// From the middle of each triangle along its normal, to both sides. Surfaces within a few ulp of each other touch, as a box does that stands on a
-/// floor;
-/// that is what an author means, and is safe.
+/// From the middle of each triangle along its normal, to both sides. Surfaces within a few ulp of each other touch, as a box does that stands
+/// on a floor; that is what an author means, and is safe.
 NearSurfaces findNearSurfaces(const CompiledScene& scene);
 
 }  // namespace crt

@@ -46,8 +46,8 @@ struct SamplingResult {
 std::uint64_t nextTargetCheck(std::uint64_t samples);
 
 /// Whether half_width_95 is at most `target`. Only even replicates are asked, so that odd ones can judge the result (estimateError) without having
-/// chosen it. They are not believed with fewer degrees of freedom than one pixel has from 1024 samples on: two replicates of one pixel now and then agree by chance,
-/// and who stops whenever they do stops at bad images.
+/// chosen it. They are not believed with fewer degrees of freedom than one pixel has from 1024 samples on: two replicates of one pixel now and
+/// then agree by chance, and who stops whenever they do stops at bad images.
 bool reachesTarget(const Film& film, double target);
 
 /// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at most a small part of the run

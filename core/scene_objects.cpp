@@ -10,7 +10,6 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
-#include <set>
 
 namespace crt {
 namespace {
@@ -279,7 +278,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
         Vec3d sum{};
         for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
             areas.push_back(cross(mesh.positions[polygon[i]] - apex, mesh.positions[polygon[i + 1]] - apex));
-            for (std::size_t c = 0; c < 3; ++c) sum[c] += areas.back()[c];
+            sum = sum + areas.back();
         }
         constexpr double kRounding = 1e-9;
         for (std::size_t i = 0; i < areas.size(); ++i) {

@@ -37,49 +37,43 @@ Spectrum resample(const std::vector<double>& x, const std::vector<double>& y, Ou
     return s;
 }
 
-/// Where a table has knots between two nanometres, reading it off at the nanometres would lose or invent lines that are narrower than that. There each
-/// node gets ∫ f·(its share of the linear interpolation) instead, so that integral and mean wavelength are the table's. A cell without inner knots is
-/// linear already and keeps its values; nothing leaves the range of the table's values.
+/// Where a table has knots between two nanometres, reading it off at the nanometres would lose or invent lines that are narrower than
+/// that. There each node gets ∫ f·(its share of the linear interpolation) instead, so that integral and mean wavelength are the table's. A
+/// cell without inner knots is linear already and keeps its values; nothing leaves the range of the table's values.
 void conserveFineDetail(const std::vector<double>& x, const std::vector<double>& y, Spectrum& s) {
     const Spectrum read_off = s;
-    const auto cells = static_cast<int>(s.values.size()) - 1;
-    const auto at = [&](double w) {  // of the table; w lies between its first and last knot
-        const auto right = static_cast<std::size_t>(std::lower_bound(x.begin(), x.end(), w) - x.begin());
-        if (x[right] == w) return y[right];
-        return y[right - 1] + (w - x[right - 1]) / (x[right] - x[right - 1]) * (y[right] - y[right - 1]);
-    };
+    const std::size_t cells = s.values.size() - 1;
     // Twice what a cell gives to the node at each end.
     std::vector<double> to_left(s.values.size()), to_right(s.values.size());
     bool fine = false;
-    for (int i = 0; i < cells; ++i) {
-        const double lower = wavelengthAt(static_cast<std::size_t>(i)), upper = lower + 1;
-        std::vector<double> knots{lower};
-        for (auto k = std::upper_bound(x.begin(), x.end(), lower); k != x.end() && *k < upper; ++k) knots.push_back(*k);
-        knots.push_back(upper);
+    struct Knot {
+        double nm, value;
+    };
+    for (std::size_t i = 0; i < cells; ++i) {
+        const double lower = wavelengthAt(i), upper = lower + 1;
+        std::vector<Knot> knots{{lower, read_off[i]}};
+        for (auto k = static_cast<std::size_t>(std::upper_bound(x.begin(), x.end(), lower) - x.begin()); k < x.size() && x[k] < upper; ++k)
+            knots.push_back({x[k], y[k]});
+        knots.push_back({upper, read_off[i + 1]});
         double left = 0, right = 0;
         if (knots.size() == 2) {
-            left = read_off[static_cast<std::size_t>(i)];
-            right = read_off[static_cast<std::size_t>(i) + 1];
+            left = read_off[i];
+            right = read_off[i + 1];
         } else {
             fine = true;
-            const auto value = [&](double w) {
-                if (w < x.front()) return w == lower ? read_off[static_cast<std::size_t>(i)] : 0.0;
-                if (w > x.back()) return w == upper ? read_off[static_cast<std::size_t>(i) + 1] : 0.0;
-                return at(w);
-            };
             for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
-                // f linear from a to b between t0 and t1 of the cell: ∫ f (1 − t) and ∫ f t by Simpson's rule, which is exact for parabolas. Between the
-                // table's end and a nanometre, f is what the table is continued by.
-                double a = value(knots[k]), b = value(knots[k + 1]);
-                if (knots[k + 1] == x.front()) b = a;
-                if (knots[k] == x.back()) a = b;
-                const double t0 = knots[k] - lower, t1 = knots[k + 1] - lower, middle = 0.5 * (t0 + t1), sixth = (t1 - t0) / 6;
+                // f linear from a to b between t0 and t1 of the cell: ∫ f (1 − t) and ∫ f t by Simpson's rule, which is exact for
+                // parabolas. Between the table's end and a nanometre, f is what the table is continued by.
+                double a = knots[k].value, b = knots[k + 1].value;
+                if (knots[k + 1].nm == x.front()) b = a;
+                if (knots[k].nm == x.back()) a = b;
+                const double t0 = knots[k].nm - lower, t1 = knots[k + 1].nm - lower, middle = 0.5 * (t0 + t1), sixth = (t1 - t0) / 6;
                 left += 2 * sixth * (a * (1 - t0) + 2 * (a + b) * (1 - middle) + b * (1 - t1));
                 right += 2 * sixth * (a * t0 + 2 * (a + b) * middle + b * t1);
             }
         }
-        to_left[static_cast<std::size_t>(i)] = left;
-        to_right[static_cast<std::size_t>(i) + 1] = right;
+        to_left[i] = left;
+        to_right[i + 1] = right;
     }
     if (!fine) return;
     to_right.front() = read_off.values.front();

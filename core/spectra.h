@@ -37,8 +37,9 @@ enum class Outside { Clamp, Zero, Error };
 
 Spectrum constantSpectrum(double value);
 
-/// Linear interpolation of (wavelength_nm, value) pairs; detail finer than a nanometre keeps its integral and its mean wavelength. Throws crt::Error(Scene) when wavelengths are not strictly
-/// increasing, lengths differ, the table is empty, a value is not finite, or `outside` is Error and 360–830 nm is not covered.
+/// Linear interpolation of (wavelength_nm, value) pairs; detail finer than a nanometre keeps its integral and its mean wavelength. Throws
+/// crt::Error(Scene) when wavelengths are not strictly increasing, lengths differ, the table is empty, a value is not finite, or `outside` is
+/// Error and 360–830 nm is not covered.
 Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vector<double>& value, Outside outside);
 
 /// Reads two-column .spd or .csv text (wavelength_nm, value; '#' comments; separators blank, tab, comma, semicolon; an

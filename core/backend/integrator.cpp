@@ -206,10 +206,9 @@ struct Integrator::Impl {
             bool finite = true;  // Without a way out of the loop, so that it becomes one of vectors: films have hundreds of millions of sums.
             for (std::size_t i = 0; i < channels * std::size_t{2}; ++i) finite &= std::isfinite(sums[i]);
             if (finite && part.counts[pixel] <= asked) continue;
-            throw Error(ErrorKind::Internal,
-                        fmt::format("backend '{}' broke the contract: pixel {},{} of its film {}; what was rendered before is kept", backend.name, pixel % width,
-                                    pixel / width,
-                                    finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked) : "is not a number"));
+            const std::string what = finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked) : "is not a number";
+            throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: pixel {},{} of its film {}; what was rendered before is kept",
+                                                         backend.name, pixel % width, pixel / width, what));
         }
     }
 

@@ -4,6 +4,8 @@
 
 #include "kernel/path.h"
 
+#include <algorithm>
+
 namespace crt::kernel {
 
 // A handful of triangles is tested eight at a time without Embree; its BVH begins to pay above that. Rays that Embree does not take go through the blob's.
@@ -28,7 +30,7 @@ using namespace kernel;
 [[gnu::noinline]] bool advance(const CrtContext& ctx, CrtPixelWork& work, CrtRayCount& rays) { return crt_pixel_vertex(&ctx, &work, &rays) != 0; }
 
 // Two pixels in turn, vertex by vertex: a path is one long chain of dependent operations, and while it waits the processor works on the other's.
-void renderPair(const CrtContext& ctx, CrtPixelWork a, CrtPixelWork b, CrtRayCount& rays) {
+void renderPair(const CrtContext& ctx, CrtPixelWork& a, CrtPixelWork& b, CrtRayCount& rays) {
     while (advance(ctx, a, rays) && advance(ctx, b, rays)) continue;
     while (advance(ctx, a, rays)) continue;
     while (advance(ctx, b, rays)) continue;
@@ -50,9 +52,9 @@ RayTotals CRT_EMBREE_ENTRY(const TileJob& job) {
     for (std::uint32_t y = job.y0; y < job.y1; ++y) {
         for (std::uint32_t x = job.x0; x < job.x1; x += 2) {
             CrtRayCount rays{0, 0};
-            CrtPixelWork none = pixel(x, y);
-            none.sample_count = 0;
-            renderPair(ctx, pixel(x, y), x + 1 < job.x1 ? pixel(x + 1, y) : none, rays);
+            CrtPixelWork first = pixel(x, y), second = pixel(std::min(x + 1, job.x1 - 1), y);
+            if (x + 1 == job.x1) second.sample_count = 0;  // A row of odd length: the last pixel is alone.
+            renderPair(ctx, first, second, rays);
             totals.closest += rays.closest;
             totals.shadow += rays.shadow;
         }
