@@ -1,6 +1,8 @@
 // The suite of `crt verify` itself: its registry, its verdicts, its diagnoses, and that its expectations are right.
 #include "error.h"
+#include "kernel/layout.h"
 #include "verify/case.h"
+#include "verify/context.h"
 #include "verify/physics.h"
 #include "verify/references.h"
 #include "verify/report.h"
@@ -11,6 +13,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <set>
 
 using namespace crt;
@@ -23,6 +26,17 @@ Outcome outcome(Verdict verdict) {
     Outcome o;
     o.verdict = verdict;
     return o;
+}
+
+/// A row of pixels of one sample each, with these values of Y.
+Film rowOf(const std::vector<double>& y) {
+    const auto width = static_cast<std::uint32_t>(y.size());
+    Film film({width, 1, CRT_CHANNELS_BASE, 0});
+    for (std::size_t x = 0; x < y.size(); ++x) {
+        film.sums[2 * (x * CRT_CHANNELS_BASE + 1)] = y[x];
+        film.counts[x] = 1;
+    }
+    return film;
 }
 
 }  // namespace
@@ -83,6 +97,20 @@ TEST_CASE("a wrong figure is traced to the mistake that gives it", "[verify]") {
     CHECK_THAT(diagnose(0, 1, 0, {}), Contains("black"));
     CHECK_THAT(diagnose(1e-3, 0, 0, {}), Contains("leak"));
     CHECK_THAT(diagnose(std::nan(""), 1, 0, {}), Contains("not a finite number"));
+}
+
+TEST_CASE("the worst pixel is the one farthest from what is expected, and a pixel that is no number is worse than any", "[verify]") {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    const Film unit = rowOf({1, 1, 1});
+    CHECK(worstRatio(rowOf({1.5, 0.25, 1}), unit) == 0.25);
+    CHECK(worstRatio(rowOf({0.75, 1.5, 1}), unit) == 1.5);
+    CHECK(worstRatio(rowOf({2, 2, 2}), unit, 2) == 1);
+    CHECK(std::isnan(worstRatio(rowOf({1.5, nan, 1}), unit)));
+    CHECK(std::isnan(worstRatio(rowOf({nan, 1.5, 1}), unit)));
+    CHECK(std::isnan(worstRatio(rowOf({1, 1.5, nan}), unit)));
+    // Nothing over nothing: black where the unit is black says nothing.
+    CHECK(std::isnan(worstRatio(rowOf({0, 1, 1}), rowOf({0, 1, 1}))));
+    CHECK(std::isinf(worstRatio(rowOf({1, 1, 1}), rowOf({1, 0, 1}))));
 }
 
 TEST_CASE("form factors agree by two formulas, and with published values", "[verify]") {

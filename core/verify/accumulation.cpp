@@ -172,7 +172,7 @@ void draws(Context& context) {
         }
         for (std::uint32_t d = 0; d < dimensions; ++d) {
             p_values.push_back(stats::kolmogorovSmirnovUniform(u[d]));
-            for (std::uint32_t e = 0; e < d; ++e) worst_correlation = std::max(worst_correlation, std::abs(correlation(u[d], u[e])));
+            for (std::uint32_t e = 0; e < d; ++e) worst_correlation = fartherFrom(0, worst_correlation, std::abs(correlation(u[d], u[e])));
         }
     }
     const double least = *std::min_element(p_values.begin(), p_values.end());

@@ -23,16 +23,6 @@ constexpr std::uint64_t kGlass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ENVIRONMEN
 
 double meanRadiance(const Film& film) { return radiance(film); }
 
-double worstRatio(const Film& film, const Film& unit) {
-    double worst = 1;
-    for (std::uint32_t y = 0; y < film.shape().height; ++y)
-        for (std::uint32_t x = 0; x < film.shape().width; ++x) {
-            const double ratio = film.mean(x, y, 1) / unit.mean(x, y, 1);
-            if (!(std::abs(ratio - 1) <= std::abs(worst - 1))) worst = ratio;
-        }
-    return worst;
-}
-
 void clearBody(Context& context) {
     const auto scene = [](bool body, double ior, int depth) {
         Stage stage("{position: [0.2, 3, 4], target: [0.5, 0.5, 0.5], fov: 15}", fmt::format("{{max_depth: {}, roulette: false}}", depth));
@@ -160,7 +150,7 @@ void glassCube(Context& context) {
             const double farthest = std::hypot(std::max(std::abs(u0), std::abs(u1)), std::max(std::abs(v0), std::abs(v1)));
             const double nearest = std::hypot(std::min(std::abs(u0), std::abs(u1)), std::min(std::abs(v0), std::abs(v1)));
             const double ratio = film.mean(x, y, 1) / empty.mean(x, y, 1);
-            if (farthest < rim && !(std::abs(ratio / (kIndex * kIndex) - 1) <= std::abs(worst - 1))) worst = ratio / (kIndex * kIndex);
+            if (farthest < rim) worst = fartherFrom(1, worst, ratio / (kIndex * kIndex));
             if (nearest > rim) trapped += film.mean(x, y, 1);
             const double weight = std::pow(1 + (u0 + u1) * (u0 + u1) / 4 + (v0 + v1) * (v0 + v1) / 4, -1.5);
             weighted += weight * ratio;

@@ -271,7 +271,7 @@ void spectralBins(Context& context) {
         }
         const stats::Summary summary = stats::summarize(ratios);
         residuals.push_back((summary.mean - 1) / summary.standardError());
-        worst = std::abs(residuals.back()) > std::abs(worst) ? residuals.back() : worst;
+        worst = fartherFrom(0, worst, residuals.back());
     }
     const double limit = stats::studentQuantile(1 - stats::sidak(1e-3, bins) / 2, seeds - 1);
     context.absolute("the worst bin, in standard errors of its mean", worst, 0, limit);

@@ -260,6 +260,15 @@ double radiance(const Film& film) {
     return meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return radiance(film, x, y); });
 }
 
+double fartherFrom(double target, double a, double b) { return std::isnan(a) || std::abs(a - target) > std::abs(b - target) ? a : b; }
+
+double worstRatio(const Film& film, const Film& unit, double factor) {
+    double worst = 1;
+    for (std::uint32_t y = 0; y < film.shape().height; ++y)
+        for (std::uint32_t x = 0; x < film.shape().width; ++x) worst = fartherFrom(1, worst, film.mean(x, y, 1) / unit.mean(x, y, 1) / factor);
+    return worst;
+}
+
 double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y) {
     const double mean = film.mean(x, y, 1);
     return film.mean(x, y, 3) - mean * mean;

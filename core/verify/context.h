@@ -109,6 +109,10 @@ private:
 double radiance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean over all pixels.
 double radiance(const Film& film);
+/// Of `a` and `b` the one that is farther from `target`; NaN when either is, which std::max would lose.
+double fartherFrom(double target, double a, double b);
+/// Y of a pixel of `film` over `factor` times that of the same pixel of `unit`, of all pixels the ratio that is farthest from 1. NaN when any pixel's is.
+double worstRatio(const Film& film, const Film& unit, double factor = 1);
 /// Variance of Y of one path of a pixel, from the film's second moment: right for independent samples.
 double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean of Y over all pixels.

@@ -36,12 +36,11 @@ std::uint64_t litPixels(const Film& film) {
     return lit;
 }
 
-/// Largest |pixel of a / pixel of b / factor − 1|.
-double worstRatio(const Film& a, const Film& b, double factor) {
+/// Largest |radiance of a pixel of `film` / (factor · that of `unit`) − 1|; NaN when any pixel's is.
+double worstDeviation(const Film& film, const Film& unit, double factor) {
     double worst = 0;
-    forEachPixel(a, [&](std::uint32_t x, std::uint32_t y) {
-        const double off = std::abs(radiance(a, x, y) / radiance(b, x, y) / factor - 1);
-        if (!(off <= worst)) worst = off;
+    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) {
+        worst = fartherFrom(0, worst, std::abs(radiance(film, x, y) / radiance(unit, x, y) / factor - 1));
     });
     return worst;
 }
@@ -73,8 +72,7 @@ void slivers(Context& context) {
         // A floor of slivers, each from one side to the other; the last ones thinner than a ulp is wide.
         const double thickness = std::pow(10.0, -exponent);
         Dice dice(static_cast<std::uint64_t>(exponent));
-        Tally hits, holes;
-        double worst = 0;
+        Tally hits;
         const std::uint64_t films = byLevel(context, 4, 60, 250);
         for (std::uint64_t film_index = 0; film_index < films; ++film_index) {
             Scene scene = emptyScene(64, film_index, {0.1, 0.02 + dice.uniform(), 0.3}, {0, 0, 0}, 0.5);
@@ -97,8 +95,7 @@ void slivers(Context& context) {
                 const Vec3d &a = corners[3 * id], &b = corners[3 * id + 1];
                 const double radius = 0.51 * length(b - a), centre = length((a + b) * 0.5 - scene.camera.position);
                 const double off = std::abs(film.mean(x, y, CRT_CHANNELS_BASE + 3) - centre) - radius;
-                worst = std::max(worst, off);
-                hits.failures += off > 1e-5;
+                hits.failures += !(off <= 1e-5);
             });
         }
         if (hits.rays == 0)
@@ -168,7 +165,7 @@ void touching(Context& context) {
             addObject(scene, mesh, diffuse(0.5), 1, true);
             Scene dark = scene;
             dark.integrator.max_depth = 0;
-            worst = std::max(worst, worstRatio(context.render(scene, samples(16)), context.render(dark, samples(16)), furnace(0.5, 16)));
+            worst = fartherFrom(0, worst, worstDeviation(context.render(scene, samples(16)), context.render(dark, samples(16)), furnace(0.5, 16)));
         }
         context.absolute(fmt::format("{}: the worst pixel", what), worst, 0, 2e-6,
                          {{0.01, "light leaks where two surfaces touch: a ray's offset carries it through both"}});
@@ -267,14 +264,14 @@ void nonManifold(Context& context) {
     Scene dark = scene;
     dark.integrator.max_depth = 0;
     context.absolute("edges of four faces and a Möbius strip, Lambertian: the worst pixel",
-                     worstRatio(context.render(scene, samples(8)), context.render(dark, samples(8)), furnace(0.5, 16)), 0, 2e-6,
+                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)), furnace(0.5, 16)), 0, 2e-6,
                      {{0.01, "a surface that is not closed loses light"}});
     // Of glass, inside and outside have no meaning: finite, and no more than n⁴ of what the walls give.
     Scene open = evenRoom(1);
     addObject(open, std::move(mesh), glass(1.5));
     const Film film = context.render(open, samples(64));
     double brightest = 0;
-    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = std::max(brightest, radiance(film, x, y)); });
+    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = fartherFrom(0, brightest, radiance(film, x, y)); });
     context.holds("the same of glass, which is open", film.invalidSamples() == 0 && std::isfinite(brightest), "finite, to its end",
                   "a path without end, or NaN", fmt::format("brightest pixel {:.3g}", brightest));
 }
@@ -326,7 +323,7 @@ void shadingNormals(Context& context) {
         double brightest = 0;
         forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) {
             if (film.primitives[static_cast<std::size_t>(y) * 48 + x] == CRT_NONE) return;
-            brightest = std::max(brightest, radiance(film, x, y) / radiance(white, x, y));
+            brightest = fartherFrom(0, brightest, radiance(film, x, y) / radiance(white, x, y));
         });
         // A pixel at the rim sees the sky as well.
         const double whole = radiance(film) / radiance(white);
@@ -350,7 +347,7 @@ void shadingNormals(Context& context) {
         }(),
         samples(64));
     double brightest = 0;
-    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = std::max(brightest, radiance(film, x, y) / radiance(sky, x, y)); });
+    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = fartherFrom(0, brightest, radiance(film, x, y) / radiance(sky, x, y)); });
     context.holds("20 faces, smooth: no more than the reflectance", brightest <= 0.8 * (1 + 1e-6), "≤ 0.8 in every pixel",
                   "a shading normal makes light", fmt::format("brightest {:.6f}", brightest));
 }
@@ -394,7 +391,7 @@ void insideOut(Context& context) {
     Scene dark = scene;
     dark.integrator.max_depth = 0;
     context.absolute("inside a box whose faces look outwards: the worst pixel",
-                     worstRatio(context.render(scene, samples(8)), context.render(dark, samples(8)), furnace(0.5, 16)), 0, 2e-6,
+                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)), furnace(0.5, 16)), 0, 2e-6,
                      {{0.5, "a Lambertian surface reflects on its front alone"}});
 }
 
@@ -413,7 +410,7 @@ void mirrorFunnel(Context& context) {
     sky.camera = scene.camera;
     const Film film = context.render(scene, samples(16)), all = context.render(sky, samples(16));
     double brightest = 0;
-    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = std::max(brightest, radiance(film, x, y) / radiance(all, x, y)); });
+    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = fartherFrom(0, brightest, radiance(film, x, y) / radiance(all, x, y)); });
     context.holds("a funnel of mirrors, 1000 bounces", brightest <= 1 + 1e-4, "ends; no pixel brighter than the sky", "reflection makes light",
                   fmt::format("brightest {:.7f}, mean {:.4f} of the sky", brightest, radiance(film) / radiance(all)));
 }

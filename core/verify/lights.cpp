@@ -21,15 +21,12 @@ constexpr std::uint64_t kDirectLight = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LI
 
 double meanRadiance(const Film& film) { return radiance(film); }
 
-/// Largest relative deviation of a sum of `film` from `factor` times that of `unit`, X, Y and Z.
+/// A sum of `film` over `factor` times that of `unit`, of all pixels' X, Y and Z the ratio that is farthest from 1. NaN when any is.
 double worstFactor(const Film& film, const Film& unit, double factor) {
     double worst = 1;
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
         for (std::uint32_t x = 0; x < film.shape().width; ++x)
-            for (std::uint32_t c = 0; c < 3; ++c) {
-                const double ratio = film.sum(x, y, c) / (unit.sum(x, y, c) * factor);
-                if (!(std::abs(ratio - 1) <= std::abs(worst - 1))) worst = ratio;
-            }
+            for (std::uint32_t c = 0; c < 3; ++c) worst = fartherFrom(1, worst, film.sum(x, y, c) / (unit.sum(x, y, c) * factor));
     return worst;
 }
 
@@ -157,7 +154,7 @@ void choosingAmongMany(Context& context) {
         double worst = 1;
         for (std::size_t i = 0; i < lights; ++i) {
             const double share = static_cast<double>(first[i + 1] - first[i]) * std::ldexp(1.0, -32) * static_cast<double>(lights);
-            if (std::abs(share - 1) > std::abs(worst - 1)) worst = share;
+            worst = fartherFrom(1, worst, share);
         }
         // Whole numbers of 2³²: with 1e7 lights 429.5 each. The pdf is the share as it is, so this costs noise, never truth.
         context.relative(fmt::format("{} lights: the most unequal share", lights), worst, 1, 0.005);

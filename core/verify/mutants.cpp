@@ -22,23 +22,10 @@ namespace {
 
 double furnaceRadiance(double albedo, int depth) { return (1 - std::pow(albedo, depth + 1)) / (1 - albedo); }
 
-/// Largest and smallest ratio of Y, pixel by pixel. Both films have the same random numbers, so that the wavelengths cancel.
-std::pair<double, double> ratios(const Film& film, const Film& unit) {
-    double low = INFINITY, high = -INFINITY;
-    for (std::uint32_t y = 0; y < film.shape().height; ++y)
-        for (std::uint32_t x = 0; x < film.shape().width; ++x) {
-            const double ratio = film.mean(x, y, 1) / unit.mean(x, y, 1);
-            low = std::min(low, ratio);
-            high = std::max(high, ratio);
-        }
-    return {low, high};
-}
-
-/// Every pixel of `film` is `factor` times that of `unit`.
+/// Every pixel of `film` is `factor` times that of `unit`. Both have the same random numbers, so that the wavelengths cancel.
 void everyPixel(Context& context, const std::string& what, const Film& film, const Film& unit, double factor, double tolerance,
                 const std::vector<Mistake>& mistakes) {
-    const auto [low, high] = ratios(film, unit);
-    context.relative(what + ": the worst pixel", std::abs(low - factor) > std::abs(high - factor) ? low : high, factor, tolerance, mistakes);
+    context.relative(what + ": the worst pixel", factor * worstRatio(film, unit, factor), factor, tolerance, mistakes);
 }
 
 /// Nothing but an environment of radiance 1.
@@ -257,7 +244,7 @@ void overflowIsCounted(Context& context) {
                   "256 samples", "samples that are no numbers are taken for black, or for bright, without a word",
                   fmt::format("{} of 256 samples counted as invalid", film.invalidSamples()));
     double largest = 0;
-    for (const double sum : film.sums) largest = std::max(largest, std::abs(sum));
+    for (const double sum : film.sums) largest = fartherFrom(0, largest, sum);
     context.holds("and nothing of them is in the film", largest == 0, "exactly 0", "the film holds a part of samples that it counts as dropped");
 }
 

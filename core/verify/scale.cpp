@@ -112,7 +112,7 @@ void mixedScale(Context& context) {
         double worst = 0;
         for (std::uint32_t y = 0; y < 24; ++y)
             for (std::uint32_t x = 0; x < 24; ++x)
-                worst = std::max(worst, std::abs(radiance(b, x, y) - radiance(a, x, y)) / std::max(radiance(a, x, y), 0.01));
+                worst = fartherFrom(0, worst, std::abs(radiance(b, x, y) - radiance(a, x, y)) / std::max(radiance(a, x, y), 0.01));
         context.absolute("any pixel, with the same random numbers", worst, 0, 0.05,
                          {{1, "the shadow is detached from the object, or lost: is the ray's offset that of the largest triangle?"}});
     }
