@@ -1,6 +1,5 @@
-// Group K: input hygiene and size. What is wrong is refused by name before anything is rendered, or borne and the same image. One of each kind:
-// every refusal has a test of
-// its own (tests/unit_scene_yaml.cpp, tests/unit_mesh_io.cpp), and every reader a fuzz target (tests/fuzz).
+// Group K: input hygiene and size. What is wrong is refused by name before anything is rendered, or borne and the same image. One of each kind: every
+// refusal has a test of its own (tests/unit_scene_yaml.cpp, tests/unit_mesh_io.cpp), and every reader a fuzz target (tests/fuzz).
 #include "verify/context.h"
 #include "verify/temporary_folder.h"
 
@@ -117,9 +116,9 @@ void sizes(Context& context) {
     context.refused("a film of 2^32 pixels", film("[65535, 65535]"), "at most 2^31");
     context.refused("an index that 32 bits cannot hold", scene("mesh: {positions: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces: [[0, 1, 4294967296]]}"),
                     "4294967296");
-    context.notApplicable(
-        "more than 2^28 triangles, more than 64 GiB",
-        "refused by counts that are made in 64 bits before memory is asked for (core/compile.cpp); a scene that large fits no test");
+    context.notApplicable("more than 2^28 triangles, more than 64 GiB",
+                          "refused by counts that are made in 64 bits before memory is asked for (core/flatten.cpp, core/blob_writer.h); a scene that large "
+                          "fits no test");
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
-// Group B: scale and position. Lengths are normalised in double before anything is float (core/compile.cpp), so where a scene lies and how large it
-// is must not
-// show; what remains is the ratio of sizes within a scene.
+// Group B: scale and position. Lengths are normalised in double before anything is float (core/flatten.cpp), so where a scene lies and how large it is must
+// not show; what remains is the ratio of sizes within a scene.
 #include "verify/probes.h"
 #include "verify/references.h"
 #include "verify/scenes.h"
