@@ -862,12 +862,15 @@ Mesh dragon() {
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc != 2) {
-        std::fprintf(stderr, "usage: crt-meshgen OUTDIR\nWrites sphere.obj, figure.obj, dragon.obj and prism.obj.\n");
-        return 2;
+    const std::string argument = argc == 2 ? argv[1] : "";
+    const bool asks_for_help = argument == "--help" || argument == "-h";
+    if (argument.empty() || argument[0] == '-') {
+        std::fprintf(asks_for_help ? stdout : stderr,
+                     "usage: crt-meshgen OUTDIR\nWrites sphere.obj, figure.obj, dragon.obj and prism.obj into the folder OUTDIR, which is made if need be.\n");
+        return asks_for_help ? 0 : 2;
     }
     try {
-        const std::filesystem::path folder = argv[1];
+        const std::filesystem::path folder = argument;
         std::filesystem::create_directories(folder);
         writeObj(sphere(), folder / "sphere.obj", "sphere of 32 segments and 16 rings");
         writeObj(prism(), folder / "prism.obj", "60 degree prism");

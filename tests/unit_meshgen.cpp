@@ -17,6 +17,7 @@ using namespace crt;
 
 namespace {
 
+const std::string kMeshgen = std::string("'") + CRT_BUILD_DIR + "/bin/crt-meshgen' ";
 const std::string kMeshes = std::string(CRT_BUILD_DIR) + "/share/crt/meshes/";
 
 Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
@@ -143,10 +144,19 @@ TEST_CASE("the dragon is an uneven load", "[meshgen]") {
 
 TEST_CASE("every run writes the same bytes", "[meshgen]") {
     const crt::verify::TemporaryFolder folder;
-    const std::string command = std::string("'") + CRT_BUILD_DIR + "/bin/crt-meshgen' '" + folder.path() + "'";
-    REQUIRE(std::system(command.c_str()) == 0);
+    REQUIRE(std::system((kMeshgen + "'" + folder.path() + "'").c_str()) == 0);
     for (const Expected& e : kExpected) {
         CAPTURE(e.file);
         CHECK((slurp(folder / e.file) == slurp(kMeshes + e.file)));
     }
+}
+
+TEST_CASE("options are not taken for the name of a folder", "[meshgen]") {
+    const crt::verify::TemporaryFolder folder;
+    const std::string there = "cd '" + folder.path() + "' && ";
+    CHECK(std::system((there + kMeshgen + "--help > help.txt").c_str()) == 0);
+    CHECK_THAT(slurp(folder / "help.txt"), Catch::Contains("usage: crt-meshgen OUTDIR"));
+    CHECK(std::system((there + kMeshgen + "--out 2> error.txt").c_str()) != 0);
+    CHECK_THAT(slurp(folder / "error.txt"), Catch::Contains("usage: crt-meshgen OUTDIR"));
+    CHECK(folder.fileCount() == 2);
 }
