@@ -1,9 +1,9 @@
 """Figure 2 of the paper that crt grew out of: render time against samples per pixel, 1 … 1024, of the Cornell box at 1440 × 1440, and at 2880 × 2880, for
 every backend. --rows takes measurements of the same kind made on another machine (JSON Lines with backend, resolution, spp, repeat, render)."""
 import json
-import math
 import pathlib
 
+from .log_log import Chart, PowerLaw, ticks
 from .program import Failure, Spread, significant
 from .results import Results
 
@@ -61,10 +61,7 @@ def line_fit(points):
 
 def slope(points):
     """d log t / d log N over the upper half of the points."""
-    upper = points[len(points) // 2 - 1:] if len(points) > 3 else points
-    xs, ys = [math.log(n) for n, _ in upper], [math.log(t) for _, t in upper]
-    mx, my = sum(xs) / len(xs), sum(ys) / len(ys)
-    return sum((x - mx) * (y - my) for x, y in zip(xs, ys)) / sum((x - mx) ** 2 for x in xs)
+    return PowerLaw(points[len(points) // 2 - 1:] if len(points) > 3 else points).exponent
 
 
 def write(program, arguments, rows, absent):
@@ -103,37 +100,21 @@ def write(program, arguments, rows, absent):
 
 
 def draw(lines):
-    """Log-log, labels at the lines' ends."""
-    width, height, left, right, top, bottom = 860, 520, 70, 190, 24, 56
+    """Labels at the lines' ends."""
     seconds = [t for points in lines.values() for _, t in points]
-    low, high = math.log10(min(seconds) * 0.7), math.log10(max(seconds) * 1.4)
-    x = lambda n: left + (width - left - right) * math.log2(n) / 10
-    y = lambda t: height - bottom - (height - top - bottom) * (math.log10(t) - low) / (high - low)
-    style = ".ink{fill:#1a1a1a}.soft{fill:#555}.grid{stroke:#e2e2e2}.ground{fill:#fff}"
-    dark = ".ink{fill:#eee}.soft{fill:#b0b0b0}.grid{stroke:#343434}.ground{fill:#161616}"
-    for name, (light, night) in COLOURS.items():
-        style += f".{name}{{stroke:{light};fill:none}}.t-{name}{{fill:{light}}}"
-        dark += f".{name}{{stroke:{night}}}.t-{name}{{fill:{night}}}"
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="system-ui, sans-serif" font-size="13" role="img">',
-           "<title>Render seconds against samples per pixel, Cornell box</title>",
-           f"<style>{style}@media (prefers-color-scheme: dark){{{dark}}}</style>", f'<rect class="ground" width="{width}" height="{height}"/>']
+    chart = Chart((860, 520), (70, 190, 24, 56), (COUNTS[0], COUNTS[-1]), (min(seconds) * 0.7, max(seconds) * 1.4), COLOURS)
     for n in COUNTS:
-        out.append(f'<line class="grid" x1="{x(n):.1f}" x2="{x(n):.1f}" y1="{top}" y2="{height - bottom}"/>'
-                   f'<text class="soft" x="{x(n):.1f}" y="{height - bottom + 18}" text-anchor="middle">{n}</text>')
-    for exponent in range(math.ceil(low), math.floor(high) + 1):
-        out.append(f'<line class="grid" x1="{left}" x2="{width - right}" y1="{y(10**exponent):.1f}" y2="{y(10**exponent):.1f}"/>'
-                   f'<text class="soft" x="{left - 8}" y="{y(10**exponent) + 4:.1f}" text-anchor="end">{10**exponent:g} s</text>')
+        chart.x_tick(n, n)
+    for tick in ticks(*chart.y_range):
+        chart.y_tick(tick, f"{tick:g} s")
+    largest = max(resolution for _, resolution in lines)
     taken = []
-    for (backend, resolution), points in sorted(lines.items(), key=lambda item: y(item[1][-1][1])):
-        dash = ' stroke-dasharray="6 4"' if resolution == max(r for _, r in lines) else ""
-        path = " ".join(f"{x(n):.1f},{y(t):.1f}" for n, t in points)
-        out.append(f'<polyline class="{backend}" stroke-width="2.2"{dash} points="{path}"/>')
-        out += [f'<circle class="t-{backend}" cx="{x(n):.1f}" cy="{y(t):.1f}" r="3"/>' for n, t in points]
-        n, t = points[-1]
-        label_y = y(t) + 4
-        while any(abs(label_y - other) < 16 and abs(x(n) - at) < 110 for other, at in taken):
+    for (backend, resolution), points in sorted(lines.items(), key=lambda item: chart.y(item[1][-1][1])):
+        chart.curve(backend, points, 2.2, 3, dashed=resolution == largest)
+        x, label_y = chart.x(points[-1][0]), chart.y(points[-1][1]) + 4
+        while any(abs(label_y - other) < 16 and abs(x - at) < 110 for other, at in taken):
             label_y += 4
-        taken.append((label_y, x(n)))
-        out.append(f'<text class="t-{backend}" x="{x(n) + 8:.1f}" y="{label_y:.1f}">{backend}, {resolution}²</text>')
-    out.append(f'<text class="soft" x="{(left + width - right) / 2}" y="{height - 14}" text-anchor="middle">samples per pixel</text>')
-    return "\n".join([*out, "</svg>"]) + "\n"
+        taken.append((label_y, x))
+        chart.label(backend, x + 8, label_y, f"{backend}, {resolution}²")
+    chart.x_title("samples per pixel")
+    return chart.svg("Render seconds against samples per pixel, Cornell box")

@@ -29,9 +29,7 @@ def spectrum(given):
     """A number, or a table on a regular grid of wavelengths in nm: Mitsuba finds its cell by a multiplication, in an irregular one by bisection."""
     if not isinstance(given, dict):
         return {"type": "uniform", "value": float(given)}
-    if given["grid"] == "regular":
-        return {"type": "regular", "wavelength_min": given["nm"][0], "wavelength_max": given["nm"][-1], "values": ", ".join(map(repr, given["value"]))}
-    return {"type": "irregular", "wavelengths": ", ".join(map(repr, given["nm"])), "values": ", ".join(map(repr, given["value"]))}
+    return {"type": "regular", "wavelength_min": given["nm"][0], "wavelength_max": given["nm"][-1], "values": ", ".join(map(repr, given["value"]))}
 
 
 class Renderer:

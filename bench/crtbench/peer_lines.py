@@ -1,4 +1,6 @@
-"""The contestants of bench/peers. Each renders the Cornell box with so many samples and a seed, and says what it cost; images are XYZ, row 0 at the top."""
+"""The contestants of bench/peers. Each renders the Cornell box with so many samples and a seed, and says what it cost; images are XYZ, row 0 at the top.
+
+What tells them apart: `renderer`, `engine` (a backend of crt or a variant of Mitsuba), `replicates` (of crt's sampler, otherwise 1) and `roulette`; `name` is for people."""
 import json
 import os
 import subprocess
@@ -36,10 +38,10 @@ def read_pfm(path):
 class Crt:
     """crt, a process for every image."""
 
-    unit = 1.0
+    renderer, unit = "crt", 1.0
 
     def __init__(self, program, backend, replicates, roulette, setup):
-        self.program, self.backend, self.replicates, self.roulette, self.setup = program, backend, replicates, roulette, setup
+        self.program, self.engine, self.replicates, self.roulette, self.setup = program, backend, replicates, roulette, setup
         self.name = f"crt {backend}, {replicates} sequence{'s' if replicates > 1 else ''}" + (", roulette" if roulette else "")
         self.start_cpu = 0.0
 
@@ -52,7 +54,7 @@ class Crt:
     def render(self, spp, seed, environment=None):
         file = self.program.scratch / "peer.pfm"
         before = crt.children_seconds()
-        run = self.program.render(SCENE, self.backend, ["--spp", spp, "--seed", seed], [file], self.settings(), environment=environment)
+        run = self.program.render(SCENE, self.engine, ["--spp", spp, "--seed", seed], [file], self.settings(), environment=environment)
         cpu = crt.children_seconds() - before
         return Cost(read_pfm(file), spp, run.value("seconds", "render"), max(0.0, cpu - self.start_cpu), run.others, run.seconds, cpu)
 
@@ -108,10 +110,13 @@ class Worker:
 
 
 class Mitsuba:
+    renderer, replicates = "Mitsuba", 1
+
     def __init__(self, worker, sampler, roulette, unit):
         """`unit`: what the tables of the observer make of Mitsuba's pixels over crt's."""
         self.worker, self.sampler, self.roulette, self.unit = worker, sampler, roulette, unit
-        self.name = f"Mitsuba {worker.variant.removesuffix('_spectral')}, {sampler}" + (", roulette" if roulette else "")
+        self.engine = worker.variant.removesuffix("_spectral")
+        self.name = f"Mitsuba {self.engine}, {sampler}" + (", roulette" if roulette else "")
 
     def request(self, spp, seed, image=None):
         return {"do": "render", "sampler": self.sampler, "spp": spp, "seed": seed, "roulette": ROULETTE_FROM if self.roulette else 0, "image": image}

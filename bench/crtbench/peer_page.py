@@ -5,10 +5,10 @@ import statistics
 import numpy as np
 
 from . import peer_agreement, peer_plot
-from .peer_lines import SCENE, Crt
+from .peer_error import seconds_to, slope_of
+from .peer_lines import SCENE
 from .program import significant
-from .peers import seconds_to, slope_of
-
+from .results import processor
 
 METRICS = {"error": "luminance, all pixels", "error_xyz": "X, Y and Z, all pixels", "error_room": "luminance, without the lamp"}
 SPREAD = {"spread": "luminance, between seeds"}
@@ -94,7 +94,8 @@ def write_agreement(results, found, described):
 def timing_row(line, target, pixels):
     at = {key: seconds_to(line.points, key, target) for key in ("cpu_seconds", "render_seconds")}
     last = line.points[-1]
-    return {"name": line.name, "cpu_to_target": at["cpu_seconds"][0], "wall_to_target": at["render_seconds"][0], "extrapolated": at["cpu_seconds"][1],
+    who = {key: getattr(line.contestant, key) for key in ("name", "renderer", "engine", "replicates", "roulette")}
+    return {**who, "cpu_to_target": at["cpu_seconds"][0], "wall_to_target": at["render_seconds"][0], "extrapolated": at["cpu_seconds"][1],
             "cpu_to_target_by": {metric: seconds_to(line.points, "cpu_seconds", target, metric)[:2] for metric in METRICS},
             "relative_se": at["cpu_seconds"][2], "slope": slope_of(line.points), "last_spp": last["spp"], "last_error": last["error"],
             "cpu_us_per_sample": 1e6 * last["cpu_seconds"] / (last["spp"] * pixels), "points": line.points}
@@ -107,19 +108,22 @@ class Race:
         self.rows = {line.name: timing_row(line, target, pixels) for line in lines}
         self.target = target
         self.start = {name: {"cold": s["cold"], "warm": [float(np.median([w[i] for w in s["warm"]])) for i in (0, 1)]} for name, s in starts.items()}
-        self.ours, self.theirs = self.best("crt embree"), self.best("Mitsuba")
+        self.ours = self.best(lambda row: (row["renderer"], row["engine"]) == ("crt", "embree"))
+        self.theirs = self.best(lambda row: row["renderer"] == "Mitsuba" and row["engine"] != "cuda_ad")
         self.factor = self.rows[self.ours]["cpu_to_target"] / self.rows[self.theirs]["cpu_to_target"]
         self.factor_se = self.factor * math.hypot(self.rows[self.ours]["relative_se"], self.rows[self.theirs]["relative_se"])
 
-    def best(self, beginning):
-        """Least time to the target on the processor, of those that were measured to within five times the target, if there are any: farther out,
-        extrapolation decides."""
-        names = [n for n in self.rows if n.startswith(beginning) and "cuda" not in n]
-        near = [n for n in names if self.rows[n]["last_error"] <= 5 * self.target]
-        return min(near or [n for n in names if "16 sequences" not in n], key=lambda n: self.rows[n]["cpu_to_target"])
+    def best(self, among):
+        """Least time to the target, of those that were measured to within five times the target, if there are any: farther out, extrapolation decides."""
+        rows = [row for row in self.rows.values() if among(row)]
+        near = [row for row in rows if row["last_error"] <= 5 * self.target]
+        return min(near or [row for row in rows if row["replicates"] == 1], key=lambda row: row["cpu_to_target"])["name"]
 
     def start_of(self, name):
-        return self.start.get(name) or self.start[name.replace("16 sequences", "1 sequence")]
+        """Replicates cost nothing to begin: start-up is measured with one."""
+        row = self.rows[name]
+        alike = ("renderer", "engine", "roulette")
+        return next(self.start[n] for n in self.start if all(self.rows[n][key] == row[key] for key in alike))
 
     def factor_with_start(self, kind):
         """`kind`: warm or cold. Processor seconds of start-up added to both."""
@@ -203,7 +207,7 @@ def write(program, results, arguments, run):
     write_samplers(results, run["scores"], run["roulette_from"])
     write_agreement(results, found, version)
     write_points(results, lines)
-    settings = next(line.contestant for line in lines if isinstance(line.contestant, Crt)).settings()
+    settings = next(line.contestant for line in lines if line.contestant.renderer == "crt").settings()
     results.command(f"crt render configs/{SCENE}.yaml --backend embree --spp N --seed SEED " + " ".join(f"--set '{s}'" for s in settings) + " -o image.pfm")
     results.data = {
         "size": size, "target": run["target"], "factor": race.json(), "lines": race.rows, "start_wall_cpu": race.start, "agreement": found,
@@ -211,9 +215,9 @@ def write(program, results, arguments, run):
         "versions": {v: {k: d[k] for k in ("mitsuba", "drjit", "numpy", "python", "threads", "llvm")} for v, d in run["described"].items()}}
     write_pictures(program.repository / "out" / "peers", run["pools"])
     arguments.results.mkdir(parents=True, exist_ok=True)
-    plot = {line.name: [(p["cpu_seconds"], p["error"]) for p in line.points if p["cpu_seconds"] > 0] for line in lines}
-    (arguments.results / "peers.svg").write_text(peer_plot.draw(plot, run["target"], f"Cornell box, {size} × {size}: noise against time",
-                                                                f"processor seconds of the render, all threads ({processor_name()})"))
+    curves = [(line.contestant, [(p["cpu_seconds"], p["error"]) for p in line.points if p["cpu_seconds"] > 0 and p["error"] > 0]) for line in lines]
+    (arguments.results / "peers.svg").write_text(peer_plot.draw([c for c in curves if c[1]], run["target"], f"Cornell box, {size} × {size}: error against time",
+                                                                f"processor seconds of the render, all threads ({processor()})"))
     results.write()
     return 0
 
@@ -224,19 +228,13 @@ def write_pictures(folder, pools):
         peer_agreement.write_png(folder / f"{name.lower()}.png", pool.mean())
 
 
-def processor_name():
-    with open("/proc/cpuinfo") as file:
-        names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
-    return f"{names[0]}, {len(names)} threads" if names else "processor unknown"
-
-
 def where_time_goes(results, rows, factor, room):
     """Time to an error is time per path times paths needed; the two factors of each pairing that has the same roulette."""
     results.heading("Where the time goes")
     table, per_paths = [], []
     for roulette in (False, True):
-        ours = next(r for n, r in rows.items() if n.startswith("crt embree, 1 sequence") and ("roulette" in n) == roulette)
-        theirs = next(r for n, r in rows.items() if n.startswith("Mitsuba llvm") and ("roulette" in n) == roulette)
+        ours, theirs = (next(r for r in rows.values() if (r["renderer"], r["engine"], r["replicates"], r["roulette"]) == (*who, 1, roulette))
+                        for who in (("crt", "embree"), ("Mitsuba", "llvm_ad")))
         per_path = ours["cpu_us_per_sample"] / theirs["cpu_us_per_sample"]
         per_paths.append(per_path)
         for metric, text in METRICS.items():

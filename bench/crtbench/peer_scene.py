@@ -10,20 +10,17 @@ from .program import Failure
 GRID_NM = np.arange(360.0, 833.0, 4.0)  # Every node of the box's tables lies on it, so resampling them changes nothing.
 
 
-def table(spectra, name, grid):
-    """A spectrum as {grid, nm, value}, or a number. What lies outside its table is clamped, and written out, since other renderers take zero there."""
+def table(spectra, name):
+    """A spectrum as {nm, value}, or a number. What lies outside its table is clamped, and written out, since other renderers take zero there."""
     given = spectra.get(name, name) if isinstance(name, str) else name
     if isinstance(given, (int, float)):
         return float(given)
     if set(given) - {"table", "outside"} or given.get("outside") != "clamp":
         raise Failure(f"the spectrum '{name}' is not a table that is clamped outside, and nothing else is translated for other renderers")
     nm, value = (np.array(given["table"][key], dtype=np.float64) for key in ("nm", "value"))
-    if grid == "irregular":
-        inside = [(GRID_NM[0], value[0]), *zip(nm, value), (GRID_NM[-1], value[-1])]
-        return {"grid": grid, "nm": [float(x) for x, _ in inside], "value": [float(y) for _, y in inside]}
     if not np.isin(nm, GRID_NM).all():
         raise Failure(f"the table of the spectrum '{name}' has nodes off the grid of 4 nm: resampling would change it")
-    return {"grid": grid, "nm": GRID_NM.tolist(), "value": np.interp(GRID_NM, nm, value).tolist()}
+    return {"nm": GRID_NM.tolist(), "value": np.interp(GRID_NM, nm, value).tolist()}
 
 
 def triangles(mesh):
@@ -41,7 +38,7 @@ def write_ply(path, corners):
     path.write_text("\n".join(lines) + "\n")
 
 
-def describe(file, folder, size, max_depth, grid="regular"):
+def describe(file, folder, size, max_depth):
     """The scene as Mitsuba's process wants it; meshes go to `folder`."""
     scene = yaml.safe_load(file.read_text())
     camera, spectra = scene["camera"], scene["spectra"]
@@ -50,10 +47,10 @@ def describe(file, folder, size, max_depth, grid="regular"):
         material = scene["materials"][thing["material"]]
         if material["type"] != "diffuse" or set(thing) - {"name", "mesh", "material", "emission"}:
             raise Failure(f"the object '{thing['name']}' is more than a diffuse mesh, and nothing else is translated for other renderers")
-        part = parts.setdefault(thing["material"], {"corners": [], "reflectance": table(spectra, material["reflectance"], grid)})
+        part = parts.setdefault(thing["material"], {"corners": [], "reflectance": table(spectra, material["reflectance"])})
         part["corners"].append(triangles(thing["mesh"]))
         if "emission" in thing:
-            part["radiance"] = table(spectra, thing["emission"]["radiance"], grid)
+            part["radiance"] = table(spectra, thing["emission"]["radiance"])
     for name, part in parts.items():
         part["ply"] = str(folder / f"{name}.ply")
         write_ply(folder / f"{name}.ply", np.concatenate(part.pop("corners")))

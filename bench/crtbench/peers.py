@@ -4,18 +4,18 @@ The error of a setting with N samples is the root of the mean over pixels and re
 the mean luminance; the converged image's own variance is taken off. The spread between seeds would need no reference, but it is blind to what all seeds have in
 common, and a low-discrepancy sampler that is scrambled alike for every seed has much of its error there."""
 import json
-import math
 import time
 
 import numpy as np
 
-from . import peer_agreement, peer_scene
+from . import peer_agreement, peer_page, peer_scene
+from .peer_error import Reference, relative_error
 from .peer_lines import ROULETTE_FROM, SCENE, Crt, Mitsuba, Worker
 from .results import Results
 
 SIZE, MAX_DEPTH, TARGET = 128, 16, 0.01
 COUNTS = [4, 16, 64, 128, 256, 512, 1024]
-REFERENCE_RENDERS, REFERENCE_SAMPLES = 8, 1024
+REFERENCE_SAMPLES = 1024  # Of each of its renders.
 FEWEST_POOLED = 16  # Samples of a render that counts among the converged ones.
 HEADLINE_WEIGHT, MATCHED_WEIGHT = 4, 2  # Of the time for measuring: with roulette, and without; the other lines have 1.
 
@@ -26,56 +26,14 @@ class Line:
     def __init__(self, contestant, weight):
         self.contestant, self.weight = contestant, weight
         self.name = contestant.name
-        self.points, self.spent, self.share, self.open = [], 0.0, 0.0, True
+        self.points, self.spent, self.share = [], 0.0, 0.0
 
     def wants(self, spp):
         """Whether `spp` still fits into this line's share, were it to cost in proportion to the last. Three points are needed in any case."""
-        if len(self.points) >= 3:
-            last = self.points[-1]
-            self.open = self.open and self.spent + last["elapsed"] * spp / last["asked"] <= self.share
-        return self.open
-
-
-def room_pixels(image):
-    """Those that do not see the lamp, nor does a neighbour: what sees it is many times brighter than anything that it lights."""
-    seen = image[:, :, 1] > 8 * image[:, :, 1].mean()
-    padded = np.pad(seen, 1)
-    height, width = seen.shape
-    return ~np.any([padded[r:r + height, c:c + width] for r in range(3) for c in range(3)], axis=0)
-
-
-class Reference:
-    """A converged image, the mean of renders by crt with seeds that nothing else has, and the variance of that mean in every pixel."""
-
-    def __init__(self, contestant, samples):
-        images = np.array([contestant.render(samples, 70_000_000 + r).image for r in range(REFERENCE_RENDERS)])
-        self.samples = REFERENCE_RENDERS * samples
-        self.mean = images.mean(axis=0)
-        self.variance = images.var(axis=0, ddof=1) / REFERENCE_RENDERS
-        self.room = room_pixels(self.mean)
-        self.error = math.sqrt(self.variance[..., 1].mean()) / self.mean[..., 1].mean()
-
-
-def relative_error(images, unit, reference):
-    """Relative RMSE of one render from R of them, and its standard error by the jackknife over renders: {metric: (error, se)}. `unit`: what their pixels are
-    divided by. `error`: luminance of all pixels; `error_xyz`: X, Y and Z of all pixels; `error_room`: luminance of the pixels that see no lamp, over
-    their mean; `spread`: luminance of all pixels, about the renders' own mean."""
-    stack, room = np.array(images) / unit, reference.room
-
-    def against(values, truth, variance):
-        squares = ((values - truth) ** 2).reshape(len(values), -1).mean(axis=1)
-        return jackknife(squares, lambda kept: math.sqrt(max(0.0, kept.mean() - variance.mean())) / truth.mean())
-
-    mean, variance = reference.mean, reference.variance
-    return {"error": against(stack[..., 1], mean[..., 1], variance[..., 1]), "error_xyz": against(stack, mean, variance),
-            "error_room": against(stack[..., 1][:, room], mean[..., 1][room], variance[..., 1][room]),
-            "spread": jackknife(stack[..., 1], lambda kept: math.sqrt(kept.var(axis=0, ddof=1).mean()) / kept.mean())}
-
-
-def jackknife(values, estimate):
-    count = len(values)
-    without = [estimate(np.delete(values, r, axis=0)) for r in range(count)]
-    return estimate(values), math.sqrt((count - 1) / count * sum((w - np.mean(without)) ** 2 for w in without))
+        if len(self.points) < 3:
+            return True
+        last = self.points[-1]
+        return self.spent + last["elapsed"] * spp / last["asked"] <= self.share
 
 
 def measure_round(lines, spp, replicates, seed_base, reference, pool_of):
@@ -103,27 +61,6 @@ def measure_round(lines, spp, replicates, seed_base, reference, pool_of):
         line.spent += data["elapsed"]
         p = line.points[-1]
         print(f"{line.name:42} {p['spp']:5} spp  {100 * p['error']:6.2f} %  spread {100 * p['spread']:6.2f} %  {p['cpu_seconds']:7.3f} cpu s  {p['render_seconds']:7.3f} s  others {p['others']:.0%}", flush=True)
-
-
-def seconds_to(points, key, target, metric="error"):
-    """(seconds, whether extrapolated, relative standard error): between points log-log; beyond them along the line through the last three."""
-    points = [p for p in points if p[metric] > 0 and p[key] > 0]  # Of the smallest images, a start may have cost more than all.
-    if len(points) < 2:
-        return math.nan, True, math.nan
-    x, y = [math.log(p[metric]) for p in points], [math.log(p[key]) for p in points]
-    goal = math.log(target)
-    uncertain = 2 * max(p[f"{metric}_se"] / p[metric] for p in points[-2:])  # Time goes with the inverse square of error.
-    for i in range(1, len(points)):
-        if x[i] <= goal <= x[i - 1]:
-            part = (goal - x[i - 1]) / (x[i] - x[i - 1])
-            return math.exp(y[i - 1] + part * (y[i] - y[i - 1])), False, uncertain
-    slope, offset = np.polyfit(x[-3:], y[-3:], 1)
-    return math.exp(offset + slope * goal), True, uncertain
-
-
-def slope_of(points):
-    """Of log error over log samples, of the last three points."""
-    return float(np.polyfit([math.log(p["spp"]) for p in points[-3:]], [math.log(p["error"]) for p in points[-3:]], 1)[0])
 
 
 def tournament(worker, unit, samplers, spp, replicates, reference):
@@ -178,7 +115,7 @@ def run(program, arguments, results, scene, setup, crt_backends, workers, begin)
             line.contestant.learn_start(2)
     starts = {}
     for line in lines:
-        if isinstance(line.contestant, Mitsuba) or line.contestant.replicates == 1:
+        if line.contestant.replicates == 1:
             starts[line.name] = {"cold": line.contestant.whole(16, True), "warm": [line.contestant.whole(16, False) for _ in range(3)]}
 
     print(f"started after {time.monotonic() - begin:.0f} s", flush=True)
@@ -190,8 +127,7 @@ def run(program, arguments, results, scene, setup, crt_backends, workers, begin)
         going = [line for line in lines if line.wants(spp)]
         if not going:
             break
-        measure_round(going, spp, arguments.replicates, 10_000_000 * number, reference, lambda line: pools["crt" if isinstance(line.contestant, Crt) else "Mitsuba"])
-    from . import peer_page
+        measure_round(going, spp, arguments.replicates, 10_000_000 * number, reference, lambda line: pools[line.contestant.renderer])
     return peer_page.write(program, results, arguments, {
         "setup": setup, "scene": scene, "described": described, "scores": scores, "lines": lines, "starts": starts, "pools": pools,
         "reference": reference, "target": TARGET, "roulette_from": ROULETTE_FROM})

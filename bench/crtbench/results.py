@@ -53,7 +53,7 @@ class Results:
                 ("Compiler", f"{facts['compiler']}, {facts['build_type']}: `{facts['flags']}`")]
         if facts["embree_kernel_flags"]:
             rows.append(("Embree kernels", f"`{facts['embree_kernel_flags']}`"))
-        rows += [("Processor", f"{facts['cpu']}, {facts['threads']} threads, {facts['memory_gb']} GB"),
+        rows += [("Processor", f"{processor()}, {facts['memory_gb']} GB"),
                  ("GPU", facts["gpu"] or "none"),
                  ("System", facts["os"])]
         rows += [(f"Backend `{name}`", text) for name, text in facts["backends"].items()]
@@ -88,15 +88,23 @@ def provenance(program):
             backends[name] = f"{status['version']}; " + ("; ".join(status["devices"]) or status.get("reason", "no device"))
     gpus = [d for name in ("cuda", "opencl") for d in statuses.get(name, {"devices": []})["devices"] if re.search(r"NVIDIA|AMD Radeon|GPU", d)]
     memory_kb = int(re.search(r"MemTotal:\s+(\d+)", pathlib.Path("/proc/meminfo").read_text())[1])
-    cpu = re.search(r"model name\s*:\s*(.*)", pathlib.Path("/proc/cpuinfo").read_text())
     # Results are what the measurements write; they do not change what is measured.
     changed = [line for line in git("status", "--porcelain").splitlines() if not line[3:].startswith("docs/results/")]
     return {"commit": git("rev-parse", "HEAD").strip(), "dirty": bool(changed),
             "compiler": version, "build_type": build_type,
             "flags": compile_flags(program, "core/compile.cpp"),
             "embree_kernel_flags": compile_flags(program, "plugins/embree/kernels.cpp"),
-            "cpu": cpu[1] if cpu else platform.processor(), "threads": os.cpu_count(), "memory_gb": round(memory_kb / 1e6, 1),
+            "cpu": processor_name(), "threads": os.cpu_count(), "memory_gb": round(memory_kb / 1e6, 1),
             "gpu": gpus[0] if gpus else None, "os": operating_system(), "backends": backends}
+
+
+def processor_name():
+    match = re.search(r"model name\s*:\s*(.*)", pathlib.Path("/proc/cpuinfo").read_text())
+    return match[1] if match else platform.processor()
+
+
+def processor():
+    return f"{processor_name()}, {os.cpu_count()} threads"
 
 
 def operating_system():
