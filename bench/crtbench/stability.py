@@ -1,11 +1,11 @@
 """How far a backend's arithmetic carries: sweeps over sizes, gaps, places, fields of view and solid angles, each to where it ends. One page a
 sweep, stability-SWEEP.md, with every backend that runs here. Rays are counted, nothing is timed: it may run on a busy machine. --rows takes what
-stability_sweep printed on other machines, with the backend's name added to each line ("backend")."""
+stability_sweep printed on other machines, with "backend", and "machine" in words, added to each line, and the number of rays asked for as "asked"."""
 import json
 import pathlib
 
 from .program import Failure
-from .results import Results
+from .results import Results, processor
 
 SWEEPS = {
     "misses": "Rays at vertices, edges and faces",
@@ -42,17 +42,54 @@ def measure(program, arguments):
             if backend not in points:
                 results.paragraph(f"Not measured: `{backend}` ({reason}).")
         if given:
-            results.paragraph(f"Measured on another machine, by the same command: {', '.join(f'`{b}`' for b in given)}.")
-        for backend in points:
-            results.command(f"{program.build}/bin/stability_sweep {backend} {sweep} {rays:.0e}")
+            results.paragraph(f"{amounts(points)} {origins(points)}")
+        for backend, rows in points.items():
+            asked = f"{rows[0]['asked']:.0e}" if "asked" in rows[0] else "RAYS"
+            results.command(f"{program.build}/bin/stability_sweep {backend} {sweep} {asked}")
         results.data = {"points": points}
         results.write()
 
 
-def run(program, backend, sweep, rays):
-    environment = {"CRT_BACKEND_PATH": f"{program.build / 'lib' / 'crt'}:{program.environment['CRT_BACKEND_PATH']}"}
-    output = program.start([backend, sweep, rays], program=program.build / "bin" / "stability_sweep", environment=environment).output
-    return [json.loads(line) for line in output.splitlines()]
+def run(program, backend, sweep, rays, environment=None):
+    paths = {"CRT_BACKEND_PATH": f"{program.build / 'lib' / 'crt'}:{program.environment['CRT_BACKEND_PATH']}"}
+    output = program.start([backend, sweep, rays], program=program.build / "bin" / "stability_sweep", environment={**paths, **(environment or {})}).output
+    return [{**json.loads(line), "asked": rays, "machine": processor()} for line in output.splitlines()]
+
+
+def together(names):
+    """`a`, `b` and `c`"""
+    *first, last = (f"`{name}`" for name in names)
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def alike(points, what):
+    """{what(rows): backends} of backends' rows."""
+    groups = {}
+    for backend, rows in points.items():
+        groups.setdefault(what(rows), []).append(backend)
+    return groups
+
+
+def amount(rows):
+    """Of rays each point of a sweep has, or of samples each pixel; what the backend refused has none."""
+    unit, what = ("samples", "samples a pixel") if any("samples" in row for row in rows) else ("rays", "rays a point")
+    counts = [row[unit] for row in rows if unit in row] or [0]
+    least, most = min(counts), max(counts)
+    return f"{least:.3g} {what}" if least == most else f"{least:.3g} to {most:.3g} {what}"
+
+
+def amounts(points):
+    groups = alike(points, amount)
+    return (next(iter(groups)) if len(groups) == 1 else "; ".join(f"{together(backends)} {text}" for text, backends in groups.items())) + "."
+
+
+def origins(points):
+    parts = []
+    # This machine comes last, as "the one below": the page's table of what it was measured with describes it.
+    for machine, backends in sorted(alike(points, lambda rows: rows[0].get("machine", "another machine")).items(), key=lambda item: item[0] == processor()):
+        verb = "" if parts else " was measured" if len(backends) == 1 else " were measured"
+        parts.append(f"{together(backends)}{verb} on {'the one below' if machine == processor() else machine}")
+    return "; ".join(parts) + "."
 
 
 def count(point):
