@@ -5,7 +5,6 @@ process, kernels compiled anew. A found fault is a verdict FAIL, exit code 7."""
 import json
 import shutil
 import statistics
-import subprocess
 
 from .program import Failure, children_seconds, significant
 from .results import Results
@@ -29,16 +28,6 @@ FAULTS = [
     Fault("05-roulette-without-compensation", "roulette without 1/p", "analytic/cube",
           "roulette from the first bounce, up to 64 bounces", 256, "2%", "roulette", ["film.resolution=[8,8]", *ROULETTE]),
 ]
-
-
-def faulty_kernel(program, fault):
-    tree = program.scratch / fault.patch
-    shutil.copytree(program.repository / "core" / "kernel", tree / "core" / "kernel")
-    patch = program.repository / "tests" / "mutations" / f"{fault.patch}.patch"
-    done = subprocess.run(["patch", "--strip=1", "--fuzz=0", "--silent", "-d", str(tree), "-i", str(patch)], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise Failure(f"{patch.name} does not apply to this tree: {done.stdout.strip()}")
-    return tree / "core" / "kernel"
 
 
 class Check:
@@ -89,7 +78,7 @@ def measure(program, arguments):
     results = Results(program, arguments, "power", "Small faults are found")
     rows, data, failures = [], [], 0
     for fault in FAULTS:
-        kernel = faulty_kernel(program, fault)
+        kernel = program.patched_kernel(program.repository / "tests" / "mutations" / f"{fault.patch}.patch")
         found = [compare(program, fault, kernel, seed) for seed in SEEDS]
         sound = [compare(program, fault, None, seed) for seed in SEEDS]
         known, known_sound = verify(program, fault, kernel), verify(program, fault, None)

@@ -1,8 +1,6 @@
 """What robustness costs, and what it buys: the watertight triangle test against Möller and Trumbore's, offsets by each triangle's error bound against one fixed
 epsilon. The alternatives are patches of the kernel's texts in bench/alternatives, which OpenCL compiles at run time (CRT_KERNEL_DIR)."""
-import json
 import shutil
-import subprocess
 
 from . import stability
 from .program import Failure, Spread
@@ -16,7 +14,7 @@ def measure(program, arguments):
     if "opencl" not in program.backends(["opencl"])[0]:
         raise Failure("the alternatives are compiled by the OpenCL backend, which has no device here")
     size, runs = (32, 2) if arguments.tiny else (250, 5)
-    environments = {"crt": {}} | {name: {"CRT_KERNEL_DIR": str(patched_kernel(program, name))} for name in ALTERNATIVES}
+    environments = {"crt": {}} | {name: {"CRT_KERNEL_DIR": str(folder)} for name, folder in kernels(program).items()}
     results = Results(program, arguments, "robustness", "What robustness costs, and what it buys")
     data = {"seconds": {}, "ratio": {}, "wrong": {}}
 
@@ -44,30 +42,23 @@ def measure(program, arguments):
     results.paragraph("Rays of the sweeps of [stability-misses](stability-misses.md), [stability-offset-safety](stability-offset-safety.md) and [stability-offset-tightness]"
                       "(stability-offset-tightness.md): how many slip through a closed mesh, meet the triangle that they leave, or step over a layer.")
     for sweep, rays in (("misses", 2e4), ("offset-safety", 4e4), ("offset-tightness", 4e3)):
-        points = {name: sweep_with(program, sweep, rays / (50 if arguments.tiny else 1), environment) for name, environment in environments.items()}
+        points = {name: stability.run(program, "opencl", sweep, rays / (50 if arguments.tiny else 1), environment) for name, environment in environments.items()}
         data["wrong"][sweep] = points
-        stability.TABLES[sweep](results, {{"crt": "crt"}.get(name, ALTERNATIVES.get(name)): p for name, p in points.items()})
+        stability.TABLES[sweep](results, {ALTERNATIVES.get(name, name): p for name, p in points.items()})
     results.command("CRT_KERNEL_DIR=SCRATCH/moeller_trumbore crt render configs/cornell_dragon.yaml --backend opencl --spp 8 -o unseen.pfm")
     results.data = data
     results.write()
 
 
-def patched_kernel(program, name):
-    """A copy of the kernel's texts with one alternative in it."""
-    folder = program.scratch / name
-    shutil.copytree(program.repository / "core" / "kernel", folder / "core" / "kernel")
-    small = name == "small_epsilon"   # The same patch with another number.
-    patch = program.repository / "bench" / "alternatives" / f"{'fixed_epsilon' if small else name}.patch"
-    done = subprocess.run(["git", "apply", "--unsafe-paths", f"--directory={folder}", str(patch)], cwd=folder, capture_output=True, text=True)
-    if done.returncode != 0:
-        raise Failure(f"{patch.name} does not fit the kernel any more: {done.stderr.strip()}")
-    if small:
-        surface = folder / "core" / "kernel" / "surface.h"
-        surface.write_text(surface.read_text().replace("CRT_FIXED_EPSILON 1e-4f", "CRT_FIXED_EPSILON 1e-6f"))
-    return folder / "core" / "kernel"
-
-
-def sweep_with(program, sweep, rays, environment):
-    paths = {"CRT_BACKEND_PATH": f"{program.build / 'lib' / 'crt'}:{program.environment['CRT_BACKEND_PATH']}"}
-    output = program.start(["opencl", sweep, rays], program=program.build / "bin" / "stability_sweep", environment={**paths, **environment}).output
-    return [json.loads(line) for line in output.splitlines()]
+def kernels(program):
+    """{name of an alternative: CRT_KERNEL_DIR}"""
+    folder = program.repository / "bench" / "alternatives"
+    patched = {name: program.patched_kernel(folder / f"{name}.patch") for name in ("moeller_trumbore", "fixed_epsilon")}
+    small = program.scratch / "small_epsilon"  # The same patch with another number.
+    shutil.copytree(patched["fixed_epsilon"], small)
+    surface, before, after = small / "surface.h", "CRT_FIXED_EPSILON 1e-4f", "CRT_FIXED_EPSILON 1e-6f"
+    text = surface.read_text()
+    if text.count(before) != 1:
+        raise Failure(f"fixed_epsilon.patch does not put '{before}' into surface.h any more")
+    surface.write_text(text.replace(before, after))
+    return {**patched, "small_epsilon": small}
