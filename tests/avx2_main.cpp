@@ -1,6 +1,6 @@
 // The main of tests compiled for AVX2. Compiled without it: on a CPU that lacks it nothing else of the program may run, static initialisers included.
-#define CATCH_CONFIG_MAIN
-#include <catch2/catch.hpp>
+#define CATCH_CONFIG_RUNNER
+#include "catch.h"
 
 #if defined(__x86_64__)
 #include <unistd.h>
@@ -21,3 +21,7 @@ __attribute__((constructor(101))) void leaveWithoutAvx2() {
 
 }  // namespace
 #endif
+
+int main(int argc, char** argv) {
+    return Catch::Session().run(argc, argv);
+}

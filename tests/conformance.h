@@ -3,11 +3,10 @@
 
 #include "backend/integrator.h"
 #include "backend/loader.h"
+#include "catch.h"
 #include "compile.h"
 #include "film.h"
 #include "scene_yaml.h"
-
-#include <catch2/catch.hpp>
 
 #include <cstdint>
 #include <string>

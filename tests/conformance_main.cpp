@@ -71,8 +71,8 @@ double imageMean(const crt::Film& film) {
 
 int main(int argc, char** argv) {
     Catch::Session session;
-    session.cli(session.cli() | Catch::clara::Opt(conformance::backend_name, "name")["--backend"]("backend under test, or a path to its .so") |
-                Catch::clara::Opt(conformance::reference_name, "name")["--against"]("backend to compare bits with"));
+    session.cli(session.cli() | Catch::Clara::Opt(conformance::backend_name, "name")["--backend"]("backend under test, or a path to its .so") |
+                Catch::Clara::Opt(conformance::reference_name, "name")["--against"]("backend to compare bits with"));
     if (const int code = session.applyCommandLine(argc, argv); code != 0) return code;
     crt::setLogLevel(crt::LogLevel::Error);
     try {

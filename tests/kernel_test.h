@@ -1,10 +1,9 @@
 /// What the kernel's unit tests share: the kernel as plain C++, scenes made in memory, seeded numbers, and chi-squared.
 #pragma once
 
+#include "catch.h"
 #include "compile.h"
 #include "kernel/path.h"
-
-#include <catch2/catch.hpp>
 
 #include <cmath>
 #include <cstdint>

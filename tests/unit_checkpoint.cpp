@@ -1,9 +1,8 @@
 // Checkpoint files: bit for bit there and back, and every kind of damage its own sentence.
+#include "catch.h"
 #include "checkpoint.h"
 #include "log.h"
 #include "verify/temporary_folder.h"
-
-#include <catch2/catch.hpp>
 
 #include <cstdio>
 #include <cstring>
@@ -13,7 +12,6 @@
 #include <unistd.h>
 
 using namespace crt;
-using Catch::Matchers::Contains;
 using crt::verify::TemporaryFolder;
 namespace fs = std::filesystem;
 

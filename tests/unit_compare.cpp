@@ -1,15 +1,14 @@
 // Comparing images: metrics worked out by hand, and everything that must not pass for equal.
+#include "catch.h"
 #include "compare_text.h"
 #include "error.h"
 
-#include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
 #include <cmath>
 #include <limits>
 
 using namespace crt;
-using Catch::Matchers::Contains;
 
 namespace {
 

@@ -1,11 +1,11 @@
 // Noise and bias of images, and errors against a reference with noise, on images whose noise is known because it was made here.
+#include "catch.h"
 #include "compare_noise.h"
 #include "compare_reference.h"
 #include "compare_text.h"
 #include "error.h"
 #include "image_noise.h"
 
-#include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -14,7 +14,6 @@
 #include <random>
 
 using namespace crt;
-using Catch::Matchers::Contains;
 
 namespace {
 

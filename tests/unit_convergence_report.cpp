@@ -1,4 +1,5 @@
 // Files and report of `crt converge`, on a run that never was: 3 scenes, 2 backends, 2 variants, and everything that can be wrong with them.
+#include "catch.h"
 #include "converge/files.h"
 #include "converge/findings.h"
 #include "converge/quantity_text.h"
@@ -8,7 +9,6 @@
 #include "synthetic_run.h"
 #include "verify/temporary_folder.h"
 
-#include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
 #include <cctype>
@@ -20,7 +20,6 @@
 
 using namespace crt;
 using namespace crt::converge;
-using Catch::Matchers::Contains;
 using crt::verify::TemporaryFolder;
 namespace fs = std::filesystem;
 

@@ -2,10 +2,9 @@
 // read from the assembler's log.
 #ifdef CRT_HAVE_CUDA_PROGRAM  // nothing to test in a build without CUDA
 
+#include "catch.h"
 #include "cuda_nvrtc.h"
 #include "cuda_program.h"
-
-#include <catch2/catch.hpp>
 
 #include <algorithm>
 #include <set>
@@ -27,9 +26,9 @@ TEST_CASE("NVRTC is looked for by name, in CUDA_HOME, then in the usual place", 
 
 TEST_CASE("a machine without NVRTC gets one sentence", "[cuda]") {
     CHECK_THROWS_WITH(Nvrtc::open({"/nowhere/libnvrtc.so.13", "/nowhere/libnvrtc.so"}),
-                      Catch::Matchers::StartsWith("NVRTC is not installed (") && Catch::Matchers::Contains("/nowhere/libnvrtc.so.13"));
+                      Catch::Matchers::StartsWith("NVRTC is not installed (") && Contains("/nowhere/libnvrtc.so.13"));
     // A library that is there, but is none.
-    CHECK_THROWS_WITH(Nvrtc::open({"libm.so.6"}), Catch::Matchers::Contains("libm.so.6"));
+    CHECK_THROWS_WITH(Nvrtc::open({"libm.so.6"}), Contains("libm.so.6"));
 }
 
 TEST_CASE("no option relaxes arithmetic", "[cuda]") {
@@ -100,7 +99,7 @@ TEST_CASE("what NVRTC refuses is quoted, and a compilation can be given up", "[c
     CHECK(nvrtc.major() >= 12);
     CHECK_FALSE(nvrtc.supports(1));
     CHECK_THROWS_WITH(nvrtc.compile("extern \"C\" __global__ void f() { g(); }", "wrong.cu", {"--gpu-architecture=sm_90"}),
-                      Catch::Matchers::Contains("wrong.cu(1)") && Catch::Matchers::Contains("\"g\" is undefined"));
+                      Contains("wrong.cu(1)") && Contains("\"g\" is undefined"));
     const Cubin cubin = nvrtc.compile("extern \"C\" __global__ void f(float *x) { *x = 1.0f; }", "right.cu",
                                       {"--gpu-architecture=sm_90", "--ptxas-options=-v"});
     REQUIRE(cubin.bytes.size() > 4);

@@ -3,11 +3,10 @@
 #include "error_estimate.h"
 #include "kernel_test.h"
 
+#include "catch.h"
 #include "kernel/layout.h"
 #include "kernel/sampler.h"
 #include "sampling.h"
-
-#include <catch2/catch.hpp>
 
 #include <array>
 #include <cmath>

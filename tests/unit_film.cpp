@@ -1,8 +1,7 @@
 // Film: sums that do not show their order, ranges that never count twice, and what they resolve to.
+#include "catch.h"
 #include "error_estimate.h"
 #include "film.h"
-
-#include <catch2/catch.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +12,6 @@
 #include <vector>
 
 using namespace crt;
-using Catch::Matchers::Contains;
 
 namespace {
 

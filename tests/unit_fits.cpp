@@ -1,8 +1,7 @@
 // Fits of convergence against renders whose variance, bias and cost are known: intervals must cover the truth as often as they say.
+#include "catch.h"
 #include "converge/fits.h"
 #include "synthetic_run.h"
-
-#include <catch2/catch.hpp>
 
 #include <functional>
 #include <map>

@@ -3,9 +3,8 @@
 // pixel, and 1e-6 of a mean.
 #include "stats/flip.h"
 
+#include "catch.h"
 #include "error.h"
-
-#include <catch2/catch.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,9 @@
 // Image files: bytes of the simple formats, everything an EXR has to keep, and what is refused.
+#include "catch.h"
 #include "error.h"
 #include "image_io.h"
 #include "log.h"
 #include "verify/temporary_folder.h"
-
-#include <catch2/catch.hpp>
 
 #include <cmath>
 #include <cstdlib>
@@ -16,7 +15,6 @@
 #include <unistd.h>
 
 using namespace crt;
-using Catch::Matchers::Contains;
 using crt::verify::TemporaryFolder;
 namespace fs = std::filesystem;
 
@@ -316,6 +314,14 @@ TEST_CASE("files of other formats and headers beyond the file's size are refused
     // A Radiance HDR header and eight bytes of one of its 65535 x 65535 pixels.
     spit(path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 65535 +X 65535\n12345678");
     CHECK_THROWS_WITH(readImage(path), Contains("65535 x 65535") && Contains("more than a file of its size can hold"));
+
+    // One row that is so long that OpenImageIO, which reads rows by 64, would allocate 4 GiB; and one that is not.
+    Image row = rgbImage(6'000'000, 1, std::vector<float>(18'000'000, 0.5f));
+    writeImage(path + ".exr", OutputFormat::Exr, row);
+    CHECK_THROWS_WITH(readImage(path + ".exr"), Contains("its rows of 6000000 pixels are longer than can be read"));
+    row = rgbImage(65'535, 1, std::vector<float>(3 * 65'535, 0.5f));
+    writeImage(path + ".exr", OutputFormat::Exr, row);
+    CHECK(readImage(path + ".exr").width == 65'535);
 }
 
 TEST_CASE("an image that lacks what it must have is refused", "[image_io]") {

@@ -1,11 +1,10 @@
 // The C++ face of a backend, against the test double `fake`: what was rendered is what is read, and whatever goes wrong in a plugin arrives
 // as an error of the right kind.
 #include "backend/integrator.h"
+#include "catch.h"
 #include "error.h"
 #include "fake_plugins/fake_pattern.h"
 #include "kernel/layout.h"
-
-#include <catch2/catch.hpp>
 
 #include <algorithm>
 #include <cstdint>
@@ -17,7 +16,6 @@
 #include <vector>
 
 using namespace crt;
-using Catch::Matchers::Contains;
 
 namespace {
 

@@ -1,8 +1,8 @@
 // The kernel cache: it finds what was stored, and nothing that happens to its directory makes it fail or lie.
 #include "backend/kernel_cache.h"
+#include "catch.h"
 #include "verify/temporary_folder.h"
 
-#include <catch2/catch.hpp>
 #include <fcntl.h>
 #include <sys/stat.h>
 

@@ -1,7 +1,6 @@
 // Launch pacing: whatever the budget does, every sample of every pixel is launched exactly once.
 #include "backend/launch_pacer.h"
-
-#include <catch2/catch.hpp>
+#include "catch.h"
 
 #include <random>
 #include <vector>

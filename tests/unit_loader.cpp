@@ -2,10 +2,10 @@
 #include "backend/crt_layout_hash.h"
 #include "backend/kernel_source.h"
 #include "backend/loader.h"
+#include "catch.h"
 #include "error.h"
 #include "verify/temporary_folder.h"
 
-#include <catch2/catch.hpp>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -14,7 +14,6 @@
 #include <optional>
 
 using namespace crt;
-using Catch::Matchers::Contains;
 using crt::verify::TemporaryFolder;
 namespace fs = std::filesystem;
 

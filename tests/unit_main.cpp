@@ -1,3 +1,7 @@
 // The one main of the unit tests; in a file of its own because compiling Catch's runner takes longer than any test.
-#define CATCH_CONFIG_MAIN
-#include <catch2/catch.hpp>
+#define CATCH_CONFIG_RUNNER
+#include "catch.h"
+
+int main(int argc, char** argv) {
+    return Catch::Session().run(argc, argv);
+}

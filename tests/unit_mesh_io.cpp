@@ -1,16 +1,14 @@
 // OBJ and MTL: what is accepted, what it becomes, and that every refusal names the line.
+#include "catch.h"
 #include "error.h"
 #include "log.h"
 #include "mesh_io.h"
 #include "verify/temporary_folder.h"
 
-#include <catch2/catch.hpp>
-
 #include <cmath>
 #include <filesystem>
 
 using namespace crt;
-using Catch::Contains;
 using crt::verify::TemporaryFolder;
 
 namespace {

@@ -1,8 +1,7 @@
 // The generated meshes: exactly the promised triangles, closed, right side out, and the same bytes from every run.
+#include "catch.h"
 #include "mesh_io.h"
 #include "verify/temporary_folder.h"
-
-#include <catch2/catch.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -155,8 +154,8 @@ TEST_CASE("options are not taken for the name of a folder", "[meshgen]") {
     const crt::verify::TemporaryFolder folder;
     const std::string there = "cd '" + folder.path() + "' && ";
     CHECK(std::system((there + kMeshgen + "--help > help.txt").c_str()) == 0);
-    CHECK_THAT(slurp(folder / "help.txt"), Catch::Contains("usage: crt-meshgen OUTDIR"));
+    CHECK_THAT(slurp(folder / "help.txt"), Contains("usage: crt-meshgen OUTDIR"));
     CHECK(std::system((there + kMeshgen + "--out 2> error.txt").c_str()) != 0);
-    CHECK_THAT(slurp(folder / "error.txt"), Catch::Contains("usage: crt-meshgen OUTDIR"));
+    CHECK_THAT(slurp(folder / "error.txt"), Contains("usage: crt-meshgen OUTDIR"));
     CHECK(folder.fileCount() == 2);
 }

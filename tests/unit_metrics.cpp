@@ -2,9 +2,8 @@
 #include "stats/color_difference.h"
 #include "stats/metrics.h"
 
+#include "catch.h"
 #include "error.h"
-
-#include <catch2/catch.hpp>
 
 #include <cmath>
 #include <limits>

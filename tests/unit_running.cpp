@@ -2,13 +2,12 @@
 // fails in the middle.
 #include "arguments.h"
 #include "backend/loader.h"
+#include "catch.h"
 #include "interrupt.h"
 #include "outputs.h"
 #include "progress.h"
 #include "sampling.h"
 #include "scene_yaml.h"
-
-#include <catch2/catch.hpp>
 
 #include <csignal>
 #include <cstdlib>
@@ -48,7 +47,7 @@ TEST_CASE("abbreviated command lines are written out") {
     CHECK(writtenOut({"--help"}, commands) == Words{"--help"});
     CHECK(writtenOut({"--resume", "a.yaml"}, commands) == Words{"render", "--resume=auto", "a.yaml"});
     CHECK(writtenOut({"a.yaml", "--resume", "b.crtfilm"}, commands) == Words{"render", "a.yaml", "--resume=b.crtfilm"});
-    CHECK_THROWS_WITH(writtenOut({"rendr", "a.yaml"}, commands), Catch::Contains("did you mean 'render'?"));
+    CHECK_THROWS_WITH(writtenOut({"rendr", "a.yaml"}, commands), Contains("did you mean 'render'?"));
 }
 
 TEST_CASE("a command line survives the shell") {

@@ -1,10 +1,10 @@
 // Scene YAML: what good scenes become, and for every kind of mistake that the message names place, reason and remedy.
+#include "catch.h"
 #include "log.h"
 #include "scene_schema.h"
 #include "scene_yaml.h"
 #include "verify/temporary_folder.h"
 
-#include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
 #include <cmath>
@@ -13,7 +13,6 @@
 #include <iterator>
 
 using namespace crt;
-using Catch::Contains;
 using crt::verify::TemporaryFolder;
 
 namespace {

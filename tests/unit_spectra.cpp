@@ -1,10 +1,9 @@
 // Spectra and colour: the measured tables by checksum and by smoothness, published reference values, and the RGB fit.
+#include "catch.h"
 #include "error.h"
 #include "spectra.h"
 #include "spectra_data.h"
 #include "verify/temporary_folder.h"
-
-#include <catch2/catch.hpp>
 
 #include <cmath>
 #include <cstring>
@@ -276,7 +275,6 @@ TEST_CASE("spectrum files are read as people write them", "[spectra]") {
 }
 
 TEST_CASE("bad spectrum files say where", "[spectra]") {
-    using Catch::Contains;
     const auto check = [](const char* text, int line, const char* words, Outside outside = Outside::Clamp) {
         const auto [sentence, at_line] = fileError(text, outside);
         CAPTURE(text);

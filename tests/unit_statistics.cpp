@@ -2,9 +2,8 @@
 // deviations of its binomial count; seeds are fixed, so it passes always or never.
 #include "stats/statistics.h"
 
+#include "catch.h"
 #include "error.h"
-
-#include <catch2/catch.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,5 @@
 // The suite of `crt verify` itself: its registry, its verdicts, its diagnoses, and that its expectations are right.
+#include "catch.h"
 #include "error.h"
 #include "kernel/layout.h"
 #include "verify/case.h"
@@ -7,7 +8,6 @@
 #include "verify/references.h"
 #include "verify/report.h"
 
-#include <catch2/catch.hpp>
 #include <fmt/format.h>
 
 #include <cmath>
@@ -18,7 +18,6 @@
 
 using namespace crt;
 using namespace crt::verify;
-using Catch::Matchers::Contains;
 
 namespace {
 
