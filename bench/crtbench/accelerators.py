@@ -113,8 +113,7 @@ def measure(program, arguments):
         data["crossover"][backend]["triangles"] = found
         results.lines.append(f"- {backend}: " + (f"the BVH is faster from about {found:.0f} triangles on." if found else "no crossing in this range."))
     results.lines.append("")
-    for backend, reason in absent.items():
-        results.paragraph(f"Not measured: `{backend}` ({reason}).")
+    results.not_measured(absent)
     results.command("crt render configs/SCENE.yaml --backend BACKEND --spp N --set 'film.resolution=[400,400]' --set 'outputs.0.aovs=[]' "
                     "--set integrator.accelerator=none|aabb|bvh -o unseen.pfm")
     results.data = data

@@ -67,8 +67,7 @@ def measure(program, arguments):
                       "says what class of speed this is and no more.")
     results.table(["scene", "pbrt-v4", "Mpaths/s", "Mrays/s"],
                   [[scene, PBRT[scene]["setting"], PBRT[scene]["mpaths_per_second"], PBRT[scene].get("mrays_per_second", "not known")] for scene in settings])
-    for name, reason in absent.items():
-        results.paragraph(f"Not measured: `{name}` ({reason}).")
+    results.not_measured(absent)
     for scene, (changes, spp) in settings.items():
         results.command(f"crt render configs/{scene}.yaml --backend BACKEND --spp {spp} " + " ".join(f"--set '{c}'" for c in changes) + " -o unseen.pfm")
     results.data = {"scenes": data, "pbrt_v4_elsewhere": PBRT}

@@ -90,9 +90,7 @@ def write(program, arguments, rows, absent):
             doubling.append(f"- {backend}: twice the width and height costs {significant(ratio)} times as much a sample; 4 is linear in the number of pixels")
     results.heading("The doubling")
     results.lines += [*doubling, ""]
-    for name, reason in absent.items():
-        if not any(b == name for b, _ in lines):
-            results.paragraph(f"Not measured: `{name}` ({reason}).")
+    results.not_measured({name: reason for name, reason in absent.items() if not any(b == name for b, _ in lines)})
     results.command(f"crt render configs/{SCENE}.yaml --backend BACKEND --spp N --set 'film.resolution=[1440,1440]' --set 'outputs.0.aovs=[]' -o unseen.pfm")
     results.data = {"rows": rows, "fits": data}
     results.write()

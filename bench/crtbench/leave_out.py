@@ -99,8 +99,7 @@ def measure(program, arguments):
         rows.append([f"`{name}`: {what}", *(feature_cell(entry["scenes"][scene]) for scene in scenes)])
         print(rows[-1], flush=True)
     results.table(["feature", *scenes], rows)
-    for backend, reason in absent.items():
-        results.paragraph(f"Not measured: `{backend}` ({reason}).")
+    results.not_measured(absent)
     for scene in scenes:
         results.command(f"crt render configs/{scene}.yaml --backend BACKEND --kernel lean|full --spp {spp[scene]} " + " ".join(f"--set '{c}'" for c in settings) + " -o unseen.pfm")
     results.data = data

@@ -8,9 +8,9 @@ import subprocess
 import sys
 import venv
 
-from .program import Failure, Program
+from .command import REPOSITORY, add_options, exit_code, program_for
+from .program import Failure
 
-REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
 PACKAGES = ["mitsuba==3.9.1", "numpy", "pyyaml"]
 OLDEST_LLVM = 17   # Older ones cannot select the instruction `fminimum` on x86, which Mitsuba's kernels contain.
 LLVM_PACKAGE = "libllvm19"
@@ -64,31 +64,20 @@ def llvm_library():
 
 def main():
     parser = argparse.ArgumentParser(prog="bench/peers", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, default=REPOSITORY / "build", help="build folder (build)")
-    parser.add_argument("--no-build", action="store_true", help="take the build as it is, instead of bringing it up to date first")
-    parser.add_argument("--results", type=pathlib.Path, default=REPOSITORY / "docs" / "results", help="where results go (docs/results)")
+    add_options(parser, busy="a wall time is marked")
     parser.add_argument("--python", help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in out/peers-venv")
     parser.add_argument("--seconds", type=float, default=600, help="about how long all of it may take, without making environments (600)")
     parser.add_argument("--replicates", type=int, default=8, help="renders with seeds of their own for each number of samples (8)")
     parser.add_argument("--samplers", nargs="+", default=["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
                         help="Mitsuba's samplers of which the best is taken (all five)")
-    parser.add_argument("--busy", type=float, default=0.05, metavar="SHARE", help="what share others may take of the processor before a wall time is marked (0.05)")
-    parser.add_argument("--tiny", action="store_true", help="small and short: does the tool work? Goes to out/tiny")
     arguments = parser.parse_args()
-    if arguments.tiny:
-        arguments.results = REPOSITORY / "out" / "tiny"
-    try:
-        os.environ["DRJIT_LIBLLVM_PATH"] = llvm_library()
-        if READY not in os.environ:
-            python = python_with_mitsuba(arguments.python)
-            os.execve(python, [python, str(REPOSITORY / "bench" / "peers"), *sys.argv[1:]], {**os.environ, READY: "1"})
-        from . import peers
-        program = Program(REPOSITORY, arguments.build.resolve(), arguments.busy)
-        if not arguments.no_build:
-            program.bring_up_to_date()
-        return peers.measure(program, arguments)
-    except Failure as failure:
-        print(f"bench/peers: {failure}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
+    return exit_code("bench/peers", arguments, lambda: measure(arguments))
+
+
+def measure(arguments):
+    os.environ["DRJIT_LIBLLVM_PATH"] = llvm_library()
+    if READY not in os.environ:
+        python = python_with_mitsuba(arguments.python)
+        os.execve(python, [python, str(REPOSITORY / "bench" / "peers"), *sys.argv[1:]], {**os.environ, READY: "1"})
+    from . import peers  # Needs what only the right Python has.
+    return peers.measure(program_for(arguments), arguments)

@@ -33,6 +33,11 @@ class Results:
         self.lines += ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
         self.lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows] + [""]
 
+    def not_measured(self, absent):
+        """`absent`: {backend: why}."""
+        for backend, reason in absent.items():
+            self.paragraph(f"Not measured: `{backend}` ({reason}).")
+
     def command(self, text):
         """A crt command line that stands for those that were run."""
         self.commands.append(self.program.plain(text))

@@ -38,9 +38,7 @@ def measure(program, arguments):
         points = {backend: given.get(backend) or run(program, backend, sweep, rays) for backend in BACKENDS if backend in given or backend in usable}
         results = Results(program, arguments, f"stability-{sweep}", SWEEPS[sweep])
         TABLES[sweep](results, points)
-        for backend, reason in absent.items():
-            if backend not in points:
-                results.paragraph(f"Not measured: `{backend}` ({reason}).")
+        results.not_measured({backend: reason for backend, reason in absent.items() if backend not in points})
         if given:
             results.paragraph(f"{amounts(points)} {origins(points)}")
         for backend, rows in points.items():

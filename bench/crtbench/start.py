@@ -102,8 +102,7 @@ def measure(program, arguments):
         results.paragraph(f"{compiler}: each variant compiled from the text to a CUBIN, nothing cached. Needs no GPU. Median of {len(kept)} runs, in brackets the "
                           "least and the most.")
         results.table(["variant", "mask", "ms", "registers", "stack, bytes", "spilled, bytes", "CUBIN, kB"], rows)
-    for backend, reason in absent.items():
-        results.paragraph(f"Not measured: `{backend}` ({reason}).")
+    results.not_measured(absent)
     results.command("crt render configs/SCENE.yaml --backend opencl --set 'film.resolution=[64,64]' --spp 1 -o unseen.pfm   # CRT_CACHE_DIR, POCL_CACHE_DIR fresh")
     results.command("nvrtc_variants configs/*.yaml")
     results.data = {"process_seconds": {name: s.json() for name, s in seconds.items()}, "libraries": libraries, "opencl_kernels": kernels,

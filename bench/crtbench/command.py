@@ -1,0 +1,38 @@
+"""What bench/run and bench/peers have in common on the command line."""
+import pathlib
+import sys
+
+from .program import Failure, Program
+
+REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
+
+
+def add_options(parser, busy):
+    """`busy`: what happens to runs during which others used the processor."""
+    parser.add_argument("--build", type=pathlib.Path, default=REPOSITORY / "build", help="build folder (build)")
+    parser.add_argument("--no-build", action="store_true", help="take the build as it is, instead of bringing it up to date first")
+    parser.add_argument("--results", type=pathlib.Path, default=REPOSITORY / "docs" / "results", help="where results go (docs/results)")
+    parser.add_argument("--tiny", action="store_true", help="small images, few samples and runs: does the tool work? The numbers mean nothing and go to out/tiny")
+    parser.add_argument("--busy", type=float, default=0.05, metavar="SHARE", help=f"{busy} when other processes took more than this share of the processor (0.05)")
+
+
+def program_for(arguments):
+    """The build that was asked for, up to date."""
+    program = Program(REPOSITORY, arguments.build.resolve(), arguments.busy)
+    if not arguments.no_build:
+        program.bring_up_to_date()
+    return program
+
+
+def exit_code(name, arguments, measure):
+    """Of measure(), which says what is wrong by a Failure."""
+    if arguments.tiny:
+        arguments.results = REPOSITORY / "out" / "tiny"
+        arguments.busy = float("inf")
+    try:
+        return measure() or 0
+    except Failure as failure:
+        print(f"{name}: {failure}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
