@@ -17,11 +17,8 @@ namespace crt::verify {
 namespace {
 
 constexpr std::uint64_t kDirectLight = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
-constexpr const char* kDirect = "{max_depth: 1, roulette: false}";
 constexpr const char* kSamplers[] = {"sobol", "independent", "xorshift"};
 constexpr std::uint32_t kKinds[] = {CRT_SAMPLER_SOBOL, CRT_SAMPLER_INDEPENDENT, CRT_SAMPLER_XORSHIFT};
-
-double meanRadiance(const Film& film) { return radiance(film); }
 
 std::string noisy(const char* sampler, const char* film = "{resolution: [4, 4]}") {
     std::string text = squareOverFloor(0, kDirect) + fmt::format("sampler: {{type: {}}}\n", sampler);
@@ -247,7 +244,7 @@ void infiniteSamples(Context& context) {
 /// Glass that reflects one path in 2^17 at normal incidence, of index (1 + √R)/(1 − √R), under a lamp behind the eye; black below.
 std::string rareReflection(double radiance) {
     const double r = std::sqrt(std::ldexp(1.0, -17));
-    return Stage("{position: [0, 0, 1], target: [0, 0, 0], fov: 0.0001}", "{max_depth: 1, roulette: false}")
+    return Stage("{position: [0, 0, 1], target: [0, 0, 0], fov: 0.0001}", kDirect)
         .set("film", "{resolution: [2, 2]}")
         .material("glass", fmt::format("{{type: dielectric, ior: {:.17g}}}", (1 + r) / (1 - r)))
         .material("black", "{type: diffuse, reflectance: 0}")

@@ -21,8 +21,6 @@ constexpr double kDegree = kPi / 180;
 constexpr double kIndex = 1.5;
 constexpr std::uint64_t kGlass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ENVIRONMENT;
 
-double meanRadiance(const Film& film) { return radiance(film); }
-
 void clearBody(Context& context) {
     const auto scene = [](bool body, double ior, int depth) {
         Stage stage("{position: [0.2, 3, 4], target: [0.5, 0.5, 0.5], fov: 15}", fmt::format("{{max_depth: {}, roulette: false}}", depth));

@@ -86,8 +86,8 @@ void linesOffTheGrid(Context& context) {
     context.estimate("589.3 ± 0.05 nm: Y", lamp(line(589.3, 0.05, 20)), kY, expected, 0.002, {.samples = 16384, .most = 65536});
 }
 
-void chromaticityOf(Context& context, double nm, double x, double y, double tolerance, const std::string& source) {
-    const Film film = context.render(lamp(line(nm, 1)), {.samples = 65536});
+/// Chromaticity of a film of the line at `nm`.
+void chromaticityOf(Context& context, const Film& film, double nm, double x, double y, double tolerance, const std::string& source) {
     const Vec3d xyz = xyzOf(film);
     const double sum = xyz[0] + xyz[1] + xyz[2];
     context.absolute(fmt::format("{} nm: x {}", nm, source), xyz[0] / sum, x, tolerance);
@@ -95,9 +95,9 @@ void chromaticityOf(Context& context, double nm, double x, double y, double tole
 }
 
 void sodium(Context& context) {
-    chromaticityOf(context, 589, 0.5690, 0.4303, 0.002, "(CIE 1931)");
     const Scene scene = context.scene(lamp(line(589, 1)));
     const Film film = context.render(scene, {.samples = 65536});
+    chromaticityOf(context, film, 589, 0.5690, 0.4303, 0.002, "(CIE 1931)");
     const Image image = resolveImage(film, scene, 0);
     const double scale = cieYIntegral();
     const Vec3d xyz = integrate([](double nm) { return std::max(0.0, 1 - std::abs(nm - 589)); }, 588, 590, 0.01);
@@ -110,8 +110,9 @@ void sodium(Context& context) {
     }
     Image bright = image;
     for (float& v : bright.pixels) v *= 100;
-    context.holds("PNG clips and counts what is out of gamut", encodeSrgb8(bright).clipped_values >= 2 * film.counts.size(), "2 values a pixel", "values out of gamut are clipped without a word",
-                  fmt::format("{} clipped values", encodeSrgb8(bright).clipped_values));
+    const std::uint64_t clipped = encodeSrgb8(bright).clipped_values;
+    context.holds("PNG clips and counts what is out of gamut", clipped >= 2 * film.counts.size(), "2 values a pixel",
+                  "values out of gamut are clipped without a word", fmt::format("{} clipped values", clipped));
 }
 
 void fluorescent(Context& context) {
@@ -174,7 +175,7 @@ void metamers(Context& context) {
     }
     const std::string metamer = fmt::format("{{table: {{nm: [{}], value: [{}]}}, outside: clamp}}", nm, value);
     const auto patch = [](const std::string& reflectance, const std::string& light) {
-        return Stage("{position: [0, 1, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 1}", "{max_depth: 1, roulette: false}")
+        return Stage("{position: [0, 1, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 1}", kDirect)
             .set("environment", fmt::format("{{radiance: {}}}", light))
             .material("it", fmt::format("{{type: diffuse, reflectance: {}}}", reflectance))
             .quad("it", "[[-9,0,-9],[-9,0,9],[9,0,9],[9,0,-9]]", "it")
@@ -195,7 +196,7 @@ void lasers(Context& context) {
     for (const int nm : {450, 532, 638}) {
         const auto i = static_cast<std::size_t>(nm - kWavelengthMin_nm);
         const double sum = cie[0][i] + cie[1][i] + cie[2][i];
-        chromaticityOf(context, nm, cie[0][i] / sum, cie[1][i] / sum, 0.002, "of the observer's table");
+        chromaticityOf(context, context.render(lamp(line(nm, 1)), {.samples = 65536}), nm, cie[0][i] / sum, cie[1][i] / sum, 0.002, "of the observer's table");
     }
 }
 

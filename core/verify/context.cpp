@@ -151,9 +151,9 @@ Outcome Context::estimated(const std::string& what, const std::vector<std::strin
     for (std::uint64_t there = 0, wanted = effort.samples;; wanted = std::min(4 * wanted, effort.most)) {
         for (std::size_t i = 0; i < seeds; ++i) {
             for (std::size_t k = 0; k < parsed.size(); ++k) {
-                const Film more = render(parsed[k], {.samples = wanted - there, .first_sample = there, .seed = 1 + i});
+                Film more = render(parsed[k], {.samples = wanted - there, .first_sample = there, .seed = 1 + i});
                 if (there == 0)
-                    films[i].push_back(more);
+                    films[i].push_back(std::move(more));
                 else
                     films[i][k].add(more);
             }
@@ -272,6 +272,10 @@ double worstRatio(const Film& film, const Film& unit, double factor) {
 double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y) {
     const double mean = film.mean(x, y, 1);
     return film.mean(x, y, 3) - mean * mean;
+}
+
+double pathVariance(const Film& film) {
+    return meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return pathVariance(film, x, y); });
 }
 
 double luminance(const Film& film) {

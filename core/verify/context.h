@@ -26,6 +26,8 @@ struct Render {
     unsigned tile_size = 0;
 };
 
+inline Render samples(std::uint64_t count, std::uint32_t aovs = 0) { return {.samples = count, .aovs = aovs}; }
+
 /// A value that a known mistake would give instead of the right one. A failing check names the mistake whose value it found.
 struct Mistake {
     double value;
@@ -52,6 +54,10 @@ public:
     Level level() const { return level_; }
     /// Whether the questions that are reserved for `level` are to be asked.
     bool atLeast(Level level) const { return level_ >= level; }
+    /// A number for each level: on every commit, before a merge, at night.
+    std::uint64_t byLevel(std::uint64_t commit, std::uint64_t merge, std::uint64_t nightly) const {
+        return atLeast(Level::Nightly) ? nightly : atLeast(Level::Merge) ? merge : commit;
+    }
 
     // Rendering. Samples that are NaN or infinite fail the case.
     Scene scene(const std::string& yaml, const std::vector<SceneOverride>& overrides = {}) const;
@@ -109,12 +115,16 @@ private:
 double radiance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean over all pixels.
 double radiance(const Film& film);
+/// The same by a name that is no overload, as a Measure.
+inline double meanRadiance(const Film& film) { return radiance(film); }
 /// Of `a` and `b` the one that is farther from `target`; NaN when either is, which std::max would lose.
 double fartherFrom(double target, double a, double b);
 /// Y of a pixel of `film` over `factor` times that of the same pixel of `unit`, of all pixels the ratio that is farthest from 1. NaN when any pixel's is.
 double worstRatio(const Film& film, const Film& unit, double factor = 1);
 /// Variance of Y of one path of a pixel, from the film's second moment: right for independent samples.
 double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y);
+/// Mean over all pixels.
+double pathVariance(const Film& film);
 /// Mean of Y over all pixels.
 double luminance(const Film& film);
 

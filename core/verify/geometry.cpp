@@ -1,6 +1,7 @@
 // Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a ray that leaks, or meets what it should
 // not, shows.
 #include "verify/probes.h"
+#include "verify/references.h"
 
 #include "kernel/features.h"
 #include "kernel/layout.h"
@@ -17,12 +18,6 @@ namespace {
 
 constexpr std::uint32_t kFirstHit = kAovNormal | kAovDepth | kAovPrimitive;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
-Render samples(std::uint64_t count, std::uint32_t aovs = 0) { return {.samples = count, .aovs = aovs}; }
-
-std::uint64_t byLevel(const Context& context, std::uint64_t commit, std::uint64_t merge, std::uint64_t nightly) {
-    return context.atLeast(Level::Nightly) ? nightly : context.atLeast(Level::Merge) ? merge : commit;
-}
 
 template <class Use>
 void forEachPixel(const Film& film, Use use) {
@@ -44,8 +39,6 @@ double worstDeviation(const Film& film, const Film& unit, double factor) {
     });
     return worst;
 }
-
-double furnace(double albedo, int depth) { return (1 - std::pow(albedo, depth + 1)) / (1 - albedo); }
 
 void withoutArea(Context& context) {
     const Scene scene = litRoom(24, 1);
@@ -73,7 +66,7 @@ void slivers(Context& context) {
         const double thickness = std::pow(10.0, -exponent);
         Dice dice(static_cast<std::uint64_t>(exponent));
         Tally hits;
-        const std::uint64_t films = byLevel(context, 4, 60, 250);
+        const std::uint64_t films = context.byLevel(4, 60, 250);
         for (std::uint64_t film_index = 0; film_index < films; ++film_index) {
             Scene scene = emptyScene(64, film_index, {0.1, 0.02 + dice.uniform(), 0.3}, {0, 0, 0}, 0.5);
             scene.integrator.max_depth = 0;
@@ -117,7 +110,7 @@ void duplicates(Context& context) {
         return context.render(scene, samples(2, kFirstHit));
     };
     const Film one = stack(1);
-    for (const std::uint64_t copies : {std::uint64_t{2}, std::uint64_t{100}, byLevel(context, 1000, 10000, 100000)})
+    for (const std::uint64_t copies : {std::uint64_t{2}, std::uint64_t{100}, context.byLevel(1000, 10000, 100000)})
         context.sameBits(fmt::format("{} copies", copies), one, stack(copies),
                          "of equally near triangles not the first in the author's order is hit");
 }
@@ -159,13 +152,13 @@ Scene evenRoom(std::uint64_t seed) {
 void touching(Context& context) {
     const auto ask = [&](const char* what, const Mesh& mesh) {
         double worst = 0;
-        const std::uint64_t seeds = byLevel(context, 2, 16, 64);
+        const std::uint64_t seeds = context.byLevel(2, 16, 64);
         for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
             Scene scene = evenRoom(seed);
             addObject(scene, mesh, diffuse(0.5), 1, true);
             Scene dark = scene;
             dark.integrator.max_depth = 0;
-            worst = fartherFrom(0, worst, worstDeviation(context.render(scene, samples(16)), context.render(dark, samples(16)), furnace(0.5, 16)));
+            worst = fartherFrom(0, worst, worstDeviation(context.render(scene, samples(16)), context.render(dark, samples(16)), furnaceRadiance(0.5, 16)));
         }
         context.absolute(fmt::format("{}: the worst pixel", what), worst, 0, 2e-6,
                          {{0.01, "light leaks where two surfaces touch: a ray's offset carries it through both"}});
@@ -188,7 +181,7 @@ void thinWalls(Context& context) {
         scene.environment = Environment{constantSpectrum(1)};
         addObject(scene, boxMesh({0, 0, 0}, {1, 1, 1}, true), diffuse(0.9));
         addObject(scene, boxMesh({-thickness, -thickness, -thickness}, {1 + thickness, 1 + thickness, 1 + thickness}), diffuse(0.9));
-        const std::uint64_t n = byLevel(context, 16, 256, 4096);
+        const std::uint64_t n = context.byLevel(16, 256, 4096);
         const std::uint64_t lit = litPixels(context.render(scene, samples(n)));
         context.holds(fmt::format("walls of {:g}", thickness), lit == 0, "inside exactly 0", "light comes through the wall, or through a corner",
                       fmt::format("{} of 1024 pixels lit, {} paths of 32 bounces", lit, 1024 * n));
@@ -197,7 +190,7 @@ void thinWalls(Context& context) {
 
 void lightTightBox(Context& context) {
     Tally tally;
-    const std::uint64_t n = byLevel(context, 64, 1024, 16384), films = byLevel(context, 2, 8, 60);
+    const std::uint64_t n = context.byLevel(64, 1024, 16384), films = context.byLevel(2, 8, 60);
     for (std::uint64_t seed = 1; seed <= films; ++seed) {
         Dice dice(seed);
         Scene scene = emptyScene(32, seed, {0.5, 0.5, 0.5}, Vec3d{0.5, 0.5, 0.5} + dice.direction(), 1);
@@ -232,7 +225,7 @@ void cracks(Context& context) {
         addTriangle(mesh, t, {1, 1, 0.25}, {1, -1, 0.25});
         addObject(scene, std::move(mesh), diffuse(0));
         addAnchors(scene, {0, 0, 0}, 1.5);
-        const std::uint64_t n = byLevel(context, 64, 1024, 4096);
+        const std::uint64_t n = context.byLevel(64, 1024, 4096);
         const Film film = context.render(scene, samples(n));
         return std::pair{radiance(film), static_cast<double>(film.counts.size() * n)};
     };
@@ -264,7 +257,7 @@ void nonManifold(Context& context) {
     Scene dark = scene;
     dark.integrator.max_depth = 0;
     context.absolute("edges of four faces and a Möbius strip, Lambertian: the worst pixel",
-                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)), furnace(0.5, 16)), 0, 2e-6,
+                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)), furnaceRadiance(0.5, 16)), 0, 2e-6,
                      {{0.01, "a surface that is not closed loses light"}});
     // Of glass, inside and outside have no meaning: finite, and no more than n⁴ of what the walls give.
     Scene open = evenRoom(1);
@@ -332,20 +325,11 @@ void shadingNormals(Context& context) {
                       fmt::format("brightest {:.6f}, mean {:.4f} of the sky", brightest, whole));
     }
     // Inside its outline a pixel brings at most its reflectance.
-    const Film film = context.render(
-        [&] {
-            Scene scene = smoothBall(radial, 0.8);
-            scene.camera.tan_half_width = scene.camera.tan_half_height = 0.15;
-            return scene;
-        }(),
-        samples(64));
-    const Film sky = context.render(
-        [&] {
-            Scene scene = smoothBall(nullptr, 1);
-            scene.camera.tan_half_width = scene.camera.tan_half_height = 0.15;
-            return scene;
-        }(),
-        samples(64));
+    const auto inside = [&](Scene scene) {
+        scene.camera.tan_half_width = scene.camera.tan_half_height = 0.15;
+        return context.render(scene, samples(64));
+    };
+    const Film film = inside(smoothBall(radial, 0.8)), sky = inside(smoothBall(nullptr, 1));
     double brightest = 0;
     forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = fartherFrom(0, brightest, radiance(film, x, y) / radiance(sky, x, y)); });
     context.holds("20 faces, smooth: no more than the reflectance", brightest <= 0.8 * (1 + 1e-6), "≤ 0.8 in every pixel",
@@ -353,36 +337,13 @@ void shadingNormals(Context& context) {
 }
 
 void oddNormals(Context& context) {
-    const Film flat = context.render(smoothBall(nullptr, 0.8), samples(4)), smooth = context.render(smoothBall(
-                                                                                                        +[](const Vec3d&p) { return p; }, 0.8),
-                                                                                                    samples(4));
+    const auto ball = [&](Vec3d (*normal_of)(const Vec3d&)) { return context.render(smoothBall(normal_of, 0.8), samples(4)); };
+    const Film flat = ball(nullptr), smooth = ball([](const Vec3d& p) { return p; });
     const std::string physics = "a shading normal is used as it came: not normalised, not checked, or on the wrong side";
-    context.sameBits("zero: as flat", flat,
-                     context.render(smoothBall(
-                                        +[](const Vec3d&) {
-                                            return Vec3d{0, 0, 0};
-                                        },
-                                        0.8),
-                                    samples(4)),
-                     physics);
-    context.sameBits("NaN: as flat", flat,
-                     context.render(smoothBall(
-                                        +[](const Vec3d&) {
-                                            return Vec3d{kNone, 0, 1};
-                                        },
-                                        0.8),
-                                    samples(4)),
-                     physics);
-    context.sameBits("eight times as long: as of unit length", smooth,
-                     context.render(smoothBall(
-                                        +[](const Vec3d& p) { return p * 8; }, 0.8),
-                                    samples(4)),
-                     physics);
-    context.sameBits("on the other side: turned round", smooth,
-                     context.render(smoothBall(
-                                        +[](const Vec3d& p) { return p * -1; }, 0.8),
-                                    samples(4)),
-                     physics);
+    context.sameBits("zero: as flat", flat, ball([](const Vec3d&) { return Vec3d{0, 0, 0}; }), physics);
+    context.sameBits("NaN: as flat", flat, ball([](const Vec3d&) { return Vec3d{kNone, 0, 1}; }), physics);
+    context.sameBits("eight times as long: as of unit length", smooth, ball([](const Vec3d& p) { return p * 8; }), physics);
+    context.sameBits("on the other side: turned round", smooth, ball([](const Vec3d& p) { return p * -1; }), physics);
 }
 
 void insideOut(Context& context) {
@@ -391,7 +352,7 @@ void insideOut(Context& context) {
     Scene dark = scene;
     dark.integrator.max_depth = 0;
     context.absolute("inside a box whose faces look outwards: the worst pixel",
-                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)), furnace(0.5, 16)), 0, 2e-6,
+                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)), furnaceRadiance(0.5, 16)), 0, 2e-6,
                      {{0.5, "a Lambertian surface reflects on its front alone"}});
 }
 
@@ -416,7 +377,7 @@ void mirrorFunnel(Context& context) {
 }
 
 void manyTriangles(Context& context) {
-    const std::uint64_t count = byLevel(context, 20000, 200000, 10000000);
+    const std::uint64_t count = context.byLevel(20000, 200000, 10000000);
     Dice dice(15);
     Scene scene = emptyScene(32, 1, {0.1, 0.2, -2.5}, {0, 0, 0}, 0.45);
     scene.integrator.max_depth = 0;

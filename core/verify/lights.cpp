@@ -16,10 +16,7 @@
 namespace crt::verify {
 namespace {
 
-constexpr const char* kDirect = "{max_depth: 1, roulette: false}";
 constexpr std::uint64_t kDirectLight = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
-
-double meanRadiance(const Film& film) { return radiance(film); }
 
 /// A sum of `film` over `factor` times that of `unit`, of all pixels' X, Y and Z the ratio that is farthest from 1. NaN when any is.
 double worstFactor(const Film& film, const Film& unit, double factor) {
@@ -173,7 +170,7 @@ void emissiveSpecular(Context& context) {
         mirrors.replace(mirrors.find("{type: diffuse, reflectance: 0.5}"), 33, fmt::format("{{type: mirror, reflectance: {}}}", albedo));
         cube.integrator = "{max_depth: 0}";
         const Film unit = context.render(yaml(cube), {.samples = 16});
-        const double expected = (1 - std::pow(albedo, 31)) / (1 - albedo);
+        const double expected = furnaceRadiance(albedo, 30);
         context.relative(fmt::format("box of glowing mirrors of reflectance {}", albedo), radiance(context.render(mirrors, {.samples = 16})) / radiance(unit), expected, 2e-6,
                          {{1, "mirrors that glow do not reflect"}, {expected - 1, "mirrors that reflect do not glow"}, {2 * expected, "emission is counted twice"}});
     }
@@ -210,11 +207,7 @@ void techniquesAgree(Context& context) {
         // Independent numbers, so that the pixel's own variance is right.
         const auto variance = [&](std::string text) {
             text += "sampler: {type: independent}\n";
-            const Film film = context.render(text, {.samples = 16384});
-            double sum = 0;
-            for (std::uint32_t y = 0; y < 4; ++y)
-                for (std::uint32_t x = 0; x < 4; ++x) sum += pathVariance(film, x, y);
-            return sum;
+            return pathVariance(context.render(text, {.samples = 16384}));
         };
         // Veach's bound for two techniques of one sample each (1997, theorem 9.2): the better one's and μ²/2 more. It matters where chance alone has hardly
         // any noise; elsewhere 1.1.

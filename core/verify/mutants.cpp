@@ -20,8 +20,6 @@
 namespace crt::verify {
 namespace {
 
-double furnaceRadiance(double albedo, int depth) { return (1 - std::pow(albedo, depth + 1)) / (1 - albedo); }
-
 /// Every pixel of `film` is `factor` times that of `unit`. Both have the same random numbers, so that the wavelengths cancel.
 void everyPixel(Context& context, const std::string& what, const Film& film, const Film& unit, double factor, double tolerance,
                 const std::vector<Mistake>& mistakes) {
@@ -35,7 +33,7 @@ void roulette(Context& context) {
     Cube cube;
     cube.reflectance = "0.8";
     cube.integrator = "{max_depth: 200, roulette_depth: 1, nee: false}";
-    context.estimate("albedo 0.8, roulette from the first event on", yaml(cube), [](const Film& f) { return radiance(f); }, furnaceRadiance(0.8, 200), 0.01,
+    context.estimate("albedo 0.8, roulette from the first event on", yaml(cube), meanRadiance, furnaceRadiance(0.8, 200), 0.01,
                      {.samples = 1024, .most = 16384},
                      {{1 / (1 - 0.64), "survivors of roulette do not carry the light of those that it ended: is the division by the probability missing?"}});
 }
@@ -44,7 +42,7 @@ void rouletteLongPaths(Context& context) {
     Cube cube;
     cube.reflectance = "0.999";
     cube.integrator = "{max_depth: 100000, roulette_depth: 4, nee: false}";
-    context.estimate("albedo 0.999: paths of a thousand events", yaml(cube), [](const Film& f) { return radiance(f); }, 1000, 0.1, {.samples = 16, .most = 64});
+    context.estimate("albedo 0.999: paths of a thousand events", yaml(cube), meanRadiance, 1000, 0.1, {.samples = 16, .most = 64});
 }
 
 void insideGlass(Context& context) {
@@ -92,7 +90,7 @@ void fresnel(Context& context) {
     const double cos_t = std::sqrt(1 - (1 - kCosine * kCosine) / (index * index));
     const double rs = std::pow((kCosine - index * cos_t) / (kCosine + index * cos_t), 2), rp = std::pow((index * kCosine - cos_t) / (index * kCosine + cos_t), 2);
     const std::vector<Mistake> one{{rs, "only the perpendicular polarisation is there"}, {rp, "only the parallel polarisation is there"}};
-    context.estimate("glass of index 1.5 under 60°", underSixtyDegrees("{type: dielectric, ior: 1.5}"), [](const Film& f) { return radiance(f); },
+    context.estimate("glass of index 1.5 under 60°", underSixtyDegrees("{type: dielectric, ior: 1.5}"), meanRadiance,
                      fresnelDielectric(kCosine, index), 0.02, {.samples = 512, .most = 16384}, one);
 
     // Fresnel's equations for a complex index, in complex arithmetic.
@@ -212,7 +210,7 @@ objects:
   - {mesh: {positions: [[-2,0.5,-2],[-2,0.5,2],[2,0.5,2],[2,0.5,-2]], faces: [[0,1,2,3]]}, material: air}
   - {mesh: {positions: [[-0.5,1,-0.5],[0.5,1,-0.5],[0.5,1,0.5],[-0.5,1,0.5]], faces: [[0,1,2,3]]}, material: lamp, emission: {radiance: 1}}
 )",
-                     [](const Film& f) { return radiance(f); }, squareFormFactor(0, 0.5), 0.02, {.samples = 256, .most = 16384},
+                     meanRadiance, squareFormFactor(0, 0.5), 0.02, {.samples = 256, .most = 16384},
                      {{2 * squareFormFactor(0, 0.5), "light is found twice: straight through glass by light sampling, and by paths through it"},
                       {0, "light does not come through glass"}});
 }

@@ -15,16 +15,9 @@ namespace {
 
 constexpr std::uint32_t kNeeds = CRT_FEATURE_BVH | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_INDEPENDENT;
 
-Render samples(std::uint64_t count, std::uint32_t aovs = 0) { return {.samples = count, .aovs = aovs}; }
-
-/// A number for each level: on every commit, before a merge, at night.
-std::uint64_t byLevel(const Context& context, std::uint64_t commit, std::uint64_t merge, std::uint64_t nightly) {
-    return context.atLeast(Level::Nightly) ? nightly : context.atLeast(Level::Merge) ? merge : commit;
-}
-
 void aimedRays(Context& context) {
     for (const Aim aim : {Aim::Vertex, Aim::Edge, Aim::Face}) {
-        const std::uint64_t rays = byLevel(context, 16000, 200000, 10000000), per_vertex = aim == Aim::Face ? 16 : 1;
+        const std::uint64_t rays = context.byLevel(16000, 200000, 10000000), per_vertex = aim == Aim::Face ? 16 : 1;
         rareFailures(
             context, fmt::format("rays at {}", name(aim)),
             collect(rays, [&](std::uint64_t seed) { return missesOfAimedRays(context, aim, kPlaces[0], 64, seed, per_vertex); }), 1e-6,
@@ -206,13 +199,13 @@ void occlusionAndClosest(Context& context) {
         Scene light_sampling = scene;
         light_sampling.integrator.nee = true;
         std::vector<double> ratio;
-        const std::uint64_t n = byLevel(context, 64, 512, 4096);
+        const std::uint64_t n = context.byLevel(64, 512, 4096);
         for (std::uint64_t seed = 1; seed <= 16; ++seed) {
             const double by_scattering = radiance(context.render(scene, {.samples = n, .seed = seed}));
             ratio.push_back(radiance(context.render(light_sampling, {.samples = n, .seed = seed})) / by_scattering);
         }
         context.equivalent(fmt::format("400 triangles, scene {}: light sampling over scattering", i), ratio, 1,
-                           static_cast<double>(byLevel(context, 40, 20, 5)) * 1e-3);
+                           static_cast<double>(context.byLevel(40, 20, 5)) * 1e-3);
     }
 }
 
@@ -241,7 +234,7 @@ void deepTree(Context& context) {
         Scene scene = emptyScene(64, 1, {0, 0, -1}, {0, 0, 0}, 0.6);
         scene.integrator.max_depth = 0;
         Mesh nest;
-        const int count = static_cast<int>(byLevel(context, 1 << 12, 1 << 16, 1 << 20));
+        const int count = static_cast<int>(context.byLevel(1 << 12, 1 << 16, 1 << 20));
         for (int i = 0; i < count; ++i) {
             // Not to nothing: what has no area is left out.
             const double s = std::max(std::pow(ratio, i), 1e-12);

@@ -69,6 +69,8 @@ double rectangleIntegral(const std::function<double(double, double)>& f, double 
     return sum;
 }
 
+double furnaceRadiance(double albedo, int depth) { return -std::expm1((depth + 1.0) * std::log(albedo)) / (1 - albedo); }
+
 double fresnelDielectric(double cos_incidence, double eta) {
     const double sin2 = (1 - cos_incidence * cos_incidence) / (eta * eta);
     if (sin2 >= 1) return 1;

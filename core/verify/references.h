@@ -21,6 +21,9 @@ double squareFormFactor(double x, double half_side);
 /// ∫∫ f(u, v) over [u0, u1] × [v0, v1], Gauss–Legendre of 30 × 30 points on `panels` × `panels` panels.
 double rectangleIntegral(const std::function<double(double, double)>& f, double u0, double u1, double v0, double v1, int panels = 4);
 
+/// E (1 − ρ^(k+1)) / (1 − ρ) for E = 1: radiance in a closed room whose walls emit 1 and reflect ρ, after k scattering events. ρ > 0, not 1.
+double furnaceRadiance(double albedo, int depth);
+
 /// Unpolarised reflectance of a smooth interface; eta is the index beyond over the index before. 1 in total internal reflection.
 double fresnelDielectric(double cos_incidence, double eta);
 

@@ -18,8 +18,6 @@ namespace {
 constexpr std::uint64_t kLitRoom =
     CRT_FEATURE_BVH | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_DIFFUSE | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
 
-Render samples(std::uint64_t count, std::uint32_t aovs = 0) { return {.samples = count, .aovs = aovs}; }
-
 void scaling(Context& context) {
     const Scene scene = litRoom(24, 1);
     const Film here = context.render(scene, samples(4, kAovNormal | kAovPrimitive));

@@ -17,13 +17,11 @@ namespace {
 
 constexpr std::uint32_t kNeeds = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_INDEPENDENT;
 
-Render samples(std::uint64_t count, std::uint64_t seed = 0) { return {.samples = count, .seed = seed}; }
-
 /// Mean radiance of `changed` over that of `original`, for eight seeds: the same random numbers, so that only what differs is seen.
 std::vector<double> ratios(Context& context, const Scene& original, const Scene& changed, std::uint64_t count) {
     std::vector<double> all;
     for (std::uint64_t seed = 1; seed <= 8; ++seed)
-        all.push_back(radiance(context.render(changed, samples(count, seed))) / radiance(context.render(original, samples(count, seed))));
+        all.push_back(radiance(context.render(changed, {.samples = count, .seed = seed})) / radiance(context.render(original, {.samples = count, .seed = seed})));
     return all;
 }
 
@@ -61,7 +59,7 @@ void farAway(Context& context) {
 }
 
 void embreesFarPlace(Context& context) {
-    const std::uint64_t rays = context.atLeast(Level::Nightly) ? 10000000 : context.atLeast(Level::Merge) ? 200000 : 16000;
+    const std::uint64_t rays = context.byLevel(16000, 200000, 10000000);
     for (const Place& place : {kPlaces[1], kPlaces[2]})
         for (const Aim aim : {Aim::Vertex, Aim::Edge})
             rareFailures(context, fmt::format("rays at {}, {}", name(aim), place.name),
@@ -104,7 +102,7 @@ void mixedScale(Context& context) {
     std::vector<double> all;
     const Scene patch = screwOnGround(false), world = screwOnGround(true);
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-        const Film a = context.render(patch, samples(64, seed)), b = context.render(world, samples(64, seed));
+        const Film a = context.render(patch, {.samples = 64, .seed = seed}), b = context.render(world, {.samples = 64, .seed = seed});
         all.push_back(radiance(b) / radiance(a));
         if (seed > 1) continue;
         // A shadow that came off its screw would show in the pixels at its foot.
@@ -120,7 +118,7 @@ void mixedScale(Context& context) {
 }
 
 void layers(Context& context) {
-    const std::uint64_t rays = context.atLeast(Level::Merge) ? 800000 : 40000;
+    const std::uint64_t rays = context.byLevel(40000, 800000, 800000);
     // Below 6e-6 of their size layers of a scene of that size begin to be skipped: docs/results/stability-offset-tightness.md.
     for (const double gap : {1e-3, 1e-4, 1e-5, 8e-6})
         rareFailures(context, fmt::format("layers {:g} of their size apart", gap),
@@ -151,7 +149,7 @@ objects:
                            half);
     };
     const double factor = polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{-1e7, 9, -1e7}, {1e7, 9, -1e7}, {0, 9, 1e7}});
-    context.estimate("irradiance 9 below a triangle of 2e7", scene("1e7"), [](const Film& f) { return radiance(f); }, 0.5 * factor, 0.003,
+    context.estimate("irradiance 9 below a triangle of 2e7", scene("1e7"), meanRadiance, 0.5 * factor, 0.003,
                      {.samples = 256, .most = 16384}, {{0, "the emitter is taken for an occluder of its own light, or never sampled"}});
     // pbrt-v4's issue 249. The height of 9 is lost in the rounding of coordinates of 1e9.
     warned(context, "9 below a triangle of 2e9", context.scene(scene("1e9")));

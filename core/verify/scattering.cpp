@@ -19,15 +19,13 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kDegree = kPi / 180;
-constexpr const char* kOnce = "{max_depth: 1, roulette: false}";
+
 /// Surfaces are smooth or Lambertian (docs/scene.md): a roughness is refused, not ignored.
 void roughnessIsRefused(Context& context, const std::string& material, std::initializer_list<double> roughnesses) {
     for (const double roughness : roughnesses)
         context.refused(fmt::format("{} of roughness {:g}", material, roughness),
                         fmt::format("crt: 1\nmaterials: {{rough: {{type: {}, roughness: {:g}}}}}\n", material, roughness), "unknown key 'roughness'");
 }
-
-double meanRadiance(const Film& film) { return radiance(film); }
 
 std::string numbers(const Vec3d& v) { return fmt::format("[{:.17g},{:.17g},{:.17g}]", v[0], v[1], v[2]); }
 
@@ -72,7 +70,7 @@ void lambertDirections(Context& context) {
 void viewAngles(Context& context) {
     const auto scene = [](double degrees, double side) {
         const double x = 10 * std::sin(degrees * kDegree), y = 10 * side * std::cos(degrees * kDegree);
-        return Stage(fmt::format("{{position: [0, {:.17g}, {:.17g}], target: [0, 0, 0], up: [1, 0, 0], fov: 0.0001}}", y, x), kOnce)
+        return Stage(fmt::format("{{position: [0, {:.17g}, {:.17g}], target: [0, 0, 0], up: [1, 0, 0], fov: 0.0001}}", y, x), kDirect)
             .material("white", "{type: diffuse, reflectance: 1}")
             .material("black", "{type: diffuse, reflectance: 0}")
             .quad("floor", "[[-40,0,-40],[-40,0,40],[40,0,40],[40,0,-40]]", "white")
@@ -136,7 +134,7 @@ void reciprocity(Context& context) {
         const std::string camera = fmt::format("{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 0.0001}}", std::sin(degrees * kDegree),
                                                side * std::cos(degrees * kDegree));
         const char* lamp = side > 0 ? "[[-900,-5,-900],[-900,-5,900],[900,-5,900],[900,-5,-900]]" : "[[-900,5,-900],[900,5,-900],[900,5,900],[-900,5,900]]";
-        return Stage(camera, kOnce)
+        return Stage(camera, kDirect)
             .material("glass", "{type: dielectric, ior: 1.5}")
             .material("black", "{type: diffuse, reflectance: 0}")
             .quad("interface", "[[-99,0,-99],[-99,0,99],[99,0,99],[99,0,-99]]", "glass")
@@ -226,7 +224,7 @@ void wordsToNumbers(Context& context) {
 
 void albedoRange(Context& context) {
     const auto scene = [](const char* albedo) {
-        return Stage("{position: [0, 1, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 1}", kOnce)
+        return Stage("{position: [0, 1, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 1}", kDirect)
             .set("environment", "{radiance: 1}")
             .material("it", fmt::format("{{type: diffuse, reflectance: {}}}", albedo))
             .quad("it", "[[-9,0,-9],[-9,0,9],[9,0,9],[9,0,-9]]", "it")

@@ -19,8 +19,11 @@ struct Cube {
 };
 std::string yaml(const Cube& cube);
 
+/// One scattering event: direct light.
+inline constexpr const char* kDirect = "{max_depth: 1, roulette: false}";
+
 /// A square light of side 1 at height 1 over a large Lambertian floor of reflectance 1, seen through a needle's eye at (x, 0, 0).
-std::string squareOverFloor(double x, const std::string& integrator = "{max_depth: 1, roulette: false}", double half_side = 0.5,
+std::string squareOverFloor(double x, const std::string& integrator = kDirect, double half_side = 0.5,
                             const std::string& radiance = "1");
 
 using Point = std::array<double, 3>;
@@ -28,7 +31,7 @@ using Point = std::array<double, 3>;
 /// A scene put together piece by piece, as YAML.
 class Stage {
 public:
-    explicit Stage(const std::string& camera, const std::string& integrator = "{max_depth: 1, roulette: false}");
+    explicit Stage(const std::string& camera, const std::string& integrator = kDirect);
     /// A further or another top-level key, as "environment", "{radiance: 1}".
     Stage& set(const std::string& key, const std::string& value);
     /// As "glass", "{type: dielectric, ior: 1.5}".

@@ -16,10 +16,6 @@ namespace {
 
 constexpr std::uint64_t kDiffuseLight = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT;
 
-double meanRadiance(const Film& film) { return radiance(film); }
-
-double furnaceRadiance(double albedo, double depth) { return -std::expm1((depth + 1) * std::log(albedo)) / (1 - albedo); }
-
 std::string furnace(double albedo, const std::string& integrator, const std::string& film = "{resolution: [2, 2]}") {
     Cube cube;
     cube.reflectance = fmt::format("{}", albedo);
@@ -131,15 +127,15 @@ void rouletteDepths(Context& context) {
         cube.integrator = fmt::format("{{max_depth: 64, roulette_depth: {}}}", start);
         context.estimate(fmt::format("unit cube, roulette from event {} on", start), yaml(cube), meanRadiance, .197603, 0.005, {.samples = 1024, .most = 16384});
     }
-    for (const char* albedo : {"1.0000001", "1.5", "-0.1"})
-        context.refused(fmt::format("albedo {}: throughput would grow, or be negative", albedo), furnace(0.5, "{max_depth: 4}").replace(furnace(0.5, "{max_depth: 4}").find("reflectance: 0.5"), 16, fmt::format("reflectance: {}", albedo)), "reflectance");
+    for (const double albedo : {1.0000001, 1.5, -0.1})
+        context.refused(fmt::format("albedo {}: throughput would grow, or be negative", albedo), furnace(albedo, "{max_depth: 4}"), "reflectance");
 }
 
 void slits(Context& context) {
     // A floor point under a long slit of width w at height 1, lit by the environment, which only scattered rays find: the share of a path's variance
     // is 1/p − 1. Walls close the space under the plates, whose rims, 100 away, would let in 8.5e-5.
     const auto scene = [](double width) {
-        return Stage("{position: [0, 0.3, 0.6], target: [0, 0, 0], fov: 0.001}", "{max_depth: 1, roulette: false}")
+        return Stage("{position: [0, 0.3, 0.6], target: [0, 0, 0], fov: 0.001}", kDirect)
             .set("environment", "{radiance: 1}")
             .set("sampler", "{type: independent}")
             .material("white", "{type: diffuse, reflectance: 1}")
@@ -151,6 +147,12 @@ void slits(Context& context) {
                   "[[0,1,5,4],[1,2,6,5],[2,3,7,6],[3,0,4,7]]", "black")
             .yaml();
     };
+    // Y² is of the whole colour, so that wavelengths add their own, constant, share: E[w²] of the empty environment.
+    const std::string sky = Stage("{position: [0,0,0], target: [0,0,1], fov: 1}")
+                                .set("environment", "{radiance: 1}")
+                                .set("sampler", "{type: independent}")
+                                .yaml();
+    const double second = context.render(sky, {.samples = 65536}).mean(0, 0, 3);
     struct Slit {
         double width;
         Level level;
@@ -163,14 +165,8 @@ void slits(Context& context) {
         // The plates end at 100, and so does the slit.
         const double p = polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{-h, 1, -100}, {h, 1, -100}, {h, 1, 100}, {-h, 1, 100}});
         context.estimate(fmt::format("slit of width {}", s.width), scene(s.width), meanRadiance, p, 0.02, s.effort);
-        // Y² is of the whole colour, so that wavelengths add their own, constant, share: E[w²] of the empty environment.
         const Film film = context.render(scene(s.width), {.samples = s.effort.samples, .seed = 99});
-        const Film sky = context.render(Stage("{position: [0,0,0], target: [0,0,1], fov: 1}").set("environment", "{radiance: 1}").set("sampler", "{type: independent}").yaml(), {.samples = 65536});
-        const double second = sky.mean(0, 0, 3);
-        double variance = 0;
-        for (std::uint32_t y = 0; y < 4; ++y)
-            for (std::uint32_t x = 0; x < 4; ++x) variance += pathVariance(film, x, y) / 16;
-        context.relative(fmt::format("slit of width {}: variance of a path", s.width), variance, p * second - p * p, 0.1);
+        context.relative(fmt::format("slit of width {}: variance of a path", s.width), pathVariance(film), p * second - p * p, 0.1);
     }
 }
 
