@@ -149,8 +149,8 @@ void randomTriangles(Context& context) {
                                       .quad("floor", "[[-4,0,-4],[-4,0,4],[4,0,4],[4,0,-4]]", "floor")
                                       .mesh("lamp", "[" + positions + "]", "[[0,1,2]]", "black", "1, two_sided: true")
                                       .yaml();
-        const Outcome o = context.estimated(fmt::format("the worst of {} triangles, number {}", count, i), {scene},
-                                            [](const std::vector<Film>& f) { return radiance(f.front()); }, expected, 0.003, {.samples = 256, .most = 65536}, {});
+        const Asked asked{fmt::format("the worst of {} triangles, number {}", count, i), [](const std::vector<Film>& f) { return radiance(f.front()); }, expected};
+        const Outcome o = context.estimated({asked}, {scene}, 0.003, {.samples = 256, .most = 65536}, {}).front();
         const auto badness = [](const Outcome& x) { return std::pair(x.verdict, std::abs(*x.measured / *x.expected - 1)); };
         if (!worst || badness(o) >= badness(*worst)) worst = o;
     }

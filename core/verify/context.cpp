@@ -137,8 +137,8 @@ void Context::equivalent(const std::string& what, const std::vector<double>& rep
     add(equivalenceOutcome(what, replicates, expected, delta, mistakes));
 }
 
-Outcome Context::estimated(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
-                           const Effort& effort, const std::vector<Mistake>& mistakes) {
+std::vector<Outcome> Context::estimated(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta, const Effort& effort,
+                                        const std::vector<Mistake>& mistakes) {
     std::vector<Scene> parsed;
     for (const std::string& text : scenes) {
         parsed.push_back(scene(text));
@@ -147,9 +147,8 @@ Outcome Context::estimated(const std::string& what, const std::vector<std::strin
     }
     const auto seeds = static_cast<std::size_t>(effort.seeds);
     std::vector<std::vector<Film>> films(seeds);
-    std::vector<double> replicates(seeds);
     for (std::uint64_t there = 0, wanted = effort.samples;; wanted = std::min(4 * wanted, effort.most)) {
-        for (std::size_t i = 0; i < seeds; ++i) {
+        for (std::size_t i = 0; i < seeds; ++i)
             for (std::size_t k = 0; k < parsed.size(); ++k) {
                 Film more = render(parsed[k], {.samples = wanted - there, .first_sample = there, .seed = 1 + i});
                 if (there == 0)
@@ -157,23 +156,32 @@ Outcome Context::estimated(const std::string& what, const std::vector<std::strin
                 else
                     films[i][k].add(more);
             }
-            replicates[i] = measure(films[i]);
-        }
         there = wanted;
-        Outcome outcome = equivalenceOutcome(what, replicates, expected, delta, mistakes);
-        outcome.note = fmt::format("{} seeds × {} samples a pixel", seeds, there);
-        if (outcome.verdict != Verdict::Inconclusive || wanted >= effort.most) return outcome;
+        std::vector<Outcome> outcomes;
+        for (const Asked& question : asked) {
+            std::vector<double> replicates;
+            for (const std::vector<Film>& of_seed : films) replicates.push_back(question.measure(of_seed));
+            outcomes.push_back(equivalenceOutcome(question.what, replicates, question.expected, delta, mistakes));
+            outcomes.back().note = fmt::format("{} seeds × {} samples a pixel", seeds, there);
+        }
+        const bool told = std::none_of(outcomes.begin(), outcomes.end(), [](const Outcome& o) { return o.verdict == Verdict::Inconclusive; });
+        if (told || wanted >= effort.most) return outcomes;
     }
+}
+
+void Context::estimate(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta, const Effort& effort,
+                       const std::vector<Mistake>& mistakes) {
+    for (Outcome& outcome : estimated(asked, scenes, delta, effort, mistakes)) add(std::move(outcome));
 }
 
 void Context::estimate(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
                        const Effort& effort, const std::vector<Mistake>& mistakes) {
-    add(estimated(what, scenes, measure, expected, delta, effort, mistakes));
+    estimate({{what, measure, expected}}, scenes, delta, effort, mistakes);
 }
 
 void Context::estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected, double delta, const Effort& effort,
                        const std::vector<Mistake>& mistakes) {
-    add(estimated(what, {yaml}, [&](const std::vector<Film>& films) { return measure(films.front()); }, expected, delta, effort, mistakes));
+    estimate(what, std::vector{yaml}, [&](const std::vector<Film>& films) { return measure(films.front()); }, expected, delta, effort, mistakes);
 }
 
 void Context::rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound, const std::string& physics) {
@@ -276,6 +284,12 @@ double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y) {
 
 double pathVariance(const Film& film) {
     return meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return pathVariance(film, x, y); });
+}
+
+Vec3d meanXyz(const Film& film) {
+    Vec3d xyz;
+    for (std::uint32_t c = 0; c < 3; ++c) xyz[c] = meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return film.mean(x, y, c); });
+    return xyz;
 }
 
 double luminance(const Film& film) {

@@ -46,6 +46,13 @@ using Measure = std::function<double(const Film&)>;
 /// A number that is made of the films of several scenes, rendered with the same seed: a ratio, a difference.
 using JointMeasure = std::function<double(const std::vector<Film>&)>;
 
+/// One of several numbers that are made of the same films, and what it should be.
+struct Asked {
+    std::string what;
+    JointMeasure measure;
+    double expected;
+};
+
 class Context {
 public:
     Context(const LoadedBackend& backend, const IntegratorOptions& options, Level level);
@@ -82,9 +89,12 @@ public:
                   const std::vector<Mistake>& mistakes = {});
     void estimate(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
                   const Effort& effort = {}, const std::vector<Mistake>& mistakes = {});
-    /// The outcome of an estimate, for cases that keep only the worst of many.
-    Outcome estimated(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
-                      const Effort& effort, const std::vector<Mistake>& mistakes);
+    /// Several numbers of the same films, which are rendered once. Goes on until it can tell of each.
+    void estimate(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta, const Effort& effort = {},
+                  const std::vector<Mistake>& mistakes = {});
+    /// The outcomes of an estimate, for cases that keep only the worst of many.
+    std::vector<Outcome> estimated(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta, const Effort& effort,
+                                   const std::vector<Mistake>& mistakes);
     /// The upper end of the 99.9 % Clopper–Pearson interval of the rate of failures is at most `bound`.
     void rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound, const std::string& physics);
     /// Every channel of every pixel the same, as the floats that are written.
@@ -125,6 +135,8 @@ double worstRatio(const Film& film, const Film& unit, double factor = 1);
 double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean over all pixels.
 double pathVariance(const Film& film);
+/// Mean X, Y and Z over all pixels.
+Vec3d meanXyz(const Film& film);
 /// Mean of Y over all pixels.
 double luminance(const Film& film);
 

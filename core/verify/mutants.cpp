@@ -117,15 +117,11 @@ void colour(Context& context) {
         cube.reflectance = slope;
         cube.radiance = band;
         cube.integrator = fmt::format("{{max_depth: 1, roulette: false, nee: {}}}", nee);
-        for (std::uint32_t c = 0; c < 3; ++c)
-            context.estimate(fmt::format("{} {} light sampling", "XYZ"[c], nee ? "with" : "without"), yaml(cube),
-                             [c](const Film& f) {
-                                 double sum = 0;
-                                 for (std::uint32_t y = 0; y < f.shape().height; ++y)
-                                     for (std::uint32_t x = 0; x < f.shape().width; ++x) sum += f.mean(x, y, c);
-                                 return sum / (f.shape().width * f.shape().height);
-                             },
-                             xyz[c], 0.01, {.samples = 256, .most = 4096});
+        std::vector<Asked> asked;
+        for (std::size_t c = 0; c < 3; ++c)
+            asked.push_back({fmt::format("{} {} light sampling", "XYZ"[c], nee ? "with" : "without"),
+                             [c](const std::vector<Film>& f) { return meanXyz(f.front())[c]; }, xyz[c]});
+        context.estimate(asked, {yaml(cube)}, 0.01, {.samples = 256, .most = 4096});
     }
 }
 
@@ -134,12 +130,7 @@ void lastNanometre(Context& context) {
     const double a = cieObserver()[0][kSpectrumSize - 2], b = cieObserver()[0][kSpectrumSize - 1];
     context.estimate("X of light between 829 and 830 nm",
                      "crt: 1\nfilm: {resolution: [32, 32]}\nenvironment: {radiance: {table: {nm: [829, 830], value: [0, 1]}, outside: zero}}\n",
-                     [](const Film& f) {
-                         double sum = 0;
-                         for (std::uint32_t y = 0; y < f.shape().height; ++y)
-                             for (std::uint32_t x = 0; x < f.shape().width; ++x) sum += f.mean(x, y, 0);
-                         return sum / (f.shape().width * f.shape().height);
-                     },
+                     [](const Film& f) { return meanXyz(f)[0]; },
                      (a + 2 * b) / 6 / cieYIntegral(), 0.5, {.samples = 1024, .most = 4096, .seeds = 8}, {{0, "the last nanometre of the spectrum is lost"}});
 }
 
