@@ -3,8 +3,11 @@
 
 #include "backend/crt_layout_hash.h"
 
+#include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <cstring>
+#include <vector>
 
 using namespace conformance;
 
@@ -69,6 +72,24 @@ struct Raw {
     }
 };
 
+/// Room for a film of kScene, which is 16 × 12.
+struct Target {
+    std::vector<double> sums;
+    std::vector<std::uint64_t> counts;
+    CrtFilmView view{};
+
+    explicit Target(const crt::CompiledScene& compiled) : sums(16 * 12 * compiled.channels * 2), counts(16 * 12) {
+        view.struct_size = sizeof(view);
+        view.width = 16;
+        view.height = 12;
+        view.channels = compiled.channels;
+        view.sums = sums.data();
+        view.counts = counts.data();
+    }
+    Target(const Target&) = delete;
+    Target& operator=(const Target&) = delete;
+};
+
 }  // namespace
 
 TEST_CASE("the table says who it is", "[abi]") {
@@ -113,17 +134,9 @@ TEST_CASE("broken calls get a status and a sentence, never a crash", "[abi]") {
     };
     refused(raw.render(0, 0, 1, 1, 0, 1));  // before set_scene
     const crt::CompiledScene compiled = crt::compileScene(sceneFrom(kScene), 0);
-    std::vector<double> sums(16 * 12 * compiled.channels * 2);
-    std::vector<std::uint64_t> counts(16 * 12);
+    Target target(compiled);
     std::vector<std::uint32_t> primitives(16 * 12);
-    CrtFilmView view{};
-    view.struct_size = sizeof(view);
-    view.width = 16;
-    view.height = 12;
-    view.channels = compiled.channels;
-    view.sums = sums.data();
-    view.counts = counts.data();
-    const auto read = [&] { return raw.integrator.read_film(raw.integrator.state, &view); };
+    const auto read = [&] { return raw.integrator.read_film(raw.integrator.state, &target.view); };
     refused(read());  // before set_scene, too
     refused(raw.integrator.set_scene(raw.integrator.state, nullptr));
     refused(raw.integrator.render(raw.integrator.state, nullptr));
@@ -132,12 +145,12 @@ TEST_CASE("broken calls get a status and a sentence, never a crash", "[abi]") {
     REQUIRE(raw.setScene(compiled) == CRT_OK);
     refused(raw.render(0, 0, 17, 12, 0, 1));
     refused(raw.render(5, 0, 4, 12, 0, 1));
-    view.primitives = primitives.data();  // which the scene does not ask for
+    target.view.primitives = primitives.data();  // which the scene does not ask for
     refused(read());
-    view.primitives = nullptr;
-    view.width = 15;
+    target.view.primitives = nullptr;
+    target.view.width = 15;
     refused(read());
-    view.width = 16;
+    target.view.width = 16;
     REQUIRE(read() == CRT_OK);
     CrtSceneBlob tiny{};
     tiny.struct_size = 4;
@@ -151,25 +164,17 @@ TEST_CASE("set_scene clears the film, render adds, the report counts", "[abi]") 
     Raw raw;
     REQUIRE(raw.created == CRT_OK);
     const crt::CompiledScene compiled = crt::compileScene(sceneFrom(kScene), 0);
-    std::vector<double> sums(16 * 12 * compiled.channels * 2);
-    std::vector<std::uint64_t> counts(16 * 12);
-    CrtFilmView view{};
-    view.struct_size = sizeof(view);
-    view.width = 16;
-    view.height = 12;
-    view.channels = compiled.channels;
-    view.sums = sums.data();
-    view.counts = counts.data();
+    Target target(compiled);
     for (int round = 0; round < 2; ++round) {
         REQUIRE(raw.setScene(compiled) == CRT_OK);
-        REQUIRE(raw.integrator.read_film(raw.integrator.state, &view) == CRT_OK);
-        CHECK(std::all_of(counts.begin(), counts.end(), [](std::uint64_t n) { return n == 0; }));
+        REQUIRE(raw.integrator.read_film(raw.integrator.state, &target.view) == CRT_OK);
+        CHECK(std::all_of(target.counts.begin(), target.counts.end(), [](std::uint64_t n) { return n == 0; }));
         REQUIRE(raw.render(0, 0, 16, 12, 0, 3) == CRT_OK);
         REQUIRE(raw.render(2, 1, 16, 12, 3, 2) == CRT_OK);
         REQUIRE(raw.render(0, 0, 16, 12, 9, 0) == CRT_OK);  // nothing is a legal amount
-        REQUIRE(raw.integrator.read_film(raw.integrator.state, &view) == CRT_OK);
-        CHECK(counts[0] == 3);
-        CHECK(counts[16 * 12 - 1] == 5);
+        REQUIRE(raw.integrator.read_film(raw.integrator.state, &target.view) == CRT_OK);
+        CHECK(target.counts[0] == 3);
+        CHECK(target.counts[16 * 12 - 1] == 5);
         CrtBackendReport report{};
         report.struct_size = sizeof(report);
         REQUIRE(raw.integrator.get_report(raw.integrator.state, &report) == CRT_OK);

@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <cmath>
+
 using namespace conformance;
 
 namespace {
@@ -29,14 +32,16 @@ objects:
   - {{name: back, mesh: {{positions: [[0,0,1],[0,1,1],[1,1,1],[1,0,1]], faces: [[0,1,2,3]]}}, material: red}}
   - {{name: left, mesh: {{positions: [[0,0,0],[0,1,0],[0,1,1],[0,0,1]], faces: [[0,1,2,3]]}}, material: gold}}
   - {{name: right, mesh: {{positions: [[1,0,0],[1,0,1],[1,1,1],[1,1,0]], faces: [[0,1,2,3]]}}, material: mirror}}
-  - {{name: lamp, mesh: {{positions: [[0.3,0.99,0.3],[0.7,0.99,0.3],[0.7,0.99,0.7],[0.3,0.99,0.7]], faces: [[0,1,2,3]]}}, material: white, emission: {{radiance: {{blackbody: 3000, scale: 5}}}}}}
+  - {{name: lamp, mesh: {{positions: [[0.3,0.99,0.3],[0.7,0.99,0.3],[0.7,0.99,0.7],[0.3,0.99,0.7]], faces: [[0,1,2,3]]}}, material: white,
+     emission: {{radiance: {{blackbody: 3000, scale: 5}}}}}}
   - {{name: strip, mesh: {{positions: [[0.02,0.1,0.2],[0.02,0.1,0.8],[0.02,0.12,0.8]], faces: [[0,1,2]]}}, material: white, emission: {{radiance: 8, two_sided: true}}}}
   - name: gems
     material: flint
     mesh: {{positions: [[0,0,0],[1,0,0],[1,1,0],[0,1,0],[0,0,1],[1,0,1],[1,1,1],[0,1,1]],
       normals: [[-1,-1,-1],[1,-1,-1],[1,1,-1],[-1,1,-1],[-1,-1,1],[1,-1,1],[1,1,1],[-1,1,1]],
       faces: [[0,3,2,1],[4,5,6,7],[0,1,5,4],[2,3,7,6],[0,4,7,3],[1,2,6,5]]}}
-    transforms: [[{{scale: 0.25}}, {{rotate: {{axis: [0, 1, 0], angle_deg: 30}}}}, {{translate: [0.2, 0.05, 0.3]}}], [{{scale: [-0.2, 0.3, 0.2]}}, {{translate: [0.9, 0.1, 0.5]}}]]
+    transforms: [[{{scale: 0.25}}, {{rotate: {{axis: [0, 1, 0], angle_deg: 30}}}}, {{translate: [0.2, 0.05, 0.3]}}],
+      [{{scale: [-0.2, 0.3, 0.2]}}, {{translate: [0.9, 0.1, 0.5]}}]]
   - name: glass
     material: glass
     mesh: {{positions: [[0,0,0],[1,0,0],[0,1,0],[0,0,1]], faces: [[0,2,1],[0,1,3],[0,3,2],[1,2,3]]}}

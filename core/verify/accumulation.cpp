@@ -84,7 +84,8 @@ void highIndices(Context& context) {
         }
     }
     const Film high = context.render(scene, {.samples = 4096, .first_sample = std::uint64_t{1} << 32});
-    context.holds("samples from 2^32 on are not those from 0 on", values(low) != values(high), "different", "the number of a sample is cut to 32 bits: samples repeat");
+    context.holds("samples from 2^32 on are not those from 0 on", values(low) != values(high), "different",
+                  "the number of a sample is cut to 32 bits: samples repeat");
     Film sum = low;
     sum.add(high);
     context.relative("merged: number of samples", static_cast<double>(sum.samples.count()), 8192, 0);
@@ -96,7 +97,8 @@ void merging(Context& context) {
         const Film whole = context.render(scene, {.samples = 64});
         Film halves = context.render(scene, {.samples = 32, .first_sample = 32});
         halves.add(context.render(scene, {.samples = 32}));
-        context.sameBits(fmt::format("{}: [32, 64) and then [0, 32) against [0, 64)", sampler), whole, halves, "samples depend on what was rendered before, or sums on their order");
+        context.sameBits(fmt::format("{}: [32, 64) and then [0, 32) against [0, 64)", sampler), whole, halves,
+                         "samples depend on what was rendered before, or sums on their order");
         Film thirds = context.render(scene, {.samples = 21});
         thirds.add(context.render(scene, {.samples = 1, .first_sample = 21}));
         thirds.add(context.render(scene, {.samples = 42, .first_sample = 22}));
@@ -108,9 +110,11 @@ void threadsAndTiles(Context& context) {
     const Scene scene = context.scene(noisy("sobol", "{resolution: [37, 19]}"));
     const Film all = context.render(scene, {.samples = 8});
     for (const unsigned threads : {1u, 2u, 7u, 64u})
-        context.sameBits(fmt::format("{} thread{}", threads, threads == 1 ? "" : "s"), all, context.render(scene, {.samples = 8, .threads = threads}), "the schedule shows in the image: a race, or a shared state");
+        context.sameBits(fmt::format("{} thread{}", threads, threads == 1 ? "" : "s"), all, context.render(scene, {.samples = 8, .threads = threads}),
+                         "the schedule shows in the image: a race, or a shared state");
     for (const unsigned tile : {1u, 8u, 13u, 128u})
-        context.sameBits(fmt::format("tiles of {}", tile), all, context.render(scene, {.samples = 8, .tile_size = tile}), "the schedule shows in the image: a race, or a shared state");
+        context.sameBits(fmt::format("tiles of {}", tile), all, context.render(scene, {.samples = 8, .tile_size = tile}),
+                         "the schedule shows in the image: a race, or a shared state");
 }
 
 void seeds(Context& context) {
@@ -121,7 +125,8 @@ void seeds(Context& context) {
             context.relative(fmt::format("{}, seed {}", sampler, seed), radiance(film), squareFormFactor(0, 0.5), 0.02);
             images.insert(values(film));
         }
-        context.relative(fmt::format("{}: different images among four seeds", sampler), static_cast<double>(images.size()), 4, 0, {{3, "seeds that differ by 2^32 are one: is the seed cut to 32 bits?"}});
+        context.relative(fmt::format("{}: different images among four seeds", sampler), static_cast<double>(images.size()), 4, 0,
+                         {{3, "seeds that differ by 2^32 are one: is the seed cut to 32 bits?"}});
     }
 }
 
@@ -149,7 +154,8 @@ void streams(Context& context) {
         const auto image = [&](std::uint64_t seed) { return values(context.render(noisy(sampler, "{resolution: [96, 96]}"), {.samples = 1, .seed = seed})); };
         const std::vector<double> zero = image(0);
         for (const std::uint64_t seed : {1, 2, 1024})
-            context.absolute(fmt::format("{}: correlation of seeds 0 and {}", sampler, seed), correlation(zero, image(seed)), 0, 4 / 96.0, {{1, "two seeds are one stream"}});
+            context.absolute(fmt::format("{}: correlation of seeds 0 and {}", sampler, seed), correlation(zero, image(seed)), 0, 4 / 96.0,
+                             {{1, "two seeds are one stream"}});
     }
 }
 
@@ -173,20 +179,24 @@ void draws(Context& context) {
         }
     }
     const double least = *std::min_element(p_values.begin(), p_values.end());
-    context.holds("uniform over pixels: least p of Kolmogorov and Smirnov", least > stats::sidak(1e-4, p_values.size()), fmt::format("> {:.2g}", stats::sidak(1e-4, p_values.size())),
-                  "numbers of neighbouring pixels are not uniform", fmt::format("{:.3g} of {} tests", least, p_values.size()));
-    context.absolute("largest correlation of two dimensions", worst_correlation, 0, 4.5 / std::sqrt(static_cast<double>(count)), {{1, "two dimensions have the same numbers"}});
+    context.holds("uniform over pixels: least p of Kolmogorov and Smirnov", least > stats::sidak(1e-4, p_values.size()),
+                  fmt::format("> {:.2g}", stats::sidak(1e-4, p_values.size())), "numbers of neighbouring pixels are not uniform",
+                  fmt::format("{:.3g} of {} tests", least, p_values.size()));
+    context.absolute("largest correlation of two dimensions", worst_correlation, 0, 4.5 / std::sqrt(static_cast<double>(count)),
+                     {{1, "two dimensions have the same numbers"}});
 }
 
 void residuals(Context& context) {
     for (const char* sampler : kSamplers) {
-        const auto image = [&](std::uint64_t seed, std::uint64_t first) { return values(context.render(noisy(sampler, "{resolution: [64, 64]}"), {.samples = 16, .first_sample = first, .seed = seed})); };
+        const auto image = [&](std::uint64_t seed, std::uint64_t first) {
+            return values(context.render(noisy(sampler, "{resolution: [64, 64]}"), {.samples = 16, .first_sample = first, .seed = seed}));
+        };
         const std::vector<double> a = image(1, 0);
         context.absolute(fmt::format("{}: two seeds", sampler), correlation(a, image(2, 0)), 0, 4 / 64.0, {{1, "two seeds are one"}});
         // Later points of a stratified sequence fill what the earlier ones left: their errors may be opposite, never alike.
         const double r = correlation(a, image(1, 16));
-        context.holds(fmt::format("{}: two ranges of samples", sampler), std::string(sampler) == "sobol" ? r < 4 / 64.0 : std::abs(r) < 4 / 64.0, "|r| < 4/64; for sobol r < 4/64", "samples repeat",
-                      fmt::format("r = {:.3g}", r));
+        context.holds(fmt::format("{}: two ranges of samples", sampler), std::string(sampler) == "sobol" ? r < 4 / 64.0 : std::abs(r) < 4 / 64.0,
+                      "|r| < 4/64; for sobol r < 4/64", "samples repeat", fmt::format("r = {:.3g}", r));
     }
 }
 
@@ -208,10 +218,12 @@ void sobol(Context& context) {
                     wrong += static_cast<std::uint64_t>(std::count_if(count.begin(), count.end(), [](int c) { return c != 1; }));
                     ++asked;
                 }
-    context.relative("elementary intervals without exactly one point", static_cast<double>(wrong), 0, 0, {{static_cast<double>(wrong), "the points are not a (0, 2)-sequence: their scrambling breaks strata"}});
+    context.relative("elementary intervals without exactly one point", static_cast<double>(wrong), 0, 0,
+                     {{static_cast<double>(wrong), "the points are not a (0, 2)-sequence: their scrambling breaks strata"}});
     // Prefixes that are no power of two are unbiased all the same.
     for (const std::uint64_t samples : {3, 100, 1000})
-        context.estimate(fmt::format("{} samples", samples), noisy("sobol"), meanRadiance, squareFormFactor(0, 0.5), 0.01, {.samples = samples, .most = samples, .seeds = samples < 10 ? 2048 : 128});
+        context.estimate(fmt::format("{} samples", samples), noisy("sobol"), meanRadiance, squareFormFactor(0, 0.5), 0.01,
+                         {.samples = samples, .most = samples, .seeds = samples < 10 ? 2048 : 128});
 }
 
 void coverage(Context& context) {

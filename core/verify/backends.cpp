@@ -1,5 +1,5 @@
-// Group L: floating point environment and backends. A backend is asked for the bits of crt's own portable build of the kernel, which is stricter
-// than any tolerance.
+// Group L: floating point environment and backends. A backend is asked for the bits of crt's own portable build of the kernel, which is stricter than any
+// tolerance.
 #include "verify/context.h"
 #include "verify/shapes.h"
 #include "verify/variants.h"
@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <cfenv>
+#include <utility>
 #if defined(__SSE__)
 #include <xmmintrin.h>
 #endif
@@ -68,8 +69,7 @@ void runToRun(Context& context) {
 void lostDevices(Context& context) {
     context.notApplicable("a device lost, out of memory, out of time",
                           "asked of the host with a plugin that fails on demand: 'a device that fails in the middle costs little' "
-                          "(tests/unit_running.cpp), tests/cli, and CUDA's "
-                          "own failures against a simulated driver (tests/unit_cuda_program.cpp)");
+                          "(tests/unit_running.cpp), tests/cli, and CUDA's own failures against a simulated driver (tests/unit_cuda_program.cpp)");
 }
 
 /// The calling thread's rounding mode and treatment of subnormals, put back at the end.

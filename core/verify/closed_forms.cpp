@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <numbers>
 #include <optional>
 #include <random>
@@ -56,12 +57,14 @@ std::vector<Mistake> squareMistakes(double x) {
         return rectangleIntegral([=](double u, double v) { return std::pow(1 + (u - x) * (u - x) + v * v, -power / 2); }, -0.5, 0.5, -0.5, 0.5) / kPi;
     };
     const double right = squareFormFactor(x, 0.5);
-    return {{integral(3), "one of the two cosines is missing: the light's irradiance is not weighted by the angle at which it arrives on the floor, or leaves the lamp"},
+    return {{integral(3), "one of the two cosines is missing: the light's irradiance is not weighted by the angle at which it arrives on the floor, "
+                          "or leaves the lamp"},
             {integral(2), "both cosines are missing"},
             {integral(5), "a cosine is applied twice"},
             {right * kPi, "the floor is 3.1416 times too bright: is the division of Lambert's law by pi missing?"},
             {right / kPi, "the floor is 3.1416 times too dark: is Lambert's law divided by pi twice?"},
-            {right * 2, "the lamp is counted twice: are light sampling and chance hits not weighted against each other, or both halves of the quad taken as the whole?"},
+            {right * 2, "the lamp is counted twice: are light sampling and chance hits not weighted against each other, or both halves of the quad "
+                        "taken as the whole?"},
             {right / 2, "half of the lamp is missing: is one of its two triangles never sampled, or its area halved?"}};
 }
 
@@ -83,7 +86,8 @@ double distanceToPlane(const Vec3d& a, const Vec3d& b, const std::vector<Vec3d>&
 }
 
 /// Spectra with a step of .8 within a nanometre, and their complement.
-constexpr const char* kSpiky = "{table: {nm: [360, 449, 450, 499, 500, 588, 589, 590, 650, 830], value: [0.1, 0.1, 0.9, 0.9, 0.1, 0.1, 0.9, 0.1, 0.5, 0.5]}, outside: clamp}";
+constexpr const char* kSpiky =
+    "{table: {nm: [360, 449, 450, 499, 500, 588, 589, 590, 650, 830], value: [0.1, 0.1, 0.9, 0.9, 0.1, 0.1, 0.9, 0.1, 0.5, 0.5]}, outside: clamp}";
 constexpr const char* kSpikyComplement =
     "{table: {nm: [360, 449, 450, 499, 500, 588, 589, 590, 650, 830], value: [0.9, 0.9, 0.1, 0.1, 0.9, 0.9, 0.1, 0.9, 0.5, 0.5]}, outside: clamp}";
 
@@ -164,8 +168,8 @@ void mirrorWall(Context& context) {
         std::string yaml = squareOverFloor(0, integrator);
         yaml.replace(yaml.find("materials: {"), 12, "materials: {mirror: {type: mirror, reflectance: 1}, ");
         // The scene's extent is the same with and without, so that rounding is, too.
-        const double at = mirror ? x : 40;
-        return yaml + fmt::format("  - {{name: mirror, mesh: {{positions: [[{0},0,-40],[{0},0,40],[{0},80,40],[{0},80,-40]], faces: [[0,1,2,3]]}}, material: mirror}}\n", at);
+        const std::string corners = fmt::format("[[{0},0,-40],[{0},0,40],[{0},80,40],[{0},80,-40]]", mirror ? x : 40);
+        return yaml + fmt::format("  - {{name: mirror, mesh: {{positions: {}, faces: [[0,1,2,3]]}}, material: mirror}}\n", corners);
     };
     const auto ask = [&](double x, double delta, const Effort& effort) {
         const double expected = squareFormFactor(2 * x, 0.5);
@@ -235,7 +239,8 @@ void glowingCeiling(Context& context) {
         return yaml(cube);
     };
     for (const CubeProbe& p : kCubeProbes) {
-        const std::pair<int, double> depths[] = {{1, p.at_depth_1}, {2, p.at_depth_2}, {3, p.at_depth_3}, {5, p.at_depth_5}, {10, p.at_depth_10}, {64, p.at_infinity}};
+        const std::pair<int, double> depths[] = {{1, p.at_depth_1}, {2, p.at_depth_2},   {3, p.at_depth_3},
+                                                 {5, p.at_depth_5}, {10, p.at_depth_10}, {64, p.at_infinity}};
         for (const auto& [depth, expected] : depths) {
             if (!context.atLeast(Level::Merge) && !p.commit_depths.contains(depth)) continue;
             context.estimate(fmt::format("{}, depth {}", p.where, depth), scene(p.camera, fmt::format("{{max_depth: {}, roulette: false}}", depth)),
@@ -274,7 +279,8 @@ void energyBalance(Context& context) {
         stage.material("ceiling", "{type: diffuse, reflectance: 0.75}").material("lamp", "{type: diffuse, reflectance: 0.2}");
         stage.quad("lamp", "[[0.3,1,0.3],[0.7,1,0.3],[0.7,1,0.7],[0.3,1,0.7]]", "lamp", "1");
         stage.quad("ceiling1", "[[0,1,0],[1,1,0],[1,1,0.3],[0,1,0.3]]", "ceiling").quad("ceiling2", "[[0,1,0.7],[1,1,0.7],[1,1,1],[0,1,1]]", "ceiling");
-        stage.quad("ceiling3", "[[0,1,0.3],[0.3,1,0.3],[0.3,1,0.7],[0,1,0.7]]", "ceiling").quad("ceiling4", "[[0.7,1,0.3],[1,1,0.3],[1,1,0.7],[0.7,1,0.7]]", "ceiling");
+        stage.quad("ceiling3", "[[0,1,0.3],[0.3,1,0.3],[0.3,1,0.7],[0,1,0.7]]", "ceiling")
+            .quad("ceiling4", "[[0.7,1,0.3],[1,1,0.3],[1,1,0.7],[0.7,1,0.7]]", "ceiling");
         return stage.yaml();
     };
     std::vector<std::string> scenes;
@@ -306,8 +312,9 @@ void lambertianBody(Context& context) {
     for (const double fov : {5.0, 40.0}) {
         const Film empty = context.render(scene(0, fov, false, once), {.samples = 16});
         if (fov == 5.0)
-            context.relative("albedo 0.5, a film full of it: the worst pixel", 0.5 * worstRatio(context.render(scene(0.5, fov, true, once), {.samples = 16}), empty, 0.5),
-                             0.5, 2e-6, {{0.5 * kPi, "3.1416 times too bright: is the division of Lambert's law by pi missing?"}});
+            context.relative("albedo 0.5, a film full of it: the worst pixel",
+                             0.5 * worstRatio(context.render(scene(0.5, fov, true, once), {.samples = 16}), empty, 0.5), 0.5, 2e-6,
+                             {{0.5 * kPi, "3.1416 times too bright: is the division of Lambert's law by pi missing?"}});
         context.relative(fmt::format("albedo 1, field of view {}°, vanishes: the worst pixel", fov),
                          worstRatio(context.render(scene(1, fov, true, once), {.samples = 16}), empty), 1, 2e-6);
     }

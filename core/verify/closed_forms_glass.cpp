@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace crt::verify {
 namespace {
@@ -90,7 +89,8 @@ void fresnel(Context& context) {
         context.relative(fmt::format("from inside, {}° beyond the critical angle: the worst pixel", beyond),
                          worstRatio(context.render(inside(critical + beyond, 2), {.samples = 64}), lamp), 1, 2e-6,
                          {{0, "light is refracted where it is totally reflected"}});
-    context.estimate("from inside, 40°", inside(40, 2), meanRadiance, fresnelDielectric(std::cos(40 * kDegree), 1 / kIndex), 0.002, {.samples = 4096, .most = 65536});
+    context.estimate("from inside, 40°", inside(40, 2), meanRadiance, fresnelDielectric(std::cos(40 * kDegree), 1 / kIndex), 0.002,
+                     {.samples = 4096, .most = 65536});
     if (!context.atLeast(Level::Merge)) return;
     // Diffuse light: a white floor sees the environment through the interface alone; what the interface sends back is not scattered again.
     const double reflected_outside = 0.0917779593, reflected_inside = 0.5963457597;
@@ -181,7 +181,8 @@ void outOfGlass(Context& context) {
                                   .yaml();
     // One decision by one stratified number: right to 1/N in each pixel.
     const Render how{.samples = 1u << 19};
-    context.relative("n²(1 − R)", radiance(context.render(scene, how)) / radiance(context.render(alone, how)), kIndex * kIndex * (1 - fresnelDielectric(1, kIndex)), 1e-5,
+    context.relative("n²(1 − R)", radiance(context.render(scene, how)) / radiance(context.render(alone, how)),
+                     kIndex * kIndex * (1 - fresnelDielectric(1, kIndex)), 1e-5,
                      {{0.96, "radiance is not multiplied by n² on the way out of glass"},
                       {0.96 / (kIndex * kIndex), "radiance is divided by n² on the way out of glass, not multiplied"},
                       {kIndex * kIndex, "nothing is reflected"}});

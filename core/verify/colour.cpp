@@ -8,9 +8,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
-#include <numbers>
+#include <utility>
 
 namespace crt::verify {
 namespace {
@@ -20,7 +22,10 @@ constexpr const char* kEye = "{position: [0, 0, 0], target: [0, 0, 1], fov: 1}";
 
 /// A film full of a lamp with this spectrum.
 std::string lamp(const std::string& radiance) {
-    return Stage(kEye, "{max_depth: 0}").material("black", "{type: diffuse, reflectance: 0}").quad("lamp", "[[-1,-1,1],[-1,1,1],[1,1,1],[1,-1,1]]", "black", radiance + ", two_sided: true").yaml();
+    return Stage(kEye, "{max_depth: 0}")
+        .material("black", "{type: diffuse, reflectance: 0}")
+        .quad("lamp", "[[-1,-1,1],[-1,1,1],[1,1,1],[1,-1,1]]", "black", radiance + ", two_sided: true")
+        .yaml();
 }
 
 /// ∫ L (x̄, ȳ, z̄) dλ / ∫ȳ dλ by trapezoids of 0.01 nm, all tables linear between nanometres as the kernels have them.
@@ -70,7 +75,8 @@ void linesOffTheGrid(Context& context) {
                 power += s[i];
                 moment += s[i] * (static_cast<double>(i) + kWavelengthMin_nm);
             }
-            context.relative(fmt::format("{} ± {} nm: power", nm, half_width), power, 1, 1e-4, {{0, "a line between two nanometres is lost"}, {1 / half_width, "a narrow line is taken for one of a nanometre"}});
+            context.relative(fmt::format("{} ± {} nm: power", nm, half_width), power, 1, 1e-4,
+                             {{0, "a line between two nanometres is lost"}, {1 / half_width, "a narrow line is taken for one of a nanometre"}});
             context.absolute(fmt::format("{} ± {} nm: mean wavelength, nm", nm, half_width), moment / power, nm, 1e-3);
         }
     const double expected = onGrid(cie[1], 589.3) / cieYIntegral();
@@ -174,7 +180,8 @@ void metamers(Context& context) {
     };
     const Render how{.samples = 65536};
     const Vec3d white = spectrumToXyz(d65);
-    const Vec3d a = labOf(meanXyz(context.render(patch("0.5", "{illuminant: D65}"), how)), white), b = labOf(meanXyz(context.render(patch(metamer, "{illuminant: D65}"), how)), white);
+    const Vec3d a = labOf(meanXyz(context.render(patch("0.5", "{illuminant: D65}"), how)), white),
+                b = labOf(meanXyz(context.render(patch(metamer, "{illuminant: D65}"), how)), white);
     context.absolute("under D65: colour difference ΔE*ab", std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]), 0, 0.1, {});
     const double expected = (0.5 + scale * unseen[589 - kWavelengthMin_nm]) / 0.5;
     context.estimate("under a line at 589 nm: ratio of their radiances", {patch(metamer, line(589, 1)), patch("0.5", line(589, 1))},
@@ -195,7 +202,8 @@ void equalEnergy(Context& context) {
     const Vec3d expected = spectrumToXyz(constantSpectrum(1));
     const Vec3d measured = meanXyz(context.render(lamp("1"), {.samples = 1u << 18}));
     for (std::size_t c = 0; c < 3; ++c)
-        context.relative(fmt::format("{} of radiance 1", "XYZ"[c]), measured[c], expected[c], 1e-5, {{0.9 * expected[c], "the white point slips: do normalisations of tables differ?"}});
+        context.relative(fmt::format("{} of radiance 1", "XYZ"[c]), measured[c], expected[c], 1e-5,
+                         {{0.9 * expected[c], "the white point slips: do normalisations of tables differ?"}});
     // CIE 15: the 1 nm tables sum to 106.865, 106.857 and 106.892.
     context.relative("X of the table over its Y", expected[0] / expected[1], 106.865 / 106.857, 1e-4);
     context.relative("Z of the table over its Y", expected[2] / expected[1], 106.892 / 106.857, 1e-4);
@@ -226,9 +234,12 @@ void heroWavelength(Context& context) {
 
 void needlessDispersion(Context& context) {
     const Film number = context.render(cubeInLight("1.5"), {.samples = 64});
-    for (const auto& [what, ior] : {std::pair{"a table of one value", "{table: {nm: [360, 830], value: [1.5, 1.5]}}"}, {"Cauchy's formula with A alone", "{cauchy: [1.5]}"}}) {
-        context.sameBits(fmt::format("{} and the number 1.5", what), number, context.render(cubeInLight(ior), {.samples = 64}), "wavelengths are given up where nothing disperses");
-        context.holds(fmt::format("{}: the kernel is left without dispersion", what), (compileScene(context.scene(cubeInLight(ior)), 0).features & CRT_FEATURE_DISPERSION) == 0, "left out",
+    for (const auto& [what, ior] :
+         {std::pair{"a table of one value", "{table: {nm: [360, 830], value: [1.5, 1.5]}}"}, {"Cauchy's formula with A alone", "{cauchy: [1.5]}"}}) {
+        context.sameBits(fmt::format("{} and the number 1.5", what), number, context.render(cubeInLight(ior), {.samples = 64}),
+                         "wavelengths are given up where nothing disperses");
+        context.holds(fmt::format("{}: the kernel is left without dispersion", what),
+                      (compileScene(context.scene(cubeInLight(ior)), 0).features & CRT_FEATURE_DISPERSION) == 0, "left out",
                       "a constant index is taken for a dispersive one");
     }
 }
@@ -283,10 +294,12 @@ void tables(Context& context) {
     context.refused("wavelengths that do not increase", lamp("{table: {nm: [400, 500, 450], value: [1, 1, 1]}, outside: clamp}"), "increas");
     context.refused("a wavelength of 0", lamp("{table: {nm: [0, 500], value: [1, 1]}, outside: clamp}"), "above 0");
     context.refused("more wavelengths than values", lamp("{table: {nm: [400, 500], value: [1]}, outside: clamp}"), "value");
-    context.sameBits("a table of one sample, held on both sides, is a constant", context.render(lamp("1"), {.samples = 16}), context.render(lamp("{table: {nm: [550], value: [1]}, outside: clamp}"), {.samples = 16}),
+    context.sameBits("a table of one sample, held on both sides, is a constant", context.render(lamp("1"), {.samples = 16}),
+                     context.render(lamp("{table: {nm: [550], value: [1]}, outside: clamp}"), {.samples = 16}),
                      "values beyond the table are not the end values");
     context.sameBits("values outside 360 to 830 nm do not matter", context.render(lamp("1"), {.samples = 16}),
-                     context.render(lamp("{table: {nm: [100, 300, 360, 830, 900], value: [77, 5, 1, 1, 9]}}"), {.samples = 16}), "wavelengths beyond the range leak into it");
+                     context.render(lamp("{table: {nm: [100, 300, 360, 830, 900], value: [77, 5, 1, 1, 9]}}"), {.samples = 16}),
+                     "wavelengths beyond the range leak into it");
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a ray that leaks, or meets what it should
-// not, shows.
+// Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a ray that leaks, or meets what it should not,
+// shows.
 #include "verify/probes.h"
 #include "verify/references.h"
 
@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace crt::verify {
 namespace {
@@ -211,8 +211,7 @@ void lightTightBox(Context& context) {
 }
 
 void cracks(Context& context) {
-    // Two squares side by side in a plane; where they meet, one has a vertex in the middle of the other's edge. Rays at a stretch of 1e-4 around
-    // it.
+    // Two squares side by side in a plane; where they meet, one has a vertex in the middle of the other's edge. Rays at a stretch of 1e-4 around it.
     const auto leaks = [&](double gap, double middle) {
         Scene scene = emptyScene(64, 1, {0.5, 0, -0.75}, {0.5, 0, 0.25}, 5e-5);
         scene.integrator.max_depth = 0;

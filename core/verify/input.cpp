@@ -9,6 +9,7 @@
 
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 namespace crt::verify {
 namespace {
@@ -79,8 +80,7 @@ void meshFiles(Context& context) {
         } catch (const Error& error) {
             context.holds(what, false, "the same image", "a mesh that others read is refused", error.what());
         }
-    // A polygon of a thousand corners, and one that is not convex: as bright as their area says is asked by the mesh reader's own tests; here, that
-    // they are rendered.
+    // A polygon of a thousand corners: that it is as bright as its area says is asked by the mesh reader's own tests; here, that it is rendered.
     std::string many;
     for (int i = 0; i < 1000; ++i)
         many += fmt::format("v {} {} 0\n", 0.3 + std::cos(i * 6.283185307179586 / 1000), 0.3 + std::sin(i * 6.283185307179586 / 1000));

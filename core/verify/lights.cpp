@@ -8,10 +8,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 namespace crt::verify {
 namespace {
@@ -31,8 +29,8 @@ void brightness(Context& context) {
     const Film unit = context.render(squareOverFloor(0, kDirect), {.samples = 64});
     const auto with = [&](const std::string& radiance) { return context.render(squareOverFloor(0, kDirect, 0.5, radiance), {.samples = 64}); };
     for (const int m : {-100, -30, 10, 30, 100})
-        context.relative(fmt::format("radiance 2^{}: the worst of all sums", m), worstFactor(with(fmt::format("{:.17g}", std::ldexp(1.0, m))), unit, std::ldexp(1.0, m)), 1, 0,
-                         {});
+        context.relative(fmt::format("radiance 2^{}: the worst of all sums", m),
+                         worstFactor(with(fmt::format("{:.17g}", std::ldexp(1.0, m))), unit, std::ldexp(1.0, m)), 1, 0, {});
     for (const int m : {-30, -10, 10, 30})
         context.relative(fmt::format("radiance 1e{}: the worst of all sums", m), worstFactor(with(fmt::format("1e{}", m)), unit, std::pow(10.0, m)), 1, 1e-6);
 }
@@ -91,12 +89,13 @@ void edgeOn(Context& context) {
         const Film film = context.render(yaml, {.samples = 4096});
         context.relative(what, radiance(film), 0, 0, {{radiance(film), physics}});
     };
-    dark("its plane passes through the receiver", scene("[[1,0,-1],[1,0,1],[2,0,1],[2,0,-1]]", "1, two_sided: true"), "light arrives along a surface, where the cosine is 0");
+    dark("its plane passes through the receiver", scene("[[1,0,-1],[1,0,1],[2,0,1],[2,0,-1]]", "1, two_sided: true"),
+         "light arrives along a surface, where the cosine is 0");
     dark("it looks away", scene("[[-0.5,1,-0.5],[-0.5,1,0.5],[0.5,1,0.5],[0.5,1,-0.5]]", "1"), "a one-sided lamp shines from its back");
     dark("it is below the floor", scene("[[-0.5,-1,-0.5],[0.5,-1,-0.5],[0.5,-1,0.5],[-0.5,-1,0.5]]", "1, two_sided: true"), "light comes through the floor");
-    // Upright above the receiver, seen exactly edge-on.
-    // But for the width of the eye's needle, which sees it from a little to either side.
-    context.absolute("upright, seen edge-on", radiance(context.render(scene("[[0,1,-0.5],[0,2,-0.5],[0,2,0.5],[0,1,0.5]]", "1, two_sided: true"), {.samples = 4096})), 0,
+    // Upright above the receiver, seen exactly edge-on but for the width of the eye's needle, which sees it from a little to either side.
+    context.absolute("upright, seen edge-on",
+                     radiance(context.render(scene("[[0,1,-0.5],[0,2,-0.5],[0,2,0.5],[0,1,0.5]]", "1, two_sided: true"), {.samples = 4096})), 0,
                      1e-6);
 }
 
@@ -113,7 +112,8 @@ void nearLight(Context& context) {
         context.estimate(fmt::format("receiver {} below the lamp", height), scene, meanRadiance, expected, 0.005, {.samples = 1024, .most = 16384},
                          {{0, "the lamp is closer than the distance that rays are moved off surfaces"}});
     }
-    context.notApplicable("receiver 1e-6 below the lamp", "below the clearance by which rays leave surfaces (docs/decisions/0004): gaps down to 1e-5 of a surface's size are seen");
+    context.notApplicable("receiver 1e-6 below the lamp",
+                          "below the clearance by which rays leave surfaces (docs/decisions/0004): gaps down to 1e-5 of a surface's size are seen");
 }
 
 /// A03 with its lamp cut into n × n squares of two triangles.
@@ -158,7 +158,8 @@ void choosingAmongMany(Context& context) {
         context.relative(fmt::format("{} lights: shares add up to 2³²", lights), static_cast<double>(first.back()), std::ldexp(1.0, 32), 0);
     }
     const std::vector<std::uint64_t> first = choiceTable({1e20, 1});
-    context.holds("powers 1e20 : 1: the weak one can be chosen", first[2] > first[1], "at least once in 2³²", "a light that is never chosen loses what only light sampling finds");
+    context.holds("powers 1e20 : 1: the weak one can be chosen", first[2] > first[1], "at least once in 2³²",
+                  "a light that is never chosen loses what only light sampling finds");
 }
 
 void emissiveSpecular(Context& context) {
@@ -171,8 +172,11 @@ void emissiveSpecular(Context& context) {
         cube.integrator = "{max_depth: 0}";
         const Film unit = context.render(yaml(cube), {.samples = 16});
         const double expected = furnaceRadiance(albedo, 30);
-        context.relative(fmt::format("box of glowing mirrors of reflectance {}", albedo), radiance(context.render(mirrors, {.samples = 16})) / radiance(unit), expected, 2e-6,
-                         {{1, "mirrors that glow do not reflect"}, {expected - 1, "mirrors that reflect do not glow"}, {2 * expected, "emission is counted twice"}});
+        context.relative(fmt::format("box of glowing mirrors of reflectance {}", albedo),
+                         radiance(context.render(mirrors, {.samples = 16})) / radiance(unit), expected, 2e-6,
+                         {{1, "mirrors that glow do not reflect"},
+                          {expected - 1, "mirrors that reflect do not glow"},
+                          {2 * expected, "emission is counted twice"}});
     }
     // A pane of index 1 that glows on both sides adds its emission to what is behind it.
     const auto pane = [](int depth, bool there) {
@@ -181,8 +185,9 @@ void emissiveSpecular(Context& context) {
         if (there) stage.quad("pane", "[[-9,-9,0],[9,-9,0],[9,9,0],[-9,9,0]]", "air", "0.5, two_sided: true");
         return stage.yaml();
     };
-    context.relative("glowing pane of index 1", radiance(context.render(pane(4, true), {.samples = 16})) / radiance(context.render(pane(4, false), {.samples = 16})), 1.5,
-                     2e-6, {{1, "glass that glows does not glow"}, {2, "emission is counted twice"}});
+    context.relative("glowing pane of index 1",
+                     radiance(context.render(pane(4, true), {.samples = 16})) / radiance(context.render(pane(4, false), {.samples = 16})), 1.5, 2e-6,
+                     {{1, "glass that glows does not glow"}, {2, "emission is counted twice"}});
 }
 
 void noLight(Context& context) {
@@ -201,8 +206,9 @@ void techniquesAgree(Context& context) {
     for (const double half : {0.05, 0.5, 5.0}) {
         const std::string both = squareOverFloor(0, kDirect, half), scattering = squareOverFloor(0, "{max_depth: 1, roulette: false, nee: false}", half);
         if (half > 0.1 || context.atLeast(Level::Merge))
-            context.estimate(fmt::format("half side {}: light found by chance", half), scattering, meanRadiance, squareFormFactor(0, half), half > 0.1 ? 0.005 : 0.01,
-                             {.samples = 4096, .most = 65536}, {{squareFormFactor(0, half) / 2, "what is found by chance is weighted although nothing competes"}});
+            context.estimate(fmt::format("half side {}: light found by chance", half), scattering, meanRadiance, squareFormFactor(0, half),
+                             half > 0.1 ? 0.005 : 0.01, {.samples = 4096, .most = 65536},
+                             {{squareFormFactor(0, half) / 2, "what is found by chance is weighted although nothing competes"}});
         context.estimate(fmt::format("half side {}: both techniques", half), both, meanRadiance, squareFormFactor(0, half), 0.002, {.samples = 1024, .most = 16384});
         // Independent numbers, so that the pixel's own variance is right.
         const auto variance = [&](std::string text) {
@@ -254,31 +260,36 @@ void enormousPdf(Context& context) {
 
 std::vector<Case> lightCases() {
     return {
-        row("E01", "brightness", "A03 with a radiance of 2^±100 and 1e±30", "every sum scaled alike", "linearity of light", "exactly; 1e-6", Level::Commit,
-            kDirectLight, brightness),
-        row("E02", "bright-and-dim", "Under a lamp of 1e+10 beside one of 1e-10, a screen between them; two equal ones, one hidden", "the floor as under its lamp alone",
-            "rectangle formula", "± 0.1 %; ± 0.3 %", Level::Merge, kDirectLight, brightAndDim),
-        row("E03", "second-moment", "Radiance 1e20: a second moment of 1e40", "1e40 times the variance at radiance 1", "scaling", "1e-5", Level::Commit, kDirectLight, secondMoment),
-        row("E04", "tiny-light", "Lamps of half side 5e-3 to 5e-6 at distance 1", "the form factor, e.g. 3.18309885123e-9 for 5e-5", "rectangle formula", "± 0.3 %",
-            Level::Commit, kDirectLight, tinyLight),
-        row("E05", "edge-on", "A lamp in the receiver's plane, turned away, below the floor, seen edge-on", "nothing", "cosines that are 0", "exactly", Level::Commit,
-            kDirectLight, edgeOn),
-        row("E06", "near-light", "A floor 0.1 to 2e-5 below a lamp of side 1", "the form factor, in the limit 1", "rectangle formula", "± 0.5 %", Level::Commit, kDirectLight, nearLight),
-        row("E07", "tiled-light", "The lamp of A03 as 2, 8 and 1058 triangles; 105800 at merge, 1002528 at night", "0.2394564705 always", "rectangle formula", "± 0.1 %",
-            Level::Commit, kDirectLight | CRT_FEATURE_BVH, tiledLight),
+        row("E01", "brightness", "A03 with a radiance of 2^±100 and 1e±30", "every sum scaled alike", "linearity of light", "exactly; 1e-6",
+            Level::Commit, kDirectLight, brightness),
+        row("E02", "bright-and-dim", "Under a lamp of 1e+10 beside one of 1e-10, a screen between them; two equal ones, one hidden",
+            "the floor as under its lamp alone", "rectangle formula", "± 0.1 %; ± 0.3 %", Level::Merge, kDirectLight, brightAndDim),
+        row("E03", "second-moment", "Radiance 1e20: a second moment of 1e40", "1e40 times the variance at radiance 1", "scaling", "1e-5",
+            Level::Commit, kDirectLight, secondMoment),
+        row("E04", "tiny-light", "Lamps of half side 5e-3 to 5e-6 at distance 1", "the form factor, e.g. 3.18309885123e-9 for 5e-5",
+            "rectangle formula", "± 0.3 %", Level::Commit, kDirectLight, tinyLight),
+        row("E05", "edge-on", "A lamp in the receiver's plane, turned away, below the floor, seen edge-on", "nothing", "cosines that are 0",
+            "exactly", Level::Commit, kDirectLight, edgeOn),
+        row("E06", "near-light", "A floor 0.1 to 2e-5 below a lamp of side 1", "the form factor, in the limit 1", "rectangle formula", "± 0.5 %",
+            Level::Commit, kDirectLight, nearLight),
+        row("E07", "tiled-light", "The lamp of A03 as 2, 8 and 1058 triangles; 105800 at merge, 1002528 at night", "0.2394564705 always",
+            "rectangle formula", "± 0.1 %", Level::Commit, kDirectLight | CRT_FEATURE_BVH, tiledLight),
         row("E08", "many-lights", "How light sampling chooses among up to 1e7 lights of equal power, and between powers of 1e20 : 1",
             "equal shares; the weak light at least once in 2³²", "arithmetic", "0.5 %", Level::Commit, 0, choosingAmongMany),
-        row("E09", "hopelessly-dim", "Under a lamp of 1e-10 beside one of 1e+10, chosen by power", "the floor as under its lamp alone", "rectangle formula", "± 1 %",
-            Level::Merge, kDirectLight, hopelesslyDim),
-        row("E10", "emissive-specular", "Mirrors that glow, glass that glows", "E (1 − R^(k+1)) / (1 − R); the pane's emission once", "geometric series", "2e-6", Level::Commit,
+        row("E09", "hopelessly-dim", "Under a lamp of 1e-10 beside one of 1e+10, chosen by power", "the floor as under its lamp alone",
+            "rectangle formula", "± 1 %", Level::Merge, kDirectLight, hopelesslyDim),
+        row("E10", "emissive-specular", "Mirrors that glow, glass that glows", "E (1 − R^(k+1)) / (1 − R); the pane's emission once",
+            "geometric series", "2e-6", Level::Commit,
             CRT_FEATURE_CONDUCTOR | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_ENVIRONMENT, emissiveSpecular),
-        row("E11", "no-light", "No lamp; radiance 0, −1, NaN, infinite", "black; the last three are refused", "docs/scene.md", "exactly", Level::Commit, kDirectLight, noLight),
+        row("E11", "no-light", "No lamp; radiance 0, −1, NaN, infinite", "black; the last three are refused", "docs/scene.md", "exactly",
+            Level::Commit, kDirectLight, noLight),
         row("E12", "techniques", "Lamps of half side 0.05, 0.5 and 5, by light sampling with scattering and by scattering alone",
-            "the form factor, and no more noise by both than by one", "rectangle formula; Veach's bound", "± 0.2 %, by chance ± 0.5 % (± 1 %); variance ≤ 1.1", Level::Commit, kDirectLight | CRT_FEATURE_INDEPENDENT,
-            techniquesAgree),
-        row("E13", "hidden-lamps", "A lamp behind a door that is ajar, and one within glass: with and without light sampling", "the same mean", "both are unbiased",
-            "ratio 1 ± 1 %", Level::Merge, kDirectLight | CRT_FEATURE_DIELECTRIC, hiddenLamps),
-        row("E14", "enormous-pdf", "A lamp of half side 1e-12 at distance 1", "1.2732395447e-24", "rectangle formula", "± 0.3 %", Level::Commit, kDirectLight, enormousPdf),
+            "the form factor, and no more noise by both than by one", "rectangle formula; Veach's bound",
+            "± 0.2 %, by chance ± 0.5 % (± 1 %); variance ≤ 1.1", Level::Commit, kDirectLight | CRT_FEATURE_INDEPENDENT, techniquesAgree),
+        row("E13", "hidden-lamps", "A lamp behind a door that is ajar, and one within glass: with and without light sampling", "the same mean",
+            "both are unbiased", "ratio 1 ± 1 %", Level::Merge, kDirectLight | CRT_FEATURE_DIELECTRIC, hiddenLamps),
+        row("E14", "enormous-pdf", "A lamp of half side 1e-12 at distance 1", "1.2732395447e-24", "rectangle formula", "± 0.3 %", Level::Commit,
+            kDirectLight, enormousPdf),
     };
 }
 

@@ -1,5 +1,5 @@
-// Group N: questions that were written because a planted fault (tests/mutations) would otherwise have gone unnoticed. Small scenes, each sharp against
-// one mistake.
+// Group N: questions that were written because a planted fault (tests/mutations) would otherwise have gone unnoticed. Small scenes, each sharp against one
+// mistake.
 #include "verify/context.h"
 #include "verify/references.h"
 #include "verify/scenes.h"
@@ -15,6 +15,7 @@
 #include <numbers>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 
 namespace crt::verify {

@@ -1,5 +1,4 @@
-/// Questions about single rays that any backend answers through its film alone. A camera's rays are known beforehand, bit by bit, because the
-/// kernel is
+/// Questions about single rays that any backend answers through its film alone. A camera's rays are known beforehand, bit by bit, because the kernel is
 /// the same everywhere; so geometry can be built onto them, and every pixel of the film counts for one ray.
 #pragma once
 
@@ -36,17 +35,15 @@ struct Place {
 /// About the origin; far from it, where nothing is round (the place is that of Embree's own tests); and there in a scene as large as that distance.
 extern const Place kPlaces[3];
 
-/// Rays from one point to the vertices, edges or faces of a connected mesh that covers the whole film, at most one in a pixel's sample: failures
-/// are rays that meet nothing. One film of resolution² rays, or `samples` times as many for faces.
+/// Rays from one point to the vertices, edges or faces of a connected mesh that covers the whole film, at most one in a pixel's sample: failures are
+/// rays that meet nothing. One film of resolution² rays, or `samples` times as many for faces.
 Tally missesOfAimedRays(Context& context, Aim aim, const Place& place, int resolution, std::uint64_t seed, std::uint64_t samples = 1);
 
-/// One random triangle, in a random place of a scene `extent` times as large, and rays that scatter off it by the cosine: failures meet the
-/// triangle
+/// One random triangle, in a random place of a scene `extent` times as large, and rays that scatter off it by the cosine: failures meet the triangle
 /// that they leave. Lengths in the author's units. One film of resolution² rays, of which those count that meet the triangle.
 Tally selfHits(Context& context, double size, double extent, int resolution, std::uint64_t seed);
 
-/// Two parallel squares of edge `size`, `gap` apart, in a random place and pose of a scene `extent` times as large; rays pass through the first,
-/// whose
+/// Two parallel squares of edge `size`, `gap` apart, in a random place and pose of a scene `extent` times as large; rays pass through the first, whose
 /// index is 1. Failures miss the second.
 Tally skippedLayers(Context& context, double size, double gap, double extent, int resolution, std::uint64_t seed);
 

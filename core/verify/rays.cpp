@@ -1,5 +1,4 @@
-// Group D: rays and traversal. Rays are those of cameras, known beforehand (probes.h); what they must meet is known by topology or by arithmetic in
-// double.
+// Group D: rays and traversal. Rays are those of cameras, known beforehand (probes.h); what they must meet is known by topology or by arithmetic in double.
 #include "verify/probes.h"
 
 #include "kernel/features.h"
@@ -9,6 +8,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 namespace crt::verify {
 namespace {
@@ -25,8 +26,7 @@ void aimedRays(Context& context) {
     }
 }
 
-/// A wall across the view at z = 1, cut into `cells`² squares, whose edges and boxes' faces lie in the planes of constant x and y through the
-/// origin.
+/// A wall across the view at z = 1, cut into `cells`² squares, whose edges and boxes' faces lie in the planes of constant x and y through the origin.
 Mesh wall(int cells) {
     Mesh mesh;
     const auto at = [&](int i) { return 2.0 * i / cells - 1; };
@@ -185,8 +185,7 @@ Mesh soup(Dice& dice, int count, double least = -2.5, double most = -0.5) {
 constexpr std::uint32_t kFirstHit = kAovNormal | kAovDepth | kAovPrimitive;
 
 void occlusionAndClosest(Context& context) {
-    // Light sampling asks whether anything is in between, scattering what is nearest. Where only one of them brings light, both must bring the
-    // same.
+    // Light sampling asks whether anything is in between, scattering what is nearest. Where only one of them brings light, both must bring the same.
     const int count = context.atLeast(Level::Merge) ? 12 : 2;
     for (int i = 0; i < count; ++i) {
         Dice dice(static_cast<std::uint64_t>(i) + 1);

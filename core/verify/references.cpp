@@ -4,7 +4,6 @@
 
 #include <boost/math/quadrature/gauss.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 

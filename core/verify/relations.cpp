@@ -1,6 +1,6 @@
 // Group M: relations between images. Those that hold exactly, M01 to M19, ask for the same bits and cost little; they need no reference.
 #include "verify/context.h"
-#include "verify/probes.h"
+#include "verify/shapes.h"
 #include "verify/temporary_folder.h"
 #include "verify/variants.h"
 
@@ -10,7 +10,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 namespace crt::verify {
 namespace {

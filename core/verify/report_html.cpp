@@ -11,8 +11,10 @@ constexpr const char* kHead = R"(<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{0}</title>
 <style>
-:root {{ color-scheme: light dark; --line: #d5d9df; --soft: #5b6470; --pass: #1a7f37; --fail: #c62828; --other: #8a6100; --back: #ffffff; --ink: #16191d; --band: #f4f6f8; }}
-@media (prefers-color-scheme: dark) {{ :root {{ --line: #343a42; --soft: #9aa4b0; --pass: #56c271; --fail: #ff7b72; --other: #e0b040; --back: #14171a; --ink: #e6e9ec; --band: #1d2126; }} }}
+:root {{ color-scheme: light dark; --line: #d5d9df; --soft: #5b6470; --back: #ffffff; --ink: #16191d; --band: #f4f6f8;
+  --pass: #1a7f37; --fail: #c62828; --other: #8a6100; }}
+@media (prefers-color-scheme: dark) {{ :root {{ --line: #343a42; --soft: #9aa4b0; --back: #14171a; --ink: #e6e9ec; --band: #1d2126;
+  --pass: #56c271; --fail: #ff7b72; --other: #e0b040; }} }}
 body {{ font: 15px/1.5 system-ui, sans-serif; margin: 0 auto; padding: 1.5rem 1rem 4rem; max-width: 72rem; background: var(--back); color: var(--ink); }}
 h1 {{ font-size: 1.4rem; margin: 0 0 .3rem; }} h2 {{ font-size: 1.05rem; margin: 2rem 0 .4rem; }}
 p.facts {{ color: var(--soft); margin: 0 0 1rem; }}
@@ -55,9 +57,11 @@ std::string outcomeRow(const Outcome& o) {
 }
 
 std::string caseHtml(const CaseResult& c) {
-    std::string text = fmt::format("<details{}><summary><b>{}</b><span>{} <span class=\"soft\">{}</span></span><span class=\"{}\">{}</span><span class=\"t\">{}</span></summary>\n",
-                                   failed(c.verdict) ? " open" : "", c.which->id, escaped(c.which->title), c.which->name, styleOf(c.verdict), name(c.verdict),
-                                   durationText(c.seconds));
+    std::string text = fmt::format(
+        "<details{}><summary><b>{}</b><span>{} <span class=\"soft\">{}</span></span><span class=\"{}\">{}</span>"
+        "<span class=\"t\">{}</span></summary>\n",
+        failed(c.verdict) ? " open" : "", c.which->id, escaped(c.which->title), c.which->name, styleOf(c.verdict), name(c.verdict),
+        durationText(c.seconds));
     text += fmt::format("<div class=\"body\"><p>Expected: {}</p><p class=\"soft\">Source: {}. Tolerance: {}. Level: {}.</p>\n", escaped(c.which->expected),
                         escaped(c.which->source), escaped(c.which->tolerance), name(c.which->level));
     text += "<div class=\"scroll\"><table><tr><th>Asked</th><th>Expected</th><th>Measured [99.9 %]</th><th>Tolerance</th><th>Verdict</th><th></th></tr>\n";

@@ -1,7 +1,6 @@
 #include "verify/run.h"
 
 #include "compile.h"
-#include "error.h"
 #include "interrupt.h"
 
 #include <fmt/format.h>

@@ -62,7 +62,8 @@ void lambertDirections(Context& context) {
         }
     const double limit = stats::chiSquaredQuantile(1 - 1e-3, static_cast<double>(counts.size()) - 1);
     context.holds("χ² of directions over 72 cells of the dome", chi_squared < limit, fmt::format("below {:.1f}, p = 1e-3", limit),
-                  "directions are not distributed as the cosine: what is sampled and what is divided by are two distributions", fmt::format("χ² = {:.1f}", chi_squared));
+                  "directions are not distributed as the cosine: what is sampled and what is divided by are two distributions",
+                  fmt::format("χ² = {:.1f}", chi_squared));
     for (const char* material : {"conductor, metal: Ag", "dielectric, ior: 1.5", "mirror, reflectance: 1", "diffuse, reflectance: 1"})
         roughnessIsRefused(context, material, {1, 0.5, 0.1, 1e-2, 1e-3, 1e-4});
 }
@@ -92,8 +93,8 @@ void pdfIntegrates(Context& context) {
             .material("white", "{type: diffuse, reflectance: 1}")
             .material("black", "{type: diffuse, reflectance: 0}")
             .quad("floor", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "white")
-            .mesh("room", "[[-2,0,-2],[2,0,-2],[-2,1,-2],[2,1,-2],[-2,0,2],[2,0,2],[-2,1,2],[2,1,2]]", "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,2,6,4],[1,5,7,3]]", "black",
-                  "1, two_sided: true")
+            .mesh("room", "[[-2,0,-2],[2,0,-2],[-2,1,-2],[2,1,-2],[-2,0,2],[2,0,2],[-2,1,2],[2,1,2]]",
+                  "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,2,6,4],[1,5,7,3]]", "black", "1, two_sided: true")
             .yaml();
     };
     context.estimate("with light sampling", scene(true), meanRadiance, 1, 0.001, {.samples = 1024, .most = 16384});
@@ -103,7 +104,8 @@ void pdfIntegrates(Context& context) {
 
 /// A film full of a flat surface under a constant environment, over the environment itself.
 double whiteFurnace(Context& context, const std::string& material, double degrees = 0) {
-    const std::string camera = fmt::format("{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 0.001}}", std::sin(degrees * kDegree), std::cos(degrees * kDegree));
+    const std::string camera = fmt::format("{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 0.001}}",
+                                           std::sin(degrees * kDegree), std::cos(degrees * kDegree));
     const Film empty = context.render(Stage(camera).set("environment", "{radiance: 1}").yaml(), {.samples = 64});
     const Film film = context.render(Stage(camera, "{max_depth: 100, roulette: false}")
                                          .set("environment", "{radiance: 1}")
@@ -123,7 +125,8 @@ void whiteFurnaces(Context& context) {
         const double c = std::cos(degrees * kDegree);
         const std::complex<double> t = std::sqrt(eta * eta - (1 - c * c));
         const double expected = (std::norm((c - t) / (c + t)) + std::norm((eta * eta * c - t) / (eta * eta * c + t))) / 2;
-        context.relative(fmt::format("conductor of n = 1, k = 6 at {}°", degrees), whiteFurnace(context, "{type: conductor, eta: 1, k: 6}", degrees), expected, 1e-5);
+        context.relative(fmt::format("conductor of n = 1, k = 6 at {}°", degrees), whiteFurnace(context, "{type: conductor, eta: 1, k: 6}", degrees),
+                         expected, 1e-5);
     }
 }
 
@@ -164,7 +167,8 @@ void indices(Context& context) {
     for (std::uint32_t y = 0; y < 8; ++y)
         for (std::uint32_t x = 0; x < 8; ++x)
             for (std::uint32_t c = 0; c < 3; ++c) differing += static_cast<float>(one.mean(x, y, c)) == static_cast<float>(empty.mean(x, y, c)) ? 0 : 1;
-    context.relative("n = 1: values that are not the empty scene's, bit by bit", differing, 0, 0, {{differing, "an index of 1 is a surface that bends or loses light"}});
+    context.relative("n = 1: values that are not the empty scene's, bit by bit", differing, 0, 0,
+                     {{differing, "an index of 1 is a surface that bends or loses light"}});
     for (const char* ior : {"1.0000001", "1.001", "1.5", "2.4", "100", "1000"}) {
         const Film film = context.render(scene(ior, 200000), how);
         context.relative(fmt::format("n = {}: a clear cube, the worst pixel", ior), worstRatio(film, empty), 1, 2e-4);
@@ -200,7 +204,8 @@ void extremeNumbers(Context& context) {
                 }
             ++asked;
         }
-    context.relative("scatterings that are neither finite nor rejected", static_cast<double>(bad), 0, 0, {{static_cast<double>(bad), "a warp degenerates at the end of its range"}});
+    context.relative("scatterings that are neither finite nor rejected", static_cast<double>(bad), 0, 0,
+                     {{static_cast<double>(bad), "a warp degenerates at the end of its range"}});
     context.holds("random numbers are above 0 and below 1", least > 0 && most < 1, "(0, 1)", "0 or 1 is where warps degenerate",
                   fmt::format("{:.9g} to 1 − {:.3g}, {} scatterings", least, 1 - most, asked));
 }
@@ -209,7 +214,8 @@ void wordsToNumbers(Context& context) {
     // float(0xffffffff)·2⁻³² is 1.0f: the conversion must not round up.
     context.holds("the largest word", kernel::crt_unit(0xffffffffu) < 1.0f, "below 1", "the largest random number rounds up to 1",
                   fmt::format("1 − {:.3g}", 1 - static_cast<double>(kernel::crt_unit(0xffffffffu))));
-    context.holds("the smallest word", kernel::crt_unit(0u) > 0.0f, "above 0", "the smallest random number is 0", fmt::format("{:.3g}", static_cast<double>(kernel::crt_unit(0u))));
+    context.holds("the smallest word", kernel::crt_unit(0u) > 0.0f, "above 0", "the smallest random number is 0",
+                  fmt::format("{:.3g}", static_cast<double>(kernel::crt_unit(0u))));
     // All cells alike: the mean is ½ and the variance 1/12.
     double sum = 0, squares = 0;
     constexpr std::uint32_t cells = 1u << 23;

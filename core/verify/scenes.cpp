@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <utility>
 
 namespace crt::verify {
 

@@ -1,10 +1,12 @@
 #include "verify/shapes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 namespace crt::verify {
 

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -64,11 +65,12 @@ void albedo9999(Context& context) {
 
 void depths(Context& context) {
     const Film emitted = context.render(furnace(0.5, "{max_depth: 0, roulette: false, nee: false}"), {.samples = 4});
-    for (const int depth : {0, 1, 2, 10000})
-        context.relative(fmt::format("depth {}", depth),
-                         radiance(context.render(furnace(0.5, fmt::format("{{max_depth: {}, roulette: false, nee: false}}", depth)), {.samples = 4})) / radiance(emitted),
-                         furnaceRadiance(0.5, depth), 2e-6);
-    context.relative("depth 1000000000, ended by roulette: the mean exists", context.render(furnace(0.5, "{max_depth: 1000000000, nee: false}"), {.samples = 64}).invalidSamples() == 0 ? 1 : 0, 1, 0);
+    for (const int depth : {0, 1, 2, 10000}) {
+        const Film film = context.render(furnace(0.5, fmt::format("{{max_depth: {}, roulette: false, nee: false}}", depth)), {.samples = 4});
+        context.relative(fmt::format("depth {}", depth), radiance(film) / radiance(emitted), furnaceRadiance(0.5, depth), 2e-6);
+    }
+    const Film endless = context.render(furnace(0.5, "{max_depth: 1000000000, nee: false}"), {.samples = 64});
+    context.relative("depth 1000000000, ended by roulette: the mean exists", endless.invalidSamples() == 0 ? 1 : 0, 1, 0);
     context.refused("depth -1", furnace(0.5, "{max_depth: -1}"), "max_depth");
     context.refused("depth 2³¹ − 1", furnace(0.5, "{max_depth: 2147483647}"), "max_depth");
 }

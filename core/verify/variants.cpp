@@ -3,7 +3,7 @@
 #include "kernel/path.h"
 #include "verify/shapes.h"
 
-#include <algorithm>
+#include <utility>
 
 namespace crt::verify {
 namespace {

@@ -731,6 +731,7 @@ class Verify(CliTest):
     def test_list_names_cases(self):
         self.assertIn("square-light", self.crt("verify", "--list").stdout)
 
+
 if __name__ == "__main__":
     if len(sys.argv) < 4:
         sys.exit(__doc__)

@@ -16,7 +16,6 @@
 namespace crt::cuda_on_host {
 namespace {
 
-
 std::vector<CrtDevice> probeDevices(const plugin::Host&) {
     const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
     return {plugin::makeDevice(0, "CUDA kernels on the host", "none", 0, threads)};
