@@ -64,15 +64,20 @@ const std::map<std::string_view, std::uint32_t>& fixedSizes() {
     return sizes;
 }
 
+/// What a part of an EXR file says of its pixels.
+struct Part {
+    std::uint64_t width = 0, height = 0, channels = 0;
+};
+
 /// The value of an attribute, by "OpenEXR File Layout" (openexr.com). What is not named here is opaque to OpenEXR, too.
-void checkValue(const std::string& path, const std::string& what, const std::string& type, std::string_view value) {
+void checkValue(const std::string& path, const std::string& what, const std::string& type, std::string_view value, Part& part) {
     const auto fixed = fixedSizes().find(type);
     if (fixed != fixedSizes().end() && value.size() != fixed->second)
         throw DamagedHeader(fmt::format("{} has {} bytes and its type, {}, takes {}", what, value.size(), type, fixed->second));
     Bytes bytes(value);
     if (type == "chlist") {
         constexpr std::uint64_t kBytesAChannel = 16;  // Type, linearity, sampling.
-        while (!bytes.text(what).empty()) bytes.take(kBytesAChannel, what);
+        for (part.channels = 0; !bytes.text(what).empty(); ++part.channels) bytes.take(kBytesAChannel, what);
         if (!bytes.empty()) throw DamagedHeader(fmt::format("{} has more bytes than channels", what));
     } else if (type == "stringvector") {
         while (!bytes.empty()) bytes.take(bytes.u32(what), what);
@@ -88,8 +93,10 @@ void checkValue(const std::string& path, const std::string& what, const std::str
         for (std::int64_t& c : corner) c = static_cast<std::int32_t>(bytes.u32(what));
         if (corner[2] < corner[0] || corner[3] < corner[1]) throw DamagedHeader(fmt::format("{} is empty", what));
         // The display window may be any size; it holds no pixels.
-        if (what.find("dataWindow") != std::string::npos)
-            checkPixels(path, static_cast<std::uint64_t>(corner[2] - corner[0] + 1), static_cast<std::uint64_t>(corner[3] - corner[1] + 1), 1);
+        if (what.find("dataWindow") != std::string::npos) {
+            part.width = static_cast<std::uint64_t>(corner[2] - corner[0] + 1);
+            part.height = static_cast<std::uint64_t>(corner[3] - corner[1] + 1);
+        }
     }
 }
 
@@ -104,11 +111,16 @@ void checkExrHeader(const std::string& path) {
     // A header is attributes and an empty name; several end with an empty header.
     for (bool more = true; more;) {
         more = false;
+        Part part;
         for (std::string name = bytes.text("its header"); !name.empty(); name = bytes.text("its header")) {
             const std::string what = fmt::format("its attribute '{}'", name), type = bytes.text(what);
-            checkValue(path, what, type, bytes.take(bytes.u32(what), what));
+            checkValue(path, what, type, bytes.take(bytes.u32(what), what), part);
             more = multipart;
         }
+        if (part.width == 0 || part.channels == 0) continue;  // OpenEXR says what is missing, and allocates nothing.
+        checkPixels(path, part.width, part.height, part.channels);
+        constexpr std::uint64_t kMostBytesAChannel = 4;
+        checkRows(part.width, part.height, part.channels * kMostBytesAChannel);
     }
 }
 
@@ -136,6 +148,13 @@ void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t hei
     if (decoded_bytes == 0) throw DamagedHeader("its header says that it has no pixels");
     if (decoded_bytes > kDecodedBytesAByte * static_cast<double>(std::filesystem::file_size(path)))
         throw DamagedHeader(fmt::format("its header says {} x {} pixels, more than a file of its size can hold", width, height));
+}
+
+void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel, std::uint64_t rows_a_strip) {
+    constexpr double kMostBytes = 1 << 30;  // 64 rows of 65,535 pixels, the widest film, with 64 channels of floats
+    const double row_bytes = static_cast<double>(width) * static_cast<double>(bytes_a_pixel);
+    if (row_bytes * static_cast<double>(rows_a_strip) > std::max(kMostBytes, row_bytes * static_cast<double>(height)))
+        throw DamagedHeader(fmt::format("its rows of {} pixels are longer than can be read", width));
 }
 
 }  // namespace crt::image

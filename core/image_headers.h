@@ -19,5 +19,8 @@ void checkExrHeader(const std::string& path);
 void checkPngHeader(const std::string& path);
 /// Throws DamagedHeader when the file cannot hold as many pixels.
 void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height, std::uint64_t channels);
+/// Throws DamagedHeader when one strip of rows would take more than a gigabyte and more than the image: OpenEXR and OpenImageIO allocate whole
+/// strips, the latter of 64 rows where the format has none, however few rows the image has.
+void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel, std::uint64_t rows_a_strip = 64);
 
 }  // namespace crt::image

@@ -253,25 +253,17 @@ std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
     throw Failure{"it is no EXR, PNG, PFM, PPM, TIFF, JPEG or Radiance HDR file"};
 }
 
-/// OpenImageIO reads whole strips into memory of its own: 64 rows where the format has none, however few rows the image has.
-void checkStrips(const ImageSpec& spec) {
-    constexpr std::uint64_t kMost = std::uint64_t{1} << 30;  // 64 channels of floats in a row of 65,535 pixels, the widest film
-    constexpr int kUsualRows = 64;
-    const auto rows = static_cast<std::uint64_t>(std::max(1, spec.get_int_attribute("tiff:RowsPerStrip", kUsualRows)));
-    const std::uint64_t bytes = spec.scanline_bytes(true);
-    if (bytes > kMost / rows && bytes * rows > spec.image_bytes(true))
-        throw Failure{"its rows of " + std::to_string(spec.width) + " pixels are longer than can be read"};
-}
-
 std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* reason, std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
         ImageSpec spec;
         const std::unique_ptr<ImageInput> input = openImage(path, spec);
         if (spec.deep) throw Failure{"it is a deep image"};
         if (spec.depth > 1) throw Failure{"it is a volume"};
-        crt::image::checkPixels(path, static_cast<std::uint64_t>(std::max(spec.width, 0)), static_cast<std::uint64_t>(std::max(spec.height, 0)),
-                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
-        checkStrips(spec);
+        const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)), height = static_cast<std::uint64_t>(std::max(spec.height, 0));
+        crt::image::checkPixels(path, width, height, static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
+        constexpr int kUsualRows = 64;
+        crt::image::checkRows(width, height, spec.pixel_bytes(true),
+                              static_cast<std::uint64_t>(std::max(1, spec.get_int_attribute("tiff:RowsPerStrip", kUsualRows))));
 
         auto owned = std::make_unique<OwnedImage>();
         // The names of a format without named channels follow from their number.
