@@ -1,6 +1,5 @@
 // The suite of `crt verify` itself: its registry, its verdicts, its diagnoses, and that its expectations are right.
 #include "catch.h"
-#include "error.h"
 #include "kernel/layout.h"
 #include "verify/case.h"
 #include "verify/context.h"
@@ -15,6 +14,7 @@
 #include <iterator>
 #include <limits>
 #include <set>
+#include <utility>
 
 using namespace crt;
 using namespace crt::verify;
