@@ -60,17 +60,23 @@ double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
 
 std::optional<ErrorEstimate> estimateError(const Film& film, ReplicateSet which, bool independent_samples) {
     const LuminanceVariance variance(film, which);
-    double luminance = 0, variances = 0, squared_variances = 0, known = 0;
+    // Squares of variances as (squares)·largest², as BLAS's nrm2 adds them up: those of a bright image leave the range of doubles.
+    double luminance = 0, variances = 0, largest = 0, squares = 0, known = 0;
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
         for (std::uint32_t x = 0; x < film.shape().width; ++x) {
             luminance += film.mean(x, y, 1);
             const double v = variance(x, y);
             if (std::isinf(v)) continue;
             variances += v;
-            squared_variances += v * v;
+            if (v > largest) {
+                squares = squares * (largest / v) * (largest / v) + 1;
+                largest = v;
+            } else if (v > 0) {
+                squares += (v / largest) * (v / largest);
+            }
             known += 1;
         }
-    if (known == 0 || !(luminance > 0)) return std::nullopt;
+    if (known == 0 || !(luminance > 0) || !std::isfinite(luminance) || !std::isfinite(variances)) return std::nullopt;
 
     ErrorEstimate e;
     const double pixels = static_cast<double>(film.counts.size());
@@ -84,9 +90,9 @@ std::optional<ErrorEstimate> estimateError(const Film& film, ReplicateSet which,
     }
     // A normal sample variance s² of d degrees of freedom has E[s⁴] = σ⁴ (d + 2)/d; so Σσ⁴ is estimated by Σs⁴ · d/(d + 2).
     const double d = variance.degreesOfFreedom();
-    const double fourth_powers = squared_variances * d / (d + 2);
+    const double sum = variances / largest, fourth_powers = squares * d / (d + 2);
     // Never more equivalent pixels than there are, and never less than one: a ratio of estimates knows neither.
-    const double equivalent_pixels = std::clamp(variances * variances / fourth_powers, 1.0, known);
+    const double equivalent_pixels = std::clamp(sum * sum / fourth_powers, 1.0, known);
     e.degrees_of_freedom = equivalent_pixels * d;
     e.relative_rmse_95 = {e.relative_rmse * std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.975, e.degrees_of_freedom)),
                           e.relative_rmse * std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.025, e.degrees_of_freedom))};

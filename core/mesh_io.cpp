@@ -156,7 +156,7 @@ public:
             for (std::string_view name = nextField(arguments); !name.empty(); name = nextField(arguments))
                 read(name, *materials, *by_name);
         }
-        return true;
+        return !materials->empty();  // Of an OBJ that names itself, none is read; tinyobjloader takes "yes" to mean one at least.
     }
 
 private:

@@ -137,6 +137,27 @@ TEST_CASE("intervals cover what they promise", "[error]") {
     }
 }
 
+// Found by fuzzing: the squares of variances left the range of doubles, and the degrees of freedom were no number.
+TEST_CASE("the relative error does not depend on the unit of radiance", "[error]") {
+    std::mt19937_64 random(5);
+    const Film film = noisyFilm({1, 2, 3}, {0.5, 0.1, 2}, 64, random);
+    const std::optional<ErrorEstimate> expected = estimateError(film);
+    REQUIRE(expected);
+    for (const int exponent : {-400, -200, 200, 400}) {
+        CAPTURE(exponent);
+        Film scaled = film;
+        for (std::size_t i = 0; i < scaled.sums.size(); ++i) {
+            const bool is_of_squares = i / 2 % kChannels == 3;
+            scaled.sums[i] = std::ldexp(scaled.sums[i], is_of_squares ? 2 * exponent : exponent);
+        }
+        const std::optional<ErrorEstimate> error = estimateError(scaled);
+        REQUIRE(error);
+        CHECK(error->relative_rmse == expected->relative_rmse);
+        CHECK(error->degrees_of_freedom == expected->degrees_of_freedom);
+        CHECK(error->half_width_95 == expected->half_width_95);
+    }
+}
+
 TEST_CASE("for one pixel the half-width is Student's", "[error]") {
     std::mt19937_64 random(6);
     const Film film = noisyFilm({3.0}, {0.5}, 1024, random);

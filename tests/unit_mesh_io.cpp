@@ -188,6 +188,14 @@ TEST_CASE("an mtllib whose name no file can have is refused with its line", "[me
     CHECK_THROWS_WITH(loadText("v 0 0 0\nmtllib " + std::string(300, 'a') + "\n"), Contains("cannot open material file"));
 }
 
+// Found by fuzzing: tinyobjloader reads the first material of an mtllib that brought none.
+TEST_CASE("an OBJ that names itself as its mtllib has no materials", "[mesh_io]") {
+    const TemporaryFolder folder;
+    const auto loaded = loadObj(folder.write("a.obj", "mtllib a.obj\n" + kTriangle + "usemtl red\nf 1 2 3\n"), true);
+    CHECK(loaded.mesh.triangles.size() == 1);
+    CHECK(loaded.materials.empty());
+}
+
 TEST_CASE("bad meshes are refused with their line", "[mesh_io]") {
     checkRefused("v 0 0 0\nv nan 0 0\n", 2, "finite");
     checkRefused("v 0 0 0\nv 0 -inf 0\n", 2, "finite");

@@ -59,6 +59,21 @@ TEST_CASE("quantiles are those of the tables", "[statistics]") {
     CHECK_THROWS_AS(studentQuantile(0.5, 0), Error);
 }
 
+// A film of 16384 x 16384 has 4e9 degrees of freedom; found by fuzzing: Boost's series no longer end somewhere above 1e10.
+TEST_CASE("quantiles of very many degrees of freedom", "[statistics]") {
+    CHECK(chiSquaredQuantile(0.975, 4e9) / 4e9 - 1 == Approx(4.3826600603e-05).epsilon(1e-9));  // SciPy 1.17, and so below
+    CHECK(chiSquaredQuantile(0.025, 4e9) / 4e9 - 1 == Approx(-4.3825653451e-05).epsilon(1e-9));
+    CHECK(fisherQuantile(0.95, 4e9, 6e10) - 1 == Approx(3.79866228637e-05).epsilon(1e-9));
+    CHECK(fisherQuantile(0.95, 2e9, 3e10) - 1 == Approx(5.3721405481e-05).epsilon(1e-9));
+    for (const double dof : {0.9999e9, 1.0001e9, 1e12, 1e15, 1e19}) {
+        CAPTURE(dof);
+        const double z = normalQuantile(0.975), expected = z * std::sqrt(2 / dof);  // normal, but for terms of 1/dof
+        CHECK(chiSquaredQuantile(0.975, dof) / dof - 1 == Approx(expected).epsilon(1e-4));
+        CHECK(fisherQuantile(0.975, dof, dof) - 1 == Approx(expected * std::sqrt(2.0)).epsilon(1e-4));
+        CHECK(fisherQuantile(0.95, 1, dof) == Approx(3.8414588).epsilon(1e-6));
+    }
+}
+
 TEST_CASE("a summary keeps a small spread about a large mean", "[statistics]") {
     const std::vector<double> values{1e9 + 4, 1e9 + 7, 1e9 + 13, 1e9 + 16};
     const Summary s = summarize(values);

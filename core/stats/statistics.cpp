@@ -31,6 +31,22 @@ double upperTail(double confidence) {
     return 0.5 + 0.5 * confidence;
 }
 
+/// Above this many degrees of freedom series that Boost's quantiles add up no longer end; the expansions below are right to 1e-13 there.
+constexpr double kManyDof = 1e9;
+
+/// Wilson and Hilferty 1931: the cube root of χ²/dof is normal, up to O(1/dof) of its deviation.
+double chiSquaredOfManyDof(double z, double dof) {
+    const double variance = 2 / (9 * dof);
+    return dof * std::pow(1 - variance + z * std::sqrt(variance), 3);
+}
+
+/// Abramowitz and Stegun 26.6.16, for Fisher's z = ½ ln F.
+double fisherOfManyDof(double z, double numerator_dof, double denominator_dof) {
+    const double a = 1 / (numerator_dof - 1), b = 1 / (denominator_dof - 1);
+    const double h = 2 / (a + b), lambda = (z * z - 3) / 6;
+    return std::exp(2 * (z * std::sqrt(h + lambda) / h - (a - b) * (lambda + 5.0 / 6 - 2 / (3 * h))));
+}
+
 /// Two variance/count pairs and their Welch–Satterthwaite degrees of freedom.
 double satterthwaite(double variance_of_mean_a, std::uint64_t count_a, double variance_of_mean_b, std::uint64_t count_b) {
     const double sum = variance_of_mean_a + variance_of_mean_b;
@@ -59,12 +75,14 @@ double studentQuantile(double p, double dof) {
 double chiSquaredQuantile(double p, double dof) {
     requireProbability(p, "a quantile is asked for a probability between 0 and 1");
     require(dof > 0, "the chi-squared distribution needs degrees of freedom above 0");
+    if (dof > kManyDof) return chiSquaredOfManyDof(normalQuantile(p), dof);
     return boost::math::quantile(boost::math::chi_squared{dof}, p);
 }
 
 double fisherQuantile(double p, double numerator_dof, double denominator_dof) {
     requireProbability(p, "a quantile is asked for a probability between 0 and 1");
     require(numerator_dof > 0 && denominator_dof > 0, "Fisher's distribution needs degrees of freedom above 0");
+    if (std::min(numerator_dof, denominator_dof) > kManyDof) return fisherOfManyDof(normalQuantile(p), numerator_dof, denominator_dof);
     return boost::math::quantile(boost::math::fisher_f{numerator_dof, denominator_dof}, p);
 }
 
