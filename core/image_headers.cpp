@@ -142,7 +142,7 @@ void checkPngHeader(const std::string& path) {
 }
 
 void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height, std::uint64_t channels) {
-    // Deflate, which EXR, PNG and TIFF use, reaches 1032:1 on bytes; EXR's lossy DWAB some sixty times that on a constant image.
+    // Deflate, which EXR and PNG use, reaches 1032:1 on bytes; EXR's lossy DWAB some sixty times that on a constant image.
     constexpr double kDecodedBytesAByte = 65536;
     const double decoded_bytes = 4.0 * static_cast<double>(width) * static_cast<double>(height) * static_cast<double>(channels);
     if (decoded_bytes == 0) throw DamagedHeader("its header says that it has no pixels");
@@ -150,10 +150,10 @@ void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t hei
         throw DamagedHeader(fmt::format("its header says {} x {} pixels, more than a file of its size can hold", width, height));
 }
 
-void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel, std::uint64_t rows_a_strip) {
+void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel) {
     constexpr double kMostBytes = 1 << 30;  // 64 rows of 65,535 pixels, the widest film, with 64 channels of floats
     const double row_bytes = static_cast<double>(width) * static_cast<double>(bytes_a_pixel);
-    if (row_bytes * static_cast<double>(rows_a_strip) > std::max(kMostBytes, row_bytes * static_cast<double>(height)))
+    if (row_bytes * static_cast<double>(kStripRows) > std::max(kMostBytes, row_bytes * static_cast<double>(height)))
         throw DamagedHeader(fmt::format("its rows of {} pixels are longer than can be read", width));
 }
 

@@ -19,8 +19,9 @@ void checkExrHeader(const std::string& path);
 void checkPngHeader(const std::string& path);
 /// Throws DamagedHeader when the file cannot hold as many pixels.
 void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height, std::uint64_t channels);
-/// Throws DamagedHeader when one strip of rows would take more than a gigabyte and more than the image: OpenEXR and OpenImageIO allocate whole
-/// strips, the latter of 64 rows where the format has none, however few rows the image has.
-void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel, std::uint64_t rows_a_strip = 64);
+/// Rows that OpenImageIO reads at a time, into memory for as many however few the image has. (It takes no fewer; left alone, it takes 256.)
+inline constexpr std::uint64_t kStripRows = 64;
+/// Throws DamagedHeader when so many rows would take more than a gigabyte, and more than the image.
+void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel);
 
 }  // namespace crt::image

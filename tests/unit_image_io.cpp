@@ -297,6 +297,10 @@ TEST_CASE("files of other formats and headers beyond the file's size are refused
     const TemporaryFolder directory;
     const std::string path = directory / "image";
     spit(path, "GIF89a, which OpenImageIO would read");
+    CHECK_THROWS_WITH(readImage(path), Contains("no EXR, PNG") && Contains("oiiotool"));
+    spit(path, std::string("II*\0\x08\0\0\0", 8));
+    CHECK_THROWS_WITH(readImage(path), Contains("no EXR, PNG"));
+    spit(path, "\xff\xd8\xff\xe0");
     CHECK_THROWS_WITH(readImage(path), Contains("no EXR, PNG"));
 
     // An EXR whose first attribute says 2 GiB; OpenEXR allocates them.
