@@ -137,6 +137,16 @@ void Context::equivalent(const std::string& what, const std::vector<double>& rep
     add(equivalenceOutcome(what, replicates, expected, delta, mistakes));
 }
 
+void Context::equivalent(const std::string& what, const std::function<std::vector<double>(std::uint64_t)>& replicatesOf, double expected, double delta,
+                         const Effort& effort) {
+    for (std::uint64_t samples = effort.samples;; samples = std::min(4 * samples, effort.most)) {
+        Outcome outcome = equivalenceOutcome(what, replicatesOf(samples), expected, delta, {});
+        if (outcome.verdict == Verdict::Inconclusive && samples < effort.most) continue;
+        add(std::move(outcome));
+        return;
+    }
+}
+
 std::vector<Outcome> Context::estimated(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta, const Effort& effort,
                                         const std::vector<Mistake>& mistakes) {
     std::vector<Scene> parsed;

@@ -84,6 +84,9 @@ public:
     /// Equivalence: the 99.9 % Student interval of the mean of `replicates` lies within ±delta · expected.
     void equivalent(const std::string& what, const std::vector<double>& replicates, double expected, double delta,
                     const std::vector<Mistake>& mistakes = {});
+    /// The same of what `replicatesOf` so many samples come out, with as many as it takes.
+    void equivalent(const std::string& what, const std::function<std::vector<double>(std::uint64_t samples)>& replicatesOf, double expected, double delta,
+                    const Effort& effort);
     /// The same of `measure` over the films of several seeds, with as many samples as it takes. A scene that does not name a number of replicates gets
     /// one sequence.
     void estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected, double delta, const Effort& effort = {},
