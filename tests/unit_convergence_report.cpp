@@ -427,6 +427,21 @@ TEST_CASE("few replicates, few looks and no reference make a report with what th
         }
 }
 
+TEST_CASE("the report bounds an error floor, but not by 0 where errors fall faster than a floor lets them", "[converge]") {
+    for (const double rate : {1.0, 1.8}) {
+        SyntheticRender what;
+        what.rate = rate;
+        what.pixels = 1024;
+        what.has_reference = false;
+        const Run run = syntheticRun(what, 1);
+        const TemporaryFolder folder;
+        writeReport(folder.path(), run, analyze(run));
+        const std::string html = readText(folder / "report.html");
+        CHECK_THAT(html, Contains(rate == 1.0 ? "none seen<span class=\"ci\">below " : "none seen<span class=\"ci\">falls faster than 1/√N"));
+        CHECK_THAT(html, !Contains("below 0 %"));
+    }
+}
+
 TEST_CASE("the summary has the fits of every configuration", "[converge]") {
     const TemporaryFolder folder;
     const Run run = syntheticStudy();
