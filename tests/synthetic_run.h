@@ -90,6 +90,8 @@ inline Run syntheticRun(const SyntheticRender& what, std::uint64_t seed) {
     Run run;
     Configuration configuration;
     configuration.key = {"scene", "backend", ""};
+    configuration.width = what.pixels;
+    configuration.height = 1;
     run.configurations.push_back(configuration);
     if (what.has_reference) {
         ReferenceInfo reference;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -22,8 +23,11 @@ using Functional = std::function<double(Replicates)>;
 enum class Scale { Linear, Logarithmic };
 
 /// Tukey's jackknife: pseudo-values R·θ − (R − 1)·θ₍₋ᵣ₎ are treated as R independent values of θ. A functional that is undefined (not finite) on some
-/// subset has no bounds. `widening` multiplies the half width.
+/// subset has no bounds. `widening` multiplies the half width. Of very many replicates, whole groups are left out instead of single ones (Wolter,
+/// Introduction to Variance Estimation, 4.2): the time would grow with R², and no interval is better for more degrees of freedom.
 Estimate jackknife(std::size_t count, const Functional& functional, Scale scale, double confidence, double widening = 1) {
+    constexpr std::size_t kMostGroups = 256;
+    const std::size_t groups = std::min(count, kMostGroups);
     std::vector<std::size_t> all(count);
     std::iota(all.begin(), all.end(), std::size_t{0});
     const auto onScale = [&](Replicates replicates) {
@@ -36,16 +40,24 @@ Estimate jackknife(std::size_t count, const Functional& functional, Scale scale,
 
     const Estimate unbounded{back(whole), back(-kInfinity), kInfinity};
     if (count < 2) return unbounded;
-    std::vector<double> pseudo_values(count);
-    for (std::size_t left_out = 0; left_out < count; ++left_out) {
-        std::vector<std::size_t> rest = all;
-        rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(left_out));
+    std::vector<double> pseudo_values(groups);
+    for (std::size_t left_out = 0; left_out < groups; ++left_out) {
+        std::vector<std::size_t> rest;
+        std::copy_if(all.begin(), all.end(), std::back_inserter(rest), [&](std::size_t r) { return r % groups != left_out; });
         const double without = onScale(rest);
         if (!std::isfinite(without)) return unbounded;
-        pseudo_values[left_out] = static_cast<double>(count) * whole - static_cast<double>(count - 1) * without;
+        pseudo_values[left_out] = static_cast<double>(groups) * whole - static_cast<double>(groups - 1) * without;
     }
     const double half = widening * stats::meanInterval(stats::summarize(pseudo_values), confidence).halfWidth();
     return {back(whole), back(whole - half), back(whole + half)};
+}
+
+/// An estimate of b² whose interval is no narrower than `spread`, the estimate's where b = 0, makes it. The square of a mean that happens to be right
+/// hardly changes with any one replicate, so that the jackknife alone would be sure of a b² below 0.
+Estimate withSpreadOfNoBias(Estimate estimate, double spread, std::size_t replicates, double confidence) {
+    if (!std::isfinite(estimate.value) || replicates < 2) return estimate;
+    const double half = stats::studentQuantile(0.5 + 0.5 * confidence, static_cast<double>(replicates - 1)) * spread;
+    return {estimate.value, std::min(estimate.low, estimate.value - half), std::max(estimate.high, estimate.value + half)};
 }
 
 /// The rows of one configuration that count, as [replicate][column]; every replicate has every column.
@@ -91,6 +103,7 @@ struct Measure {
     ErrorSource source = ErrorSource::BetweenReplicates;
     double scale = 1;                 ///< Mean of the reference, or of the replicates.
     double reference_variance = 0;    ///< Relative².
+    double pixels = 1;                ///< Of an image.
 
     /// Relative mean squared error. NaN where the row does not say.
     double mse(const Row& row) const {
@@ -101,6 +114,11 @@ struct Measure {
     std::optional<double> biasSquared(const Row& row) const {
         if (source != ErrorSource::Reference || !row.between_replicates_mse) return std::nullopt;
         return mse(row) - *row.between_replicates_mse / (scale * scale);
+    }
+    /// Standard deviation that an estimate of b² has where there is no bias, from images of that relative MSE whose pixels are independent and alike:
+    /// P times the square of a mean of R normal values, less its expectation.
+    double spreadOfNoBias(double relative_mse, std::size_t replicates) const {
+        return std::sqrt(2 / pixels) * relative_mse / static_cast<double>(replicates);
     }
     double widening(std::size_t replicates) const {
         if (source == ErrorSource::Reference) return 1;
@@ -196,15 +214,10 @@ public:
     }
 
     double biasSquared(Replicates replicates) const {
-        const std::vector<double> bias = columns(replicates, [&](const Row& row) { return measure_.biasSquared(row).value_or(kNaN); });
-        double sum = 0, weights = 0;
-        for (std::size_t i = 0; i < bias.size(); ++i) {
-            const double weight = block_.samples[i] * block_.samples[i];  // Its variance falls with 1/N² or faster.
-            sum += weight * bias[i];
-            weights += weight;
-        }
-        return sum / weights;
+        return weighted(columns(replicates, [&](const Row& row) { return measure_.biasSquared(row).value_or(kNaN); }));
     }
+    /// Measure's, all columns taken for one: they are looks at the same renders.
+    double spreadOfNoBias(Replicates replicates) const { return measure_.spreadOfNoBias(weighted(errors(replicates)), replicates.size()); }
 
     double slopeSamples(Replicates replicates) const { return logSlope(block_.samples, errors(replicates)) / 2; }
 
@@ -251,6 +264,16 @@ public:
     }
 
 private:
+    /// Mean over columns for estimates of b², whose variance falls with 1/N² or faster.
+    double weighted(const std::vector<double>& of_columns) const {
+        double sum = 0, weights = 0;
+        for (std::size_t i = 0; i < of_columns.size(); ++i) {
+            const double weight = block_.samples[i] * block_.samples[i];
+            sum += weight * of_columns[i];
+            weights += weight;
+        }
+        return sum / weights;
+    }
     std::vector<double> columns(Replicates replicates, const std::function<double(const Row&)>& value) const {
         std::vector<double> means(block_.columns());
         for (std::size_t i = 0; i < means.size(); ++i)
@@ -323,7 +346,10 @@ Point makePoint(std::uint64_t samples, const std::vector<const Row*>& rows, cons
     point.relative_rmse = estimate([&](Replicates replicates) { return std::sqrt(mse(replicates)); }, Scale::Logarithmic, widening);
     point.efficiency = estimate([&](Replicates replicates) { return 1 / (mse(replicates) * seconds(replicates)); }, Scale::Logarithmic, widening);
     const bool knows_bias = std::all_of(rows.begin(), rows.end(), [&](const Row* row) { return measure.biasSquared(*row).has_value(); });
-    if (knows_bias) point.bias_squared = estimate(over([&](const Row& row) { return *measure.biasSquared(row); }), Scale::Linear);
+    if (knows_bias)
+        point.bias_squared = withSpreadOfNoBias(estimate(over([&](const Row& row) { return *measure.biasSquared(row); }), Scale::Linear),
+                                                measure.spreadOfNoBias(point.relative_rmse.value * point.relative_rmse.value, rows.size()),
+                                                rows.size(), options.confidence);
     if (measure.source == ErrorSource::Reference) point.mean_bias = meanBias(rows, *reference, std::nullopt, options.confidence);
     calibrate(point, rows, measure, options.confidence);
     point.relmse = meanOfKnown(rows, [](const ErrorMetrics& e) { return std::optional(e.relmse); });
@@ -372,12 +398,15 @@ void fit(ConfigurationFit& result, const Block& block, const Measure& measure, c
 
     ErrorFit& error = result.error;
     const Functional intercept = [&](Replicates r) { return model.errorLine(r).intercept; };
-    const Functional bias_squared = [&](Replicates r) { return model.biasSquared(r); };
+    const auto biasSquared = [&](double confidence) {
+        return withSpreadOfNoBias(estimate([&](Replicates r) { return model.biasSquared(r); }, Scale::Linear, 1, confidence),
+                                  model.spreadOfNoBias(all), all.size(), confidence);
+    };
     error.variance = estimate([&](Replicates r) { return model.errorLine(r).slope; }, Scale::Logarithmic, widening, options.confidence);
     error.intercept = estimate(intercept, Scale::Linear, widening, options.confidence);
     error.faster_than_inverse = error.intercept.high < 0;
-    if (const Estimate bias = estimate(bias_squared, Scale::Linear, 1, options.confidence); std::isfinite(bias.value)) error.bias_squared = bias;
-    error.verdict_floor = error.bias_squared ? estimate(bias_squared, Scale::Linear, 1, options.verdict_confidence)
+    if (const Estimate bias = biasSquared(options.confidence); std::isfinite(bias.value)) error.bias_squared = bias;
+    error.verdict_floor = error.bias_squared ? biasSquared(options.verdict_confidence)
                                              : estimate(intercept, Scale::Linear, widening, options.verdict_confidence);
     error.flattening = error.verdict_floor.low > 0;
 
@@ -487,7 +516,8 @@ Analysis analyze(const Run& run, const FitOptions& options) {
                 by_samples[row.samples][row.replicate] = &row;
         }
         const ReferenceInfo* reference = findReference(run, configuration.key.scene);
-        const Measure measure = chooseMeasure(by_samples, reference);
+        Measure measure = chooseMeasure(by_samples, reference);
+        measure.pixels = std::max(1.0, static_cast<double>(configuration.width) * configuration.height);
         result.source = measure.source;
         for (auto& [samples, rows] : by_samples)
             std::erase_if(rows, [&](const auto& entry) { return !std::isfinite(measure.mse(*entry.second)); });
