@@ -69,9 +69,11 @@ class Crt:
         environment = {"CRT_CACHE_DIR": str(folder / "crt"), "POCL_CACHE_DIR": str(folder / "pocl")} if fresh else None
         if fresh:
             (folder / "pocl").mkdir(parents=True)
-        # The render's cost comes from a second process, with warm caches: the first one's `cpu` is less the usual start, and would give just that back.
-        done, warm = self.render(spp, 8_000_000, environment), self.render(spp, 8_000_001)
-        return max(0.0, done.process - warm.render), max(0.0, done.process_cpu - warm.cpu)
+        done = self.render(spp, 8_000_000, environment)
+        if not fresh:
+            return done.process - done.render, self.start_cpu
+        # Compiling takes processor time that only a second, warm process can be told apart from: `cpu` is less the warm start.
+        return done.process - done.render, max(0.0, done.process_cpu - self.render(spp, 8_000_001).cpu)
 
 
 class Worker:

@@ -148,8 +148,8 @@ def write_race(results, race, lines, arguments, roulette_from, reference):
         f"{race.factor_with_start('cold'):.2f}. At most half of Mitsuba's best was the aim: {'reached' if race.factor <= 0.5 else '**missed**'}.")
     table = []
     for name, row in sorted(race.rows.items(), key=lambda item: item[1]["cpu_to_target"]):
-        kinds = race.start.get(name)
-        warm, cold = (f"{kinds[k][1]:.2f} / {kinds[k][0]:.2f}" if kinds else "as above" for k in ("warm", "cold"))
+        kinds = race.start_of(name)
+        warm, cold = (f"{kinds[k][1]:.2f} / {kinds[k][0]:.2f}" for k in ("warm", "cold"))
         table.append([name, f"{seconds(name)} ± {196 * row['relative_se']:.0f} %", seconds(name, "wall_to_target"), f"{row['cpu_us_per_sample']:.2f}",
                       f"{row['slope']:.2f}", f"{100 * row['last_error']:.2f} % at {row['last_spp']}", warm, cold])
     results.table(["", "processor s to 1 %", "wall s to 1 %", "processor µs per path", "slope of error over samples", "smallest error measured",

@@ -66,7 +66,7 @@ def verify(program, fault, kernel):
     def read(_run):
         case = json.loads((folder / "verify.json").read_text())["cases"][0]
         bad = next((o for o in case["outcomes"] if o["verdict"] in ("FAIL", "INCONCLUSIVE")), {})
-        return case["verdict"].upper(), " ".join(filter(None, [bad.get("physics"), bad.get("note")])) or bad.get("what", "")
+        return case["verdict"].upper(), "; ".join(filter(None, [bad.get("physics"), bad.get("note")])) or bad.get("what", "")
 
     return Check(program, ["verify", "--backend", "opencl", "--case", fault.case, "-q", "-o", folder], kernel, read)
 

@@ -45,7 +45,7 @@ def measure(program, arguments):
         points = {name: stability.run(program, "opencl", sweep, rays / (50 if arguments.tiny else 1), environment) for name, environment in environments.items()}
         data["wrong"][sweep] = points
         stability.TABLES[sweep](results, {ALTERNATIVES.get(name, name): p for name, p in points.items()})
-    results.command("CRT_KERNEL_DIR=SCRATCH/moeller_trumbore crt render configs/cornell_dragon.yaml --backend opencl --spp 8 -o unseen.pfm")
+    results.command("CRT_KERNEL_DIR=SCRATCH/moeller_trumbore/core/kernel crt render configs/cornell_dragon.yaml --backend opencl --spp 8 -o unseen.pfm")
     results.data = data
     results.write()
 

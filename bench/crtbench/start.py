@@ -55,7 +55,7 @@ def measure(program, arguments):
                          "yes" if any("embree" in f for f in found) else "no", "yes" if any(re.match(r"libOpenCL|libpocl", f) for f in found) else "no"])
     results.heading("Libraries")
     results.paragraph("Shared objects in `/proc/PID/maps` of a small render, looked at every millisecond until it ends. Image codecs are opened when an image "
-                      "needs them, and of the backends only the one that was asked for.")
+                      "needs them, and of the backends only the one that was asked for; OpenImageIO brings libOpenCL along.")
     results.table(["backend", "output", "shared objects", "OpenImageIO", "Embree", "OpenCL"], rows)
 
     # OpenCL kernels.
