@@ -60,7 +60,7 @@ double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
 
 std::optional<ErrorEstimate> estimateError(const Film& film, ReplicateSet which, bool independent_samples) {
     const LuminanceVariance variance(film, which);
-    // Squares of variances as (squares)·largest², as BLAS's nrm2 adds them up: those of a bright image leave the range of doubles.
+    // Squares of variances as (squares)·largest², as BLAS's nrm2 adds them up: a checkpoint may hold any finite sums.
     double luminance = 0, variances = 0, largest = 0, squares = 0, known = 0;
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
         for (std::uint32_t x = 0; x < film.shape().width; ++x) {

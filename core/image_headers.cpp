@@ -70,14 +70,17 @@ struct Part {
 };
 
 /// The value of an attribute, by "OpenEXR File Layout" (openexr.com). What is not named here is opaque to OpenEXR, too.
-void checkValue(const std::string& path, const std::string& what, const std::string& type, std::string_view value, Part& part) {
+void checkValue(const std::string& path, const std::string& name, const std::string& type, std::string_view value, Part& part) {
+    const std::string what = fmt::format("its attribute '{}'", name);
     const auto fixed = fixedSizes().find(type);
     if (fixed != fixedSizes().end() && value.size() != fixed->second)
         throw DamagedHeader(fmt::format("{} has {} bytes and its type, {}, takes {}", what, value.size(), type, fixed->second));
     Bytes bytes(value);
     if (type == "chlist") {
         constexpr std::uint64_t kBytesAChannel = 16;  // Type, linearity, sampling.
-        for (part.channels = 0; !bytes.text(what).empty(); ++part.channels) bytes.take(kBytesAChannel, what);
+        std::uint64_t channels = 0;
+        for (; !bytes.text(what).empty(); ++channels) bytes.take(kBytesAChannel, what);
+        if (name == "channels") part.channels = channels;
         if (!bytes.empty()) throw DamagedHeader(fmt::format("{} has more bytes than channels", what));
     } else if (type == "stringvector") {
         while (!bytes.empty()) bytes.take(bytes.u32(what), what);
@@ -88,12 +91,12 @@ void checkValue(const std::string& path, const std::string& what, const std::str
     } else if (type == "tiledesc") {
         const std::uint64_t width = bytes.u32(what), height = bytes.u32(what);
         checkPixels(path, width, height, 1);
-    } else if (type == "box2i" && what.find("Window'") != std::string::npos) {
+    } else if (type == "box2i" && (name == "dataWindow" || name == "displayWindow")) {
         std::int64_t corner[4];
         for (std::int64_t& c : corner) c = static_cast<std::int32_t>(bytes.u32(what));
         if (corner[2] < corner[0] || corner[3] < corner[1]) throw DamagedHeader(fmt::format("{} is empty", what));
         // The display window may be any size; it holds no pixels.
-        if (what.find("dataWindow") != std::string::npos) {
+        if (name == "dataWindow") {
             part.width = static_cast<std::uint64_t>(corner[2] - corner[0] + 1);
             part.height = static_cast<std::uint64_t>(corner[3] - corner[1] + 1);
         }
@@ -114,7 +117,7 @@ void checkExrHeader(const std::string& path) {
         Part part;
         for (std::string name = bytes.text("its header"); !name.empty(); name = bytes.text("its header")) {
             const std::string what = fmt::format("its attribute '{}'", name), type = bytes.text(what);
-            checkValue(path, what, type, bytes.take(bytes.u32(what), what), part);
+            checkValue(path, name, type, bytes.take(bytes.u32(what), what), part);
             more = multipart;
         }
         if (part.width == 0 || part.channels == 0) continue;  // OpenEXR says what is missing, and allocates nothing.

@@ -82,8 +82,9 @@ std::string floorText(const ErrorFit& error) {
     if (!std::isfinite(floor.value)) return "–";
     const auto root = [](double value) { return std::sqrt(std::max(value, 0.0)); };
     if (error.flattening) return h(percentText(root(floor.value), 2)) + "<span class=\"ci\">" + h(percentText(root(floor.low), 2) + " – " + percentText(root(floor.high), 2)) + "</span>";
-    // The line v/N + b² of points that fall faster than 1/N meets the axis below 0.
-    if (!(floor.high > 0)) return "none seen<span class=\"ci\">falls faster than 1/√N</span>";
+    // Without a reference the floor is where the line v/N + b² meets the axis, which is below 0 for errors that fall faster.
+    if (!error.bias_squared && error.faster_than_inverse) return "none seen<span class=\"ci\">falls faster than 1/√N</span>";
+    if (!(floor.high > 0)) return "none seen";
     return "none seen<span class=\"ci\">below " + h(percentText(root(floor.high), 2)) + "</span>";
 }
 

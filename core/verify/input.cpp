@@ -86,7 +86,7 @@ void meshFiles(Context& context) {
         many += fmt::format("v {} {} 0\n", 0.3 + std::cos(i * 6.283185307179586 / 1000), 0.3 + std::sin(i * 6.283185307179586 / 1000));
     many += "f";
     for (int i = 1; i <= 1000; ++i) many += fmt::format(" {}", i);
-    context.holds("a face of a thousand corners", context.render(obj(many + "\n")).invalidSamples() == 0, "rendered", "");
+    context.holds("a face of a thousand corners", luminance(context.render(obj(many + "\n"))) > 0, "rendered, not black", "");
 }
 
 void keys(Context& context) {
