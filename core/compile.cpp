@@ -12,6 +12,7 @@
 #include "vec3d.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -61,7 +62,7 @@ public:
     Compiler(const Scene& scene, std::uint32_t aovs) : scene_(scene) {
         header_.magic = CRT_SCENE_MAGIC;
         out_.aovs = aovs & (kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive);
-        if (hasReplicates(scene_)) out_.aovs |= kAovReplicates;
+        if (replicatesOf(scene_) > 1) out_.aovs |= kAovReplicates;
     }
 
     CompiledScene run() {
@@ -158,7 +159,10 @@ private:
 
     std::vector<kernel::CrtTriangle8> blocksOf(const std::vector<std::uint32_t>& slots) const {
         std::vector<kernel::CrtTriangle8> blocks((slots.size() + 7) / 8);
-        for (kernel::CrtTriangle8& block : blocks) std::fill(std::begin(block.slot), std::end(block.slot), CRT_NONE);
+        for (kernel::CrtTriangle8& block : blocks) {
+            std::fill(std::begin(block.slot), std::end(block.slot), CRT_NONE);
+            std::fill(std::begin(block.row[0][3]), std::end(block.row[0][3]), 1.0f);
+        }
         for (std::size_t i = 0; i < slots.size(); ++i) {
             blocks[i / 8].slot[i % 8] = slots[i];
             const Vec3d n = planeNormal(slots[i]);  // brute force keeps the author's order: slot and id are one
@@ -417,7 +421,9 @@ private:
         take(kAovAlbedo, header_.albedo_channel, 3);
         take(kAovNormal, header_.normal_channel, 3);
         take(kAovDepth, header_.depth_channel, 1);
-        take(kAovReplicates, header_.replicate_channel, CRT_REPLICATES);
+        const auto replicates = static_cast<std::uint32_t>(replicatesOf(scene_));
+        take(kAovReplicates, header_.replicate_channel, replicates - 1);
+        header_.replicate_shift = static_cast<std::uint32_t>(std::bit_width(replicates) - 1);
         header_.depth_scale = static_cast<float>(std::ldexp(1.0, -out_.scale_exponent));
         out_.width = header_.width;
         out_.height = header_.height;
@@ -467,7 +473,7 @@ private:
         header_.seed_high = static_cast<std::uint32_t>(scene_.sampler.seed >> 32);
         header_.max_depth = static_cast<std::uint32_t>(scene_.integrator.max_depth);
         header_.roulette_depth = scene_.integrator.roulette ? static_cast<std::uint32_t>(scene_.integrator.roulette_depth) : CRT_NONE;
-        header_.nee = scene_.integrator.nee ? 1 : 0;
+        header_.nee = !scene_.integrator.nee ? CRT_NEE_NONE : scene_.integrator.mis ? CRT_NEE_MIS : CRT_NEE_ONLY;
     }
 
     void decideFeatures() {
@@ -519,9 +525,7 @@ private:
         if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
         if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");
         if (!has(CRT_FEATURE_REPLICATES))
-            left_out("replicates", !isPath()                        ? "integrator.type is a view"
-                                   : scene_.sampler.replicates == 1 ? "sampler.replicates is 1"
-                                                                    : "the samples are independent: their own spread tells the error");
+            left_out("replicates", !isPath() ? "integrator.type is a view" : "sampler.replicates is 1");
         if (!has(CRT_FEATURE_VIEW)) left_out("normals and bounding-box views", "integrator.type is path");
         for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"}, std::pair{CRT_FEATURE_INDEPENDENT, "independent sampler"},
                                             std::pair{CRT_FEATURE_XORSHIFT, "xorshift sampler"}})

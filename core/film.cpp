@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -13,7 +14,6 @@
 namespace crt {
 namespace {
 
-static_assert(Film::kReplicates == CRT_REPLICATES);
 static_assert(kAovAlbedo == CRT_AOV_ALBEDO && kAovNormal == CRT_AOV_NORMAL && kAovDepth == CRT_AOV_DEPTH &&
                   kAovPrimitive == CRT_AOV_PRIMITIVE && kAovReplicates == CRT_AOV_REPLICATES,
               "the film's AOV bits are the kernel's");
@@ -47,17 +47,22 @@ std::uint32_t firstChannel(std::uint32_t aovs, std::uint32_t aov) {
     return channel;
 }
 
-std::uint32_t channelsFor(std::uint32_t aovs) {
-    return firstChannel(aovs, kAovReplicates) + ((aovs & kAovReplicates) ? CRT_REPLICATES : 0);
+/// Channels of replicates: of each but the last, whose sum is what the others leave of the sum of all.
+std::uint32_t replicateChannels(const FilmShape& shape) {
+    const std::uint32_t first = firstChannel(shape.aovs, kAovReplicates);
+    return shape.channels > first ? shape.channels - first : 0;
 }
 
-/// Samples of `range` that belong to a replicate: its turn is one block in every round of all replicates.
-std::uint64_t samplesOfReplicate(SampleRange range, std::uint64_t replicate) {
-    constexpr std::uint64_t kBlock = CRT_REPLICATE_BLOCK, kRound = kBlock * CRT_REPLICATES;
-    const auto below = [=](std::uint64_t end) {
-        const std::uint64_t begin_of_turn = std::min(end % kRound, replicate * kBlock);
-        return end / kRound * kBlock + std::min(end % kRound - begin_of_turn, kBlock);
-    };
+bool hasRightChannels(const FilmShape& shape) {
+    const std::uint32_t first = firstChannel(shape.aovs, kAovReplicates);
+    if ((shape.aovs & kAovReplicates) == 0) return shape.channels == first;
+    const std::uint32_t replicates = replicateChannels(shape) + 1;
+    return shape.channels > first && std::has_single_bit(replicates) && replicates <= CRT_REPLICATES_MAX;
+}
+
+/// Samples of `range` that belong to a replicate: they take turns.
+std::uint64_t samplesOfReplicate(SampleRange range, std::uint64_t replicate, std::uint64_t replicates) {
+    const auto below = [=](std::uint64_t end) { return end / replicates + (end % replicates > replicate ? 1 : 0); };
     return below(range.second) - below(range.first);
 }
 
@@ -120,9 +125,8 @@ std::string SampleRanges::text() const {
 }
 
 Film::Film(FilmShape shape) : shape_(shape) {
-    if (shape.channels != channelsFor(shape.aovs))
-        throw Error(ErrorKind::Internal, fmt::format("a film with AOV mask {:#x} has {} channels, not {}", shape.aovs,
-                                                     channelsFor(shape.aovs), shape.channels));
+    if (!hasRightChannels(shape))
+        throw Error(ErrorKind::Internal, fmt::format("a film with AOV mask {:#x} cannot have {} channels", shape.aovs, shape.channels));
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
     sums.assign(pixels * shape.channels * 2, 0.0);
     counts.assign(pixels, 0);
@@ -159,13 +163,24 @@ double Film::mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const
     return n == 0 ? 0.0 : sum(x, y, channel) / static_cast<double>(n);
 }
 
+std::uint32_t FilmShape::replicates() const { return (aovs & kAovReplicates) != 0 ? replicateChannels(*this) + 1 : 1; }
+
 double Film::replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const {
-    return sum(x, y, firstChannel(shape_.aovs, kAovReplicates) + replicate);
+    const std::uint32_t first = firstChannel(shape_.aovs, kAovReplicates), stored = replicates() - 1;
+    if (replicate < stored) return sum(x, y, first + replicate);
+    // In pairs: next to one bright sample in another replicate, this one's sum would be rounding.
+    const double* pixel = &sums[(std::size_t{y} * shape_.width + x) * shape_.channels * 2];
+    double rest[2] = {pixel[2], pixel[3]};  // Y
+    for (std::uint32_t r = 0; r < stored; ++r) {
+        const double minus[2] = {-pixel[(first + r) * 2], -pixel[(first + r) * 2 + 1]};
+        addPair(rest, minus);
+    }
+    return rest[0] + rest[1];
 }
 
 std::uint64_t Film::replicateSamples(std::uint32_t replicate) const {
     std::uint64_t count = 0;
-    for (const SampleRange& range : samples.ranges()) count += samplesOfReplicate(range, replicate);
+    for (const SampleRange& range : samples.ranges()) count += samplesOfReplicate(range, replicate, replicates());
     return count;
 }
 

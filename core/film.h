@@ -39,6 +39,8 @@ struct FilmShape {
     std::uint32_t width = 0, height = 0;
     std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, Y², then AOV channels, then replicates.
     std::uint32_t aovs = 0;       ///< Bits of Aov that need film channels or the primitive plane, kAovReplicates among them.
+    /// Independent sequences that samples take turns between (layout.h); 1: the film does not tell them apart.
+    std::uint32_t replicates() const;
     bool operator==(const FilmShape&) const = default;
 };
 
@@ -61,8 +63,7 @@ public:
     /// Mean of a channel; 0 when the pixel has no valid sample.
     double mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
     /// Sum of Y of the samples of a replicate (layout.h), and how many samples were asked of it; error_estimate.h makes error bars of them.
-    static constexpr std::uint32_t kReplicates = 16;
-    bool hasReplicates() const { return (shape_.aovs & kAovReplicates) != 0; }
+    std::uint32_t replicates() const { return shape_.replicates(); }
     double replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const;
     std::uint64_t replicateSamples(std::uint32_t replicate) const;
     /// Samples that were NaN or infinite and were dropped.

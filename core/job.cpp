@@ -67,12 +67,12 @@ Files planFiles(const Job& job, const Scene& scene) {
 
 /// A target error is decided on and judged by different replicates, so there must be some. Independent samples are the same with them.
 void requireReplicates(Scene& scene) {
-    if (hasReplicates(scene)) return;
+    if (replicatesOf(scene) > 1) return;
     if (scene.integrator.type != IntegratorType::Path)
         throw Error(ErrorKind::Usage, "--target-error is for integrator.type path: the views have no noise");
     if (scene.sampler.type == SamplerType::Sobol)
-        throw Error(ErrorKind::Usage, "--target-error needs the replicates that sampler.replicates: 1 leaves out; add --set sampler.replicates=16");
-    scene.sampler.replicates = 16;
+        throw Error(ErrorKind::Usage, "--target-error needs the replicates that sampler.replicates: 1 leaves out; add --set sampler.replicates=2");
+    scene.sampler.replicates = 2;
 }
 
 /// An empty film, or what an earlier run of the same scene left.
@@ -243,17 +243,22 @@ std::string summary(const RunFacts& facts, const Film& film) {
     return text;
 }
 
-/// Whether the target error is reached, by those who did not decide when to stop; else what it, or 1 %, would still take.
+/// How the target error was reached; else what it, or 1 %, would still take, where that is known.
 void tellTarget(const RunFacts& facts) {
     const double target = facts.target_error > 0 ? facts.target_error : 0.01;
-    if (facts.stop == StopReason::Target && facts.verdict)
-        logInfo("target error {:.3g} % reached: the replicates that did not decide put the 95 % half-width at {}", target * 100,
-                percentText(facts.verdict->half_width_95));
-    if (facts.error->half_width_95 <= target || facts.rendered_samples == 0) return;
+    const auto half_width = [](const std::optional<ErrorEstimate>& error) { return error ? percentText(error->half_width_95) : std::string("none"); };
+    if (facts.stop == StopReason::Target)
+        logInfo("target error {:.3g} % reached: 95 % half-width {}, of the even pixels {}, of the odd ones {}", target * 100,
+                half_width(facts.error), half_width(facts.deciding), half_width(facts.judging));
+    else if (facts.target_error > 0 && !facts.error->known())
+        logInfo("whether the target error is reached cannot be told: too few paths carry the light");
+    if (!facts.error->known() || facts.error->half_width_95 <= target || facts.rendered_samples == 0) return;
     const auto samples = static_cast<double>(facts.samples.count());
-    const double more = std::ceil(facts.error->samplesFor(target, samples) - samples);
-    logInfo("{:.3g} % would take about {:.0f} samples per pixel more, {}", target * 100, more,
-            durationText(more * facts.sampling_seconds / static_cast<double>(facts.rendered_samples)));
+    const stats::Interval needed = facts.error->samplesFor(target, samples);
+    const stats::Interval more{needed.lower - samples, needed.upper - samples};
+    const double each = facts.sampling_seconds / static_cast<double>(facts.rendered_samples);
+    logInfo("{:.3g} % would take {} samples per pixel more, {} to {}", target * 100, sampleCountText(more), durationText(more.lower * each),
+            durationText(more.upper * each));
 }
 
 }  // namespace
@@ -306,9 +311,13 @@ int runJob(const Job& job) {
     FirstFailure failure(plan.ranges.empty() ? std::nullopt : renderSamples(job, compiled, plan, film, saveCheckpoint, facts));
     facts.samples = film.samples;
     facts.invalid_samples = film.invalidSamples();
-    facts.error = estimateError(film, ReplicateSet::All, scene.sampler.type != SamplerType::Sobol);
+    const bool independent = scene.sampler.type != SamplerType::Sobol;
+    facts.error = estimateError(film, PixelSet::All, independent);
     facts.target_error = job.target_error;
-    if (job.target_error > 0) facts.verdict = estimateError(film, ReplicateSet::Odd);
+    if (job.target_error > 0) {
+        facts.deciding = estimateError(film, PixelSet::Even, independent);
+        facts.judging = estimateError(film, PixelSet::Odd, independent);
+    }
     if (facts.invalid_samples > 0) logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
 
     // Images, and the report of how they came about.

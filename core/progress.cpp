@@ -39,10 +39,12 @@ void writeStderr(std::string_view text) {
 /// What the target error, or 1 % where there is none, would still take. Power-of-two checks may make it more.
 std::string stillNeeded(const ProgressState& state) {
     const double target = state.target_error > 0 ? state.target_error : 0.01;
-    if (state.error->half_width_95 <= target || !(state.samples > state.start_samples)) return {};
-    const double samples = state.error->samplesFor(target, state.samples);
-    const double seconds = (samples - state.samples) * state.elapsed_seconds / (state.samples - state.start_samples);
-    return fmt::format("  {:.3g} % at {:.0f} spp, in {}", target * 100, std::ceil(samples), clockText(seconds));
+    // A bound forecasts nothing: the error lies below it by an unknown factor.
+    if (!state.error->known() || state.error->half_width_95 <= target || !(state.samples > state.start_samples)) return {};
+    const stats::Interval samples = state.error->samplesFor(target, state.samples);
+    const double each = state.elapsed_seconds / (state.samples - state.start_samples);
+    return fmt::format("  {:.3g} % at {} spp, in {}-{}", target * 100, sampleCountText(samples),
+                       clockText((samples.lower - state.samples) * each), clockText((samples.upper - state.samples) * each));
 }
 
 }  // namespace
@@ -103,10 +105,20 @@ std::string percentText(double fraction) {
 }
 
 std::string errorText(const ErrorEstimate& error) {
-    if (error.is_bound) return "error below " + percentText(error.relative_rmse);
+    if (error.knowledge == ErrorKnowledge::NotYet) return "error not yet known";
+    if (error.knowledge == ErrorKnowledge::Bound) return "error below " + percentText(error.relative_rmse);
     const double lower = error.relative_rmse_95.lower * 100, upper = error.relative_rmse_95.upper * 100;
     const int digits = std::clamp(-static_cast<int>(std::floor(std::log10(std::max(upper - lower, 1e-6)))), 1, 6);
     return fmt::format("error {:.{}f} % ({:.{}f}-{:.{}f})", error.relative_rmse * 100, digits, lower, digits, upper, digits);
+}
+
+std::string sampleCountText(const stats::Interval& samples) {
+    // Two significant digits: more would claim what the interval does not know.
+    const auto rounded = [](double value) {
+        const double unit = std::pow(10.0, std::max(0.0, std::floor(std::log10(std::max(value, 1.0))) - 1));
+        return std::ceil(value / unit) * unit;
+    };
+    return fmt::format("{:.0f}-{:.0f}", rounded(samples.lower), rounded(samples.upper));
 }
 
 std::string bytesText(double bytes) {

@@ -37,7 +37,7 @@ struct ProgressState {
     double secondsLeft() const;
 };
 
-/// "43 %  28/64 spp  12.3 Mpaths/s  0:42 left  error 1.90 % (1.86-1.94)  1 % at 101 spp, in 2:12"; a target error stands instead of 1 %.
+/// "43 %  28/64 spp  12.3 Mpaths/s  0:42 left  error 1.90 % (1.86-1.94)  1 % at 54-110 spp, in 0:40-2:12"; a target error stands instead of 1 %.
 std::string progressText(const ProgressState& state);
 /// The same behind a bar, fitted into `columns`.
 std::string progressBar(const ProgressState& state, int columns);
@@ -51,8 +51,10 @@ std::string rateText(double per_second, const char* unit);
 /// "1.9 %"
 std::string percentText(double fraction);
 /// "error 1.90 % (1.86-1.94)": relative root mean square error with its 95 % interval; "error below 9 %" where only a
-/// bound is known. ASCII, so that bytes are columns.
+/// bound is known; "error not yet known" where too few paths carry the light. ASCII, so that bytes are columns.
 std::string errorText(const ErrorEstimate& error);
+/// "1200-3400": an interval of numbers of samples, two digits each.
+std::string sampleCountText(const stats::Interval& samples);
 /// "138 MB"
 std::string bytesText(double bytes);
 

@@ -32,32 +32,43 @@ const char* stopName(StopReason reason) {
     return "failed";
 }
 
+const char* knowledgeName(ErrorKnowledge knowledge) {
+    switch (knowledge) {
+        case ErrorKnowledge::Known: return "known";
+        case ErrorKnowledge::Bound: return "upper bound";
+        case ErrorKnowledge::NotYet: break;
+    }
+    return "not yet known";
+}
+
 /// What the image knows of its own error (docs/error.md), relative to its mean luminance.
 Json estimateJson(const std::optional<ErrorEstimate>& error) {
     if (!error) return nullptr;
+    Json json{{"knowledge", knowledgeName(error->knowledge)}, {"mean_luminance", error->mean_luminance}, {"degrees_of_freedom", error->degrees_of_freedom}};
+    // A number that cannot be trusted must not be read as one that can.
+    if (error->knowledge == ErrorKnowledge::NotYet) return json;
     const stats::Interval mean = error->meanInterval(0.95);
-    return {{"relative_rmse", error->relative_rmse},
-            {"relative_rmse_95", {error->relative_rmse_95.lower, error->relative_rmse_95.upper}},
-            {"half_width_95", error->half_width_95},
-            {"mean_luminance", error->mean_luminance},
-            {"mean_luminance_standard_error", error->mean_standard_error},
-            {"mean_luminance_95", {mean.lower, mean.upper}},
-            {"degrees_of_freedom", error->degrees_of_freedom},
-            {"is_upper_bound", error->is_bound}};
+    json["relative_rmse"] = error->relative_rmse;
+    json["relative_rmse_95"] = {error->relative_rmse_95.lower, error->relative_rmse_95.upper};
+    json["half_width_95"] = error->half_width_95;
+    json["mean_luminance_standard_error"] = error->mean_standard_error;
+    json["mean_luminance_95"] = {mean.lower, mean.upper};
+    return json;
 }
 
 Json errorJson(const RunFacts& facts) {
     Json json = estimateJson(facts.error);
     if (!facts.error) return json;
-    const auto samples = static_cast<double>(facts.samples.count());
-    const double target = facts.target_error > 0 ? facts.target_error : 0.01;
-    const double more = facts.error->samplesFor(target, samples) - samples;
-    json["to_target"] = {{"half_width_95", target},
-                         {"more_samples", std::ceil(more)},
-                         {"more_seconds", facts.rendered_samples > 0
-                                              ? Json(more * facts.sampling_seconds / static_cast<double>(facts.rendered_samples))
-                                              : Json(nullptr)}};
-    if (facts.target_error > 0) json["verdict"] = estimateJson(facts.verdict);
+    if (facts.error->known()) {
+        const auto samples = static_cast<double>(facts.samples.count());
+        const double target = facts.target_error > 0 ? facts.target_error : 0.01;
+        const stats::Interval needed = facts.error->samplesFor(target, samples);
+        const double each = facts.rendered_samples > 0 ? facts.sampling_seconds / static_cast<double>(facts.rendered_samples) : std::nan("");
+        json["to_target"] = {{"half_width_95", target},
+                             {"more_samples", {std::ceil(needed.lower - samples), std::ceil(needed.upper - samples)}},
+                             {"more_seconds", {knownOrNull((needed.lower - samples) * each), knownOrNull((needed.upper - samples) * each)}}};
+    }
+    if (facts.target_error > 0) json["judged"] = {{"even_pixels", estimateJson(facts.deciding)}, {"odd_pixels", estimateJson(facts.judging)}};
     return json;
 }
 

@@ -43,7 +43,7 @@ struct RunFacts {
     std::uint64_t chunks = 0;
     std::uint64_t invalid_samples = 0;
     std::optional<ErrorEstimate> error; ///< Of the film, by all replicates; nothing while unknown.
-    std::optional<ErrorEstimate> verdict;  ///< With a target error: by the replicates that did not decide when to stop.
+    std::optional<ErrorEstimate> deciding, judging;  ///< With a target error: by even and by odd pixels, which must both reach it.
     double target_error = 0;            ///< 0: none.
 
     StopReason stop = StopReason::Samples;

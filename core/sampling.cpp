@@ -1,7 +1,6 @@
 #include "sampling.h"
 
 #include "interrupt.h"
-#include "kernel/layout.h"
 
 #include <algorithm>
 #include <bit>
@@ -69,7 +68,7 @@ public:
             if (before_) next_->add(*before_);
             std::swap(film_, *next_);
         }
-        error_ = estimateError(film_, ReplicateSet::All, independent_samples_);
+        error_ = estimateError(film_, PixelSet::All, independent_samples_);
         read_seconds_ = secondsSince(start);
         read_at_ = Clock::now();
         current_ = true;
@@ -95,15 +94,17 @@ private:
 }  // namespace
 
 std::uint64_t nextTargetCheck(std::uint64_t samples) {
-    constexpr std::uint64_t kFirstCheck = 4 * CRT_REPLICATE_BLOCK;
+    constexpr std::uint64_t kFirstCheck = 64;
     return samples < kFirstCheck ? kFirstCheck : std::bit_floor(samples) * 2;
 }
 
-bool reachesTarget(const Film& film, double target) {
-    constexpr unsigned kDecidingReplicates = CRT_REPLICATES / 2;
-    constexpr double kDecidingDegreesOfFreedom = kDecidingReplicates - 1;
-    const std::optional<ErrorEstimate> error = estimateError(film, ReplicateSet::Even);
-    return error && error->degrees_of_freedom >= kDecidingDegreesOfFreedom && error->half_width_95 <= target;
+bool reachesTarget(const Film& film, double target, bool independent_samples) {
+    const auto reached = [&](PixelSet which) {
+        const std::optional<ErrorEstimate> error = estimateError(film, which, independent_samples);
+        return error && error->known() && error->half_width_95 <= target;
+    };
+    const bool one_pixel = film.counts.size() == 1;
+    return reached(PixelSet::All) && reached(PixelSet::Even) && (one_pixel || reached(PixelSet::Odd));
 }
 
 std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& there) {
@@ -139,7 +140,7 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
         if (plan.target_error <= 0 || resumed + result.rendered < check_at) return false;
         check_at = nextTargetCheck(resumed + result.rendered);
         if (!reader.current()) reader.read();
-        return reachesTarget(film, plan.target_error);
+        return reachesTarget(film, plan.target_error, plan.independent_samples);
     };
 
     // Why to stop before the samples are there; nothing while there is no reason.

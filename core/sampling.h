@@ -41,14 +41,13 @@ struct SamplingResult {
     double seconds = 0;
 };
 
-/// The target error is looked at when the film holds a power of two of samples, enough for two even and two odd replicates: looking all the time
-/// would stop at the luckiest moment.
+/// The target error is looked at when the film holds a power of two of samples, 64 or more: looking all the time would stop at the luckiest moment.
 std::uint64_t nextTargetCheck(std::uint64_t samples);
 
-/// Whether half_width_95 is at most `target`. Only even replicates are asked, so that odd ones can judge the result (estimateError) without having
-/// chosen it. They are not believed with fewer degrees of freedom than one pixel has from 1024 samples on: two replicates of one pixel now and
-/// then agree by chance, and who stops whenever they do stops at bad images.
-bool reachesTarget(const Film& film, double target);
+/// Whether half_width_95 is known and at most `target` for the image, and for its even and its odd pixels each: of two halves that are independent of
+/// each other, each can veto what the other would have stopped at by luck. An error that is not known (error_estimate.h) stops nothing; the wider the
+/// pixels' variances scatter, the more samples it takes until it is.
+bool reachesTarget(const Film& film, double target, bool independent_samples = false);
 
 /// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at most a small part of the run
 /// behind: a backend that failed cannot be asked for its film any more. The caller holds the InterruptGuard.

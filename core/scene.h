@@ -52,7 +52,8 @@ struct IntegratorSettings {
     int max_depth = 16;       ///< Scattering events; 0 shows emitters only.
     int roulette_depth = 4;   ///< First scattering event after which Russian roulette may end a path.
     bool roulette = true;
-    bool nee = true;          ///< Next event estimation with MIS; false is the paper's indirect-only estimator.
+    bool nee = true;          ///< Next event estimation; false is the paper's indirect-only estimator.
+    bool mis = true;          ///< Combines it with scattered rays that meet lights; false: light sampling alone where it can.
     Accelerator accelerator = Accelerator::Auto;
 };
 
@@ -62,7 +63,7 @@ struct SamplerSettings {
     SamplerType type = SamplerType::Sobol;
     std::uint64_t seed = 0;
     std::uint64_t samples = 64;  ///< Samples per pixel when neither --spp nor --time says otherwise.
-    int replicates = 0;          ///< 16, 1, or 0: 16 where samples are not independent of each other.
+    int replicates = 0;          ///< 1, 2, 4, 8, 16, or 0: by the size of the film (replicatesOf).
 };
 
 enum class MaterialType { Diffuse, Mirror, Conductor, Dielectric };
@@ -144,10 +145,17 @@ struct Scene {
     double parse_seconds = 0;
 };
 
-/// Whether the film keeps the sums of independent replicates, from which the image's error follows (layout.h: CRT_REPLICATES).
-inline bool hasReplicates(const Scene& scene) {
-    if (scene.integrator.type != IntegratorType::Path) return false;
-    return scene.sampler.replicates > 1 || (scene.sampler.replicates == 0 && scene.sampler.type == SamplerType::Sobol);
+/// How many independent sequences the samples of a pixel are of (layout.h: CRT_REPLICATES_MAX); 1: the film keeps no sums of replicates. By default as
+/// few as give the image's error a thousand degrees of freedom, since the pixels of a film add theirs up and every further sequence costs
+/// noise. By the whole film, so that the crop window of an image has its bits.
+inline int replicatesOf(const Scene& scene) {
+    if (scene.integrator.type != IntegratorType::Path) return 1;
+    if (scene.sampler.replicates != 0) return scene.sampler.replicates;
+    constexpr std::int64_t kDegreesOfFreedom = 1000, kMost = 16;
+    const std::int64_t pixels = std::int64_t{scene.film.width} * scene.film.height;
+    std::int64_t replicates = 2;
+    while (replicates < kMost && (replicates - 1) * pixels < kDegreesOfFreedom) replicates *= 2;
+    return static_cast<int>(replicates);
 }
 
 }  // namespace crt

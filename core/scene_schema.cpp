@@ -150,7 +150,10 @@ SectionSchema integrator() {
                 {.name = "roulette", .kind = Kind::Boolean, .fallback = yaml(d.roulette),
                  .doc = "Russian roulette: shorter paths, same mean, more noise per sample."},
                 {.name = "nee", .kind = Kind::Boolean, .fallback = yaml(d.nee),
-                 .doc = "Next event estimation with multiple importance sampling; off, light is only found by chance."},
+                 .doc = "Next event estimation: every diffuse vertex samples a light; off, light is only found by chance."},
+                {.name = "mis", .kind = Kind::Boolean, .fallback = yaml(d.mis),
+                 .doc = "Combines light sampling with scattered rays that meet lights by multiple importance sampling; off, direct light comes from light "
+                        "sampling alone wherever it covers a light (the same mean, more noise: for tests)."},
                 {.name = "accelerator", .kind = Kind::Choice, .choices = accelerators, .fallback = yaml(accelerators, d.accelerator),
                  .doc = "Hierarchy for tracing rays: chosen by scene size, a BVH, a box per object, or a plain loop."},
             }};
@@ -168,8 +171,9 @@ SectionSchema sampler() {
                 {.name = "samples", .kind = Kind::Integer, .range = {1, 9007199254740992.0, false, false}, .unit = "per pixel",
                  .fallback = yaml(d.samples), .doc = "Used when neither --spp nor --time says otherwise."},
                 {.name = "replicates", .kind = Kind::Integer, .range = {1, 16, false, false},
-                 .doc = "16: blocks of 64 samples take turns between 16 independent sequences, from which the image knows its own error. 1: one sequence, with "
-                        "less noise beyond 64 samples, whose error is only bounded. By default 16 for sobol, 1 for the others, which do not need them."},
+                 .doc = "Samples take turns between 2, 4, 8 or 16 independent sequences, from whose spread the image knows its own error. More make the "
+                        "error of a single pixel better known and, with sobol, the image noisier. 1: one sequence, whose error is only bounded. "
+                        "By default 2 for films of 1000 pixels and more, up to 16 for smaller ones."},
             }};
 }
 

@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -236,6 +237,7 @@ void readIntegrator(const SectionReader& section, IntegratorSettings& settings) 
     section.read("roulette_depth", settings.roulette_depth);
     section.read("roulette", settings.roulette);
     section.read("nee", settings.nee);
+    section.read("mis", settings.mis);
     section.readEnum("accelerator", settings.accelerator);
 }
 
@@ -243,8 +245,8 @@ void readSampler(const SectionReader& section, SamplerSettings& settings) {
     section.readEnum("type", settings.type);
     section.read("seed", settings.seed);
     section.read("samples", settings.samples);
-    if (section.read("replicates", settings.replicates) && settings.replicates != 1 && settings.replicates != 16)
-        section.error("replicates", fmt::format("{} replicates cannot be had: 16, or 1 for a single sequence", settings.replicates));
+    if (section.read("replicates", settings.replicates) && !std::has_single_bit(static_cast<unsigned>(settings.replicates)))
+        section.error("replicates", fmt::format("{} replicates cannot be had: 2, 4, 8 or 16, or 1 for a single sequence", settings.replicates));
 }
 
 void readOutput(const SectionReader& section, std::vector<Output>& outputs) {

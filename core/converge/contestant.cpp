@@ -101,7 +101,7 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
         luminance[p] = static_cast<float>(y);
     }
     const bool independent = scene_.sampler.type != SamplerType::Sobol;
-    if (const std::optional<ErrorEstimate> own = estimateError(film, ReplicateSet::All, independent); own && !own->is_bound)
+    if (const std::optional<ErrorEstimate> own = estimateError(film, PixelSet::All, independent); own && own->known())
         row.predicted_relative_rmse = {own->relative_rmse, own->relative_rmse_95.lower, own->relative_rmse_95.upper};
 
     if (reference_ != nullptr) {

@@ -168,7 +168,7 @@ int makeReference(const ReferenceRequest& request) {
     file.metadata.emplace_back("crt/backend", backend.name);
     writeImage(request.output, OutputFormat::Exr, file);
 
-    const std::optional<ErrorEstimate> error = estimateError(film, ReplicateSet::All, true);
+    const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, true);
     logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, film.samples.count(), kFolds, estimatorText(scene), durationText(elapsed()));
     if (error) logInfo("its own {}", errorText(*error));
     if (error && error->relative_rmse > 0.02)

@@ -124,7 +124,7 @@ CRT_FN vec8 crt_row8(CRT_GLOBAL const f32 *row, vec8 x, vec8 y, vec8 z, vec8 w) 
 
 /* Lanes of eight triangles that the ray may hit before `limit`. In homogeneous form, without a division: with h the height of the origin over the
    plane and n the height gained per length of the ray, the ray meets the plane at (n·o − h·d) / n. It may name a triangle that
-   crt_intersect_triangle refuses, never miss one that it accepts: a ray's origin is clear of every plane by more than h can err (surface.h). */
+   crt_intersect_triangle refuses, never miss one that it accepts: close to a plane h may err by the slack. */
 CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtRay ray, f32 slack, f32 limit) {
     CRT_GLOBAL const f32 *row = &block->row[0][0][0];
     const vec8 ox = splat8(V3X(ray.o)), oy = splat8(V3Y(ray.o)), oz = splat8(V3Z(ray.o));
@@ -138,7 +138,7 @@ CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtRay ray, f32
                         crt_min8(crt_flip8(crt_row8(row + 64, x, y, z, n), crt_sign8(n)), crt_flip8(crt_row8(row + 96, x, y, z, n), crt_sign8(n))));
     const vec8 t = crt_flip8(-h, crt_sign8(n)); /* times |n| */
     const vec8 reach = crt_fma8(crt_flip8(n, crt_sign8(n)), splat8(crt_min(limit, 1e30f)), splat8(slack));
-    return mask8_bits((inside > splat8(-slack)) & (t > splat8(0.0f)) & (t < reach));
+    return mask8_bits((inside > splat8(-slack)) & (t > splat8(-slack)) & (t < reach));
 }
 #endif
 

@@ -38,7 +38,8 @@ typedef struct CrtTriangle {
 CRT_ASSERT_SIZE(CrtTriangle, 48);
 
 /* Eight triangles side by side, for the brute-force loops. A row (x, y, z, w) is an affine function of a point p: x·p.x + y·p.y + z·p.z + w. Row 0 is
-   the height over the triangle's plane; rows 1 to 3 the distance from each edge, positive inside. Unused lanes have slot CRT_NONE and are all zero. */
+   the height over the triangle's plane; rows 1 to 3 the distance from each edge, positive inside. Unused lanes have slot CRT_NONE and a plane of height 1
+   everywhere, which no ray meets. */
 typedef struct CrtTriangle8 {
     f32 row[4][4][8];
     u32 slot[8]; /* in the triangle array */
@@ -142,6 +143,12 @@ CRT_ASSERT_SIZE(CrtCamera, 96);
 #define CRT_SAMPLER_INDEPENDENT 1u
 #define CRT_SAMPLER_XORSHIFT 2u
 
+/* Next event estimation: none; combined with scattered rays by MIS; or alone wherever light sampling covers an emitter from a point, to test it
+   (scattered rays then count what is left to chance). */
+#define CRT_NEE_NONE 0u
+#define CRT_NEE_MIS 1u
+#define CRT_NEE_ONLY 2u
+
 #define CRT_VIEW_PATH 0u
 #define CRT_VIEW_NORMALS 1u
 #define CRT_VIEW_AABB 2u
@@ -152,18 +159,17 @@ CRT_ASSERT_SIZE(CrtCamera, 96);
 
 /* Film channels: X, Y, Z and Y² of each sample; those of AOVs and of the replicates follow where the scene asks for them. */
 #define CRT_CHANNELS_BASE 4u
-#define CRT_CHANNELS_MAX 27u
+#define CRT_CHANNELS_MAX 26u
 #define CRT_AOV_ALBEDO 1u
 #define CRT_AOV_NORMAL 2u
 #define CRT_AOV_DEPTH 4u
 #define CRT_AOV_PRIMITIVE 8u
 #define CRT_AOV_REPLICATES 64u
 
-/* Replicates are scrambled independently of each other, so that the spread of their means is an unbiased measure of the image's error; each has a
-   channel, the sum of Y. They take turns in blocks of 64 samples: up to 64 samples are one sequence, with all its stratification, and from 1024 on all
-   16 have equally many (docs/decisions/0007-replicates.md has what other layouts lose). */
-#define CRT_REPLICATES 16u
-#define CRT_REPLICATE_BLOCK 64u
+/* Replicates are scrambled independently of each other, so that the spread of their means is an unbiased measure of the image's error. They take turns
+   sample by sample, so that all are equally full whenever a render stops. The film holds the sum of Y of each but the last, which is what is left of
+   the sum of all (docs/decisions/0007-replicates.md). */
+#define CRT_REPLICATES_MAX 16u
 
 typedef struct CrtScene {
     u32 magic;
@@ -181,7 +187,8 @@ typedef struct CrtScene {
     u32 albedo_channel, normal_channel, depth_channel; /* first channel of each; 0 when not asked for */
     f32 depth_scale;             /* scene units per length here: a power of two */
     u32 replicate_channel;       /* likewise */
-    u32 padding[3];
+    u32 replicate_shift;         /* there are 2^shift replicates; 0: one sequence */
+    u32 padding[2];
 
     u32 sampler;
     u32 seed_low, seed_high;

@@ -1,6 +1,7 @@
 /*
- * light.h: sampling the emitters. One emissive triangle, or two that make a parallelogram, is one light, chosen by power; a point on it is chosen
- * by solid angle where it is seen large, else by area.
+ * light.h: sampling the emitters. One emissive triangle, or two that make a parallelogram, is one light, chosen by power. How a point on it is found is
+ * decided by the shaded point and the emitter alone, in crt_light_view, which sampling and the pdf both ask: uniformly in solid angle where the
+ * emitter is seen large, else uniformly on its area; where neither works, scattered rays alone find it.
  */
 #ifndef CRT_LIGHT_H
 #define CRT_LIGHT_H
@@ -9,13 +10,21 @@
 
 CRT_KERNEL_BEGIN
 
-/* Area over squared distance above which a triangle is sampled by solid angle (Arvo 1995). Below, area sampling has nearly the same variance at a
-   fifth of the cost; above, its 1/r² and cosine make it noisy. The choice depends on the triangle and the point alone, so that sampling and pdf agree. */
+/* Area over squared distance above which a light is sampled by solid angle. Below, area sampling has nearly the same variance at a
+   fifth of the cost; above, its 1/r² and cosine make it noisy. */
 #define CRT_SOLID_ANGLE_THRESHOLD 0.3f
 
-/* A light seen as nearly a hemisphere is left to chance hits, which find it all but always. Its corners lie on the horizon, some across from each
-   other, and the arcs between them are hardly defined; area sampling would be noisy and weigh next to nothing. */
-#define CRT_SOLID_ANGLE_MAX 6.0f
+/* A light seen as nearly a hemisphere is left to chance: scattered rays find it all but always. */
+#define CRT_SOLID_ANGLE_MAX 5.0f
+
+/* Least height over the emitter's plane, as a share of the distance to its farthest corner, at which directions uniform in solid angle are found in
+   single precision: nearer, corners lie on the horizon, some across from each other, and rounding turns the arcs between
+   them by more than 1e-3. */
+#define CRT_SOLID_ANGLE_HEIGHT 2.5e-4f
+
+/* Nearer to the plane than that, points are sampled by area where the largest weight of one, area · cosine / distance² at the emitter's nearest point,
+   is at most this. Elsewhere the emitter is within a few heights, and left to chance. */
+#define CRT_AREA_WEIGHT_MAX 32.0f
 
 typedef struct CrtLightSample {
     vec3 point;   /* on the emitter */
@@ -25,83 +34,157 @@ typedef struct CrtLightSample {
     u32 spectrum;
 } CrtLightSample;
 
-/* |a·(b×c)| / (1 + a·b + b·c + c·a) = tan(Ω/2) for unit vectors (Van Oosterom and Strackee 1983); accurate for the smallest triangles. */
-CRT_FN f32 crt_solid_angle(vec3 a, vec3 b, vec3 c) {
-    const f32 triple = crt_abs(dot3(a, cross3(b, c)));
+/* Solid angle of the triangle of the unit vectors a, b, c, given their |a·(b×c)|: tan(Ω/2) = |a·(b×c)| / (1 + a·b + b·c + c·a) (Van Oosterom
+   and Strackee 1983); accurate for the smallest triangles. */
+CRT_FN f32 crt_solid_angle(f32 triple, vec3 a, vec3 b, vec3 c) {
     return 2.0f * crt_atan2(triple, 1.0f + dot3(a, b) + dot3(b, c) + dot3(c, a));
 }
 
 /* An emitter's shape: the triangle o, o + a, o + b, or the parallelogram of the edges a and b at o. */
 typedef struct CrtLightShape {
     vec3 o, a, b;
+    vec3 normal;
+    f32 area;
     int parallelogram;
 } CrtLightShape;
 
 CRT_FN CrtLightShape crt_light_shape(const CrtContext *ctx, CRT_GLOBAL const CrtEmitter *emitter) {
     CRT_GLOBAL const CrtTriangle *triangle = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + emitter->slot;
+    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
     const u32 corner = emitter->corner;
     CrtLightShape s;
     s.o = crt_triangle_vertex(triangle, corner);
     s.a = crt_triangle_vertex(triangle, corner == 2u ? 0u : corner + 1u) - s.o;
     s.b = crt_triangle_vertex(triangle, corner == 0u ? 2u : corner - 1u) - s.o;
+    s.normal = crt_load3(face->normal);
+    s.area = emitter->area;
     s.parallelogram = (emitter->flags & CRT_EMITTER_PARALLELOGRAM) != 0u;
     return s;
 }
 
-CRT_FN int crt_seen_large(CrtLightShape shape, f32 area, vec3 p) {
+CRT_FN int crt_seen_large(CrtLightShape shape, vec3 p) {
     const vec3 d = shape.o + (shape.a + shape.b) * (shape.parallelogram ? 0.5f : 1.0f / 3.0f) - p;
-    return area > CRT_SOLID_ANGLE_THRESHOLD * dot3(d, d);
+    return shape.area > CRT_SOLID_ANGLE_THRESHOLD * dot3(d, d);
 }
 
-/* Solid angles of the triangle at o and, for a parallelogram, of the one across the diagonal. */
+#define CRT_LIGHT_BY_AREA 0u
+#define CRT_LIGHT_BY_SOLID_ANGLE 1u
+#define CRT_LIGHT_BY_CHANCE 2u
+
+/* How an emitter is sampled from a point, and what that takes. */
 typedef struct CrtLightView {
-    vec3 o, a, b, far; /* unit directions to the corners */
-    f32 omega, omega_far;
-    int usable; /* whether directions are to be sampled by solid angle */
-    int left_to_chance; /* not to be sampled at all */
+    u32 technique;
+    f32 height;          /* of the point over the emitter's plane, against its normal: above 0 behind it */
+    vec3 o, a, b, far;   /* by solid angle: unit directions to the corners */
+    f32 triple, triple_far;
+    f32 omega, omega_far; /* solid angles of the triangle at o and, for a parallelogram, of the one across the diagonal */
 } CrtLightView;
 
-CRT_FN CrtLightView crt_light_view(CrtLightShape shape, f32 area, vec3 p) {
+/* Squared distance of p from the nearest point of the segment o … o + edge. */
+CRT_FN f32 crt_segment_distance2(vec3 o, vec3 edge, vec3 p) {
+    const vec3 d = o - p;
+    const f32 length2 = dot3(edge, edge);
+    const f32 s = length2 > 0.0f ? crt_clamp(-dot3(d, edge) / length2, 0.0f, 1.0f) : 0.0f;
+    const vec3 nearest = crt_fma3(edge, s, d);
+    return dot3(nearest, nearest);
+}
+
+/* Squared distance of p from the emitter's edge, or 0 where p is over or under the emitter itself. */
+CRT_FN f32 crt_edge_distance2(CrtLightShape s, vec3 p) {
+    const vec3 d = p - s.o;
+    const f32 aa = dot3(s.a, s.a), ab = dot3(s.a, s.b), bb = dot3(s.b, s.b);
+    const f32 da = dot3(d, s.a), db = dot3(d, s.b);
+    const f32 determinant = aa * bb - ab * ab;
+    const f32 u = bb * da - ab * db, v = aa * db - ab * da; /* times the determinant */
+    const f32 beyond = s.parallelogram ? crt_max(u, v) : u + v;
+    if (u >= 0.0f && v >= 0.0f && beyond <= determinant) return 0.0f;
+    const f32 at_o = crt_min(crt_segment_distance2(s.o, s.a, p), crt_segment_distance2(s.o, s.b, p));
+    if (!s.parallelogram) return crt_min(at_o, crt_segment_distance2(s.o + s.a, s.b - s.a, p));
+    return crt_min(at_o, crt_min(crt_segment_distance2(s.o + s.a, s.b, p), crt_segment_distance2(s.o + s.b, s.a, p)));
+}
+
+CRT_FN CrtLightView crt_light_view(CrtLightShape shape, vec3 p) {
     CrtLightView v;
-    v.left_to_chance = 0;
-    v.usable = crt_seen_large(shape, area, p);
-    if (!v.usable) return v;
-    v.o = normalize3(shape.o - p);
-    v.a = normalize3(shape.o + shape.a - p);
-    v.b = normalize3(shape.o + shape.b - p);
-    v.far = normalize3(shape.o + shape.a + shape.b - p);
-    v.omega = crt_solid_angle(v.o, v.a, v.b);
-    v.omega_far = shape.parallelogram ? crt_solid_angle(v.far, v.b, v.a) : 0.0f;
-    v.left_to_chance = !(v.omega + v.omega_far < CRT_SOLID_ANGLE_MAX);
-    v.usable = !v.left_to_chance;
+    v.technique = CRT_LIGHT_BY_AREA;
+    v.height = dot3(shape.normal, shape.o - p);
+    v.omega = v.omega_far = v.triple = v.triple_far = 0.0f;
+    if (!crt_seen_large(shape, p)) return v;
+    const vec3 o = shape.o - p;
+    const vec3 a = o + shape.a, b = o + shape.b, far = a + shape.b;
+    const f32 oo = dot3(o, o), aa = dot3(a, a), bb = dot3(b, b), ff = dot3(far, far);
+    const f32 height = crt_abs(v.height);
+    const f32 farthest2 = crt_max(crt_max(oo, crt_max(aa, bb)), shape.parallelogram ? ff : 0.0f);
+    if (!(height * height > CRT_SOLID_ANGLE_HEIGHT * CRT_SOLID_ANGLE_HEIGHT * farthest2)) {
+        const f32 distance2 = crt_edge_distance2(shape, p);
+        const f32 weight = shape.area * height;
+        if (!(weight <= CRT_AREA_WEIGHT_MAX * distance2 * crt_sqrt(distance2))) v.technique = CRT_LIGHT_BY_CHANCE;
+        return v;
+    }
+    const f32 inverse_o = 1.0f / crt_sqrt(oo), inverse_a = 1.0f / crt_sqrt(aa), inverse_b = 1.0f / crt_sqrt(bb), inverse_f = 1.0f / crt_sqrt(ff);
+    v.o = o * inverse_o;
+    v.a = a * inverse_a;
+    v.b = b * inverse_b;
+    v.far = far * inverse_f;
+    /* Six times the volume of p and the triangle: from height and area, since a product of vectors near one plane would be rounding. */
+    const f32 volume = height * shape.area * (shape.parallelogram ? 1.0f : 2.0f) * (inverse_a * inverse_b);
+    v.triple = volume * inverse_o;
+    v.omega = crt_solid_angle(v.triple, v.o, v.a, v.b);
+    if (shape.parallelogram) {
+        v.triple_far = volume * inverse_f;
+        v.omega_far = crt_solid_angle(v.triple_far, v.far, v.b, v.a);
+    }
+    v.technique = v.omega + v.omega_far < CRT_SOLID_ANGLE_MAX ? CRT_LIGHT_BY_SOLID_ANGLE : CRT_LIGHT_BY_CHANCE;
     return v;
+}
+
+/* pdf per steradian of a direction that meets the emitter's plane with `cosine` at `distance`, given the emitter; 0 where it is left to chance. */
+CRT_FN f32 crt_light_density(CrtLightView view, f32 area, f32 cosine, f32 distance) {
+    if (view.technique == CRT_LIGHT_BY_CHANCE) return 0.0f;
+    if (view.technique == CRT_LIGHT_BY_SOLID_ANGLE) {
+        const f32 omega = view.omega + view.omega_far;
+        return omega > 0.0f ? 1.0f / omega : 0.0f;
+    }
+    return crt_abs(cosine) > 0.0f ? distance * distance / (crt_abs(cosine) * area) : 0.0f;
 }
 
 /* The part of v perpendicular to unit n, normalised. */
 CRT_FN vec3 crt_perpendicular(vec3 v, vec3 n) { return normalize3(v - n * dot3(v, n)); }
 
-/* A direction uniform in the solid angle `omega` of the spherical triangle a, b, c (Arvo 1995, in PBRT 4e's form). */
-CRT_FN vec3 crt_sample_spherical_triangle(vec3 a, vec3 b, vec3 c, f32 omega, CrtRandom2 u) {
-    const vec3 n_ab = normalize3(cross3(a, b));
-    const vec3 n_ca = normalize3(cross3(c, a));
-    const f32 cos_alpha = crt_clamp(-dot3(n_ab, n_ca), -1.0f, 1.0f);
-    const f32 sin_alpha = crt_sqrt(crt_max(0.0f, 1.0f - cos_alpha * cos_alpha));
-    f32 cos_x;
-    const f32 sin_x = crt_sincos(u.x * omega, &cos_x);
-    const f32 sin_phi = cos_x * sin_alpha - sin_x * cos_alpha;
-    const f32 cos_phi = -cos_x * cos_alpha - sin_x * sin_alpha;
-    const f32 k1 = cos_phi + cos_alpha;
-    const f32 k2 = sin_phi - sin_alpha * dot3(a, b);
-    const f32 denominator = (k2 * sin_phi + k1 * cos_phi) * sin_alpha;
-    f32 cos_b = denominator != 0.0f ? (k2 + (k2 * cos_phi - k1 * sin_phi) * cos_alpha) / denominator : 1.0f;
-    cos_b = crt_clamp(cos_b, -1.0f, 1.0f);
-    const f32 sin_b = crt_sqrt(crt_max(0.0f, 1.0f - cos_b * cos_b));
-    const vec3 c_cut = a * cos_b + crt_perpendicular(c, a) * sin_b;
-    const f32 cos_theta = 1.0f - u.y * (1.0f - dot3(c_cut, b));
-    const f32 sin_theta = crt_sqrt(crt_max(0.0f, 1.0f - cos_theta * cos_theta));
-    const vec3 towards = c_cut - b * dot3(c_cut, b);
+/*
+ * A direction uniform in the solid angle `omega` of the spherical triangle a, b, c, whose |a·(b×c)| is `triple` (after Arvo 1995). The side from a to
+ * c is cut at x so that a, b, x has the wanted part w of the area; then a point on the arc from b to x is chosen. With Todhunter's
+ * tan(w/2) = tan(ab/2) tan(ax/2) sin α / (1 + tan(ab/2) tan(ax/2) cos α) (1886, § 103) the cut is at tan(ax/2) = sin(w/2) / (tan(ab/2) sin(α − w/2)).
+ */
+CRT_FN vec3 crt_sample_spherical_triangle(vec3 a, vec3 b, vec3 c, f32 triple, f32 omega, CrtRandom2 u) {
+    /* The longest side, which may be nearly half a circle, is the one that is cut: arcs from the corner across from it are shorter. */
+    const f32 ab = dot3(a, b), bc = dot3(b, c), ca = dot3(c, a);
+    vec3 p = a, q = b, r = c;
+    f32 pq = ab, qr = bc, rp = ca;
+    if (ab < bc && ab < ca) {
+        p = b; q = c; r = a;
+        pq = bc; qr = ca; rp = ab;
+    } else if (bc < ca) {
+        p = c; q = a; r = b;
+        pq = ca; qr = ab; rp = bc;
+    }
+    const f32 alpha = crt_atan2(triple, qr - pq * rp);
+    const f32 half_area = 0.5f * u.x * omega;
+    f32 unused;
+    const f32 numerator = crt_sincos(half_area, &unused) * length3(p + q);
+    const f32 denominator = crt_sincos(crt_max(alpha - half_area, 0.0f), &unused) * length3(p - q);
+    /* cos and sin of the arc from p to the cut, from numerator / denominator = tan of its half. */
+    const f32 squares = numerator * numerator + denominator * denominator;
+    const f32 scale = squares > 0.0f ? 1.0f / squares : 0.0f;
+    const f32 cos_cut = (denominator * denominator - numerator * numerator) * scale;
+    const f32 sin_cut = 2.0f * numerator * denominator * scale;
+    const vec3 cut = p * cos_cut + crt_perpendicular(r, p) * sin_cut;
+    const vec3 chord = q - cut;
+    const f32 one_minus_cos = 0.5f * u.y * dot3(chord, chord);
+    const f32 cos_theta = 1.0f - one_minus_cos;
+    const f32 sin_theta = crt_sqrt(crt_max(0.0f, one_minus_cos * (2.0f - one_minus_cos)));
+    const vec3 towards = cut - q * dot3(cut, q);
     const f32 length = length3(towards);
-    return length > 0.0f ? normalize3(b * cos_theta + towards * (sin_theta / length)) : b;
+    return length > 0.0f ? normalize3(q * cos_theta + towards * (sin_theta / length)) : q;
 }
 
 /* Chooses a light and a point on it for the point p. */
@@ -118,35 +201,32 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
         }
     }
     CRT_GLOBAL const CrtEmitter *emitter = emitters + index;
-    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
     const CrtLightShape shape = crt_light_shape(ctx, emitter);
-    const vec3 normal = crt_load3(face->normal);
-    CrtRandom2 u = crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT);
+    const CrtLightView view = crt_light_view(shape, p);
     CrtLightSample s;
     s.spectrum = emitter->spectrum;
     s.pdf = 0.0f;
     s.reach = 0.0f;
+    s.point = p;
+    s.wi = shape.normal;
+    const int two_sided = (emitter->flags & CRT_EMITTER_TWO_SIDED) != 0u;
+    /* Nothing to sample where the emitter's dark side is seen, or its plane. */
+    if (view.technique == CRT_LIGHT_BY_CHANCE || !(view.height < 0.0f || (two_sided && view.height > 0.0f))) return s;
+    CrtRandom2 u = crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT);
     f32 cosine, distance;
-    const CrtLightView view = crt_light_view(shape, emitter->area, p);
-    if (view.left_to_chance) {
-        s.point = p;
-        s.wi = normal;
-        return s;
-    }
-    if (view.usable) {
-        const f32 omega = view.omega + view.omega_far;
-        const f32 split = view.omega / omega;
+    if (view.technique == CRT_LIGHT_BY_SOLID_ANGLE) {
+        const f32 split = view.omega / (view.omega + view.omega_far);
         if (u.x < split || view.omega_far == 0.0f) {
             u.x = view.omega_far == 0.0f ? u.x : u.x / split;
-            s.wi = crt_sample_spherical_triangle(view.o, view.a, view.b, view.omega, u);
+            s.wi = crt_sample_spherical_triangle(view.o, view.a, view.b, view.triple, view.omega, u);
         } else {
             u.x = (u.x - split) / (1.0f - split);
-            s.wi = crt_sample_spherical_triangle(view.far, view.b, view.a, view.omega_far, u);
+            s.wi = crt_sample_spherical_triangle(view.far, view.b, view.a, view.triple_far, view.omega_far, u);
         }
-        cosine = -dot3(normal, s.wi);
-        distance = -dot3(normal, shape.o - p) / cosine;
+        cosine = dot3(shape.normal, s.wi);
+        distance = view.height / cosine;
         s.point = crt_fma3(s.wi, distance, p);
-        if (distance > 0.0f && omega > 0.0f) s.pdf = emitter->choice_probability / omega;
+        if (!(distance > 0.0f)) return s; /* a direction along the plane, by rounding */
     } else {
         if (!shape.parallelogram) { /* uniform in the triangle */
             const f32 root = crt_sqrt(u.x);
@@ -155,32 +235,23 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
         }
         s.point = crt_fma3(shape.a, u.x, crt_fma3(shape.b, u.y, shape.o));
         const vec3 d = s.point - p;
-        const f32 distance2 = dot3(d, d);
-        distance = crt_sqrt(distance2);
+        distance = length3(d);
         s.wi = d * (1.0f / distance);
-        cosine = -dot3(normal, s.wi);
-        if (cosine != 0.0f) s.pdf = emitter->choice_probability * distance2 / (crt_abs(cosine) * emitter->area);
+        cosine = view.height / distance; /* the same for all points of the plane but for the distance */
     }
-    const int two_sided = (emitter->flags & CRT_EMITTER_TWO_SIDED) != 0u;
-    if (!(cosine > 0.0f) && !(two_sided && cosine < 0.0f)) s.pdf = 0.0f;
+    s.pdf = emitter->choice_probability * crt_light_density(view, shape.area, cosine, distance);
     /* The shadow ray stops short of the emitter by its clearance, measured along the ray. */
+    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
     if (s.pdf > 0.0f) s.reach = 1.0f - face->clearance / (crt_abs(cosine) * distance);
     return s;
 }
 
-/* pdf per steradian with which crt_sample_light at p would have found the point at distance t along w_i on an emitter. */
-CRT_FN f32 crt_light_pdf(const CrtContext *ctx, u32 emitter_index, vec3 p, vec3 wi, f32 t) {
+/* pdf per steradian with which crt_sample_light at p finds the point at distance t on an emitter. */
+CRT_FN f32 crt_light_pdf(const CrtContext *ctx, u32 emitter_index, vec3 p, f32 t) {
     CRT_GLOBAL const CrtEmitter *emitter = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + emitter_index;
     const CrtLightShape shape = crt_light_shape(ctx, emitter);
-    const CrtLightView view = crt_light_view(shape, emitter->area, p);
-    if (view.left_to_chance) return 0.0f;
-    if (view.usable) {
-        const f32 omega = view.omega + view.omega_far;
-        return omega > 0.0f ? emitter->choice_probability / omega : 0.0f;
-    }
-    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
-    const f32 cosine = crt_abs(dot3(crt_load3(face->normal), wi));
-    return cosine > 0.0f ? emitter->choice_probability * t * t / (cosine * emitter->area) : 0.0f;
+    const CrtLightView view = crt_light_view(shape, p);
+    return emitter->choice_probability * crt_light_density(view, shape.area, view.height / t, t);
 }
 
 /* Veach's power heuristic for one sample of each technique, as a ratio so that a large pdf cannot overflow. */

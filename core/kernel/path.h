@@ -42,7 +42,7 @@ CRT_FN CrtPath crt_path_begin(const CrtContext *ctx, u32 x, u32 y, u64 sample) {
     const u32 pixel_x = scene->crop_x + x;
     const u32 pixel_y = scene->crop_y + y;
     CrtPath path;
-    path.sampler = crt_sampler_begin(scene->sampler, scene->replicate_channel != 0u, scene->seed_low, scene->seed_high,
+    path.sampler = crt_sampler_begin(scene->sampler, scene->replicate_shift, scene->seed_low, scene->seed_high,
                                      pixel_y * scene->film_width + pixel_x, sample);
     path.ray = crt_camera_ray(ctx, &path.sampler, pixel_x, pixel_y);
     path.wavelengths = crt_sample_wavelengths(ctx, crt_sample_1d(&path.sampler, CRT_DIM_WAVELENGTH));
@@ -70,19 +70,23 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, CrtSurface su
     const int front = dot3(surface.ng, path->ray.d) < 0.0f;
     if (!front && (emitter->flags & CRT_EMITTER_TWO_SIDED) == 0u) return;
     f32 weight = 1.0f;
-    if (CRT_HAS(NEE) && ctx->scene->nee != 0u && path->scatter_pdf > 0.0f)
-        weight = crt_power_heuristic(path->scatter_pdf, crt_light_pdf(ctx, surface.emitter, path->ray.o, path->ray.d, t));
+    if (CRT_HAS(NEE) && ctx->scene->nee != CRT_NEE_NONE && path->scatter_pdf > 0.0f) {
+        const f32 light_pdf = crt_light_pdf(ctx, surface.emitter, path->ray.o, t);
+        if (ctx->scene->nee == CRT_NEE_ONLY) weight = light_pdf > 0.0f ? 0.0f : 1.0f;
+        else weight = crt_power_heuristic(path->scatter_pdf, light_pdf);
+    }
     path->radiance = path->radiance + path->throughput * crt_spectrum(ctx, emitter->spectrum, path->wavelengths.position) * weight;
 }
 
 /* Next event estimation at a Lambertian vertex; ns and ng are on the side of w_o. */
 CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurface surface, vec3 ns, vec3 ng, vec4 reflectance, u32 dimension,
                                  CrtRayCount *rays) {
-    const CrtLightSample light = crt_sample_light(ctx, &path->sampler, dimension, surface.p);
+    /* Scattered rays start there, too: both techniques must see the emitter from one point, or their weights do not add up to 1 close to it. */
+    CrtRay shadow;
+    shadow.o = crt_offset_origin(surface.p, surface.clearance, ng, ng);
+    const CrtLightSample light = crt_sample_light(ctx, &path->sampler, dimension, shadow.o);
     const f32 cosine = dot3(light.wi, ns);
     if (!(light.pdf > 0.0f) || !(cosine > 0.0f) || !(dot3(light.wi, ng) > 0.0f)) return;
-    CrtRay shadow;
-    shadow.o = crt_offset_origin(surface.p, surface.clearance, ng, light.wi);
     shadow.d = light.point - shadow.o;
     shadow.reach = light.reach;
     /* Nothing fits in between where the emitter is nearer than its clearance. */
@@ -92,7 +96,8 @@ CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurfac
     }
     const f32 scatter = crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction */
     const f32 ratio = scatter / light.pdf;
-    const f32 weight = ratio / (1.0f + ratio * ratio); /* the power heuristic times f·cos / pdf */
+    /* The power heuristic times f·cos / pdf. */
+    const f32 weight = ctx->scene->nee == CRT_NEE_ONLY ? ratio : ratio / (1.0f + ratio * ratio);
     path->radiance =
         path->radiance + path->throughput * reflectance * crt_spectrum(ctx, light.spectrum, path->wavelengths.position) * weight;
 }
@@ -138,7 +143,7 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
     switch (material.type) {
         case CRT_MATERIAL_DIFFUSE:
             if (CRT_HAS(DIFFUSE)) {
-                if (CRT_HAS(NEE) && scene->nee != 0u && scene->emitters.count != 0u)
+                if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->emitters.count != 0u)
                     crt_add_direct_light(ctx, path, surface, ns, ng, a, dimension, rays);
                 scatter = crt_sample_diffuse(a, ns, ng, crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF));
             }
@@ -292,8 +297,10 @@ CRT_FN void crt_add_sample(const CrtContext *ctx, CrtPixelWork *work, vec4 xyz) 
         crt_film_add(pairs + 2, luminance);
         crt_film_add(pairs + 4, (f64)V4Z(xyz));
         crt_film_add(pairs + 6, luminance * luminance);
-        if (CRT_HAS(REPLICATES) && scene->replicate_channel != 0u)
-            crt_film_add(pairs + 2u * (scene->replicate_channel + crt_replicate(work->first_sample + work->done)), luminance);
+        if (CRT_HAS(REPLICATES) && scene->replicate_shift != 0u) {
+            const u32 replicate = crt_replicate(work->first_sample + work->done, scene->replicate_shift);
+            if (replicate + 1u < 1u << scene->replicate_shift) crt_film_add(pairs + 2u * (scene->replicate_channel + replicate), luminance);
+        }
         if (CRT_HAS(AOV)) {
             if (scene->channels > CRT_CHANNELS_BASE) crt_add_aovs(ctx, &work->path, pairs);
             if (work->primitive != 0 && work->valid == 0u && *work->count == 0u) *work->primitive = work->path.first.primitive;

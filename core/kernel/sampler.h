@@ -24,7 +24,7 @@ CRT_KERNEL_BEGIN
 
 typedef struct CrtSampler {
     u32 kind;
-    u32 pixel_key;      /* Sobol: hash of seed, pixel and the high half of the index. Independent: the pixel */
+    u32 pixel_key;      /* Sobol: hash of seed, pixel and sequence. Independent: the pixel */
     u32 index;          /* low half of the sample index; bit-reversed for Sobol */
     u32 index_high;
     u32 seed_low, seed_high;
@@ -44,6 +44,25 @@ CRT_FN u32 crt_hash(u32 x) {
     x *= 0x846ca68bu;
     x ^= x >> 16;
     return x;
+}
+
+/* Two words that differ for any two seeds: two rounds of a Feistel network, a bijection on 64 bits, each word hashed. */
+typedef struct CrtSeed {
+    u32 first, second;
+} CrtSeed;
+
+CRT_FN CrtSeed crt_seed(u32 low, u32 high) {
+    CrtSeed s;
+    s.first = low ^ crt_hash(high + 0x9e3779b9u);
+    s.second = high ^ crt_hash(s.first + 0x85ebca6bu);
+    s.first ^= crt_hash(s.second + 0xc2b2ae35u);
+    return s;
+}
+
+/* Key of a sequence of a pixel. The seed's two words enter one before and one after a hash: with one word, hash(pixel ^ word), seeds whose words
+   differ in their low bits alone would give the same keys to other pixels. */
+CRT_FN u32 crt_pixel_key(CrtSeed seed, u32 pixel, u32 sequence) {
+    return crt_hash(crt_hash(pixel ^ seed.first) + seed.second + sequence * 0x9e3779b9u);
 }
 
 /* The middle of one of 2^23 cells of (0, 1): exact, and never 0 or 1, where warps degenerate. */
@@ -96,18 +115,16 @@ CRT_FN CrtPhilox crt_philox(u32 c0, u32 c1, u32 c2, u32 c3, u32 k0, u32 k1) {
     return r;
 }
 
-/* The replicate that a sample belongs to, and its place there (layout.h). */
-CRT_FN u32 crt_replicate(u64 sample) { return (u32)(sample / CRT_REPLICATE_BLOCK) % CRT_REPLICATES; }
-CRT_FN u64 crt_index_in_replicate(u64 sample) {
-    return sample / (CRT_REPLICATE_BLOCK * CRT_REPLICATES) * CRT_REPLICATE_BLOCK + sample % CRT_REPLICATE_BLOCK;
-}
+/* With 2^shift replicates (layout.h), the one that a sample belongs to, and its place there. */
+CRT_FN u32 crt_replicate(u64 sample, u32 shift) { return (u32)sample & ((1u << shift) - 1u); }
+CRT_FN u64 crt_index_in_replicate(u64 sample, u32 shift) { return sample >> shift; }
 
 /*
- * Numbers of sample `sample` of the pixel with index `pixel` in the whole film. With replicates, Sobol samples take turns between sequences that are
- * each scrambled on their own (Owen 1997, "Monte Carlo variance of scrambled net quadrature", section 3). The other samplers' samples are independent
- * as it is.
+ * Numbers of sample `sample` of the pixel with index `pixel` in the whole film. With 2^replicate_shift replicates, Sobol samples take turns between
+ * sequences that are each scrambled on their own (Owen 1997, "Monte Carlo variance of scrambled net quadrature", section 3). The other samplers'
+ * samples are independent as it is.
  */
-CRT_FN CrtSampler crt_sampler_begin(u32 kind, int replicates, u32 seed_low, u32 seed_high, u32 pixel, u64 sample) {
+CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, u32 seed_low, u32 seed_high, u32 pixel, u64 sample) {
     CrtSampler s;
     const u32 low = (u32)sample;
     const u32 high = (u32)(sample >> 32);
@@ -120,15 +137,17 @@ CRT_FN CrtSampler crt_sampler_begin(u32 kind, int replicates, u32 seed_low, u32 
     s.block = CRT_NONE;
     s.b0 = s.b1 = s.b2 = s.b3 = 0u;
     if (CRT_HAS(SOBOL) && kind == CRT_SAMPLER_SOBOL) {
-        const int split = CRT_HAS(REPLICATES) && replicates;
-        const u64 index = split ? crt_index_in_replicate(sample) : sample;
-        s.pixel_key = crt_hash(pixel ^ crt_hash(seed_low ^ crt_hash(seed_high ^ crt_hash((u32)(index >> 32) + 0x632be5abu))));
-        if (split) s.pixel_key = crt_hash(s.pixel_key ^ crt_hash(crt_replicate(sample) + 0x5bd1e995u));
+        const u32 shift = CRT_HAS(REPLICATES) ? replicate_shift : 0u;
+        const u64 index = crt_index_in_replicate(sample, shift);
+        /* A sequence has 2^32 points; what lies beyond them begins another. */
+        const u32 sequence = ((u32)(index >> 32) << shift) + crt_replicate(sample, shift);
+        s.pixel_key = crt_pixel_key(crt_seed(seed_low, seed_high), pixel, sequence);
         s.index = crt_reverse_bits((u32)index);
     }
     if (CRT_HAS(XORSHIFT) && kind == CRT_SAMPLER_XORSHIFT) {
         /* Marsaglia's xorshift32 has one bad state, 0, and neighbouring seeds give neighbouring streams: seed it with a hash. */
-        const u32 h = crt_hash(low ^ crt_hash(high ^ crt_hash(pixel ^ crt_hash(seed_low ^ crt_hash(seed_high + 0x9e3779b9u)))));
+        const u32 key = crt_pixel_key(crt_seed(seed_low, seed_high), pixel, high);
+        const u32 h = crt_hash(crt_hash(low ^ key) + crt_hash(key));
         s.b0 = h != 0u ? h : 0x6c078965u;
     }
     return s;
