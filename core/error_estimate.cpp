@@ -10,8 +10,11 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
-/// Below it an image of many pixels owes its variance to so few paths that intervals do not cover what they claim (docs/results/calibration.md).
-constexpr double kLeastDegreesOfFreedom = 50;
+/// Below it a handful of paths makes the estimate, and an interval would not cover what it claims (docs/results/calibration.md).
+constexpr double kLeastDegreesOfFreedom = 4;
+
+/// What the brightest pixel says of pixels as bright that no path has met yet: so many more squares like its own.
+constexpr double kUnseen = 0.5;
 
 /// From so many pixels on the scatter of variances is measured; of fewer, where a measurement would be noise, replicates are taken as normal.
 constexpr double kPixelsToMeasure = 32;
@@ -30,30 +33,25 @@ bool belongs(std::uint32_t x, std::uint32_t y, PixelSet which) {
     return which == PixelSet::All || ((x + y) % 2 == 0) == (which == PixelSet::Even);
 }
 
-/// The pixels' variances v in units of the largest, so that no square overflows: a checkpoint may hold any finite sums.
-class VarianceMap {
+/// A number for each pixel; infinite where it is not known.
+class PixelMap {
 public:
-    VarianceMap(const Film& film, const LuminanceVariance& variance) : width_(film.shape().width), height_(film.shape().height) {
+    template <class Function>
+    PixelMap(const Film& film, const Function& function) : width_(film.shape().width), height_(film.shape().height) {
         values_.reserve(std::size_t{width_} * height_);
         for (std::uint32_t y = 0; y < height_; ++y)
-            for (std::uint32_t x = 0; x < width_; ++x) {
-                values_.push_back(variance(x, y));
-                if (std::isfinite(values_.back())) largest_ = std::max(largest_, values_.back());
-            }
-        if (largest_ > 0)
-            for (double& v : values_) v /= largest_;
+            for (std::uint32_t x = 0; x < width_; ++x) values_.push_back(function(x, y));
     }
-    double largest() const { return largest_; }
     double at(std::uint32_t x, std::uint32_t y) const { return values_[std::size_t{y} * width_ + x]; }
     bool known(std::uint32_t x, std::uint32_t y) const { return std::isfinite(at(x, y)); }
 
-    /// Square of a variance's deviation from the mean of its k neighbours, times k/(k + 1): its own variance, and more where neighbours
-    /// differ. With one degree of freedom a pixel scatters more than its neighbours differ, so that this is hardly too large, and never more than v².
-    double squaredDeviation(std::uint32_t x, std::uint32_t y) const {
+    /// Square of a value's deviation from the mean of its k neighbours in the set, times k/(k + 1): the value's variance, and more where neighbours have
+    /// other means. With one degree of freedom a pixel's variance scatters more than those of neighbours differ, so that this is hardly too large.
+    double squaredDeviation(std::uint32_t x, std::uint32_t y, PixelSet which) const {
         double sum = 0, count = 0;
         for (std::uint32_t j = y > 0 ? y - 1 : 0; j <= std::min(y + 1, height_ - 1); ++j)
             for (std::uint32_t i = x > 0 ? x - 1 : 0; i <= std::min(x + 1, width_ - 1); ++i) {
-                if ((i == x && j == y) || !known(i, j)) continue;
+                if ((i == x && j == y) || !known(i, j) || !belongs(i, j, which)) continue;
                 sum += at(i, j);
                 count += 1;
             }
@@ -65,8 +63,55 @@ public:
 private:
     std::uint32_t width_, height_;
     std::vector<double> values_;
-    double largest_ = 0;
 };
+
+/// Sums over the pixels of a set, variances in units of the largest, so that no square overflows: a checkpoint may hold any finite sums.
+struct VarianceSums {
+    double pixels = 0, known = 0, sum = 0, most = 0, squares = 0;
+};
+
+VarianceSums sumsOf(const Film& film, const PixelMap& variances, PixelSet which) {
+    VarianceSums s;
+    for (std::uint32_t y = 0; y < film.shape().height; ++y)
+        for (std::uint32_t x = 0; x < film.shape().width; ++x) {
+            if (!belongs(x, y, which)) continue;
+            s.pixels += 1;
+            if (!variances.known(x, y)) continue;
+            const double v = variances.at(x, y);
+            s.known += 1;
+            s.sum += v;
+            s.most = std::max(s.most, v);
+            s.squares += v * v;
+        }
+    return s;
+}
+
+double largestOf(const Film& film, const LuminanceVariance& variance) {
+    double largest = 0;
+    for (std::uint32_t y = 0; y < film.shape().height; ++y)
+        for (std::uint32_t x = 0; x < film.shape().width; ++x)
+            if (const double v = variance(x, y); std::isfinite(v)) largest = std::max(largest, v);
+    return largest;
+}
+
+/// Variance of the sum S of variances, in their units, as it enters the relative error √S/M, whatever the distribution of samples.
+double measuredSpread(const Film& film, const LuminanceVariance& variance, const PixelMap& variances, PixelSet which, const VarianceSums& sums, double largest,
+                      double luminance) {
+    const auto total = [&](const auto& of) {
+        double sum = 0;
+        for (std::uint32_t y = 0; y < film.shape().height; ++y)
+            for (std::uint32_t x = 0; x < film.shape().width; ++x)
+                if (belongs(x, y, which) && variances.known(x, y)) sum += of(x, y);
+        return sum;
+    };
+    if (variance.fromReplicates() && variance.degreesOfFreedom() >= 3)
+        return total([&](std::uint32_t x, std::uint32_t y) { return variance.varianceOfVariance(x, y, largest); });
+    // What a pixel adds to log(√S/M): where a bright path raises both S and M, they partly cancel.
+    const PixelMap influence(film, [&](std::uint32_t x, std::uint32_t y) {
+        return 0.5 * variances.at(x, y) / sums.sum - film.mean(x, y, 1) / luminance;
+    });
+    return 4 * sums.sum * sums.sum * total([&](std::uint32_t x, std::uint32_t y) { return influence.squaredDeviation(x, y, which); });
+}
 
 }  // namespace
 
@@ -104,11 +149,11 @@ double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
 }
 
 /// Var k₂ of R values is estimated without bias by (2R k₂² + (R − 1) k₄) / (R (R + 1)) (Kendall and Stuart 1969, 12.16); the variance of the mean is k₂/R.
-double LuminanceVariance::varianceOfVariance(std::uint32_t x, std::uint32_t y) const {
+double LuminanceVariance::varianceOfVariance(std::uint32_t x, std::uint32_t y, double unit) const {
     const double r = dof_ + 1, mean = film_.mean(x, y, 1);
     double squares = 0, fourth_powers = 0;
     for (std::uint32_t i = 0; i < film_.replicates(); ++i) {
-        const double d = film_.replicateSum(x, y, i) / samples_[i] - mean;
+        const double d = (film_.replicateSum(x, y, i) / samples_[i] - mean) / std::sqrt(unit);
         squares += d * d;
         fourth_powers += d * d * d * d;
     }
@@ -119,43 +164,35 @@ double LuminanceVariance::varianceOfVariance(std::uint32_t x, std::uint32_t y) c
 
 std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, bool independent_samples) {
     const LuminanceVariance variance(film);
-    const VarianceMap map(film, variance);
-    const double d = variance.degreesOfFreedom();
-    const bool by_moments = variance.fromReplicates() && d >= 3;
-    double luminance = 0, pixels = 0, known = 0, sum = 0, squares = 0, spread = 0;
+    const double d = variance.degreesOfFreedom(), largest = largestOf(film, variance), unit = largest > 0 ? largest : 1;
+    const PixelMap variances(film, [&](std::uint32_t x, std::uint32_t y) { return variance(x, y) / unit; });
+    const VarianceSums sums = sumsOf(film, variances, which);
+    double luminance = 0;
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
-        for (std::uint32_t x = 0; x < film.shape().width; ++x) {
-            luminance += film.mean(x, y, 1);
-            if (!belongs(x, y, which)) continue;
-            pixels += 1;
-            if (!map.known(x, y)) continue;
-            known += 1;
-            sum += map.at(x, y);
-            squares += map.at(x, y) * map.at(x, y);
-            if (map.largest() > 0) spread += by_moments ? variance.varianceOfVariance(x, y) / map.largest() / map.largest() : map.squaredDeviation(x, y);
-        }
-    const double variances = sum * map.largest();
-    if (known == 0 || !(luminance > 0) || !std::isfinite(luminance) || !std::isfinite(variances)) return std::nullopt;
+        for (std::uint32_t x = 0; x < film.shape().width; ++x) luminance += film.mean(x, y, 1);
+    const double total = sums.sum * unit;
+    if (sums.known == 0 || !(luminance > 0) || !std::isfinite(luminance) || !std::isfinite(total)) return std::nullopt;
 
     ErrorEstimate e;
     e.knowledge = variance.fromReplicates() || independent_samples ? ErrorKnowledge::Known : ErrorKnowledge::Bound;
     e.mean_luminance = luminance / static_cast<double>(film.counts.size());
-    e.mean_standard_error = std::sqrt(variances / known / pixels);
-    e.relative_rmse = std::sqrt(variances / known) / e.mean_luminance;
-    if (!(variances > 0)) {  // Every sample the same: a furnace.
-        e.degrees_of_freedom = d * known;
+    e.mean_standard_error = std::sqrt(total / sums.known / sums.pixels);
+    e.relative_rmse = std::sqrt(total / sums.known) / e.mean_luminance;
+    if (!(total > 0)) {  // Every sample the same: a furnace.
+        e.degrees_of_freedom = d * sums.known;
         return e;
     }
-    // Normal replicates have Var v = 2 v²/d, whose unbiased estimate is 2 v²/(d + 2); longer tails have more. No variance exceeds the mean square.
-    const double normal = 2 * squares / (d + 2);
-    const double measured = known < kPixelsToMeasure ? normal : std::clamp(spread, normal, std::max(squares, normal));
-    e.degrees_of_freedom = std::clamp(2 * sum * sum / measured, 1.0, d * known);
-    const double least = std::min(kLeastDegreesOfFreedom, d > 1 ? d : kLeastDegreesOfFreedom);
-    if (e.known() && e.degrees_of_freedom < least) e.knowledge = ErrorKnowledge::NotYet;
+    // Normal replicates have Var v = 2 v²/d, whose unbiased estimate is 2 v²/(d + 2); longer tails have more.
+    const double normal = 2 * sums.squares / (d + 2);
+    double spread = normal;
+    if (sums.known >= kPixelsToMeasure)
+        spread = std::max(normal, measuredSpread(film, variance, variances, which, sums, unit, luminance) + kUnseen * sums.most * sums.most);
+    e.degrees_of_freedom = std::clamp(2 * sums.sum * sums.sum / spread, 1.0, d * sums.known);
+    if (e.known() && e.degrees_of_freedom < std::min(kLeastDegreesOfFreedom, d * sums.known)) e.knowledge = ErrorKnowledge::NotYet;
     e.relative_rmse_95 = {e.relative_rmse * std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.975, e.degrees_of_freedom)),
                           e.relative_rmse * std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.025, e.degrees_of_freedom))};
     // The squared error that the image has scatters like the normal part of one degree of freedom a pixel, and the tails' part.
-    const double squared_error = std::clamp(2 * sum * sum / (d * normal + (measured - normal)), 1.0, known);
+    const double squared_error = std::clamp(2 * sums.sum * sums.sum / (d * normal + (spread - normal)), 1.0, sums.known);
     e.half_width_95 = e.relative_rmse * std::sqrt(stats::fisherQuantile(0.95, squared_error, e.degrees_of_freedom));
     return e;
 }

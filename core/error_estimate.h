@@ -24,8 +24,8 @@ public:
     double degreesOfFreedom() const { return dof_; }
     /// Whether it is the spread between replicates; else between samples.
     bool fromReplicates() const { return from_replicates_; }
-    /// Variance of operator() itself, by unbiased k-statistics, whatever the distribution of replicates. Needs four replicates.
-    double varianceOfVariance(std::uint32_t x, std::uint32_t y) const;
+    /// Variance of operator() itself, over unit² so that nothing overflows, by unbiased k-statistics: whatever the distribution of replicates. Needs four.
+    double varianceOfVariance(std::uint32_t x, std::uint32_t y, double unit = 1) const;
 
 private:
     double betweenReplicates(std::uint32_t x, std::uint32_t y) const;

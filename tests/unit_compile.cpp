@@ -114,13 +114,13 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         return mask;
     };
     std::uint32_t seen = base;
-    constexpr std::uint32_t sobol = CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES;
+    constexpr std::uint32_t sobol = CRT_FEATURE_SOBOL;
     seen |= differs(CRT_FEATURE_INDEPENDENT, sobol, [](Scene& s) { s.sampler.type = crt::SamplerType::Independent; });
     seen |= differs(CRT_FEATURE_XORSHIFT, sobol, [](Scene& s) { s.sampler.type = crt::SamplerType::XorShift; });
     differs(0, CRT_FEATURE_REPLICATES, [](Scene& s) { s.sampler.replicates = 1; });
-    differs(CRT_FEATURE_INDEPENDENT, CRT_FEATURE_SOBOL, [](Scene& s) {
+    differs(CRT_FEATURE_INDEPENDENT, CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES, [](Scene& s) {
         s.sampler.type = crt::SamplerType::Independent;
-        s.sampler.replicates = 16;
+        s.sampler.replicates = 1;
     });
     seen |= differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Bvh; });
     seen |= differs(CRT_FEATURE_AABB, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Aabb; });
@@ -592,6 +592,28 @@ TEST_CASE("what is left out is listed with a reason, and what is needed is not",
     CHECK(listed(full, "light sampling and shadow rays"));  // glass alone cannot be lit by it
 }
 
+TEST_CASE("replicates are as few as give the error of a film a thousand degrees of freedom", "[compile]") {
+    const auto replicatesFor = [](int width, int height) {
+        Scene scene = litFloor();
+        scene.film.width = width;
+        scene.film.height = height;
+        return crt::replicatesOf(scene);
+    };
+    CHECK(replicatesFor(1, 1) == 16);
+    CHECK(replicatesFor(8, 8) == 16);
+    CHECK(replicatesFor(16, 16) == 8);
+    CHECK(replicatesFor(20, 20) == 4);
+    CHECK(replicatesFor(50, 20) == 2);
+    CHECK(replicatesFor(16384, 16384) == 2);
+    // The film's and not the crop window's, whose pixels must have the film's bits.
+    Scene cropped = litFloor();
+    cropped.film.width = cropped.film.height = 64;
+    cropped.film.crop = {0, 0, 1, 1};
+    CHECK(crt::replicatesOf(cropped) == 2);
+    cropped.integrator.type = crt::IntegratorType::Normals;
+    CHECK(crt::replicatesOf(cropped) == 1);
+}
+
 TEST_CASE("AOVs take channels in order, and only those that are asked for", "[compile]") {
     const auto single = [](std::uint32_t aovs) {
         Scene scene = litFloor();
@@ -599,10 +621,13 @@ TEST_CASE("AOVs take channels in order, and only those that are asked for", "[co
         return compiled(scene, aovs);
     };
     CHECK(single(0).channels == CRT_CHANNELS_BASE);
-    const CompiledScene replicates = compiled(litFloor());
+    Scene sixteen = litFloor();
+    sixteen.sampler.replicates = 16;
+    const CompiledScene replicates = compiled(sixteen);
+    CHECK(headerOf(replicates).replicate_shift == 4);
     CHECK(headerOf(replicates).replicate_channel == CRT_CHANNELS_BASE);
-    CHECK(replicates.channels == CRT_CHANNELS_BASE + CRT_REPLICATES);
-    const CompiledScene all = compiled(litFloor(), 0xffu);
+    CHECK(replicates.channels == CRT_CHANNELS_BASE + 15);
+    const CompiledScene all = compiled(sixteen, 0xffu);
     CHECK(headerOf(all).albedo_channel == 4);
     CHECK(headerOf(all).normal_channel == 7);
     CHECK(headerOf(all).depth_channel == 10);

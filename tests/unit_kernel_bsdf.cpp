@@ -273,16 +273,26 @@ TEST_CASE("the power heuristic shares out 1, for any densities", "[kernel][bsdf]
 
 // --------------------------------------------------------------------------------------------------------------------------- lights
 
+namespace {
+
+/// |a·(b×c)| of the rounded directions.
+f32 tripleOf(const vec3& a, const vec3& b, const vec3& c) {
+    return static_cast<f32>(std::abs(dot(toDouble(a), cross(toDouble(b), toDouble(c)))));
+}
+f32 solidAngleOf(const vec3& a, const vec3& b, const vec3& c) { return crt_solid_angle(tripleOf(a, b, c), a, b, c); }
+
+}  // namespace
+
 TEST_CASE("solid angles of triangles, down to 1e-8 sr", "[kernel][light]") {
-    CHECK(crt_solid_angle(make_vec3(1, 0, 0), make_vec3(0, 1, 0), make_vec3(0, 0, 1)) == Approx(kPi / 2));
+    CHECK(solidAngleOf(make_vec3(1, 0, 0), make_vec3(0, 1, 0), make_vec3(0, 0, 1)) == Approx(kPi / 2));
     // A face of the regular tetrahedron, of the cube halved, of the icosahedron.
     const double t = 1 / std::sqrt(3.0), g = (1 + std::sqrt(5.0)) / 2;
-    CHECK(crt_solid_angle(toFloat({t, t, t}), toFloat({t, -t, -t}), toFloat({-t, t, -t})) == Approx(kPi));
-    CHECK(crt_solid_angle(toFloat({t, t, t}), toFloat({-t, t, t}), toFloat({-t, -t, t})) == Approx(kPi / 3));
-    CHECK(crt_solid_angle(unitFloat({0, 1, g}), unitFloat({0, -1, g}), unitFloat({g, 0, 1})) == Approx(kPi / 5));
+    CHECK(solidAngleOf(toFloat({t, t, t}), toFloat({t, -t, -t}), toFloat({-t, t, -t})) == Approx(kPi));
+    CHECK(solidAngleOf(toFloat({t, t, t}), toFloat({-t, t, t}), toFloat({-t, -t, t})) == Approx(kPi / 3));
+    CHECK(solidAngleOf(unitFloat({0, 1, g}), unitFloat({0, -1, g}), unitFloat({g, 0, 1})) == Approx(kPi / 5));
     // Nearly a half space, and none at all.
-    CHECK(crt_solid_angle(unitFloat({1, 0, 1e-3}), unitFloat({-0.5, 0.9, 1e-3}), unitFloat({-0.5, -0.9, 1e-3})) == Approx(2 * kPi).margin(2e-2));
-    CHECK(crt_solid_angle(make_vec3(0, 0, 1), make_vec3(0, 0, 1), make_vec3(1, 0, 0)) == 0);
+    CHECK(solidAngleOf(unitFloat({1, 0, 1e-3}), unitFloat({-0.5, 0.9, 1e-3}), unitFloat({-0.5, -0.9, 1e-3})) == Approx(2 * kPi).margin(2e-2));
+    CHECK(solidAngleOf(make_vec3(0, 0, 1), make_vec3(0, 0, 1), make_vec3(1, 0, 0)) == 0);
 
     // Of the same rounded directions, in long double. What is left is the rounding of the triple product, 1e-7 of the triangle's width.
     Random random(35);
@@ -292,7 +302,7 @@ TEST_CASE("solid angles of triangles, down to 1e-8 sr", "[kernel][light]") {
             const Vec3d d = random.direction(), x = unit(cross(d, random.direction())), y = cross(d, x);
             const auto corner = [&](double u, double v) { return unitFloat(plus(d, plus(times(x, u * width), times(y, v * width)))); };
             const vec3 a = corner(0.9, 0.1 * random.uniform()), b = corner(-0.5, 0.8), c = corner(-0.5 * random.uniform(), -0.9);
-            worst = std::max(worst, std::abs(crt_solid_angle(a, b, c) / solidAngle(toDouble(a), toDouble(b), toDouble(c)) - 1));
+            worst = std::max(worst, std::abs(solidAngleOf(a, b, c) / solidAngle(toDouble(a), toDouble(b), toDouble(c)) - 1));
         }
         INFO("width " << width);
         CHECK(worst < 4e-7 / width);
@@ -310,7 +320,8 @@ TEST_CASE("directions are uniform in a spherical triangle", "[kernel][light]") {
     };
     for (const auto& corners : triangles) {
         const Vec3d a = unit(corners[0]), b = unit(corners[1]), c = unit(corners[2]);
-        const f32 omega = crt_solid_angle(toFloat(a), toFloat(b), toFloat(c));
+        const f32 triple = tripleOf(toFloat(a), toFloat(b), toFloat(c));
+        const f32 omega = solidAngleOf(toFloat(a), toFloat(b), toFloat(c));
         // The flat triangle, cut into 8 × 8 strips of smaller ones; each has its own solid angle.
         constexpr int kCut = 8;
         const auto point = [&](int i, int j) {
@@ -330,7 +341,7 @@ TEST_CASE("directions are uniform in a spherical triangle", "[kernel][light]") {
         const Vec3d n = cross(minus(b, a), minus(c, a));
         std::uint64_t outside = 0;
         for (int i = 0; i < 300000; ++i) {
-            const Vec3d d = toDouble(crt_sample_spherical_triangle(toFloat(a), toFloat(b), toFloat(c), omega, random.pair()));
+            const Vec3d d = toDouble(crt_sample_spherical_triangle(toFloat(a), toFloat(b), toFloat(c), triple, omega, random.pair()));
             const Vec3d p = minus(times(d, dot(n, a) / dot(n, d)), a);
             const double u = dot(cross(p, minus(c, a)), n) / dot(n, n), v = dot(cross(minus(b, a), p), n) / dot(n, n);
             if (u < -1e-3 || v < -1e-3 || u + v > 1.001) {
@@ -424,7 +435,7 @@ TEST_CASE("light sampling integrates: solid angles and form factors in closed fo
                 const Vec3d wi = toDouble(s.wi), to = minus(toDouble(s.point), toDouble(toFloat(p)));
                 solid_angle.add(1.0 / s.pdf);
                 form_factor.add(std::max(0.0, dot(wi, up)) / kPi / s.pdf);
-                const f32 pdf = crt_light_pdf(&scene.ctx, 0, toFloat(p), s.wi, static_cast<f32>(length(to)));
+                const f32 pdf = crt_light_pdf(&scene.ctx, 0, toFloat(p), static_cast<f32>(length(to)));
                 inconsistent = std::max(inconsistent, std::abs(pdf / static_cast<double>(s.pdf) - 1));
                 off_plane = std::max(off_plane, std::abs(s.point.z - scene.place(corners[0])[2]));
                 beside = std::max(beside, length(minus(times(unit(to), 1.0), wi)));
@@ -457,7 +468,7 @@ TEST_CASE("a light's density integrates to 1 over the light", "[kernel][light]")
                         const double third = j % 2 ? 2.0 / 3 : 1.0 / 3;  // centroids of small triangles, upright and inverted
                         const Vec3d d = minus(plus(o, plus(times(a, (i + third) / kCut), times(b, (j / 2 + third) / kCut))), p);
                         const Vec3d wi = unit(d);
-                        const f32 pdf = crt_light_pdf(&scene.ctx, 0, toFloat(p), toFloat(wi), static_cast<f32>(length(d)));
+                        const f32 pdf = crt_light_pdf(&scene.ctx, 0, toFloat(p), static_cast<f32>(length(d)));
                         integral += pdf * std::abs(wi[2]) / dot(d, d) * area / (kCut * kCut);
                     }
             }

@@ -96,10 +96,16 @@ TEST_CASE("progress: numbers and texts") {
     ErrorEstimate error;
     error.relative_rmse = error.half_width_95 = 0.02;
     error.relative_rmse_95 = {0.0196, 0.0204};
-    error.is_bound = false;
+    error.knowledge = ErrorKnowledge::Known;
     state.error = error;
-    // A fourth of the samples that 1 % takes are there, at one a second.
-    CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error 2.00 % (1.96-2.04)  1 % at 120 spp, in 1:30");
+    // A fourth of the samples that 1 % takes at 1/sqrt N are there, one a second, and half of those that it takes at 1/N.
+    CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error 2.00 % (1.96-2.04)  1 % at 59-130 spp, in 0:29-1:35");
+    // A bound forecasts nothing.
+    state.error->knowledge = ErrorKnowledge::Bound;
+    CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error below 2.0 %");
+    state.error->knowledge = ErrorKnowledge::NotYet;
+    CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error not yet known");
+    state.error = error;
     state.target_error = 0.02;
     CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error 2.00 % (1.96-2.04)");
 

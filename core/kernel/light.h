@@ -15,7 +15,7 @@ CRT_KERNEL_BEGIN
 #define CRT_SOLID_ANGLE_THRESHOLD 0.3f
 
 /* A light seen as nearly a hemisphere is left to chance: scattered rays find it all but always. */
-#define CRT_SOLID_ANGLE_MAX 5.0f
+#define CRT_SOLID_ANGLE_MAX 6.0f
 
 /* Least height over the emitter's plane, as a share of the distance to its farthest corner, at which directions uniform in solid angle are found in
    single precision: nearer, corners lie on the horizon, some across from each other, and rounding turns the arcs between
