@@ -38,9 +38,16 @@ KeySchema scaleKey() {
 }
 
 KeySchema outsideKey() {
-    return {.name = "outside", .kind = Kind::Choice, .choices = {"clamp", "zero", "error"},
-            .doc = "Beyond the first and last wavelength: the end value, zero, or an error. Must be said unless the data cover "
-                   "360 to 830 nm."};
+    return {.name = "outside",
+            .kind = Kind::Choice,
+            .choices = {"clamp", "zero", "error"},
+            .doc =
+                "Beyond the first and last wavelength: the end value, zero, or an error. Must be said "
+                "unless the "
+                "data cover 360 to 830 nm. With `zero` the table keeps its integral: where its end is not "
+                "0, the "
+                "step is spread over the nanometres that it touches, and one wavelength alone is refused, "
+                "because it has no width."};
 }
 
 KeySchema typeKey(std::string word) {

@@ -37,48 +37,72 @@ Spectrum resample(const std::vector<double>& x, const std::vector<double>& y, Ou
     return s;
 }
 
+struct Knot {
+    double nm, value;
+};
+
+/// Twice what a cell of one nanometre gives to the node at each of its ends.
+struct CellShares {
+    double left = 0, right = 0;
+};
+
+/// ∫ f (1 − t) and ∫ f t over the cell that begins at `lower`, twice, of the lines through `knots`: by
+/// Simpson's rule, which is exact for parabolas. Between the ends of the table, `first_nm` and `last_nm`,
+/// and a nanometre f is what the table is continued by.
+CellShares momentsOf(const std::vector<Knot>& knots, double lower, double first_nm, double last_nm) {
+    CellShares shares;
+    for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+        double a = knots[k].value, b = knots[k + 1].value;
+        if (knots[k + 1].nm == first_nm) b = a;
+        if (knots[k].nm == last_nm) a = b;
+        const double t0 = knots[k].nm - lower, t1 = knots[k + 1].nm - lower;
+        const double middle = 0.5 * (t0 + t1), sixth = (t1 - t0) / 6;
+        shares.left += 2 * sixth * (a * (1 - t0) + 2 * (a + b) * (1 - middle) + b * (1 - t1));
+        shares.right += 2 * sixth * (a * t0 + 2 * (a + b) * middle + b * t1);
+    }
+    return shares;
+}
+
+/// Whether the table falls to zero at the whole nanometre `nm`, which is then the end of a step and not of a
+/// line. Nothing is told of wavelengths beyond the grid, so its own ends are none.
+bool stepsAt(double nm, const std::vector<double>& x, const std::vector<double>& y, Outside outside) {
+    if (outside != Outside::Zero || nm == kWavelengthMin_nm || nm == kWavelengthMax_nm) return false;
+    return (nm == x.front() && y.front() != 0) || (nm == x.back() && y.back() != 0);
+}
+
 /// Where a table has knots between two nanometres, reading it off at the nanometres would lose or invent lines that are narrower than
-/// that. There each node gets ∫ f·(its share of the linear interpolation) instead, so that integral and mean wavelength are the table's. A
-/// cell without inner knots is linear already and keeps its values; nothing leaves the range of the table's values.
-void conserveFineDetail(const std::vector<double>& x, const std::vector<double>& y, Spectrum& s) {
+/// that; and where it ends on a nanometre with a step to zero, the step would become a ramp of a nanometre
+/// and add half of it. In such cells each node gets ∫ f·(its share of the linear interpolation) instead, so
+/// that integral and mean wavelength are the table's. A cell without inner knots and steps is linear already
+/// and keeps its values; nothing leaves the range of the table's values and zero.
+void conserveIntegral(const std::vector<double>& x, const std::vector<double>& y, Outside outside,
+                      Spectrum& s) {
     const Spectrum read_off = s;
     const std::size_t cells = s.values.size() - 1;
-    // Twice what a cell gives to the node at each end.
-    std::vector<double> to_left(s.values.size()), to_right(s.values.size());
-    bool fine = false;
-    struct Knot {
-        double nm, value;
-    };
+    std::vector<CellShares> of_cell(cells);
+    bool changed = false;
     for (std::size_t i = 0; i < cells; ++i) {
         const double lower = wavelengthAt(i), upper = lower + 1;
-        std::vector<Knot> knots{{lower, read_off[i]}};
-        for (auto k = static_cast<std::size_t>(std::upper_bound(x.begin(), x.end(), lower) - x.begin()); k < x.size() && x[k] < upper; ++k)
-            knots.push_back({x[k], y[k]});
-        knots.push_back({upper, read_off[i + 1]});
-        double left = 0, right = 0;
-        if (knots.size() == 2) {
-            left = read_off[i];
-            right = read_off[i + 1];
-        } else {
-            fine = true;
-            for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
-                // f linear from a to b between t0 and t1 of the cell: ∫ f (1 − t) and ∫ f t by Simpson's rule, which is exact for
-                // parabolas. Between the table's end and a nanometre, f is what the table is continued by.
-                double a = knots[k].value, b = knots[k + 1].value;
-                if (knots[k + 1].nm == x.front()) b = a;
-                if (knots[k].nm == x.back()) a = b;
-                const double t0 = knots[k].nm - lower, t1 = knots[k + 1].nm - lower, middle = 0.5 * (t0 + t1), sixth = (t1 - t0) / 6;
-                left += 2 * sixth * (a * (1 - t0) + 2 * (a + b) * (1 - middle) + b * (1 - t1));
-                right += 2 * sixth * (a * t0 + 2 * (a + b) * middle + b * t1);
-            }
+        if (outside == Outside::Zero && (upper <= x.front() || lower >= x.back())) {
+            changed = changed || read_off[i] != 0 || read_off[i + 1] != 0;
+            continue;
         }
-        to_left[i] = left;
-        to_right[i + 1] = right;
+        std::vector<Knot> knots{{lower, read_off[i]}};
+        const auto first = static_cast<std::size_t>(std::upper_bound(x.begin(), x.end(), lower) - x.begin());
+        for (std::size_t k = first; k < x.size() && x[k] < upper; ++k) knots.push_back({x[k], y[k]});
+        knots.push_back({upper, read_off[i + 1]});
+        if (knots.size() == 2 && !stepsAt(lower, x, y, outside) && !stepsAt(upper, x, y, outside)) {
+            of_cell[i] = {read_off[i], read_off[i + 1]};
+        } else {
+            of_cell[i] = momentsOf(knots, lower, x.front(), x.back());
+            changed = true;
+        }
     }
-    if (!fine) return;
-    to_right.front() = read_off.values.front();
-    to_left.back() = read_off.values.back();
-    for (std::size_t i = 0; i < s.values.size(); ++i) s[i] = 0.5 * (to_left[i] + to_right[i]);
+    if (!changed) return;
+    // The outermost nodes have one cell each.
+    s.values.front() = of_cell.front().left;
+    s.values.back() = of_cell.back().right;
+    for (std::size_t i = 1; i < cells; ++i) s[i] = 0.5 * (of_cell[i - 1].right + of_cell[i].left);
 }
 
 [[noreturn]] void fail(const std::string& sentence, SourcePlace place = {}) {
@@ -166,8 +190,13 @@ Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vect
     if (outside == Outside::Error && (wavelength_nm.front() > kWavelengthMin_nm || wavelength_nm.back() < kWavelengthMax_nm))
         fail(fmt::format("a spectrum table covers {} to {} nm, not all of {} to {} nm; say 'outside: clamp' or 'outside: zero'",
                          wavelength_nm.front(), wavelength_nm.back(), kWavelengthMin_nm, kWavelengthMax_nm));
+    if (outside == Outside::Zero && wavelength_nm.size() == 1)
+        fail(fmt::format(
+            "a spectrum table of one wavelength with 'outside: zero' is zero everywhere, because {} nm "
+            "alone has no width; give two or more, or say 'outside: clamp' for a constant",
+            wavelength_nm.front()));
     Spectrum s = resample(wavelength_nm, value, outside);
-    conserveFineDetail(wavelength_nm, value, s);
+    conserveIntegral(wavelength_nm, value, outside, s);
     return s;
 }
 

@@ -37,9 +37,12 @@ enum class Outside { Clamp, Zero, Error };
 
 Spectrum constantSpectrum(double value);
 
-/// Linear interpolation of (wavelength_nm, value) pairs; detail finer than a nanometre keeps its integral and its mean wavelength. Throws
-/// crt::Error(Scene) when wavelengths are not strictly increasing, lengths differ, the table is empty, a value is not finite, or `outside` is
-/// Error and 360–830 nm is not covered.
+/// Linear interpolation of (wavelength_nm, value) pairs. Detail finer than a nanometre keeps its integral
+/// and its mean wavelength. With Outside::Zero the whole table keeps its integral: the step at an end that
+/// is not zero is spread over the nanometres that it touches. Throws crt::Error(Scene) when wavelengths are
+/// not strictly increasing, lengths differ, the table is empty, a value is not finite, `outside` is Error
+/// and 360–830 nm is not covered, or `outside` is Zero and there is one wavelength alone, which has no
+/// width.
 Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vector<double>& value, Outside outside);
 
 /// Reads two-column .spd or .csv text (wavelength_nm, value; '#' comments; separators blank, tab, comma, semicolon; an

@@ -53,6 +53,21 @@ inline crt::Vec3d cross(const crt::Vec3d& a, const crt::Vec3d& b) {
 /// A unit vector in float, as near to v as rounding once allows.
 inline vec3 unitFloat(const crt::Vec3d& v) { return toFloat(unit(v)); }
 
+/// What crt_hash does, undone: its multipliers' inverses modulo 2^32, and its shifts in the other order.
+inline u32 unhash(u32 x) {
+    const auto inverse = [](u32 odd) {
+        u32 y = odd;
+        for (int i = 0; i < 5; ++i) y *= 2u - odd * y;  // Newton
+        return y;
+    };
+    static const u32 first = inverse(0x7feb352du), second = inverse(0x846ca68bu);
+    x ^= x >> 16;
+    x *= second;
+    x ^= x >> 15 ^ x >> 30;
+    x *= first;
+    return x ^ x >> 16;
+}
+
 /// The scene as the kernel sees it. `compiled` must outlive it.
 inline CrtContext contextOf(const crt::CompiledScene& compiled) {
     CrtContext ctx{};

@@ -231,6 +231,51 @@ TEST_CASE("tree, boxes and lanes find what the plain loop finds, bit by bit", "[
     CHECK(shadowDisagreements(sphere, random, 10000, &blocked) == 0);
 }
 
+#if CRT_SIMD8
+TEST_CASE(
+    "eight triangles at a time refuse no hit of a ray that starts within rounding of a triangle's plane",
+    "[kernel][rays]") {
+    Random random(27);
+    std::uint64_t accepted = 0, refused = 0;
+    for (int scene = 0; scene < 40; ++scene) {
+        const crt::CompiledScene compiled = ThreeWays::compiled(soup(random, 64), Accelerator::None);
+        const CrtContext ctx = contextOf(compiled);
+        const auto* triangles = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles);
+        const auto* blocks = CRT_ARRAY(CrtTriangle8, ctx.blob, ctx.scene->triangles8);
+        for (int i = 0; i < 50000; ++i) {
+            const CrtTriangle& target = triangles[random.below(ctx.scene->triangle_count)];
+            const Vec3d a = toDouble(vertexOf(target, 0)), b = toDouble(vertexOf(target, 1)),
+                        c = toDouble(vertexOf(target, 2));
+            const Vec3d normal = cross(minus(b, a), minus(c, a));
+            if (!(length(normal) > 0)) continue;
+            // In the plane, beside the triangle or on it, and off it by what lies on both sides of the
+            // rounding of heights.
+            const double u = random.uniform(-2, 3), v = random.uniform(-2, 3);
+            const double height = std::pow(10.0, random.uniform(-7.5, -5.7)) * (random.bits() & 1 ? 1 : -1);
+            const Vec3d in_plane = plus(a, plus(times(minus(b, a), u), times(minus(c, a), v)));
+            const vec3 o = toFloat(plus(in_plane, times(unit(normal), height)));
+            const CrtRay ray = rayOf(o, unitFloat(minus(toDouble(aimAt(target, 2, random)), toDouble(o))));
+            const CrtShear shear = crt_shear(ray);
+            const f32 slack = crt_candidate_slack(o);
+            for (u32 block = 0; block < ctx.scene->triangles8.count; ++block) {
+                const u32 lanes = crt_candidates8(blocks + block, ray, slack, CRT_INFINITY);
+                for (u32 lane = 0; lane < 8; ++lane) {
+                    CrtHit hit;
+                    const u32 slot = blocks[block].slot[lane];
+                    if (slot == CRT_NONE ||
+                        !crt_intersect_triangle(triangles + slot, shear, CRT_INFINITY, &hit))
+                        continue;
+                    ++accepted;
+                    refused += (lanes >> lane & 1) == 0;
+                }
+            }
+        }
+    }
+    CHECK(accepted > 1000000);
+    CHECK(refused == 0);
+}
+#endif
+
 TEST_CASE("and on the meshes that crt makes", "[kernel][rays]") {
     Random random(22);
     std::uint64_t hits = 0;

@@ -303,8 +303,11 @@ TEST_CASE("whatever names a number changes it", "[kernel][sampler]") {
 
 TEST_CASE("xorshift is well seeded and never stuck", "[kernel][sampler]") {
     // Its hash reaches 0, the one state that xorshift never leaves, where the low half of the index meets this value.
-    const u32 low = crt_hash(0u ^ crt_hash(5u ^ crt_hash(6u ^ crt_hash(7u + 0x9e3779b9u))));
+    const u32 key = crt_pixel_key(crt_seed(6, 7), 5, 0);
+    const u32 low = key ^ unhash(0u - crt_hash(key + 0x85ebca6bu));
+    CHECK(crt_hash(crt_hash(low ^ key) + crt_hash(key + 0x85ebca6bu)) == 0);
     CrtSampler stuck = crt_sampler_begin(CRT_SAMPLER_XORSHIFT, 0, 6, 7, 5, low);
+    CHECK(stuck.b0 == 0x6c078965u);
     CHECK(stuck.b0 != 0);
     CHECK(crt_sample_1d(&stuck, 0) != crt_sample_1d(&stuck, 0));
     // Marsaglia 2003, "Xorshift RNGs": from y = 2463534242 by 13, 17, 5 follows 723471715.

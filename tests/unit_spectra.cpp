@@ -5,6 +5,7 @@
 #include "spectra_data.h"
 #include "verify/temporary_folder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -57,6 +58,42 @@ std::pair<std::string, int> fileError(const std::string& text, Outside outside =
         return {e.what(), e.place().line};
     }
     return {"no error", -1};
+}
+
+/// Abscissae in (0, 1) and weights of Gauss's rule of three points.
+const std::pair<double, double> kGauss[] = {
+    {0.5 - std::sqrt(0.15), 5.0 / 18}, {0.5, 8.0 / 18}, {0.5 + std::sqrt(0.15), 5.0 / 18}};
+
+/// ∫ f(λ) s(λ) dλ over 360–830 nm, s linear between nanometres: f at three points of each nanometre.
+template <class F>
+double gridIntegral(const Spectrum& s, F f) {
+    double sum = 0;
+    for (std::size_t i = 0; i + 1 < s.values.size(); ++i)
+        for (const auto& [t, weight] : kGauss)
+            sum +=
+                weight * f(kWavelengthMin_nm + static_cast<double>(i) + t) * (s[i] + t * (s[i + 1] - s[i]));
+    return sum;
+}
+
+/// The same of the lines through (nm, value) and zero beyond their ends: 2000 times three points between two
+/// knots.
+template <class F>
+double tableIntegral(const std::vector<double>& nm, const std::vector<double>& value, F f) {
+    constexpr int kParts = 2000;
+    double sum = 0;
+    for (std::size_t k = 0; k + 1 < nm.size(); ++k) {
+        const double lower = std::max<double>(nm[k], kWavelengthMin_nm);
+        const double upper = std::min<double>(nm[k + 1], kWavelengthMax_nm);
+        if (!(upper > lower)) continue;
+        const double width = (upper - lower) / kParts;
+        for (int i = 0; i < kParts; ++i)
+            for (const auto& [t, weight] : kGauss) {
+                const double w = lower + (i + t) * width,
+                             slope = (value[k + 1] - value[k]) / (nm[k + 1] - nm[k]);
+                sum += weight * width * f(w) * (value[k] + (w - nm[k]) * slope);
+            }
+    }
+    return sum;
 }
 
 }  // namespace
@@ -234,8 +271,9 @@ TEST_CASE("tables are linear inside and explicit outside", "[spectra]") {
 
     const Spectrum zero = tableSpectrum({400, 500, 600}, {1, 3, 2}, Outside::Zero);
     CHECK(at(zero, 399) == 0);
-    CHECK(at(zero, 400) == 1);
-    CHECK(at(zero, 600) == 2);
+    CHECK(at(zero, 401) == Approx(clamp[41]).margin(1.0 / 300));
+    CHECK(at(zero, 402) == clamp[42]);
+    CHECK(at(zero, 598) == at(clamp, 598));
     CHECK(at(zero, 601) == 0);
 
     CHECK_THROWS_AS(tableSpectrum({400, 500}, {1, 3}, Outside::Error), Error);
@@ -261,6 +299,89 @@ TEST_CASE("tables are linear inside and explicit outside", "[spectra]") {
     CHECK_THROWS_AS(tableSpectrum({400, 400}, {1, 1}, Outside::Clamp), Error);
     CHECK_THROWS_AS(tableSpectrum({400, 500}, {1, nan}, Outside::Clamp), Error);
     CHECK_THROWS_AS(tableSpectrum({400, nan}, {1, 1}, Outside::Clamp), Error);
+}
+
+TEST_CASE("tables with zero outside keep their integral, wherever they end", "[spectra]") {
+    const std::pair<std::vector<double>, std::vector<double>> tables[] = {
+        {{549, 551}, {1, 1}},
+        {{549.001, 550.999}, {1, 1}},
+        {{540, 570}, {1, 1}},
+        {{540.5, 570}, {1, 2}},
+        {{540, 570.25}, {3, 0}},
+        {{540, 550, 590, 600}, {0, 1, 1, 0}},
+        {{549, 551}, {0, 2}},
+        {{550, 551}, {1, 3}},
+        {{549, 550, 551}, {1, 4, 1}},
+        {{550, 550.5}, {1, 1}},
+        {{550.5, 551}, {2, 1}},
+        {{550.3, 550.4}, {5, 7}},
+        {{549.9, 550.1}, {4, 4}},
+        {{550, 550.001}, {1000, 1000}},
+        {{549.999, 550}, {1000, 0}},
+        {{588.28, 588.3, 588.32}, {0, 50, 0}},
+        {{500, 500.5, 501, 700}, {1, 0, 1, .25}},
+        {{360, 362}, {1, 1}},
+        {{360.25, 360.75}, {1, 1}},
+        {{829.25, 830}, {1, 1}},
+        {{828, 830}, {1, 1}},
+        {{300, 400}, {1, 1}},
+        {{800, 900}, {2, 2}},
+        {{300, 360}, {1, 1}},
+        {{830, 900}, {1, 1}},
+        {{100, 200}, {1, 1}},
+    };
+    const auto one = [](double) { return 1.0; };
+    for (const auto& [nm, value] : tables) {
+        CAPTURE(nm, value);
+        const Spectrum s = tableSpectrum(nm, value, Outside::Zero);
+        CHECK(s.min() >= 0);
+        CHECK(s.max() <= *std::max_element(value.begin(), value.end()));
+        CHECK(gridIntegral(s, one) == Approx(tableIntegral(nm, value, one)).epsilon(1e-12));
+    }
+}
+
+TEST_CASE("tables with zero outside act on smooth functions as they are written", "[spectra]") {
+    // A curve as narrow as those of the eye. The nanometre that a step is spread over costs up to (1 nm)²/3
+    // of the second derivative.
+    const auto curve = [](double nm) { return std::exp(-0.5 * (nm - 555) * (nm - 555) / (40.0 * 40.0)); };
+    const double second = 1.0 / (40.0 * 40.0);  // The largest of the second derivative, at the top.
+    const std::pair<std::vector<double>, std::vector<double>> tables[] = {
+        {{549, 551}, {1, 1}},     {{549.001, 550.999}, {1, 1}}, {{540, 570}, {1, 1}},
+        {{540.4, 569.7}, {1, 1}}, {{500, 550}, {0, 1}},         {{500, 550.5}, {1, .5}},
+        {{549, 551}, {0, 2}},     {{520, 521}, {1, 3}},         {{520.2, 520.3}, {1, 3}},
+        {{589, 589.001}, {1, 1}}, {{400, 700}, {1, 1}},         {{540, 550, 590, 600}, {2, 1, 1, 3}},
+    };
+    for (const auto& [nm, value] : tables) {
+        CAPTURE(nm, value);
+        const double expected = tableIntegral(nm, value, curve),
+                     bare = tableIntegral(nm, value, [](double) { return 1.0; });
+        const double found = gridIntegral(tableSpectrum(nm, value, Outside::Zero), curve);
+        CHECK(std::abs(found - expected) < second * bare / 3);
+    }
+    // The luminance of two nanometres, with ends on whole nanometres and just inside them.
+    const auto luminance = [](double first, double last) {
+        return spectrumToXyz(tableSpectrum({first, last}, {1, 1}, Outside::Zero))[1];
+    };
+    CHECK(luminance(549, 551) == Approx(luminance(549.001, 550.999) * 2 / 1.998).epsilon(1e-5));
+    CHECK(luminance(549, 551) == Approx(2 * 0.9949501 / cieYIntegral()).epsilon(1e-4));  // ȳ(550)
+}
+
+TEST_CASE("a step within a narrow table keeps its mean wavelength", "[spectra]") {
+    const std::pair<std::vector<double>, std::vector<double>> tables[] = {
+        {{549, 550}, {0, 2}},     {{549.001, 549.999}, {0, 2}}, {{550, 550.5}, {1, 1}},
+        {{549.75, 550.25}, {1, 2}}, {{550, 551}, {3, 1}}};
+    const auto identity = [](double nm) { return nm - 550; };
+    for (const auto& [nm, value] : tables) {
+        CAPTURE(nm, value);
+        const double found = gridIntegral(tableSpectrum(nm, value, Outside::Zero), identity);
+        CHECK(found == Approx(tableIntegral(nm, value, identity)).margin(1e-12));
+    }
+}
+
+TEST_CASE("with zero outside, one wavelength alone is refused", "[spectra]") {
+    for (const double nm : {300.0, 550.0, 550.3})
+        CHECK_THROWS_WITH(tableSpectrum({nm}, {1}, Outside::Zero),
+                          Contains("one wavelength") && Contains("outside: clamp"));
 }
 
 TEST_CASE("spectrum files are read as people write them", "[spectra]") {

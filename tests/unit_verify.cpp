@@ -53,7 +53,7 @@ TEST_CASE("every case of the suite says what is asked, what is expected and from
     }
     // Left out of no group: the list of the suite's plan, of relations the exact ones.
     for (const auto& [group, count] : {std::pair{'A', 18}, {'B', 10}, {'C', 16}, {'D', 10}, {'E', 14}, {'F', 10}, {'G', 11}, {'H', 11}, {'I', 14}, {'J', 8},
-                                       {'K', 6}, {'L', 7}, {'M', 19}, {'N', 13}})
+                                       {'K', 6}, {'L', 7}, {'M', 19}, {'N', 13}, {'O', 9}})
         for (int i = 1; i <= count; ++i) {
             const std::string id = fmt::format("{}{:02}", group, i);
             INFO(id);
@@ -119,6 +119,18 @@ TEST_CASE("form factors agree by two formulas, and with published values", "[ver
     CHECK(squareFormFactor(0, 0.5) == Approx(.2394564705).epsilon(1e-9));
     CHECK(squareFormFactor(20, 0.5) == Approx(1.982807681e-6).epsilon(1e-8));
     CHECK(squareFormFactor(0, 5e-5) == Approx(3.18309885123e-9).epsilon(1e-10));
+    // Two rectangles with a common edge: Howell's C-14 against the mean of Lambert's formula over one of
+    // them.
+    CHECK(perpendicularFormFactor(1, 1) == Approx(.2000437761).epsilon(1e-9));
+    for (const auto& [depth, height] : {std::pair{1.0, 1.0}, {0.25, 2.0}, {2.0, 0.5}}) {
+        const std::vector<Vec3d> wall{{-.5, 0, 0}, {.5, 0, 0}, {.5, height, 0}, {-.5, height, 0}};
+        const double sum = rectangleIntegral(
+            [&](double x, double s) {
+                return 2 * s * polygonFormFactor({x, 0, s * s}, {0, 1, 0}, wall);
+            },
+            -.5, .5, 0, std::sqrt(depth), 8);
+        CHECK(perpendicularFormFactor(depth, height) == Approx(sum / depth).epsilon(1e-5));
+    }
     // The part of a wall below the horizon does not count: half of an upright square that straddles it.
     CHECK(polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{1, -1, -1}, {1, 1, -1}, {1, 1, 1}, {1, -1, 1}}) ==
           Approx(polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{1, 0, -1}, {1, 1, -1}, {1, 1, 1}, {1, 0, 1}})).epsilon(1e-12));

@@ -147,7 +147,8 @@ CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, u32 seed_low,
     if (CRT_HAS(XORSHIFT) && kind == CRT_SAMPLER_XORSHIFT) {
         /* Marsaglia's xorshift32 has one bad state, 0, and neighbouring seeds give neighbouring streams: seed it with a hash. */
         const u32 key = crt_pixel_key(crt_seed(seed_low, seed_high), pixel, high);
-        const u32 h = crt_hash(crt_hash(low ^ key) + crt_hash(key));
+        /* Not + crt_hash(key), which would be the same for key and key ^ low. */
+        const u32 h = crt_hash(crt_hash(low ^ key) + crt_hash(key + 0x85ebca6bu));
         s.b0 = h != 0u ? h : 0x6c078965u;
     }
     return s;

@@ -12,7 +12,7 @@
 namespace crt::verify {
 namespace {
 
-constexpr std::array<std::pair<char, const char*>, 14> kGroups{{
+constexpr std::array<std::pair<char, const char*>, 15> kGroups{{
     {'A', "Closed forms"},
     {'B', "Scale and position"},
     {'C', "Degenerate and awkward geometry"},
@@ -27,6 +27,7 @@ constexpr std::array<std::pair<char, const char*>, 14> kGroups{{
     {'L', "Floating point environment and backends"},
     {'M', "Relations between images"},
     {'N', "Faults that no other case would notice"},
+    {'O', "Emitters in contact"},
 }};
 
 constexpr std::array kLevels{"commit", "merge", "nightly"};
@@ -74,8 +75,10 @@ Verdict worst(const std::vector<Outcome>& outcomes) {
 const std::vector<Case>& registry() {
     static const std::vector<Case> cases = [] {
         std::vector<Case> all;
-        for (const auto group : {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases, stiffCases, scatteringCases, colourCases,
-                                 accumulationCases, imageCases, inputCases, backendCases, exactRelationCases, mutantCases})
+        for (const auto group :
+             {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases, stiffCases,
+              scatteringCases, colourCases, accumulationCases, imageCases, inputCases, backendCases,
+              exactRelationCases, mutantCases, contactCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

@@ -95,5 +95,6 @@ std::vector<Case> inputCases();          ///< K
 std::vector<Case> backendCases();        ///< L
 std::vector<Case> exactRelationCases();  ///< M01 to M19
 std::vector<Case> mutantCases();         ///< N
+std::vector<Case> contactCases();        ///< O
 
 }  // namespace crt::verify

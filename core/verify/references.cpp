@@ -56,6 +56,16 @@ double squareFormFactor(double x, double half_side) {
     return 2 * (cornerFormFactor(u1, half_side) - cornerFormFactor(u0, half_side));
 }
 
+double perpendicularFormFactor(double depth, double height) {
+    const double w2 = depth * depth, h2 = height * height, r2 = w2 + h2, r = std::sqrt(r2);
+    const double logarithms = std::log((1 + w2) * (1 + h2) / (1 + r2)) +
+                              w2 * std::log(w2 * (1 + r2) / ((1 + w2) * r2)) +
+                              h2 * std::log(h2 * (1 + r2) / ((1 + h2) * r2));
+    return (depth * std::atan(1 / depth) + height * std::atan(1 / height) - r * std::atan(1 / r) +
+            0.25 * logarithms) /
+           (kPi * depth);
+}
+
 double rectangleIntegral(const std::function<double(double, double)>& f, double u0, double u1, double v0, double v1, int panels) {
     using Gauss = boost::math::quadrature::gauss<double, 30>;
     double sum = 0;

@@ -18,6 +18,10 @@ double polygonFormFactor(const Vec3d& point, const Vec3d& normal, const std::vec
 /// the same number.
 double squareFormFactor(double x, double half_side);
 
+/// The same between two rectangles that stand on each other at a right angle with a common edge of length 1:
+/// from the one that reaches `depth` away from the edge to the one that reaches `height` (Howell, C-14).
+double perpendicularFormFactor(double depth, double height);
+
 /// ∫∫ f(u, v) over [u0, u1] × [v0, v1], Gauss–Legendre of 30 × 30 points on `panels` × `panels` panels.
 double rectangleIntegral(const std::function<double(double, double)>& f, double u0, double u1, double v0, double v1, int panels = 4);
 
