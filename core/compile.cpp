@@ -25,7 +25,12 @@
 namespace crt {
 namespace {
 
-/// Up to this many triangles `auto` takes the brute-force loop. A choice, not yet a measurement: `bench/run accelerators` finds the crossover.
+static_assert(kSpectrumSize == CRT_WAVELENGTH_COUNT && CRT_SPECTRUM_STRIDE == CRT_WAVELENGTH_COUNT + 1 &&
+                  kWavelengthMin_nm == CRT_WAVELENGTH_MIN_NM,
+              "the host's spectra are the kernel's tables");
+
+/// Up to this many triangles `auto` takes the brute-force loop. `bench/run accelerators` measures where the
+/// tree begins to pay.
 constexpr std::size_t kBruteForceTriangles = 64;
 
 /// By a power of two first, so that no square overflows or vanishes.

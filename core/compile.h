@@ -32,7 +32,7 @@ struct CompiledScene {
 };
 
 /// `aovs` are the bits of Aov that outputs ask for. Warns about a scene without light. Throws crt::Error(Scene) for scenes that cannot be
-/// flattened (coordinates too large, more than 2^31 triangles).
+/// flattened (coordinates too large, more than 2^28 triangles).
 CompiledScene compileScene(const Scene& scene, std::uint32_t aovs);
 
 /// "bvh, diffuse, nee": the names of a mask.

@@ -215,7 +215,7 @@ CRT_FN vec4 crt_view(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
         }
     }
     if (which == CRT_NONE) return splat4(0.0f);
-    /* A colour an object, shaded by the distance that the ray spends inside, as if the boxes were fog. */
+    /* A colour an object, in one of three shades by the axis of the face that the ray meets. */
     const u32 h = crt_hash(which + 1u);
     const vec3 c = abs3((path->ray.o + path->ray.d * nearest) - (crt_load3(objects[which].lower) + crt_load3(objects[which].upper)) * 0.5f);
     const vec3 extent = (crt_load3(objects[which].upper) - crt_load3(objects[which].lower)) * 0.5f;
