@@ -65,7 +65,7 @@ class Compiler {
 public:
     Compiler(const Scene& scene, std::uint32_t aovs) : scene_(scene) {
         header_.magic = CRT_SCENE_MAGIC;
-        out_.aovs = aovs & (kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive);
+        out_.aovs = aovs & kAovsOfFirstHits;
         if (hasReplicates(scene_)) out_.aovs |= kAovReplicates;
     }
 
@@ -413,16 +413,11 @@ private:
         header_.width = cropped ? static_cast<std::uint32_t>(film.crop[2] - film.crop[0]) : header_.film_width;
         header_.height = cropped ? static_cast<std::uint32_t>(film.crop[3] - film.crop[1]) : header_.film_height;
         header_.aovs = out_.aovs;
-        header_.channels = CRT_CHANNELS_BASE;
-        const auto take = [&](std::uint32_t aov, std::uint32_t& first, std::uint32_t channels) {
-            if (!(out_.aovs & aov)) return;
-            first = header_.channels;
-            header_.channels += channels;
-        };
-        take(kAovAlbedo, header_.albedo_channel, 3);
-        take(kAovNormal, header_.normal_channel, 3);
-        take(kAovDepth, header_.depth_channel, 1);
-        take(kAovReplicates, header_.replicate_channel, CRT_REPLICATES);
+        header_.channels = channelsFor(out_.aovs);
+#define CRT_SET_CHANNEL(bit, NAME, Name, stem, width, SOURCE, name, exr) \
+    header_.stem##_channel = firstChannel(out_.aovs, kAov##Name);
+        CRT_CHANNEL_LIST(CRT_SET_CHANNEL)
+#undef CRT_SET_CHANNEL
         header_.depth_scale = static_cast<float>(std::ldexp(1.0, -out_.scale_exponent));
         out_.width = header_.width;
         out_.height = header_.height;
@@ -496,7 +491,7 @@ private:
         need(header_.camera.lens_radius > 0, CRT_FEATURE_LENS);
         need(header_.filter.count > 0, CRT_FEATURE_FILTER);
         need(!isPath(), CRT_FEATURE_VIEW);
-        need((out_.aovs & ~kAovReplicates) != 0, CRT_FEATURE_AOV);
+        need((out_.aovs & kAovsOfFirstHits) != 0, CRT_FEATURE_AOV);
         need((out_.aovs & kAovReplicates) != 0, CRT_FEATURE_REPLICATES);
         header_.features = f;
         out_.features = f;

@@ -1,5 +1,6 @@
 #include "film.h"
 
+#include "aov.h"
 #include "error_estimate.h"
 #include "kernel/layout.h"
 
@@ -14,10 +15,6 @@ namespace crt {
 namespace {
 
 static_assert(Film::kReplicates == CRT_REPLICATES);
-static_assert(kAovAlbedo == CRT_AOV_ALBEDO && kAovNormal == CRT_AOV_NORMAL && kAovDepth == CRT_AOV_DEPTH &&
-                  kAovPrimitive == CRT_AOV_PRIMITIVE && kAovReplicates == CRT_AOV_REPLICATES,
-              "the film's AOV bits are the kernel's");
-
 /// a + b = sum + error exactly (Knuth 1969, TAOCP 2, 4.2.2). Needs no |a| ≥ |b|.
 void twoSum(double a, double b, double& sum, double& error) {
     sum = a + b;
@@ -33,22 +30,6 @@ void addPair(double* pair, const double* other) {
     twoSum(pair[1], other[1], low, low_error);
     twoSum(high, high_error + low, high, low);
     twoSum(high, low + low_error, pair[0], pair[1]);
-}
-
-/// First film channel of an AOV; the order is the kernel's: albedo, normal, depth, replicates, each only when asked for.
-std::uint32_t firstChannel(std::uint32_t aovs, std::uint32_t aov) {
-    std::uint32_t channel = CRT_CHANNELS_BASE;
-    if (aov == kAovAlbedo) return channel;
-    if (aovs & kAovAlbedo) channel += 3;
-    if (aov == kAovNormal) return channel;
-    if (aovs & kAovNormal) channel += 3;
-    if (aov == kAovDepth) return channel;
-    if (aovs & kAovDepth) channel += 1;
-    return channel;
-}
-
-std::uint32_t channelsFor(std::uint32_t aovs) {
-    return firstChannel(aovs, kAovReplicates) + ((aovs & kAovReplicates) ? CRT_REPLICATES : 0);
 }
 
 /// Samples of `range` that belong to a replicate: its turn is one block in every round of all replicates.
@@ -178,11 +159,11 @@ std::uint64_t Film::invalidSamples() const {
 
 Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     const FilmShape& shape = film.shape();
-    constexpr std::uint32_t kInFilm = kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive;
-    if (const std::uint32_t missing = aovs & kInFilm & ~shape.aovs; missing != 0) {
-        const char* name = missing & kAovAlbedo ? "albedo" : missing & kAovNormal ? "normal" : missing & kAovDepth ? "depth" : "primitive";
-        throw Error(ErrorKind::Usage, fmt::format("an output asks for the {} plane, but the film was rendered without it", name));
-    }
+    for (const AovRow& row : kAovRows)
+        if ((aovs & kAovsOfFirstHits & ~shape.aovs & row.aov) != 0)
+            throw Error(ErrorKind::Usage,
+                        fmt::format("an output asks for the {} plane, but the film was rendered without it",
+                                    row.name));
 
     const ColorSpace space = scene.film.color_space;
     const double exposure = std::exp2(scene.film.exposure_ev);
@@ -207,13 +188,11 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     image.width = shape.width;
     image.height = shape.height;
     image.channels = {"R", "G", "B"};
-    if (aovs & kAovAlbedo) image.channels.insert(image.channels.end(), {"Albedo.R", "Albedo.G", "Albedo.B"});
-    if (aovs & kAovNormal) image.channels.insert(image.channels.end(), {"Ns.X", "Ns.Y", "Ns.Z"});
-    if (aovs & kAovDepth) image.channels.emplace_back("Z");
-    if (aovs & kAovVariance) image.channels.emplace_back("Variance.Y");
-    if (aovs & kAovError) image.channels.emplace_back("StdError.Y");
-    if (aovs & kAovPrimitive) image.integer_channels.emplace_back("id.primitive");
-    if (aovs & kAovSamples) image.integer_channels.emplace_back("sampleCount");
+    for (const AovRow& row : kAovRows) {
+        if ((aovs & row.aov) == 0) continue;
+        std::vector<std::string>& names = row.integer ? image.integer_channels : image.channels;
+        for (std::string& name : exrNames(row)) names.push_back(std::move(name));
+    }
 
     const LuminanceVariance variance(film);
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
@@ -224,19 +203,30 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     };
     for (std::uint32_t y = 0; y < shape.height; ++y)
         for (std::uint32_t x = 0; x < shape.width; ++x) {
-            const auto triple = [&](std::uint32_t c) { return Vec3d{film.mean(x, y, c), film.mean(x, y, c + 1), film.mean(x, y, c + 2)}; };
+            const auto triple = [&](std::uint32_t c) {
+                return Vec3d{film.mean(x, y, c), film.mean(x, y, c + 1), film.mean(x, y, c + 2)};
+            };
+            const auto add = [&](double value) { image.pixels.push_back(static_cast<float>(value)); };
             const std::size_t pixel = std::size_t{y} * shape.width + x;
             append(multiply(color, triple(0)));
-            if (aovs & kAovAlbedo) append(multiply(albedo_color, triple(firstChannel(shape.aovs, kAovAlbedo))));
-            if (aovs & kAovNormal) append(triple(firstChannel(shape.aovs, kAovNormal)));
-            if (aovs & kAovDepth)
-                image.pixels.push_back(static_cast<float>(film.mean(x, y, firstChannel(shape.aovs, kAovDepth))));
-            if (aovs & kAovVariance) image.pixels.push_back(static_cast<float>(variance(x, y) * exposure * exposure));
-            if (aovs & kAovError) image.pixels.push_back(static_cast<float>(std::sqrt(variance(x, y)) * exposure));
-            if (aovs & kAovPrimitive) image.integers.push_back(film.primitives[pixel]);
-            if (aovs & kAovSamples)
-                image.integers.push_back(static_cast<std::uint32_t>(
-                    std::min<std::uint64_t>(film.counts[pixel], std::numeric_limits<std::uint32_t>::max())));
+            // In the order of the names above.
+            for (const AovRow& row : kAovRows) {
+                if ((aovs & row.aov) == 0) continue;
+                const std::uint32_t first = firstChannel(shape.aovs, row.aov);
+                switch (row.aov) {
+                    case kAovAlbedo: append(multiply(albedo_color, triple(first))); break;
+                    case kAovNormal: append(triple(first)); break;
+                    case kAovDepth: add(film.mean(x, y, first)); break;
+                    case kAovReplicates: break;
+                    case kAovPrimitive: image.integers.push_back(film.primitives[pixel]); break;
+                    case kAovVariance: add(variance(x, y) * exposure * exposure); break;
+                    case kAovSamples:
+                        image.integers.push_back(static_cast<std::uint32_t>(std::min<std::uint64_t>(
+                            film.counts[pixel], std::numeric_limits<std::uint32_t>::max())));
+                        break;
+                    case kAovError: add(std::sqrt(variance(x, y)) * exposure); break;
+                }
+            }
         }
 
     image.chromaticities = chromaticities(space);

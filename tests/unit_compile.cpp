@@ -602,17 +602,36 @@ TEST_CASE("AOVs take channels in order, and only those that are asked for", "[co
     const CompiledScene replicates = compiled(litFloor());
     CHECK(headerOf(replicates).replicate_channel == CRT_CHANNELS_BASE);
     CHECK(replicates.channels == CRT_CHANNELS_BASE + CRT_REPLICATES);
-    const CompiledScene all = compiled(litFloor(), 0xffu);
-    CHECK(headerOf(all).albedo_channel == 4);
-    CHECK(headerOf(all).normal_channel == 7);
-    CHECK(headerOf(all).depth_channel == 10);
-    CHECK(headerOf(all).replicate_channel == 11);
+    // Each behind the one before it, in the order of the list, which is that of film files.
+    const CompiledScene all = compiled(litFloor(), ~0u);
+    CHECK(headerOf(all).albedo_channel == CRT_CHANNELS_BASE);
+    CHECK(headerOf(all).normal_channel == CRT_CHANNELS_BASE + 3);
+    CHECK(headerOf(all).depth_channel == CRT_CHANNELS_BASE + 6);
+    CHECK(headerOf(all).replicate_channel == CRT_CHANNELS_BASE + 7);
     CHECK(all.channels == CRT_CHANNELS_MAX);
     const CompiledScene depth = single(crt::kAovDepth);
     CHECK(headerOf(depth).albedo_channel == 0);
-    CHECK(headerOf(depth).depth_channel == 4);
+    CHECK(headerOf(depth).depth_channel == CRT_CHANNELS_BASE);
     CHECK(headerOf(depth).replicate_channel == 0);
-    CHECK(depth.channels == 5);
+    CHECK(depth.channels == CRT_CHANNELS_BASE + 1);
+}
+
+TEST_CASE("the bits of AOVs never change: film files hold them", "[compile]") {
+    CHECK(crt::kAovAlbedo == 1);
+    CHECK(crt::kAovNormal == 2);
+    CHECK(crt::kAovDepth == 4);
+    CHECK(crt::kAovPrimitive == 8);
+    CHECK(crt::kAovVariance == 16);
+    CHECK(crt::kAovSamples == 32);
+    CHECK(crt::kAovReplicates == 64);
+    CHECK(crt::kAovError == 128);
+    std::uint32_t seen = 0;
+    for (const crt::AovRow& row : crt::kAovRows) {
+        CHECK((seen & row.aov) == 0);  // no bit twice
+        seen |= row.aov;
+    }
+    CHECK(seen == 255);
+    CHECK(crt::kAovsOfFirstHits == 15);
 }
 
 TEST_CASE("the hash is the scene's: the same for the same, another for another", "[compile]") {

@@ -243,7 +243,7 @@ TEST_CASE("expanding includes", "[loader]") {
 
 TEST_CASE("CRT_KERNEL_DIR replaces the embedded sources", "[loader]") {
     const TemporaryFolder directory;
-    for (const char* header : {"layout.h", "features.h", "dialect.h"}) {
+    for (const char* header : {CRT_LAYOUT_HEADERS, "dialect.h"}) {
         fs::copy(fs::path(CRT_SOURCE_DIR) / "core/kernel" / header, directory.path());
     }
     directory.write("path.h", "#include \"layout.h\"\nint changed;\n");

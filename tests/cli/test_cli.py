@@ -652,6 +652,18 @@ class Info(CliTest):
         for word in ("24 x 16", "R, G, B", "crt/sceneHash", "fake"):
             self.assertIn(word, text)
 
+    def test_every_aov_of_a_scene_is_in_its_exr(self):
+        channels = {"albedo": "Albedo.R, Albedo.G, Albedo.B", "normal": "Ns.X, Ns.Y, Ns.Z", "depth": "Z",
+                    "primitive": "id.primitive", "variance": "Variance.Y", "samples": "sampleCount", "error": "StdError.Y"}
+        schema = json.loads(self.crt("schema").stdout)
+        listed = re.findall(r'"aovs".*?"enum": (\[.*?\])', json.dumps(schema))
+        self.assertEqual(json.loads(listed[0]), list(channels))
+        for aov, names in channels.items():
+            self.write("aov.yaml", SCENE + f"outputs: [{{file: {aov}.exr, aovs: [{aov}]}}]\n")
+            self.crt("aov.yaml", "-b", "fake", "--spp", "64")
+            text = self.crt("info", f"{aov}.exr").stdout
+            self.assertRegex(text, rf"(?m)^(channels|integers) +(.*, )?{re.escape(names)}$")
+
     def test_the_hash_is_that_of_the_report(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
         self.assertIn(self.report("a.report.json")["scene"]["hash"], self.crt("info", "scene.yaml").stdout)
