@@ -136,7 +136,7 @@ void showFilm(const std::string& file) {
     row("invalid", counted(film.invalidSamples(), "sample", "samples"));
     row("error", error ? errorText(*error).substr(6) : "unknown");
     row("scene hash", identity.scene_hash);
-    row("written by", "crt " + identity.version);
+    row("written by", fmt::format("crt {}, bits version {}", identity.version, identity.bits_version));
 }
 
 void showImage(const std::string& file) {
