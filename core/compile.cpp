@@ -9,6 +9,7 @@
 #include "kernel/surface.h"
 #include "log.h"
 #include "near_surfaces.h"
+#include "scene_identity.h"
 #include "vec3d.h"
 
 #include <algorithm>
@@ -18,9 +19,6 @@
 #include <limits>
 #include <map>
 #include <optional>
-
-#define XXH_INLINE_ALL
-#include <xxhash.h>
 
 namespace crt {
 namespace {
@@ -534,8 +532,7 @@ private:
         out_.triangles = flat_.triangles.size();
         out_.blob.resize(bytes.size() / sizeof(CompiledScene::Line));
         std::memcpy(out_.blob.data(), bytes.data(), bytes.size());
-        const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-        out_.hash = fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+        out_.hash = sceneIdentity(out_.data(), flat_.positions);
     }
 
     const Scene& scene_;
