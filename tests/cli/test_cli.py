@@ -662,7 +662,7 @@ class Info(CliTest):
             self.write("aov.yaml", SCENE + f"outputs: [{{file: {aov}.exr, aovs: [{aov}]}}]\n")
             self.crt("aov.yaml", "-b", "fake", "--spp", "64")
             text = self.crt("info", f"{aov}.exr").stdout
-            self.assertRegex(text, rf"(?m)^(channels|integers) +(.*, )?{re.escape(names)}$")
+            self.assertRegex(text, rf"(?m)^ *(channels|integers) +(.*, )?{re.escape(names)}$")
 
     def test_the_hash_is_that_of_the_report(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
