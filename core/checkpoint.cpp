@@ -41,8 +41,11 @@ struct Header {
     std::array<char, kHashDigits> scene_hash;
     std::uint32_t version_bytes;
     std::uint32_t range_count;
+    std::uint32_t bits_version;
+    std::uint32_t reserved;
 };
-static_assert(sizeof(Header) == 88 && offsetof(Header, checksum) == 24 && offsetof(Header, scene_hash) == 48);
+static_assert(sizeof(Header) == 96 && offsetof(Header, checksum) == 24 &&
+              offsetof(Header, scene_hash) == 48);
 constexpr std::size_t kBeforeChecksum = offsetof(Header, checksum);
 constexpr std::size_t kAfterChecksum = kBeforeChecksum + sizeof(std::uint64_t);
 
@@ -133,6 +136,7 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
     std::copy_n(identity.scene_hash.data(), kHashDigits, header.scene_hash.begin());
     header.version_bytes = static_cast<std::uint32_t>(identity.version.size());
     header.range_count = static_cast<std::uint32_t>(film.samples.ranges().size());
+    header.bits_version = identity.bits_version;
     header.file_bytes = describedBytes(header);
 
     // Hashed first and written second, straight from the film: a gigabyte of sums is not copied to be saved.
@@ -214,8 +218,11 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     if (checksum.value() != header.checksum) refuse(path, kBadChecksum);
 
     // From here on the file is what a crt wrote; what is checked still is what could only be a bug of that crt.
-    FilmIdentity identity{std::string(header.scene_hash.data(), kHashDigits),
-                          std::string(reinterpret_cast<const char*>(tail.data()) + header.range_count * std::size_t{16}, header.version_bytes)};
+    FilmIdentity identity{
+        std::string(header.scene_hash.data(), kHashDigits),
+        std::string(reinterpret_cast<const char*>(tail.data()) + header.range_count * std::size_t{16},
+                    header.version_bytes),
+        header.bits_version};
     if (!isHexHash(identity.scene_hash.data(), identity.scene_hash.size())) refuse(path, "holds a scene hash that is not one");
     try {
         for (std::uint32_t i = 0; i < header.range_count; ++i) {
@@ -231,6 +238,12 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
 }
 
 void requireSameScene(const std::string& path, const FilmIdentity& found, const FilmIdentity& expected) {
+    // Before the hash, which covers the version too and could not say what differs.
+    if (found.bits_version != expected.bits_version)
+        refuse(path, fmt::format("holds samples of bits version {}, rendered by crt {}, and version {} is "
+                                 "expected: samples of two "
+                                 "versions do not make one image; render it anew",
+                                 found.bits_version, found.version, expected.bits_version));
     if (found.scene_hash != expected.scene_hash)
         refuse(path, fmt::format("is of another scene, seed or film: its hash is {}, expected is {}", found.scene_hash,
                                  expected.scene_hash));
@@ -243,6 +256,14 @@ std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& p
     std::pair<Film, FilmIdentity> merged = readCheckpoint(paths.front());
     for (std::size_t i = 1; i < paths.size(); ++i) {
         const auto [film, identity] = readCheckpoint(paths[i]);
+        if (identity.bits_version != merged.second.bits_version)
+            throw Error(
+                ErrorKind::Usage,
+                fmt::format("'{}' and '{}' hold samples of bits versions {} and {}, which do not make one "
+                            "image: render one of "
+                            "them anew",
+                            paths.front(), paths[i], merged.second.bits_version, identity.bits_version),
+                {paths[i]});
         if (identity.scene_hash != merged.second.scene_hash)
             throw Error(ErrorKind::Usage,
                         fmt::format("'{}' and '{}' are of different scenes, seeds or films: their hashes are {} and {}", paths.front(), paths[i],

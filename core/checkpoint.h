@@ -11,7 +11,9 @@
 ///     48  char[32]       scene hash, hex digits
 ///     80  u32            bytes of the crt version text
 ///     84  u32            number of sample ranges
-///     88  u64 × 2 each   sample ranges, first and end
+///     88  u32            version of the bits (kernel/bits_version.h)
+///     92  u32            0
+///     96  u64 × 2 each   sample ranges, first and end
 ///         char[]         crt version, zero-padded to 8
 ///         f64 × 2 each   sums, hi and lo, [height][width][channels]
 ///         u64 each       counts, [height][width]
@@ -27,15 +29,16 @@
 
 namespace crt {
 
-inline constexpr std::uint32_t kCheckpointVersion = 1;
+inline constexpr std::uint32_t kCheckpointVersion = 2;
 inline constexpr const char* kCheckpointExtension = ".crtfilm";
 
-/// Refuses to go on from `path` when it holds another scene than `expected`: crt::Error(Usage) naming both hashes. Warns when another version of
-/// crt wrote it, because samples of one image are promised to agree only within a version.
+/// Refuses to go on from `path` when it holds other bits or another scene than `expected`: crt::Error(Usage)
+/// naming both versions of the bits or both hashes. Warns when another version of crt wrote it: a change of
+/// bits that nobody noticed would not show otherwise.
 void requireSameScene(const std::string& path, const FilmIdentity& found, const FilmIdentity& expected);
 
 /// Adds partial films of one scene; the result does not depend on the order of `paths`. Throws crt::Error(Usage) naming the files when there is
-/// none, one is damaged, scenes or shapes differ, or two hold the same samples.
+/// none, one is damaged, bits, scenes or shapes differ, or two hold the same samples.
 std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& paths);
 
 }  // namespace crt

@@ -120,8 +120,9 @@ void showScene(const SceneRequest& what) {
 
 std::string aovText(std::uint32_t aovs) {
     std::string text;
-    for (const auto& [bit, title] : {std::pair{kAovAlbedo, "albedo"}, {kAovNormal, "normal"}, {kAovDepth, "depth"}, {kAovPrimitive, "primitive"}})
-        if (aovs & bit) text += fmt::format("{}{}", text.empty() ? "" : ", ", title);
+    for (const AovRow& row : kAovRows)
+        if ((aovs & row.aov) != 0 && !row.name.empty())
+            text += fmt::format("{}{}", text.empty() ? "" : ", ", row.name);
     return text.empty() ? "none" : text;
 }
 
@@ -135,7 +136,7 @@ void showFilm(const std::string& file) {
     row("invalid", counted(film.invalidSamples(), "sample", "samples"));
     row("error", error ? errorText(*error).substr(6) : "unknown");
     row("scene hash", identity.scene_hash);
-    row("written by", "crt " + identity.version);
+    row("written by", fmt::format("crt {}, bits version {}", identity.version, identity.bits_version));
 }
 
 void showImage(const std::string& file) {

@@ -9,6 +9,7 @@
 #include "kernel/surface.h"
 #include "log.h"
 #include "near_surfaces.h"
+#include "scene_identity.h"
 #include "vec3d.h"
 
 #include <algorithm>
@@ -20,13 +21,15 @@
 #include <map>
 #include <optional>
 
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 namespace crt {
 namespace {
 
-/// Up to this many triangles `auto` takes the brute-force loop. A choice, not yet a measurement: `bench/run accelerators` finds the crossover.
+static_assert(kSpectrumSize == CRT_WAVELENGTH_COUNT && CRT_SPECTRUM_STRIDE == CRT_WAVELENGTH_COUNT + 1 &&
+                  kWavelengthMin_nm == CRT_WAVELENGTH_MIN_NM,
+              "the host's spectra are the kernel's tables");
+
+/// Up to this many triangles `auto` takes the brute-force loop. `bench/run accelerators` measures where the
+/// tree begins to pay.
 constexpr std::size_t kBruteForceTriangles = 64;
 
 /// By a power of two first, so that no square overflows or vanishes.
@@ -61,7 +64,7 @@ class Compiler {
 public:
     Compiler(const Scene& scene, std::uint32_t aovs) : scene_(scene) {
         header_.magic = CRT_SCENE_MAGIC;
-        out_.aovs = aovs & (kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive);
+        out_.aovs = aovs & kAovsOfFirstHits;
         if (replicatesOf(scene_) > 1) out_.aovs |= kAovReplicates;
     }
 
@@ -412,18 +415,13 @@ private:
         header_.width = cropped ? static_cast<std::uint32_t>(film.crop[2] - film.crop[0]) : header_.film_width;
         header_.height = cropped ? static_cast<std::uint32_t>(film.crop[3] - film.crop[1]) : header_.film_height;
         header_.aovs = out_.aovs;
-        header_.channels = CRT_CHANNELS_BASE;
-        const auto take = [&](std::uint32_t aov, std::uint32_t& first, std::uint32_t channels) {
-            if (!(out_.aovs & aov)) return;
-            first = header_.channels;
-            header_.channels += channels;
-        };
-        take(kAovAlbedo, header_.albedo_channel, 3);
-        take(kAovNormal, header_.normal_channel, 3);
-        take(kAovDepth, header_.depth_channel, 1);
         const auto replicates = static_cast<std::uint32_t>(replicatesOf(scene_));
-        take(kAovReplicates, header_.replicate_channel, replicates - 1);
+        header_.channels = channelsFor(out_.aovs, replicates);
         header_.replicate_shift = static_cast<std::uint32_t>(std::bit_width(replicates) - 1);
+#define CRT_SET_CHANNEL(bit, NAME, Name, stem, width, SOURCE, name, exr) \
+    header_.stem##_channel = firstChannel(out_.aovs, kAov##Name);
+        CRT_CHANNEL_LIST(CRT_SET_CHANNEL)
+#undef CRT_SET_CHANNEL
         header_.depth_scale = static_cast<float>(std::ldexp(1.0, -out_.scale_exponent));
         out_.width = header_.width;
         out_.height = header_.height;
@@ -497,7 +495,7 @@ private:
         need(header_.camera.lens_radius > 0, CRT_FEATURE_LENS);
         need(header_.filter.count > 0, CRT_FEATURE_FILTER);
         need(!isPath(), CRT_FEATURE_VIEW);
-        need((out_.aovs & ~kAovReplicates) != 0, CRT_FEATURE_AOV);
+        need((out_.aovs & kAovsOfFirstHits) != 0, CRT_FEATURE_AOV);
         need((out_.aovs & kAovReplicates) != 0, CRT_FEATURE_REPLICATES);
         header_.features = f;
         out_.features = f;
@@ -538,8 +536,7 @@ private:
         out_.triangles = flat_.triangles.size();
         out_.blob.resize(bytes.size() / sizeof(CompiledScene::Line));
         std::memcpy(out_.blob.data(), bytes.data(), bytes.size());
-        const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-        out_.hash = fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+        out_.hash = sceneIdentity(out_.data(), flat_.positions);
     }
 
     const Scene& scene_;

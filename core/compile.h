@@ -23,7 +23,7 @@ struct CompiledScene {
     std::uint64_t triangles = 0, emitters = 0, objects = 0, nodes = 0;
     int scale_exponent = 0;           ///< World lengths were multiplied by 2^scale_exponent after centring.
     Vec3d centre{};                   ///< In the author's units.
-    std::string hash;                 ///< 32 hex digits, XXH3-128 of the blob.
+    std::string hash;  ///< 32 hex digits: what a film of this scene belongs to (scene_identity.h).
     double build_seconds = 0;         ///< BVH.
     double compile_seconds = 0;
     std::vector<std::pair<std::string, std::string>> left_out;  ///< What this scene does not need, and why.
@@ -32,7 +32,7 @@ struct CompiledScene {
 };
 
 /// `aovs` are the bits of Aov that outputs ask for. Warns about a scene without light. Throws crt::Error(Scene) for scenes that cannot be
-/// flattened (coordinates too large, more than 2^31 triangles).
+/// flattened (coordinates too large, more than 2^28 triangles).
 CompiledScene compileScene(const Scene& scene, std::uint32_t aovs);
 
 /// "bvh, diffuse, nee": the names of a mask.

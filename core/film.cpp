@@ -1,5 +1,6 @@
 #include "film.h"
 
+#include "aov.h"
 #include "error_estimate.h"
 #include "kernel/layout.h"
 
@@ -13,10 +14,6 @@
 
 namespace crt {
 namespace {
-
-static_assert(kAovAlbedo == CRT_AOV_ALBEDO && kAovNormal == CRT_AOV_NORMAL && kAovDepth == CRT_AOV_DEPTH &&
-                  kAovPrimitive == CRT_AOV_PRIMITIVE && kAovReplicates == CRT_AOV_REPLICATES,
-              "the film's AOV bits are the kernel's");
 
 /// a + b = sum + error exactly (Knuth 1969, TAOCP 2, 4.2.2). Needs no |a| ≥ |b|.
 void twoSum(double a, double b, double& sum, double& error) {
@@ -35,29 +32,9 @@ void addPair(double* pair, const double* other) {
     twoSum(high, low + low_error, pair[0], pair[1]);
 }
 
-/// First film channel of an AOV; the order is the kernel's: albedo, normal, depth, replicates, each only when asked for.
-std::uint32_t firstChannel(std::uint32_t aovs, std::uint32_t aov) {
-    std::uint32_t channel = CRT_CHANNELS_BASE;
-    if (aov == kAovAlbedo) return channel;
-    if (aovs & kAovAlbedo) channel += 3;
-    if (aov == kAovNormal) return channel;
-    if (aovs & kAovNormal) channel += 3;
-    if (aov == kAovDepth) return channel;
-    if (aovs & kAovDepth) channel += 1;
-    return channel;
-}
-
-/// Channels of replicates: of each but the last, whose sum is what the others leave of the sum of all.
-std::uint32_t replicateChannels(const FilmShape& shape) {
-    const std::uint32_t first = firstChannel(shape.aovs, kAovReplicates);
-    return shape.channels > first ? shape.channels - first : 0;
-}
-
 bool hasRightChannels(const FilmShape& shape) {
-    const std::uint32_t first = firstChannel(shape.aovs, kAovReplicates);
-    if ((shape.aovs & kAovReplicates) == 0) return shape.channels == first;
-    const std::uint32_t replicates = replicateChannels(shape) + 1;
-    return shape.channels > first && std::has_single_bit(replicates) && replicates <= CRT_REPLICATES_MAX;
+    const std::uint32_t replicates = shape.replicates();
+    return shape.channels == channelsFor(shape.aovs, replicates) && std::has_single_bit(replicates) && replicates <= CRT_REPLICATES_MAX;
 }
 
 /// Samples of `range` that belong to a replicate: they take turns.
@@ -163,7 +140,10 @@ double Film::mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const
     return n == 0 ? 0.0 : sum(x, y, channel) / static_cast<double>(n);
 }
 
-std::uint32_t FilmShape::replicates() const { return (aovs & kAovReplicates) != 0 ? replicateChannels(*this) + 1 : 1; }
+std::uint32_t FilmShape::replicates() const {
+    const std::uint32_t without = channelsFor(aovs & ~kAovReplicates);
+    return (aovs & kAovReplicates) != 0 && channels > without ? channels - without + 1 : 1;
+}
 
 double Film::replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const {
     const std::uint32_t first = firstChannel(shape_.aovs, kAovReplicates), stored = replicates() - 1;
@@ -193,11 +173,11 @@ std::uint64_t Film::invalidSamples() const {
 
 Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     const FilmShape& shape = film.shape();
-    constexpr std::uint32_t kInFilm = kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive;
-    if (const std::uint32_t missing = aovs & kInFilm & ~shape.aovs; missing != 0) {
-        const char* name = missing & kAovAlbedo ? "albedo" : missing & kAovNormal ? "normal" : missing & kAovDepth ? "depth" : "primitive";
-        throw Error(ErrorKind::Usage, fmt::format("an output asks for the {} plane, but the film was rendered without it", name));
-    }
+    for (const AovRow& row : kAovRows)
+        if ((aovs & kAovsOfFirstHits & ~shape.aovs & row.aov) != 0)
+            throw Error(ErrorKind::Usage,
+                        fmt::format("an output asks for the {} plane, but the film was rendered without it",
+                                    row.name));
 
     const ColorSpace space = scene.film.color_space;
     const double exposure = std::exp2(scene.film.exposure_ev);
@@ -222,13 +202,11 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     image.width = shape.width;
     image.height = shape.height;
     image.channels = {"R", "G", "B"};
-    if (aovs & kAovAlbedo) image.channels.insert(image.channels.end(), {"Albedo.R", "Albedo.G", "Albedo.B"});
-    if (aovs & kAovNormal) image.channels.insert(image.channels.end(), {"Ns.X", "Ns.Y", "Ns.Z"});
-    if (aovs & kAovDepth) image.channels.emplace_back("Z");
-    if (aovs & kAovVariance) image.channels.emplace_back("Variance.Y");
-    if (aovs & kAovError) image.channels.emplace_back("StdError.Y");
-    if (aovs & kAovPrimitive) image.integer_channels.emplace_back("id.primitive");
-    if (aovs & kAovSamples) image.integer_channels.emplace_back("sampleCount");
+    for (const AovRow& row : kAovRows) {
+        if ((aovs & row.aov) == 0) continue;
+        std::vector<std::string>& names = row.integer ? image.integer_channels : image.channels;
+        for (std::string& name : exrNames(row)) names.push_back(std::move(name));
+    }
 
     const LuminanceVariance variance(film);
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
@@ -239,19 +217,30 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     };
     for (std::uint32_t y = 0; y < shape.height; ++y)
         for (std::uint32_t x = 0; x < shape.width; ++x) {
-            const auto triple = [&](std::uint32_t c) { return Vec3d{film.mean(x, y, c), film.mean(x, y, c + 1), film.mean(x, y, c + 2)}; };
+            const auto triple = [&](std::uint32_t c) {
+                return Vec3d{film.mean(x, y, c), film.mean(x, y, c + 1), film.mean(x, y, c + 2)};
+            };
+            const auto add = [&](double value) { image.pixels.push_back(static_cast<float>(value)); };
             const std::size_t pixel = std::size_t{y} * shape.width + x;
             append(multiply(color, triple(0)));
-            if (aovs & kAovAlbedo) append(multiply(albedo_color, triple(firstChannel(shape.aovs, kAovAlbedo))));
-            if (aovs & kAovNormal) append(triple(firstChannel(shape.aovs, kAovNormal)));
-            if (aovs & kAovDepth)
-                image.pixels.push_back(static_cast<float>(film.mean(x, y, firstChannel(shape.aovs, kAovDepth))));
-            if (aovs & kAovVariance) image.pixels.push_back(static_cast<float>(variance(x, y) * exposure * exposure));
-            if (aovs & kAovError) image.pixels.push_back(static_cast<float>(std::sqrt(variance(x, y)) * exposure));
-            if (aovs & kAovPrimitive) image.integers.push_back(film.primitives[pixel]);
-            if (aovs & kAovSamples)
-                image.integers.push_back(static_cast<std::uint32_t>(
-                    std::min<std::uint64_t>(film.counts[pixel], std::numeric_limits<std::uint32_t>::max())));
+            // In the order of the names above.
+            for (const AovRow& row : kAovRows) {
+                if ((aovs & row.aov) == 0) continue;
+                const std::uint32_t first = firstChannel(shape.aovs, row.aov);
+                switch (row.aov) {
+                    case kAovAlbedo: append(multiply(albedo_color, triple(first))); break;
+                    case kAovNormal: append(triple(first)); break;
+                    case kAovDepth: add(film.mean(x, y, first)); break;
+                    case kAovReplicates: break;
+                    case kAovPrimitive: image.integers.push_back(film.primitives[pixel]); break;
+                    case kAovVariance: add(variance(x, y) * exposure * exposure); break;
+                    case kAovSamples:
+                        image.integers.push_back(static_cast<std::uint32_t>(std::min<std::uint64_t>(
+                            film.counts[pixel], std::numeric_limits<std::uint32_t>::max())));
+                        break;
+                    case kAovError: add(std::sqrt(variance(x, y)) * exposure); break;
+                }
+            }
         }
 
     image.chromaticities = chromaticities(space);

@@ -6,6 +6,7 @@
 
 #include "compile.h"
 #include "error.h"
+#include "kernel/bits_version.h"
 
 #include <array>
 #include <cstdint>
@@ -87,10 +88,12 @@ struct Image {
 /// XYZ sums → colour image: white balance, exposure and colour space of the scene's film; AOVs as asked.
 Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs);
 
-/// Identity of what was rendered; a checkpoint of another scene, seed or film is refused.
+/// Identity of what was rendered; a checkpoint of another scene, seed, film or version of the bits is
+/// refused.
 struct FilmIdentity {
-    std::string scene_hash;   ///< 32 hex digits: XXH3-128 of the compiled scene blob (which holds seed, film and integrator).
+    std::string scene_hash;   ///< 32 hex digits: CompiledScene::hash.
     std::string version;      ///< Of crt.
+    std::uint32_t bits_version = CRT_BITS_VERSION;  ///< kernel/bits_version.h of the crt that rendered it.
 };
 
 /// Checkpoint = partial = resume file. Written to a temporary name, synced and renamed.

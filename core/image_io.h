@@ -26,8 +26,9 @@ std::optional<OutputFormat> formatOfFile(const std::string& path);
 /// chromaticities; PNG keeps the metadata; PFM and PPM keep neither. Throws crt::Error(Output).
 void writeImage(const std::string& path, OutputFormat format, const Image& image);
 
-/// Reads a PFM, PPM (8 or 16 bits), EXR, PNG, TIFF, JPEG or Radiance HDR, chosen by content. Channels named by the file; a format without names
-/// gives R, G, B (and A), grey ones repeated. 8- and 16-bit colours are decoded from sRGB. Throws crt::Error(Usage).
+/// Reads a PFM, PPM (8 or 16 bits), EXR, PNG or Radiance HDR, chosen by content. Channels named by the file;
+/// a format without names gives R, G, B (and A), grey ones repeated. 8- and 16-bit colours are decoded from
+/// sRGB. Throws crt::Error(Usage).
 Image readImage(const std::string& path);
 
 /// Value of a metadata key, or empty.

@@ -48,7 +48,8 @@ typedef struct CrtImageModule {
     /* 8-bit RGB, sRGB-encoded, interleaved. */
     int32_t (*write_png)(const char *path, uint32_t width, uint32_t height, const uint8_t *rgb, const CrtImageText *metadata,
                          uint32_t metadata_count, char *reason, uint32_t reason_size);
-    /* EXR, PNG, TIFF, JPEG or Radiance HDR, by content; the first image of a file that holds several. *image stays valid until freed. */
+    /* EXR, PNG or Radiance HDR, by content; the first image of a file that holds several. *image stays valid
+       until freed. */
     int32_t (*read)(const char *path, const CrtImagePlanes **image, char *reason, uint32_t reason_size);
     void (*free_image)(const CrtImagePlanes *image);
 } CrtImageModule;

@@ -2,6 +2,7 @@
 /// units and in double. Plain data without behaviour; scene_yaml.cpp fills it, compile.cpp flattens it.
 #pragma once
 
+#include "aov.h"
 #include "error.h"
 #include "spectra.h"
 
@@ -108,18 +109,6 @@ struct Environment {
 };
 
 enum class OutputFormat { Exr, Png, Ppm, Pfm };
-
-/// AOVs a scene may ask for. Values are bits of an AOV mask.
-enum Aov : std::uint32_t {
-    kAovAlbedo = 1u << 0,
-    kAovNormal = 1u << 1,
-    kAovDepth = 1u << 2,
-    kAovPrimitive = 1u << 3,
-    kAovVariance = 1u << 4,
-    kAovSamples = 1u << 5,
-    kAovReplicates = 1u << 6,  ///< Not an output: the sums that error estimates come from.
-    kAovError = 1u << 7,
-};
 
 struct Output {
     std::string file;  ///< As resolved: absolute or relative to the working directory.

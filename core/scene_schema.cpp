@@ -312,7 +312,7 @@ void addOutside(std::vector<SectionSchema>& all) {
                     {.name = "format", .kind = Kind::Choice, .choices = {"exr", "png", "ppm", "pfm"},
                      .doc = "By the extension of `file` when left out."},
                     {.name = "aovs", .kind = Kind::Choice, .shape = Shape::List,
-                     .choices = {"albedo", "normal", "depth", "primitive", "variance", "samples", "error"}, .fallback = "[]",
+                     .choices = aovNames(), .fallback = "[]",
                      .doc = "Further channels; exr only."}}});
 }
 

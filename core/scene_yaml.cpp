@@ -275,8 +275,9 @@ void readOutput(const SectionReader& section, std::vector<Output>& outputs) {
     if (const YamlNode* list = section.list("aovs")) {
         const KeySchema& key = *section.schema().find("aovs");
         for (const YamlNodePtr& item : list->items) {
-            std::size_t bit = 0;
-            if (readChoice(section.diagnostics(), *item, item->place, key, "an item of 'aovs'", bit)) output.aovs |= 1u << bit;
+            std::size_t choice = 0;
+            if (readChoice(section.diagnostics(), *item, item->place, key, "an item of 'aovs'", choice))
+                output.aovs |= aovNamed(key.choices[choice]);
         }
         if (!list->items.empty() && format_known && output.format != OutputFormat::Exr)
             section.error("aovs", "only exr files hold more than the image");

@@ -29,8 +29,12 @@ struct Run {
     std::uint32_t aovs = 0;
 };
 
+/// --one-kernel: the backend under test has the full kernel and no other.
+bool oneKernel();
+
 /// Compiles, opens, renders, reads back.
-crt::Film render(const crt::LoadedBackend& backend, const crt::Scene& scene, const Run& run);
+crt::Film render(const crt::LoadedBackend& backend, const crt::Scene& scene, const Run& run,
+                 CrtBackendReport* report = nullptr);
 
 /// Pixels whose XYZ (every channel, when `all`) mean differs in any bit after rounding to float.
 std::uint64_t differingPixels(const crt::Film& a, const crt::Film& b, bool all = true);

@@ -1,4 +1,5 @@
-// conformance --backend NAME [--against NAME] [Catch2 options]: one suite for every backend. Exit code 77 and one sentence when the backend cannot
+// conformance --backend NAME [--against NAME] [--one-kernel] [Catch2 options]: one suite for every backend.
+// Exit code 77 and one sentence when the backend cannot
 // run here, so that a machine without a GPU skips visibly.
 #define CATCH_CONFIG_RUNNER
 #include "conformance.h"
@@ -14,6 +15,7 @@ namespace {
 
 std::string backend_name = "embree";
 std::string reference_name = "example";
+bool one_kernel = false;
 constexpr int kSkipped = 77;
 
 }  // namespace
@@ -32,7 +34,10 @@ crt::Scene sceneFrom(const std::string& yaml, const std::vector<crt::SceneOverri
     return crt::parseScene(yaml, "conformance.yaml", ".", overrides);
 }
 
-crt::Film render(const crt::LoadedBackend& with, const crt::Scene& scene, const Run& run) {
+bool oneKernel() { return one_kernel; }
+
+crt::Film render(const crt::LoadedBackend& with, const crt::Scene& scene, const Run& run,
+                 CrtBackendReport* report) {
     const crt::CompiledScene compiled = crt::compileScene(scene, run.aovs);
     crt::Integrator integrator(with, run.options);
     integrator.setScene(compiled);
@@ -42,6 +47,7 @@ crt::Film render(const crt::LoadedBackend& with, const crt::Scene& scene, const 
     REQUIRE(integrator.render(range));
     crt::Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
     integrator.readFilm(film);
+    if (report != nullptr) *report = integrator.report();
     return film;
 }
 
@@ -71,8 +77,13 @@ double imageMean(const crt::Film& film) {
 
 int main(int argc, char** argv) {
     Catch::Session session;
-    session.cli(session.cli() | Catch::Clara::Opt(conformance::backend_name, "name")["--backend"]("backend under test, or a path to its .so") |
-                Catch::Clara::Opt(conformance::reference_name, "name")["--against"]("backend to compare bits with"));
+    session.cli(
+        session.cli() |
+        Catch::Clara::Opt(conformance::backend_name,
+                          "name")["--backend"]("backend under test, or a path to its .so") |
+        Catch::Clara::Opt(conformance::reference_name, "name")["--against"]("backend to compare bits with") |
+        Catch::Clara::Opt(conformance::one_kernel)["--one-kernel"](
+            "the backend has no lean kernels to compare"));
     if (const int code = session.applyCommandLine(argc, argv); code != 0) return code;
     crt::setLogLevel(crt::LogLevel::Error);
     try {

@@ -2,6 +2,7 @@
 #include "catch.h"
 #include "checkpoint.h"
 #include "log.h"
+#include "scene_schema.h"
 #include "verify/temporary_folder.h"
 
 #include <cstdio>
@@ -93,6 +94,16 @@ TEST_CASE("a checkpoint of a film with an impossible side is refused", "[checkpo
     }
 }
 
+TEST_CASE("the largest film of a scene file is the largest of a checkpoint", "[checkpoint]") {
+    const TemporaryFolder directory;
+    const std::string path = directory / "part.crtfilm";
+    const auto most = static_cast<std::uint32_t>(schemaSection("film").find("resolution")->range.max);
+    writeCheckpoint(path, Film({most, 1, 4, 0}), kIdentity);
+    CHECK(readCheckpoint(path).first.shape().width == most);
+    writeCheckpoint(path, Film({most + 1, 1, 4, 0}), kIdentity);
+    CHECK_THROWS_WITH(readCheckpoint(path), Contains("a side"));
+}
+
 TEST_CASE("the format is what checkpoint.h says", "[checkpoint]") {
     const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
@@ -104,19 +115,20 @@ TEST_CASE("the format is what checkpoint.h says", "[checkpoint]") {
     const std::string bytes = slurp(path);
     const auto u32 = [&](std::size_t at) { std::uint32_t v; std::memcpy(&v, &bytes[at], 4); return v; };
     const auto u64 = [&](std::size_t at) { std::uint64_t v; std::memcpy(&v, &bytes[at], 8); return v; };
-    REQUIRE(bytes.size() == 88 + 16 + 8 + 4 * 16 + 8);
+    REQUIRE(bytes.size() == 96 + 16 + 8 + 4 * 16 + 8);
     CHECK(bytes.substr(0, 8) == "\x89" "CRTF\r\n\x1a");
     CHECK(u32(8) == kCheckpointVersion);
-    CHECK(u32(12) == 88 + 16 + 8);
+    CHECK(u32(12) == 96 + 16 + 8);
     CHECK(u64(16) == bytes.size());
     CHECK(u32(32) == 1);
     CHECK(u32(40) == 4);
     CHECK(bytes.substr(48, 32) == kIdentity.scene_hash);
-    CHECK(u64(88) == 3);
-    CHECK(u64(96) == 5);
-    CHECK(bytes.substr(104, 8) == std::string("0.1.0\0\0\0", 8));
-    CHECK(u64(112) == 0x3ff8000000000000u);
-    CHECK(u64(176) == 2);
+    CHECK(u32(88) == CRT_BITS_VERSION);
+    CHECK(u64(96) == 3);
+    CHECK(u64(104) == 5);
+    CHECK(bytes.substr(112, 8) == std::string("0.1.0\0\0\0", 8));
+    CHECK(u64(120) == 0x3ff8000000000000u);
+    CHECK(u64(184) == 2);
 }
 
 TEST_CASE("a truncated checkpoint is refused wherever it ends", "[checkpoint]") {
@@ -175,7 +187,9 @@ TEST_CASE("what is wrong with a checkpoint is said", "[checkpoint]") {
         spit(path, bytes);
         return path;
     };
-    CHECK_THROWS_WITH(readCheckpoint(with(8, 9)), Contains("format 9") && Contains("format 1"));
+    CHECK_THROWS_WITH(
+        readCheckpoint(with(8, 9)),
+        Contains("format 9") && Contains("reads format " + std::to_string(kCheckpointVersion)));
     CHECK_THROWS_WITH(readCheckpoint(with(0, 'x')), Contains("not a crt film"));
     CHECK_THROWS_WITH(readCheckpoint(with(35, 0x7f)), Contains("damaged: its header"));  // Two thousand million pixels wide.
     CHECK_THROWS_WITH(readCheckpoint(with(whole.size() / 2, static_cast<char>(~whole[whole.size() / 2]))), Contains("checksum"));
@@ -195,6 +209,30 @@ TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpo
     setLogLevel(LogLevel::Info);
     const TemporaryFolder directory;
     CHECK_THROWS_AS(writeCheckpoint(directory / "x.crtfilm", Film({1, 1, 4, 0}), {"no hash", "0.1.0"}), Error);
+}
+
+TEST_CASE("films of other bits are neither gone on with nor merged", "[checkpoint]") {
+    const TemporaryFolder directory;
+    // Even if the hash were the same, which covers the version.
+    FilmIdentity older = kIdentity;
+    older.bits_version = CRT_BITS_VERSION - 1;
+    const std::string now = directory / "now.crtfilm", then = directory / "then.crtfilm",
+                      later = directory / "later.crtfilm";
+    writeCheckpoint(now, randomFilm(kShape, {0, 4}, 1), kIdentity);
+    writeCheckpoint(then, randomFilm(kShape, {4, 8}, 2), older);
+    writeCheckpoint(later, randomFilm(kShape, {8, 12}, 3), older);
+    CHECK(readCheckpoint(now).second.bits_version == CRT_BITS_VERSION);
+    CHECK(readCheckpoint(then).second.bits_version == CRT_BITS_VERSION - 1);
+
+    const std::string version = std::to_string(CRT_BITS_VERSION),
+                      before = std::to_string(CRT_BITS_VERSION - 1);
+    CHECK_THROWS_WITH(requireSameScene(then, older, kIdentity),
+                      Contains("samples of bits version " + before +
+                               ", rendered by crt 0.1.0, and version " + version + " is expected"));
+    CHECK_THROWS_WITH(mergeCheckpoints({now, then}),
+                      Contains("bits versions " + version + " and " + before));
+    // Sums of one version add up, whoever adds them; they stay what they are.
+    CHECK(mergeCheckpoints({then, later}).second.bits_version == CRT_BITS_VERSION - 1);
 }
 
 TEST_CASE("a checkpoint that cannot be written is an output error and leaves the old one", "[checkpoint]") {

@@ -4,10 +4,13 @@
 
 #include "distributions.h"
 #include "error.h"
+#include "scene_identity.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <functional>
+#include <map>
 #include <set>
 #include <string>
 
@@ -627,17 +630,36 @@ TEST_CASE("AOVs take channels in order, and only those that are asked for", "[co
     CHECK(headerOf(replicates).replicate_shift == 4);
     CHECK(headerOf(replicates).replicate_channel == CRT_CHANNELS_BASE);
     CHECK(replicates.channels == CRT_CHANNELS_BASE + 15);
-    const CompiledScene all = compiled(sixteen, 0xffu);
-    CHECK(headerOf(all).albedo_channel == 4);
-    CHECK(headerOf(all).normal_channel == 7);
-    CHECK(headerOf(all).depth_channel == 10);
-    CHECK(headerOf(all).replicate_channel == 11);
+    // Each behind the one before it, in the order of the list, which is that of film files.
+    const CompiledScene all = compiled(sixteen, ~0u);
+    CHECK(headerOf(all).albedo_channel == CRT_CHANNELS_BASE);
+    CHECK(headerOf(all).normal_channel == CRT_CHANNELS_BASE + 3);
+    CHECK(headerOf(all).depth_channel == CRT_CHANNELS_BASE + 6);
+    CHECK(headerOf(all).replicate_channel == CRT_CHANNELS_BASE + 7);
     CHECK(all.channels == CRT_CHANNELS_MAX);
     const CompiledScene depth = single(crt::kAovDepth);
     CHECK(headerOf(depth).albedo_channel == 0);
-    CHECK(headerOf(depth).depth_channel == 4);
+    CHECK(headerOf(depth).depth_channel == CRT_CHANNELS_BASE);
     CHECK(headerOf(depth).replicate_channel == 0);
-    CHECK(depth.channels == 5);
+    CHECK(depth.channels == CRT_CHANNELS_BASE + 1);
+}
+
+TEST_CASE("the bits of AOVs never change: film files hold them", "[compile]") {
+    CHECK(crt::kAovAlbedo == 1);
+    CHECK(crt::kAovNormal == 2);
+    CHECK(crt::kAovDepth == 4);
+    CHECK(crt::kAovPrimitive == 8);
+    CHECK(crt::kAovVariance == 16);
+    CHECK(crt::kAovSamples == 32);
+    CHECK(crt::kAovReplicates == 64);
+    CHECK(crt::kAovError == 128);
+    std::uint32_t seen = 0;
+    for (const crt::AovRow& row : crt::kAovRows) {
+        CHECK((seen & row.aov) == 0);  // no bit twice
+        seen |= row.aov;
+    }
+    CHECK(seen == 255);
+    CHECK(crt::kAovsOfFirstHits == 15);
 }
 
 TEST_CASE("the hash is the scene's: the same for the same, another for another", "[compile]") {
@@ -646,28 +668,135 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     CHECK(sameBytes(a, b));
     CHECK(a.hash.size() == 32);
     CHECK(a.hash.find_first_not_of("0123456789abcdef") == std::string::npos);
-    std::set<std::string> hashes{a.hash};
-    for (const std::function<void(Scene&)>& change : std::vector<std::function<void(Scene&)>>{
-             [](Scene& s) { s.sampler.seed = 1; },
-             [](Scene& s) { s.sampler.seed = std::uint64_t{1} << 32; },
-             [](Scene& s) { s.integrator.max_depth = 3; },
-             [](Scene& s) { s.integrator.roulette = false; },
-             [](Scene& s) { s.integrator.nee = false; },
-             [](Scene& s) { s.camera.position[0] = 0.5; },
-             [](Scene& s) { s.film.crop = {1, 2, 3, 4}; },
-             [](Scene& s) { s.film.height = 25; },
-             [](Scene& s) { s.materials[0].reflectance[200] = 0.25; },
-             [](Scene& s) { s.emissions[0].two_sided = true; },
-             [](Scene& s) { s.meshes[0].positions[2][1] = 1e-6; },
-         })
-        hashes.insert(changed(change).hash);
-    CHECK(hashes.size() == 12);
+    std::map<std::string, std::string> named{{a.hash, "the scene itself"}};
+    const auto differs = [&](const std::string& what, const std::function<void(Scene&)>& change) {
+        const auto [place, is_new] = named.emplace(changed(change).hash, what);
+        INFO(what << " has the hash of " << place->second);
+        CHECK(is_new);
+    };
+    differs("seed", [](Scene& s) { s.sampler.seed = 1; });
+    differs("high word of the seed", [](Scene& s) { s.sampler.seed = std::uint64_t{1} << 32; });
+    differs("sampler", [](Scene& s) { s.sampler.type = crt::SamplerType::Independent; });
+    differs("other sampler", [](Scene& s) { s.sampler.type = crt::SamplerType::XorShift; });
+    differs("replicates", [](Scene& s) { s.sampler.replicates = 1; });
+    differs("max_depth", [](Scene& s) { s.integrator.max_depth = 3; });
+    differs("roulette", [](Scene& s) { s.integrator.roulette = false; });
+    differs("roulette_depth", [](Scene& s) { s.integrator.roulette_depth += 1; });
+    differs("nee", [](Scene& s) { s.integrator.nee = false; });
+    differs("view of normals", [](Scene& s) { s.integrator.type = crt::IntegratorType::Normals; });
+    differs("view of boxes", [](Scene& s) { s.integrator.type = crt::IntegratorType::Aabb; });
+    differs("camera position", [](Scene& s) { s.camera.position[0] = 0.5; });
+    differs("camera target", [](Scene& s) { s.camera.target[1] = 0.5; });
+    differs("field of view", [](Scene& s) { s.camera.tan_half_width = 0.25; });
+    differs("lens", [](Scene& s) { s.camera.aperture_radius = 0.1; });
+    differs("focus", [](Scene& s) {
+        s.camera.aperture_radius = 0.1;
+        s.camera.focus_distance = 3;
+    });
+    differs("crop", [](Scene& s) { s.film.crop = {1, 2, 3, 4}; });
+    differs("another crop of that size", [](Scene& s) { s.film.crop = {2, 2, 4, 4}; });
+    differs("film height", [](Scene& s) { s.film.height = 25; });
+    differs("film width", [](Scene& s) { s.film.width = 33; });
+    differs("filter", [](Scene& s) {
+        s.film.filter = crt::PixelFilter::Gaussian;
+        s.film.filter_radius = 1.5;
+    });
+    differs("filter radius", [](Scene& s) {
+        s.film.filter = crt::PixelFilter::Gaussian;
+        s.film.filter_radius = 2;
+    });
+    differs("reflectance", [](Scene& s) { s.materials[0].reflectance[200] = 0.25; });
+    differs("material", [](Scene& s) { s.materials[0].type = crt::MaterialType::Mirror; });
+    differs("glass", makeGlass);
+    differs("index of the glass", [](Scene& s) {
+        makeGlass(s);
+        s.materials[0].eta = crt::constantSpectrum(1.25);
+    });
+    differs("radiance", [](Scene& s) { s.emissions[0].radiance[100] = 3; });
+    differs("two-sided", [](Scene& s) { s.emissions[0].two_sided = true; });
+    differs("what emits", [](Scene& s) { s.objects[0].emission = 0; });
+    differs("environment", [](Scene& s) { s.environment = crt::Environment{crt::constantSpectrum(1)}; });
+    differs("its radiance", [](Scene& s) { s.environment = crt::Environment{crt::constantSpectrum(2)}; });
+    differs("a vertex", [](Scene& s) { s.meshes[0].positions[2][1] = 1e-6; });
+    differs("the order of triangles",
+            [](Scene& s) { std::swap(s.meshes[0].triangles[0], s.meshes[0].triangles[1]); });
+    differs("the first vertex of a triangle", [](Scene& s) { s.meshes[1].triangles[0] = {1, 2, 0}; });
+    differs("a triangle less", [](Scene& s) { s.meshes[0].triangles.pop_back(); });
+    differs("smooth normals", [](Scene& s) {
+        s.meshes[0].normals = {{0, 1, 0}};
+        s.meshes[0].normal_index = {{0, 0, 0}, {0, 0, 0}};
+    });
+    differs("another normal", [](Scene& s) {
+        s.meshes[0].normals = {{0.6, 0.8, 0}};
+        s.meshes[0].normal_index = {{0, 0, 0}, {0, 0, 0}};
+    });
+    CHECK(compiled(litFloor(), crt::kAovDepth).hash != a.hash);
     // What the film does with the samples afterwards is not the scene's.
     CHECK(changed([](Scene& s) {
               s.film.exposure_ev = 2;
               s.title = "another";
               s.sampler.samples = 1000;
           }).hash == a.hash);
+}
+
+TEST_CASE("the hash is not that of what only finds hits sooner", "[compile]") {
+    // Enough triangles for a tree that puts them into another order, among them an emitter and smooth
+    // normals.
+    const auto withTree = [](crt::Accelerator accelerator) {
+        return changed([&](Scene& s) {
+            s.integrator.accelerator = accelerator;
+            s.objects[0].transforms.resize(20, crt::kIdentity4d);
+            for (std::size_t i = 0; i < 20; ++i) s.objects[0].transforms[i][3] = (i * 7) % 20 * 11.0;
+            s.meshes.push_back(smoothTetrahedron());
+            s.objects.emplace_back();
+            s.objects.back().mesh = 2;
+            s.objects.back().emission = 0;
+        });
+    };
+    const CompiledScene tree = withTree(crt::Accelerator::Bvh);
+    std::vector<std::uint32_t> order;
+    for (const CrtTriangle& t : listOf<CrtTriangle>(tree, headerOf(tree).triangles)) order.push_back(t.id);
+    REQUIRE_FALSE(std::is_sorted(order.begin(), order.end()));
+    REQUIRE(headerOf(tree).emitters.count > 2);
+    for (const crt::Accelerator accelerator :
+         {crt::Accelerator::None, crt::Accelerator::Aabb, crt::Accelerator::Auto}) {
+        const CompiledScene other = withTree(accelerator);
+        CHECK(other.hash == tree.hash);
+        if (accelerator == crt::Accelerator::None) CHECK(other.features != tree.features);
+    }
+}
+
+TEST_CASE("a better tree and a smaller kernel leave the hash alone", "[compile]") {
+    const Scene scene = [] {
+        Scene s = litFloor();
+        s.integrator.accelerator = crt::Accelerator::Bvh;
+        return s;
+    }();
+    CompiledScene c = compiled(scene);
+    auto& header = *reinterpret_cast<CrtScene*>(c.blob.data());
+    REQUIRE(header.nodes.count > 0);
+    std::vector<std::array<float, 9>> positions(header.triangle_count);
+    auto* triangles = const_cast<CrtTriangle*>(arrayOf<CrtTriangle>(c, header.triangles));
+    for (std::uint32_t slot = 0; slot < header.triangle_count; ++slot)
+        std::copy(std::begin(triangles[slot].p), std::end(triangles[slot].p),
+                  positions[triangles[slot].id].begin());
+    REQUIRE(crt::sceneIdentity(c.data(), positions) == c.hash);
+
+    // Two leaves change places, as another builder might put them; emitters follow their triangles.
+    std::swap(triangles[0], triangles[header.triangle_count - 1]);
+    auto* emitters = const_cast<CrtEmitter*>(arrayOf<CrtEmitter>(c, header.emitters));
+    for (std::uint32_t i = 0; i < header.emitters.count; ++i) {
+        if (emitters[i].slot == 0)
+            emitters[i].slot = header.triangle_count - 1;
+        else if (emitters[i].slot == header.triangle_count - 1)
+            emitters[i].slot = 0;
+    }
+    header.nodes.count -= 1;
+    header.features |= CRT_FEATURE_DIELECTRIC;
+    CHECK(crt::sceneIdentity(c.data(), positions) == c.hash);
+    // An emitter that does not follow shines elsewhere.
+    emitters[0].slot = emitters[0].slot == 0 ? 1 : 0;
+    CHECK(crt::sceneIdentity(c.data(), positions) != c.hash);
 }
 
 TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]") {

@@ -616,3 +616,13 @@ TEST_CASE("spectra and observer are exact at whole nanometres and linear between
         if (nm < 470) CHECK(lane(crt_spectrum(&ctx, ctx.scene->environment, splat4(at + 0.25f)), 0) == Approx(0.75 * s[nm] + 0.25 * s[nm + 1]).margin(1e-5));
     }
 }
+
+TEST_CASE("colours of views are the film's sRGB", "[kernel][spectrum]") {
+    // The kernel's matrix to XYZ against the host's from XYZ, which resolves the image.
+    const crt::Matrix3d to_rgb = crt::xyzToRgb(crt::ColorSpace::LinearSrgb);
+    for (int axis = 0; axis < 3; ++axis) {
+        const vec4 xyz = crt_srgb_to_xyz(axis == 0 ? 1.0f : 0.0f, axis == 1 ? 1.0f : 0.0f, axis == 2 ? 1.0f : 0.0f);
+        const crt::Vec3d rgb = crt::multiply(to_rgb, crt::Vec3d{V4X(xyz), V4Y(xyz), V4Z(xyz)});
+        for (int k = 0; k < 3; ++k) CHECK(rgb[k] == Approx(k == axis ? 1.0 : 0.0).margin(2e-6));
+    }
+}

@@ -4,10 +4,12 @@
 #include "backend/loader.h"
 #include "catch.h"
 #include "error.h"
+#include "kernel/bits_version.h"
 #include "verify/temporary_folder.h"
 
 #include <unistd.h>
 
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -59,14 +61,16 @@ TEST_CASE("a plugin that is not there", "[loader]") {
     CHECK_THAT(refusal("/nowhere/crt_backend_x.so"), Contains("there is no backend file /nowhere/crt_backend_x.so"));
     CHECK_THAT(refusal(""), Contains("the backend has no name"));
 
-    // A name that crt knows is not a spelling mistake.
+    // A name that crt knows is not a spelling mistake. Those that were built beside this program are found
+    // in any case.
     const TemporaryFolder empty;
     const ScopedVariable path("CRT_BACKEND_PATH", empty.path());
-    try {
-        loadBackend("cuda");
-    } catch (const Error& error) {
-        CHECK_THAT(error.what(), Contains("backend 'cuda' is not installed: no crt_backend_cuda.so in " + empty.path()));
-        CHECK_THAT(error.what(), !Contains("did you mean"));
+    for (const std::string name : {"cuda", "embree", "opencl"}) {
+        if (fs::exists(CRT_BACKEND_DIR "/crt_backend_" + name + ".so")) continue;
+        CHECK_THROWS_WITH(loadBackend(name),
+                          Contains("backend '" + name + "' is not installed: no crt_backend_" + name +
+                                   ".so in " + empty.path()) &&
+                              !Contains("did you mean"));
     }
 }
 
@@ -84,9 +88,12 @@ TEST_CASE("a plugin that cannot be opened", "[loader]") {
 TEST_CASE("a library that is no plugin of this version", "[loader]") {
     CHECK_THAT(refusal("no_symbol"), Contains("is not a crt backend, or built for another major version") &&
                                          Contains("undefined symbol: crt_backend_v1"));
-    CHECK_THAT(refusal("wrong_abi"), Contains("speaks version 2.0 of the plugin interface and this crt speaks 1.0: rebuild the plugin"));
+    CHECK_THAT(
+        refusal("wrong_abi"),
+        Contains("speaks version 2.1 of the plugin interface and this crt speaks 1.1: rebuild the plugin"));
     CHECK_THAT(refusal("no_table"), Contains("crt_backend_v1 returned no table"));
-    CHECK_THAT(refusal("small_table"), Contains("its table has 32 bytes where version 1 needs " + std::to_string(sizeof(CrtBackend))));
+    CHECK_THAT(refusal("small_table"), Contains("its table has 32 bytes where version 1 needs " +
+                                                std::to_string(offsetof(CrtBackend, bits_version))));
     CHECK_THAT(refusal("no_create"), Contains("its table lacks create"));
 }
 
@@ -99,6 +106,19 @@ TEST_CASE("a plugin built for another scene layout names both builds", "[loader]
     CHECK_THAT(refusal("wrong_layout"), Contains("was built for another scene layout, " + hex(~CRT_LAYOUT_HASH) + " (an old compiler)") &&
                                             Contains(hex(CRT_LAYOUT_HASH) + " (crt " CRT_HEADERS_VERSION ", ") &&
                                             Contains("rebuild the plugin"));
+}
+
+TEST_CASE("a plugin that renders other bits is refused by both versions and both builds", "[loader]") {
+    const auto check = [](const std::string& plugin, std::uint32_t version) {
+        CHECK_THAT(refusal(plugin),
+                   Contains("renders bits version " + std::to_string(version) +
+                            " (an old compiler), and this crt has bits version " +
+                            std::to_string(CRT_BITS_VERSION) + " (crt " CRT_HEADERS_VERSION ", ") &&
+                       Contains("rebuild the plugin"));
+    };
+    check("wrong_bits", CRT_BITS_VERSION + 1);
+    check("no_bits", 1);  // its table ends before the version
+    CHECK(refusal("fake").empty());
 }
 
 TEST_CASE("no device is an answer with a reason", "[loader]") {
@@ -145,7 +165,7 @@ TEST_CASE("the list of backends has the known ones, the found ones and every rea
     CHECK(list["fake"].reason.empty());
     CHECK(list["fake"].version == CRT_HEADERS_VERSION);
     CHECK(list["fake"].devices.size() == 2);
-    CHECK_THAT(list["wrong_abi"].reason, Contains("version 2.0"));
+    CHECK_THAT(list["wrong_abi"].reason, Contains("version 2.1"));
     CHECK_THAT(list["no_device"].reason, Contains("older than 1.2"));
     CHECK(list["no_device"].build == "an old compiler");
 }
@@ -243,7 +263,7 @@ TEST_CASE("expanding includes", "[loader]") {
 
 TEST_CASE("CRT_KERNEL_DIR replaces the embedded sources", "[loader]") {
     const TemporaryFolder directory;
-    for (const char* header : {"layout.h", "features.h", "dialect.h"}) {
+    for (const char* header : {CRT_LAYOUT_HEADERS, "dialect.h"}) {
         fs::copy(fs::path(CRT_SOURCE_DIR) / "core/kernel" / header, directory.path());
     }
     directory.write("path.h", "#include \"layout.h\"\nint changed;\n");

@@ -1,5 +1,7 @@
 // Scene YAML: what good scenes become, and for every kind of mistake that the message names place, reason and remedy.
+#include "aov.h"
 #include "catch.h"
+#include "film.h"
 #include "log.h"
 #include "scene_schema.h"
 #include "scene_yaml.h"
@@ -11,6 +13,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <map>
 
 using namespace crt;
 using crt::verify::TemporaryFolder;
@@ -126,22 +129,100 @@ TEST_CASE("writing every default of the schema out changes nothing", "[scene_yam
 }
 
 TEST_CASE("the choices of the schema are in the order of the enumerations", "[scene_yaml]") {
-    CHECK(parse("integrator: {type: aabb, accelerator: none}").integrator.type == IntegratorType::Aabb);
-    CHECK(parse("integrator: {type: normals, accelerator: none}").integrator.accelerator == Accelerator::None);
-    CHECK(parse("integrator: {accelerator: aabb}").integrator.accelerator == Accelerator::Aabb);
-    CHECK(parse("sampler: {type: independent}").sampler.type == SamplerType::Independent);
-    CHECK(parse("sampler: {type: xorshift}").sampler.type == SamplerType::XorShift);
-    CHECK(parse("film: {color_space: acescg}").film.color_space == ColorSpace::AcesCg);
-    CHECK(parse("film: {color_space: xyz}").film.color_space == ColorSpace::Xyz);
-    CHECK(parse("film: {filter: blackman-harris}").film.filter == PixelFilter::BlackmanHarris);
+    // Of every choice of the schema what it shall become; a choice that is not here fails the test.
+    const auto all = [](const std::string& section, const std::string& key, const auto& values, auto read) {
+        const std::vector<std::string>& choices = schemaSection(section).find(key)->choices;
+        INFO(section << "." << key);
+        REQUIRE(choices.size() == values.size());
+        for (std::size_t i = 0; i < choices.size(); ++i) {
+            const auto found = values.find(choices[i]);
+            INFO(choices[i]);
+            REQUIRE(found != values.end());
+            CHECK(read(choices[i]) == found->second);
+        }
+    };
+    all("integrator", "type",
+        std::map<std::string, IntegratorType>{{"path", IntegratorType::Path},
+                                              {"normals", IntegratorType::Normals},
+                                              {"aabb", IntegratorType::Aabb}},
+        [](const std::string& name) { return parse("integrator: {type: " + name + "}").integrator.type; });
+    all("integrator", "accelerator",
+        std::map<std::string, Accelerator>{{"auto", Accelerator::Auto},
+                                           {"bvh", Accelerator::Bvh},
+                                           {"aabb", Accelerator::Aabb},
+                                           {"none", Accelerator::None}},
+        [](const std::string& name) {
+            return parse("integrator: {accelerator: " + name + "}").integrator.accelerator;
+        });
+    all("sampler", "type",
+        std::map<std::string, SamplerType>{{"sobol", SamplerType::Sobol},
+                                           {"independent", SamplerType::Independent},
+                                           {"xorshift", SamplerType::XorShift}},
+        [](const std::string& name) { return parse("sampler: {type: " + name + "}").sampler.type; });
+    all("film", "color_space",
+        std::map<std::string, ColorSpace>{
+            {"srgb", ColorSpace::LinearSrgb}, {"acescg", ColorSpace::AcesCg}, {"xyz", ColorSpace::Xyz}},
+        [](const std::string& name) { return parse("film: {color_space: " + name + "}").film.color_space; });
+    all("filter", "type",
+        std::map<std::string, PixelFilter>{{"box", PixelFilter::Box},
+                                           {"gaussian", PixelFilter::Gaussian},
+                                           {"blackman-harris", PixelFilter::BlackmanHarris}},
+        [](const std::string& name) { return parse("film: {filter: " + name + "}").film.filter; });
+    all("output", "format",
+        std::map<std::string, OutputFormat>{{"exr", OutputFormat::Exr},
+                                            {"png", OutputFormat::Png},
+                                            {"ppm", OutputFormat::Ppm},
+                                            {"pfm", OutputFormat::Pfm}},
+        [](const std::string& name) {
+            return parse("outputs: [{file: a, format: " + name + "}]").outputs[0].format;
+        });
+    all("output", "aovs",
+        std::map<std::string, std::uint32_t>{{"albedo", kAovAlbedo},
+                                             {"normal", kAovNormal},
+                                             {"depth", kAovDepth},
+                                             {"primitive", kAovPrimitive},
+                                             {"variance", kAovVariance},
+                                             {"samples", kAovSamples},
+                                             {"error", kAovError}},
+        [](const std::string& name) {
+            return parse("outputs: [{file: a.exr, aovs: [" + name + "]}]").outputs[0].aovs;
+        });
+
     const Scene outputs = parse("outputs: [{file: a.exr}, {file: a.PNG}, {file: a, format: ppm}, {file: -, format: pfm}]");
     CHECK(outputs.outputs[0].format == OutputFormat::Exr);
     CHECK(outputs.outputs[1].format == OutputFormat::Png);
     CHECK(outputs.outputs[2].format == OutputFormat::Ppm);
     CHECK(outputs.outputs[3].format == OutputFormat::Pfm);
-    const std::uint32_t all = kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive | kAovVariance | kAovSamples;
-    CHECK(parse("outputs: [{file: a.exr, aovs: [albedo, normal, depth, primitive, variance, samples]}]").outputs[0].aovs == all);
-    CHECK(parse("outputs: [{file: a.exr, aovs: [depth]}]").outputs[0].aovs == kAovDepth);
+}
+
+TEST_CASE("every AOV is written by its name in a scene, alone and together", "[scene_yaml]") {
+    std::uint32_t together = 0;
+    std::string list;
+    for (const AovRow& row : kAovRows) {
+        if (row.name.empty()) continue;
+        INFO(row.name);
+        const Output output =
+            parse(fmt::format("outputs: [{{file: a.exr, aovs: [{}]}}]", row.name)).outputs[0];
+        CHECK(output.aovs == row.aov);
+        together |= row.aov;
+        list += fmt::format("{}{}", list.empty() ? "" : ", ", row.name);
+
+        // Read from the scene, resolved from a film that has what the scene asks for: the channels that the
+        // row names, and no others.
+        const std::uint32_t in_film = output.aovs & kAovsOfFirstHits;
+        const Image image = resolveImage(Film({2, 1, channelsFor(in_film), in_film}), Scene{}, output.aovs);
+        std::vector<std::string> channels = {"R", "G", "B"};
+        const std::vector<std::string> own = exrNames(row);
+        CHECK_FALSE(own.empty());
+        if (!row.integer) channels.insert(channels.end(), own.begin(), own.end());
+        CHECK(image.channels == channels);
+        CHECK(image.integer_channels == (row.integer ? own : std::vector<std::string>{}));
+        CHECK(image.pixels.size() == 2 * image.channels.size());
+        CHECK(image.integers.size() == 2 * image.integer_channels.size());
+    }
+    CHECK(parse("outputs: [{file: a.exr, aovs: [" + list + "]}]").outputs[0].aovs == together);
+    CHECK(aovNamed("") == 0);
+    CHECK(aovNamed("replicates") == 0);
 }
 
 TEST_CASE("the field of view is across the shorter side, or comes from the sensor", "[scene_yaml]") {

@@ -1,11 +1,13 @@
 // The suite of `crt verify` itself: its registry, its verdicts, its diagnoses, and that its expectations are right.
 #include "catch.h"
+#include "kernel/features.h"
 #include "kernel/layout.h"
 #include "verify/case.h"
 #include "verify/context.h"
 #include "verify/physics.h"
 #include "verify/references.h"
 #include "verify/report.h"
+#include "verify/variants.h"
 
 #include <fmt/format.h>
 
@@ -59,6 +61,13 @@ TEST_CASE("every case of the suite says what is asked, what is expected and from
             INFO(id);
             CHECK(ids.count(id) == 1);
         }
+}
+
+TEST_CASE("the scenes of the relations need together all that the kernel has", "[verify]") {
+    std::uint64_t together = 0;
+    for (const Variant& v : variants(8)) together |= v.needs;
+    INFO("no scene needs " << featureNames(CRT_FEATURES_ALL & ~together));
+    CHECK(together == CRT_FEATURES_ALL);
 }
 
 TEST_CASE("docs/stability.md is what the registry says", "[verify][docs]") {

@@ -7,7 +7,9 @@
  *
  * Versioning. Every struct begins with its own size. A minor revision only appends members; a reader uses a member only
  * if the writer's struct_size covers it. A change of meaning or order is a new major version and a new symbol name.
- * The layout hash covers kernel/layout.h and kernel/features.h: the scene blob is read as C structs, so it must be equal.
+ * The layout hash covers kernel/layout.h, channels.h and features.h: the scene blob is read as C structs, so
+ * it must be equal. The bits version says that samples are the same: it must be equal too, or one image
+ * would hold samples of two renderers.
  *
  * Threads. Each function says who may call it: [owner thread] is the one thread at a time that uses an integrator,
  * [any thread] needs no care.
@@ -22,7 +24,7 @@ extern "C" {
 #endif
 
 #define CRT_ABI_MAJOR 1
-#define CRT_ABI_MINOR 0
+#define CRT_ABI_MINOR 1 /* 1: CrtBackend::bits_version */
 
 /* The entry symbol carries the major version: a plugin of another major version simply does not have it. */
 #define CRT_BACKEND_ENTRY crt_backend_v1
@@ -173,6 +175,9 @@ typedef struct CrtBackend {
     /* Opens a device. On failure *integrator is untouched and `reason` says why. [any thread] */
     CrtStatus (*create)(const CrtHost *host, const CrtCreateInfo *info, CrtIntegrator *integrator,
                         char *reason, uint32_t reason_size);
+    /* Since 1.1: CRT_BITS_VERSION (kernel/bits_version.h) of the headers it was built with. Without it: 1. */
+    uint32_t bits_version;
+    uint32_t reserved;
 } CrtBackend;
 
 typedef const CrtBackend *(*CrtBackendEntry)(void);

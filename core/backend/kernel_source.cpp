@@ -1,5 +1,6 @@
 #include "backend/kernel_source.h"
 
+#include "backend/crt_layout_hash.h"
 #include "error.h"
 
 #include <fmt/format.h>
@@ -123,7 +124,7 @@ const char* kernelSource(const std::string& name) {
             return nullptr;
         }
         if (!directory.empty()) {
-            for (const char* header : {"layout.h", "features.h"}) {
+            for (const char* header : {CRT_LAYOUT_HEADERS}) {
                 if (text_of(header) != embeddedText(header)) {
                     throw Error(ErrorKind::Backend, fmt::format("CRT_KERNEL_DIR ({}) holds another {} than this crt was built with: rebuild crt",
                                                                 directory, header));

@@ -3,6 +3,7 @@
 #include "backend/crt_layout_hash.h"
 #include "backend/kernel_source.h"
 #include "error.h"
+#include "kernel/bits_version.h"
 #include "log.h"
 #include "yaml_reader.h"
 
@@ -89,6 +90,12 @@ std::optional<std::string> findPlugin(const std::string& name) {
                        searched, hint.empty() ? "" : "; " + hint));
 }
 
+/// Of a table that is large enough for version 1.0, which had no such member.
+std::uint32_t bitsVersionOf(const CrtBackend& table) {
+    constexpr std::size_t needed = offsetof(CrtBackend, bits_version) + sizeof(CrtBackend::bits_version);
+    return table.struct_size >= needed ? table.bits_version : 1;
+}
+
 /// The checks between dlsym and the first use of the table. `name` is what the user asked for.
 void checkTable(const std::string& name, const std::string& path, const CrtBackend* table) {
     if (table == nullptr) refuse(fmt::format("backend '{}' ({}) broke the contract: {} returned no table", name, path, CRT_BACKEND_ENTRY_NAME));
@@ -107,6 +114,13 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
     if (table->layout_hash != CRT_LAYOUT_HASH) {
         refuse(fmt::format("backend '{}' ({}) was built for another scene layout, {:016x} ({}), and this crt has {:016x} ({}): rebuild the plugin",
                            name, path, table->layout_hash, orUnknown(table->build), std::uint64_t{CRT_LAYOUT_HASH}, kHostBuild));
+    }
+    if (bitsVersionOf(*table) != CRT_BITS_VERSION) {
+        refuse(fmt::format(
+            "backend '{}' ({}) renders bits version {} ({}), and this crt has bits version {} ({}): its "
+            "samples would be "
+            "others; rebuild the plugin",
+            name, path, bitsVersionOf(*table), orUnknown(table->build), CRT_BITS_VERSION, kHostBuild));
     }
     if (table->name == nullptr || table->probe == nullptr || table->create == nullptr) {
         refuse(fmt::format("backend '{}' ({}) broke the contract: its table lacks {}", name, path,

@@ -21,6 +21,7 @@
 
 #include "backend/crt_backend.h"
 #include "backend/crt_layout_hash.h"
+#include "kernel/bits_version.h"
 #include "kernel/layout.h"
 
 #include <algorithm>
@@ -338,6 +339,7 @@ constexpr CrtBackend makeBackend(const char* name, const char* version, const ch
     table.features = features;
     table.probe = probe<List>;
     table.create = IntegratorVerbs<I>::create;
+    table.bits_version = CRT_BITS_VERSION;
     return table;
 }
 

@@ -1,6 +1,7 @@
 /*
- * bsdf.h: how surfaces scatter. One function samples a direction; the switch in it is the only dispatch. Only the Lambertian can be evaluated for a given
- * pair of directions; mirror, conductor and dielectric are smooth: their pdf is a delta.
+ * bsdf.h: how surfaces scatter. A function a kind of material samples a direction; crt_path_vertex (path.h)
+ * has the switch between them. Only the Lambertian can be evaluated for a given pair of directions; mirror,
+ * conductor and dielectric are smooth: their pdf is a delta.
  *
  * w_o and w_i point away from the surface. Radiance is transported: crossing into an index η times the other scales it by 1/η².
  */

@@ -27,13 +27,15 @@
     F(14, LENS, "thin lens")                                                                 \
     F(15, FILTER, "pixel filter other than the box")                                         \
     F(16, VIEW, "normals and bounding-box views")                                            \
-    F(17, AOV, "albedo, normal, depth and primitive outputs")                                   \
+    F(17, AOV, "albedo, normal, depth and primitive outputs")                                \
     F(18, REPLICATES, "independent replicates, from which the image knows its error")
 
 #define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,
 enum CrtFeature { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) CRT_FEATURE_END };
 
-#define CRT_FEATURES_ALL 0x7ffffu
+/* Every bit of the list. */
+#define CRT_FEATURE_BIT(bit, name, text) | (1u << bit)
+#define CRT_FEATURES_ALL (0u CRT_FEATURE_LIST(CRT_FEATURE_BIT))
 
 /* The mask that this kernel is compiled for; everything when the build says nothing. */
 #ifndef CRT_FEATURES

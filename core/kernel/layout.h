@@ -9,6 +9,7 @@
 #ifndef CRT_LAYOUT_H
 #define CRT_LAYOUT_H
 
+#include "channels.h"
 #include "dialect.h"
 
 CRT_KERNEL_BEGIN
@@ -157,15 +158,6 @@ CRT_ASSERT_SIZE(CrtCamera, 96);
 #define CRT_ACCELERATOR_BVH 1u
 #define CRT_ACCELERATOR_AABB 2u
 
-/* Film channels: X, Y, Z and Y² of each sample; those of AOVs and of the replicates follow where the scene asks for them. */
-#define CRT_CHANNELS_BASE 4u
-#define CRT_CHANNELS_MAX 26u
-#define CRT_AOV_ALBEDO 1u
-#define CRT_AOV_NORMAL 2u
-#define CRT_AOV_DEPTH 4u
-#define CRT_AOV_PRIMITIVE 8u
-#define CRT_AOV_REPLICATES 64u
-
 /* Replicates are scrambled independently of each other, so that the spread of their means is an unbiased measure of the image's error. They take turns
    sample by sample, so that all are equally full whenever a render stops. The film holds the sum of Y of each but the last, which is what is left of
    the sum of all (docs/decisions/0007-replicates.md). */
@@ -184,9 +176,10 @@ typedef struct CrtScene {
     u32 channels;
     u32 aovs;
 
-    u32 albedo_channel, normal_channel, depth_channel; /* first channel of each; 0 when not asked for */
+#define CRT_CHANNEL_MEMBER(bit, NAME, Name, stem, width, SOURCE, name, exr) u32 stem##_channel;
+    CRT_CHANNEL_LIST(CRT_CHANNEL_MEMBER) /* first channel of each; 0 when not asked for */
+
     f32 depth_scale;             /* scene units per length here: a power of two */
-    u32 replicate_channel;       /* likewise */
     u32 replicate_shift;         /* there are 2^shift replicates; 0: one sequence */
     u32 padding[2];
 

@@ -220,7 +220,7 @@ CRT_FN vec4 crt_view(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
         }
     }
     if (which == CRT_NONE) return splat4(0.0f);
-    /* A colour an object, shaded by the distance that the ray spends inside, as if the boxes were fog. */
+    /* A colour an object, in one of three shades by the axis of the face that the ray meets. */
     const u32 h = crt_hash(which + 1u);
     const vec3 c = abs3((path->ray.o + path->ray.d * nearest) - (crt_load3(objects[which].lower) + crt_load3(objects[which].upper)) * 0.5f);
     const vec3 extent = (crt_load3(objects[which].upper) - crt_load3(objects[which].lower)) * 0.5f;
@@ -239,21 +239,36 @@ CRT_FN void crt_film_add(CRT_GLOBAL f64 *pair, f64 value) {
     pair[1] = sum.lo;
 }
 
+/* What a sample adds to the channels of each AOV of the first hit: as many components as it has channels. */
+CRT_FN vec4 crt_first_hit_albedo(const CrtContext* ctx, const CrtPath* path) {
+    return crt_to_xyz(ctx, path->wavelengths, path->first.albedo);
+}
+CRT_FN vec4 crt_first_hit_normal(const CrtContext* ctx, const CrtPath* path) {
+    (void)ctx;
+    return make_vec4(V3X(path->first.normal), V3Y(path->first.normal), V3Z(path->first.normal), 0.0f);
+}
+CRT_FN vec4 crt_first_hit_depth(const CrtContext* ctx, const CrtPath* path) {
+    (void)ctx;
+    return splat4(path->first.depth);
+}
+
+CRT_FN void crt_film_add_vector(CRT_GLOBAL f64* pairs, u32 width, vec4 value) {
+    crt_film_add(pairs, (f64)V4X(value));
+    if (width > 1u) crt_film_add(pairs + 2, (f64)V4Y(value));
+    if (width > 2u) crt_film_add(pairs + 4, (f64)V4Z(value));
+    if (width > 3u) crt_film_add(pairs + 6, (f64)V4W(value));
+}
+
 /* AOV channels of one sample, into the pixel's channel pairs. */
+#define CRT_ADD_CHANNEL_FIRST_HIT(stem, width) \
+    if (scene->stem##_channel != 0u)           \
+        crt_film_add_vector(pixel + 2u * scene->stem##_channel, width, crt_first_hit_##stem(ctx, path));
+#define CRT_ADD_CHANNEL_SAMPLES(stem, width) /* crt_add_sample */
+#define CRT_ADD_CHANNEL(bit, NAME, Name, stem, width, SOURCE, name, exr) \
+    CRT_ADD_CHANNEL_##SOURCE(stem, width)
 CRT_FN void crt_add_aovs(const CrtContext *ctx, const CrtPath *path, CRT_GLOBAL f64 *pixel) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
-    if (scene->albedo_channel != 0u) {
-        const vec4 xyz = crt_to_xyz(ctx, path->wavelengths, path->first.albedo);
-        crt_film_add(pixel + 2u * scene->albedo_channel, (f64)V4X(xyz));
-        crt_film_add(pixel + 2u * scene->albedo_channel + 2u, (f64)V4Y(xyz));
-        crt_film_add(pixel + 2u * scene->albedo_channel + 4u, (f64)V4Z(xyz));
-    }
-    if (scene->normal_channel != 0u) {
-        crt_film_add(pixel + 2u * scene->normal_channel, (f64)V3X(path->first.normal));
-        crt_film_add(pixel + 2u * scene->normal_channel + 2u, (f64)V3Y(path->first.normal));
-        crt_film_add(pixel + 2u * scene->normal_channel + 4u, (f64)V3Z(path->first.normal));
-    }
-    if (scene->depth_channel != 0u) crt_film_add(pixel + 2u * scene->depth_channel, (f64)path->first.depth);
+    CRT_CHANNEL_LIST(CRT_ADD_CHANNEL)
 }
 
 /* A pixel of the crop window, some of whose samples are being taken: their sums go to its place in the film. */

@@ -67,6 +67,45 @@ void runToRun(Context& context) {
 }
 
 void lostDevices(Context& context) {
+    const Scene scene = litRoom(32, 1);
+    const CompiledScene compiled = compileScene(scene, 0);
+    const Film expected = context.render(scene, {.samples = 8});
+    const auto filmOf = [&](Integrator& integrator) {
+        Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+        integrator.readFilm(film);
+        return film;
+    };
+
+    std::string sentence = "none";
+    ErrorKind kind = ErrorKind::Internal;
+    try {
+        IntegratorOptions options;
+        options.device = "a device that is not here";
+        const Integrator integrator(context.backend(), options);
+    } catch (const Error& error) {
+        sentence = error.what();
+        kind = error.kind();
+    }
+    context.holds(
+        "a device that is not there",
+        kind == ErrorKind::Backend && sentence.find("a device that is not here") != std::string::npos,
+        "an error of the backend that names it",
+        "the wish for a device is dropped, or the failure is not passed on", sentence);
+
+    // Out of time: a host that asks for the end gets it, and the next render is not what the last one left
+    // behind.
+    Integrator integrator(context.backend(), {});
+    integrator.setScene(compiled);
+    int calls = 0;
+    const bool finished =
+        integrator.render({.sample_count = 4096}, [&](double) { return ++calls > 0; });
+    context.holds("a host that asks for the end", !finished, "the render ends before its time",
+                  "the answer of progress() is dropped", fmt::format("progress was called {} times", calls));
+    integrator.setScene(compiled);
+    integrator.render({.sample_count = 8});
+    context.sameBits("the same integrator afterwards", expected, filmOf(integrator),
+                     "what was cancelled is still in the film");
+
     context.notApplicable("a device lost, out of memory, out of time",
                           "asked of the host with a plugin that fails on demand: 'a device that fails in the middle costs little' "
                           "(tests/unit_running.cpp), tests/cli, and CUDA's own failures against a simulated driver (tests/unit_cuda_program.cpp)");

@@ -22,7 +22,7 @@ std::vector<Variant> variants(int resolution);
 void forEachVariant(Context& context, int resolution, void (*ask)(Context&, const Variant&));
 
 /// All AOVs of first hits.
-inline constexpr std::uint32_t kAllAovs = kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive;
+inline constexpr std::uint32_t kAllAovs = kAovsOfFirstHits;
 
 /// What crt's own build of the kernel gives, on one thread, in portable C++: what every backend must give.
 Film portableFilm(const Scene& scene, const Render& how);

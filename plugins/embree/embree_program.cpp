@@ -1,6 +1,6 @@
 #include "embree_program.h"
 
-#include "kernel/features.h"
+#include "embree_kernels.h"
 
 #include <array>
 
@@ -13,11 +13,11 @@ RayTotals renderAll(const TileJob& job);
 
 namespace {
 
-// CRT_EMBREE_*_FEATURES come from CMakeLists.txt, which compiles kernels.cpp with the same masks. Smallest first.
+// kernels.cpp is compiled with the same masks. Smallest first.
 constexpr std::array<Program, 3> kPrograms{{
     {"box: a handful of diffuse triangles", CRT_EMBREE_BOX_FEATURES, renderBox},
     {"mesh: diffuse meshes", CRT_EMBREE_MESH_FEATURES, renderMesh},
-    {"all features", CRT_FEATURES_ALL, renderAll},
+    {"all features", CRT_EMBREE_ALL_FEATURES, renderAll},
 }};
 
 }  // namespace

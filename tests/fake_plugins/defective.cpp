@@ -2,7 +2,9 @@
 // these happen.
 #include "backend/crt_backend.h"
 #include "backend/crt_layout_hash.h"
+#include "kernel/bits_version.h"
 
+#include <cstddef>
 #include <cstdio>
 #include <stdexcept>
 
@@ -13,6 +15,8 @@ enum Defect {
     small_table,
     wrong_abi,
     wrong_layout,
+    wrong_bits,
+    no_bits,
     no_create,
     no_device,
     many_devices,
@@ -59,7 +63,9 @@ CrtStatus create(const CrtHost*, const CrtCreateInfo*, CrtIntegrator* integrator
 }
 
 const CrtBackend kTable = {
-    kDefect == small_table ? 32 : sizeof(CrtBackend),
+    kDefect == small_table ? 32
+    : kDefect == no_bits   ? offsetof(CrtBackend, bits_version)
+                           : sizeof(CrtBackend),
     kDefect == wrong_abi ? CRT_ABI_MAJOR + 1 : CRT_ABI_MAJOR,
     CRT_ABI_MINOR,
     kDefect == wrong_layout ? ~CRT_LAYOUT_HASH : CRT_LAYOUT_HASH,
@@ -69,6 +75,8 @@ const CrtBackend kTable = {
     ~uint64_t{0},
     probe,
     kDefect == no_create ? nullptr : create,
+    kDefect == wrong_bits ? CRT_BITS_VERSION + 1 : CRT_BITS_VERSION,
+    0,
 };
 
 }  // namespace

@@ -1,0 +1,18 @@
+/*
+ * bits_version.h: one number for "renders the same samples". Raise it whenever any bit of any sample
+ * changes: in the light transport, in elementary functions, in the sampler, in what compile.cpp writes into
+ * the scene. Adding what no scene had before changes nothing.
+ *
+ * A plugin of another version is refused, and so is a film: their samples do not belong into one image. The
+ * conformance suite compares films with stored hashes (tests/bits_hashes.txt), so that a change of bits
+ * cannot go unseen; it says how to store new ones.
+ *
+ *   1   what carries no version
+ *   2   the first version that plugins and films carry
+ */
+#ifndef CRT_BITS_VERSION_H
+#define CRT_BITS_VERSION_H
+
+#define CRT_BITS_VERSION 2u
+
+#endif

@@ -1,0 +1,83 @@
+#include "scene_identity.h"
+
+#include "kernel/bits_version.h"
+
+#include <fmt/format.h>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <cstdint>
+#include <memory>
+#include <new>
+
+namespace crt {
+namespace {
+
+class IdentityHash {
+public:
+    IdentityHash() : state_(XXH3_createState()) {
+        if (!state_) throw std::bad_alloc();
+        XXH3_128bits_reset(state_.get());
+    }
+    /// The size goes first: otherwise an item could move from one array to the next unseen.
+    void add(const void* items, std::size_t count, std::size_t item_bytes) {
+        const std::uint64_t sizes[] = {count, item_bytes};
+        XXH3_128bits_update(state_.get(), sizes, sizeof sizes);
+        if (count > 0) XXH3_128bits_update(state_.get(), items, count * item_bytes);
+    }
+    std::string digits() const {
+        const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
+        return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+    }
+
+private:
+    struct Free {
+        void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
+    };
+    std::unique_ptr<XXH3_state_t, Free> state_;
+};
+
+/// The header without what names accelerators and kernels, and without places in the blob. What is added to
+/// CrtScene belongs to the identity until it is cleared here: a setting that was forgotten would mix films.
+kernel::CrtScene settingsOf(kernel::CrtScene header) {
+    header.features = 0;
+    header.accelerator = 0;
+    for (kernel::CrtSpan* span :
+         {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
+          &header.normals, &header.nodes, &header.objects, &header.materials, &header.emitters,
+          &header.spectra, &header.observer, &header.wavelengths, &header.filter})
+        *span = {};
+    return header;
+}
+
+}  // namespace
+
+std::string sceneIdentity(const unsigned char* blob, const std::vector<std::array<float, 9>>& positions) {
+    using namespace kernel;
+    const CrtScene& header = *reinterpret_cast<const CrtScene*>(blob);
+    IdentityHash hash;
+    const std::uint32_t bits_version = CRT_BITS_VERSION;
+    hash.add(&bits_version, 1, sizeof bits_version);
+    const CrtScene settings = settingsOf(header);
+    hash.add(&settings, 1, sizeof settings);
+    hash.add(positions.data(), positions.size(), sizeof positions[0]);
+    hash.add(CRT_ARRAY(CrtPrimitive, blob, header.primitives), header.primitives.count,
+             sizeof(CrtPrimitive));
+    hash.add(CRT_ARRAY(CrtNormals, blob, header.normals), header.normals.count, sizeof(CrtNormals));
+    hash.add(CRT_ARRAY(CrtMaterial, blob, header.materials), header.materials.count, sizeof(CrtMaterial));
+    hash.add(CRT_ARRAY(f32, blob, header.spectra), header.spectra.count, CRT_SPECTRUM_STRIDE * sizeof(f32));
+    hash.add(CRT_ARRAY(f32, blob, header.observer), header.observer.count, sizeof(f32));
+    hash.add(CRT_ARRAY(f32, blob, header.wavelengths), header.wavelengths.count, sizeof(f32));
+    hash.add(CRT_ARRAY(f32, blob, header.filter), header.filter.count, sizeof(f32));
+
+    // An emitter names its triangle by the place that the tree gave it.
+    const CrtEmitter* emitters = CRT_ARRAY(CrtEmitter, blob, header.emitters);
+    const CrtTriangle* triangles = CRT_ARRAY(CrtTriangle, blob, header.triangles);
+    std::vector<CrtEmitter> by_id(emitters, emitters + header.emitters.count);
+    for (CrtEmitter& emitter : by_id) emitter.slot = triangles[emitter.slot].id;
+    hash.add(by_id.data(), by_id.size(), sizeof(CrtEmitter));
+    return hash.digits();
+}
+
+}  // namespace crt

@@ -1,0 +1,19 @@
+/// What a film belongs to: the scene as the samples see it, its settings, and the version of the bits.
+/// Whatever only finds hits sooner is left out, so that another accelerator, a better tree or a smaller
+/// kernel goes on with the films that are there.
+#pragma once
+
+#include "kernel/layout.h"
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// 32 hex digits: XXH3-128 of the header's settings, of the triangles by id, of all arrays but those that
+/// accelerate, and of CRT_BITS_VERSION. `positions` are those of the triangles, by id (FlatScene); `blob`
+/// begins with the header.
+std::string sceneIdentity(const unsigned char* blob, const std::vector<std::array<float, 9>>& positions);
+
+}  // namespace crt

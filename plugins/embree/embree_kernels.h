@@ -1,0 +1,18 @@
+/// The masks that kernels.cpp is compiled with, by the names of features.h. CMakeLists.txt compiles it once
+/// per mask, and embree_program.cpp chooses between the results: both take the masks from here.
+#pragma once
+
+#include "kernel/features.h"
+
+#define CRT_EMBREE_LIT_FEATURES                                                                 \
+    (CRT_FEATURE_SOBOL | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_XORSHIFT | CRT_FEATURE_DIFFUSE | \
+     CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_FILTER | CRT_FEATURE_AOV |          \
+     CRT_FEATURE_REPLICATES)
+
+/// A handful of diffuse triangles.
+#define CRT_EMBREE_BOX_FEATURES ((unsigned)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BRUTE_FORCE))
+/// Diffuse meshes: Embree's BVH and smooth normals.
+#define CRT_EMBREE_MESH_FEATURES \
+    ((unsigned)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BVH | CRT_FEATURE_SMOOTH_NORMALS))
+/// Every scene.
+#define CRT_EMBREE_ALL_FEATURES CRT_FEATURES_ALL
