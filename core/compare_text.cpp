@@ -66,20 +66,22 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
         return;
     }
     const auto source = [](const std::string& from) { return from.empty() ? std::string("none known, taken as exact") : from; };
-    lines.heading(fmt::format("Noise or bias? By the images' own noise (A: {}; B: {}):", source(noise.source_a), source(noise.source_b)));
+    lines.heading("Noise or bias? By the images' own noise:");
+    lines.add("noise of A", source(noise.source_a));
+    lines.add("noise of B", source(noise.source_b));
     for (const ChannelBias& c : noise.channels) {
         const double scale = std::abs(c.mean_b);
-        const bool zero_inside = c.interval.contains(0);
         lines.add(("bias " + c.channel).c_str(),
                   fmt::format("{:+.3g} %, {:g} % interval [{:+.3g}, {:+.3g}] %: {}", 100 * c.difference / scale, 100 * noise.confidence,
-                              100 * c.interval.lower / scale, 100 * c.interval.upper / scale, zero_inside ? "may be noise" : "more than noise"));
+                              100 * c.interval.lower / scale, 100 * c.interval.upper / scale, c.beyondNoise() ? "more than noise" : "may be noise"));
     }
     const std::size_t channels = noise.channels.size();
     const auto at = [&](std::size_t place, std::uint32_t across, std::uint32_t side) {
         return fmt::format("at {},{}", place / channels % across * side, place / channels / across * side);
     };
     lines.add("tiles of 8x8", familyText(noise.tiles, "after Holm", at(noise.tiles.worst, noise.tiles_across, stats::kTileSide)));
-    lines.add("pixels", familyText(noise.pixels, "after Sidak", at(noise.pixels.worst, width, 1)));
+    lines.add("pixels", noise.pixels_untested.empty() ? familyText(noise.pixels, "after Sidak", at(noise.pixels.worst, width, 1))
+                                                      : "not tested: " + noise.pixels_untested);
     lines.add("rms z", fmt::format("{:.3g} (1: all of the difference is noise, and as large as the images say)", noise.rms_z));
 }
 
@@ -92,9 +94,9 @@ Json noiseJson(const NoiseComparison& noise) {
     Json json{{"source_a", noise.source_a}, {"source_b", noise.source_b}, {"confidence", noise.confidence}, {"bias", Json::array()}};
     for (const ChannelBias& c : noise.channels)
         json["bias"].push_back({{"channel", c.channel}, {"mean", {c.mean_a, c.mean_b}}, {"difference", c.difference},
-                                {"interval", {c.interval.lower, c.interval.upper}}, {"p", c.p}});
+                                {"interval", {c.interval.lower, c.interval.upper}}, {"p", c.p}, {"beyond_noise", c.beyondNoise()}});
     json["tiles"] = familyJson(noise.tiles);
-    json["pixels"] = familyJson(noise.pixels);
+    json["pixels"] = noise.pixels_untested.empty() ? familyJson(noise.pixels) : Json{{"untested", noise.pixels_untested}};
     json["rms_z"] = noise.rms_z;
     return json;
 }

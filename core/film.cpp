@@ -1,7 +1,9 @@
 #include "film.h"
 
 #include "error_estimate.h"
+#include "image_metadata.h"
 #include "kernel/layout.h"
+#include "stats/luminance_error.h"
 
 #include <fmt/format.h>
 
@@ -199,6 +201,13 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     }
     for (Vec3d& row : color)
         for (double& entry : row) entry *= exposure;
+    // The film has the noise of Y alone, and a white balance mixes X, Y and Z: what becomes of that noise is known where it changes brightness and
+    // not colour. Then the relative error of luminance stays what it was.
+    const stats::Rgb luminance_weights = stats::luminanceWeights(space);
+    const auto luminanceGain = [&](const Vec3d& xyz) {
+        if (!scene.film.white_balance || !(xyz[1] > 0)) return exposure;
+        return std::abs(stats::luminance(multiply(color, xyz), luminance_weights)) / xyz[1];
+    };
     // Albedo is a reflectance: the film has it as XYZ under equal-energy light, and a perfect white must come out as (1,1,1) in the RGB spaces
     // whatever the exposure and white balance.
     const Matrix3d albedo_color = multiply(to_rgb, bradfordAdaptation({1, 1, 1}, d65WhiteXyz()));
@@ -231,8 +240,11 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
             if (aovs & kAovNormal) append(triple(firstChannel(shape.aovs, kAovNormal)));
             if (aovs & kAovDepth)
                 image.pixels.push_back(static_cast<float>(film.mean(x, y, firstChannel(shape.aovs, kAovDepth))));
-            if (aovs & kAovVariance) image.pixels.push_back(static_cast<float>(variance(x, y) * exposure * exposure));
-            if (aovs & kAovError) image.pixels.push_back(static_cast<float>(std::sqrt(variance(x, y)) * exposure));
+            if (aovs & (kAovVariance | kAovError)) {
+                const double error = std::sqrt(variance(x, y)) * luminanceGain(triple(0));
+                if (aovs & kAovVariance) image.pixels.push_back(static_cast<float>(error * error));
+                if (aovs & kAovError) image.pixels.push_back(static_cast<float>(error));
+            }
             if (aovs & kAovPrimitive) image.integers.push_back(film.primitives[pixel]);
             if (aovs & kAovSamples)
                 image.integers.push_back(static_cast<std::uint32_t>(
@@ -245,8 +257,11 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
                       {"crt/spp", std::to_string(film.samples.count())},
                       {"crt/sampleRanges", film.samples.text()},
                       {"crt/seed", std::to_string(scene.sampler.seed)},
-                      {"crt/exposure", fmt::format("{}", scene.film.exposure_ev)},
+                      {kExposureKey, fmt::format("{}", scene.film.exposure_ev)},
+                      {kWhiteBalanceKey, whiteBalanceText(scene)},
                       {"crt/invalidSamples", std::to_string(film.invalidSamples())}};
+    if ((aovs & (kAovVariance | kAovError)) && variance.degreesOfFreedom() >= 1)
+        image.metadata.emplace_back(kErrorDofKey, fmt::format("{:.6g}", variance.degreesOfFreedom()));
     const auto& crop = scene.film.crop;
     if (crop != std::array<int, 4>{0, 0, 0, 0})
         image.metadata.emplace_back("crt/crop", fmt::format("{},{},{},{} of {}x{}", crop[0], crop[1], crop[2], crop[3], scene.film.width,

@@ -1,0 +1,133 @@
+// `crt compare` on pairs of images whose difference is known: alarms where there is none, and planted errors that must be found.
+#include "catch.h"
+#include "compare_noise.h"
+#include "image_metadata.h"
+#include "stats/pooled_tests.h"
+#include "stats/statistics.h"
+#include "synthetic_noise.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string>
+
+using namespace crt;
+using synthetic::Noise;
+using synthetic::Planted;
+using synthetic::Scenario;
+
+namespace {
+
+/// How often each kind of test speaks up, at two levels. Adjusted p-values below a level are alarms at it.
+struct Alarms {
+    static constexpr std::array<double, 2> kLevels{0.05, 0.001};
+    std::array<int, 2> mean{}, tiles{}, pixels{};
+    bool pixels_tested = true;
+    int repeats = 0;
+};
+
+Alarms countAlarms(const Scenario& s, int repeats, const Planted& planted = {}, double quality_of_b = 1, std::uint64_t seed = 1) {
+    synthetic::Maker maker(seed);
+    Alarms alarms;
+    alarms.repeats = repeats;
+    for (int i = 0; i < repeats; ++i) {
+        const Image a = maker.image(s, planted), b = maker.image(s, {}, quality_of_b);
+        const NoiseComparison n = compareNoise(a, b);
+        REQUIRE(n.unknown.empty());
+        REQUIRE(n.channels.size() == 1);
+        alarms.pixels_tested = n.pixels_untested.empty();
+        CHECK(alarms.pixels_tested == (s.replicates >= 8));
+        for (std::size_t l = 0; l < 2; ++l) {
+            alarms.mean[l] += n.channels[0].p < Alarms::kLevels[l];
+            alarms.tiles[l] += n.tiles.smallest_p < Alarms::kLevels[l];
+            alarms.pixels[l] += n.pixels.smallest_p < Alarms::kLevels[l];
+        }
+        // The figure, the word and the p beside it are one.
+        CHECK(n.channels[0].beyondNoise() == (n.channels[0].p < 1 - n.confidence));
+        CHECK((n.tiles.rejected > 0) == (n.tiles.smallest_p < n.tiles.alpha));
+        CHECK((n.pixels.rejected > 0) == (n.pixels.smallest_p < n.pixels.alpha));
+    }
+    return alarms;
+}
+
+/// Fewest alarms that are as rare as one in 10,000 test runs when they come at the stated level or below.
+int tooMany(int repeats, double level) {
+    int k = 0;
+    while (stats::clopperPearson(static_cast<std::uint64_t>(k), static_cast<std::uint64_t>(repeats), 0.9998).lower <= level) ++k;
+    return k;
+}
+
+const char* nameOf(Noise noise) {
+    constexpr std::array<const char*, 4> kNames{"normal", "skewed", "rare light", "coverage"};
+    return kNames[static_cast<std::size_t>(noise)];
+}
+
+/// A pixel's standard error over its mean: large enough that the kind of noise matters.
+double noiseOf(Noise noise) {
+    constexpr std::array<double, 4> kRelative{0.3, 1, 2, 0.125};  // RareLight: a path in every fourth pixel. Coverage: 64 samples.
+    return kRelative[static_cast<std::size_t>(noise)];
+}
+
+}  // namespace
+
+TEST_CASE("what is only noise raises no more alarms than is stated, whatever the noise and however little is known of it",
+          "[false-alarms]") {
+    constexpr int kRepeats = 60;
+    for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Coverage})
+        for (const bool equal : {true, false})
+            for (const std::uint32_t replicates : {2u, 4u, 8u, 16u}) {
+                const Alarms alarms = countAlarms({noise, equal, replicates, noiseOf(noise), 40, 24}, kRepeats);
+                INFO(nameOf(noise) << ", " << (equal ? "equal" : "unequal") << " pixels, " << replicates - 1 << " degrees of freedom");
+                for (std::size_t l = 0; l < 2; ++l) {
+                    const int too_many = tooMany(kRepeats, Alarms::kLevels[l]);
+                    INFO("level " << Alarms::kLevels[l]);
+                    CHECK(alarms.mean[l] < too_many);
+                    CHECK(alarms.tiles[l] < too_many);
+                    CHECK(alarms.pixels[l] < too_many);
+                }
+            }
+}
+
+TEST_CASE("planted errors are found: 2 % of the image, 20 % of a tile", "[false-alarms]") {
+    for (const std::uint32_t replicates : {2u, 4u, 16u})
+        for (const Noise noise : {Noise::Normal, Noise::Skewed}) {
+            INFO(nameOf(noise) << ", " << replicates - 1 << " degrees of freedom");
+            CHECK(countAlarms({noise, true, replicates, 0.1, 64, 64}, 10, {0.02, 0}).mean[1] == 10);
+            const Alarms tile = countAlarms({noise, true, replicates, 0.1, 64, 64}, 10, {0, 0.2});
+            CHECK(tile.tiles[1] == 10);
+        }
+}
+
+TEST_CASE("(a table) false alarms of compare", "[.][false-alarm-table]") {
+    constexpr int kRepeats = 400;
+    std::printf("Alarms in %% of %d pairs of 64 x 64 pixels where nothing is wrong, at the stated levels 5 %% and 0.1 %%.\n\n", kRepeats);
+    std::printf("| B | noise | pixels | dof | mean 5 %% | tiles 5 %% | pixels 5 %% | mean .1 %% | tiles .1 %% | pixels .1 %% |\n"
+                "|---|---|---|---|---|---|---|---|---|---|\n");
+    for (const double quality : {1.0, 16.0})
+        for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Coverage})
+            for (const bool equal : {true, false})
+                for (const std::uint32_t replicates : {2u, 4u, 8u, 16u}) {
+                    const Alarms a = countAlarms({noise, equal, replicates, noiseOf(noise), 64, 64}, kRepeats, {}, quality);
+                    std::printf("| %s | %s | %s | %u |", quality == 1 ? "alike" : "16 times the samples", nameOf(noise),
+                                equal ? "equal" : "unequal", replicates - 1);
+                    for (std::size_t l = 0; l < 2; ++l) {
+                        for (const int count : {a.mean[l], a.tiles[l]}) std::printf(" %.2f |", 100.0 * count / a.repeats);
+                        std::printf(a.pixels_tested ? " %.2f |" : " - |", 100.0 * a.pixels[l] / a.repeats);
+                    }
+                    std::printf("\n");
+                    std::fflush(stdout);
+                }
+}
+
+TEST_CASE("(a table) power of compare", "[.][false-alarm-table]") {
+    constexpr int kRepeats = 100;
+    std::printf("| noise | a pixel's standard error | dof | 2 %% everywhere: mean | 20 %% in a tile: tiles |\n|---|---|---|---|---|\n");
+    for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight})
+        for (const double relative : {0.05, 0.1, 0.2})
+            for (const std::uint32_t replicates : {2u, 4u, 16u}) {
+                const Scenario s{noise, true, replicates, relative, 64, 64};
+                const int mean = countAlarms(s, kRepeats, {0.02, 0}).mean[1], tile = countAlarms(s, kRepeats, {0, 0.2}).tiles[1];
+                std::printf("| %s | %g %% | %u | %d %% | %d %% |\n", nameOf(noise), 100 * relative, replicates - 1, mean, tile);
+                std::fflush(stdout);
+            }
+}
