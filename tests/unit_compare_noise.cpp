@@ -196,12 +196,17 @@ TEST_CASE("errors against a reference: its variance is subtracted, and its choic
     constexpr double reference_noise = 0.1;
     const ReferenceComparison r = compareWithReference(a, b, withFolds(3, reference_noise), false);
     REQUIRE(r.reference_rms_error);
-    CHECK(*r.reference_rms_error == Approx(reference_noise / 2).epsilon(0.03));
+    // All are of luminance: of three independent channels with their weights.
+    const auto w = luminanceWeights(a);
+    const double share = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), mean_y = w[0] + 2 * w[1] + 3 * w[2];
+    CHECK(*r.reference_rms_error == Approx(reference_noise * share / mean_y).epsilon(0.03));
     const ReferenceError& of_a = r.errors[0];
     CHECK(of_a.metrics.mse == Approx(kNoise * kNoise + reference_noise * reference_noise).epsilon(0.08));
     REQUIRE(of_a.corrected_relative_rmse);
-    CHECK(*of_a.corrected_relative_rmse == Approx(kNoise / 2).epsilon(0.04));
-    CHECK(*r.errors[1].corrected_relative_rmse == Approx(std::sqrt(kNoise * kNoise + 0.01 * 14 / 3) / 2).epsilon(0.04));
+    CHECK(*of_a.corrected_relative_rmse == Approx(kNoise * share / mean_y).epsilon(0.05));
+    CHECK(*r.errors[1].corrected_relative_rmse == Approx(std::hypot(kNoise * share, 0.1 * mean_y) / mean_y).epsilon(0.05));
+    CHECK(of_a.relative_rmse.value > *of_a.corrected_relative_rmse);
+    CHECK(of_a.relative_rmse.value == Approx(*compareImages(a, withFolds(3, reference_noise)).relative_rmse));
     CHECK(of_a.warnings.empty());
 
     // The spread, against that of references made anew.
@@ -236,6 +241,9 @@ TEST_CASE("a reference that may hold the image's samples, or is noisier than the
     broken.pixels[0] = std::numeric_limits<float>::quiet_NaN();
     const ReferenceComparison voided = compareWithReference(broken, a, noisy, true);
     CHECK_FALSE(voided.errors[0].metrics.valid());
+    const CompareResult same = compareImages(a, a);
+    const std::string words = comparisonText({&same, nullptr, &voided});
+    CHECK_THAT(words, Contains("void: 1 values are not finite, 0 in the reference") && Contains("less R's noise  void"));
     CHECK(std::isnan(voided.errors[0].rmse.value));
     CHECK(voided.errors[1].metrics.valid());
 }
@@ -247,7 +255,7 @@ TEST_CASE("text and JSON of a comparison say what was found and what is not know
     const ReferenceComparison errors = compareWithReference(a, b, reference, false);
     const std::string text = comparisonText({&result, &noise, &errors});
     CHECK_THAT(text, Contains("bias R") && Contains("more than noise") && Contains("noise of A        StdError.R, G, B, 15 degrees of freedom a pixel"));
-    CHECK_THAT(text, Contains("variance subtracted") && Contains("±") && Contains("Against the reference R"));
+    CHECK_THAT(text, Contains("has its variance subtracted") && Contains("±") && Contains("Against the reference R"));
     for (std::size_t begin = 0; begin < text.size(); begin = text.find('\n', begin) + 1) {
         CHECK(text.substr(begin, text.find('\n', begin) - begin).size() < 140);
         if (text.find('\n', begin) == std::string::npos) break;
