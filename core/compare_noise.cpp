@@ -203,6 +203,12 @@ void testPixels(NoiseComparison& result, const View& view, double alpha) {
 NoiseComparison compareNoise(const Image& a, const Image& b) {
     NoiseComparison result;
     if (result.unknown = sameSeed(a, b); !result.unknown.empty()) return result;
+    // Never taken as exact: that it knows its noise in part is no reason to forget it.
+    for (const auto& [image, name] : {std::pair{&a, "A"}, {&b, "B"}})
+        if (statesNoise(*image) && !noisyImage(*image, NoiseOf::Color) && !noisyImage(*image, NoiseOf::Luminance)) {
+            result.unknown = fmt::format("{} does not know the noise of all its pixels (they have too few samples, or lost some)", name);
+            return result;
+        }
     std::optional<Pair> pair = commonView(a, b);
     if (!pair) {
         result.unknown = "neither image says how large its noise is (render with output AOV 'variance' or 'error')";

@@ -117,6 +117,12 @@ std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what) {
     return noisy;
 }
 
+bool statesNoise(const Image& image) {
+    return std::any_of(image.channels.begin(), image.channels.end(), [](const std::string& name) {
+        return name.rfind("StdError.", 0) == 0 || name.rfind("Variance.", 0) == 0 || name.rfind("Fold.", 0) == 0;
+    });
+}
+
 std::string sameSeed(const Image& a, const Image& b) {
     const std::string seed = metadataValue(a, "crt/seed");
     if (seed.empty() || seed != metadataValue(b, "crt/seed")) return {};

@@ -32,6 +32,9 @@ enum class NoiseOf { Color, Luminance };
 /// are not, they are taken as one, the fewest that an estimate can have, and `source` says so.
 std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what);
 
+/// Has it channels that state noise, whether they can be used or not? A pixel that lost samples states an infinite one.
+bool statesNoise(const Image& image);
+
 /// One sentence when both images name the same seed in their metadata, so that they may share samples; else empty.
 std::string sameSeed(const Image& a, const Image& b);
 

@@ -13,6 +13,8 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <tuple>
+#include <utility>
 
 using namespace crt;
 
@@ -189,6 +191,81 @@ TEST_CASE("images of one seed, and without noise, are not judged, and one that k
     const NoiseComparison folds = compareNoise(withStandardError(1), withFolds(2, 0.05));
     CHECK(folds.source_b == "8 folds");
     CHECK(folds.rms_z == Approx(1).margin(0.06));
+}
+
+TEST_CASE("words, figures and JSON of a noise comparison agree in every branch", "[compare-noise]") {
+    const auto said = [](const Image& a, const Image& b) {
+        const CompareResult result = compareImages(a, b);
+        const NoiseComparison noise = compareNoise(a, b);
+        return std::pair{comparisonText({&result, &noise, nullptr}), nlohmann::json::parse(comparisonJson({&result, &noise, nullptr}))["noise"]};
+    };
+    const auto withMetadata = [](Image image, const char* key, const char* value) {
+        for (auto& [name, text] : image.metadata)
+            if (name == key) text = value;
+        return image;
+    };
+    const Image a = withStandardError(1), b = withStandardError(2), biased = withStandardError(2, 1.1);
+
+    // Noise, and more than noise: the word is that of the interval beside it.
+    for (const auto& [other, word, not_said, beyond] : {std::tuple{&b, "may be noise", "more than noise", false}, {&biased, "more than noise", "may be", true}}) {
+        const auto [text, json] = said(a, *other);
+        CHECK_THAT(text, Contains(word) && !Contains(not_said));
+        for (const auto& channel : json["bias"]) {
+            CHECK(channel["beyond_noise"] == beyond);
+            const bool outside = channel["interval"][0].get<double>() > 0 || channel["interval"][1].get<double>() < 0;
+            CHECK(outside == beyond);
+            CHECK((channel["p"].get<double>() < 0.001) == beyond);
+        }
+        CHECK((json["tiles"]["rejected"] > 0) == beyond);
+        CHECK_THAT(text, Contains(std::to_string(json["tiles"]["rejected"].get<int>()) + " of 45 tests differ beyond noise"));
+    }
+
+    // Too few degrees of freedom for single pixels, in either image.
+    for (const auto& [first, second] : {std::pair{withMetadata(a, kErrorDofKey, "3"), b}, {a, withMetadata(b, kErrorDofKey, "3")}}) {
+        const auto [text, json] = said(first, second);
+        CHECK_THAT(text, Contains("pixels            not tested: a variance of 3 degrees of freedom"));
+        CHECK(json["pixels"]["untested"].is_string());
+    }
+
+    // Nothing is said, and why.
+    Image lost = a;
+    lost.pixels[3] = std::numeric_limits<float>::infinity();
+    Image plain = blank({"R", "G", "B"}, "9");
+    plain.pixels.assign(std::size_t{3} * kWidth * kHeight, 2.0f);
+    Image other_plain = plain;
+    other_plain.metadata = {{"crt/seed", "10"}};
+    other_plain.pixels[0] = 3;
+    for (const auto& [first, second, why] : {std::tuple{&a, &a, "both have seed 1"}, {&lost, &b, "A does not know the noise of all"},
+                                             {&b, &lost, "B does not know the noise of all"}, {&plain, &other_plain, "neither image says"}}) {
+        const NoiseComparison noise = compareNoise(*first, *second);
+        CHECK_THAT(noise.unknown, Contains(why));
+        CHECK(noise.channels.empty());
+        CHECK(noise.z.empty());
+        const auto [text, json] = said(*first, *second);
+        CHECK_THAT(json["unknown"].get<std::string>(), Contains(why));
+        if (first != second) CHECK_THAT(text, Contains("Noise or bias? Not known: ") && Contains(why));
+        CHECK_THROWS_WITH(writeZMap("z.pfm", noise, kWidth, kHeight), Contains(why));
+    }
+
+    // Against black nothing is relative, and no NaN is printed.
+    Image black = b;
+    for (std::size_t i = 0; i < black.pixels.size(); ++i)
+        if (i % 6 < 3) black.pixels[i] = 0;
+    const auto [text, json] = said(a, black);
+    CHECK_THAT(text.substr(text.find("Noise or bias?")), Contains("more than noise") && !Contains("nan") && !Contains("inf"));
+
+    // What differs by rounding alone is no bias, though no noise explains it.
+    Image rounded = plain;
+    rounded.metadata = {{"crt/seed", "11"}};
+    for (Image* image : {&rounded, &plain}) {
+        image->channels.emplace_back("StdError.Y");
+        image->pixels.clear();
+        for (std::uint32_t p = 0; p < kWidth * kHeight; ++p)
+            image->pixels.insert(image->pixels.end(), {2, 2, image == &rounded ? std::nextafter(2.0f, 3.0f) : 2.0f, 0});
+    }
+    const auto [words, figures] = said(rounded, plain);
+    CHECK_THAT(words, Contains("may be noise") && Contains("0 of 15 tests differ beyond noise"));
+    CHECK(figures["bias"][0]["beyond_noise"] == false);
 }
 
 TEST_CASE("errors against a reference: its variance is subtracted, and its choice moves them as far as is said", "[compare-noise]") {
