@@ -4,6 +4,7 @@
 #include "image_io.h"
 #include "image_noise.h"
 #include "stats/pooled_tests.h"
+#include "yaml_reader.h"
 
 #include <fmt/format.h>
 
@@ -64,6 +65,8 @@ constexpr double kFewestPixelDof = 7;
 struct View {
     NoisyImage a, b;
     std::uint32_t width = 0, height = 0;
+    /// Of A's samples over B's; 1 where either does not say, or is a reference, which is rendered in another way.
+    double samples_ratio = 1;
 
     std::size_t channels() const { return a.channels.size(); }
     std::uint32_t across() const { return (width + stats::kTileSide - 1) / stats::kTileSide; }
@@ -84,6 +87,21 @@ void forWindow(std::uint32_t x, std::uint32_t y, std::uint32_t width, std::uint3
 
 // ------------------------------------------------------------------------------------------------------------------------- mean
 
+/// By the metadata of two renders; see View::samples_ratio.
+double samplesRatio(const Image& a, const Image& b) {
+    const auto samples = [](const Image& image) { return parseNumber(metadataValue(image, "crt/spp")).value.value_or(0); };
+    const double of_a = samples(a), of_b = samples(b);
+    return of_a > 0 && of_b > 0 && !hasFolds(a) && !hasFolds(b) ? of_a / of_b : 1;
+}
+
+/// The mean of `ratio` times the other's samples has at least the variance that follows from the other's: with fewer samples it may have met none of
+/// the rare paths that carry much of the light, and then does not know of their noise.
+void learnVariance(Mean& mean, const Mean& other, double ratio) {
+    if (!(ratio < 1) || !(other.variance / ratio > mean.variance)) return;
+    mean.variance = other.variance / ratio;
+    mean.dof = other.dof;
+}
+
 /// Both the stated noise and the symmetry of differences must rule equality out.
 ChannelBias biasOf(const View& view, std::size_t channel, double confidence) {
     PixelSums sums_a, sums_b;
@@ -96,7 +114,9 @@ ChannelBias biasOf(const View& view, std::size_t channel, double confidence) {
     const auto meanOf = [channel](const NoisyImage& image, const PixelSums& sums) {
         return image.fold_means.empty() ? sums.mean(image.dof) : stats::meanOf(stats::summarize(image.fold_means[channel]));
     };
-    const Mean a = meanOf(view.a, sums_a), b = meanOf(view.b, sums_b);
+    Mean a = meanOf(view.a, sums_a), b = meanOf(view.b, sums_b);
+    learnVariance(a, b, view.samples_ratio);
+    learnVariance(b, a, 1 / view.samples_ratio);
     ChannelBias bias{view.a.channels[channel], a.value, b.value, a.value - b.value, {}, stats::carefulEqualityP(a, b)};
     double half = stats::carefulHalfWidth(a, b, confidence);
     if (differences.count >= stats::kFewestForSymmetry) {
@@ -216,7 +236,7 @@ NoiseComparison compareNoise(const Image& a, const Image& b) {
     }
     if (!pair->a) pair->a = exactly(a, *pair->b);
     if (!pair->b) pair->b = exactly(b, *pair->a);
-    const View view{std::move(*pair->a), std::move(*pair->b), a.width, a.height};
+    const View view{std::move(*pair->a), std::move(*pair->b), a.width, a.height, samplesRatio(a, b)};
     const auto finite = [](const NoisyImage& image) {
         return std::all_of(image.values.begin(), image.values.end(), [](double v) { return std::isfinite(v); });
     };

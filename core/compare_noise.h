@@ -22,7 +22,8 @@ struct ChannelBias {
 /// rare as 1 − confidence: where noise is normal; and, of means and tiles, also where the images differ in their seeds alone, whatever the noise
 /// and however few the degrees of freedom of the stated variances. Means and tiles are judged by the stated noise and by the signs of the pixels'
 /// differences (stats/pooled_tests.h), and both must agree. A pixel is judged by its own variance and by that of its neighbours, and not at all where
-/// its variance has fewer than seven degrees of freedom. Of images under 64 pixels, and with noise that is skewed and
+/// its variance has fewer than seven degrees of freedom. The mean of a render of fewer samples than the other's has at least the variance that the
+/// other's says. Of images under 64 pixels, and with noise that is skewed and
 /// not alike in both, the mean is judged as if noise were normal; that of tiles is then at least the average of the tiles about them.
 struct NoiseComparison {
     std::string unknown;            ///< Why nothing is said, one sentence; then all else is empty.

@@ -17,6 +17,7 @@ enum class Noise {
     Normal,    ///< As sums of many alike terms do.
     Skewed,    ///< Gamma: bounded below by 0, a long tail above.
     RareLight, ///< A Poisson number of equally bright paths: most replicates of a dim pixel meet none.
+    Fireflies, ///< Rare, and of very different brightness.
     Coverage,  ///< Of a pixel that an edge crosses: whole numbers of samples, so that replicates agree exactly by chance.
 };
 
@@ -44,7 +45,8 @@ public:
         image.width = s.width;
         image.height = s.height;
         image.channels = {"R", "G", "B", "StdError.Y"};
-        image.metadata = {{"crt/seed", std::to_string(seed_++)}, {"crt/errorDegreesOfFreedom", std::to_string(s.replicates - 1)}};
+        image.metadata = {{"crt/seed", std::to_string(seed_++)}, {"crt/errorDegreesOfFreedom", std::to_string(s.replicates - 1)},
+                          {"crt/spp", std::to_string(64 * quality)}};
         for (std::uint32_t y = 0; y < s.height; ++y)
             for (std::uint32_t x = 0; x < s.width; ++x) {
                 double expectation = 1, relative = s.relative_noise;
@@ -79,6 +81,13 @@ private:
             case Noise::Normal: return 1 + std::sqrt(variance) * std::normal_distribution<double>()(random_);
             case Noise::Skewed: return std::gamma_distribution<double>(1 / variance, variance)(random_);
             case Noise::RareLight: return variance * std::poisson_distribution<int>(1 / variance)(random_);
+            case Noise::Fireflies: {
+                // Lognormal brightness of mean 1 and mean square e.
+                double sum = 0;
+                const double events = std::exp(1.0) / variance;
+                for (int n = std::poisson_distribution<int>(events)(random_); n > 0; --n) sum += std::lognormal_distribution<double>(-0.5, 1)(random_);
+                return sum / events;
+            }
             case Noise::Coverage: break;
         }
         // Half of n samples are inside: variance 1/n of the doubled share.
