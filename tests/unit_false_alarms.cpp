@@ -90,14 +90,15 @@ TEST_CASE("what is only noise raises no more alarms than is stated, whatever the
 }
 
 TEST_CASE("what is only noise raises no more alarms than is stated when one image has sixteen times the samples", "[false-alarms]") {
-    constexpr int kRepeats = 60;
     for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies})
         for (const bool equal : {true, false})
             for (const bool better_first : {true, false}) {
+                // A mean that hangs on few rare paths, of which fewer samples may have met none, is the worst case.
+                const int repeats = noise == Noise::Fireflies && !equal ? 400 : 60;
                 synthetic::Maker maker(7);
                 const Scenario s{noise, equal, 4, noiseOf(noise), 64, 64};
                 std::array<int, 2> mean{}, tiles{};
-                for (int i = 0; i < kRepeats; ++i) {
+                for (int i = 0; i < repeats; ++i) {
                     const Image few = maker.image(s), many = maker.image(s, {}, 16);
                     const NoiseComparison n = better_first ? compareNoise(many, few) : compareNoise(few, many);
                     for (std::size_t l = 0; l < 2; ++l) {
@@ -107,8 +108,8 @@ TEST_CASE("what is only noise raises no more alarms than is stated when one imag
                 }
                 INFO(nameOf(noise) << ", " << (equal ? "equal" : "unequal") << " pixels");
                 for (std::size_t l = 0; l < 2; ++l) {
-                    CHECK(mean[l] < tooMany(kRepeats, Alarms::kLevels[l]));
-                    CHECK(tiles[l] < tooMany(kRepeats, Alarms::kLevels[l]));
+                    CHECK(mean[l] < tooMany(repeats, Alarms::kLevels[l]));
+                    CHECK(tiles[l] < tooMany(repeats, Alarms::kLevels[l]));
                 }
             }
 }
