@@ -184,11 +184,14 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
             break;
         }
 
-    const std::vector<float> values_a = valuesOf(a, metric_channels), values_b = valuesOf(b, metric_channels);
+    const std::vector<float> values_a = valuesOf(a, metric_channels);
+    const std::vector<float> values_b = valuesOf(b, metric_channels);
     addMetrics(result, values_a, values_b);
     if (result.metrics_valid && color) {
         const stats::Rgb weights = luminanceWeights(b.chromaticities ? b : a);
-        result.relative_rmse = stats::luminanceError(stats::luminances(values_a, weights), stats::luminances(values_b, weights)).relative_rmse;
+        result.relative_rmse =
+            stats::luminanceError(stats::luminances(values_a, weights), stats::luminances(values_b, weights))
+                .relative_rmse;
         addLooks(result, a, b, options.display_referred);
     }
 

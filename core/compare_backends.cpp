@@ -211,7 +211,8 @@ std::string againstText(const BackendComparison& all, const BackendAgainst& b) {
         line("first difference", fmt::format("pixel {},{} channel {}: {:.9g} and {:.9g}{}", d.x, d.y, d.channel, d.first, d.second,
                                              d.ulps ? fmt::format(" ({} ulp)", *d.ulps) : ""));
         line("", b.same_seed.relative_rmse
-                     ? fmt::format("error {:.3g} % (RMSE of luminance), at most {} ulp", 100 * *b.same_seed.relative_rmse, b.same_seed.max_ulp)
+                     ? fmt::format("error {:.3g} % (RMSE of luminance), at most {} ulp",
+                                   100 * *b.same_seed.relative_rmse, b.same_seed.max_ulp)
                      : "values are not finite: there is no error to measure");
     }
     line("other seeds", fmt::format("{} renders of {} samples per pixel by each", all.replicates, all.samples));
@@ -243,9 +244,12 @@ nlohmann::ordered_json familyJson(const stats::TestFamily& family) {
 nlohmann::ordered_json againstJson(const BackendAgainst& b) {
     const stats::GateResult& g = b.other_seeds;
     nlohmann::ordered_json json{{"backend", b.backend}, {"device", b.device}, {"verdict", stats::verdictName(b.verdict)}, {"reasons", g.reasons}};
-    json["same_seed"] = {{"same_bits", b.same_seed.same}, {"differing_pixels", b.same_seed.differing_pixels}, {"max_ulp", b.same_seed.max_ulp},
-                         {"relative_rmse", b.same_seed.relative_rmse ? nlohmann::ordered_json(*b.same_seed.relative_rmse)
-                                                                     : nlohmann::ordered_json(nullptr)}};
+    json["same_seed"] = {
+        {"same_bits", b.same_seed.same},
+        {"differing_pixels", b.same_seed.differing_pixels},
+        {"max_ulp", b.same_seed.max_ulp},
+        {"relative_rmse", b.same_seed.relative_rmse ? nlohmann::ordered_json(*b.same_seed.relative_rmse)
+                                                    : nlohmann::ordered_json(nullptr)}};
     json["means"] = nlohmann::ordered_json::array();
     for (std::size_t c = 0; c < g.channels.size(); ++c)
         json["means"].push_back({{"channel", kColorNames[c]}, {"relative_difference", g.channels[c].relative},

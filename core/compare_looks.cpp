@@ -10,7 +10,8 @@
 
 namespace crt {
 
-std::optional<std::vector<float>> linearSrgb(const Image& image, const std::optional<std::array<double, 8>>& primaries) {
+std::optional<std::vector<float>> linearSrgb(const Image& image,
+                                             const std::optional<std::array<double, 8>>& primaries) {
     std::array<std::size_t, 3> places{};
     for (std::size_t c = 0; c < 3; ++c) {
         const auto found = std::find(image.channels.begin(), image.channels.end(), std::array{"R", "G", "B"}[c]);

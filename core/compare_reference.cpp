@@ -41,14 +41,15 @@ struct NamedMetric {
     SpreadMetric ReferenceError::*to;
     double stats::ErrorMetrics::*from;
 };
-constexpr std::array<NamedMetric, 8> kMetrics{{{&ReferenceError::rmse, &stats::ErrorMetrics::rmse},
-                                               {&ReferenceError::rmse_over_mean, &stats::ErrorMetrics::relative_rmse},
-                                               {&ReferenceError::relmse, &stats::ErrorMetrics::relmse},
-                                               {&ReferenceError::smape, &stats::ErrorMetrics::smape},
-                                               {&ReferenceError::mae, &stats::ErrorMetrics::mae},
-                                               {&ReferenceError::p99_absolute, &stats::ErrorMetrics::p99_absolute},
-                                               {&ReferenceError::max_absolute, &stats::ErrorMetrics::max_absolute},
-                                               {&ReferenceError::mean_ratio, &stats::ErrorMetrics::mean_ratio}}};
+constexpr std::array<NamedMetric, 8> kMetrics{
+    {{&ReferenceError::rmse, &stats::ErrorMetrics::rmse},
+     {&ReferenceError::rmse_over_mean, &stats::ErrorMetrics::relative_rmse},
+     {&ReferenceError::relmse, &stats::ErrorMetrics::relmse},
+     {&ReferenceError::smape, &stats::ErrorMetrics::smape},
+     {&ReferenceError::mae, &stats::ErrorMetrics::mae},
+     {&ReferenceError::p99_absolute, &stats::ErrorMetrics::p99_absolute},
+     {&ReferenceError::max_absolute, &stats::ErrorMetrics::max_absolute},
+     {&ReferenceError::mean_ratio, &stats::ErrorMetrics::mean_ratio}}};
 
 /// FLIP against eight more references of this many pixels takes seconds; beyond, its spread is left out.
 constexpr std::size_t kMostPixelsForFlipSpread = 1 << 16;
@@ -68,7 +69,9 @@ ReferenceError errorAgainst(const Colors& test, const Colors& reference, const s
     Looks seen{nan, !display_referred, nan, nan};
     if (looks) seen = compareLooks(*test.srgb, *reference.srgb, width, height, display_referred);
     for (const NamedMetric& m : kMetrics) (error.*m.to).value = error.metrics.*m.from;
-    const auto relativeRmse = [&](const Colors& r) { return stats::luminanceError(test.luminances, r.luminances).relative_rmse; };
+    const auto relativeRmse = [&](const Colors& r) {
+        return stats::luminanceError(test.luminances, r.luminances).relative_rmse;
+    };
     error.relative_rmse.value = error.metrics.valid() ? relativeRmse(reference) : nan;
     error.flip.value = seen.flip_mean;
     error.delta_e_mean.value = seen.delta_e_mean;
@@ -135,8 +138,11 @@ ReferenceComparison compareWithReference(const Image& a, const Image& b, const I
     for (const auto& [image, name] : {std::pair{&a, "A"}, {&b, "B"}}) {
         const ColorConditions of_image = colorConditions(*image);
         if (const std::string conflict = conflictOf(of_image, name, of_reference, "R"); !conflict.empty())
-            throw Error(ErrorKind::Usage, fmt::format("{}; R, the reference, must be rendered again as {} was", conflict, name));
-        for (std::string& note : unknownConditions(of_image, name, of_reference, "R")) result.notes.push_back(std::move(note));
+            throw Error(
+                ErrorKind::Usage,
+                fmt::format("{}; R, the reference, must be rendered again as {} was", conflict, name));
+        for (std::string& note : unknownConditions(of_image, name, of_reference, "R"))
+            result.notes.push_back(std::move(note));
     }
     const Colors colors = colorsOf(reference, a.chromaticities ? a : b);
     const std::vector<Colors> without_fold = colorsWithoutFolds(reference, a.chromaticities ? a : b);
@@ -155,10 +161,12 @@ ReferenceComparison compareWithReference(const Image& a, const Image& b, const I
             error.warnings.push_back("the reference may hold the same samples: " + same);
         if (!error.metrics.valid()) continue;
         if (variance) {
-            const stats::LuminanceError of_luminance = stats::luminanceError(own.luminances, colors.luminances);
+            const stats::LuminanceError of_luminance =
+                stats::luminanceError(own.luminances, colors.luminances);
             const double left = of_luminance.mse - *variance;
             error.within_reference_noise = left <= 0;
-            if (left > 0) error.corrected_relative_rmse = stats::relativeRmse(left, of_luminance.reference_mean);
+            if (left > 0)
+                error.corrected_relative_rmse = stats::relativeRmse(left, of_luminance.reference_mean);
         }
     }
     return result;

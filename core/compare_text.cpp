@@ -28,7 +28,8 @@ private:
 };
 
 const char* verdictOf(const CompareResult& r) {
-    if (!r.same && r.differing_pixels == 0) return "not the same within a tolerance, since values are not finite";
+    if (!r.same && r.differing_pixels == 0)
+        return "not the same within a tolerance, since values are not finite";
     return r.same ? (r.differing_pixels == 0 ? "same bits" : "same within the tolerance") : "different";
 }
 
@@ -41,7 +42,9 @@ std::string differenceText(const Difference& d) {
 void addMetricLines(Lines& lines, const CompareResult& r) {
     lines.add("largest",
               fmt::format("{} absolute, {} ulp; 99 % of the values are within {}", number(r.max_absolute), r.max_ulp, number(r.p99_absolute)));
-    if (r.relative_rmse) lines.add("error", fmt::format("{} (RMSE of luminance, over B's mean luminance)", percent(*r.relative_rmse)));
+    if (r.relative_rmse)
+        lines.add("error",
+                  fmt::format("{} (RMSE of luminance, over B's mean luminance)", percent(*r.relative_rmse)));
     lines.add("RMSE", fmt::format("{} ({} of the mean{}), MSE {}", number(r.rmse), number(r.rmse_over_mean),
                                   r.tolerance > 0 ? fmt::format(", {} allowed", number(r.tolerance)) : "", number(r.mse)));
     lines.add("relMSE", number(r.relmse));
@@ -75,17 +78,20 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
         const bool relative = c.mean_b != 0;  // Nothing is relative to black.
         const double scale = relative ? 100 / std::abs(c.mean_b) : 1;
         const char* unit = relative ? " %" : "";
-        lines.add(("bias " + c.channel).c_str(),
-                  fmt::format("{:+.3g}{}, {:g} % interval [{:+.3g}, {:+.3g}]{}: {}", scale * c.difference, unit, 100 * noise.confidence,
-                              scale * c.interval.lower, scale * c.interval.upper, unit, c.beyondNoise() ? "more than noise" : "may be noise"));
+        lines.add(
+            ("bias " + c.channel).c_str(),
+            fmt::format("{:+.3g}{}, {:g} % interval [{:+.3g}, {:+.3g}]{}: {}", scale * c.difference, unit,
+                        100 * noise.confidence, scale * c.interval.lower, scale * c.interval.upper, unit,
+                        c.beyondNoise() ? "more than noise" : "may be noise"));
     }
     const std::size_t channels = noise.channels.size();
     const auto at = [&](std::size_t place, std::uint32_t across, std::uint32_t side) {
         return fmt::format("at {},{}", place / channels % across * side, place / channels / across * side);
     };
     lines.add("tiles of 8x8", familyText(noise.tiles, "after Holm", at(noise.tiles.worst, noise.tiles_across, stats::kTileSide)));
-    lines.add("pixels", noise.pixels_untested.empty() ? familyText(noise.pixels, "after Sidak", at(noise.pixels.worst, width, 1))
-                                                      : "not tested: " + noise.pixels_untested);
+    lines.add("pixels", noise.pixels_untested.empty()
+                            ? familyText(noise.pixels, "after Sidak", at(noise.pixels.worst, width, 1))
+                            : "not tested: " + noise.pixels_untested);
     lines.add("rms z", fmt::format("{:.3g} (1: all of the difference is noise, and as large as the images say)", noise.rms_z));
 }
 
@@ -97,10 +103,15 @@ Json noiseJson(const NoiseComparison& noise) {
     if (!noise.unknown.empty()) return {{"unknown", noise.unknown}};
     Json json{{"source_a", noise.source_a}, {"source_b", noise.source_b}, {"confidence", noise.confidence}, {"bias", Json::array()}};
     for (const ChannelBias& c : noise.channels)
-        json["bias"].push_back({{"channel", c.channel}, {"mean", {c.mean_a, c.mean_b}}, {"difference", c.difference},
-                                {"interval", {c.interval.lower, c.interval.upper}}, {"p", c.p}, {"beyond_noise", c.beyondNoise()}});
+        json["bias"].push_back({{"channel", c.channel},
+                                {"mean", {c.mean_a, c.mean_b}},
+                                {"difference", c.difference},
+                                {"interval", {c.interval.lower, c.interval.upper}},
+                                {"p", c.p},
+                                {"beyond_noise", c.beyondNoise()}});
     json["tiles"] = familyJson(noise.tiles);
-    json["pixels"] = noise.pixels_untested.empty() ? familyJson(noise.pixels) : Json{{"untested", noise.pixels_untested}};
+    json["pixels"] =
+        noise.pixels_untested.empty() ? familyJson(noise.pixels) : Json{{"untested", noise.pixels_untested}};
     json["rms_z"] = noise.rms_z;
     return json;
 }
@@ -111,18 +122,19 @@ struct ReferenceRow {
     const char *name, *key;
     SpreadMetric ReferenceError::*metric;
 };
-constexpr std::array<ReferenceRow, 12> kRows{{{"error", "relative_rmse", &ReferenceError::relative_rmse},
-                                              {"RMSE", "rmse", &ReferenceError::rmse},
-                                              {"RMSE / mean", "rmse_over_mean", &ReferenceError::rmse_over_mean},
-                                              {"relMSE", "relmse", &ReferenceError::relmse},
-                                              {"SMAPE", "smape", &ReferenceError::smape},
-                                              {"MAE", "mae", &ReferenceError::mae},
-                                              {"99th percentile", "p99_absolute", &ReferenceError::p99_absolute},
-                                              {"largest", "max_absolute", &ReferenceError::max_absolute},
-                                              {"mean / mean R", "mean_ratio", &ReferenceError::mean_ratio},
-                                              {"FLIP", "flip", &ReferenceError::flip},
-                                              {"Delta E, mean", "delta_e_2000_mean", &ReferenceError::delta_e_mean},
-                                              {"Delta E, largest", "delta_e_2000_max", &ReferenceError::delta_e_max}}};
+constexpr std::array<ReferenceRow, 12> kRows{
+    {{"error", "relative_rmse", &ReferenceError::relative_rmse},
+     {"RMSE", "rmse", &ReferenceError::rmse},
+     {"RMSE / mean", "rmse_over_mean", &ReferenceError::rmse_over_mean},
+     {"relMSE", "relmse", &ReferenceError::relmse},
+     {"SMAPE", "smape", &ReferenceError::smape},
+     {"MAE", "mae", &ReferenceError::mae},
+     {"99th percentile", "p99_absolute", &ReferenceError::p99_absolute},
+     {"largest", "max_absolute", &ReferenceError::max_absolute},
+     {"mean / mean R", "mean_ratio", &ReferenceError::mean_ratio},
+     {"FLIP", "flip", &ReferenceError::flip},
+     {"Delta E, mean", "delta_e_2000_mean", &ReferenceError::delta_e_mean},
+     {"Delta E, largest", "delta_e_2000_max", &ReferenceError::delta_e_max}}};
 
 std::string spreadText(const SpreadMetric& m) {
     return m.spread ? fmt::format("{:.5g} ±{:.1g}", m.value, *m.spread) : fmt::format("{:.5g}", m.value);
@@ -157,17 +169,21 @@ void addReferenceLines(Lines& lines, const ReferenceComparison& r) {
     lines.add("", cell("A", kColumn) + cell("B", kColumn) + "A / B");
     for (const ReferenceRow& row : kRows) {
         const SpreadMetric &a = r.errors[0].*row.metric, &b = r.errors[1].*row.metric;
-        lines.add(row.name, cell(spreadText(a), kColumn) + cell(spreadText(b), kColumn) + ratioText(a.value, b.value));
+        lines.add(row.name,
+                  cell(spreadText(a), kColumn) + cell(spreadText(b), kColumn) + ratioText(a.value, b.value));
         if (row.metric != &ReferenceError::relative_rmse) continue;
-        lines.add("  less R's noise", cell(correctedText(r.errors[0]), kColumn) + cell(correctedText(r.errors[1]), kColumn) +
-                                        (r.errors[0].corrected_relative_rmse && r.errors[1].corrected_relative_rmse
-                                             ? ratioText(*r.errors[0].corrected_relative_rmse, *r.errors[1].corrected_relative_rmse)
-                                             : "-"));
+        lines.add(
+            "  less R's noise",
+            cell(correctedText(r.errors[0]), kColumn) + cell(correctedText(r.errors[1]), kColumn) +
+                (r.errors[0].corrected_relative_rmse && r.errors[1].corrected_relative_rmse
+                     ? ratioText(*r.errors[0].corrected_relative_rmse, *r.errors[1].corrected_relative_rmse)
+                     : "-"));
     }
-    lines.heading("  \"error\" is the RMSE of luminance over R's mean luminance; the rows below it are of R, G and B.");
+    lines.heading("  \"error\" is the RMSE of luminance over R's mean luminance; rows below it are of R, G and B.");
     if (r.reference_rms_error) {
-        lines.heading(fmt::format("  R's own error is {} ({}); \"less R's noise\" has its variance subtracted.", percent(*r.reference_rms_error),
-                                  r.reference_noise_source));
+        lines.heading(
+            fmt::format("  R's own error is {} ({}); \"less R's noise\" has its variance subtracted.",
+                        percent(*r.reference_rms_error), r.reference_noise_source));
     } else {
         lines.heading("  R does not say how large its own noise is, so it is in all errors (`crt reference` makes references that do).");
     }
@@ -214,10 +230,17 @@ Json resultJson(const CompareResult& r) {
     json["not_finite"] = r.not_finite;
     json["metrics"] = nullptr;
     if (!r.metrics_valid) return json;
-    json["metrics"] = Json{{"max_absolute", r.max_absolute}, {"max_ulp", r.max_ulp}, {"p99_absolute", r.p99_absolute}, {"mse", r.mse},
+    json["metrics"] = Json{{"max_absolute", r.max_absolute},
+                           {"max_ulp", r.max_ulp},
+                           {"p99_absolute", r.p99_absolute},
+                           {"mse", r.mse},
                            {"rmse", r.rmse},
                            {"relative_rmse", r.relative_rmse ? Json(*r.relative_rmse) : Json(nullptr)},
-                           {"rmse_over_mean", r.rmse_over_mean}, {"relmse", r.relmse}, {"mae", r.mae}, {"smape", r.smape}, {"mean", r.mean},
+                           {"rmse_over_mean", r.rmse_over_mean},
+                           {"relmse", r.relmse},
+                           {"mae", r.mae},
+                           {"smape", r.smape},
+                           {"mean", r.mean},
                            {"mean_ratio", r.mean_ratio}};
     if (r.looks) {
         json["metrics"]["flip"] = r.looks->flip_mean;

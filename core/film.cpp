@@ -201,8 +201,9 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     }
     for (Vec3d& row : color)
         for (double& entry : row) entry *= exposure;
-    // The film has the noise of Y alone, and a white balance mixes X, Y and Z: what becomes of that noise is known where it changes brightness and
-    // not colour. Then the relative error of luminance stays what it was.
+    // The film has the noise of Y alone, and a white balance mixes X, Y and Z: what becomes of that noise is
+    // known where it changes brightness and not colour. Then the relative error of luminance stays what it
+    // was.
     const stats::Rgb luminance_weights = stats::luminanceWeights(space);
     const auto luminanceGain = [&](const Vec3d& xyz) {
         if (!scene.film.white_balance || !(xyz[1] > 0)) return exposure;

@@ -89,8 +89,9 @@ bool addStated(NoisyImage& noisy, const Image& image, NoiseOf what) {
         const std::optional<double> stated = errorDegreesOfFreedom(image);
         noisy.dof = stated.value_or(kUnstatedDof);
         const std::string channels = what == NoiseOf::Color ? prefix + "R, G, B" : names.front();
-        noisy.source = stated ? fmt::format("{}, {:.6g} degrees of freedom a pixel", channels, *stated)
-                              : fmt::format("{}, degrees of freedom not stated, taken as {}", channels, kUnstatedDof);
+        noisy.source =
+            stated ? fmt::format("{}, {:.6g} degrees of freedom a pixel", channels, *stated)
+                   : fmt::format("{}, degrees of freedom not stated, taken as {}", channels, kUnstatedDof);
         return true;
     }
     return false;
@@ -119,7 +120,8 @@ std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what) {
 
 bool statesNoise(const Image& image) {
     return std::any_of(image.channels.begin(), image.channels.end(), [](const std::string& name) {
-        return name.rfind("StdError.", 0) == 0 || name.rfind("Variance.", 0) == 0 || name.rfind("Fold.", 0) == 0;
+        return name.rfind("StdError.", 0) == 0 || name.rfind("Variance.", 0) == 0 ||
+               name.rfind("Fold.", 0) == 0;
     });
 }
 

@@ -1,5 +1,5 @@
-/// Pairs of images whose expectation and noise are known because they were made here: pixels of independent replicates, which state the variance of
-/// their mean as a film does.
+/// Pairs of images whose expectation and noise are known because they were made here: pixels of independent
+/// replicates, which state the variance of their mean as a film does.
 #pragma once
 
 #include "film.h"
@@ -14,16 +14,18 @@ namespace crt::synthetic {
 
 /// How one pixel's samples scatter about their mean.
 enum class Noise {
-    Normal,    ///< As sums of many alike terms do.
-    Skewed,    ///< Gamma: bounded below by 0, a long tail above.
-    RareLight, ///< A Poisson number of equally bright paths: most replicates of a dim pixel meet none.
-    Fireflies, ///< Rare, and of very different brightness.
-    Coverage,  ///< Of a pixel that an edge crosses: whole numbers of samples, so that replicates agree exactly by chance.
+    Normal,     ///< As sums of many alike terms do.
+    Skewed,     ///< Gamma: bounded below by 0, a long tail above.
+    RareLight,  ///< A Poisson number of equally bright paths: most replicates of a dim pixel meet none.
+    Fireflies,  ///< Rare, and of very different brightness.
+    Coverage,   ///< Of a pixel that an edge crosses: whole numbers of samples, so that replicates agree
+                ///< exactly by chance.
 };
 
 struct Scenario {
     Noise noise = Noise::Normal;
-    bool equal_pixels = true;      ///< Else expectations and variances differ a hundredfold, in blocks with sharp edges.
+    /// Else expectations and variances differ a hundredfold, in blocks with sharp edges.
+    bool equal_pixels = true;
     std::uint32_t replicates = 4;  ///< The stated variance has one degree of freedom less.
     double relative_noise = 0.1;   ///< Standard error of the median pixel over its mean.
     std::uint32_t width = 64, height = 64;
@@ -39,13 +41,15 @@ class Maker {
 public:
     explicit Maker(std::uint64_t seed) : random_(seed), seed_(seed) {}
 
-    /// R = G = B with StdError.Y and its degrees of freedom. `quality` divides the variance, as so many times the samples would.
+    /// R = G = B with StdError.Y and its degrees of freedom. `quality` divides the variance, as so many
+    /// times the samples would.
     Image image(const Scenario& s, const Planted& planted = {}, double quality = 1) {
         Image image;
         image.width = s.width;
         image.height = s.height;
         image.channels = {"R", "G", "B", "StdError.Y"};
-        image.metadata = {{"crt/seed", std::to_string(seed_++)}, {"crt/errorDegreesOfFreedom", std::to_string(s.replicates - 1)},
+        image.metadata = {{"crt/seed", std::to_string(seed_++)},
+                          {"crt/errorDegreesOfFreedom", std::to_string(s.replicates - 1)},
                           {"crt/spp", std::to_string(64 * quality)}};
         for (std::uint32_t y = 0; y < s.height; ++y)
             for (std::uint32_t x = 0; x < s.width; ++x) {
@@ -67,7 +71,8 @@ private:
         const double k = s.replicates;
         std::vector<double> values;
         double sum = 0;
-        for (std::uint32_t r = 0; r < s.replicates; ++r) sum += values.emplace_back(expectation * replicate(s.noise, k * relative_variance));
+        for (std::uint32_t r = 0; r < s.replicates; ++r)
+            sum += values.emplace_back(expectation * replicate(s.noise, k * relative_variance));
         const double mean = sum / k;
         double squares = 0;
         for (const double v : values) squares += (v - mean) * (v - mean);
@@ -85,7 +90,8 @@ private:
                 // Lognormal brightness of mean 1 and mean square e.
                 double sum = 0;
                 const double events = std::exp(1.0) / variance;
-                for (int n = std::poisson_distribution<int>(events)(random_); n > 0; --n) sum += std::lognormal_distribution<double>(-0.5, 1)(random_);
+                for (int n = std::poisson_distribution<int>(events)(random_); n > 0; --n)
+                    sum += std::lognormal_distribution<double>(-0.5, 1)(random_);
                 return sum / events;
             }
             case Noise::Coverage: break;

@@ -225,7 +225,8 @@ TEST_CASE("a film of samples of several versions names them all", "[checkpoint]"
     std::uint64_t first = 0;
     for (const char* version : {"1.1.0", "0.9.0", "1.1.0"}) {
         paths.push_back(directory / ("part" + std::to_string(first) + ".crtfilm"));
-        writeCheckpoint(paths.back(), randomFilm(kShape, {first, first + 8}, 1), {kIdentity.scene_hash, version});
+        writeCheckpoint(paths.back(), randomFilm(kShape, {first, first + 8}, 1),
+                        {kIdentity.scene_hash, version});
         first += 8;
     }
     do {

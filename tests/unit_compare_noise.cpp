@@ -117,7 +117,8 @@ TEST_CASE("luminance weights are those of the primaries", "[compare-noise]") {
     image.chromaticities = {1, 0, 0, 1, 0, 0, 1.0 / 3, 1.0 / 3};  // XYZ: luminance is Y.
     CHECK(luminanceWeights(image)[0] == Approx(0).margin(1e-15));
     CHECK(luminanceWeights(image)[1] == Approx(1));
-    // Of a space that crt writes, they give back the film's Y, to which the variances belong: in ACEScg too, whose white is not D65.
+    // Of a space that crt writes, they give back the film's Y, to which the variances belong: in ACEScg too,
+    // whose white is not D65.
     image.chromaticities = chromaticities(ColorSpace::AcesCg);
     const Vec3d rgb = multiply(xyzToRgb(ColorSpace::AcesCg), Vec3d{1.4, 0.7, 0.2});
     const auto aces = luminanceWeights(image);
@@ -136,8 +137,9 @@ TEST_CASE("noise alone is no bias, and z says that it is noise", "[compare-noise
         CHECK(n.rms_z == Approx(1).margin(0.06));
         for (const ChannelBias& c : n.channels) {
             covered += c.interval.contains(0);
-            // 960 pixels of 15 degrees of freedom each: next to the normal quantile, not the 4.07 of one pixel; or, where the differences scatter so
-            // much, that of sums which are known to be symmetric and no more (3.605).
+            // 960 pixels of 15 degrees of freedom each: next to the normal quantile, not the 4.07 of one
+            // pixel; or, where the differences scatter so much, that of sums which are known to be symmetric
+            // and no more (3.605).
             const double standard_error = kNoise * std::sqrt(2.0 / 960);
             CHECK(c.interval.halfWidth() > 3.2905 * standard_error * (1 - 2e-3));
             CHECK(c.interval.halfWidth() < 3.605 * standard_error * 1.15);
@@ -197,7 +199,8 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     const auto said = [](const Image& a, const Image& b) {
         const CompareResult result = compareImages(a, b);
         const NoiseComparison noise = compareNoise(a, b);
-        return std::pair{comparisonText({&result, &noise, nullptr}), nlohmann::json::parse(comparisonJson({&result, &noise, nullptr}))["noise"]};
+        return std::pair{comparisonText({&result, &noise, nullptr}),
+                         nlohmann::json::parse(comparisonJson({&result, &noise, nullptr}))["noise"]};
     };
     const auto withMetadata = [](Image image, const char* key, const char* value) {
         for (auto& [name, text] : image.metadata)
@@ -207,21 +210,26 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     const Image a = withStandardError(1), b = withStandardError(2), biased = withStandardError(2, 1.1);
 
     // Noise, and more than noise: the word is that of the interval beside it.
-    for (const auto& [other, word, not_said, beyond] : {std::tuple{&b, "may be noise", "more than noise", false}, {&biased, "more than noise", "may be", true}}) {
+    for (const auto& [other, word, not_said, beyond] :
+         {std::tuple{&b, "may be noise", "more than noise", false},
+          {&biased, "more than noise", "may be", true}}) {
         const auto [text, json] = said(a, *other);
         CHECK_THAT(text, Contains(word) && !Contains(not_said));
         for (const auto& channel : json["bias"]) {
             CHECK(channel["beyond_noise"] == beyond);
-            const bool outside = channel["interval"][0].get<double>() > 0 || channel["interval"][1].get<double>() < 0;
+            const bool outside =
+                channel["interval"][0].get<double>() > 0 || channel["interval"][1].get<double>() < 0;
             CHECK(outside == beyond);
             CHECK((channel["p"].get<double>() < 0.001) == beyond);
         }
         CHECK((json["tiles"]["rejected"] > 0) == beyond);
-        CHECK_THAT(text, Contains(std::to_string(json["tiles"]["rejected"].get<int>()) + " of 45 tests differ beyond noise"));
+        CHECK_THAT(text, Contains(std::to_string(json["tiles"]["rejected"].get<int>()) +
+                                  " of 45 tests differ beyond noise"));
     }
 
     // Too few degrees of freedom for single pixels, in either image.
-    for (const auto& [first, second] : {std::pair{withMetadata(a, kErrorDofKey, "3"), b}, {a, withMetadata(b, kErrorDofKey, "3")}}) {
+    for (const auto& [first, second] :
+         {std::pair{withMetadata(a, kErrorDofKey, "3"), b}, {a, withMetadata(b, kErrorDofKey, "3")}}) {
         const auto [text, json] = said(first, second);
         CHECK_THAT(text, Contains("pixels            not tested: a variance of 3 degrees of freedom"));
         CHECK(json["pixels"]["untested"].is_string());
@@ -235,8 +243,10 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     Image other_plain = plain;
     other_plain.metadata = {{"crt/seed", "10"}};
     other_plain.pixels[0] = 3;
-    for (const auto& [first, second, why] : {std::tuple{&a, &a, "both have seed 1"}, {&lost, &b, "A does not know the noise of all"},
-                                             {&b, &lost, "B does not know the noise of all"}, {&plain, &other_plain, "neither image says"}}) {
+    for (const auto& [first, second, why] : {std::tuple{&a, &a, "both have seed 1"},
+                                             {&lost, &b, "A does not know the noise of all"},
+                                             {&b, &lost, "B does not know the noise of all"},
+                                             {&plain, &other_plain, "neither image says"}}) {
         const NoiseComparison noise = compareNoise(*first, *second);
         CHECK_THAT(noise.unknown, Contains(why));
         CHECK(noise.channels.empty());
@@ -252,7 +262,8 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     for (std::size_t i = 0; i < black.pixels.size(); ++i)
         if (i % 6 < 3) black.pixels[i] = 0;
     const auto [text, json] = said(a, black);
-    CHECK_THAT(text.substr(text.find("Noise or bias?")), Contains("more than noise") && !Contains("nan") && !Contains("inf"));
+    CHECK_THAT(text.substr(text.find("Noise or bias?")),
+               Contains("more than noise") && !Contains("nan") && !Contains("inf"));
 
     // What differs by rounding alone is no bias, though no noise explains it.
     Image rounded = plain;
@@ -261,7 +272,8 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
         image->channels.emplace_back("StdError.Y");
         image->pixels.clear();
         for (std::uint32_t p = 0; p < kWidth * kHeight; ++p)
-            image->pixels.insert(image->pixels.end(), {2, 2, image == &rounded ? std::nextafter(2.0f, 3.0f) : 2.0f, 0});
+            image->pixels.insert(image->pixels.end(),
+                                 {2, 2, image == &rounded ? std::nextafter(2.0f, 3.0f) : 2.0f, 0});
     }
     const auto [words, figures] = said(rounded, plain);
     CHECK_THAT(words, Contains("may be noise") && Contains("0 of 15 tests differ beyond noise"));
@@ -275,15 +287,18 @@ TEST_CASE("errors against a reference: its variance is subtracted, and its choic
     REQUIRE(r.reference_rms_error);
     // All are of luminance: of three independent channels with their weights.
     const auto w = luminanceWeights(a);
-    const double share = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), mean_y = w[0] + 2 * w[1] + 3 * w[2];
+    const double share = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]),
+                 mean_y = w[0] + 2 * w[1] + 3 * w[2];
     CHECK(*r.reference_rms_error == Approx(reference_noise * share / mean_y).epsilon(0.03));
     const ReferenceError& of_a = r.errors[0];
     CHECK(of_a.metrics.mse == Approx(kNoise * kNoise + reference_noise * reference_noise).epsilon(0.08));
     REQUIRE(of_a.corrected_relative_rmse);
     CHECK(*of_a.corrected_relative_rmse == Approx(kNoise * share / mean_y).epsilon(0.05));
-    CHECK(*r.errors[1].corrected_relative_rmse == Approx(std::hypot(kNoise * share, 0.1 * mean_y) / mean_y).epsilon(0.05));
+    CHECK(*r.errors[1].corrected_relative_rmse ==
+          Approx(std::hypot(kNoise * share, 0.1 * mean_y) / mean_y).epsilon(0.05));
     CHECK(of_a.relative_rmse.value > *of_a.corrected_relative_rmse);
-    CHECK(of_a.relative_rmse.value == Approx(*compareImages(a, withFolds(3, reference_noise)).relative_rmse));
+    CHECK(of_a.relative_rmse.value ==
+          Approx(*compareImages(a, withFolds(3, reference_noise)).relative_rmse));
     CHECK(of_a.warnings.empty());
 
     // The spread, against that of references made anew.
@@ -320,7 +335,8 @@ TEST_CASE("a reference that may hold the image's samples, or is noisier than the
     CHECK_FALSE(voided.errors[0].metrics.valid());
     const CompareResult same = compareImages(a, a);
     const std::string words = comparisonText({&same, nullptr, &voided});
-    CHECK_THAT(words, Contains("void: 1 values are not finite, 0 in the reference") && Contains("less R's noise  void"));
+    CHECK_THAT(words, Contains("void: 1 values are not finite, 0 in the reference") &&
+                          Contains("less R's noise  void"));
     CHECK(std::isnan(voided.errors[0].rmse.value));
     CHECK(voided.errors[1].metrics.valid());
 }
@@ -331,8 +347,10 @@ TEST_CASE("text and JSON of a comparison say what was found and what is not know
     const NoiseComparison noise = compareNoise(a, b);
     const ReferenceComparison errors = compareWithReference(a, b, reference, false);
     const std::string text = comparisonText({&result, &noise, &errors});
-    CHECK_THAT(text, Contains("bias R") && Contains("more than noise") && Contains("noise of A        StdError.R, G, B, 15 degrees of freedom a pixel"));
-    CHECK_THAT(text, Contains("has its variance subtracted") && Contains("±") && Contains("Against the reference R"));
+    CHECK_THAT(text, Contains("bias R") && Contains("more than noise") &&
+                         Contains("noise of A        StdError.R, G, B, 15 degrees of freedom a pixel"));
+    CHECK_THAT(text, Contains("has its variance subtracted") && Contains("±") &&
+                         Contains("Against the reference R"));
     for (std::size_t begin = 0; begin < text.size(); begin = text.find('\n', begin) + 1) {
         CHECK(text.substr(begin, text.find('\n', begin) - begin).size() < 140);
         if (text.find('\n', begin) == std::string::npos) break;

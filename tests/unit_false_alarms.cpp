@@ -1,4 +1,5 @@
-// `crt compare` on pairs of images whose difference is known: alarms where there is none, and planted errors that must be found.
+// `crt compare` on pairs of images whose difference is known: alarms where there is none, and planted errors
+// that must be found.
 #include "catch.h"
 #include "compare_noise.h"
 #include "image_metadata.h"
@@ -26,7 +27,8 @@ struct Alarms {
     int repeats = 0;
 };
 
-Alarms countAlarms(const Scenario& s, int repeats, const Planted& planted = {}, double quality_of_b = 1, std::uint64_t seed = 1) {
+Alarms countAlarms(const Scenario& s, int repeats, const Planted& planted = {}, double quality_of_b = 1,
+                   std::uint64_t seed = 1) {
     synthetic::Maker maker(seed);
     Alarms alarms;
     alarms.repeats = repeats;
@@ -53,7 +55,9 @@ Alarms countAlarms(const Scenario& s, int repeats, const Planted& planted = {}, 
 /// Fewest alarms that are as rare as one in 10,000 test runs when they come at the stated level or below.
 int tooMany(int repeats, double level) {
     int k = 0;
-    while (stats::clopperPearson(static_cast<std::uint64_t>(k), static_cast<std::uint64_t>(repeats), 0.9998).lower <= level) ++k;
+    while (stats::clopperPearson(static_cast<std::uint64_t>(k), static_cast<std::uint64_t>(repeats), 0.9998)
+               .lower <= level)
+        ++k;
     return k;
 }
 
@@ -71,14 +75,19 @@ double noiseOf(Noise noise) {
 
 }  // namespace
 
-TEST_CASE("what is only noise raises no more alarms than is stated, whatever the noise and however little is known of it",
-          "[false-alarms]") {
+TEST_CASE(
+    "what is only noise raises no more alarms than is stated, whatever the noise and however little is "
+    "known of it",
+    "[false-alarms]") {
     constexpr int kRepeats = 60;
-    for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies, Noise::Coverage})
+    for (const Noise noise :
+         {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies, Noise::Coverage})
         for (const bool equal : {true, false})
             for (const std::uint32_t replicates : {2u, 4u, 8u, 16u}) {
-                const Alarms alarms = countAlarms({noise, equal, replicates, noiseOf(noise), 40, 24}, kRepeats);
-                INFO(nameOf(noise) << ", " << (equal ? "equal" : "unequal") << " pixels, " << replicates - 1 << " degrees of freedom");
+                const Alarms alarms =
+                    countAlarms({noise, equal, replicates, noiseOf(noise), 40, 24}, kRepeats);
+                INFO(nameOf(noise) << ", " << (equal ? "equal" : "unequal") << " pixels, " << replicates - 1
+                                   << " degrees of freedom");
                 for (std::size_t l = 0; l < 2; ++l) {
                     const int too_many = tooMany(kRepeats, Alarms::kLevels[l]);
                     INFO("level " << Alarms::kLevels[l]);
@@ -89,18 +98,22 @@ TEST_CASE("what is only noise raises no more alarms than is stated, whatever the
             }
 }
 
-TEST_CASE("what is only noise raises no more alarms than is stated when one image has sixteen times the samples", "[false-alarms]") {
+TEST_CASE(
+    "what is only noise raises no more alarms than is stated when one image has sixteen times the samples",
+    "[false-alarms]") {
     for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies})
         for (const bool equal : {true, false})
             for (const bool better_first : {true, false}) {
-                // A mean that hangs on few rare paths, of which fewer samples may have met none, is the worst case.
+                // A mean that hangs on few rare paths, of which fewer samples may have met none, is the
+                // worst case.
                 const int repeats = noise == Noise::Fireflies && !equal ? 400 : 60;
                 synthetic::Maker maker(7);
                 const Scenario s{noise, equal, 4, noiseOf(noise), 64, 64};
                 std::array<int, 2> mean{}, tiles{};
                 for (int i = 0; i < repeats; ++i) {
                     const Image few = maker.image(s), many = maker.image(s, {}, 16);
-                    const NoiseComparison n = better_first ? compareNoise(many, few) : compareNoise(few, many);
+                    const NoiseComparison n =
+                        better_first ? compareNoise(many, few) : compareNoise(few, many);
                     for (std::size_t l = 0; l < 2; ++l) {
                         mean[l] += n.channels[0].p < Alarms::kLevels[l];
                         tiles[l] += n.tiles.smallest_p < Alarms::kLevels[l];
@@ -126,18 +139,26 @@ TEST_CASE("planted errors are found: 2 % of the image, 20 % of a tile", "[false-
 
 TEST_CASE("(a table) false alarms of compare", "[.][false-alarm-table]") {
     constexpr int kRepeats = 300;
-    std::printf("Alarms in %% of %d pairs of 64 x 64 pixels where nothing is wrong, at the stated levels 5 %% and 0.1 %%.\n\n", kRepeats);
-    std::printf("| B | noise | pixels | dof | mean 5 %% | tiles 5 %% | pixels 5 %% | mean .1 %% | tiles .1 %% | pixels .1 %% |\n"
-                "|---|---|---|---|---|---|---|---|---|---|\n");
+    std::printf(
+        "Alarms in %% of %d pairs of 64 x 64 pixels where nothing is wrong, at the stated levels 5 %% and "
+        "0.1 %%.\n\n",
+        kRepeats);
+    std::printf(
+        "| B | noise | pixels | dof | mean 5 %% | tiles 5 %% | pixels 5 %% | mean .1 %% | tiles .1 %% | "
+        "pixels .1 %% |\n"
+        "|---|---|---|---|---|---|---|---|---|---|\n");
     for (const double quality : {1.0, 16.0})
-        for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies, Noise::Coverage})
+        for (const Noise noise :
+             {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies, Noise::Coverage})
             for (const bool equal : {true, false})
                 for (const std::uint32_t replicates : {2u, 4u, 8u, 16u}) {
-                    const Alarms a = countAlarms({noise, equal, replicates, noiseOf(noise), 64, 64}, kRepeats, {}, quality);
-                    std::printf("| %s | %s | %s | %u |", quality == 1 ? "alike" : "16 times the samples", nameOf(noise),
-                                equal ? "equal" : "unequal", replicates - 1);
+                    const Alarms a = countAlarms({noise, equal, replicates, noiseOf(noise), 64, 64},
+                                                 kRepeats, {}, quality);
+                    std::printf("| %s | %s | %s | %u |", quality == 1 ? "alike" : "16 times the samples",
+                                nameOf(noise), equal ? "equal" : "unequal", replicates - 1);
                     for (std::size_t l = 0; l < 2; ++l) {
-                        for (const int count : {a.mean[l], a.tiles[l]}) std::printf(" %.2f |", 100.0 * count / a.repeats);
+                        for (const int count : {a.mean[l], a.tiles[l]})
+                            std::printf(" %.2f |", 100.0 * count / a.repeats);
                         std::printf(a.pixels_tested ? " %.2f |" : " - |", 100.0 * a.pixels[l] / a.repeats);
                     }
                     std::printf("\n");
@@ -147,13 +168,17 @@ TEST_CASE("(a table) false alarms of compare", "[.][false-alarm-table]") {
 
 TEST_CASE("(a table) power of compare", "[.][false-alarm-table]") {
     constexpr int kRepeats = 100;
-    std::printf("| noise | a pixel's standard error | dof | 2 %% everywhere: mean | 20 %% in a tile: tiles |\n|---|---|---|---|---|\n");
+    std::printf(
+        "| noise | a pixel's standard error | dof | 2 %% everywhere: mean | 20 %% in a tile: tiles "
+        "|\n|---|---|---|---|---|\n");
     for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight})
         for (const double relative : {0.05, 0.1, 0.2})
             for (const std::uint32_t replicates : {2u, 4u, 16u}) {
                 const Scenario s{noise, true, replicates, relative, 64, 64};
-                const int mean = countAlarms(s, kRepeats, {0.02, 0}).mean[1], tile = countAlarms(s, kRepeats, {0, 0.2}).tiles[1];
-                std::printf("| %s | %g %% | %u | %d %% | %d %% |\n", nameOf(noise), 100 * relative, replicates - 1, mean, tile);
+                const int mean = countAlarms(s, kRepeats, {0.02, 0}).mean[1],
+                          tile = countAlarms(s, kRepeats, {0, 0.2}).tiles[1];
+                std::printf("| %s | %g %% | %u | %d %% | %d %% |\n", nameOf(noise), 100 * relative,
+                            replicates - 1, mean, tile);
                 std::fflush(stdout);
             }
 }

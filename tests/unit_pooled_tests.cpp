@@ -16,22 +16,29 @@ namespace {
 
 /// Mean 0 and true variance 1, and an estimate of it with so many degrees of freedom.
 Mean estimated(std::mt19937_64& random, double variance, double dof) {
-    return {std::sqrt(variance) * std::normal_distribution<double>()(random), variance * std::chi_squared_distribution<double>(dof)(random) / dof,
-            dof};
+    return {std::sqrt(variance) * std::normal_distribution<double>()(random),
+            variance * std::chi_squared_distribution<double>(dof)(random) / dof, dof};
 }
 
 /// Whether so many of `trials` are too many for a test of this level, but one time in 10,000.
 bool exceeds(int alarms, int trials, double level) {
-    return clopperPearson(static_cast<std::uint64_t>(alarms), static_cast<std::uint64_t>(trials), 0.9998).lower > level;
+    return clopperPearson(static_cast<std::uint64_t>(alarms), static_cast<std::uint64_t>(trials), 0.9998)
+               .lower > level;
 }
 
 }  // namespace
 
-TEST_CASE("equality of two means is rejected no more often than stated, however few the degrees of freedom", "[pooled-tests]") {
+TEST_CASE("equality of two means is rejected no more often than stated, however few the degrees of freedom",
+          "[pooled-tests]") {
     constexpr int kTrials = 20000;
     std::mt19937_64 random(1);
-    for (const auto& [dof_a, dof_b, variance_a] :
-         {std::tuple{1.0, 1.0, 1.0}, {1.0, 1.0, 30.0}, {3.0, 3.0, 1.0}, {3.0, 1.0, 5.0}, {1.0, 15.0, 0.2}, {15.0, 15.0, 4.0}, {200.0, 3.0, 1.0}}) {
+    for (const auto& [dof_a, dof_b, variance_a] : {std::tuple{1.0, 1.0, 1.0},
+                                                   {1.0, 1.0, 30.0},
+                                                   {3.0, 3.0, 1.0},
+                                                   {3.0, 1.0, 5.0},
+                                                   {1.0, 15.0, 0.2},
+                                                   {15.0, 15.0, 4.0},
+                                                   {200.0, 3.0, 1.0}}) {
         std::array<int, 3> alarms{}, outside{};
         constexpr std::array<double, 3> kLevels{0.05, 0.01, 0.001};
         for (int i = 0; i < kTrials; ++i) {
@@ -48,7 +55,8 @@ TEST_CASE("equality of two means is rejected no more often than stated, however 
             CHECK_FALSE(exceeds(alarms[l], kTrials, kLevels[l]));
             CHECK(alarms[l] == outside[l]);  // p and interval are one test.
         }
-        if (dof_a >= 8 && dof_b >= 8) CHECK(alarms[0] > 0.04 * kTrials);  // Where enough is known, nothing is lost.
+        if (dof_a >= 8 && dof_b >= 8)
+            CHECK(alarms[0] > 0.04 * kTrials);  // Where enough is known, nothing is lost.
     }
     CHECK(carefulEqualityP({1, 0, 3}, {1 + 1e-7, 0, 3}) == 1);  // Rounding.
     CHECK(carefulEqualityP({1, 0, 3}, {1.001, 0, 3}) == 0);
@@ -61,8 +69,13 @@ TEST_CASE("sums of symmetric differences are judged rightly whatever their tails
     const std::vector<double (*)(std::mt19937_64&)> kinds{
         [](std::mt19937_64& r) { return std::normal_distribution<double>()(r); },
         [](std::mt19937_64& r) { return std::cauchy_distribution<double>()(r); },
-        [](std::mt19937_64& r) { return double(std::poisson_distribution<int>(0.02)(r)) - std::poisson_distribution<int>(0.02)(r); },
-        [](std::mt19937_64& r) { return std::pow(std::gamma_distribution<double>(0.1)(r), 3) - std::pow(std::gamma_distribution<double>(0.1)(r), 3); }};
+        [](std::mt19937_64& r) {
+            return double(std::poisson_distribution<int>(0.02)(r)) - std::poisson_distribution<int>(0.02)(r);
+        },
+        [](std::mt19937_64& r) {
+            return std::pow(std::gamma_distribution<double>(0.1)(r), 3) -
+                   std::pow(std::gamma_distribution<double>(0.1)(r), 3);
+        }};
     for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
         std::array<int, 2> alarms{}, outside{};
         constexpr std::array<double, 2> kLevels{0.05, 0.001};
@@ -81,7 +94,8 @@ TEST_CASE("sums of symmetric differences are judged rightly whatever their tails
             CHECK_FALSE(exceeds(alarms[l], kTrials, kLevels[l]));
             CHECK(alarms[l] == outside[l]);
         }
-        if (kind == 0) CHECK(alarms[0] > 0.05 / 4 * kTrials);  // The price of knowing nothing is a factor of three.
+        if (kind == 0)
+            CHECK(alarms[0] > 0.05 / 4 * kTrials);  // The price of knowing nothing is a factor of three.
     }
     // The worst case: two signs are equal every other time, and no smaller factor would do.
     DifferenceSums two;

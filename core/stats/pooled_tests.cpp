@@ -22,8 +22,11 @@ double differenceDof(const Mean& a, const Mean& b) {
     return inverse > 0 ? 1 / inverse : kInfinite;
 }
 
-/// Differences up to this are rounding: without noise, say in the sky, there is no other way to tell them from bias.
-double roundingOf(const Mean& a, const Mean& b) { return 0x1p-20 * std::max(std::abs(a.value), std::abs(b.value)); }
+/// Differences up to this are rounding: without noise, say in the sky, there is no other way to tell them
+/// from bias.
+double roundingOf(const Mean& a, const Mean& b) {
+    return 0x1p-20 * std::max(std::abs(a.value), std::abs(b.value));
+}
 
 }  // namespace
 
@@ -55,7 +58,8 @@ Mean PixelSums::mean(double dof) const {
 
 double carefulEqualityP(const Mean& a, const Mean& b) {
     const double difference = a.value - b.value, variance = a.variance + b.variance;
-    if (!std::isfinite(difference) || !std::isfinite(variance)) return std::numeric_limits<double>::quiet_NaN();
+    if (!std::isfinite(difference) || !std::isfinite(variance))
+        return std::numeric_limits<double>::quiet_NaN();
     if (std::abs(difference) <= roundingOf(a, b)) return 1;
     if (variance == 0) return 0;
     const double t = difference / std::sqrt(variance), dof = differenceDof(a, b);
@@ -81,17 +85,21 @@ double symmetricP(const DifferenceSums& d) {
     return d.squares > 0 ? std::min(1.0, kTailFactor * normalTwoSided(d.sum / std::sqrt(d.squares))) : 1.0;
 }
 
-/// With mean m, n values and S = Σ (d − m)², the test of a shift δ rejects when n (m − δ) > q √(S + n (m − δ)²).
+/// With mean m, n values and S = Σ (d − m)², the test of a shift δ rejects when n (m − δ) > q √(S + n (m −
+/// δ)²).
 double symmetricHalfWidth(const DifferenceSums& d, double confidence) {
-    const double n = static_cast<double>(d.count), q = normalQuantile(1 - 0.5 * (1 - confidence) / kTailFactor);
+    const double n = static_cast<double>(d.count),
+                 q = normalQuantile(1 - 0.5 * (1 - confidence) / kTailFactor);
     if (n <= q * q) return kInfinite;
     const double about_mean = std::max(0.0, d.squares - d.sum * d.sum / n);
     return q * std::sqrt(about_mean / (n * (n - q * q)));
 }
 
-std::vector<double> windowMeans(std::span<const double> values, std::uint32_t width, std::uint32_t height, std::uint32_t radius) {
+std::vector<double> windowMeans(std::span<const double> values, std::uint32_t width, std::uint32_t height,
+                                std::uint32_t radius) {
     // Along rows, then along columns: a mean over the square is a mean of means, every row being cut alike.
-    const auto along = [radius](std::span<const double> from, std::vector<double>& to, std::size_t first, std::size_t step, std::uint32_t count) {
+    const auto along = [radius](std::span<const double> from, std::vector<double>& to, std::size_t first,
+                                std::size_t step, std::uint32_t count) {
         for (std::uint32_t i = 0; i < count; ++i) {
             const std::uint32_t begin = i > radius ? i - radius : 0, end = std::min(count, i + radius + 1);
             double sum = 0;

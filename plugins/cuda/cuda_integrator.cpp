@@ -111,11 +111,13 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
 
 std::uint32_t CudaIntegrator::ensureSlices(std::uint32_t slices) {
     if (slices <= std::max(slice_count_, 1u)) return slices;
-    // Others may have taken memory since the device was opened. Slices only make a render faster: it must not fail for want of them.
+    // Others may have taken memory since the device was opened. Slices only make a render faster: it must
+    // not fail for want of them.
     std::size_t free_bytes = 0, all_bytes = 0;
     driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "asking for free memory");
     const std::uint64_t film_bytes = std::max<std::uint64_t>(film_.bytes(), 1);
-    const std::uint64_t affordable = sliceBudget(device_.memory_bytes, free_bytes + slices_.bytes()) / film_bytes;
+    const std::uint64_t affordable =
+        sliceBudget(device_.memory_bytes, free_bytes + slices_.bytes()) / film_bytes;
     slices = static_cast<std::uint32_t>(std::min<std::uint64_t>(slices, affordable));
     if (slices <= std::max(slice_count_, 1u)) return std::max(slice_count_, 1u);
     slices_ = DeviceFilm();
@@ -131,9 +133,11 @@ double CudaIntegrator::launch(const Launch& launch) {
     const Module& module = program_->current();
 
     const std::uint64_t blocks = divideUp(launch.x1 - launch.x0, kBlockWidth) * divideUp(launch.y1 - launch.y0, kBlockHeight);
-    const std::uint64_t most = sliceBudget(device_.memory_bytes, device_.memory_bytes) / std::max<std::uint64_t>(film_.bytes(), 1);
-    std::uint32_t slices = ensureSlices(
-        chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors, launch.sample_count, most));
+    const std::uint64_t most =
+        sliceBudget(device_.memory_bytes, device_.memory_bytes) / std::max<std::uint64_t>(film_.bytes(), 1);
+    std::uint32_t slices =
+        ensureSlices(chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors,
+                                  launch.sample_count, most));
 
     DeviceFilm& target = slices > 1 ? slices_ : film_;
     CUdeviceptr blob = blob_.address(), rays = rays_.address();

@@ -1,9 +1,10 @@
-// A libcuda.so.1 for tests: one device with 1 GB whose memory is the host's and whose kernels are those of host_kernels.cpp. With it the real CUDA
-// plugin runs on a machine without a GPU: opening the driver, allocating, choosing slices, passing arguments, going over from the
-// precompiled kernel to NVRTC's, running out of memory. It checks what a driver would check: sizes, handles, and that memory is given back.
+// A libcuda.so.1 for tests: one device with 1 GB whose memory is the host's and whose kernels are those of
+// host_kernels.cpp. With it the real CUDA plugin runs on a machine without a GPU: opening the driver,
+// allocating, choosing slices, passing arguments, going over from the precompiled kernel to NVRTC's, running
+// out of memory. It checks what a driver would check: sizes, handles, and that memory is given back.
 //
-// CRT_FAKE_CUDA says what is to go wrong: "no_device", "old" (a driver for CUDA 11), "launch" (every launch fails) or
-// "little_memory" (other programs have taken all but a few megabytes).
+// CRT_FAKE_CUDA says what is to go wrong: "no_device", "old" (a driver for CUDA 11), "launch" (every launch
+// fails) or "little_memory" (other programs have taken all but a few megabytes).
 #include "host_kernels.h"
 
 #include <cuda.h>
