@@ -228,7 +228,9 @@ std::string againstText(const BackendComparison& all, const BackendAgainst& b) {
         const std::uint32_t across = (all.width + stats::kTileSide - 1) / stats::kTileSide;
         line("tiles of 8x8", familyText(g.tiles, placeText(g.tiles, across, stats::kTileSide)) +
                                  fmt::format("; their p-values are uniform with p {:.2g}", g.tile_uniformity_p));
-        line("pixels", familyText(g.pixels, placeText(g.pixels, all.width, 1)));
+        line("pixels", g.pixels.tests > 0 ? familyText(g.pixels, placeText(g.pixels, all.width, 1))
+                                          : fmt::format("not tested: that needs --replicates {} or more",
+                                                        stats::kFewestForPixels));
         line("largest value",
              fmt::format("carries {:.2g} % of the squared error ({:g} % allowed)", 100 * g.largest_share, 100 * all.gate.largest_share));
     }

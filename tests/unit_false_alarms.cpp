@@ -3,6 +3,7 @@
 #include "catch.h"
 #include "compare_noise.h"
 #include "image_metadata.h"
+#include "stats/image_tests.h"
 #include "stats/pooled_tests.h"
 #include "stats/statistics.h"
 #include "synthetic_noise.h"
@@ -180,5 +181,40 @@ TEST_CASE("(a table) power of compare", "[.][false-alarm-table]") {
                 std::printf("| %s | %g %% | %u | %d %% | %d %% |\n", nameOf(noise), 100 * relative,
                             replicates - 1, mean, tile);
                 std::fflush(stdout);
+            }
+}
+
+TEST_CASE("backends that render the same do not fail, whatever the noise and however few the replicates",
+          "[false-alarms]") {
+    constexpr int kRepeats = 60;
+    for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies, Noise::Coverage})
+        for (const bool equal : {true, false})
+            for (const int renders : {2, 4, 16}) {
+                synthetic::Maker maker(3);
+                const Scenario s{noise, equal, 2, noiseOf(noise), 24, 16};
+                int means = 0, tiles = 0, pixels = 0, fails = 0;
+                for (int i = 0; i < kRepeats; ++i) {
+                    stats::Replicates a(s.width, s.height, 1), b(s.width, s.height, 1);
+                    for (int r = 0; r < renders; ++r)
+                        for (stats::Replicates* side : {&a, &b}) {
+                            const Image image = maker.image(s);
+                            std::vector<double> values;
+                            for (std::size_t p = 0; p < image.pixels.size(); p += image.channels.size())
+                                values.push_back(image.pixels[p]);
+                            side->add(values);
+                        }
+                    const stats::GateResult g = stats::gate(a, b);
+                    means += g.channels[0].verdict == stats::Verdict::Fail;
+                    tiles += g.tiles.rejected > 0;
+                    pixels += g.pixels.rejected > 0;
+                    fails += g.verdict == stats::Verdict::Fail;
+                }
+                INFO(nameOf(noise) << ", " << (equal ? "equal" : "unequal") << " pixels, " << renders
+                                   << " renders");
+                const int too_many = tooMany(kRepeats, 0.001);
+                CHECK(means < too_many);
+                CHECK(tiles < too_many);
+                CHECK(pixels < too_many);
+                CHECK(fails < too_many);
             }
 }
