@@ -210,7 +210,14 @@ double pixelP(const View& view, std::size_t i) {
         stats::carefulEqualityP({a.values[i], a.variances[i], a.dof}, {b.values[i], b.variances[i], b.dof});
     constexpr double kNotWorthPooling = 0.01;
     if (std::isnan(own) || own > kNotWorthPooling) return own;
-    return std::max(own, stats::carefulEqualityP(pooledPixel(view, a, i), pooledPixel(view, b, i)));
+    const Mean around_a = pooledPixel(view, a, i), around_b = pooledPixel(view, b, i);
+    // Replicates that agree, up to rounding, amid noise do so by chance: nothing is known of this pixel.
+    constexpr double kRounding = 1e-6;
+    const auto agrees = [i](const NoisyImage& image, const Mean& around) {
+        return image.variances[i] < kRounding * around.variance;
+    };
+    if (agrees(a, around_a) || agrees(b, around_b)) return 1;
+    return std::max(own, stats::carefulEqualityP(around_a, around_b));
 }
 
 /// Fills z, rms_z and the pixels' tests.

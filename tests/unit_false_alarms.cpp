@@ -218,3 +218,10 @@ TEST_CASE("backends that render the same do not fail, whatever the noise and how
                 CHECK(fails < too_many);
             }
 }
+
+TEST_CASE("a pixel whose replicates agree exactly by chance is no alarm", "[false-alarms]") {
+    // Coins: eight replicates of one sample each agree in one pixel of 128, and B knows the pixel much better.
+    const Alarms alarms = countAlarms({Noise::Coverage, false, 8, noiseOf(Noise::Coverage), 64, 64}, 60, {}, 16);
+    CHECK(alarms.pixels[0] < tooMany(60, 0.05));
+    CHECK(alarms.pixels[1] < tooMany(60, 0.001));
+}
