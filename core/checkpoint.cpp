@@ -17,6 +17,8 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <set>
+#include <string_view>
 
 namespace crt {
 namespace {
@@ -251,6 +253,21 @@ void requireSameScene(const std::string& path, const FilmIdentity& found, const 
         logWarning("'{}' was rendered by crt {}, this is {}: samples may differ between versions", path, found.version, expected.version);
 }
 
+std::string joinVersions(const std::string& a, const std::string& b) {
+    constexpr std::string_view kBetween = " and ", kMore = "more";
+    std::set<std::string> versions;
+    for (const std::string& text : {a, b})
+        for (std::size_t begin = 0; begin < text.size();) {
+            const std::size_t end = std::min(text.find(kBetween, begin), text.size());
+            versions.insert(text.substr(begin, end - begin));
+            begin = end + kBetween.size();
+        }
+    const std::string joined = fmt::format("{}", fmt::join(versions, kBetween));
+    if (joined.size() <= kVersionBytesMax) return joined;
+    const std::size_t end = joined.rfind(kBetween, kVersionBytesMax - kBetween.size() - kMore.size());
+    return fmt::format("{}{}{}", joined.substr(0, end), kBetween, kMore);
+}
+
 std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& paths) {
     if (paths.empty()) throw Error(ErrorKind::Usage, "nothing to merge: name at least one .crtfilm file");
     std::pair<Film, FilmIdentity> merged = readCheckpoint(paths.front());
@@ -270,6 +287,7 @@ std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& p
                                     merged.second.scene_hash, identity.scene_hash),
                         {paths[i]});
         requireSameScene(paths[i], identity, merged.second);
+        merged.second.version = joinVersions(merged.second.version, identity.version);
         try {
             merged.first.add(film);
         } catch (const Error& error) {

@@ -37,8 +37,13 @@ inline constexpr const char* kCheckpointExtension = ".crtfilm";
 /// bits that nobody noticed would not show otherwise.
 void requireSameScene(const std::string& path, const FilmIdentity& found, const FilmIdentity& expected);
 
-/// Adds partial films of one scene; the result does not depend on the order of `paths`. Throws crt::Error(Usage) naming the files when there is
-/// none, one is damaged, bits, scenes or shapes differ, or two hold the same samples.
+/// "1.0.0 and 1.1.0": every version that is in `a` or in `b`, once, in the order of their text, whatever the
+/// order of films. What a checkpoint has no room for is "and more".
+std::string joinVersions(const std::string& a, const std::string& b);
+
+/// Adds partial films of one scene; the identity names the versions of all of them. The result does not
+/// depend on the order of `paths`. Throws crt::Error(Usage) naming the files when there is none, one is
+/// damaged, bits, scenes or shapes differ, or two hold the same samples.
 std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& paths);
 
 }  // namespace crt

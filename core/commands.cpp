@@ -176,7 +176,10 @@ int mergeFilms(const MergeArguments& arguments) {
     if (!arguments.scene.file.empty())
         requireSameScene(arguments.parts.front(), identity, {compileScene(scene, requestedAovs(scene)).hash, CRT_VERSION});
 
-    const Metadata metadata{{"Software", "crt " CRT_VERSION}, {"crt/version", CRT_VERSION}, {"crt/sceneHash", identity.scene_hash}};
+    // The version of the samples; who merged them is the software.
+    const Metadata metadata{{"Software", "crt " CRT_VERSION},
+                            {"crt/version", identity.version},
+                            {"crt/sceneHash", identity.scene_hash}};
     for (const std::string& name : plan.films) writeCheckpoint(name, film, identity);
     for (const Output& output : plan.images) writeOutput(output, film, scene, metadata);
     logInfo("{} samples per pixel from {} to {}", film.samples.count(), counted(arguments.parts.size(), "part", "parts"),

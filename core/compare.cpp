@@ -2,6 +2,9 @@
 
 #include "error.h"
 #include "image_io.h"
+#include "image_metadata.h"
+#include "image_noise.h"
+#include "stats/luminance_error.h"
 #include "stats/metrics.h"
 
 #include <fmt/format.h>
@@ -84,7 +87,7 @@ void addMetrics(CompareResult& result, const std::vector<float>& a, const std::v
     result.p99_absolute = m.p99_absolute;
     result.mse = m.mse;
     result.rmse = m.rmse;
-    result.relative_rmse = m.relative_rmse;
+    result.rmse_over_mean = m.relative_rmse;
     result.relmse = m.relmse;
     result.mae = m.mae;
     result.smape = m.smape;
@@ -93,7 +96,9 @@ void addMetrics(CompareResult& result, const std::vector<float>& a, const std::v
 }
 
 void addLooks(CompareResult& result, const Image& a, const Image& b, bool display_referred) {
-    const auto seen_a = linearSrgb(a), seen_b = linearSrgb(b);
+    // Who does not name its primaries is taken to have the other's.
+    const auto seen_a = linearSrgb(a, a.chromaticities ? a.chromaticities : b.chromaticities);
+    const auto seen_b = linearSrgb(b, b.chromaticities ? b.chromaticities : a.chromaticities);
     if (!seen_a || !seen_b) return;
     // Same colours look the same; the answer is known without seconds of FLIP.
     result.looks = *seen_a == *seen_b ? Looks{0, !display_referred, 0, 0} : compareLooks(*seen_a, *seen_b, a.width, a.height, display_referred);
@@ -151,6 +156,12 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
         result.mismatch = fmt::format("the images differ in channels: {} only in one of them or of another type", fmt::join(result.other_channels, ", "));
         return result;
     }
+    if (color) {
+        const ColorConditions of_a = colorConditions(a), of_b = colorConditions(b);
+        result.mismatch = conflictOf(of_a, "A", of_b, "B");
+        if (!result.mismatch.empty()) return result;
+        result.notes = unknownConditions(of_a, "A", of_b, "B");
+    }
     const std::vector<std::string> metric_channels = color ? std::vector<std::string>{"R", "G", "B"} : a.channels;
     result.channels = metric_channels;
     if (options.all_channels) {
@@ -173,11 +184,19 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
             break;
         }
 
-    addMetrics(result, valuesOf(a, metric_channels), valuesOf(b, metric_channels));
-    if (result.metrics_valid && color) addLooks(result, a, b, options.display_referred);
+    const std::vector<float> values_a = valuesOf(a, metric_channels);
+    const std::vector<float> values_b = valuesOf(b, metric_channels);
+    addMetrics(result, values_a, values_b);
+    if (result.metrics_valid && color) {
+        const stats::Rgb weights = luminanceWeights(b.chromaticities ? b : a);
+        result.relative_rmse =
+            stats::luminanceError(stats::luminances(values_a, weights), stats::luminances(values_b, weights))
+                .relative_rmse;
+        addLooks(result, a, b, options.display_referred);
+    }
 
     if (options.tolerance > 0) {
-        result.same = result.metrics_valid && result.relative_rmse <= options.tolerance;
+        result.same = result.metrics_valid && result.rmse_over_mean <= options.tolerance;
     } else {
         result.same = result.differing_pixels == 0;
     }
@@ -187,7 +206,7 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
 Image differenceImage(const Image& a, const Image& b) {
     const ColorPair pair = colorPair(a, b);
     Image image = rgbImage(a);
-    image.chromaticities = a.chromaticities;
+    image.chromaticities = a.chromaticities ? a.chromaticities : b.chromaticities;
     for (std::size_t p = 0; p < pair.pixels; ++p)
         for (std::size_t c = 0; c < 3; ++c) image.pixels.push_back(static_cast<float>(pair.a[c].value(p) - pair.b[c].value(p)));
     return image;

@@ -30,13 +30,16 @@ struct Difference {
     std::optional<std::uint64_t> ulps;  ///< Floats between the two; nothing when one is no number or they are integers.
 };
 
-/// The second image is the reference. Metrics run over the colour values: R, G and B of every pixel, or every float channel when the images
-/// have no R, G and B.
+/// The second image is the reference; the images are called A and B. Metrics run over the colour values: R,
+/// G and B of every pixel, or every float channel when the images have no R, G and B.
 struct CompareResult {
     bool same = false;
     double tolerance = 0;
-    /// Why the images cannot be compared (other size, other channels); empty when they can. Then everything below is zero.
+    /// Why the images cannot be compared (other size, other channels, colours under other conditions); empty
+    /// when they can. Then everything below is zero.
     std::string mismatch;
+    /// What had to be supposed to compare them, one sentence each, without a full stop.
+    std::vector<std::string> notes;
     std::uint32_t width = 0, height = 0;
     std::vector<std::string> channels;        ///< Compared bit by bit.
 
@@ -50,12 +53,15 @@ struct CompareResult {
     double p99_absolute = 0;                  ///< The smallest |a − b| that 99 % of the values do not exceed.
     double mse = 0;                           ///< mean (a − b)²
     double rmse = 0;                          ///< √mse
-    double relative_rmse = 0;                 ///< rmse / mean b; infinite when b is black and a is not.
+    double rmse_over_mean = 0;                ///< rmse / mean b, of colour values; infinite against black.
     double relmse = 0;                        ///< mean (a − b)² / (b² + ε²), ε = mean(b)/100
     double mae = 0;                           ///< mean |a − b|
     double smape = 0;                         ///< mean 2|a − b| / (|a| + |b|), in [0,2]
     std::array<double, 2> mean{0, 0};
     double mean_ratio = 1;                    ///< mean a / mean b; NaN when both are black, infinite when only b is.
+    /// The error as crt states it everywhere (stats/luminance_error.h): of luminance, relative to b's mean
+    /// luminance. With R, G and B only.
+    std::optional<double> relative_rmse;
     std::optional<Looks> looks;               ///< When both have R, G and B of known primaries, and metrics are valid.
     std::vector<std::string> other_channels;  ///< In one image only; they do not matter unless all_channels.
 };

@@ -210,7 +210,10 @@ std::string againstText(const BackendComparison& all, const BackendAgainst& b) {
         const Difference& d = *b.same_seed.first_difference;
         line("first difference", fmt::format("pixel {},{} channel {}: {:.9g} and {:.9g}{}", d.x, d.y, d.channel, d.first, d.second,
                                              d.ulps ? fmt::format(" ({} ulp)", *d.ulps) : ""));
-        line("", fmt::format("RMS difference {:.3g} % of the mean, at most {} ulp", 100 * b.same_seed.relative_rmse, b.same_seed.max_ulp));
+        line("", b.same_seed.relative_rmse
+                     ? fmt::format("error {:.3g} % (RMSE of luminance), at most {} ulp",
+                                   100 * *b.same_seed.relative_rmse, b.same_seed.max_ulp)
+                     : "values are not finite: there is no error to measure");
     }
     line("other seeds", fmt::format("{} renders of {} samples per pixel by each", all.replicates, all.samples));
     const stats::GateResult& g = b.other_seeds;
@@ -225,7 +228,9 @@ std::string againstText(const BackendComparison& all, const BackendAgainst& b) {
         const std::uint32_t across = (all.width + stats::kTileSide - 1) / stats::kTileSide;
         line("tiles of 8x8", familyText(g.tiles, placeText(g.tiles, across, stats::kTileSide)) +
                                  fmt::format("; their p-values are uniform with p {:.2g}", g.tile_uniformity_p));
-        line("pixels", familyText(g.pixels, placeText(g.pixels, all.width, 1)));
+        line("pixels", g.pixels.tests > 0 ? familyText(g.pixels, placeText(g.pixels, all.width, 1))
+                                          : fmt::format("not tested: that needs --replicates {} or more",
+                                                        stats::kFewestForPixels));
         line("largest value",
              fmt::format("carries {:.2g} % of the squared error ({:g} % allowed)", 100 * g.largest_share, 100 * all.gate.largest_share));
     }
@@ -241,8 +246,12 @@ nlohmann::ordered_json familyJson(const stats::TestFamily& family) {
 nlohmann::ordered_json againstJson(const BackendAgainst& b) {
     const stats::GateResult& g = b.other_seeds;
     nlohmann::ordered_json json{{"backend", b.backend}, {"device", b.device}, {"verdict", stats::verdictName(b.verdict)}, {"reasons", g.reasons}};
-    json["same_seed"] = {{"same_bits", b.same_seed.same}, {"differing_pixels", b.same_seed.differing_pixels}, {"max_ulp", b.same_seed.max_ulp},
-                         {"relative_rmse", b.same_seed.relative_rmse}};
+    json["same_seed"] = {
+        {"same_bits", b.same_seed.same},
+        {"differing_pixels", b.same_seed.differing_pixels},
+        {"max_ulp", b.same_seed.max_ulp},
+        {"relative_rmse", b.same_seed.relative_rmse ? nlohmann::ordered_json(*b.same_seed.relative_rmse)
+                                                    : nlohmann::ordered_json(nullptr)}};
     json["means"] = nlohmann::ordered_json::array();
     for (std::size_t c = 0; c < g.channels.size(); ++c)
         json["means"].push_back({{"channel", kColorNames[c]}, {"relative_difference", g.channels[c].relative},

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <tuple>
 
 namespace crt {
 namespace {
@@ -37,6 +38,18 @@ void print(const CompareArguments& arguments, const std::string& text, const std
     if (!arguments.json_file.empty() && arguments.json_file != "-") writeText(arguments.json_file, json + "\n");
 }
 
+/// Of images that do not match there is nothing but that to say. Throws crt::Error(Usage) when more was
+/// asked for.
+void requireNothingMore(const CompareArguments& arguments, const std::string& mismatch) {
+    for (const auto& [option, file, what] :
+         {std::tuple{"--reference", &arguments.reference, "errors against a reference"},
+          {"--diff", &arguments.difference_file, "a difference image"},
+          {"--map", &arguments.map_file, "a z map"}})
+        if (!file->empty())
+            throw Error(ErrorKind::Usage,
+                        fmt::format("{}: there is no {}, because {}", option, what, mismatch));
+}
+
 int compareFiles(const CompareArguments& arguments) {
     if (arguments.second.empty())
         throw Error(ErrorKind::Usage, fmt::format("there is nothing to compare '{}' with; name a second image, or backends with --backends",
@@ -59,10 +72,14 @@ int compareFiles(const CompareArguments& arguments) {
 
     const Comparison comparison{&result, noise ? &*noise : nullptr, reference ? &*reference : nullptr};
     print(arguments, comparisonText(comparison), comparisonJson(comparison));
-    if (!arguments.difference_file.empty() && result.mismatch.empty()) writeDifference(arguments.difference_file, a, b);
+    // What was asked for and cannot be is an error, and not an answer that leaves it out.
+    if (!result.mismatch.empty()) requireNothingMore(arguments, result.mismatch);
+    if (!arguments.difference_file.empty()) writeDifference(arguments.difference_file, a, b);
     if (!arguments.map_file.empty()) {
         if (!noise)
-            throw Error(ErrorKind::Usage, "there is no z map of images that differ in size, lack R, G and B, or hold values that are not finite");
+            throw Error(
+                ErrorKind::Usage,
+                "there is no z map of images that lack R, G and B or hold values that are not finite");
         writeZMap(arguments.map_file, *noise, a.width, a.height);
     }
     return result.same ? 0 : kDifferent;

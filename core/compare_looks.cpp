@@ -10,7 +10,8 @@
 
 namespace crt {
 
-std::optional<std::vector<float>> linearSrgb(const Image& image) {
+std::optional<std::vector<float>> linearSrgb(const Image& image,
+                                             const std::optional<std::array<double, 8>>& primaries) {
     std::array<std::size_t, 3> places{};
     for (std::size_t c = 0; c < 3; ++c) {
         const auto found = std::find(image.channels.begin(), image.channels.end(), std::array{"R", "G", "B"}[c]);
@@ -19,7 +20,9 @@ std::optional<std::vector<float>> linearSrgb(const Image& image) {
     }
     std::optional<Matrix3d> matrix;
     try {
-        matrix = toLinearSrgb(image);
+        Image space;
+        space.chromaticities = primaries;
+        matrix = toLinearSrgb(space);
     } catch (const Error&) {
         return std::nullopt;  // Unknown primaries: there are differences to measure, but none to see.
     }

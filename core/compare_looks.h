@@ -3,6 +3,7 @@
 
 #include "film.h"
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -15,8 +16,10 @@ struct Looks {
     double delta_e_mean = 0, delta_e_max = 0;  ///< CIEDE2000, 1 being white.
 };
 
-/// R, G and B of every pixel in linear sRGB; nothing when they are missing or the image's primaries are unknown.
-std::optional<std::vector<float>> linearSrgb(const Image& image);
+/// R, G and B of every pixel, which belong to `primaries` (none: sRGB's), in linear sRGB; nothing when they
+/// are missing or the primaries are unknown.
+std::optional<std::vector<float>> linearSrgb(const Image& image,
+                                             const std::optional<std::array<double, 8>>& primaries);
 
 /// Values as linearSrgb gives them, all finite. `display_referred`: both are as a screen shows them, as PNG files are; else they are radiances.
 Looks compareLooks(std::span<const float> test, std::span<const float> reference, std::uint32_t width, std::uint32_t height, bool display_referred);

@@ -15,19 +15,35 @@ struct ChannelBias {
     double difference = 0;          ///< mean_a − mean_b
     stats::Interval interval;       ///< Of the difference, at NoiseComparison::confidence.
     double p = 1;                   ///< That the means are equal.
+    bool beyondNoise() const { return !interval.contains(0); }  ///< The same as p < 1 − confidence.
 };
 
-/// What the images' own noise says of their difference.
+/// What the images' own noise says of their difference. When nothing is wrong, an alarm of each kind (a
+/// channel's mean, any tile, any pixel) is as rare as 1 − confidence: where noise is normal; and, of means
+/// and tiles, also where the images differ in their seeds alone, whatever the noise and however few the
+/// degrees of freedom of the stated variances. Means and tiles are judged by the stated noise and by the
+/// signs of the pixels' differences (stats/pooled_tests.h), and both must agree. A pixel is judged by its
+/// own variance and by that of its neighbours, and not at all where its variance has fewer than seven
+/// degrees of freedom. The mean of a render of fewer samples than the other's has at least the variance that
+/// the other's says. Of images under 64 pixels, and with noise that is skewed and not alike in both, the
+/// mean is judged as if noise were normal; that of tiles is then at least the average of the tiles about
+/// them.
 struct NoiseComparison {
     std::string unknown;            ///< Why nothing is said, one sentence; then all else is empty.
     std::string source_a, source_b; ///< Where variances are from; empty: none, the image is taken as exact.
     double confidence = 0.999;
     std::vector<ChannelBias> channels;
     stats::TestFamily tiles, pixels;   ///< Channels among them: `worst` is place · channels + channel.
+    std::string pixels_untested;  ///< Why single pixels are not tested, one sentence without a full stop;
+                                  ///< empty when they are.
     std::uint32_t tiles_across = 0;
-    /// (a − b) / standard error; [pixel][channel]. 0 where there is neither noise nor difference, infinite where no noise.
+    /// (a − b) / standard error; [pixel][channel]. 0 where there is neither noise nor difference, infinite
+    /// where no noise. The standard error is the larger of the pixel's own and the average of the 7 × 7
+    /// pixels about it.
     std::vector<double> z;
-    double rms_z = 0;               ///< 1 when all the difference is noise, and the noise is what the images say.
+    /// √(Σ (a − b)² / Σ stated variances): 1 when all the difference is noise, and the noise is what the
+    /// images say. Unbiased with any degrees of freedom, which the mean square of single z's is not.
+    double rms_z = 0;
 };
 
 /// Images of one size with R, G and B. Between pixels noise is independent, and so are the images: with one seed they are not, and then nothing is

@@ -2,7 +2,9 @@
 
 #include "compare_looks.h"
 #include "error.h"
+#include "image_metadata.h"
 #include "image_noise.h"
+#include "stats/luminance_error.h"
 #include "stats/statistics.h"
 
 #include <fmt/format.h>
@@ -10,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -38,21 +41,22 @@ struct NamedMetric {
     SpreadMetric ReferenceError::*to;
     double stats::ErrorMetrics::*from;
 };
-constexpr std::array<NamedMetric, 8> kMetrics{{{&ReferenceError::rmse, &stats::ErrorMetrics::rmse},
-                                               {&ReferenceError::relative_rmse, &stats::ErrorMetrics::relative_rmse},
-                                               {&ReferenceError::relmse, &stats::ErrorMetrics::relmse},
-                                               {&ReferenceError::smape, &stats::ErrorMetrics::smape},
-                                               {&ReferenceError::mae, &stats::ErrorMetrics::mae},
-                                               {&ReferenceError::p99_absolute, &stats::ErrorMetrics::p99_absolute},
-                                               {&ReferenceError::max_absolute, &stats::ErrorMetrics::max_absolute},
-                                               {&ReferenceError::mean_ratio, &stats::ErrorMetrics::mean_ratio}}};
+constexpr std::array<NamedMetric, 8> kMetrics{
+    {{&ReferenceError::rmse, &stats::ErrorMetrics::rmse},
+     {&ReferenceError::rmse_over_mean, &stats::ErrorMetrics::relative_rmse},
+     {&ReferenceError::relmse, &stats::ErrorMetrics::relmse},
+     {&ReferenceError::smape, &stats::ErrorMetrics::smape},
+     {&ReferenceError::mae, &stats::ErrorMetrics::mae},
+     {&ReferenceError::p99_absolute, &stats::ErrorMetrics::p99_absolute},
+     {&ReferenceError::max_absolute, &stats::ErrorMetrics::max_absolute},
+     {&ReferenceError::mean_ratio, &stats::ErrorMetrics::mean_ratio}}};
 
 /// FLIP against eight more references of this many pixels takes seconds; beyond, its spread is left out.
 constexpr std::size_t kMostPixelsForFlipSpread = 1 << 16;
 
 /// Colours in the file's space for errors, in sRGB for looks.
 struct Colors {
-    std::vector<float> values;
+    std::vector<float> values, luminances;
     std::optional<std::vector<float>> srgb;
 };
 
@@ -65,11 +69,18 @@ ReferenceError errorAgainst(const Colors& test, const Colors& reference, const s
     Looks seen{nan, !display_referred, nan, nan};
     if (looks) seen = compareLooks(*test.srgb, *reference.srgb, width, height, display_referred);
     for (const NamedMetric& m : kMetrics) (error.*m.to).value = error.metrics.*m.from;
+    const auto relativeRmse = [&](const Colors& r) {
+        return stats::luminanceError(test.luminances, r.luminances).relative_rmse;
+    };
+    error.relative_rmse.value = error.metrics.valid() ? relativeRmse(reference) : nan;
     error.flip.value = seen.flip_mean;
     error.delta_e_mean.value = seen.delta_e_mean;
     error.delta_e_max.value = seen.delta_e_max;
     if (without_fold.empty() || !error.metrics.valid()) return error;
 
+    std::vector<double> relative;
+    for (const Colors& r : without_fold) relative.push_back(relativeRmse(r));
+    error.relative_rmse.spread = jackknifeError(relative);
     std::vector<stats::ErrorMetrics> left_out;
     for (const Colors& r : without_fold) left_out.push_back(stats::errorMetrics(test.values, r.values));
     for (const NamedMetric& m : kMetrics) {
@@ -91,9 +102,15 @@ ReferenceError errorAgainst(const Colors& test, const Colors& reference, const s
     return error;
 }
 
-Colors colorsOf(const Image& image) { return {colorValues(image), linearSrgb(image)}; }
+/// `like` names the primaries where the image does not.
+Colors colorsOf(const Image& image, const Image& like) {
+    const Image& named = image.chromaticities ? image : like;
+    Colors colors{colorValues(image), {}, linearSrgb(image, named.chromaticities)};
+    colors.luminances = stats::luminances(colors.values, luminanceWeights(named));
+    return colors;
+}
 
-std::vector<Colors> colorsWithoutFolds(const Image& reference) {
+std::vector<Colors> colorsWithoutFolds(const Image& reference, const Image& like) {
     std::vector<Colors> colors;
     if (!hasFolds(reference)) return colors;
     for (std::size_t k = 0; k < kFolds; ++k) {
@@ -103,7 +120,7 @@ std::vector<Colors> colorsWithoutFolds(const Image& reference) {
         rest.channels = {"R", "G", "B"};
         rest.chromaticities = reference.chromaticities;
         rest.pixels = colorWithoutFold(reference, k);
-        colors.push_back(colorsOf(rest));
+        colors.push_back(colorsOf(rest, like));
     }
     return colors;
 }
@@ -117,30 +134,39 @@ ReferenceComparison compareWithReference(const Image& a, const Image& b, const I
                                                       reference.width,
                                                       reference.height, image->width, image->height));
     ReferenceComparison result;
-    const Colors colors = colorsOf(reference);
-    const std::vector<Colors> without_fold = colorsWithoutFolds(reference);
-    std::optional<double> variance;  // Mean over the colours' values.
-    for (const NoiseOf what : {NoiseOf::Color, NoiseOf::Luminance}) {
-        const std::optional<NoisyImage> noisy = noisyImage(reference, what);
-        if (!noisy) continue;
-        const double mean_variance = stats::summarize(noisy->variances).mean;
-        result.reference_rms_error = std::sqrt(mean_variance) / std::abs(stats::summarize(noisy->values).mean);
+    const ColorConditions of_reference = colorConditions(reference);
+    for (const auto& [image, name] : {std::pair{&a, "A"}, {&b, "B"}}) {
+        const ColorConditions of_image = colorConditions(*image);
+        if (const std::string conflict = conflictOf(of_image, name, of_reference, "R"); !conflict.empty())
+            throw Error(
+                ErrorKind::Usage,
+                fmt::format("{}; R, the reference, must be rendered again as {} was", conflict, name));
+        for (std::string& note : unknownConditions(of_image, name, of_reference, "R"))
+            result.notes.push_back(std::move(note));
+    }
+    const Colors colors = colorsOf(reference, a.chromaticities ? a : b);
+    const std::vector<Colors> without_fold = colorsWithoutFolds(reference, a.chromaticities ? a : b);
+    std::optional<double> variance;
+    if (const std::optional<NoisyImage> noisy = noisyImage(reference, NoiseOf::Luminance)) {
+        variance = stats::summarize(noisy->variances).mean;
+        result.reference_rms_error = std::sqrt(*variance) / std::abs(stats::summarize(noisy->values).mean);
         result.reference_noise_source = noisy->source;
-        result.reference_noise_of_color = what == NoiseOf::Color;
-        if (result.reference_noise_of_color) variance = mean_variance;
-        break;
     }
     for (std::size_t i = 0; i < 2; ++i) {
         const Image& image = i == 0 ? a : b;
         ReferenceError& error = result.errors[i];
-        error = errorAgainst(colorsOf(image), colors, without_fold, reference.width, reference.height, display_referred);
+        const Colors own = colorsOf(image, reference.chromaticities ? reference : i == 0 ? b : a);
+        error = errorAgainst(own, colors, without_fold, reference.width, reference.height, display_referred);
         if (const std::string same = sameSeed(image, reference); !same.empty())
             error.warnings.push_back("the reference may hold the same samples: " + same);
         if (!error.metrics.valid()) continue;
         if (variance) {
-            const double mean = std::abs(error.metrics.reference_mean), left = error.metrics.mse - *variance;
+            const stats::LuminanceError of_luminance =
+                stats::luminanceError(own.luminances, colors.luminances);
+            const double left = of_luminance.mse - *variance;
             error.within_reference_noise = left <= 0;
-            if (left > 0) error.corrected_relative_rmse = std::sqrt(left) / mean;
+            if (left > 0)
+                error.corrected_relative_rmse = stats::relativeRmse(left, of_luminance.reference_mean);
         }
     }
     return result;

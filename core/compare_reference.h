@@ -20,22 +20,27 @@ struct SpreadMetric {
 /// One image against the reference.
 struct ReferenceError {
     stats::ErrorMetrics metrics{};
-    SpreadMetric rmse, relative_rmse, relmse, smape, mae, p99_absolute, max_absolute, mean_ratio, delta_e_mean, delta_e_max, flip;
-    /// √(mse − reference variance) / mean R: what the error would be against a reference without noise. Nothing while its variance is unknown, or
-    /// when the error is within it.
+    SpreadMetric relative_rmse;  ///< The error as crt states it everywhere: of luminance, relative to R's
+                                 ///< mean luminance.
+    SpreadMetric rmse, rmse_over_mean, relmse, smape, mae, p99_absolute, max_absolute, mean_ratio,
+        delta_e_mean, delta_e_max, flip;
+    /// relative_rmse with the reference's variance taken out of its square: what the error would be against
+    /// a reference without noise. Nothing while its variance is unknown, or when the error is within it.
     std::optional<double> corrected_relative_rmse;
     bool within_reference_noise = false;
     std::vector<std::string> warnings;      ///< Why not to trust it: one sentence each.
 };
 
 struct ReferenceComparison {
-    std::optional<double> reference_rms_error;   ///< √ mean variance of the reference's values / their mean.
-    bool reference_noise_of_color = false;       ///< Of R, G and B; else of luminance, and then no error can be corrected.
+    /// √ mean variance of the reference's luminance / its mean luminance.
+    std::optional<double> reference_rms_error;
+    std::vector<std::string> notes;  ///< What had to be supposed, one sentence each, without a full stop.
     std::string reference_noise_source;
     std::array<ReferenceError, 2> errors;        ///< Of a and of b.
 };
 
-/// Throws crt::Error(Usage) when sizes differ or R, G and B are missing.
+/// The images are called A, B and R. Throws crt::Error(Usage) when sizes differ, R, G and B are missing, or
+/// R has another exposure, white balance or colour space: those are differences, and no errors.
 ReferenceComparison compareWithReference(const Image& a, const Image& b, const Image& reference, bool display_referred);
 
 }  // namespace crt

@@ -28,6 +28,8 @@ private:
 };
 
 const char* verdictOf(const CompareResult& r) {
+    if (!r.same && r.differing_pixels == 0)
+        return "not the same within a tolerance, since values are not finite";
     return r.same ? (r.differing_pixels == 0 ? "same bits" : "same within the tolerance") : "different";
 }
 
@@ -40,7 +42,10 @@ std::string differenceText(const Difference& d) {
 void addMetricLines(Lines& lines, const CompareResult& r) {
     lines.add("largest",
               fmt::format("{} absolute, {} ulp; 99 % of the values are within {}", number(r.max_absolute), r.max_ulp, number(r.p99_absolute)));
-    lines.add("RMSE", fmt::format("{} ({} of the mean{}), MSE {}", number(r.rmse), number(r.relative_rmse),
+    if (r.relative_rmse)
+        lines.add("error",
+                  fmt::format("{} (RMSE of luminance, over B's mean luminance)", percent(*r.relative_rmse)));
+    lines.add("RMSE", fmt::format("{} ({} of the mean{}), MSE {}", number(r.rmse), number(r.rmse_over_mean),
                                   r.tolerance > 0 ? fmt::format(", {} allowed", number(r.tolerance)) : "", number(r.mse)));
     lines.add("relMSE", number(r.relmse));
     lines.add("MAE", number(r.mae));
@@ -66,20 +71,27 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
         return;
     }
     const auto source = [](const std::string& from) { return from.empty() ? std::string("none known, taken as exact") : from; };
-    lines.heading(fmt::format("Noise or bias? By the images' own noise (A: {}; B: {}):", source(noise.source_a), source(noise.source_b)));
+    lines.heading("Noise or bias? By the images' own noise:");
+    lines.add("noise of A", source(noise.source_a));
+    lines.add("noise of B", source(noise.source_b));
     for (const ChannelBias& c : noise.channels) {
-        const double scale = std::abs(c.mean_b);
-        const bool zero_inside = c.interval.contains(0);
-        lines.add(("bias " + c.channel).c_str(),
-                  fmt::format("{:+.3g} %, {:g} % interval [{:+.3g}, {:+.3g}] %: {}", 100 * c.difference / scale, 100 * noise.confidence,
-                              100 * c.interval.lower / scale, 100 * c.interval.upper / scale, zero_inside ? "may be noise" : "more than noise"));
+        const bool relative = c.mean_b != 0;  // Nothing is relative to black.
+        const double scale = relative ? 100 / std::abs(c.mean_b) : 1;
+        const char* unit = relative ? " %" : "";
+        lines.add(
+            ("bias " + c.channel).c_str(),
+            fmt::format("{:+.3g}{}, {:g} % interval [{:+.3g}, {:+.3g}]{}: {}", scale * c.difference, unit,
+                        100 * noise.confidence, scale * c.interval.lower, scale * c.interval.upper, unit,
+                        c.beyondNoise() ? "more than noise" : "may be noise"));
     }
     const std::size_t channels = noise.channels.size();
     const auto at = [&](std::size_t place, std::uint32_t across, std::uint32_t side) {
         return fmt::format("at {},{}", place / channels % across * side, place / channels / across * side);
     };
     lines.add("tiles of 8x8", familyText(noise.tiles, "after Holm", at(noise.tiles.worst, noise.tiles_across, stats::kTileSide)));
-    lines.add("pixels", familyText(noise.pixels, "after Sidak", at(noise.pixels.worst, width, 1)));
+    lines.add("pixels", noise.pixels_untested.empty()
+                            ? familyText(noise.pixels, "after Sidak", at(noise.pixels.worst, width, 1))
+                            : "not tested: " + noise.pixels_untested);
     lines.add("rms z", fmt::format("{:.3g} (1: all of the difference is noise, and as large as the images say)", noise.rms_z));
 }
 
@@ -91,10 +103,15 @@ Json noiseJson(const NoiseComparison& noise) {
     if (!noise.unknown.empty()) return {{"unknown", noise.unknown}};
     Json json{{"source_a", noise.source_a}, {"source_b", noise.source_b}, {"confidence", noise.confidence}, {"bias", Json::array()}};
     for (const ChannelBias& c : noise.channels)
-        json["bias"].push_back({{"channel", c.channel}, {"mean", {c.mean_a, c.mean_b}}, {"difference", c.difference},
-                                {"interval", {c.interval.lower, c.interval.upper}}, {"p", c.p}});
+        json["bias"].push_back({{"channel", c.channel},
+                                {"mean", {c.mean_a, c.mean_b}},
+                                {"difference", c.difference},
+                                {"interval", {c.interval.lower, c.interval.upper}},
+                                {"p", c.p},
+                                {"beyond_noise", c.beyondNoise()}});
     json["tiles"] = familyJson(noise.tiles);
-    json["pixels"] = familyJson(noise.pixels);
+    json["pixels"] =
+        noise.pixels_untested.empty() ? familyJson(noise.pixels) : Json{{"untested", noise.pixels_untested}};
     json["rms_z"] = noise.rms_z;
     return json;
 }
@@ -105,17 +122,19 @@ struct ReferenceRow {
     const char *name, *key;
     SpreadMetric ReferenceError::*metric;
 };
-constexpr std::array<ReferenceRow, 11> kRows{{{"RMSE", "rmse", &ReferenceError::rmse},
-                                              {"RMSE / mean", "relative_rmse", &ReferenceError::relative_rmse},
-                                              {"relMSE", "relmse", &ReferenceError::relmse},
-                                              {"SMAPE", "smape", &ReferenceError::smape},
-                                              {"MAE", "mae", &ReferenceError::mae},
-                                              {"99th percentile", "p99_absolute", &ReferenceError::p99_absolute},
-                                              {"largest", "max_absolute", &ReferenceError::max_absolute},
-                                              {"mean / mean R", "mean_ratio", &ReferenceError::mean_ratio},
-                                              {"FLIP", "flip", &ReferenceError::flip},
-                                              {"Delta E, mean", "delta_e_2000_mean", &ReferenceError::delta_e_mean},
-                                              {"Delta E, largest", "delta_e_2000_max", &ReferenceError::delta_e_max}}};
+constexpr std::array<ReferenceRow, 12> kRows{
+    {{"error", "relative_rmse", &ReferenceError::relative_rmse},
+     {"RMSE", "rmse", &ReferenceError::rmse},
+     {"RMSE / mean", "rmse_over_mean", &ReferenceError::rmse_over_mean},
+     {"relMSE", "relmse", &ReferenceError::relmse},
+     {"SMAPE", "smape", &ReferenceError::smape},
+     {"MAE", "mae", &ReferenceError::mae},
+     {"99th percentile", "p99_absolute", &ReferenceError::p99_absolute},
+     {"largest", "max_absolute", &ReferenceError::max_absolute},
+     {"mean / mean R", "mean_ratio", &ReferenceError::mean_ratio},
+     {"FLIP", "flip", &ReferenceError::flip},
+     {"Delta E, mean", "delta_e_2000_mean", &ReferenceError::delta_e_mean},
+     {"Delta E, largest", "delta_e_2000_max", &ReferenceError::delta_e_max}}};
 
 std::string spreadText(const SpreadMetric& m) {
     return m.spread ? fmt::format("{:.5g} ±{:.1g}", m.value, *m.spread) : fmt::format("{:.5g}", m.value);
@@ -127,7 +146,11 @@ std::string cell(const std::string& text, std::size_t columns) {
     return text + std::string(columns > shown ? columns - shown : 1, ' ');
 }
 
+/// A void or undefined ratio has no number: 0/0 is none.
+std::string ratioText(double a, double b) { return std::isnan(a / b) ? "-" : fmt::format("{:.3g}", a / b); }
+
 std::string correctedText(const ReferenceError& e) {
+    if (!e.metrics.valid()) return "void";
     if (e.corrected_relative_rmse) return fmt::format("{:.5g}", *e.corrected_relative_rmse);
     return e.within_reference_noise ? "below R's noise" : "R's noise unknown";
 }
@@ -142,21 +165,25 @@ void addReferenceLines(Lines& lines, const ReferenceComparison& r) {
                                                       e.metrics.reference.total()));
         for (const std::string& warning : e.warnings) lines.add(i == 0 ? "WARNING, A" : "WARNING, B", warning);
     }
+    for (const std::string& note : r.notes) lines.add("note", note);
     lines.add("", cell("A", kColumn) + cell("B", kColumn) + "A / B");
     for (const ReferenceRow& row : kRows) {
         const SpreadMetric &a = r.errors[0].*row.metric, &b = r.errors[1].*row.metric;
-        lines.add(row.name, cell(spreadText(a), kColumn) + cell(spreadText(b), kColumn) + fmt::format("{:.3g}", a.value / b.value));
+        lines.add(row.name,
+                  cell(spreadText(a), kColumn) + cell(spreadText(b), kColumn) + ratioText(a.value, b.value));
+        if (row.metric != &ReferenceError::relative_rmse) continue;
+        lines.add(
+            "  less R's noise",
+            cell(correctedText(r.errors[0]), kColumn) + cell(correctedText(r.errors[1]), kColumn) +
+                (r.errors[0].corrected_relative_rmse && r.errors[1].corrected_relative_rmse
+                     ? ratioText(*r.errors[0].corrected_relative_rmse, *r.errors[1].corrected_relative_rmse)
+                     : "-"));
     }
-    lines.add("  less R's noise", cell(correctedText(r.errors[0]), kColumn) + cell(correctedText(r.errors[1]), kColumn) +
-                                    (r.errors[0].corrected_relative_rmse && r.errors[1].corrected_relative_rmse
-                                         ? fmt::format("{:.3g}", *r.errors[0].corrected_relative_rmse / *r.errors[1].corrected_relative_rmse)
-                                         : "-"));
-    if (r.reference_rms_error && r.reference_noise_of_color) {
-        lines.heading(fmt::format("  R's own error is {} of its mean ({}); \"less R's noise\" is RMSE / mean with its variance subtracted.",
-                                  percent(*r.reference_rms_error), r.reference_noise_source));
-    } else if (r.reference_rms_error) {
-        lines.heading(fmt::format("  R's own error is {} of its mean in luminance ({}). It is in all errors: that of its colours is not known.",
-                                  percent(*r.reference_rms_error), r.reference_noise_source));
+    lines.heading("  \"error\" is the RMSE of luminance over R's mean luminance; rows below it are of R, G and B.");
+    if (r.reference_rms_error) {
+        lines.heading(
+            fmt::format("  R's own error is {} ({}); \"less R's noise\" has its variance subtracted.",
+                        percent(*r.reference_rms_error), r.reference_noise_source));
     } else {
         lines.heading("  R does not say how large its own noise is, so it is in all errors (`crt reference` makes references that do).");
     }
@@ -165,7 +192,7 @@ void addReferenceLines(Lines& lines, const ReferenceComparison& r) {
 
 Json referenceJson(const ReferenceComparison& r) {
     Json json{{"reference_relative_rms_error", r.reference_rms_error ? Json(*r.reference_rms_error) : Json(nullptr)},
-              {"reference_noise_source", r.reference_noise_source}, {"reference_noise_of_color", r.reference_noise_of_color}};
+              {"reference_noise_source", r.reference_noise_source}, {"notes", r.notes}};
     for (std::size_t i = 0; i < 2; ++i) {
         const ReferenceError& e = r.errors[i];
         Json& of = json[i == 0 ? "a" : "b"];
@@ -187,6 +214,7 @@ Json resultJson(const CompareResult& r) {
     json["same"] = r.same;
     json["tolerance"] = r.tolerance;
     json["mismatch"] = r.mismatch.empty() ? Json(nullptr) : Json(r.mismatch);
+    json["notes"] = r.notes;
     if (!r.mismatch.empty()) return json;
     json["width"] = r.width;
     json["height"] = r.height;
@@ -202,9 +230,17 @@ Json resultJson(const CompareResult& r) {
     json["not_finite"] = r.not_finite;
     json["metrics"] = nullptr;
     if (!r.metrics_valid) return json;
-    json["metrics"] = Json{{"max_absolute", r.max_absolute}, {"max_ulp", r.max_ulp}, {"p99_absolute", r.p99_absolute}, {"mse", r.mse},
+    json["metrics"] = Json{{"max_absolute", r.max_absolute},
+                           {"max_ulp", r.max_ulp},
+                           {"p99_absolute", r.p99_absolute},
+                           {"mse", r.mse},
                            {"rmse", r.rmse},
-                           {"relative_rmse", r.relative_rmse}, {"relmse", r.relmse}, {"mae", r.mae}, {"smape", r.smape}, {"mean", r.mean},
+                           {"relative_rmse", r.relative_rmse ? Json(*r.relative_rmse) : Json(nullptr)},
+                           {"rmse_over_mean", r.rmse_over_mean},
+                           {"relmse", r.relmse},
+                           {"mae", r.mae},
+                           {"smape", r.smape},
+                           {"mean", r.mean},
                            {"mean_ratio", r.mean_ratio}};
     if (r.looks) {
         json["metrics"]["flip"] = r.looks->flip_mean;
@@ -226,6 +262,7 @@ Lines resultLines(const CompareResult& r) {
     } else if (r.differing_pixels > 0) {
         addMetricLines(lines, r);
     }
+    for (const std::string& note : r.notes) lines.add("note", note);
     if (!r.other_channels.empty()) lines.add("not compared", fmt::format("{} (in one image only)", fmt::join(r.other_channels, ", ")));
     return lines;
 }

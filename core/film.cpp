@@ -2,7 +2,9 @@
 
 #include "aov.h"
 #include "error_estimate.h"
+#include "image_metadata.h"
 #include "kernel/layout.h"
+#include "stats/luminance_error.h"
 
 #include <fmt/format.h>
 
@@ -194,6 +196,14 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     }
     for (Vec3d& row : color)
         for (double& entry : row) entry *= exposure;
+    // The film has the noise of Y alone, and a white balance mixes X, Y and Z: what becomes of that noise is
+    // known where it changes brightness and not colour. Then the relative error of luminance stays what it
+    // was.
+    const stats::Rgb luminance_weights = stats::luminanceWeights(space);
+    const auto luminanceGain = [&](const Vec3d& xyz) {
+        if (!scene.film.white_balance || !(xyz[1] > 0)) return exposure;
+        return std::abs(stats::luminance(multiply(color, xyz), luminance_weights)) / xyz[1];
+    };
     // Albedo is a reflectance: the film has it as XYZ under equal-energy light, and a perfect white must come out as (1,1,1) in the RGB spaces
     // whatever the exposure and white balance.
     const Matrix3d albedo_color = multiply(to_rgb, bradfordAdaptation({1, 1, 1}, d65WhiteXyz()));
@@ -223,6 +233,9 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
             const auto add = [&](double value) { image.pixels.push_back(static_cast<float>(value)); };
             const std::size_t pixel = std::size_t{y} * shape.width + x;
             append(multiply(color, triple(0)));
+            const auto error = [&](std::uint32_t i, std::uint32_t j) {
+                return std::sqrt(variance(i, j)) * luminanceGain(triple(0));
+            };
             // In the order of the names above.
             for (const AovRow& row : kAovRows) {
                 if ((aovs & row.aov) == 0) continue;
@@ -233,12 +246,12 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
                     case kAovDepth: add(film.mean(x, y, first)); break;
                     case kAovReplicates: break;
                     case kAovPrimitive: image.integers.push_back(film.primitives[pixel]); break;
-                    case kAovVariance: add(variance(x, y) * exposure * exposure); break;
+                    case kAovVariance: add(error(x, y) * error(x, y)); break;
                     case kAovSamples:
                         image.integers.push_back(static_cast<std::uint32_t>(std::min<std::uint64_t>(
                             film.counts[pixel], std::numeric_limits<std::uint32_t>::max())));
                         break;
-                    case kAovError: add(std::sqrt(variance(x, y)) * exposure); break;
+                    case kAovError: add(error(x, y)); break;
                 }
             }
         }
@@ -249,8 +262,11 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
                       {"crt/spp", std::to_string(film.samples.count())},
                       {"crt/sampleRanges", film.samples.text()},
                       {"crt/seed", std::to_string(scene.sampler.seed)},
-                      {"crt/exposure", fmt::format("{}", scene.film.exposure_ev)},
+                      {kExposureKey, fmt::format("{}", scene.film.exposure_ev)},
+                      {kWhiteBalanceKey, whiteBalanceText(scene)},
                       {"crt/invalidSamples", std::to_string(film.invalidSamples())}};
+    if ((aovs & (kAovVariance | kAovError)) && variance.degreesOfFreedom() >= 1)
+        image.metadata.emplace_back(kErrorDofKey, fmt::format("{:.6g}", variance.degreesOfFreedom()));
     const auto& crop = scene.film.crop;
     if (crop != std::array<int, 4>{0, 0, 0, 0})
         image.metadata.emplace_back("crt/crop", fmt::format("{},{},{},{} of {}x{}", crop[0], crop[1], crop[2], crop[3], scene.film.width,

@@ -1,6 +1,8 @@
 #include "image_noise.h"
 
 #include "image_io.h"
+#include "image_metadata.h"
+#include "stats/luminance_error.h"
 #include "stats/statistics.h"
 
 #include <fmt/format.h>
@@ -11,7 +13,7 @@
 namespace crt {
 namespace {
 
-constexpr double kReplicateDof = 15;
+constexpr double kUnstatedDof = 1;
 constexpr std::array<const char*, 3> kColor{"R", "G", "B"};
 
 using Places = std::vector<std::size_t>;  // Of channels, in the order asked for.
@@ -84,8 +86,12 @@ bool addStated(NoisyImage& noisy, const Image& image, NoiseOf what) {
                 const double v = image.pixels[p * image.channels.size() + place];
                 noisy.variances.push_back(prefix == "StdError." ? v * v : v);
             }
-        noisy.dof = kReplicateDof;
-        noisy.source = what == NoiseOf::Color ? prefix + "R, G, B" : names.front();
+        const std::optional<double> stated = errorDegreesOfFreedom(image);
+        noisy.dof = stated.value_or(kUnstatedDof);
+        const std::string channels = what == NoiseOf::Color ? prefix + "R, G, B" : names.front();
+        noisy.source =
+            stated ? fmt::format("{}, {:.6g} degrees of freedom a pixel", channels, *stated)
+                   : fmt::format("{}, degrees of freedom not stated, taken as {}", channels, kUnstatedDof);
         return true;
     }
     return false;
@@ -112,6 +118,13 @@ std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what) {
     return noisy;
 }
 
+bool statesNoise(const Image& image) {
+    return std::any_of(image.channels.begin(), image.channels.end(), [](const std::string& name) {
+        return name.rfind("StdError.", 0) == 0 || name.rfind("Variance.", 0) == 0 ||
+               name.rfind("Fold.", 0) == 0;
+    });
+}
+
 std::string sameSeed(const Image& a, const Image& b) {
     const std::string seed = metadataValue(a, "crt/seed");
     if (seed.empty() || seed != metadataValue(b, "crt/seed")) return {};
@@ -134,18 +147,9 @@ std::vector<float> colorWithoutFold(const Image& image, std::size_t left_out) {
     return values;
 }
 
-// The middle row of the matrix from RGB to XYZ: each primary's share of the white's luminance. With xyY, chromaticities weighed by S add up to the
-// white, and S, here without division by y so that X and Z may be primaries, is solved by Cramer's rule.
 std::array<double, 3> luminanceWeights(const Image& image) {
-    if (!image.chromaticities) return {0.212636821677324, 0.715182981841251, 0.072180196481425};  // Rec. 709 and D65 (color_difference.h).
-    const std::array<double, 8>& c = *image.chromaticities;
-    const auto column = [&c](std::size_t i) { return std::array<double, 3>{c[2 * i], c[2 * i + 1], 1 - c[2 * i] - c[2 * i + 1]}; };
-    const auto determinant = [](const std::array<double, 3>& u, const std::array<double, 3>& v, const std::array<double, 3>& w) {
-        return u[0] * (v[1] * w[2] - v[2] * w[1]) - v[0] * (u[1] * w[2] - u[2] * w[1]) + w[0] * (u[1] * v[2] - u[2] * v[1]);
-    };
-    const auto r = column(0), g = column(1), b = column(2), white = column(3);
-    const double all = determinant(r, g, b) * white[1];
-    return {determinant(white, g, b) / all * r[1], determinant(r, white, b) / all * g[1], determinant(r, g, white) / all * b[1]};
+    if (const std::optional<ColorSpace> space = colorSpaceOf(image)) return stats::luminanceWeights(*space);
+    return stats::luminanceWeights(*image.chromaticities);
 }
 
 }  // namespace crt

@@ -19,18 +19,24 @@ struct NoisyImage {
     std::vector<double> values;         ///< [pixel][channel]
     std::vector<double> variances;      ///< Of the values; [pixel][channel]
     double dof = 0;                     ///< Degrees of freedom of each variance.
-    std::string source;                 ///< "StdError.Y", …: where the variances are from.
+    std::string source;  ///< "StdError.Y, 3 degrees of freedom a pixel", …: where the variances are from.
     std::vector<std::vector<double>> fold_means;  ///< [channel][fold], over the image; empty without folds.
 };
 
 enum class NoiseOf { Color, Luminance };
 
-/// With NoiseOf::Color, from channels StdError.R, .G and .B, Variance.R, .G and .B, or folds. With NoiseOf::Luminance, from StdError.Y, Variance.Y or
-/// folds; the values are then the luminance of R, G and B by the image's primaries. Nothing when there is none of them, or they are not finite.
+/// With NoiseOf::Color, from channels StdError.R, .G and .B, Variance.R, .G and .B, or folds. With
+/// NoiseOf::Luminance, from StdError.Y, Variance.Y or folds; the values are then the luminance of R, G and B
+/// by the image's primaries. Nothing when there is none of them, or they are not finite.
 ///
-/// StdError and Variance are of the pixel's mean, in the image's exposure. Their degrees of freedom are taken as 15, those of the 16 replicates that
-/// a render has: what was counted over more samples than that has tails that make up for it.
+/// StdError and Variance are of the pixel's mean, in the image's exposure. Their degrees of freedom are in
+/// the metadata (kErrorDofKey); where they are not, they are taken as one, the fewest that an estimate can
+/// have, and `source` says so.
 std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what);
+
+/// Has it channels that state noise, whether they can be used or not? A pixel that lost samples states an
+/// infinite one.
+bool statesNoise(const Image& image);
 
 /// One sentence when both images name the same seed in their metadata, so that they may share samples; else empty.
 std::string sameSeed(const Image& a, const Image& b);
@@ -41,7 +47,8 @@ bool hasFolds(const Image& image);
 /// R, G and B of every pixel without fold `left_out`: the mean of the seven others. Requires hasFolds.
 std::vector<float> colorWithoutFold(const Image& image, std::size_t left_out);
 
-/// Weights of R, G and B in luminance, adding to 1: of the image's primaries, or of sRGB when it names none.
+/// Weights of R, G and B in luminance, as stats/luminance_error.h defines it: of the image's colour space,
+/// or of sRGB when it names none.
 std::array<double, 3> luminanceWeights(const Image& image);
 
 }  // namespace crt

@@ -75,13 +75,14 @@ void requireReplicates(Scene& scene) {
     scene.sampler.replicates = 2;
 }
 
-/// An empty film, or what an earlier run of the same scene left.
-Film openFilm(const Files& files, const CompiledScene& compiled, const FilmIdentity& identity) {
+/// An empty film, or what an earlier run of the same scene left; then `identity` names its version too.
+Film openFilm(const Files& files, const CompiledScene& compiled, FilmIdentity& identity) {
     Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
     if (files.resume.empty()) return film;
     const auto [earlier, found] = readCheckpoint(files.resume);
     requireSameScene(files.resume, found, identity);
     film.add(earlier);
+    identity.version = joinVersions(found.version, identity.version);
     logInfo("resuming '{}' after {} samples per pixel", files.resume, film.samples.count());
     return film;
 }
@@ -195,7 +196,7 @@ void writeFiles(const Files& files, const Scene& scene, const Film& film, const 
     // With nothing but a time to go by, the end of the time is the end of the work.
     const bool complete = facts.stop == StopReason::Samples || facts.stop == StopReason::Target || (facts.stop == StopReason::Time && facts.target_samples == 0);
     Metadata metadata{{"Software", "crt " CRT_VERSION},
-                      {"crt/version", CRT_VERSION},
+                      {"crt/version", identity.version},
                       {"crt/sceneHash", identity.scene_hash},
                       {"crt/complete", complete ? "1" : "0"}};
     if (!scene.title.empty()) metadata.emplace_back("ImageDescription", scene.title);
@@ -288,7 +289,7 @@ int runJob(const Job& job) {
 
     // What it takes to see it: one flat blob, and the mask of what it needs.
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
-    const FilmIdentity identity{compiled.hash, CRT_VERSION};
+    FilmIdentity identity{compiled.hash, CRT_VERSION};
     logDebug("scene {} needs {}", compiled.hash, featureNames(compiled.features));
 
     // What is there already, and what is missing.

@@ -5,6 +5,7 @@
 #include "scene_schema.h"
 #include "verify/temporary_folder.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -254,6 +255,29 @@ TEST_CASE("a checkpoint that cannot be written is an output error and leaves the
     writeCheckpoint(directory / "link.crtfilm", randomFilm(kShape, {0, 16}, 6), kIdentity);
     CHECK(fs::is_symlink(directory / "link.crtfilm"));
     CHECK(readCheckpoint(directory / "real.crtfilm").first.samples.count() == 16);
+}
+
+TEST_CASE("a film of samples of several versions names them all", "[checkpoint]") {
+    const TemporaryFolder directory;
+    std::vector<std::string> paths;
+    std::uint64_t first = 0;
+    for (const char* version : {"1.1.0", "0.9.0", "1.1.0"}) {
+        paths.push_back(directory / ("part" + std::to_string(first) + ".crtfilm"));
+        writeCheckpoint(paths.back(), randomFilm(kShape, {first, first + 8}, 1),
+                        {kIdentity.scene_hash, version});
+        first += 8;
+    }
+    do {
+        CHECK(mergeCheckpoints(paths).second.version == "0.9.0 and 1.1.0");
+    } while (std::next_permutation(paths.begin(), paths.end()));
+    // A merge of merges says no more than there is.
+    CHECK(joinVersions("0.9.0 and 1.1.0", "1.1.0 and 1.2.0") == "0.9.0 and 1.1.0 and 1.2.0");
+    CHECK(joinVersions("", "1.0.0") == "1.0.0");
+    std::string many;
+    for (int i = 0; i < 100; ++i) many = joinVersions(many, "1." + std::to_string(i) + ".0");
+    writeCheckpoint(paths[0], randomFilm(kShape, {0, 8}, 1), {kIdentity.scene_hash, many});
+    CHECK(readCheckpoint(paths[0]).second.version == many);
+    CHECK_THAT(many, Contains(" and more"));
 }
 
 TEST_CASE("merging partial films gives one film whatever the order", "[checkpoint]") {

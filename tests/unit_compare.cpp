@@ -1,7 +1,9 @@
 // Comparing images: metrics worked out by hand, and everything that must not pass for equal.
 #include "catch.h"
+#include "compare_reference.h"
 #include "compare_text.h"
 #include "error.h"
+#include "image_metadata.h"
 
 #include <nlohmann/json.hpp>
 
@@ -61,7 +63,14 @@ TEST_CASE("the metrics are those of their formulas", "[compare]") {
     CHECK(r.max_absolute == 1.0);
     CHECK(r.max_ulp == 0x3f000000u);  // All floats between 0 and 0.5.
     CHECK(r.rmse == Approx(std::sqrt((0.25 + 1.0) / 6)));
-    CHECK(r.relative_rmse == Approx(std::sqrt((0.25 + 1.0) / 6) / 2));
+    CHECK(r.rmse_over_mean == Approx(std::sqrt((0.25 + 1.0) / 6) / 2));
+    // The error is of luminance, here by the weights of sRGB: Y of b is 1.8594 and 3.0051, and a's second
+    // pixel is off by 0.5 R − 1 B.
+    const double red = 0.2126390, green = 0.7151687, blue = 0.0721923,
+                 mean_y = (red + 2 * green + 3 * blue + 4 * green + 2 * blue) / 2;
+    REQUIRE(r.relative_rmse);
+    CHECK(*r.relative_rmse == Approx(std::abs(0.5 * red - blue) / std::sqrt(2.0) / mean_y).epsilon(1e-3));
+    CHECK_THAT(compareText(r), Contains("(RMSE of luminance, over B's mean luminance)"));
     CHECK(r.relmse == Approx((0.25 / (0.02 * 0.02) + 1.0 / (4 + 0.02 * 0.02)) / 6));
     CHECK(r.mae == Approx(1.5 / 6));
     CHECK(r.smape == Approx((2.0 + 2.0 / 3.0) / 6));
@@ -120,6 +129,9 @@ TEST_CASE("a NaN or an infinity voids the metrics and never passes a tolerance",
         CHECK_FALSE(self.metrics_valid);
         CHECK_THAT(compareText(self), Contains("not finite"));
         CHECK_FALSE(compareImages(a, a, {0.5, false}).same);
+        CHECK_THAT(compareText(compareImages(a, a, {0.5, false})),
+                   Contains("not the same within a tolerance, since values are not finite"));
+        CHECK_FALSE(compareImages(a, b).relative_rmse);
     }
 }
 
@@ -174,6 +186,58 @@ TEST_CASE("channels are found by name, and extra ones matter only when asked for
     grey.channels = {"Y"};
     CHECK_FALSE(compareImages(depth, grey).same);
     CHECK_FALSE(compareImages(depth, grey).mismatch.empty());
+}
+
+TEST_CASE("images of other exposure, white balance or colour space are not compared", "[compare]") {
+    const auto under = [](const char* exposure, const char* balance, std::optional<ColorSpace> space) {
+        Image image = twoPixels(kReference);
+        if (*exposure != 0) image.metadata.emplace_back(kExposureKey, exposure);
+        if (*balance != 0) image.metadata.emplace_back(kWhiteBalanceKey, balance);
+        if (space) image.chromaticities = chromaticities(*space);
+        return image;
+    };
+    const Image plain = under("0", "none", ColorSpace::LinearSrgb);
+    CHECK(compareImages(plain, plain).same);
+    const Image brighter = under("1", "none", ColorSpace::LinearSrgb),
+                balanced = under("0", "0.447574,0.407443", ColorSpace::LinearSrgb);
+    const Image aces = under("0", "none", ColorSpace::AcesCg);
+    for (const auto& [other, words] :
+         {std::pair{&brighter, "A and B differ in exposure: +0 EV and +1 EV"},
+          {&balanced, "A and B differ in white balance: none and of 0.447574,0.407443"},
+          {&aces, "A and B differ in colour space: sRGB and ACEScg"}}) {
+        const CompareResult r =
+            compareImages(plain, *other, {1e9, false});  // No tolerance makes them comparable.
+        CHECK_FALSE(r.same);
+        CHECK(r.mismatch == words);
+        CHECK_THAT(compareText(r), Contains(std::string("different: ") + words));
+        CHECK(nlohmann::json::parse(compareJson(r))["same"] == false);
+        CHECK(nlohmann::json::parse(compareJson(r))["mismatch"] == words);
+        // The same as a reference: not an error of the image, but a wrong question.
+        CHECK_THROWS_WITH(compareWithReference(plain, plain, *other, false),
+                          Contains("differ in") && Contains("A and R"));
+        CHECK_THROWS_WITH(compareWithReference(*other, plain, *other, false), Contains("B and R"));
+        // An image that says nothing is taken to be alike, with a word where that is not the usual.
+        const Image silent = under("", "", std::nullopt);
+        const CompareResult supposed = compareImages(silent, *other);
+        CHECK(supposed.mismatch.empty());
+        REQUIRE(supposed.notes.size() == 1);
+        CHECK_THAT(supposed.notes[0], Contains("A does not say its") && Contains("taken as that of B"));
+        CHECK_THAT(compareText(supposed), Contains("note") && Contains(supposed.notes[0]));
+        CHECK(nlohmann::json::parse(compareJson(supposed))["notes"].size() == 1);
+        CHECK(supposed.same);
+        REQUIRE(supposed.looks);
+        CHECK(supposed.looks->delta_e_max == 0);
+        CHECK(compareWithReference(silent, silent, *other, false).notes.size() == 2);
+        CHECK(compareImages(silent, plain).notes.empty());
+    }
+    // Rounding of text and of floats is no difference.
+    CHECK(compareImages(under("0.1", "0.44757,0.40744", {}),
+                        under("0.10000000000000001", "0.447574,0.407443", {}))
+              .mismatch.empty());
+    // Depth has neither exposure nor white.
+    Image depth = brighter, other_depth = plain;
+    depth.channels = other_depth.channels = {"Z", "Ns.X", "Ns.Y"};
+    CHECK(compareImages(depth, other_depth).same);
 }
 
 TEST_CASE("the JSON says the same as the struct", "[compare]") {

@@ -2,6 +2,10 @@
 #include "catch.h"
 #include "error_estimate.h"
 #include "film.h"
+#include "image_io.h"
+#include "image_metadata.h"
+#include "stats/luminance_error.h"
+#include "stats/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -275,6 +279,69 @@ TEST_CASE("white balance maps the illuminant to white and exposure scales", "[fi
 
     scene.film.white_balance = constantSpectrum(0.0);
     CHECK_THROWS_AS(resolveImage(film, scene, 0), Error);
+}
+
+TEST_CASE(
+    "StdError.Y is the standard error of the luminance that the image has, after exposure and white balance",
+    "[film]") {
+    // Sixteen samples of one colour and different brightness: what is noise of brightness alone follows the
+    // colour's own luminance.
+    const Vec3d color{1.4, 1.0, 0.25};
+    const std::vector<double> brightness{0.2, 1.1, 0.7, 2.0, 0.4, 0.9, 1.6, 0.3,
+                                         1.2, 0.8, 0.1, 2.2, 0.6, 1.3, 0.5, 1.0};
+    Film film(kOnePixel);
+    for (std::size_t i = 0; i < brightness.size(); ++i)
+        film.add(oneSample(i, static_cast<float>(color[0] * brightness[i]),
+                           static_cast<float>(color[1] * brightness[i]),
+                           static_cast<float>(color[2] * brightness[i])));
+    Scene scene = sceneIn(ColorSpace::LinearSrgb);
+    scene.film.exposure_ev = 1;
+    for (const ColorSpace space : {ColorSpace::LinearSrgb, ColorSpace::AcesCg, ColorSpace::Xyz})
+        for (const char* light : {"", "A", "F11"}) {
+            INFO(light << " in space " << static_cast<int>(space));
+            scene.film.color_space = space;
+            scene.film.white_balance = *light != 0 ? illuminantSpectrum(light) : std::nullopt;
+            const stats::Rgb weights = stats::luminanceWeights(space);
+            // The same by resolving every sample as an image of its own.
+            std::vector<double> luminances;
+            for (const double b : brightness) {
+                const Image one = resolveImage(filmOf({color[0] * b, color[1] * b, color[2] * b}), scene, 0);
+                luminances.push_back(
+                    stats::luminance({one.pixels[0], one.pixels[1], one.pixels[2]}, weights));
+            }
+            const double expected = stats::summarize(luminances).standardError();
+            const Image image = resolveImage(film, scene, kAovVariance | kAovError);
+            REQUIRE(image.channels[4] == "StdError.Y");
+            CHECK(image.pixels[4] == Approx(expected).epsilon(1e-4));
+            CHECK(image.pixels[3] == Approx(expected * expected).epsilon(1e-4));
+        }
+    // The white balance of A moves this colour's luminance by much more than the tolerance above.
+    scene.film.color_space = ColorSpace::LinearSrgb;
+    scene.film.white_balance = illuminantSpectrum("A");
+    const double balanced = resolveImage(film, scene, kAovError).pixels[3];
+    scene.film.white_balance.reset();
+    CHECK(std::abs(balanced / resolveImage(film, scene, kAovError).pixels[3] - 1) > 0.03);
+}
+
+TEST_CASE("an image says under which conditions its values came about, and how surely its error is known",
+          "[film]") {
+    Film film(kOnePixel);
+    for (std::uint64_t i = 0; i < 9; ++i) film.add(oneSample(i, 1, static_cast<float>(i), 1));
+    Scene scene = sceneIn(ColorSpace::AcesCg);
+    scene.film.exposure_ev = -1.5;
+    const Image plain = resolveImage(film, scene, 0);
+    CHECK(metadataValue(plain, kExposureKey) == "-1.5");
+    CHECK(metadataValue(plain, kWhiteBalanceKey) == "none");
+    CHECK(metadataValue(plain, kErrorDofKey).empty());  // It states no error.
+    scene.film.white_balance = illuminantSpectrum("A");
+    const Image with_error = resolveImage(film, scene, kAovError);
+    // CIE 15: illuminant A has x = 0.44758, y = 0.40745; the sums here go to 830 nm in steps of 1 nm.
+    CHECK_THAT(metadataValue(with_error, kWhiteBalanceKey), Contains("0.4475") && Contains(",0.4074"));
+    CHECK(errorDegreesOfFreedom(with_error) == LuminanceVariance(film).degreesOfFreedom());
+    CHECK(errorDegreesOfFreedom(resolveImage(film, scene, kAovVariance)) ==
+          LuminanceVariance(film).degreesOfFreedom());
+    CHECK_FALSE(errorDegreesOfFreedom(
+        resolveImage(oneSample(0, 1, 1, 1), scene, kAovError)));  // One sample knows nothing.
 }
 
 TEST_CASE("AOV planes carry their names, types and values", "[film]") {

@@ -2,6 +2,7 @@
 #include "backend/launch_pacer.h"
 #include "catch.h"
 
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -71,6 +72,38 @@ TEST_CASE("launches come to take the wanted time", "[launch_pacer]") {
     REQUIRE(seconds.size() == 60);
     CHECK(seconds.front() < 0.001);
     for (std::size_t i = 20; i < 60; ++i) CHECK(seconds[i] == Approx(0.02).epsilon(0.6));
+}
+
+TEST_CASE("a device whose clock says nothing does not make launches grow", "[launch_pacer]") {
+    // Start and end the same, in the wrong order, a tick apart, or far apart; the host waited all the same.
+    using crt::launchSeconds;
+    CHECK(launchSeconds(1000, 1000, 0.25) == 0.25);
+    CHECK(launchSeconds(2000, 1000, 0.25) == 0.25);
+    CHECK(launchSeconds(1000, 1001, 0.16) == 0.01);
+    CHECK(launchSeconds(0, std::uint64_t{1} << 62, 0.25) == 0.25);
+    CHECK(launchSeconds(0, 20'000'000, 0.021) == 0.02);
+
+    constexpr double kWanted = 0.02, kPathsPerSecond = 1e6;
+    for (const std::uint64_t ticks : {0u, 1u}) {
+        LaunchPacer pacer(kWanted, 1000);
+        pacer.begin(range(0, 0, 4000, 3000, 0, 100000), 0);
+        Launch launch;
+        for (int i = 0; i < 200; ++i) {
+            REQUIRE(pacer.next(launch));
+            const double waited = static_cast<double>(launch.paths()) / kPathsPerSecond;
+            CHECK(waited < 17 * kWanted);
+            pacer.finished(launch, launchSeconds(5, 5 + ticks, waited));
+        }
+    }
+    // And who passes on a time of nothing learns nothing.
+    LaunchPacer pacer(kWanted, 1000);
+    pacer.begin(range(0, 0, 4000, 3000, 0, 100000), 0);
+    Launch launch;
+    for (int i = 0; i < 100; ++i) {
+        REQUIRE(pacer.next(launch));
+        CHECK(launch.paths() <= 4000);  // One row.
+        pacer.finished(launch, i % 2 == 0 ? 0.0 : std::nan(""));
+    }
 }
 
 TEST_CASE("an empty range has no launches and is done", "[launch_pacer]") {

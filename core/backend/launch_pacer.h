@@ -19,6 +19,18 @@ struct Launch {
     std::uint64_t paths() const { return pixels() * sample_count; }
 };
 
+/// Seconds that a launch took, from the clock of its device (nanoseconds, at its start and end) and the time
+/// that the host waited for it. Some drivers give the same moment twice, or none in order. So the device is
+/// believed within what the wait allows: no more than the wait, and no less than a sixteenth of it, which is
+/// what the launch itself may cost beside a short kernel. A launch then takes at most sixteen times the
+/// wanted time, whatever the device says.
+inline double launchSeconds(std::uint64_t start_ns, std::uint64_t end_ns, double waited_seconds) {
+    constexpr double kLeastShareOfWait = 1.0 / 16;
+    if (end_ns <= start_ns) return waited_seconds;
+    return std::clamp(static_cast<double>(end_ns - start_ns) * 1e-9, kLeastShareOfWait * waited_seconds,
+                      waited_seconds);
+}
+
 /// Learns from every launch how many paths fit into the wanted time, and keeps that from one range to the next.
 ///
 ///     pacer.begin(range, tile_size);
@@ -55,10 +67,11 @@ public:
         return true;
     }
 
-    /// Tells how long a launch took.
+    /// Tells how long a launch took. A time that is not above 0 is none, and changes nothing.
     void finished(const Launch& launch, double seconds) {
         const double paths = static_cast<double>(launch.paths());
         finished_ += launch.paths();
+        if (!(seconds > 0)) return;
         const double fitting = paths * target_seconds_ / std::max(seconds, 1e-6);
         // A launch much below the budget says little about larger ones: its fixed cost hides the rate.
         if (paths < 0.4 * budget_ && seconds < target_seconds_) return;

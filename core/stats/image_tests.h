@@ -72,6 +72,10 @@ private:
     std::vector<std::vector<double>> tile_means_;   ///< [tile · channels + channel][replicate]
 };
 
+/// Single pixels are tested with so many replicates of each or more. With fewer, tiles must differ by the
+/// signs of their pixels' differences too (pooled_tests.h).
+inline constexpr std::uint64_t kFewestForPixels = 8;
+
 struct GateOptions {
     double delta = 0.01;          ///< Means that differ by less, relative to b's, are equivalent.
     double confidence = 0.999;    ///< Of the interval of each channel's mean; 1 − confidence is alpha of tiles and of pixels.

@@ -12,8 +12,8 @@ namespace {
 
 constexpr double kLaunchSeconds = 0.03;
 constexpr std::uint64_t kFirstPaths = 1u << 18;
-/// Of the device's memory that films of slices may take, and of any device's.
-constexpr std::uint64_t kSliceShare = 16, kSliceBytes = std::uint64_t{512} << 20;
+/// Of the device's memory that films of slices may take, of what is free of it, and of any device's.
+constexpr std::uint64_t kSliceShare = 16, kFreeShare = 2, kSliceBytes = std::uint64_t{512} << 20;
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -30,6 +30,10 @@ std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, 
     constexpr std::uint64_t kGridRows = 65535;
     return static_cast<std::uint32_t>(
         std::max<std::uint64_t>(1, std::min({wanted, samples / least_samples, most, kGridRows})));
+}
+
+std::uint64_t sliceBudget(std::uint64_t device_bytes, std::uint64_t free_bytes) {
+    return std::min({kSliceBytes, device_bytes / kSliceShare, free_bytes / kFreeShare});
 }
 
 CudaIntegrator::CudaIntegrator(const plugin::Host& host, const CrtCreateInfo& info)
@@ -105,13 +109,23 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     noteMemory();
 }
 
-void CudaIntegrator::ensureSlices(std::uint32_t slices) {
-    if (slices <= slice_count_) return;
+std::uint32_t CudaIntegrator::ensureSlices(std::uint32_t slices) {
+    if (slices <= std::max(slice_count_, 1u)) return slices;
+    // Others may have taken memory since the device was opened. Slices only make a render faster: it must
+    // not fail for want of them.
+    std::size_t free_bytes = 0, all_bytes = 0;
+    driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "asking for free memory");
+    const std::uint64_t film_bytes = std::max<std::uint64_t>(film_.bytes(), 1);
+    const std::uint64_t affordable =
+        sliceBudget(device_.memory_bytes, free_bytes + slices_.bytes()) / film_bytes;
+    slices = static_cast<std::uint32_t>(std::min<std::uint64_t>(slices, affordable));
+    if (slices <= std::max(slice_count_, 1u)) return std::max(slice_count_, 1u);
     slices_ = DeviceFilm();
     slice_count_ = 0;
     slices_ = allocateFilm(slices, "the film's slices");
     slice_count_ = slices;
     noteMemory();
+    return slices;
 }
 
 double CudaIntegrator::launch(const Launch& launch) {
@@ -119,10 +133,11 @@ double CudaIntegrator::launch(const Launch& launch) {
     const Module& module = program_->current();
 
     const std::uint64_t blocks = divideUp(launch.x1 - launch.x0, kBlockWidth) * divideUp(launch.y1 - launch.y0, kBlockHeight);
-    const std::uint64_t budget = std::min(kSliceBytes, device_.memory_bytes / kSliceShare);
-    std::uint32_t slices = chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors, launch.sample_count,
-                                        budget / std::max<std::uint64_t>(film_.bytes(), 1));
-    if (slices > 1) ensureSlices(slices);
+    const std::uint64_t most =
+        sliceBudget(device_.memory_bytes, device_.memory_bytes) / std::max<std::uint64_t>(film_.bytes(), 1);
+    std::uint32_t slices =
+        ensureSlices(chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors,
+                                  launch.sample_count, most));
 
     DeviceFilm& target = slices > 1 ? slices_ : film_;
     CUdeviceptr blob = blob_.address(), rays = rays_.address();

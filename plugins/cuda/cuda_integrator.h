@@ -18,6 +18,9 @@ namespace crt::cuda {
 /// `resident_blocks` at once is full, and does not end on a few last blocks. At most `most`.
 std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, std::uint32_t samples, std::uint64_t most);
 
+/// Bytes that films of slices may take on a device of so many bytes, so many of them free.
+std::uint64_t sliceBudget(std::uint64_t device_bytes, std::uint64_t free_bytes);
+
 /// One GPU with one scene. Film and scene live on the device between calls. Failures are thrown as PluginError.
 class CudaIntegrator {
 public:
@@ -38,7 +41,8 @@ private:
         std::uint64_t bytes() const { return sums.bytes() + counts.bytes() + primitives.bytes(); }
     };
     DeviceFilm allocateFilm(std::uint64_t copies, const char* what);
-    void ensureSlices(std::uint32_t slices);
+    /// Makes room for so many slices, or for as many as free memory allows; how many there may be.
+    std::uint32_t ensureSlices(std::uint32_t slices);
     void noteMemory();
     double launch(const Launch& launch);
 

@@ -115,15 +115,17 @@ double OpenClIntegrator::launch(const Launch& launch) {
     const std::size_t local[2] = {group.x, group.y};
     const std::size_t global[2] = {(launch.x1 - launch.x0 + local[0] - 1) / local[0] * local[0],
                                    (launch.y1 - launch.y0 + local[1] - 1) / local[1] * local[1]};
+    const double enqueued_at = now();
     cl_event enqueued = nullptr;
     check(clEnqueueNDRangeKernel(session_.queue.get(), kernel, 2, nullptr, global, local, 0, nullptr, &enqueued), "launching the kernel");
     const Event event(enqueued);
     check(clWaitForEvents(1, &enqueued), "rendering on '" + device_.name + "'");
 
+    const double waited = now() - enqueued_at;
     cl_ulong start = 0, end = 0;
     check(clGetEventProfilingInfo(enqueued, CL_PROFILING_COMMAND_START, sizeof start, &start, nullptr), "reading the kernel's start");
     check(clGetEventProfilingInfo(enqueued, CL_PROFILING_COMMAND_END, sizeof end, &end, nullptr), "reading the kernel's end");
-    return static_cast<double>(end - start) * 1e-9;
+    return launchSeconds(start, end, waited);
 }
 
 bool OpenClIntegrator::render(const CrtRenderRange& range) {

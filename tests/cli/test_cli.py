@@ -596,6 +596,45 @@ class Comparing(CliTest):
         run = self.crt("compare", "a.exr", "a.exr", "--map", "z.png", expect=2)
         self.assert_one_error(run, "seed 1")
 
+    def test_other_exposure_white_balance_and_colour_space_are_refused(self):
+        changes = {"exposure": "film.exposure_ev=1", "white balance": "film.white_balance=A", "colour space": "film.color_space=acescg"}
+        for ending in ("exr", "png"):
+            self.crt("scene.yaml", "-b", "fake", "-o", "a." + ending)
+            self.crt("scene.yaml", "-b", "fake", "--seed", "1", "-o", "c." + ending)
+            for what, change in changes.items():
+                if ending == "png" and what == "colour space":
+                    continue  # All PNG files are sRGB.
+                self.crt("scene.yaml", "-b", "fake", "--set", change, "-o", "b." + ending)
+                text = self.crt("compare", "a." + ending, "b." + ending, "--tolerance", "1e9", expect=7).stdout
+                self.assertIn("different: A and B differ in " + what, text)
+                run = self.crt("compare", "a." + ending, "c." + ending, "--reference", "b." + ending, expect=2)
+                self.assert_one_error(run, "A and R differ in " + what)
+        self.crt("scene.yaml", "-b", "fake", "--set", "film.color_space=acescg", "-o", "b.exr")
+        self.assertIn("differ in colour space: sRGB and ACEScg", self.crt("compare", "a.png", "b.exr", expect=7).stdout)
+        # PFM says nothing of all that: what is supposed is said.
+        self.crt("scene.yaml", "-b", "fake", "--set", "film.color_space=acescg", "-o", "b.pfm")
+        self.assertIn("A does not say its colour space; it is taken as that of B: ACEScg", self.crt("compare", "b.pfm", "b.exr").stdout)
+
+    def test_what_was_asked_for_and_cannot_be_is_an_error(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")
+        self.crt("scene.yaml", "-b", "fake", "--crop", "0,0,8,8", "-o", "b.pfm")
+        for option, file, words in (("--diff", "d.pfm", "a difference image"), ("--map", "z.pfm", "a z map"),
+                                    ("--reference", "a.pfm", "errors against a reference")):
+            run = self.crt("compare", "a.pfm", "b.pfm", option, file, expect=2)
+            self.assertIn("different: the images differ in size", run.stdout)
+            self.assert_one_error(run, words)
+
+    def test_an_image_says_how_surely_it_knows_its_error(self):
+        with open(self.path("with.yaml"), "w") as file:
+            file.write(SCENE + "outputs: [{file: a.exr, aovs: [variance]}]\n")
+        self.crt("with.yaml", "-b", "fake", "--spp", "256", "-o", "a.exr")
+        self.crt("with.yaml", "-b", "fake", "--spp", "256", "--seed", "2", "-o", "b.exr")
+        info = self.crt("info", "a.exr").stdout
+        degrees = re.search(r"crt/errorDegreesOfFreedom +(\d+)", info).group(1)
+        text = self.crt("compare", "a.exr", "b.exr", expect=7).stdout
+        self.assertIn("Variance.Y, %s degrees of freedom a pixel" % degrees, text)
+        self.assertNotIn("not stated", text)
+
     def test_backends_that_agree(self):
         run = self.crt("compare", "--backends", "fake,fake", "scene.yaml", "--spp", "64", "--json", "v.json")
         self.assertIn("fake against fake: PASS", run.stdout)

@@ -1,8 +1,10 @@
-// A libcuda.so.1 for tests: one device with 1 GB whose memory is the host's and whose kernels are those of host_kernels.cpp. With it the real CUDA
-// plugin runs on a machine without a GPU: opening the driver, allocating, choosing slices, passing arguments, going over from the
-// precompiled kernel to NVRTC's, running out of memory. It checks what a driver would check: sizes, handles, and that memory is given back.
+// A libcuda.so.1 for tests: one device with 1 GB whose memory is the host's and whose kernels are those of
+// host_kernels.cpp. With it the real CUDA plugin runs on a machine without a GPU: opening the driver,
+// allocating, choosing slices, passing arguments, going over from the precompiled kernel to NVRTC's, running
+// out of memory. It checks what a driver would check: sizes, handles, and that memory is given back.
 //
-// CRT_FAKE_CUDA says what is to go wrong: "no_device", "old" (a driver for CUDA 11) or "launch" (every launch fails).
+// CRT_FAKE_CUDA says what is to go wrong: "no_device", "old" (a driver for CUDA 11), "launch" (every launch
+// fails) or "little_memory" (other programs have taken all but a few megabytes).
 #include "host_kernels.h"
 
 #include <cuda.h>
@@ -29,6 +31,9 @@ bool goesWrong(const char* how) {
     const char* wanted = std::getenv("CRT_FAKE_CUDA");
     return wanted != nullptr && std::strcmp(wanted, how) == 0;
 }
+
+/// What this program can have of the device's memory.
+std::size_t ownMemory() { return goesWrong("little_memory") ? std::size_t{8} << 20 : kMemory; }
 
 /// Whether [address, address + bytes) lies in one allocation.
 bool isAllocated(CUdeviceptr address, std::size_t bytes) {
@@ -184,7 +189,7 @@ CRT_FAKE cuMemAlloc(CUdeviceptr* address, std::size_t bytes) {
     if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
     if (bytes == 0) return CUDA_ERROR_INVALID_VALUE;
     const std::lock_guard<std::mutex> lock(mutex);
-    if (bytes > kMemory - allocated) return CUDA_ERROR_OUT_OF_MEMORY;
+    if (bytes > ownMemory() - allocated) return CUDA_ERROR_OUT_OF_MEMORY;
     void* memory = std::aligned_alloc(256, (bytes + 255) / 256 * 256);
     if (memory == nullptr) return CUDA_ERROR_OUT_OF_MEMORY;
     std::memset(memory, 0xcd, bytes);  // whoever relies on cleared memory shall see it
@@ -205,7 +210,7 @@ CRT_FAKE cuMemFree(CUdeviceptr address) {
 }
 CRT_FAKE cuMemGetInfo(std::size_t* free_bytes, std::size_t* all_bytes) {
     const std::lock_guard<std::mutex> lock(mutex);
-    *free_bytes = kMemory - allocated;
+    *free_bytes = ownMemory() - allocated;
     *all_bytes = kMemory;
     return CUDA_SUCCESS;
 }

@@ -1,0 +1,52 @@
+/// What an image file says of how its values came about, under names that whoever writes and whoever
+/// compares share.
+#pragma once
+
+#include "film.h"
+#include "scene.h"
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+inline constexpr const char* kExposureKey =
+    "crt/exposure";  ///< Stops: values were multiplied by 2 to this power.
+inline constexpr const char* kWhiteBalanceKey =
+    "crt/whiteBalance";  ///< "none", or "x,y": chromaticity of the light that became white.
+/// Of the variance behind one pixel's StdError.Y or Variance.Y.
+inline constexpr const char* kErrorDofKey = "crt/errorDegreesOfFreedom";
+
+/// Value of kWhiteBalanceKey for a scene. Throws crt::Error(Scene) when the illuminant has no visible light.
+std::string whiteBalanceText(const Scene& scene);
+
+/// By kErrorDofKey. Nothing without it, or when it is no number of 1 or more.
+std::optional<double> errorDegreesOfFreedom(const Image& image);
+
+/// Space of the image's primaries; sRGB when it names none. Nothing when they are those of another space.
+std::optional<ColorSpace> colorSpaceOf(const Image& image);
+
+/// What else than light decides an image's values.
+struct ColorConditions {
+    std::optional<double> exposure_ev;                    ///< Nothing: the file does not say.
+    std::optional<std::string> white_balance;  ///< As in kWhiteBalanceKey; nothing: the file does not say.
+    std::optional<std::array<double, 8>> chromaticities;  ///< Nothing: the file does not say.
+};
+ColorConditions colorConditions(const Image& image);
+/// Those with which the scene's film is resolved.
+ColorConditions colorConditions(const Scene& scene);
+
+/// Why values under the one and the other cannot be compared, one sentence without a full stop, in which `a`
+/// and `b` name them: other exposure, white balance or colour space. Empty when both say the same, or
+/// nothing.
+std::string conflictOf(const ColorConditions& conditions_a, const std::string& a,
+                       const ColorConditions& conditions_b, const std::string& b);
+
+/// What only one of them says, where it is not what is usual (0 stops, no white balance, sRGB), one sentence
+/// each: the other is taken to be alike.
+std::vector<std::string> unknownConditions(const ColorConditions& conditions_a, const std::string& a,
+                                           const ColorConditions& conditions_b, const std::string& b);
+
+}  // namespace crt

@@ -1,0 +1,137 @@
+// stats/pooled_tests.h: the parts of compare's tests, each against what it promises.
+#include "catch.h"
+#include "stats/luminance_error.h"
+#include "stats/pooled_tests.h"
+#include "stats/statistics.h"
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <tuple>
+#include <vector>
+
+using namespace crt::stats;
+
+namespace {
+
+/// Mean 0 and true variance 1, and an estimate of it with so many degrees of freedom.
+Mean estimated(std::mt19937_64& random, double variance, double dof) {
+    return {std::sqrt(variance) * std::normal_distribution<double>()(random),
+            variance * std::chi_squared_distribution<double>(dof)(random) / dof, dof};
+}
+
+/// Whether so many of `trials` are too many for a test of this level, but one time in 10,000.
+bool exceeds(int alarms, int trials, double level) {
+    return clopperPearson(static_cast<std::uint64_t>(alarms), static_cast<std::uint64_t>(trials), 0.9998)
+               .lower > level;
+}
+
+}  // namespace
+
+TEST_CASE("equality of two means is rejected no more often than stated, however few the degrees of freedom",
+          "[pooled-tests]") {
+    constexpr int kTrials = 20000;
+    std::mt19937_64 random(1);
+    for (const auto& [dof_a, dof_b, variance_a] : {std::tuple{1.0, 1.0, 1.0},
+                                                   {1.0, 1.0, 30.0},
+                                                   {3.0, 3.0, 1.0},
+                                                   {3.0, 1.0, 5.0},
+                                                   {1.0, 15.0, 0.2},
+                                                   {15.0, 15.0, 4.0},
+                                                   {200.0, 3.0, 1.0}}) {
+        std::array<int, 3> alarms{}, outside{};
+        constexpr std::array<double, 3> kLevels{0.05, 0.01, 0.001};
+        for (int i = 0; i < kTrials; ++i) {
+            const Mean a = estimated(random, variance_a, dof_a), b = estimated(random, 1, dof_b);
+            const double p = carefulEqualityP(a, b);
+            for (std::size_t l = 0; l < kLevels.size(); ++l) {
+                alarms[l] += p < kLevels[l];
+                outside[l] += std::abs(a.value - b.value) > carefulHalfWidth(a, b, 1 - kLevels[l]);
+            }
+        }
+        INFO(dof_a << " and " << dof_b << " degrees of freedom, variances " << variance_a << " and 1");
+        for (std::size_t l = 0; l < kLevels.size(); ++l) {
+            INFO(alarms[l] << " alarms at " << kLevels[l]);
+            CHECK_FALSE(exceeds(alarms[l], kTrials, kLevels[l]));
+            CHECK(alarms[l] == outside[l]);  // p and interval are one test.
+        }
+        if (dof_a >= 8 && dof_b >= 8)
+            CHECK(alarms[0] > 0.04 * kTrials);  // Where enough is known, nothing is lost.
+    }
+    CHECK(carefulEqualityP({1, 0, 3}, {1 + 1e-7, 0, 3}) == 1);  // Rounding.
+    CHECK(carefulEqualityP({1, 0, 3}, {1.001, 0, 3}) == 0);
+    CHECK(std::isnan(carefulEqualityP({1, INFINITY, 3}, {1, 0, 3})));
+}
+
+TEST_CASE("sums of symmetric differences are judged rightly whatever their tails", "[pooled-tests]") {
+    constexpr int kTrials = 20000;
+    std::mt19937_64 random(2);
+    const std::vector<double (*)(std::mt19937_64&)> kinds{
+        [](std::mt19937_64& r) { return std::normal_distribution<double>()(r); },
+        [](std::mt19937_64& r) { return std::cauchy_distribution<double>()(r); },
+        [](std::mt19937_64& r) {
+            return double(std::poisson_distribution<int>(0.02)(r)) - std::poisson_distribution<int>(0.02)(r);
+        },
+        [](std::mt19937_64& r) {
+            return std::pow(std::gamma_distribution<double>(0.1)(r), 3) -
+                   std::pow(std::gamma_distribution<double>(0.1)(r), 3);
+        }};
+    for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
+        std::array<int, 2> alarms{}, outside{};
+        constexpr std::array<double, 2> kLevels{0.05, 0.001};
+        for (int i = 0; i < kTrials; ++i) {
+            DifferenceSums sums;
+            for (int n = 0; n < 64; ++n) sums.add(kinds[kind](random));
+            const double p = symmetricP(sums);
+            for (std::size_t l = 0; l < kLevels.size(); ++l) {
+                alarms[l] += p < kLevels[l];
+                outside[l] += std::abs(sums.sum) / 64 > symmetricHalfWidth(sums, 1 - kLevels[l]);
+            }
+        }
+        INFO("kind " << kind);
+        for (std::size_t l = 0; l < kLevels.size(); ++l) {
+            INFO(alarms[l] << " alarms at " << kLevels[l]);
+            CHECK_FALSE(exceeds(alarms[l], kTrials, kLevels[l]));
+            CHECK(alarms[l] == outside[l]);
+        }
+        if (kind == 0)
+            CHECK(alarms[0] > 0.05 / 4 * kTrials);  // The price of knowing nothing is a factor of three.
+    }
+    // The worst case: two signs are equal every other time, and no smaller factor would do.
+    DifferenceSums two;
+    for (int n = 0; n < 2; ++n) two.add(1);
+    CHECK(symmetricP(two) >= 0.5);
+    CHECK(symmetricP(two) < 0.5001);
+    DifferenceSums few;
+    for (int n = 0; n < 8; ++n) few.add(1);
+    CHECK(std::isinf(symmetricHalfWidth(few, 0.999)));  // All signs are equal once in 128 times.
+    CHECK(symmetricP(DifferenceSums{}) == 1);
+}
+
+TEST_CASE("variances add up, and so do their degrees of freedom", "[pooled-tests]") {
+    const std::vector<double> variances{1, 2, 4, 0.5, 0};
+    PixelSums sums, first, rest;
+    for (std::size_t i = 0; i < variances.size(); ++i) {
+        sums.add(static_cast<double>(i), variances[i]);
+        (i < 2 ? first : rest).add(static_cast<double>(i), variances[i]);
+    }
+    first.add(rest);
+    const Mean mean = sums.mean(3);
+    CHECK(mean.value == 2);
+    CHECK(mean.variance == Approx(7.5 / 25));
+    CHECK(mean.dof == Approx(3 * effectivePixels(variances, 3)));
+    CHECK(first.mean(3).variance == Approx(mean.variance));
+    CHECK(first.mean(3).dof == Approx(mean.dof));
+    PixelSums one;
+    one.add(1, 4);
+    CHECK(one.mean(3).dof == 3);
+}
+
+TEST_CASE("a window has what of it lies in the image", "[pooled-tests]") {
+    const std::vector<double> values{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};  // 4 × 3
+    const std::vector<double> means = windowMeans(values, 4, 3, 1);
+    CHECK(means[0] == Approx((1 + 2 + 5 + 6) / 4.0));
+    CHECK(means[5] == Approx((1 + 2 + 3 + 5 + 6 + 7 + 9 + 10 + 11) / 9.0));
+    CHECK(means[11] == Approx((7 + 8 + 11 + 12) / 4.0));
+    CHECK(windowMeans(values, 4, 3, 0) == values);
+}
