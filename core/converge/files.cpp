@@ -77,8 +77,12 @@ Json rowJson(const Row& row) {
     json["closest_rays"] = row.closest_rays;
     json["shadow_rays"] = row.shadow_rays;
     json["error"] = row.error ? errorJson(*row.error) : Json(nullptr);
+    json["fold_mse"] = Json::array();
+    for (const double mse : row.fold_mse) json["fold_mse"].push_back(number(mse));
     json["between_replicates_mse"] = number(row.between_replicates_mse);
+    json["effective_pixels"] = number(row.effective_pixels);
     json["predicted_relative_rmse"] = interval(row.predicted_relative_rmse);
+    json["mean_luminance"] = number(row.mean_luminance);
     json["image_mean"] = numbers(row.image_mean);
     json["image_mean_standard_error"] = row.image_mean_standard_error ? numbers(*row.image_mean_standard_error) : Json(nullptr);
     json["invalid_samples"] = row.invalid_samples;
@@ -102,9 +106,12 @@ Row rowOf(const Json& json) {
     row.closest_rays = json.at("closest_rays").get<std::uint64_t>();
     row.shadow_rays = json.at("shadow_rays").get<std::uint64_t>();
     if (const Json& error = json.at("error"); !error.is_null()) row.error = errorOf(error);
+    for (const Json& mse : json.at("fold_mse")) row.fold_mse.push_back(numberIn(mse));
     row.between_replicates_mse = knownNumberIn(json.at("between_replicates_mse"));
+    row.effective_pixels = knownNumberIn(json.at("effective_pixels"));
     if (const Json& predicted = json.at("predicted_relative_rmse"); !predicted.is_null())
         row.predicted_relative_rmse = Estimate{numberIn(predicted.at("value")), numberIn(predicted.at("low")), numberIn(predicted.at("high"))};
+    row.mean_luminance = numberIn(json.at("mean_luminance"));
     row.image_mean = numbersIn(json.at("image_mean"));
     if (const Json& error = json.at("image_mean_standard_error"); !error.is_null()) row.image_mean_standard_error = numbersIn(error);
     row.invalid_samples = json.at("invalid_samples").get<std::uint64_t>();
@@ -183,6 +190,8 @@ const std::vector<Column>& csvColumns() {
         {"predicted_relative_rmse", predictionField(&Estimate::value)},
         {"predicted_relative_rmse_low", predictionField(&Estimate::low)},
         {"predicted_relative_rmse_high", predictionField(&Estimate::high)},
+        {"effective_pixels", [](const Row& r) { return csvField(r.effective_pixels); }},
+        {"mean_luminance", [](const Row& r) { return csvField(r.mean_luminance); }},
         {"image_mean_r", [](const Row& r) { return csvField(r.image_mean[0]); }},
         {"image_mean_g", [](const Row& r) { return csvField(r.image_mean[1]); }},
         {"image_mean_b", [](const Row& r) { return csvField(r.image_mean[2]); }},
@@ -234,6 +243,8 @@ Json fitJson(const ConfigurationFit& fit) {
     json["replicates"] = fit.replicates;
     json["void_rows"] = fit.void_rows;
     json["error_source"] = fit.source == ErrorSource::Reference ? "reference" : "between replicates";
+    json["same_bits_as"] = Json::array();
+    for (const Key& key : fit.same_bits) json["same_bits_as"].push_back(key.backend);
     json["verdict"] = stats::verdictName(fit.judgement.verdict);
     json["verdict_reason"] = fit.judgement.reason;
     json["relative_mean_bias_rgb"] = nullptr;
@@ -251,6 +262,7 @@ Json fitJson(const ConfigurationFit& fit) {
                          {"faster_than_inverse", fit.error.faster_than_inverse}};
         json["slope_against_samples"] = interval(fit.slope_samples);
         json["slope_against_seconds"] = interval(fit.slope_seconds);
+        json["common_error"] = targetJson(fit.common);
         json["efficiency_per_second"] = interval(fit.efficiency);
         json["targets"] = Json::array();
         for (const Target& target : fit.targets) json["targets"].push_back(targetJson(target));
@@ -279,7 +291,6 @@ Json testsJson(const ImageTests& t) {
     return {{"smallest_tile_p", number(t.smallest_tile_p)},
             {"tile_p_uniformity", number(t.tile_p_uniformity)},
             {"smallest_pixel_p", number(t.smallest_pixel_p)},
-            {"variance_of_variance", number(t.variance_of_variance)},
             {"largest_share", number(t.largest_share)}};
 }
 
@@ -309,9 +320,12 @@ Json referenceJson(const ReferenceInfo& r) {
             {"hash", r.hash},
             {"samples_per_pixel", r.samples},
             {"estimator", r.estimator},
+            {"mean_luminance", number(r.mean_luminance)},
+            {"mean_luminance_standard_error", number(r.mean_luminance_standard_error)},
             {"image_mean", numbers(r.image_mean)},
             {"image_mean_standard_error", numbers(r.image_mean_standard_error)},
             {"mean_variance", number(r.mean_variance)},
+            {"effective_pixels", number(r.effective_pixels)},
             {"eightfold_spread", number(r.eightfold_spread)}};
 }
 

@@ -8,6 +8,7 @@
 #include "interrupt.h"
 #include "log.h"
 #include "sampling.h"
+#include "stats/luminance_error.h"
 #include "stats/statistics.h"
 #include "yaml_reader.h"
 
@@ -50,11 +51,34 @@ std::vector<float> channelsOf(const Image& image, const std::array<std::string, 
     return values;
 }
 
-std::vector<float> luminanceOf(const std::vector<float>& rgb, const std::array<double, 3>& weights) {
-    std::vector<float> luminance(rgb.size() / 3);
-    for (std::size_t p = 0; p < luminance.size(); ++p)
-        luminance[p] = static_cast<float>(weights[0] * rgb[3 * p] + weights[1] * rgb[3 * p + 1] + weights[2] * rgb[3 * p + 2]);
-    return luminance;
+/// Mean, variance and distances of the folds, from their luminances and colours.
+void describeFolds(ReferenceInfo& info, const std::vector<std::vector<float>>& luminances, const std::vector<std::vector<double>>& colours) {
+    const std::size_t pixels = luminances.front().size();
+    std::vector<double> variances(pixels);
+    for (std::size_t p = 0; p < pixels; ++p) {
+        std::array<double, kFolds> values{};
+        for (std::uint32_t fold = 0; fold < kFolds; ++fold) values[fold] = luminances[fold][p];
+        variances[p] = stats::summarize(values).variance / kFolds;
+    }
+    info.mean_variance = stats::summarize(variances).mean;
+    info.effective_pixels = stats::effectivePixels(variances, kFolds - 1);
+    for (const std::vector<float>& a : luminances) {
+        info.fold_mean_luminance.push_back(stats::meanLuminance(a));
+        info.fold_distance.emplace_back();
+        for (const std::vector<float>& b : luminances) info.fold_distance.back().push_back(stats::meanSquaredDifference(a, b));
+    }
+    const stats::Summary luminance = stats::summarize(info.fold_mean_luminance);
+    info.mean_luminance = luminance.mean;
+    info.mean_luminance_standard_error = luminance.standardError();
+    info.eightfold_spread = stats::relativeRmse(info.mean_variance, info.mean_luminance);
+    for (std::size_t c = 0; c < 3; ++c) {
+        std::array<double, kFolds> means{};
+        for (std::uint32_t fold = 0; fold < kFolds; ++fold)
+            for (std::size_t p = 0; p < pixels; ++p) means[fold] += colours[fold][3 * p + c] / static_cast<double>(pixels);
+        const stats::Summary summary = stats::summarize(means);
+        info.image_mean[c] = summary.mean;
+        info.image_mean_standard_error[c] = summary.standardError();
+    }
 }
 
 /// Samples per fold that fit into the time, from the first ones.
@@ -63,17 +87,6 @@ std::uint64_t affordable(double seconds_left, double seconds_per_sample) {
 }
 
 }  // namespace
-
-std::array<double, 3> luminanceWeights(ColorSpace space) {
-    // Row Y of the inverse of XYZ → RGB, by Cramer's rule on its transpose: w · M = (0, 1, 0).
-    const Matrix3d m = xyzToRgb(space);
-    const auto minor = [&m](std::size_t r0, std::size_t r1) { return m[r0][0] * m[r1][2] - m[r0][2] * m[r1][0]; };
-    // Cofactors of column 1.
-    const std::array<double, 3> cofactors{-minor(1, 2), minor(0, 2), -minor(0, 1)};
-    // Y_row of M⁻¹: (M⁻¹)_{1j} = C_{j1}/det, with C_{j1} = (−1)^{j+1} det of M without row j and column 1.
-    const double det = m[0][1] * cofactors[0] + m[1][1] * cofactors[1] + m[2][1] * cofactors[2];
-    return {cofactors[0] / det, cofactors[1] / det, cofactors[2] / det};
-}
 
 Scene referenceScene(Scene scene, bool same_estimator) {
     scene.sampler.type = SamplerType::Independent;
@@ -184,6 +197,7 @@ Reference readReference(const std::string& text, const Scene& scene) {
         reference.info.kind = ReferenceKind::Analytic;
         reference.info.estimator = fmt::format("closed form: every pixel has luminance {}", text);
         reference.luminance = {static_cast<float>(*value.value)};
+        reference.info.mean_luminance = *value.value;
         reference.info.image_mean.fill(*value.value);
         return reference;
     }
@@ -196,13 +210,12 @@ Reference readReference(const std::string& text, const Scene& scene) {
     reference.width = image.width;
     reference.height = image.height;
     reference.rgb = channelsOf(image, {"R", "G", "B"});
-    const std::array<double, 3> weights = luminanceWeights(scene.film.color_space);
-    reference.luminance = luminanceOf(reference.rgb, weights);
-    std::vector<std::vector<float>> folds;
+    const stats::Rgb weights = stats::luminanceWeights(scene.film.color_space);
+    reference.luminance = stats::luminances(reference.rgb, weights);
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
         const std::vector<float> rgb = channelsOf(image, {fmt::format("Fold.{}.R", fold), fmt::format("Fold.{}.G", fold), fmt::format("Fold.{}.B", fold)});
         if (rgb.empty()) throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: it lacks its eighths", text));
-        folds.push_back(luminanceOf(rgb, weights));
+        reference.fold_luminance.push_back(stats::luminances(rgb, weights));
         reference.fold_rgb.emplace_back(rgb.begin(), rgb.end());
     }
 
@@ -213,24 +226,7 @@ Reference readReference(const std::string& text, const Scene& scene) {
     info.estimator = metadataOf(image, kEstimatorKey);
     const Parsed<std::uint64_t> samples = parseUnsigned(metadataOf(image, "crt/spp"));
     info.samples = samples.value.value_or(0);
-    const std::size_t pixels = reference.luminance.size();
-    double variance = 0, mean = 0;
-    for (std::size_t p = 0; p < pixels; ++p) {
-        std::array<double, kFolds> values{};
-        for (std::uint32_t fold = 0; fold < kFolds; ++fold) values[fold] = folds[fold][p];
-        variance += stats::summarize(values).variance / kFolds / static_cast<double>(pixels);
-        mean += reference.luminance[p] / static_cast<double>(pixels);
-    }
-    info.mean_variance = variance;
-    info.eightfold_spread = std::sqrt(variance) / mean;
-    for (std::size_t c = 0; c < 3; ++c) {
-        std::array<double, kFolds> means{};
-        for (std::uint32_t fold = 0; fold < kFolds; ++fold)
-            for (std::size_t p = 0; p < pixels; ++p) means[fold] += reference.fold_rgb[fold][3 * p + c] / static_cast<double>(pixels);
-        const stats::Summary summary = stats::summarize(means);
-        info.image_mean[c] = summary.mean;
-        info.image_mean_standard_error[c] = summary.standardError();
-    }
+    describeFolds(info, reference.fold_luminance, reference.fold_rgb);
     return reference;
 }
 

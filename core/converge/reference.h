@@ -47,14 +47,12 @@ struct Reference {
     std::uint32_t width = 0, height = 0;   ///< 0: one value for all pixels.
     std::vector<float> rgb;                ///< [height][width][3]; empty with one value.
     std::vector<float> luminance;          ///< [height][width]; one value when all pixels have it.
+    std::vector<std::vector<float>> fold_luminance;        ///< kFolds planes; empty with one value.
     std::vector<std::vector<double>> fold_rgb;  ///< kFolds images, [height][width][3]; empty with one value.
 };
 
 /// "0.2394564705" is the luminance that every pixel has (a closed form); anything else a file of makeReference's, which must be of this scene. Throws
 /// crt::Error(Usage).
 Reference readReference(const std::string& text, const Scene& scene);
-
-/// Luminance of linear RGB in the scene's colour space.
-std::array<double, 3> luminanceWeights(ColorSpace space);
 
 }  // namespace crt::converge

@@ -153,16 +153,16 @@ std::string testTable(const Run& run, const std::string& scene) {
     const auto known = [](const std::optional<double>& value) { return value ? h(numberText(*value, 2)) : std::string("–"); };
     for (const Configuration& c : run.configurations) {
         const ImageTests& t = c.tests;
-        if (c.key.scene != scene || !(t.smallest_tile_p || t.smallest_pixel_p || t.variance_of_variance || t.largest_share)) continue;
+        if (c.key.scene != scene || !(t.smallest_tile_p || t.smallest_pixel_p || t.largest_share)) continue;
         rows += "<tr>" + rowHead(run, c.key) + cell("smallest p of tiles", known(t.smallest_tile_p)) + cell("smallest p of pixels", known(t.smallest_pixel_p)) +
-                cell("tiles’ p uniform", known(t.tile_p_uniformity)) + cell("variance of the variance", known(t.variance_of_variance)) +
+                cell("tiles’ p uniform", known(t.tile_p_uniformity)) +
                 cell("largest share", t.largest_share ? h(percentText(*t.largest_share, 2)) : "–") + "</tr>\n";
     }
     if (rows.empty()) return {};
     return "<h3>Tests against the reference</h3>\n<p>Smallest p-values are adjusted for how many tiles and pixels there are: below 0.001, one differs. The largest share is "
            "the part of all squared error that a single value carries.</p>\n" +
            tableOf({{"configuration", ""}, {"smallest p of tiles", "num"}, {"smallest p of pixels", "num"}, {"tiles’ p uniform", "num"},
-                    {"variance of the variance", "num"}, {"largest share", "num"}}, rows);
+                    {"largest share", "num"}}, rows);
 }
 
 std::string voidTable(const Run& run, const std::string& scene) {
