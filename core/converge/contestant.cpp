@@ -57,7 +57,6 @@ Contestant::Contestant(Key key, Scene scene, const Reference* reference, const I
 }
 
 void Contestant::describe(const CompiledScene& compiled, double setup_seconds) {
-    described_ = true;
     before_first_sample_ += setup_seconds;
     const CrtBackendReport report = integrator_->report();
     Configuration& c = configuration_;
@@ -137,16 +136,41 @@ void Contestant::warmUp(const CompiledScene& compiled) {
     integrator_->setScene(compiled);  // An empty film again.
 }
 
-bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
-                           const std::function<bool()>& stop) {
-    scene_.sampler.seed = seed_ + 1 + replicate;
+void Contestant::prepare() {
     const Clock::time_point setup = Clock::now();
     const CompiledScene compiled = compileScene(scene_, 0);
     integrator_->setScene(compiled);
-    if (!described_) {
-        describe(compiled, secondsSince(setup));
-        warmUp(compiled);
-    }
+    describe(compiled, secondsSince(setup));
+    warmUp(compiled);
+}
+
+StoredReplicate Contestant::stored(std::uint32_t replicate) const {
+    StoredReplicate stored;
+    for (const auto& [samples, planes] : looks_)
+        if (const auto plane = planes.find(replicate); plane != planes.end()) stored.looks.emplace_back(samples, plane->second);
+    stored.rgb = last_image_.pixels;
+    stored.standard_error = last_error_.values;
+    return stored;
+}
+
+void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored) {
+    for (const auto& [samples, plane] : stored.looks) looks_[samples][replicate] = plane;
+    samples_reached_ = std::max(samples_reached_, stored.looks.back().first);
+    tests_.add(std::vector<double>(stored.rgb.begin(), stored.rgb.end()));
+    last_image_ = Image{};
+    last_image_.width = configuration_.width;
+    last_image_.height = configuration_.height;
+    last_image_.channels = {"R", "G", "B"};
+    last_image_.pixels = stored.rgb;
+    last_image_.chromaticities = chromaticities(scene_.film.color_space);
+    last_error_ = {configuration_.width, configuration_.height, stored.standard_error};
+}
+
+bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
+                           const std::function<bool()>& stop) {
+    scene_.sampler.seed = seed_ + 1 + replicate;
+    const CompiledScene compiled = compileScene(scene_, 0);
+    integrator_->setScene(compiled);
     const Clock::time_point start = Clock::now();
 
     const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};

@@ -172,6 +172,16 @@ std::vector<std::string> scenesOf(const Run& run) {
     return scenes;
 }
 
+std::string verdictLine(const ConfigurationFit& fit) {
+    std::string text = fmt::format("{} {}: ", fit.key.scene, labelOf(fit.key));
+    if (!fit.points.empty()) {
+        text += fmt::format("error {} at {} spp", errorText(fit.points.back().relative_rmse), fit.points.back().samples);
+        if (fit.fitted && std::isfinite(fit.slope_samples.value)) text += fmt::format(", slope {}", numberText(fit.slope_samples));
+        text += ", ";
+    }
+    return text + fmt::format("{}: {}", stats::verdictName(fit.judgement.verdict), fit.judgement.reason);
+}
+
 std::string labelOf(const Key& key) { return key.variant.empty() ? key.backend : key.backend + ", " + key.variant; }
 
 }  // namespace crt::converge

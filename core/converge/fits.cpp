@@ -309,6 +309,7 @@ struct Subject {
 void collectRows(Subject& subject, const Run& run) {
     subject.fit.key = subject.configuration->key;
     subject.tests = subject.configuration->tests;
+    subject.fit.omitted = !subject.configuration->omitted.empty();
     for (const Row& row : run.rows) {
         if (row.key != subject.configuration->key) continue;
         if (row.isVoid())

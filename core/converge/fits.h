@@ -98,6 +98,7 @@ struct ConfigurationFit {
     std::vector<Key> same_bits;       ///< Others whose rows are the same bit for bit: errors and verdicts are shared.
     std::uint32_t replicates = 0;     ///< In the fits; points may have more.
     std::uint32_t void_rows = 0;
+    bool omitted = false;             ///< It was not measured; the judgement's reason says why.
     ErrorSource source = ErrorSource::BetweenReplicates;
     std::vector<Point> points;        ///< By samples. Those with two replicates at least.
     bool fitted = false;              ///< Three points or more with two replicates each; else all below but the judgement is empty.

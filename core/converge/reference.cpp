@@ -24,6 +24,7 @@ namespace {
 /// Far from the seeds of `crt converge`, which follow the scene's one by one.
 constexpr std::uint64_t kReferenceSeedOffset = std::uint64_t{1} << 40;
 constexpr const char* kContentKey = "crt/referenceContent";
+constexpr const char* kColourKey = "crt/referenceColour";
 constexpr const char* kEstimatorKey = "crt/referenceEstimator";
 
 std::string estimatorText(const Scene& scene) {
@@ -106,40 +107,51 @@ std::string hashOfContent(const Scene& scene) {
     return compileScene(canonical, 0).hash;
 }
 
+std::string colourText(const Scene& scene) {
+    const auto space = [](ColorSpace s) { return s == ColorSpace::LinearSrgb ? "linear sRGB" : s == ColorSpace::AcesCg ? "ACEScg" : "XYZ"; };
+    std::string white = "no white balance";
+    if (scene.film.white_balance) {
+        const Vec3d xyz = spectrumToXyz(*scene.film.white_balance);
+        white = fmt::format("white balance from X : Y : Z = {:.6f} : 1 : {:.6f}", xyz[0] / xyz[1], xyz[2] / xyz[1]);
+    }
+    return fmt::format("exposure {} EV, {}, {}", scene.film.exposure_ev, space(scene.film.color_space), white);
+}
+
 int makeReference(const ReferenceRequest& request) {
-    Scene scene = loadScene(request.scene);
-    if (scene.integrator.type != IntegratorType::Path)
-        throw Error(ErrorKind::Usage, "a view has no noise and needs no reference: integrator.type must be path");
-    const std::string content = hashOfContent(scene);
-    scene = referenceScene(std::move(scene), request.same_estimator);
-    if (std::filesystem::path(request.output).extension() != ".exr")
-        throw Error(ErrorKind::Usage, fmt::format("a reference holds its eighths beside the image, which only EXR can: '{}' should end in .exr", request.output));
-    checkWritable(request.output);
-
-    const LoadedBackend backend = openBackend(request.backend);
-    Integrator integrator(backend, request.integrator);
-    const CompiledScene compiled = compileScene(scene, 0);
-    const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
-
     const InterruptGuard interrupt;
+    const std::optional<MadeReference> made = renderReference(loadScene(request.scene), request);
+    if (!made) return 128 + InterruptGuard::signalReceived();
+    logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, made->samples, kFolds, made->estimator, durationText(made->seconds));
+    if (made->error) logInfo("its own {}", errorText(*made->error));
+    if (made->error && made->error->relative_rmse > 0.02)
+        logWarning("the reference is noisy itself; its variance is subtracted from errors, but more --time, or --same-estimator, makes them surer");
+    return 0;
+}
+
+namespace {
+
+/// The eighths and their sum.
+struct RenderedFolds {
+    Film film;
+    std::vector<Image> images;
+};
+
+/// Each eighth has samples of its own. The first also finds out how many fit into the time. Nothing when a signal came.
+std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene& compiled, Integrator& integrator, const ReferenceRequest& request) {
+    const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
     Progress progress(request.progress);
     ProgressState state;
     state.pixels = std::uint64_t{shape.width} * shape.height;
     const auto started = std::chrono::steady_clock::now();
     const auto elapsed = [started] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count(); };
-
-    // Each eighth has samples of its own. The first also finds out how many fit into the time.
-    Film film(shape);
-    Image image;
-    std::vector<Image> folds;
+    RenderedFolds folds{Film(shape), {}};
     std::uint64_t per_fold = request.samples / kFolds;
-    if (request.samples > 0 && per_fold == 0) throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
         integrator.setScene(compiled);
         const std::uint64_t first = std::uint64_t{fold} << 44;
         std::uint64_t done = 0;
         for (std::uint64_t chunk = 1; per_fold == 0 || done < per_fold;) {
-            if (InterruptGuard::signalReceived() != 0) return 128 + InterruptGuard::signalReceived();
+            if (InterruptGuard::signalReceived() != 0) return std::nullopt;
             const double before = elapsed();
             if (per_fold > 0) chunk = std::min(chunk, per_fold - done);
             integrator.render({.first_sample = first + done, .sample_count = chunk});
@@ -158,35 +170,54 @@ int makeReference(const ReferenceRequest& request) {
         integrator.readFilm(part);
         if (part.invalidSamples() > 0)
             throw Error(ErrorKind::Device, fmt::format("{} samples of the reference were NaN or infinite: it would be worth nothing", part.invalidSamples()));
-        folds.push_back(resolveImage(part, scene, 0));
-        film.add(part);
+        folds.images.push_back(resolveImage(part, scene, 0));
+        folds.film.add(part);
     }
-    image = resolveImage(film, scene, 0);
+    return folds;
+}
 
-    Image file = image;
-    file.channels.clear();
+/// R, G and B of the mean, then of each eighth.
+Image referenceImage(const RenderedFolds& folds, const Scene& scene) {
+    const Image mean = resolveImage(folds.film, scene, 0);
+    Image file = mean;
     file.pixels.clear();
     file.channels = {"R", "G", "B"};
     for (std::uint32_t fold = 0; fold < kFolds; ++fold)
         for (const char* c : {"R", "G", "B"}) file.channels.push_back(fmt::format("Fold.{}.{}", fold, c));
-    const std::size_t pixels = std::size_t{image.width} * image.height;
+    const std::size_t pixels = std::size_t{mean.width} * mean.height;
     for (std::size_t p = 0; p < pixels; ++p) {
-        for (std::size_t c = 0; c < 3; ++c) file.pixels.push_back(image.pixels[3 * p + c]);
-        for (const Image& fold : folds)
+        for (std::size_t c = 0; c < 3; ++c) file.pixels.push_back(mean.pixels[3 * p + c]);
+        for (const Image& fold : folds.images)
             for (std::size_t c = 0; c < 3; ++c) file.pixels.push_back(fold.pixels[3 * p + c]);
     }
+    return file;
+}
+
+}  // namespace
+
+std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request) {
+    if (scene.integrator.type != IntegratorType::Path)
+        throw Error(ErrorKind::Usage, "a view has no noise and needs no reference: integrator.type must be path");
+    if (std::filesystem::path(request.output).extension() != ".exr")
+        throw Error(ErrorKind::Usage, fmt::format("a reference holds its eighths beside the image, which only EXR can: '{}' should end in .exr", request.output));
+    if (request.samples > 0 && request.samples < kFolds) throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
+    checkWritable(request.output);
+    const auto started = std::chrono::steady_clock::now();
+    const std::string content = hashOfContent(scene), colour = colourText(scene);
+    scene = referenceScene(std::move(scene), request.same_estimator);
+    const LoadedBackend backend = openBackend(request.backend);
+    Integrator integrator(backend, request.integrator);
+    const std::optional<RenderedFolds> folds = renderFolds(scene, compileScene(scene, 0), integrator, request);
+    if (!folds) return std::nullopt;
+    Image file = referenceImage(*folds, scene);
     file.metadata.emplace_back("Software", "crt " CRT_VERSION);
     file.metadata.emplace_back(kContentKey, content);
+    file.metadata.emplace_back(kColourKey, colour);
     file.metadata.emplace_back(kEstimatorKey, estimatorText(scene));
     file.metadata.emplace_back("crt/backend", backend.name);
     writeImage(request.output, OutputFormat::Exr, file);
-
-    const std::optional<ErrorEstimate> error = estimateError(film, ReplicateSet::All, true);
-    logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, film.samples.count(), kFolds, estimatorText(scene), durationText(elapsed()));
-    if (error) logInfo("its own {}", errorText(*error));
-    if (error && error->relative_rmse > 0.02)
-        logWarning("the reference is noisy itself; its variance is subtracted from errors, but more --time, or --same-estimator, makes them surer");
-    return 0;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    return MadeReference{folds->film.samples.count(), estimatorText(scene), seconds, estimateError(folds->film, ReplicateSet::All, true)};
 }
 
 Reference readReference(const std::string& text, const Scene& scene) {
@@ -207,6 +238,12 @@ Reference readReference(const std::string& text, const Scene& scene) {
         throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: make one with 'crt reference {} -o {}'", text, scene.file, text));
     if (content != hashOfContent(scene))
         throw Error(ErrorKind::Usage, fmt::format("'{}' is a reference of another scene, or of this one with other settings or resolution", text));
+    const std::string colour = metadataOf(image, kColourKey);
+    if (colour.empty())
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is of an earlier crt, which did not note exposure, colour space and white balance: make it again "
+                                                  "with 'crt reference'", text));
+    if (colour != colourText(scene))
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is a reference in other colours: it has {}; the scene has {}", text, colour, colourText(scene)));
     reference.width = image.width;
     reference.height = image.height;
     reference.rgb = channelsOf(image, {"R", "G", "B"});
