@@ -62,7 +62,7 @@ TEST_CASE("a bias fails in a channel whose mean is 0 or below 0, too", "[fits]")
 
 // 500 repeats place 5 % of misses below 8 % at three standard deviations. Without the folds' part misses are 20 % and more.
 TEST_CASE("the noise of the reference is in every interval", "[fits]") {
-    for (const double times : {1.0, 4.0}) {
+    for (const double times : {0.08, 1.0, 4.0}) {
         SyntheticRender what = noisyReference();
         what.reference_variance *= times;
         what.inequality = 10;
@@ -103,13 +103,32 @@ TEST_CASE("a real floor is seen through a noisy reference", "[fits]") {
     CHECK(covers(fit.error.floor(), 0.0025));
 }
 
+TEST_CASE("where the reference is noisier than the images, it judges bias, and errors are the spread",
+          "[fits]") {
+    SyntheticRender what = noisyReference();
+    what.reference_variance *= 20;
+    const ConfigurationFit fit = fitOf(what, 5);
+    CHECK(fit.source == ErrorSource::BetweenReplicates);
+    CHECK(fit.has_reference);
+    CHECK(fit.points.back().relative_rmse.value == Approx(std::sqrt(what.variance / 256)).epsilon(0.1));
+    CHECK(fit.slope_samples.high - fit.slope_samples.low < 0.1);
+    REQUIRE(fit.error.bias_squared);
+    CHECK(covers(*fit.error.bias_squared, 0));
+    what.bias = 0.2;  // A bias that is seen is part of the error.
+    const ConfigurationFit biased = fitOf(what, 5);
+    CHECK(biased.source == ErrorSource::Reference);
+    CHECK(covers(biased.points.back().relative_rmse, std::sqrt(what.variance / 256 + 0.04)));
+}
+
 TEST_CASE("an error below the noise of the reference is bounded, not a NaN", "[fits]") {
     SyntheticRender what = noisyReference();
     what.variance = 1e-6;
     what.reference_variance = 0.01;
     int at_zero = 0, covered = 0;
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-        const ConfigurationFit fit = fitOf(what, 100 * seed);
+        Run run = syntheticRun(what, 100 * seed);
+        for (Row& row : run.rows) row.between_replicates_mse.reset();  // Else that would be the error.
+        const ConfigurationFit fit = analyze(run).fits.at(0);
         for (const Point& point : fit.points) {
             CHECK(std::isfinite(point.relative_rmse.value));
             CHECK(std::isfinite(point.relative_rmse.high));
@@ -120,7 +139,7 @@ TEST_CASE("an error below the noise of the reference is bounded, not a NaN", "[f
         CHECK(fit.judgement.verdict != stats::Verdict::Fail);
     }
     CHECK(covered >= 16);  // Of 20 intervals of 95 %: fewer are a chance of 0.3 %.
-    CHECK(at_zero > 0);  // Where a logarithm would have been a NaN.
+    CHECK(at_zero > 0);    // Where a logarithm would have been a NaN.
 }
 
 // The reference's mean is known from eight folds: a normal quantile misses 1.2 % where 0.1 % is stated.

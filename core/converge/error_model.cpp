@@ -115,21 +115,37 @@ void Measure::divideReference() {
     }
 }
 
-SampleCounts Measure::counts(std::size_t replicates) const {
+bool Measure::referenceIsNoisy(const RowList& column) const {
+    if (reference_ == nullptr || column.empty()) return false;
+    double mean = 0;
+    for (const Row* row : column) mean += variance(*row) / static_cast<double>(column.size());
+    return reference_->mean_variance / (scale_ * scale_) > 0.1 * mean;
+}
+
+SampleCounts Measure::countsOfBias(std::size_t replicates) const {
     SampleCounts counts;
     counts.errors = replicates;
     counts.folds = parts_.empty() ? 0 : parts_.size() - 1;
-    if (source_ == ErrorSource::BetweenReplicates)
-        // Deviations from a common mean are not independent of each other.
-        counts.widening =
-            replicates > 2
-                ? std::sqrt(static_cast<double>(replicates - 1) / static_cast<double>(replicates - 2))
-                : std::numeric_limits<double>::infinity();
+    return counts;
+}
+
+SampleCounts Measure::counts(std::size_t replicates) const {
+    if (source_ == ErrorSource::Reference) return countsOfBias(replicates);
+    // Deviations from a common mean are not independent of each other.
+    const double few = replicates > 2
+                           ? static_cast<double>(replicates - 1) / static_cast<double>(replicates - 2)
+                           : std::numeric_limits<double>::infinity();
+    SampleCounts counts;
+    counts.errors = replicates;
+    counts.widening = std::sqrt(few);
     return counts;
 }
 
 double Measure::mse(const Row& row, std::size_t reference_part) const {
-    if (source_ == ErrorSource::BetweenReplicates) return variance(row);
+    return source_ == ErrorSource::Reference ? referenceMse(row, reference_part) : variance(row);
+}
+
+double Measure::referenceMse(const Row& row, std::size_t reference_part) const {
     if (parts_.empty()) return (row.error->mse - reference_->mean_variance) / (scale_ * scale_);
     const Part& part = parts_[reference_part];
     double sum = 0;

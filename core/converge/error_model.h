@@ -47,9 +47,17 @@ public:
     Measure(const RowsBySamples& by_samples, const ReferenceInfo* reference, double pixels);
 
     ErrorSource source() const { return source_; }
+    bool hasReference() const { return reference_ != nullptr; }
+    /// Whether the reference's own variance is more than a tenth of that of the images in a column. Its noise would hide
+    /// their error.
+    bool referenceIsNoisy(const RowList& column) const;
+    /// Errors are the spread between replicates from now on; the reference judges bias only.
+    void measureErrorsBetweenReplicates() { source_ = ErrorSource::BetweenReplicates; }
     bool usable() const { return scale_ > 0; }
     /// Of the rows' errors over so many replicates.
     SampleCounts counts(std::size_t replicates) const;
+    /// Of biasSquared(), which always knows the reference.
+    SampleCounts countsOfBias(std::size_t replicates) const;
 
     /// Relative mean squared error against part of the reference (Resample::reference_part), its noise subtracted. NaN
     /// where the row does not say.
@@ -58,7 +66,7 @@ public:
     double variance(const Row& row) const;
     /// Their difference: its mean over replicates estimates the squared bias.
     double biasSquared(const Row& row, std::size_t reference_part) const {
-        return mse(row, reference_part) - variance(row);
+        return referenceMse(row, reference_part) - variance(row);
     }
 
     /// The interval that an estimate of b² would have where b = 0, from `variance` of one image, widens `estimate`. The
@@ -75,6 +83,7 @@ private:
         double scale = 1;
     };
     void divideReference();
+    double referenceMse(const Row& row, std::size_t reference_part) const;
 
     ErrorSource source_ = ErrorSource::BetweenReplicates;
     const ReferenceInfo* reference_ = nullptr;

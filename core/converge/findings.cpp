@@ -116,7 +116,7 @@ std::vector<Finding> bias(const Fits& fits, double margin) {
         switch (fit->judgement.verdict) {
             case stats::Verdict::Fail: findings.push_back({Tone::Bad, fmt::format("{} FAILS: {}", labelOf(fit->key), fit->judgement.reason)}); break;
             case stats::Verdict::Pass: pass.push_back(fit); break;
-            case stats::Verdict::Inconclusive: (fit->source == ErrorSource::Reference ? unclear : blind).push_back(fit); break;
+            case stats::Verdict::Inconclusive: (fit->has_reference ? unclear : blind).push_back(fit); break;
         }
     }
     if (!pass.empty())
@@ -126,6 +126,9 @@ std::vector<Finding> bias(const Fits& fits, double margin) {
         findings.push_back({Tone::Warning, fmt::format("{} is undecided: {}", labelOf(fit->key), fit->judgement.reason)});
     if (!blind.empty())
         findings.push_back({Tone::Warning, "There is no reference for this scene: errors are the spread between replicates, in which a bias does not show."});
+    const auto noisy = [](const ConfigurationFit* fit) { return fit->has_reference && fit->source == ErrorSource::BetweenReplicates; };
+    if (std::any_of(fits.begin(), fits.end(), noisy))
+        findings.push_back({Tone::Neutral, "The reference is too noisy to measure errors against: errors are the spread between replicates, and the reference judges bias."});
     for (const ConfigurationFit* fit : fits) {
         if (!fit->fitted || !fit->error.flattening) continue;
         const double floor = std::sqrt(std::max(fit->error.floor().value, 0.0));

@@ -69,7 +69,7 @@ public:
             return 1 / (squares(r) * meanTime(r, secondsOf));
         };
         point.efficiency = jackknife(both, efficiency, Scale::Logarithmic, options_.confidence);
-        if (measure_.source() == ErrorSource::Reference) {
+        if (measure_.hasReference()) {
             point.bias_squared = biasSquared();
             point.mean_bias = meanBias(errors_, *reference, std::nullopt, options_.confidence);
         }
@@ -111,7 +111,8 @@ private:
                 return measure_.biasSquared(*errors_[r], resample.reference_part);
             });
         };
-        const Estimate estimate = jackknife(counts(), statistic, Scale::Linear, options_.confidence);
+        const Estimate estimate =
+            jackknife(measure_.countsOfBias(errors_.size()), statistic, Scale::Linear, options_.confidence);
         if (!std::isfinite(estimate.value)) return std::nullopt;
         double variance = 0;
         for (const Row* row : errors_)
@@ -183,8 +184,7 @@ public:
         fit.variance = jackknife(counts, variance, Scale::Logarithmic, options_.confidence);
         fit.intercept = jackknife(counts, intercept, Scale::Linear, options_.confidence);
         fit.faster_than_inverse = fit.intercept.high < 0;
-        if (error_.measure().source() == ErrorSource::Reference)
-            fit.bias_squared = biasSquared(options_.confidence);
+        if (error_.measure().hasReference()) fit.bias_squared = biasSquared(options_.confidence);
         if (fit.bias_squared && !std::isfinite(fit.bias_squared->value)) fit.bias_squared.reset();
         fit.verdict_floor = fit.bias_squared
                                 ? *biasSquared(options_.verdict_confidence)
@@ -260,7 +260,8 @@ private:
     }
     std::optional<Estimate> biasSquared(double confidence) const {
         const Statistic statistic = [&](const Resample& r) { return error_.biasSquared(r); };
-        const Estimate estimate = jackknife(error_.counts(), statistic, Scale::Linear, confidence);
+        const Estimate estimate = jackknife(error_.measure().countsOfBias(error_.replicates()), statistic,
+                                            Scale::Linear, confidence);
         return error_.measure().noNarrowerThanNoBias(estimate, error_.varianceOfBias(), error_.lastRow(),
                                                      error_.replicates(), confidence);
     }
@@ -367,7 +368,32 @@ void fitSubject(Subject& subject, const FitOptions& options) {
     fit.error = fitter.errorFit();
     fit.slope_samples = fitter.slopeSamples();
     fit.slope_seconds = fitter.slopeSeconds(fit.time.launch);
+    fit.targets.clear();
     for (const double target : options.targets) fit.targets.push_back(fitter.target(target, fit.error));
+}
+
+/// What a configuration's errors are measured by, its points and its fits. A reference that is noisier than the images judges
+/// bias only; unless it sees one, which is then part of the error.
+void measureAndFit(Subject& subject, const FitOptions& options) {
+    const double pixels = static_cast<double>(subject.configuration->width) * subject.configuration->height;
+    subject.measure.emplace(subject.errors, subject.reference, std::max(1.0, pixels));
+    Measure& measure = *subject.measure;
+    subject.fit.has_reference = measure.hasReference();
+    for (RowsBySamples* rows : {&subject.own, &subject.errors})
+        for (auto& [samples, of_replicates] : *rows)
+            std::erase_if(of_replicates,
+                          [&](const auto& entry) { return !std::isfinite(measure.mse(*entry.second, 0)); });
+    const auto last = lastFullColumn(subject.errors);
+    const bool noisy = last != subject.errors.rend() && measure.referenceIsNoisy(rowsOf(last->second));
+    if (noisy) {
+        measure.measureErrorsBetweenReplicates();
+        fitSubject(subject, options);
+        if (subject.fit.fitted && subject.fit.error.flattening)
+            measure = Measure(subject.errors, subject.reference, std::max(1.0, pixels));
+    }
+    subject.fit.source = measure.source();
+    if (!noisy || measure.source() == ErrorSource::Reference) fitSubject(subject, options);
+    makePoints(subject, options);
 }
 
 /// The upper end of the interval of the last point, so that parts of the replicates reach it, too.
@@ -424,19 +450,7 @@ Analysis analyze(const Run& run, const FitOptions& options) {
         collectRows(subjects.back(), run);
     }
     shareSameBits(subjects);
-    for (Subject& subject : subjects) {
-        const double pixels =
-            static_cast<double>(subject.configuration->width) * subject.configuration->height;
-        subject.measure.emplace(subject.errors, subject.reference, std::max(1.0, pixels));
-        subject.fit.source = subject.measure->source();
-        for (RowsBySamples* rows : {&subject.own, &subject.errors})
-            for (auto& [samples, of_replicates] : *rows)
-                std::erase_if(of_replicates, [&](const auto& entry) {
-                    return !std::isfinite(subject.measure->mse(*entry.second, 0));
-                });
-        makePoints(subject, options);
-        fitSubject(subject, options);
-    }
+    for (Subject& subject : subjects) measureAndFit(subject, options);
     compareAtCommonError(subjects, options);
     Analysis analysis;
     analysis.options = options;

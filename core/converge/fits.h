@@ -99,7 +99,10 @@ struct ConfigurationFit {
     std::uint32_t replicates = 0;     ///< In the fits; points may have more.
     std::uint32_t void_rows = 0;
     bool omitted = false;             ///< It was not measured; the judgement's reason says why.
+    /// Of the errors. BetweenReplicates, too, where the reference is noisier than a third of the images' own error and no
+    /// bias is seen against it.
     ErrorSource source = ErrorSource::BetweenReplicates;
+    bool has_reference = false;       ///< Which judges bias.
     std::vector<Point> points;        ///< By samples. Those with two replicates at least.
     bool fitted = false;              ///< Three points or more with two replicates each; else all below but the judgement is empty.
     TimeFit time;

@@ -120,8 +120,7 @@ Judgement judge(const ConfigurationFit& fit, const ImageTests& tests, const Rows
     RowList rows;
     if (const auto last = lastFullColumn(by_samples); last != by_samples.rend()) rows = rowsOf(last->second);
     std::optional<Pooled> pooled;
-    if (fit.source == ErrorSource::Reference && !rows.empty())
-        pooled = poolChannels(rows, *reference, options);
+    if (fit.has_reference && !rows.empty()) pooled = poolChannels(rows, *reference, options);
     Judgement judgement;
     if (fit.void_rows > 0) {
         judgement = {Verdict::Fail, voidText(fit), {}};
