@@ -61,7 +61,8 @@ private:
 void countIntervals(Tallies& tallies, const ConfigurationFit& fit, const SyntheticRender& what) {
     const double v = what.variance, b2 = what.bias * what.bias + what.mean_bias * what.mean_bias;
     const Point& last = fit.points.back();
-    const double mse = v / static_cast<double>(last.samples) + (what.has_reference ? b2 : 0);
+    const double mse =
+        v / static_cast<double>(last.samples) + (fit.source == ErrorSource::Reference ? b2 : 0);
     tallies.interval("relative RMSE", last.relative_rmse, std::sqrt(mse));
     if (fit.fitted && std::isfinite(fit.error.variance.value) && (b2 == 0 || what.has_reference))
         tallies.interval("v of v/N + b²", fit.error.variance, v);
@@ -106,7 +107,8 @@ std::vector<Situation> situations() {
     add("exact reference, 16 replicates", true, [](SyntheticRender&) {});
     for (const unsigned r : {2u, 3u, 5u})
         add(fmt::format("{} replicates", r), true, [r](SyntheticRender& w) { w.replicates = r; });
-    add("2 replicates, unequal variances", true, [](SyntheticRender& w) { w.replicates = 2, w.inequality = 100; });
+    add("2 replicates, unequal variances", true,
+        [](SyntheticRender& w) { w.replicates = 2, w.inequality = 100; });
     add("one pixel", true, [](SyntheticRender& w) { w.pixels = 1; });
     add("unequal variances, 100 : 1", true, [](SyntheticRender& w) { w.inequality = 100; });
     add("reference as noisy as the images", true, [&](SyntheticRender& w) { w.reference_variance = own; });
@@ -142,9 +144,73 @@ void measure(const Situation& situation, int repeats) {
         const Run run = syntheticRun(situation.what, 7919u * static_cast<std::uint64_t>(i) + 13);
         const ConfigurationFit fit = analyze(run).fits.at(0);
         countIntervals(tallies, fit, situation.what);
-        if (situation.what.has_reference) countVerdict(tallies, fit, situation.right, situation.what.mean_bias != 0);
+        if (situation.what.has_reference)
+            countVerdict(tallies, fit, situation.right, situation.what.mean_bias != 0);
     }
     tallies.print(situation.name);
+}
+
+Configuration configurationOf(const std::string& backend, const std::string& variant,
+                              const SyntheticRender& what) {
+    Configuration configuration;
+    configuration.key = {"scene", backend, variant};
+    configuration.width = what.pixels;
+    configuration.height = 1;
+    return configuration;
+}
+
+/// Four configurations that are alike but for their seeds: whoever is said to be ahead of another is a false alarm.
+void measureRanking(int repeats) {
+    SyntheticRender what;
+    what.variance = 0.02;
+    what.looks = 9;
+    what.has_reference = false;
+    Tallies tallies;
+    for (int i = 0; i < repeats; ++i) {
+        Run run;
+        for (int c = 0; c < 4; ++c) {
+            run.configurations.push_back(configurationOf("backend", fmt::format("variant={}", c), what));
+            const auto seed = static_cast<std::uint64_t>(100 * (4 * i + c));
+            for (Row& row : syntheticRows(run.configurations.back().key, what, seed))
+                run.rows.push_back(std::move(row));
+        }
+        std::string text;
+        for (const Finding& finding : findingsOfScene(run, analyze(run), "scene")) text += finding.text;
+        tallies.count("'times sooner than the next'", 0.05, text.find("times sooner") != std::string::npos);
+        tallies.count("'the most efficient'", 0.05, text.find("times the least") != std::string::npos);
+    }
+    tallies.print("four alike, without a reference");
+}
+
+/// Rows that are void, of a render that is right otherwise, and a bias far beyond the margin: both must fail, always.
+void measureFaults(int repeats) {
+    Tallies tallies;
+    for (int i = 0; i < repeats; ++i) {
+        SyntheticRender what;
+        what.variance = 0.02;
+        what.looks = 9;
+        const auto seed = static_cast<std::uint64_t>(7919 * i + 13);
+        Run run = syntheticRun(what, seed);
+        run.rows[static_cast<std::size_t>(i) % run.rows.size()].invalid_samples = 1;
+        tallies.count("no FAIL of a void row", 0,
+                      analyze(run).fits[0].judgement.verdict != stats::Verdict::Fail);
+        for (Row& row : run.rows) row.invalid_samples = 1;
+        tallies.count("no FAIL where all rows are void", 0,
+                      analyze(run).fits[0].judgement.verdict != stats::Verdict::Fail);
+        what.mean_bias = -0.05;
+        tallies.count("no FAIL of a bias of −5 %", 0,
+                      analyze(syntheticRun(what, seed)).fits[0].judgement.verdict != stats::Verdict::Fail);
+        what.mean_bias = 0;
+        what.colour = {1.3, 0.9, -0.2};
+        what.colour_bias = {0, 0, -0.05};
+        tallies.count("no FAIL of one of −5 % in a channel below 0", 0,
+                      analyze(syntheticRun(what, seed)).fits[0].judgement.verdict != stats::Verdict::Fail);
+        what.colour_bias = {0, 0, 0};
+        what.bias = 0.05;
+        tallies.count("no FAIL of pixels off by 5 %", 0,
+                      analyze(syntheticRun(what, seed)).fits[0].judgement.verdict != stats::Verdict::Fail);
+    }
+    tallies.print("what must fail");
 }
 
 }  // namespace
@@ -157,6 +223,8 @@ int main(int argc, char** argv) {
     }
     try {
         for (const Situation& situation : situations()) measure(situation, repeats);
+        measureRanking(repeats);
+        measureFaults(repeats);
         return 0;
     } catch (const Error& error) {
         std::fprintf(stderr, "false_alarms: %s\n", error.what());
