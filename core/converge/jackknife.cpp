@@ -104,9 +104,7 @@ Estimate jackknife(const SampleCounts& counts, const Statistic& statistic, Scale
     std::vector<Component> components;
     if (counts.errors > 0) {
         Component errors = parts.errors(whole);
-        // Replicates that agree exactly give no spread to widen: two of them always do, in their distance.
-        errors.variance =
-            std::isfinite(counts.widening) ? errors.variance * counts.widening * counts.widening : kInfinity;
+        errors.variance *= counts.widening * counts.widening;  // 0 · ∞ is a NaN, which has no bounds either.
         components.push_back(errors);
     }
     if (counts.times > 0) components.push_back(parts.times(whole));

@@ -56,7 +56,9 @@ struct Row {
 
     double render_wall_seconds = 0;                    ///< Since the first chunk of this replicate, reading the film for looks left out.
     std::optional<double> render_device_seconds;       ///< The same by the device's clock.
-    double seconds_before_first_sample = 0;            ///< Parse, build, compile and upload, as a user pays them who runs only this.
+    /// Parse, build, compile, upload and the first sample, with libraries loaded and kernels in the cache: every start was
+    /// tried once before it was timed, so that it does not matter who is listed first.
+    double seconds_before_first_sample = 0;
     std::uint64_t paths = 0;                           ///< Since the replicate began, as the two below.
     std::uint64_t closest_rays = 0, shadow_rays = 0;
 
