@@ -7,7 +7,7 @@ import math
 from .program import Failure
 from .results import Results
 
-REPEATS = 2000
+REPEATS = 4000
 
 
 def measure(program, arguments):

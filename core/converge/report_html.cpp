@@ -276,7 +276,7 @@ std::string referenceSentence(const Run& run, const std::string& scene) {
     if (!r->file.empty()) text += " (" + r->file + ")";
     text += ".";
     if (r->mean_variance > 0)
-        text += fmt::format(" Its own relative error is {}: subtracted from all figures, and part of every interval.",
+        text += fmt::format(" Its own relative error is {}; it is subtracted, and part of every interval of what is measured against it.",
                             percentText(stats::relativeRmse(r->mean_variance, r->mean_luminance), 2));
     return text;
 }

@@ -134,6 +134,15 @@ class Converging(CliTest):
                 run = self.converge("scene.yaml", "--reference", "ref.exr", "--set", changed, *SMALL, folder="o" + changed[5:8], expect=2)
                 self.assert_one_error(run, "a reference in other colours")
 
+    def test_a_variant_that_shows_another_image_is_not_held_against_the_reference(self):
+        depths = ["--set", "integrator.max_depth=4", "--vary", "depth=1,4"]
+        self.converge("scene.yaml", *SMALL, *depths)
+        fits = {fit["variant"]: fit for fit in self.summary("out")["fits"]}
+        self.assertIsNone(fits["depth=1"]["relative_mean_bias_rgb"])
+        self.assertEqual(fits["depth=1"]["verdict"], "INCONCLUSIVE")
+        self.assertIsNotNone(fits["depth=4"]["relative_mean_bias_rgb"])
+        self.assertTrue(any("'depth=1' shows another image" in note for note in self.summary("out")["notes"]))
+
     def test_without_a_reference_one_is_made_within_the_time(self):
         run = self.converge("scene.yaml", *SMALL, time="4s", spp="64")
         self.assertIn("no reference was given", run.stderr)
