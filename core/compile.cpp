@@ -554,8 +554,25 @@ private:
 
 }  // namespace
 
+/// "'ceiling light'": what the author calls the object of a primitive.
+std::string objectOf(const Scene& scene, const CompiledScene& compiled, std::uint32_t primitive) {
+    using namespace kernel;
+    const auto* header = reinterpret_cast<const CrtScene*>(compiled.data());
+    std::uint32_t placement = CRT_ARRAY(CrtPrimitive, compiled.data(), header->primitives)[primitive].object;
+    for (const Object& object : scene.objects) {
+        if (placement < object.transforms.size()) return object.name.empty() ? std::string("an object without a name") : fmt::format("'{}'", object.name);
+        placement -= static_cast<std::uint32_t>(object.transforms.size());
+    }
+    return "a surface";
+}
+
 CompiledScene compileScene(const Scene& scene, std::uint32_t aovs) {
     CompiledScene compiled = Compiler(scene, aovs).run();
+    if (scene.integrator.type == IntegratorType::Path)
+        if (const std::optional<CoplanarLight> found = findCoplanarLight(compiled))
+            logWarning("{} lies in the plane of {} and overlaps it: rounding decides which of them is seen, and the image is wrong there; move the lamp {:.3g} "
+                       "or more towards the side that it lights, or cut a hole for it",
+                       objectOf(scene, compiled, found->light), objectOf(scene, compiled, found->surface), found->least_gap);
     if (scene.integrator.type == IntegratorType::Path && scene.integrator.max_depth > 0)
         if (const NearSurfaces found = findNearSurfaces(compiled); found.near > 0)
             logWarning("{} of {} triangles looked at have another surface nearer than single precision can tell for triangles of this size (up to {:.3g} "

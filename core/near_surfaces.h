@@ -4,6 +4,7 @@
 #include "compile.h"
 
 #include <cstdint>
+#include <optional>
 
 namespace crt {
 
@@ -12,6 +13,15 @@ struct NearSurfaces {
     std::uint64_t near = 0;      ///< Of those: with another surface nearer than the clearance of either (kernel/surface.h), yet not touching.
     double nearest_clearance = 0;  ///< The largest clearance that was too large for its neighbour, in the author's units.
 };
+
+/// A lamp in the plane of another surface, which it overlaps: rays meet both at one distance but for rounding, and see now one, now the other.
+struct CoplanarLight {
+    std::uint32_t light = 0, surface = 0;  ///< Primitive ids of one such pair.
+    double least_gap = 0;                  ///< So far apart, in the author's units, they would be told apart.
+};
+
+/// The first such pair, by the order of emitters; nothing where there is none. Of very many emitters an even choice is looked at.
+std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene);
 
 /// From the middle of each triangle along its normal, to both sides. Surfaces within a few ulp of each other touch, as a box does that stands
 /// on a floor; that is what an author means, and is safe.

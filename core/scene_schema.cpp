@@ -298,7 +298,8 @@ void addObjects(std::vector<SectionSchema>& all) {
                      .doc = "Four rows of four, points as columns, last row 0 0 0 1; must be invertible."}}});
     all.push_back({"emission", "an emission", "",
                    {{.name = "radiance", .kind = Kind::Spectrum, .range = kNotNegative, .unit = "W·m⁻²·sr⁻¹·nm⁻¹", .required = true,
-                     .doc = "Emitted equally in all directions."},
+                     .doc = "Emitted equally in all directions. A lamp must not lie in the plane of another surface that it overlaps: rounding "
+                            "decides which of them is seen, and crt warns."},
                     {.name = "two_sided", .kind = Kind::Boolean, .fallback = yaml(Emission{}.two_sided),
                      .doc = "Shine on the back side too?"}}});
 }

@@ -1,9 +1,12 @@
-/// Rows of renders that never were, with known variance, bias and cost: progressive means of normal samples, pixel by pixel, so that looks at one
-/// replicate are nested exactly as those of a render are.
+/// Rows of renders that never were, with known variance, bias and cost: progressive means of normal samples, pixel by
+/// pixel, so that looks at one replicate are nested exactly as those of a render are; against a reference that is exact, or
+/// has noisy folds as `crt reference` makes them.
 #pragma once
 
 #include "converge/measurement.h"
+#include "stats/luminance_error.h"
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -12,36 +15,131 @@
 namespace crt::converge {
 
 struct SyntheticRender {
-    double variance = 1;            ///< v: of one sample, relative to the image mean squared.
-    double bias = 0;                ///< b: of every pixel, alternately up and down, so that the image mean is right.
-    double mean_bias = 0;           ///< Of every pixel, the same way.
-    double rate = 1;                ///< Variance falls as N^−rate; 1 is independent sampling.
+    double variance = 1;    ///< v: of one sample, mean over the pixels, relative to the image mean squared.
+    double inequality = 1;  ///< Variance of every eighth pixel over that of the others.
+    double bias = 0;        ///< b: of every pixel, alternately up and down, so that the image mean is right.
+    double mean_bias = 0;   ///< Of every pixel, the same way.
+    double rate = 1;        ///< Variance falls as N^−rate; 1 is independent sampling.
     double launch_seconds = 0.02, seconds_per_sample = 0.003;
     double before_first_sample = 0.4;
-    double jitter = 0.02;           ///< Relative standard deviation of the time between two looks.
-    double prediction = 1;          ///< Predicted over actual error.
+    double jitter = 0.02;   ///< Relative standard deviation of the time between two looks.
+    double prediction = 1;  ///< Predicted over actual error.
     std::uint32_t replicates = 16, looks = 11, pixels = 64;
     bool has_reference = true;
+    /// Of the reference's own pixel, mean over the pixels, with the same inequality; 0: it is exact and has no folds.
+    double reference_variance = 0;
+    /// R, G and B of an image whose luminance is 1, and what is added to each of the render's.
+    std::array<double, 3> colour{1, 1, 1}, colour_bias{0, 0, 0};
 };
 
+/// Of pixel p relative to the mean; 1 on average.
+inline double syntheticShare(const SyntheticRender& what, std::uint32_t p) {
+    if (what.pixels % 8 != 0) return 1;
+    return (p % 8 == 0 ? what.inequality : 1) * 8 / (what.inequality + 7);
+}
+
+/// The folds' luminances, [fold][pixel]; empty where the reference is exact.
+inline std::vector<std::vector<double>> syntheticFolds(const SyntheticRender& what,
+                                                       std::mt19937_64& engine) {
+    std::normal_distribution<double> normal;
+    std::vector<std::vector<double>> folds(what.has_reference && what.reference_variance > 0 ? 8 : 0);
+    for (std::vector<double>& fold : folds)
+        for (std::uint32_t p = 0; p < what.pixels; ++p)
+            fold.push_back(1 + std::sqrt(8 * what.reference_variance * syntheticShare(what, p)) *
+                                   normal(engine));
+    return folds;
+}
+
+inline double syntheticMean(const std::vector<double>& values) {
+    double sum = 0;
+    for (const double v : values) sum += v / static_cast<double>(values.size());
+    return sum;
+}
+
+inline double syntheticDistance(const std::vector<double>& a, const std::vector<double>& b) {
+    double sum = 0;
+    for (std::size_t p = 0; p < a.size(); ++p)
+        sum += (a[p] - b[p]) * (a[p] - b[p]) / static_cast<double>(a.size());
+    return sum;
+}
+
+inline ReferenceInfo syntheticReference(const SyntheticRender& what,
+                                        const std::vector<std::vector<double>>& folds) {
+    ReferenceInfo info;
+    info.scene = "scene";
+    info.kind = folds.empty() ? ReferenceKind::Analytic : ReferenceKind::Independent;
+    info.mean_luminance = 1;
+    info.image_mean = what.colour;
+    if (folds.empty()) return info;
+    std::vector<double> variances(what.pixels), means;
+    for (std::uint32_t p = 0; p < what.pixels; ++p) {
+        std::vector<double> values;
+        for (const std::vector<double>& fold : folds) values.push_back(fold[p]);
+        variances[p] = stats::summarize(values).variance / 8;
+    }
+    info.mean_variance = syntheticMean(variances);
+    info.effective_pixels = stats::effectivePixels(variances, 7);
+    for (const std::vector<double>& a : folds) {
+        info.fold_mean_luminance.push_back(syntheticMean(a));
+        info.fold_distance.emplace_back();
+        for (const std::vector<double>& b : folds)
+            info.fold_distance.back().push_back(syntheticDistance(a, b));
+    }
+    const stats::Summary mean = stats::summarize(info.fold_mean_luminance);
+    info.mean_luminance = mean.mean;
+    info.mean_luminance_standard_error = mean.standardError();
+    info.eightfold_spread = std::sqrt(info.mean_variance) / mean.mean;
+    for (std::size_t c = 0; c < 3; ++c) {
+        info.image_mean[c] = what.colour[c] * mean.mean;
+        info.image_mean_standard_error[c] = std::abs(what.colour[c]) * mean.standardError();
+    }
+    return info;
+}
+
+inline ErrorMetrics syntheticMetrics(double mse) {
+    ErrorMetrics error;
+    error.mse = mse;
+    error.rmse = error.relative_rmse = std::sqrt(mse);
+    error.relmse = mse;
+    error.smape = error.mae = 0.8 * error.rmse;
+    error.max_absolute = 3.5 * error.rmse;
+    error.flip_mean = 0.5 * error.rmse / (0.1 + error.rmse);
+    return error;
+}
+
 /// The image mean is 1.
-inline std::vector<Row> syntheticRows(const Key& key, const SyntheticRender& what, std::uint64_t seed) {
+inline std::vector<Row> syntheticRows(const Key& key, const SyntheticRender& what, std::uint64_t seed,
+                                      const std::vector<std::vector<double>>& folds = {}) {
     std::mt19937_64 engine(seed);
     std::normal_distribution<double> normal;
     const std::uint32_t replicates = what.replicates, pixels = what.pixels;
-    std::vector<double> sums(std::size_t{replicates} * pixels, 0.0), images(sums.size());
+    std::vector<double> reference(pixels, folds.empty() ? 1.0 : 0.0);
+    for (const std::vector<double>& fold : folds)
+        for (std::uint32_t p = 0; p < pixels; ++p)
+            reference[p] += fold[p] / static_cast<double>(folds.size());
+    std::vector<std::vector<double>> sums(replicates, std::vector<double>(pixels)), images = sums;
     std::vector<double> seconds(replicates, what.launch_seconds);
     std::vector<Row> rows;
     for (std::uint32_t look = 0; look < what.looks; ++look) {
         const std::uint64_t samples = std::uint64_t{1} << look, before = look == 0 ? 0 : samples / 2;
         const auto n = static_cast<double>(samples);
-        const double shrink = std::pow(n, (1 - what.rate) / 2);  // From independent sampling's error to that of `rate`.
-        for (std::size_t i = 0; i < sums.size(); ++i) {
-            sums[i] += normal(engine) * std::sqrt(what.variance * static_cast<double>(samples - before));
-            images[i] = 1 + what.mean_bias + (i % 2 == 0 ? what.bias : -what.bias) + shrink * sums[i] / n;
-        }
+        const double shrink =
+            std::pow(n, (1 - what.rate) / 2);  // From independent sampling's error to that of `rate`.
+        std::vector<double> mean(pixels), variances(pixels);
+        for (std::uint32_t r = 0; r < replicates; ++r)
+            for (std::uint32_t p = 0; p < pixels; ++p) {
+                sums[r][p] += normal(engine) * std::sqrt(what.variance * syntheticShare(what, p) *
+                                                         static_cast<double>(samples - before));
+                images[r][p] =
+                    1 + what.mean_bias + (p % 2 == 0 ? what.bias : -what.bias) + shrink * sums[r][p] / n;
+                mean[p] += images[r][p] / replicates;
+            }
+        for (std::uint32_t r = 0; r < replicates; ++r)
+            for (std::uint32_t p = 0; p < pixels; ++p)
+                variances[p] += (images[r][p] - mean[p]) * (images[r][p] - mean[p]) / (replicates - 1);
         for (std::uint32_t r = 0; r < replicates; ++r) {
-            seconds[r] += what.seconds_per_sample * static_cast<double>(samples - before) * (1 + what.jitter * normal(engine));
+            seconds[r] += what.seconds_per_sample * static_cast<double>(samples - before) *
+                          (1 + what.jitter * normal(engine));
             Row row;
             row.key = key;
             row.seed = seed + r;
@@ -52,32 +150,24 @@ inline std::vector<Row> syntheticRows(const Key& key, const SyntheticRender& wha
             row.paths = samples * pixels;
             row.closest_rays = 5 * row.paths;
             row.shadow_rays = 3 * row.paths;
-            double mse = 0, between = 0, mean = 0;
-            for (std::uint32_t p = 0; p < pixels; ++p) {
-                double others = 0;
-                for (std::uint32_t s = 0; s < replicates; ++s)
-                    if (s != r) others += images[std::size_t{s} * pixels + p] / (replicates - 1);
-                const double value = images[std::size_t{r} * pixels + p];
-                mse += (value - 1) * (value - 1) / pixels;
-                between += (value - others) * (value - others) / pixels * (replicates - 1) / replicates;
-                mean += value / pixels;
-            }
-            row.between_replicates_mse = between;
-            row.image_mean = {mean, mean, mean};
+            // (R − 1)/R · mean (I_r − Ī_r)² = R/(R − 1) · mean (I_r − Ī)²
+            row.between_replicates_mse = syntheticDistance(images[r], mean) * replicates / (replicates - 1);
+            row.effective_pixels = stats::effectivePixels(variances, replicates - 1);
+            row.mean_luminance = syntheticMean(images[r]);
             const double deviation = std::sqrt(what.variance * std::pow(n, -what.rate));
-            row.image_mean_standard_error = {deviation / std::sqrt(pixels), deviation / std::sqrt(pixels), deviation / std::sqrt(pixels)};
-            const double predicted = what.prediction * deviation * (1 + 0.05 * normal(engine)), spread = 2 / std::sqrt(2.0 * pixels);
-            row.predicted_relative_rmse = Estimate{predicted, predicted * (1 - spread), predicted * (1 + spread)};
-            if (what.has_reference) {
-                ErrorMetrics error;
-                error.mse = mse;
-                error.rmse = error.relative_rmse = std::sqrt(mse);
-                error.relmse = mse;
-                error.smape = error.mae = 0.8 * error.rmse;
-                error.max_absolute = 3.5 * error.rmse;
-                error.flip_mean = 0.5 * error.rmse / (0.1 + error.rmse);
-                row.error = error;
+            row.image_mean_standard_error.emplace();
+            for (std::size_t c = 0; c < 3; ++c) {
+                row.image_mean[c] = what.colour[c] * row.mean_luminance + what.colour_bias[c];
+                (*row.image_mean_standard_error)[c] =
+                    std::abs(what.colour[c]) * deviation / std::sqrt(pixels);
             }
+            const double predicted = what.prediction * deviation * (1 + 0.05 * normal(engine)),
+                         spread = 2 / std::sqrt(2.0 * pixels);
+            row.predicted_relative_rmse =
+                Estimate{predicted, predicted * (1 - spread), predicted * (1 + spread)};
+            if (what.has_reference) row.error = syntheticMetrics(syntheticDistance(images[r], reference));
+            for (const std::vector<double>& fold : folds)
+                row.fold_mse.push_back(syntheticDistance(images[r], fold));
             if (look + 1 == what.looks) row.stop_reason = "samples";
             rows.push_back(row);
         }
@@ -93,14 +183,10 @@ inline Run syntheticRun(const SyntheticRender& what, std::uint64_t seed) {
     configuration.width = what.pixels;
     configuration.height = 1;
     run.configurations.push_back(configuration);
-    if (what.has_reference) {
-        ReferenceInfo reference;
-        reference.scene = "scene";
-        reference.kind = ReferenceKind::Analytic;
-        reference.image_mean = {1, 1, 1};
-        run.references.push_back(reference);
-    }
-    run.rows = syntheticRows(configuration.key, what, seed);
+    std::mt19937_64 engine(seed ^ 0x9e3779b97f4a7c15u);
+    const std::vector<std::vector<double>> folds = syntheticFolds(what, engine);
+    if (what.has_reference) run.references.push_back(syntheticReference(what, folds));
+    run.rows = syntheticRows(configuration.key, what, seed, folds);
     return run;
 }
 

@@ -3,7 +3,7 @@ import argparse
 import os
 import sys
 
-from . import accelerators, calibration, cpu_speed, figure2, leave_out, pictures, power, robustness, same_bits, stability, start
+from . import accelerators, calibration, cpu_speed, false_alarms, figure2, leave_out, pictures, power, robustness, same_bits, stability, start
 from .command import add_options, exit_code, program_for
 
 COMMANDS = {
@@ -16,6 +16,7 @@ COMMANDS = {
     "stability": (stability, "sweeps to where the arithmetic ends; --scenes names sweeps instead of scenes"),
     "robustness": (robustness, "what the watertight triangle test and the offsets cost, and what they buy"),
     "calibration": (calibration, "does the error that an image states of itself hold? 400 repeats of each scene"),
+    "false-alarms": (false_alarms, "statements of crt converge where the truth is known by construction: how often are they wrong?"),
     "power": (power, "planted faults: how many seconds until a check finds each"),
     "pictures": (pictures, "all scenes as PNG in out/pictures, to look at; measures nothing"),
 }

@@ -7,6 +7,7 @@
 #include "report.h"
 #include "stats/color_difference.h"
 #include "stats/flip.h"
+#include "stats/luminance_error.h"
 #include "stats/metrics.h"
 
 #include <fmt/format.h>
@@ -56,7 +57,6 @@ Contestant::Contestant(Key key, Scene scene, const Reference* reference, const I
 }
 
 void Contestant::describe(const CompiledScene& compiled, double setup_seconds) {
-    described_ = true;
     before_first_sample_ += setup_seconds;
     const CrtBackendReport report = integrator_->report();
     Configuration& c = configuration_;
@@ -89,17 +89,11 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     row.cpu_clock_mhz = clockMhz();
 
     const Image image = resolveImage(film, scene_, 0);
-    const std::array<double, 3> weights = luminanceWeights(scene_.film.color_space);
     const std::size_t pixels = film.counts.size();
-    LookPlane luminance(pixels);
-    for (std::size_t p = 0; p < pixels; ++p) {
-        double y = 0;
-        for (std::size_t c = 0; c < 3; ++c) {
-            row.image_mean[c] += image.pixels[3 * p + c] / static_cast<double>(pixels);
-            y += weights[c] * image.pixels[3 * p + c];
-        }
-        luminance[p] = static_cast<float>(y);
-    }
+    LookPlane luminance = stats::luminances(image.pixels, stats::luminanceWeights(scene_.film.color_space));
+    row.mean_luminance = stats::meanLuminance(luminance);
+    for (std::size_t p = 0; p < pixels; ++p)
+        for (std::size_t c = 0; c < 3; ++c) row.image_mean[c] += image.pixels[3 * p + c] / static_cast<double>(pixels);
     const bool independent = scene_.sampler.type != SamplerType::Sobol;
     if (const std::optional<ErrorEstimate> own = estimateError(film, PixelSet::All, independent); own && own->known())
         row.predicted_relative_rmse = {own->relative_rmse, own->relative_rmse_95.lower, own->relative_rmse_95.upper};
@@ -107,9 +101,10 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     if (reference_ != nullptr) {
         const stats::ErrorMetrics m = stats::errorMetrics(luminance, spread(*reference_, pixels));
         row.error = ErrorMetrics{m.mse, m.rmse, m.relative_rmse, m.relmse, m.smape, m.mae, m.max_absolute, {}, {}};
+        for (const std::vector<float>& fold : reference_->fold_luminance)
+            row.fold_mse.push_back(stats::meanSquaredDifference(luminance, fold));
         if (reference_->info.kind == ReferenceKind::Analytic) {
-            const double mean = std::accumulate(luminance.begin(), luminance.end(), 0.0) / static_cast<double>(pixels);
-            row.image_mean = {mean, mean, mean};
+            row.image_mean.fill(row.mean_luminance);
         } else if (last && scene_.film.color_space == ColorSpace::LinearSrgb) {
             const stats::RgbView test{image.pixels, image.width, image.height}, truth{reference_->rgb, image.width, image.height};
             row.error->flip_mean = stats::flipHdr(test, truth).mean;
@@ -122,7 +117,7 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
         last_image_ = image;
         last_error_ = {image.width, image.height, std::vector<float>(pixels)};
         const LuminanceVariance variance(film);
-        const double mean = std::accumulate(luminance.begin(), luminance.end(), 0.0) / static_cast<double>(pixels);
+        const double mean = row.mean_luminance;
         const double exposure = std::exp2(scene_.film.exposure_ev);
         for (std::uint32_t y = 0; y < image.height; ++y)
             for (std::uint32_t x = 0; x < image.width; ++x)
@@ -141,16 +136,41 @@ void Contestant::warmUp(const CompiledScene& compiled) {
     integrator_->setScene(compiled);  // An empty film again.
 }
 
-bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
-                           const std::function<bool()>& stop) {
-    scene_.sampler.seed = seed_ + 1 + replicate;
+void Contestant::prepare() {
     const Clock::time_point setup = Clock::now();
     const CompiledScene compiled = compileScene(scene_, 0);
     integrator_->setScene(compiled);
-    if (!described_) {
-        describe(compiled, secondsSince(setup));
-        warmUp(compiled);
-    }
+    describe(compiled, secondsSince(setup));
+    warmUp(compiled);
+}
+
+StoredReplicate Contestant::stored(std::uint32_t replicate) const {
+    StoredReplicate stored;
+    for (const auto& [samples, planes] : looks_)
+        if (const auto plane = planes.find(replicate); plane != planes.end()) stored.looks.emplace_back(samples, plane->second);
+    stored.rgb = last_image_.pixels;
+    stored.standard_error = last_error_.values;
+    return stored;
+}
+
+void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored) {
+    for (const auto& [samples, plane] : stored.looks) looks_[samples][replicate] = plane;
+    samples_reached_ = std::max(samples_reached_, stored.looks.back().first);
+    tests_.add(std::vector<double>(stored.rgb.begin(), stored.rgb.end()));
+    last_image_ = Image{};
+    last_image_.width = configuration_.width;
+    last_image_.height = configuration_.height;
+    last_image_.channels = {"R", "G", "B"};
+    last_image_.pixels = stored.rgb;
+    last_image_.chromaticities = chromaticities(scene_.film.color_space);
+    last_error_ = {configuration_.width, configuration_.height, stored.standard_error};
+}
+
+bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
+                           const std::function<bool()>& stop) {
+    scene_.sampler.seed = seed_ + 1 + replicate;
+    const CompiledScene compiled = compileScene(scene_, 0);
+    integrator_->setScene(compiled);
     const Clock::time_point start = Clock::now();
 
     const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
@@ -223,6 +243,11 @@ void fillBetweenReplicates(std::vector<Row>& rows, const Key& key, const std::ma
         std::vector<double> sum(replicates.begin()->second.size());
         for (const auto& [replicate, plane] : replicates)
             for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += plane[p];
+        std::vector<double> variances(sum.size());
+        for (std::size_t p = 0; p < sum.size(); ++p)
+            for (const auto& [replicate, plane] : replicates)
+                variances[p] += std::pow(plane[p] - sum[p] / count, 2) / (count - 1);
+        const double effective = stats::effectivePixels(variances, count - 1);
         for (Row& row : rows) {
             if (!(row.key == key) || row.samples != samples) continue;
             const auto found = replicates.find(row.replicate);
@@ -233,6 +258,7 @@ void fillBetweenReplicates(std::vector<Row>& rows, const Key& key, const std::ma
                 squares += (mine - others) * (mine - others);
             }
             row.between_replicates_mse = (count - 1) / count * squares / static_cast<double>(sum.size());
+            row.effective_pixels = effective;
         }
     }
 }

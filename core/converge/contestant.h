@@ -4,6 +4,7 @@
 #include "backend/integrator.h"
 #include "converge/measurement.h"
 #include "converge/reference.h"
+#include "converge/replicate_file.h"
 #include "scene.h"
 
 #include <cstdint>
@@ -15,13 +16,14 @@
 
 namespace crt::converge {
 
-/// Luminances of one look, row-major.
-using LookPlane = std::vector<float>;
-
 class Contestant {
 public:
     /// Loads the backend. Throws crt::Error when it cannot run.
     Contestant(Key key, Scene scene, const Reference* reference, const IntegratorOptions& options);
+
+    /// Compiles the scene and renders one sample that does not count: all that is needed before the first replicate, and
+    /// timed as the start of every one.
+    void prepare();
 
     /// Renders seed number `replicate` to N = 1, 2, 4 … and gives each look to `found`, until `most_samples`, or (on the first replicate) until the
     /// next doubling would take the replicate beyond `seconds`. Returns false when `stop` said so.
@@ -31,7 +33,12 @@ public:
     const Key& key() const { return configuration_.key; }
     Configuration& configuration() { return configuration_; }
     std::uint64_t samplesReached() const { return samples_reached_; }
-    void setSamplesReached(std::uint64_t samples) { samples_reached_ = samples; }
+    const Scene& scene() const { return scene_; }
+    const Reference* reference() const { return reference_; }
+    /// The replicate that was rendered last, for a file; and one from a file, in its place. Requires prepare().
+    StoredReplicate stored(std::uint32_t replicate) const;
+    void restore(std::uint32_t replicate, const StoredReplicate& stored);
+    std::size_t pixels() const { return std::size_t{configuration_.width} * configuration_.height; }
     double secondsOfLastReplicate() const { return seconds_of_last_; }
     /// All looks so far, by samples and replicate.
     std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks() { return looks_; }
@@ -51,7 +58,6 @@ private:
     double before_first_sample_ = 0;
     double seconds_of_last_ = 0;
     std::uint64_t samples_reached_ = 0;
-    bool described_ = false;
     std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>> looks_;
     stats::Replicates tests_;   ///< Colours at the most samples, one image a replicate.
     Image last_image_;

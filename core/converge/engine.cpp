@@ -1,11 +1,15 @@
 #include "converge/engine.h"
 
-#include "arguments.h"
-#include "atomic_file.h"
+#include "backend/loader.h"
 #include "converge/contestant.h"
+#include "converge/experiment.h"
 #include "converge/files.h"
+#include "converge/findings.h"
 #include "converge/fits.h"
+#include "converge/quantity_text.h"
 #include "converge/report_html.h"
+#include "converge/report_maps.h"
+#include "converge/variants.h"
 #include "host.h"
 #include "interrupt.h"
 #include "log.h"
@@ -29,49 +33,10 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-const std::map<std::string, std::string>& shortNames() {
-    static const std::map<std::string, std::string> names{{"sampler", "sampler.type"},          {"replicates", "sampler.replicates"},
-                                                          {"nee", "integrator.nee"},            {"roulette", "integrator.roulette"},
-                                                          {"depth", "integrator.max_depth"},    {"accelerator", "integrator.accelerator"},
-                                                          {"filter", "film.filter"}};
-    return names;
-}
-
-/// All combinations of what varies, as label and changes of the scene.
-struct Variant {
-    std::string label;
-    std::vector<SceneOverride> changes;
-};
-std::vector<Variant> variantsOf(const std::vector<Vary>& vary) {
-    std::vector<Variant> variants{{}};
-    for (const Vary& v : vary) {
-        std::vector<Variant> longer;
-        for (const Variant& variant : variants)
-            for (const std::string& value : v.values) {
-                Variant next = variant;
-                next.label += fmt::format("{}{}={}", next.label.empty() ? "" : " ", v.key, value);
-                next.changes.push_back({v.path, value});
-                longer.push_back(std::move(next));
-            }
-        variants = std::move(longer);
-    }
-    return variants;
-}
-
-std::string nameOf(const std::string& file) { return fs::path(file).stem().string(); }
-
-/// The scene, smaller where nobody asked for a size: error against time does not need 2 million pixels.
-Scene loadSmall(SceneRequest request, const std::vector<SceneOverride>& changes, int resolution) {
-    request.overrides.insert(request.overrides.end(), changes.begin(), changes.end());
-    Scene scene = loadScene(request);
-    const bool sized = std::any_of(request.overrides.begin(), request.overrides.end(), [](const SceneOverride& o) { return o.path == "film.resolution"; });
-    const int longer = std::max(scene.film.width, scene.film.height);
-    const bool cropped = scene.film.crop != std::array<int, 4>{0, 0, 0, 0};
-    if (resolution <= 0 || sized || cropped || longer <= resolution) return scene;
-    const auto scaled = [&](int side) { return std::max(1, static_cast<int>(std::lround(static_cast<double>(side) * resolution / longer))); };
-    request.overrides.push_back({"film.resolution", fmt::format("[{},{}]", scaled(scene.film.width), scaled(scene.film.height))});
-    return loadScene(request);
-}
+/// Part of --time that goes into references where none was given.
+constexpr double kReferenceShare = 0.25;
+/// Part of --time after which no start-up is paid twice any more.
+constexpr double kWarmUpShare = 0.4;
 
 /// One run from start to report.
 class Engine {
@@ -79,11 +44,15 @@ public:
     explicit Engine(const ConvergeRequest& request) : request_(request), start_(Clock::now()) {}
 
     int run() {
+        const InterruptGuard interrupt;
+        refuseAmbiguity();
         openFolder();
         describeEnvironment();
         loadReferences();
+        claimFolder();
+        makeReferences();
+        if (stopped()) return 128 + InterruptGuard::signalReceived();
         openContestants();
-        const InterruptGuard interrupt;
         render();
         return report();
     }
@@ -91,12 +60,26 @@ public:
 private:
     double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
     std::string path(const std::string& name) const { return (fs::path(request_.output) / name).string(); }
+    static bool stopped() { return InterruptGuard::signalReceived() != 0; }
+
+    /// Rows are told apart by scene, backend and variant: each of these once.
+    void refuseAmbiguity() {
+        names_ = namesOfScenes(request_.scenes);
+        refuseRepeats(request_.backends, "--backends");
+        std::vector<std::string> keys;
+        for (const Vary& vary : request_.vary) {
+            keys.push_back(vary.path);
+            refuseRepeats(vary.values, fmt::format("--vary {}", vary.key));
+        }
+        refuseRepeats(keys, "--vary");
+    }
 
     void openFolder() {
         std::error_code error;
         fs::create_directories(request_.output, error);
         if (error) throw Error(ErrorKind::Output, fmt::format("cannot make the folder '{}': {}", request_.output, error.message()));
-        if (fs::exists(path("results.jsonl"))) {
+        if (fs::exists(path("results.jsonl")) && fs::file_size(path("results.jsonl")) > 0) {
+            holds_rows_ = true;
             if (!request_.resume)
                 throw Error(ErrorKind::Usage, fmt::format("'{}' holds an earlier run: add --resume to go on with it, or choose another folder", request_.output));
             run_.rows = readResults(path("results.jsonl"));
@@ -131,35 +114,121 @@ private:
             bool used = false;
             for (std::size_t s = 0; s < scenes_.size(); ++s) try {
                     references_[s] = std::make_unique<Reference>(readReference(text, scenes_[s]));
-                    references_[s]->info.scene = nameOf(scenes_[s].file);
+                    references_[s]->info.scene = names_[s];
                     used = true;
                 } catch (const Error& error) {
                     refusals.emplace_back(error.what());
                 }
             if (!used) throw Error(ErrorKind::Usage, refusals.front());
         }
+    }
+
+    /// What this run is, for those who resume it; or, resuming, that it is the same.
+    void claimFolder() {
+        Experiment experiment{commonProperties(buildInfo(), request_.integrator)};
         for (std::size_t s = 0; s < scenes_.size(); ++s) {
-            if (references_[s]) {
-                run_.references.push_back(references_[s]->info);
-                continue;
+            const std::string reference = !references_[s]                        ? "made by the run"
+                                          : references_[s]->info.hash.empty() ? references_[s]->info.estimator
+                                                                              : references_[s]->info.hash;
+            for (const Variant& variant : variantsOf(request_.vary)) {
+                const Scene scene = loadSmall(request_.scenes[s], variant.changes, request_.resolution);
+                for (const std::string& backend : request_.backends)
+                    experiment.push_back(propertiesOf({names_[s], backend, variant.label}, scene, contentOf(s, variant.label, scene), reference));
             }
-            ReferenceInfo none;
-            none.scene = nameOf(scenes_[s].file);
-            run_.references.push_back(none);
-            run_.notes.push_back(fmt::format("{}: no reference was given, so errors are the spread between replicates, which no bias shows in; "
-                                             "'crt reference' makes one",
-                                             none.scene));
         }
+        if (holds_rows_)
+            requireSameExperiment(path("experiment.json"), experiment);
+        else
+            writeExperiment(path("experiment.json"), experiment);
+    }
+
+    /// The first backend of those asked for that can run, or nothing.
+    std::string runnableBackend() const {
+        for (const std::string& name : request_.backends) try {
+                probeDevices(loadBackend(name));
+                return name;
+            } catch (const Error& error) {
+                if (error.kind() != ErrorKind::Backend) throw;
+            }
+        return {};
+    }
+
+    /// Where no reference was given: one from a quarter of the time. It is of the same estimator, which has far less noise, and so is blind to a
+    /// bias that all light sampling shares; what it sees is a bias of sampler, roulette, seeds and backends.
+    void makeReferences() {
+        const auto missing = static_cast<std::size_t>(std::count(references_.begin(), references_.end(), nullptr));
+        const std::string backend = missing > 0 ? runnableBackend() : std::string();
+        for (std::size_t s = 0; s < scenes_.size() && !backend.empty(); ++s) {
+            if (references_[s] || scenes_[s].integrator.type != IntegratorType::Path) continue;
+            ReferenceRequest request;
+            request.backend = backend;
+            request.integrator = request_.integrator;
+            request.output = path("reference-" + slug(names_[s]) + ".exr");
+            request.seconds = kReferenceShare * request_.seconds / static_cast<double>(missing);
+            request.same_estimator = true;
+            request.progress = request_.progress;
+            if (holds_rows_ && !fs::exists(request.output))
+                throw Error(ErrorKind::Usage, fmt::format("'{}' is missing, against which the rows of this run were measured: it cannot be resumed", request.output));
+            if (!holds_rows_) {
+                const std::optional<MadeReference> made = renderReference(scenes_[s], request);
+                if (!made) return;
+                logInfo("{}: no reference was given; {} of the {} of --time made one: {} samples per pixel on {}{}", names_[s],
+                        durationText(made->seconds), durationText(request_.seconds), made->samples, backend,
+                        made->error ? ", its own " + crt::errorText(*made->error) : "");
+            }
+            references_[s] = std::make_unique<Reference>(readReference(request.output, scenes_[s]));
+            references_[s]->info.scene = names_[s];
+            run_.notes.push_back(fmt::format("{}: no reference was given, so {} % of --time went into one, made with {} and the scene's own light sampling; "
+                                             "a bias that they share does not show against it ('crt reference' makes one that shares less)",
+                                             names_[s], 100 * kReferenceShare / static_cast<double>(missing), backend));
+        }
+        for (std::size_t s = 0; s < scenes_.size(); ++s) {
+            ReferenceInfo none;
+            none.scene = names_[s];
+            run_.references.push_back(references_[s] ? references_[s]->info : none);
+            if (!references_[s])
+                run_.notes.push_back(fmt::format("{}: there is no reference, so errors are the spread between replicates, which no bias shows in", names_[s]));
+        }
+    }
+
+    /// Hash and colours of what a variant shows. Kept: reckoning it takes as long as compiling the scene.
+    const std::string& contentOf(std::size_t s, const std::string& variant, const Scene& scene) {
+        std::string& content = contents_[{s, variant}];
+        if (content.empty()) content = hashOfContent(scene);
+        return content;
+    }
+
+    /// A reference judges only what has the same expected image: not a variant with another depth. A number is taken as it is.
+    const Reference* referenceFor(std::size_t s, const Scene& variant, const Key& key) {
+        const Reference* reference = references_[s].get();
+        if (reference == nullptr || reference->info.kind == ReferenceKind::Analytic) return reference;
+        if (contentOf(s, key.variant, variant) == contentOf(s, {}, scenes_[s]) && colourText(variant) == colourText(scenes_[s])) return reference;
+        run_.notes.push_back(fmt::format("{}: '{}' shows another image than the reference, so it is measured without one", key.scene, key.variant));
+        return nullptr;
+    }
+
+    /// Libraries, drivers and caches are warm before any start-up is timed: else whoever comes first pays for all. Where starts take so long that
+    /// little time would be left, it is not done, and said.
+    void warmUp(const Key& key, const Scene& scene) {
+        if (elapsed() < (kReferenceShare + kWarmUpShare) * request_.seconds) {
+            Contestant(key, scene, nullptr, request_.integrator).prepare();
+            return;
+        }
+        if (!left_cold_) run_.notes.push_back("start-up takes so long that it was not tried beforehand everywhere: start-up times cannot be compared");
+        left_cold_ = true;
     }
 
     void openContestants() {
         for (std::size_t s = 0; s < scenes_.size(); ++s)
             for (const std::string& backend : request_.backends)
                 for (const Variant& variant : variantsOf(request_.vary)) {
-                    Key key{nameOf(scenes_[s].file), backend, variant.label};
+                    Key key{names_[s], backend, variant.label};
                     try {
                         Scene scene = loadSmall(request_.scenes[s], variant.changes, request_.resolution);
-                        contestants_.push_back(std::make_unique<Contestant>(key, std::move(scene), references_[s].get(), request_.integrator));
+                        const Reference* reference = referenceFor(s, scene, key);
+                        warmUp(key, scene);
+                        contestants_.push_back(std::make_unique<Contestant>(key, std::move(scene), reference, request_.integrator));
+                        contestants_.back()->prepare();
                         order_.push_back({key, contestants_.back().get(), {}});
                     } catch (const Error& error) {
                         if (error.kind() != ErrorKind::Backend) throw;
@@ -173,7 +242,7 @@ private:
 
     void render() {
         Progress progress(request_.progress);
-        const auto stop = [] { return InterruptGuard::signalReceived() != 0; };
+        const auto stop = [] { return stopped(); };
         // A report takes a little, and so does reading films; the rest is shared by replicates and configurations alike.
         const double for_report = 1 + 0.01 * request_.seconds;
         const double share = std::max(0.0, request_.seconds - elapsed() - for_report) / static_cast<double>(request_.replicates * contestants_.size());
@@ -209,49 +278,40 @@ private:
             progress.update(state);
         };
         const bool done = contestant.replicate(replicate, most, share, found, stop);
-        if (done) saveLooks(contestant, replicate);
+        if (done) writeReplicate(replicateFile(contestant.key(), replicate), contestant.stored(replicate));
         return done;
     }
 
-    // Replicates on disk, so that a run can go on: the luminances of every look, which the spread between replicates needs.
-    std::string looksFile(const Key& key, std::uint32_t replicate) const {
-        std::string name = fmt::format("{}-{}-{}-{}.looks", key.scene, key.backend, key.variant, replicate);
-        std::replace_if(name.begin(), name.end(), [](char c) { return c == ' ' || c == '/' || c == '='; }, '_');
-        return path("replicates/" + name);
-    }
-    void saveLooks(Contestant& contestant, std::uint32_t replicate) {
-        const std::string name = looksFile(contestant.key(), replicate);
-        checkWritable(name);
-        AtomicFile file(name);
-        for (const auto& [samples, planes] : contestant.looks()) {
-            const auto plane = planes.find(replicate);
-            if (plane == planes.end()) continue;
-            const std::uint64_t header[2] = {samples, plane->second.size()};
-            file.write(header, sizeof header);
-            file.write(plane->second.data(), plane->second.size() * sizeof(float));
+    /// Different for different keys: what a file name does not take becomes %XX.
+    std::string replicateFile(const Key& key, std::uint32_t replicate) const {
+        std::string name;
+        for (const char c : fmt::format("{}-{}-{}", key.scene, key.backend, key.variant)) {
+            const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_' || c == '.' || c == ',';
+            name += plain ? std::string(1, c) : fmt::format("%{:02x}", static_cast<unsigned char>(c));
         }
-        file.commit();
+        return path(fmt::format("replicates/{}-{}.looks", name, replicate));
     }
+    /// Replicates that are whole, with a row for each of their looks; the rows of others are dropped, and rendered again.
     void resumeReplicates() {
         std::vector<Row> kept;
         for (const auto& contestant : contestants_)
-            for (std::uint32_t replicate = 0; readLooks(*contestant, replicate); ++replicate)
+            for (std::uint32_t replicate = 0; holds_rows_; ++replicate) {
+                std::vector<Row> rows;
                 for (const Row& row : run_.rows)
-                    if (row.key == contestant->key() && row.replicate == replicate) kept.push_back(row);
+                    if (row.key == contestant->key() && row.replicate == replicate) rows.push_back(row);
+                const std::optional<StoredReplicate> stored = readReplicate(replicateFile(contestant->key(), replicate), contestant->pixels());
+                if (!stored || !isWhole(*stored, rows, contestant->samplesReached())) break;
+                contestant->restore(replicate, *stored);
+                kept.insert(kept.end(), rows.begin(), rows.end());
+            }
         run_.rows = std::move(kept);
     }
-    bool readLooks(Contestant& contestant, std::uint32_t replicate) {
-        std::ifstream file(looksFile(contestant.key(), replicate), std::ios::binary);
-        if (!request_.resume || !file) return false;
-        std::uint64_t header[2];
-        while (file.read(reinterpret_cast<char*>(header), sizeof header)) {
-            if (header[1] > (std::uint64_t{1} << 28)) return false;
-            LookPlane plane(header[1]);
-            if (!file.read(reinterpret_cast<char*>(plane.data()), static_cast<std::streamsize>(plane.size() * sizeof(float)))) return false;
-            contestant.looks()[header[0]][replicate] = std::move(plane);
-            contestant.setSamplesReached(std::max(contestant.samplesReached(), header[0]));
-        }
-        return true;
+    /// `reached`: samples of the replicates before; 0 for the first.
+    static bool isWhole(const StoredReplicate& stored, const std::vector<Row>& rows, std::uint64_t reached) {
+        if (reached > 0 && stored.looks.back().first != reached) return false;
+        return std::all_of(stored.looks.begin(), stored.looks.end(), [&](const auto& look) {
+            return std::any_of(rows.begin(), rows.end(), [&](const Row& row) { return row.samples == look.first; });
+        });
     }
 
     int report() {
@@ -280,17 +340,20 @@ private:
         files.insert(files.end(), {"results.jsonl", "results.csv", "summary.json"});
         writeManifest(path("manifest.json"), run_, files);
 
+        const bool failed = printVerdicts(analysis);
+        logInfo("{} rounds of replicates in {}; wrote {}", rounds_, durationText(elapsed()), path("report.html"));
+        if (stopped()) return 128 + InterruptGuard::signalReceived();
+        return failed ? 7 : 0;
+    }
+
+    /// One line for each configuration that ran, whatever came of it; whether any fails.
+    static bool printVerdicts(const Analysis& analysis) {
         bool failed = false;
         for (const ConfigurationFit& fit : analysis.fits) {
-            if (fit.points.empty()) continue;
-            failed = failed || fit.judgement.verdict == stats::Verdict::Fail;
-            logInfo("{} {} {}: error {} at {} spp, slope {:.3f} ({:.3f} to {:.3f}), {}: {}", fit.key.scene, fit.key.backend, fit.key.variant,
-                    percentText(fit.points.back().relative_rmse.value), fit.points.back().samples, fit.slope_samples.value, fit.slope_samples.low,
-                    fit.slope_samples.high, stats::verdictName(fit.judgement.verdict), fit.judgement.reason);
+            if (!fit.omitted) logInfo("{}", verdictLine(fit));
+            failed = failed || (!fit.omitted && fit.judgement.verdict == stats::Verdict::Fail);
         }
-        logInfo("{} rounds of replicates in {}; wrote {}", rounds_, durationText(elapsed()), path("report.html"));
-        if (InterruptGuard::signalReceived() != 0) return 128 + InterruptGuard::signalReceived();
-        return failed ? 7 : 0;
+        return failed;
     }
 
     void noteReferences() {
@@ -311,6 +374,10 @@ private:
     const ConvergeRequest& request_;
     Clock::time_point start_;
     Run run_;
+    std::vector<std::string> names_;   ///< Of the scenes, in keys.
+    bool holds_rows_ = false;          ///< The folder did, when the run began.
+    bool left_cold_ = false;
+    std::map<std::pair<std::size_t, std::string>, std::string> contents_;
     std::vector<Scene> scenes_;
     std::vector<std::unique_ptr<Reference>> references_;
     std::vector<std::unique_ptr<Contestant>> contestants_;
@@ -320,25 +387,6 @@ private:
 };
 
 }  // namespace
-
-Vary parseVary(const std::string& text) {
-    const std::size_t equals = text.find('=');
-    if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
-        throw Error(ErrorKind::Usage, fmt::format("--vary takes KEY=VALUE,VALUE such as sampler=sobol,independent, not '{}'", text));
-    Vary vary;
-    vary.key = text.substr(0, equals);
-    const auto found = shortNames().find(vary.key);
-    if (found == shortNames().end() && vary.key.find('.') == std::string::npos) {
-        std::vector<std::string> names;
-        for (const auto& [name, path] : shortNames()) names.push_back(name);
-        const std::string hint = didYouMean(vary.key, names);
-        throw Error(ErrorKind::Usage, fmt::format("--vary knows {} and keys of the scene such as film.filter, not '{}'{}", fmt::join(names, ", "), vary.key,
-                                                  hint.empty() ? "" : "; " + hint));
-    }
-    vary.path = found != shortNames().end() ? found->second : vary.key;
-    vary.values = parseList(text.substr(equals + 1), "--vary");
-    return vary;
-}
 
 int converge(const ConvergeRequest& request) { return Engine(request).run(); }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "converge/reference.h"
+#include "converge/variants.h"
 #include "job.h"
 #include "progress.h"
 
@@ -11,15 +12,6 @@
 #include <vector>
 
 namespace crt::converge {
-
-/// "sampler=sobol,independent": a key of the scene, or one of the short names of shortNames(), and the values it takes.
-struct Vary {
-    std::string key;                  ///< As written, for labels.
-    std::string path;                 ///< In the scene: "sampler.type".
-    std::vector<std::string> values;
-};
-/// Throws crt::Error(Usage).
-Vary parseVary(const std::string& text);
 
 struct ConvergeRequest {
     std::vector<SceneRequest> scenes;

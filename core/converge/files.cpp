@@ -1,10 +1,9 @@
 #include "converge/files.h"
 
-#include "atomic_file.h"
+#include "converge/json_parts.h"
 #include "error.h"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 // In the header's inline form, so that nothing has to be linked or found at run time.
 #define XXH_INLINE_ALL
@@ -27,14 +26,6 @@ namespace crt::converge {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
-
-/// JSON has no infinity and no NaN.
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
-Json numbers(const std::array<double, 3>& values) { return Json::array({number(values[0]), number(values[1]), number(values[2])}); }
-Json interval(const Estimate& e) { return Json{{"value", number(e.value)}, {"low", number(e.low)}, {"high", number(e.high)}}; }
-Json interval(const std::optional<Estimate>& e) { return e ? interval(*e) : Json(nullptr); }
 
 double numberIn(const Json& value) { return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>(); }
 std::optional<double> knownNumberIn(const Json& value) { return value.is_null() ? std::nullopt : std::optional(value.get<double>()); }
@@ -77,8 +68,12 @@ Json rowJson(const Row& row) {
     json["closest_rays"] = row.closest_rays;
     json["shadow_rays"] = row.shadow_rays;
     json["error"] = row.error ? errorJson(*row.error) : Json(nullptr);
+    json["fold_mse"] = Json::array();
+    for (const double mse : row.fold_mse) json["fold_mse"].push_back(number(mse));
     json["between_replicates_mse"] = number(row.between_replicates_mse);
+    json["effective_pixels"] = number(row.effective_pixels);
     json["predicted_relative_rmse"] = interval(row.predicted_relative_rmse);
+    json["mean_luminance"] = number(row.mean_luminance);
     json["image_mean"] = numbers(row.image_mean);
     json["image_mean_standard_error"] = row.image_mean_standard_error ? numbers(*row.image_mean_standard_error) : Json(nullptr);
     json["invalid_samples"] = row.invalid_samples;
@@ -102,9 +97,12 @@ Row rowOf(const Json& json) {
     row.closest_rays = json.at("closest_rays").get<std::uint64_t>();
     row.shadow_rays = json.at("shadow_rays").get<std::uint64_t>();
     if (const Json& error = json.at("error"); !error.is_null()) row.error = errorOf(error);
+    for (const Json& mse : json.at("fold_mse")) row.fold_mse.push_back(numberIn(mse));
     row.between_replicates_mse = knownNumberIn(json.at("between_replicates_mse"));
+    row.effective_pixels = knownNumberIn(json.at("effective_pixels"));
     if (const Json& predicted = json.at("predicted_relative_rmse"); !predicted.is_null())
         row.predicted_relative_rmse = Estimate{numberIn(predicted.at("value")), numberIn(predicted.at("low")), numberIn(predicted.at("high"))};
+    row.mean_luminance = numberIn(json.at("mean_luminance"));
     row.image_mean = numbersIn(json.at("image_mean"));
     if (const Json& error = json.at("image_mean_standard_error"); !error.is_null()) row.image_mean_standard_error = numbersIn(error);
     row.invalid_samples = json.at("invalid_samples").get<std::uint64_t>();
@@ -116,12 +114,6 @@ Row rowOf(const Json& json) {
 
 [[noreturn]] void cannotWrite(const std::string& path) {
     throw Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, std::strerror(errno)), {path});
-}
-
-void writeWhole(const std::string& path, const std::string& text) {
-    AtomicFile file(path);
-    file.write(text.data(), text.size());
-    file.commit();
 }
 
 // -------------------------------------------------------------------------------------------------------------------------- csv
@@ -183,6 +175,8 @@ const std::vector<Column>& csvColumns() {
         {"predicted_relative_rmse", predictionField(&Estimate::value)},
         {"predicted_relative_rmse_low", predictionField(&Estimate::low)},
         {"predicted_relative_rmse_high", predictionField(&Estimate::high)},
+        {"effective_pixels", [](const Row& r) { return csvField(r.effective_pixels); }},
+        {"mean_luminance", [](const Row& r) { return csvField(r.mean_luminance); }},
         {"image_mean_r", [](const Row& r) { return csvField(r.image_mean[0]); }},
         {"image_mean_g", [](const Row& r) { return csvField(r.image_mean[1]); }},
         {"image_mean_b", [](const Row& r) { return csvField(r.image_mean[2]); }},
@@ -196,135 +190,6 @@ const std::vector<Column>& csvColumns() {
         {"stop_reason", [](const Row& r) { return csvField(r.stop_reason); }},
     };
     return columns;
-}
-
-// ---------------------------------------------------------------------------------------------------------------------- summary
-
-Json keyJson(const Key& key) { return {{"scene", key.scene}, {"backend", key.backend}, {"variant", key.variant}}; }
-
-Json pointJson(const Point& p) {
-    return {{"samples_per_pixel", p.samples},
-            {"replicates", p.replicates},
-            {"seconds", interval(p.seconds)},
-            {"render_seconds", interval(p.render_seconds)},
-            {"relative_rmse", interval(p.relative_rmse)},
-            {"efficiency_per_second", interval(p.efficiency)},
-            {"relative_mean_bias", interval(p.mean_bias)},
-            {"relative_bias_squared", interval(p.bias_squared)},
-            {"predicted_over_actual_error", interval(p.calibration)},
-            {"predictions", p.predicted},
-            {"predictions_that_hold", p.covered},
-            {"relmse", number(p.relmse)},
-            {"smape", number(p.smape)},
-            {"mae", number(p.mae)},
-            {"flip_mean", number(p.flip_mean)},
-            {"delta_e2000_mean", number(p.delta_e2000_mean)}};
-}
-
-Json targetJson(const Target& t) {
-    return {{"relative_rmse", t.relative_rmse},
-            {"reached", t.reached},
-            {"at_first_point", t.at_first_point},
-            {"samples_per_pixel", interval(t.samples)},
-            {"seconds", interval(t.seconds)}};
-}
-
-Json fitJson(const ConfigurationFit& fit) {
-    Json json = keyJson(fit.key);
-    json["replicates"] = fit.replicates;
-    json["void_rows"] = fit.void_rows;
-    json["error_source"] = fit.source == ErrorSource::Reference ? "reference" : "between replicates";
-    json["verdict"] = stats::verdictName(fit.judgement.verdict);
-    json["verdict_reason"] = fit.judgement.reason;
-    json["relative_mean_bias_rgb"] = nullptr;
-    if (const auto& bias = fit.judgement.mean_bias)
-        json["relative_mean_bias_rgb"] = Json::array({interval((*bias)[0]), interval((*bias)[1]), interval((*bias)[2])});
-    if (fit.fitted) {
-        json["time"] = {{"before_first_sample_seconds", number(fit.time.before_first_sample)},
-                        {"launch_seconds", interval(fit.time.launch)},
-                        {"seconds_per_sample", interval(fit.time.per_sample)},
-                        {"r2", number(fit.time.r2)}};
-        json["error"] = {{"variance_of_one_sample", interval(fit.error.variance)},
-                         {"fitted_bias_squared", interval(fit.error.intercept)},
-                         {"bias_squared", interval(fit.error.bias_squared)},
-                         {"flattening", fit.error.flattening},
-                         {"faster_than_inverse", fit.error.faster_than_inverse}};
-        json["slope_against_samples"] = interval(fit.slope_samples);
-        json["slope_against_seconds"] = interval(fit.slope_seconds);
-        json["efficiency_per_second"] = interval(fit.efficiency);
-        json["targets"] = Json::array();
-        for (const Target& target : fit.targets) json["targets"].push_back(targetJson(target));
-    }
-    json["points"] = Json::array();
-    for (const Point& point : fit.points) json["points"].push_back(pointJson(point));
-    return json;
-}
-
-Json featuresJson(const std::vector<Feature>& features) {
-    Json json = Json::array();
-    for (const Feature& feature : features) json.push_back({{"what", feature.name}, {"why", feature.reason}});
-    return json;
-}
-
-Json stagesJson(const StageSeconds& s) {
-    return {{"parse", number(s.parse)},     {"build", number(s.build)},
-            {"compile", number(s.compile)}, {"upload", number(s.upload)},
-            {"first_sample", number(s.first_sample)},
-            {"render_wall", number(s.render_wall)},
-            {"render_device", number(s.render_device)},
-            {"write", number(s.write)}};
-}
-
-Json testsJson(const ImageTests& t) {
-    return {{"smallest_tile_p", number(t.smallest_tile_p)},
-            {"tile_p_uniformity", number(t.tile_p_uniformity)},
-            {"smallest_pixel_p", number(t.smallest_pixel_p)},
-            {"variance_of_variance", number(t.variance_of_variance)},
-            {"largest_share", number(t.largest_share)}};
-}
-
-Json configurationJson(const Configuration& c) {
-    Json json = keyJson(c.key);
-    json["omitted"] = c.omitted.empty() ? Json(nullptr) : Json(c.omitted);
-    if (!c.omitted.empty()) return json;
-    json["device"] = c.device;
-    json["driver"] = c.driver;
-    json["kernel"] = c.kernel;
-    json["threads"] = c.threads;
-    json["scene_file"] = c.scene_file;
-    json["scene_hash"] = c.scene_hash;
-    json["width"] = c.width;
-    json["height"] = c.height;
-    json["kept"] = featuresJson(c.kept);
-    json["left_out"] = featuresJson(c.left_out);
-    json["stage_seconds"] = stagesJson(c.stages);
-    json["image_tests"] = testsJson(c.tests);
-    return json;
-}
-
-Json referenceJson(const ReferenceInfo& r) {
-    return {{"scene", r.scene},
-            {"kind", referenceKindName(r.kind)},
-            {"file", r.file},
-            {"hash", r.hash},
-            {"samples_per_pixel", r.samples},
-            {"estimator", r.estimator},
-            {"image_mean", numbers(r.image_mean)},
-            {"image_mean_standard_error", numbers(r.image_mean_standard_error)},
-            {"mean_variance", number(r.mean_variance)},
-            {"eightfold_spread", number(r.eightfold_spread)}};
-}
-
-Json environmentJson(const Environment& e) {
-    return {{"crt_version", e.crt_version},   {"commit", e.commit},
-            {"dirty", e.dirty},               {"compiler", e.compiler},
-            {"build_flags", e.build_flags},   {"cpu", e.cpu},
-            {"operating_system", e.operating_system},
-            {"threads", e.threads},           {"load_start", e.load_start},
-            {"load_end", e.load_end},         {"working_directory", e.working_directory},
-            {"commands", e.commands},         {"started", e.started},
-            {"finished", e.finished},         {"budget_seconds", number(e.budget_seconds)},
-            {"spent_seconds", number(e.spent_seconds)}};
 }
 
 }  // namespace
@@ -399,23 +264,6 @@ void writeCsv(const std::string& path, const std::vector<Row>& rows) {
     add_line([](const Column& column) { return std::string(column.name); });
     for (const Row& row : rows) add_line([&](const Column& column) { return column.field(row); });
     writeWhole(path, text);
-}
-
-void writeSummary(const std::string& path, const Run& run, const Analysis& analysis) {
-    Json json;
-    json["environment"] = environmentJson(run.environment);
-    json["options"] = {{"confidence", analysis.options.confidence},
-                       {"verdict_confidence", analysis.options.verdict_confidence},
-                       {"equivalence_margin", analysis.options.equivalence_margin},
-                       {"family_alpha", analysis.options.family_alpha}};
-    json["notes"] = run.notes;
-    json["references"] = Json::array();
-    for (const ReferenceInfo& reference : run.references) json["references"].push_back(referenceJson(reference));
-    json["configurations"] = Json::array();
-    for (const Configuration& configuration : run.configurations) json["configurations"].push_back(configurationJson(configuration));
-    json["fits"] = Json::array();
-    for (const ConfigurationFit& fit : analysis.fits) json["fits"].push_back(fitJson(fit));
-    writeWhole(path, json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n');
 }
 
 std::string hashOfFile(const std::string& path) {

@@ -1,11 +1,15 @@
 /// From rows to statements: how fast a configuration converges, what it costs, whether it is right, and how sure all that is.
 ///
-/// Relative to the scene. Errors are divided by the mean of the reference (of the replicates, without one), so mean squared errors here are relative²
-/// and 0.01² is "1 %". The reference's own variance is subtracted from every mean squared error.
+/// Relative to the scene. Errors are of luminance, divided by the mean luminance of the reference (of the replicates,
+/// without one; stats/luminance_error.h), so mean squared errors here are relative² and 0.01² is "1 %". The reference's own
+/// variance is subtracted from every mean squared error.
 ///
-/// Where intervals come from. Rows of one replicate are looks at one progressive render, so only replicates are independent. Every interval is the
-/// jackknife over replicates (Tukey 1958; Miller 1974) with Student's t, R − 1 degrees of freedom: leave one replicate out, repeat the whole fit.
-/// Positive quantities are treated as logarithms. For means it is Student's interval exactly; for the rest unit_fits.cpp measures the coverage.
+/// Where intervals come from. Rows of one replicate are looks at one progressive render, so only replicates are
+/// independent, and so are the folds of a reference. Every interval is the jackknife over both (jackknife.h): leave one
+/// out, repeat the whole fit. Positive quantities are treated as logarithms. For means it is Student's interval exactly; for
+/// the rest unit_fits.cpp and docs/results/false-alarms.md measure the coverage.
+///
+/// Configurations that render the same bits share the errors of whichever has more of them; times are their own.
 ///
 /// Without a reference the error is the variance between replicates: unbiased for the variance, blind to bias. Deviations from their common mean are not
 /// independent; for normal errors intervals come out too short by √((R − 2)/(R − 1)), and are widened by that.
@@ -42,10 +46,9 @@ struct Point {
     std::uint32_t replicates = 0;
     Estimate seconds;            ///< What a user waits who asks for N: start-up and render.
     Estimate render_seconds;
-    Estimate relative_rmse;
-    Estimate efficiency;         ///< 1/(relative MSE × seconds), start-up included. 1/s.
-    /// Mean of the image over that of the reference, − 1, averaged over R, G and B; with the verdict's confidence in `mean_bias_verdict`.
-    std::optional<Estimate> mean_bias;
+    Estimate relative_rmse;      ///< 0, or from 0 on, where the reference's own noise hides the error.
+    Estimate efficiency;         ///< 1/(relative MSE × seconds), start-up included. 1/s. NaN where there is no error.
+    std::optional<Estimate> mean_bias;      ///< Mean luminance over that of the reference, − 1.
     std::optional<Estimate> bias_squared;   ///< mean (E I − R)², relative²; may be below 0, which is how it contains it.
     std::optional<Estimate> calibration;    ///< Predicted over actual relative RMSE.
     std::uint32_t covered = 0, predicted = 0;  ///< Replicates whose predicted interval holds their actual error, and those that predicted.
@@ -92,17 +95,27 @@ struct Judgement {
 /// All that is said about one configuration.
 struct ConfigurationFit {
     Key key;
+    std::vector<Key> same_bits;       ///< Others whose rows are the same bit for bit: errors and verdicts are shared.
     std::uint32_t replicates = 0;     ///< In the fits; points may have more.
     std::uint32_t void_rows = 0;
+    bool omitted = false;             ///< It was not measured; the judgement's reason says why.
+    /// Of the errors. BetweenReplicates, too, where the reference is noisier than a third of the images' own error and no
+    /// bias is seen against it.
     ErrorSource source = ErrorSource::BetweenReplicates;
+    bool has_reference = false;       ///< Which judges bias.
     std::vector<Point> points;        ///< By samples. Those with two replicates at least.
-    bool fitted = false;              ///< Three points or more with two replicates each; else the four below are empty.
+    bool fitted = false;              ///< Three points or more with two replicates each; else all below but the judgement is empty.
     TimeFit time;
     ErrorFit error;
     Estimate slope_samples;           ///< d log RMSE / d log N
     Estimate slope_seconds;           ///< d log RMSE / d log(t − t0)
-    Estimate efficiency;              ///< 1/(v·c), start-up excluded. 1/s.
     std::vector<Target> targets;      ///< As in FitOptions::targets.
+    /// The least error that every fitted configuration of the scene reached: where they can be compared without looking
+    /// beyond what was measured.
+    Target common;
+    /// 1/(e²·N·c) for the common error e, reached with N samples: 1/(v·c) where error falls as 1/√N. Start-up excluded. 1/s.
+    /// A lower bound where common.at_first_point.
+    Estimate efficiency;
     Judgement judgement;
 };
 

@@ -34,7 +34,7 @@ struct Estimate {
     double value = 0, low = 0, high = 0;
 };
 
-/// Image against reference, over the colour values of all pixels; defined in compare.h.
+/// Image against reference, over the luminances of all pixels (stats/luminance_error.h).
 struct ErrorMetrics {
     double mse = 0;            ///< mean (I − R)²
     double rmse = 0;           ///< √mse
@@ -56,18 +56,25 @@ struct Row {
 
     double render_wall_seconds = 0;                    ///< Since the first chunk of this replicate, reading the film for looks left out.
     std::optional<double> render_device_seconds;       ///< The same by the device's clock.
-    double seconds_before_first_sample = 0;            ///< Parse, build, compile and upload, as a user pays them who runs only this.
+    /// Parse, build, compile, upload and the first sample, with libraries loaded and kernels in the cache: every start was
+    /// tried once before it was timed, so that it does not matter who is listed first.
+    double seconds_before_first_sample = 0;
     std::uint64_t paths = 0;                           ///< Since the replicate began, as the two below.
     std::uint64_t closest_rays = 0, shadow_rays = 0;
 
     std::optional<ErrorMetrics> error;                 ///< Against the scene's reference.
+    /// Mean squared difference from each fold of the reference alone, absolute; empty where it has none. With
+    /// ReferenceInfo::fold_distance it says what the error would be against any of the folds.
+    std::vector<double> fold_mse;
     /// (R − 1)/R · mean (I_r − Ī_r)², Ī_r the mean of the configuration's other R − 1 replicates at the same N. Its mean over replicates is their
     /// sample variance: unbiased for the variance of one image, blind to bias. It stands in for the error where there is no reference, and where
     /// there is one, mean(error->mse − between_replicates_mse) estimates bias². Known when all replicates have reached N.
     std::optional<double> between_replicates_mse;
+    std::optional<double> effective_pixels;            ///< stats::effectivePixels of that variance; known with it.
     std::optional<Estimate> predicted_relative_rmse;   ///< What the image says of itself, from its own scrambles.
 
-    std::array<double, 3> image_mean{0, 0, 0};                      ///< Of the channels that `error` runs over, in that order (R, G, B).
+    double mean_luminance = 0;
+    std::array<double, 3> image_mean{0, 0, 0};                      ///< R, G, B. Against a closed form, all three are mean luminance.
     std::optional<std::array<double, 3>> image_mean_standard_error; ///< As the image itself predicts it.
     std::uint64_t invalid_samples = 0;                 ///< NaN or infinite. Any makes the row void.
     std::optional<double> cpu_clock_mhz, load_average; ///< At the moment of the look.
@@ -98,7 +105,6 @@ struct ImageTests {
     std::optional<double> smallest_tile_p;   ///< Welch on 8×8 tiles, smallest p after Holm's adjustment.
     std::optional<double> tile_p_uniformity; ///< Kolmogorov–Smirnov p of the tiles' p-values being uniform (Jung et al. 2020); shown, not judged by.
     std::optional<double> smallest_pixel_p;  ///< Of all pixels and channels, Šidák-adjusted.
-    std::optional<double> variance_of_variance;   ///< VOV of the pooled estimate, as MCNP defines it; trusted below 0.1.
     std::optional<double> largest_share;     ///< Part of the squared spread of all replicates that one value carries; trusted below 0.05.
 };
 
@@ -147,10 +153,16 @@ struct ReferenceInfo {
     std::string file, hash;           ///< Hash: XXH3-128 of the file.
     std::uint64_t samples = 0;        ///< Per pixel; 0 for what has no samples.
     std::string estimator;            ///< "independent sampler, no light sampling, no roulette, seed 77"
+    double mean_luminance = 0;        ///< What relative errors are relative to.
+    double mean_luminance_standard_error = 0;
     std::array<double, 3> image_mean{0, 0, 0};           ///< R, G, B.
     std::array<double, 3> image_mean_standard_error{0, 0, 0};
-    double mean_variance = 0;         ///< Mean over pixels and channels of the variance of the reference's pixel: it is subtracted from errors.
-    double eightfold_spread = 0;      ///< Relative RMSE between eighths of the reference, divided by √8: what the choice of reference moves errors by.
+    double mean_variance = 0;         ///< Mean over pixels of the variance of the reference's luminance: it is subtracted from errors.
+    double eightfold_spread = 0;      ///< Relative RMSE between eighths of the reference, divided by √8: its own relative error.
+    /// What the folds (eighths) say of themselves; empty where there are none.
+    std::vector<double> fold_mean_luminance;
+    std::vector<std::vector<double>> fold_distance;      ///< Mean squared difference of the luminances of two folds, absolute.
+    std::optional<double> effective_pixels;              ///< stats::effectivePixels of the reference's variance.
 };
 
 /// Where and how it all ran.

@@ -77,4 +77,9 @@ std::string secondsText(const Estimate& estimate, int digits) { return estimateT
 std::string percentText(const Estimate& estimate, int digits) { return estimateText(estimate, {0.01, " %"}, digits); }
 std::string numberText(const Estimate& estimate, int digits) { return estimateText(estimate, {1, ""}, digits); }
 
+std::string errorText(const Estimate& e, int digits) {
+    if (!std::isfinite(e.value) || e.low > 0 || !std::isfinite(e.high)) return percentText(e, digits);
+    return "below " + percentText(e.high, digits);
+}
+
 }  // namespace crt::converge

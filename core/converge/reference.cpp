@@ -8,6 +8,7 @@
 #include "interrupt.h"
 #include "log.h"
 #include "sampling.h"
+#include "stats/luminance_error.h"
 #include "stats/statistics.h"
 #include "yaml_reader.h"
 
@@ -23,6 +24,7 @@ namespace {
 /// Far from the seeds of `crt converge`, which follow the scene's one by one.
 constexpr std::uint64_t kReferenceSeedOffset = std::uint64_t{1} << 40;
 constexpr const char* kContentKey = "crt/referenceContent";
+constexpr const char* kColourKey = "crt/referenceColour";
 constexpr const char* kEstimatorKey = "crt/referenceEstimator";
 
 std::string estimatorText(const Scene& scene) {
@@ -50,11 +52,34 @@ std::vector<float> channelsOf(const Image& image, const std::array<std::string, 
     return values;
 }
 
-std::vector<float> luminanceOf(const std::vector<float>& rgb, const std::array<double, 3>& weights) {
-    std::vector<float> luminance(rgb.size() / 3);
-    for (std::size_t p = 0; p < luminance.size(); ++p)
-        luminance[p] = static_cast<float>(weights[0] * rgb[3 * p] + weights[1] * rgb[3 * p + 1] + weights[2] * rgb[3 * p + 2]);
-    return luminance;
+/// Mean, variance and distances of the folds, from their luminances and colours.
+void describeFolds(ReferenceInfo& info, const std::vector<std::vector<float>>& luminances, const std::vector<std::vector<double>>& colours) {
+    const std::size_t pixels = luminances.front().size();
+    std::vector<double> variances(pixels);
+    for (std::size_t p = 0; p < pixels; ++p) {
+        std::array<double, kFolds> values{};
+        for (std::uint32_t fold = 0; fold < kFolds; ++fold) values[fold] = luminances[fold][p];
+        variances[p] = stats::summarize(values).variance / kFolds;
+    }
+    info.mean_variance = stats::summarize(variances).mean;
+    info.effective_pixels = stats::effectivePixels(variances, kFolds - 1);
+    for (const std::vector<float>& a : luminances) {
+        info.fold_mean_luminance.push_back(stats::meanLuminance(a));
+        info.fold_distance.emplace_back();
+        for (const std::vector<float>& b : luminances) info.fold_distance.back().push_back(stats::meanSquaredDifference(a, b));
+    }
+    const stats::Summary luminance = stats::summarize(info.fold_mean_luminance);
+    info.mean_luminance = luminance.mean;
+    info.mean_luminance_standard_error = luminance.standardError();
+    info.eightfold_spread = stats::relativeRmse(info.mean_variance, info.mean_luminance);
+    for (std::size_t c = 0; c < 3; ++c) {
+        std::array<double, kFolds> means{};
+        for (std::uint32_t fold = 0; fold < kFolds; ++fold)
+            for (std::size_t p = 0; p < pixels; ++p) means[fold] += colours[fold][3 * p + c] / static_cast<double>(pixels);
+        const stats::Summary summary = stats::summarize(means);
+        info.image_mean[c] = summary.mean;
+        info.image_mean_standard_error[c] = summary.standardError();
+    }
 }
 
 /// Samples per fold that fit into the time, from the first ones.
@@ -63,17 +88,6 @@ std::uint64_t affordable(double seconds_left, double seconds_per_sample) {
 }
 
 }  // namespace
-
-std::array<double, 3> luminanceWeights(ColorSpace space) {
-    // Row Y of the inverse of XYZ → RGB, by Cramer's rule on its transpose: w · M = (0, 1, 0).
-    const Matrix3d m = xyzToRgb(space);
-    const auto minor = [&m](std::size_t r0, std::size_t r1) { return m[r0][0] * m[r1][2] - m[r0][2] * m[r1][0]; };
-    // Cofactors of column 1.
-    const std::array<double, 3> cofactors{-minor(1, 2), minor(0, 2), -minor(0, 1)};
-    // Y_row of M⁻¹: (M⁻¹)_{1j} = C_{j1}/det, with C_{j1} = (−1)^{j+1} det of M without row j and column 1.
-    const double det = m[0][1] * cofactors[0] + m[1][1] * cofactors[1] + m[2][1] * cofactors[2];
-    return {cofactors[0] / det, cofactors[1] / det, cofactors[2] / det};
-}
 
 Scene referenceScene(Scene scene, bool same_estimator) {
     scene.sampler.type = SamplerType::Independent;
@@ -93,40 +107,51 @@ std::string hashOfContent(const Scene& scene) {
     return compileScene(canonical, 0).hash;
 }
 
+std::string colourText(const Scene& scene) {
+    const auto space = [](ColorSpace s) { return s == ColorSpace::LinearSrgb ? "linear sRGB" : s == ColorSpace::AcesCg ? "ACEScg" : "XYZ"; };
+    std::string white = "no white balance";
+    if (scene.film.white_balance) {
+        const Vec3d xyz = spectrumToXyz(*scene.film.white_balance);
+        white = fmt::format("white balance from X : Y : Z = {:.6f} : 1 : {:.6f}", xyz[0] / xyz[1], xyz[2] / xyz[1]);
+    }
+    return fmt::format("exposure {} EV, {}, {}", scene.film.exposure_ev, space(scene.film.color_space), white);
+}
+
 int makeReference(const ReferenceRequest& request) {
-    Scene scene = loadScene(request.scene);
-    if (scene.integrator.type != IntegratorType::Path)
-        throw Error(ErrorKind::Usage, "a view has no noise and needs no reference: integrator.type must be path");
-    const std::string content = hashOfContent(scene);
-    scene = referenceScene(std::move(scene), request.same_estimator);
-    if (std::filesystem::path(request.output).extension() != ".exr")
-        throw Error(ErrorKind::Usage, fmt::format("a reference holds its eighths beside the image, which only EXR can: '{}' should end in .exr", request.output));
-    checkWritable(request.output);
-
-    const LoadedBackend backend = openBackend(request.backend);
-    Integrator integrator(backend, request.integrator);
-    const CompiledScene compiled = compileScene(scene, 0);
-    const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
-
     const InterruptGuard interrupt;
+    const std::optional<MadeReference> made = renderReference(loadScene(request.scene), request);
+    if (!made) return 128 + InterruptGuard::signalReceived();
+    logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, made->samples, kFolds, made->estimator, durationText(made->seconds));
+    if (made->error) logInfo("its own {}", errorText(*made->error));
+    if (made->error && made->error->relative_rmse > 0.02)
+        logWarning("the reference is noisy itself; its variance is subtracted from errors, but more --time, or --same-estimator, makes them surer");
+    return 0;
+}
+
+namespace {
+
+/// The eighths and their sum.
+struct RenderedFolds {
+    Film film;
+    std::vector<Image> images;
+};
+
+/// Each eighth has samples of its own. The first also finds out how many fit into the time. Nothing when a signal came.
+std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene& compiled, Integrator& integrator, const ReferenceRequest& request) {
+    const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
     Progress progress(request.progress);
     ProgressState state;
     state.pixels = std::uint64_t{shape.width} * shape.height;
     const auto started = std::chrono::steady_clock::now();
     const auto elapsed = [started] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count(); };
-
-    // Each eighth has samples of its own. The first also finds out how many fit into the time.
-    Film film(shape);
-    Image image;
-    std::vector<Image> folds;
+    RenderedFolds folds{Film(shape), {}};
     std::uint64_t per_fold = request.samples / kFolds;
-    if (request.samples > 0 && per_fold == 0) throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
         integrator.setScene(compiled);
         const std::uint64_t first = std::uint64_t{fold} << 44;
         std::uint64_t done = 0;
         for (std::uint64_t chunk = 1; per_fold == 0 || done < per_fold;) {
-            if (InterruptGuard::signalReceived() != 0) return 128 + InterruptGuard::signalReceived();
+            if (InterruptGuard::signalReceived() != 0) return std::nullopt;
             const double before = elapsed();
             if (per_fold > 0) chunk = std::min(chunk, per_fold - done);
             integrator.render({.first_sample = first + done, .sample_count = chunk});
@@ -145,35 +170,54 @@ int makeReference(const ReferenceRequest& request) {
         integrator.readFilm(part);
         if (part.invalidSamples() > 0)
             throw Error(ErrorKind::Device, fmt::format("{} samples of the reference were NaN or infinite: it would be worth nothing", part.invalidSamples()));
-        folds.push_back(resolveImage(part, scene, 0));
-        film.add(part);
+        folds.images.push_back(resolveImage(part, scene, 0));
+        folds.film.add(part);
     }
-    image = resolveImage(film, scene, 0);
+    return folds;
+}
 
-    Image file = image;
-    file.channels.clear();
+/// R, G and B of the mean, then of each eighth.
+Image referenceImage(const RenderedFolds& folds, const Scene& scene) {
+    const Image mean = resolveImage(folds.film, scene, 0);
+    Image file = mean;
     file.pixels.clear();
     file.channels = {"R", "G", "B"};
     for (std::uint32_t fold = 0; fold < kFolds; ++fold)
         for (const char* c : {"R", "G", "B"}) file.channels.push_back(fmt::format("Fold.{}.{}", fold, c));
-    const std::size_t pixels = std::size_t{image.width} * image.height;
+    const std::size_t pixels = std::size_t{mean.width} * mean.height;
     for (std::size_t p = 0; p < pixels; ++p) {
-        for (std::size_t c = 0; c < 3; ++c) file.pixels.push_back(image.pixels[3 * p + c]);
-        for (const Image& fold : folds)
+        for (std::size_t c = 0; c < 3; ++c) file.pixels.push_back(mean.pixels[3 * p + c]);
+        for (const Image& fold : folds.images)
             for (std::size_t c = 0; c < 3; ++c) file.pixels.push_back(fold.pixels[3 * p + c]);
     }
+    return file;
+}
+
+}  // namespace
+
+std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request) {
+    if (scene.integrator.type != IntegratorType::Path)
+        throw Error(ErrorKind::Usage, "a view has no noise and needs no reference: integrator.type must be path");
+    if (std::filesystem::path(request.output).extension() != ".exr")
+        throw Error(ErrorKind::Usage, fmt::format("a reference holds its eighths beside the image, which only EXR can: '{}' should end in .exr", request.output));
+    if (request.samples > 0 && request.samples < kFolds) throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
+    checkWritable(request.output);
+    const auto started = std::chrono::steady_clock::now();
+    const std::string content = hashOfContent(scene), colour = colourText(scene);
+    scene = referenceScene(std::move(scene), request.same_estimator);
+    const LoadedBackend backend = openBackend(request.backend);
+    Integrator integrator(backend, request.integrator);
+    const std::optional<RenderedFolds> folds = renderFolds(scene, compileScene(scene, 0), integrator, request);
+    if (!folds) return std::nullopt;
+    Image file = referenceImage(*folds, scene);
     file.metadata.emplace_back("Software", "crt " CRT_VERSION);
     file.metadata.emplace_back(kContentKey, content);
+    file.metadata.emplace_back(kColourKey, colour);
     file.metadata.emplace_back(kEstimatorKey, estimatorText(scene));
     file.metadata.emplace_back("crt/backend", backend.name);
     writeImage(request.output, OutputFormat::Exr, file);
-
-    const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, true);
-    logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, film.samples.count(), kFolds, estimatorText(scene), durationText(elapsed()));
-    if (error) logInfo("its own {}", errorText(*error));
-    if (error && error->relative_rmse > 0.02)
-        logWarning("the reference is noisy itself; its variance is subtracted from errors, but more --time, or --same-estimator, makes them surer");
-    return 0;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    return MadeReference{folds->film.samples.count(), estimatorText(scene), seconds, estimateError(folds->film, PixelSet::All, true)};
 }
 
 Reference readReference(const std::string& text, const Scene& scene) {
@@ -184,6 +228,7 @@ Reference readReference(const std::string& text, const Scene& scene) {
         reference.info.kind = ReferenceKind::Analytic;
         reference.info.estimator = fmt::format("closed form: every pixel has luminance {}", text);
         reference.luminance = {static_cast<float>(*value.value)};
+        reference.info.mean_luminance = *value.value;
         reference.info.image_mean.fill(*value.value);
         return reference;
     }
@@ -193,16 +238,21 @@ Reference readReference(const std::string& text, const Scene& scene) {
         throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: make one with 'crt reference {} -o {}'", text, scene.file, text));
     if (content != hashOfContent(scene))
         throw Error(ErrorKind::Usage, fmt::format("'{}' is a reference of another scene, or of this one with other settings or resolution", text));
+    const std::string colour = metadataOf(image, kColourKey);
+    if (colour.empty())
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is of an earlier crt, which did not note exposure, colour space and white balance: make it again "
+                                                  "with 'crt reference'", text));
+    if (colour != colourText(scene))
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is a reference in other colours: it has {}; the scene has {}", text, colour, colourText(scene)));
     reference.width = image.width;
     reference.height = image.height;
     reference.rgb = channelsOf(image, {"R", "G", "B"});
-    const std::array<double, 3> weights = luminanceWeights(scene.film.color_space);
-    reference.luminance = luminanceOf(reference.rgb, weights);
-    std::vector<std::vector<float>> folds;
+    const stats::Rgb weights = stats::luminanceWeights(scene.film.color_space);
+    reference.luminance = stats::luminances(reference.rgb, weights);
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
         const std::vector<float> rgb = channelsOf(image, {fmt::format("Fold.{}.R", fold), fmt::format("Fold.{}.G", fold), fmt::format("Fold.{}.B", fold)});
         if (rgb.empty()) throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: it lacks its eighths", text));
-        folds.push_back(luminanceOf(rgb, weights));
+        reference.fold_luminance.push_back(stats::luminances(rgb, weights));
         reference.fold_rgb.emplace_back(rgb.begin(), rgb.end());
     }
 
@@ -213,24 +263,7 @@ Reference readReference(const std::string& text, const Scene& scene) {
     info.estimator = metadataOf(image, kEstimatorKey);
     const Parsed<std::uint64_t> samples = parseUnsigned(metadataOf(image, "crt/spp"));
     info.samples = samples.value.value_or(0);
-    const std::size_t pixels = reference.luminance.size();
-    double variance = 0, mean = 0;
-    for (std::size_t p = 0; p < pixels; ++p) {
-        std::array<double, kFolds> values{};
-        for (std::uint32_t fold = 0; fold < kFolds; ++fold) values[fold] = folds[fold][p];
-        variance += stats::summarize(values).variance / kFolds / static_cast<double>(pixels);
-        mean += reference.luminance[p] / static_cast<double>(pixels);
-    }
-    info.mean_variance = variance;
-    info.eightfold_spread = std::sqrt(variance) / mean;
-    for (std::size_t c = 0; c < 3; ++c) {
-        std::array<double, kFolds> means{};
-        for (std::uint32_t fold = 0; fold < kFolds; ++fold)
-            for (std::size_t p = 0; p < pixels; ++p) means[fold] += reference.fold_rgb[fold][3 * p + c] / static_cast<double>(pixels);
-        const stats::Summary summary = stats::summarize(means);
-        info.image_mean[c] = summary.mean;
-        info.image_mean_standard_error[c] = summary.standardError();
-    }
+    describeFolds(info, reference.fold_luminance, reference.fold_rgb);
     return reference;
 }
 

@@ -6,6 +6,7 @@
 
 #include "backend/integrator.h"
 #include "converge/measurement.h"
+#include "error_estimate.h"
 #include "job.h"
 #include "progress.h"
 #include "scene.h"
@@ -35,11 +36,25 @@ struct ReferenceRequest {
 /// Renders it and returns the exit code. Throws crt::Error.
 int makeReference(const ReferenceRequest& request);
 
+/// The same for a scene that is read already; `request.scene` does not matter. What it took and how noisy it is, or nothing
+/// when a signal stopped it.
+struct MadeReference {
+    std::uint64_t samples = 0;  ///< Per pixel.
+    std::string estimator;
+    double seconds = 0;
+    std::optional<ErrorEstimate> error;
+};
+std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request);
+
 /// The scene as a reference renders it: independent samples, another seed, light sampling switched, no roulette.
 Scene referenceScene(Scene scene, bool same_estimator);
 
-/// Hash of what is to be seen, without how: two scenes with it have the same expected image.
+/// Hash of what is to be seen, without how: two scenes with it have the same expected light on the film. Their images are
+/// the same when colourText() is, too.
 std::string hashOfContent(const Scene& scene);
+
+/// What becomes of that light in the image: "exposure 0 EV, linear sRGB, no white balance".
+std::string colourText(const Scene& scene);
 
 /// A reference in memory, of the film's size.
 struct Reference {
@@ -47,14 +62,12 @@ struct Reference {
     std::uint32_t width = 0, height = 0;   ///< 0: one value for all pixels.
     std::vector<float> rgb;                ///< [height][width][3]; empty with one value.
     std::vector<float> luminance;          ///< [height][width]; one value when all pixels have it.
+    std::vector<std::vector<float>> fold_luminance;        ///< kFolds planes; empty with one value.
     std::vector<std::vector<double>> fold_rgb;  ///< kFolds images, [height][width][3]; empty with one value.
 };
 
 /// "0.2394564705" is the luminance that every pixel has (a closed form); anything else a file of makeReference's, which must be of this scene. Throws
 /// crt::Error(Usage).
 Reference readReference(const std::string& text, const Scene& scene);
-
-/// Luminance of linear RGB in the scene's colour space.
-std::array<double, 3> luminanceWeights(ColorSpace space);
 
 }  // namespace crt::converge

@@ -61,6 +61,113 @@ class Converging(CliTest):
         for key, value in first.items():
             self.assertEqual(both[key], value)
 
+    def converge(self, *arguments, folder="out", expect=0, time="2s", spp="8"):
+        return self.crt("converge", *arguments, "--backends", self.backend, "--time", time, "--max-spp", spp, "-o", folder, expect=expect)
+
+    def test_resume_refuses_what_is_not_the_same_experiment(self):
+        self.converge("scene.yaml", *SMALL)
+        cases = [("the size", ["--set", "film.resolution=[32,32]", "--set", "sampler.type=independent"]),
+                 ("the size", ["--set", "film.resolution=[4,4]", "--set", "sampler.type=independent"]),
+                 ("the maximum depth", [*SMALL, "--set", "integrator.max_depth=2"]),
+                 ("the sampler", ["--set", "film.resolution=[16,16]"]),
+                 ("the seed", [*SMALL, "--set", "sampler.seed=77"]),
+                 ("light sampling", [*SMALL, "--set", "integrator.nee=false"]),
+                 ("the colour", [*SMALL, "--set", "film.exposure_ev=1"]),
+                 ("the hash of what is to be seen", [*SMALL, "--set", "camera.fov=20"]),
+                 ("the reference", [*SMALL, "--reference", "0.5"]),
+                 ("the number of threads", [*SMALL, "-t", "1"]),
+                 ("it has no", [*SMALL, "--vary", "roulette=true,false"])]
+        before = self.rows("out")
+        for what, changed in cases:
+            with self.subTest(what=what, changed=changed):
+                self.assert_one_error(self.converge("scene.yaml", *changed, "--resume", expect=2), "another experiment", what)
+        self.assertEqual(self.rows("out"), before)
+        self.converge("scene.yaml", *SMALL, "--resume")
+
+    def test_resume_refuses_what_it_cannot_read(self):
+        self.converge("scene.yaml", *SMALL)
+        replicates = self.path("out/replicates")
+        name = os.path.join(replicates, sorted(os.listdir(replicates))[0])
+        with open(name, "r+b") as file:
+            file.truncate(os.path.getsize(name) - 4)
+        self.assert_one_error(self.converge("scene.yaml", *SMALL, "--resume", expect=2), "is not a replicate of this run")
+        os.remove(name)
+        os.remove(self.path("out/experiment.json"))
+        self.assert_one_error(self.converge("scene.yaml", *SMALL, "--resume", expect=2), "experiment.json")
+
+    def test_a_resumed_run_says_of_the_same_rows_what_the_first_said(self):
+        self.converge("scene.yaml", *SMALL, "--replicates", "4", time="3s", spp="64")
+        first = self.summary("out")
+        self.converge("scene.yaml", *SMALL, "--replicates", "4", "--resume", time="0.01s", spp="64")
+        again = self.summary("out")
+        fit, fit_again = first["fits"][0], again["fits"][0]
+        self.assertIn("error", fit)
+        for name in ("verdict", "verdict_reason", "error", "slope_against_samples", "relative_mean_bias_rgb", "points"):
+            self.assertEqual(fit_again[name], fit[name], name)
+        configuration, configuration_again = first["configurations"][0], again["configurations"][0]
+        for name in ("width", "height", "image_tests", "scene_hash", "kept", "left_out"):
+            self.assertEqual(configuration_again[name], configuration[name], name)
+        self.assertEqual(again["configurations"][0]["width"], 16)
+        self.assertIsNotNone(again["configurations"][0]["image_tests"]["smallest_tile_p"])
+
+    def test_scenes_of_one_file_name_are_kept_apart_and_repeats_refused(self):
+        for folder, fov in (("a", 20), ("b", 60)):
+            os.makedirs(self.path(folder))
+            with open(self.path("scene.yaml"), encoding="utf-8") as file:
+                text = file.read()
+            with open(self.path(f"{folder}/scene.yaml"), "w", encoding="utf-8") as file:
+                file.write(text)
+        self.converge("a/scene.yaml", "b/scene.yaml", *SMALL)
+        self.assertEqual({fit["scene"] for fit in self.summary("out")["fits"]}, {"a/scene", "b/scene"})
+        rows = self.rows("out")
+        keys = [(row["scene"], row["replicate"], row["samples_per_pixel"]) for row in rows if row["between_replicates_mse"] is None]
+        self.assertEqual(len(keys), len(set(keys)))
+        self.assert_one_error(self.converge("scene.yaml", "./scene.yaml", folder="c", expect=2), "twice")
+        run = self.crt("converge", "scene.yaml", "--backends", f"{self.backend},{self.backend}", "-o", "d", expect=2)
+        self.assert_one_error(run, "--backends", "twice")
+        self.assert_one_error(self.converge("scene.yaml", "--vary", "nee=true,true", folder="e", expect=2), "--vary nee", "twice")
+
+    def test_a_reference_of_other_colours_is_refused(self):
+        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", "64", "--same-estimator", "-b", self.backend, *SMALL)
+        for changed in ("film.exposure_ev=1", "film.color_space=acescg", "film.white_balance={illuminant: A}"):
+            with self.subTest(changed=changed):
+                run = self.converge("scene.yaml", "--reference", "ref.exr", "--set", changed, *SMALL, folder="o" + changed[5:8], expect=2)
+                self.assert_one_error(run, "a reference in other colours")
+
+    def test_a_variant_that_shows_another_image_is_not_held_against_the_reference(self):
+        depths = ["--set", "integrator.max_depth=4", "--vary", "depth=1,4"]
+        self.converge("scene.yaml", *SMALL, *depths)
+        fits = {fit["variant"]: fit for fit in self.summary("out")["fits"]}
+        self.assertIsNone(fits["depth=1"]["relative_mean_bias_rgb"])
+        self.assertEqual(fits["depth=1"]["verdict"], "INCONCLUSIVE")
+        self.assertIsNotNone(fits["depth=4"]["relative_mean_bias_rgb"])
+        self.assertTrue(any("'depth=1' shows another image" in note for note in self.summary("out")["notes"]))
+
+    def test_without_a_reference_one_is_made_within_the_time(self):
+        run = self.converge("scene.yaml", *SMALL, time="4s", spp="64")
+        self.assertIn("no reference was given", run.stderr)
+        summary = self.summary("out")
+        reference = summary["references"][0]
+        self.assertEqual(reference["kind"], "independent")
+        self.assertTrue(os.path.exists(self.path("out/reference-scene.exr")))
+        self.assertEqual(summary["fits"][0]["error_source"], "reference")
+        self.assertTrue(any("25 % of --time" in note for note in summary["notes"]), summary["notes"])
+        self.assertLess(summary["environment"]["spent_seconds"], 6)
+
+    def test_void_rows_fail_in_text_and_exit_code(self):
+        run = self.crt("converge", "scene.yaml", "--backends", "fake", "--reference", "0.5", "--time", "2s", "--max-spp", "64", "-o", "out",
+                       "--set", "film.resolution=[8,8]", expect=7, CRT_FAKE_FAULT="nan")
+        self.assertIn("FAIL", run.stderr)
+        self.assertIn("void", run.stderr)
+        self.assertEqual(self.summary("out")["fits"][0]["verdict"], "FAIL")
+
+    def test_start_up_is_not_charged_to_whoever_is_first(self):
+        self.crt("converge", "scene.yaml", "--backends", "fake", "--reference", "5", "--vary", "roulette=true,false", "--time", "6s",
+                 "--max-spp", "8", "-o", "out", "--set", "film.resolution=[8,8]", expect=7, CRT_FAKE_FIRST_START_MS="700")
+        starts = {row["variant"]: row["seconds_before_first_sample"] for row in self.rows("out")}
+        self.assertEqual(len(starts), 2)
+        self.assertLess(max(starts.values()), 0.5, starts)
+
     def test_vary_takes_combinations_and_names_what_it_does_not_know(self):
         self.crt("converge", "scene.yaml", "--backends", self.backend, "--vary", "sampler=sobol,independent", "--vary", "nee=true,false", "--time", "3s",
                  "--max-spp", "4", "-o", "out", "--set", "film.resolution=[8,8]")

@@ -1,0 +1,233 @@
+// What crt converge says about renders whose truth is known by construction: one JSON object a line for every statement in
+// every situation, with how often it was wrong. bench/run false-alarms makes a page of them.
+//
+//     false_alarms REPEATS
+#include "converge/findings.h"
+#include "converge/fits.h"
+#include "error.h"
+#include "synthetic_run.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <limits>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+using namespace crt;
+using namespace crt::converge;
+
+namespace {
+
+/// How often a statement was made, and how often it was wrong.
+struct Tally {
+    double stated = 0;  ///< Part that may be wrong.
+    std::uint64_t asked = 0, wrong = 0;
+};
+
+/// Statements in the order in which they first came.
+class Tallies {
+public:
+    void count(const std::string& statement, double stated, bool wrong) {
+        const auto [found, is_new] = places_.try_emplace(statement, tallies_.size());
+        if (is_new) tallies_.push_back({statement, {stated, 0, 0}});
+        Tally& tally = tallies_[found->second].second;
+        ++tally.asked;
+        tally.wrong += wrong ? 1 : 0;
+    }
+    void interval(const std::string& statement, const Estimate& estimate, double truth) {
+        count(statement, 0.05, !(estimate.low <= truth && truth <= estimate.high));
+    }
+    void print(const std::string& situation) const {
+        for (const auto& [statement, tally] : tallies_)
+            fmt::print(
+                "{{\"situation\": \"{}\", \"statement\": \"{}\", \"stated\": {}, \"asked\": {}, \"wrong\": "
+                "{}}}\n",
+                situation, statement, tally.stated, tally.asked, tally.wrong);
+        std::fflush(stdout);
+    }
+
+private:
+    std::map<std::string, std::size_t> places_;
+    std::vector<std::pair<std::string, Tally>> tallies_;
+};
+
+/// Intervals of one configuration against what they should hold.
+void countIntervals(Tallies& tallies, const ConfigurationFit& fit, const SyntheticRender& what) {
+    const double v = what.variance, b2 = what.bias * what.bias + what.mean_bias * what.mean_bias;
+    const Point& last = fit.points.back();
+    const double mse =
+        v / static_cast<double>(last.samples) + (fit.source == ErrorSource::Reference ? b2 : 0);
+    tallies.interval("relative RMSE", last.relative_rmse, std::sqrt(mse));
+    if (fit.fitted && std::isfinite(fit.error.variance.value) && (b2 == 0 || what.has_reference))
+        tallies.interval("v of v/N + b²", fit.error.variance, v);
+    if (fit.error.bias_squared) tallies.interval("b²", *fit.error.bias_squared, b2);
+    if (last.mean_bias) tallies.interval("bias of the image mean", *last.mean_bias, what.mean_bias);
+    if (fit.fitted && b2 == 0 && std::isfinite(fit.slope_samples.value))
+        tallies.interval("slope", fit.slope_samples, -0.5);
+    const double predicted =
+        what.prediction * std::sqrt(v / static_cast<double>(last.samples)) * std::sqrt(1 + 0.05 * 0.05);
+    if (last.calibration && std::isfinite(last.calibration->value))
+        tallies.interval("predicted over actual error", *last.calibration, predicted / std::sqrt(mse));
+}
+
+/// Verdicts that are wrong, whatever the situation: FAIL of what is right, PASS of what is not.
+void countVerdict(Tallies& tallies, const ConfigurationFit& fit, bool right, bool flat) {
+    using stats::Verdict;
+    if (right) {
+        tallies.count("FAIL of what is right", 0.001, fit.judgement.verdict == Verdict::Fail);
+        if (fit.fitted && !flat) tallies.count("a floor where there is none", 0.001, fit.error.flattening);
+    } else {
+        tallies.count("PASS of what is wrong", 0.001, fit.judgement.verdict == Verdict::Pass);
+    }
+}
+
+struct Situation {
+    std::string name;
+    SyntheticRender what;
+    bool right = true;
+};
+
+std::vector<Situation> situations() {
+    SyntheticRender plain;
+    plain.variance = 0.02;
+    plain.looks = 9;  // To 256 samples: 0.9 %.
+    std::vector<Situation> list;
+    const auto add = [&](const std::string& name, bool right,
+                         const std::function<void(SyntheticRender&)>& change) {
+        list.push_back({name, plain, right});
+        change(list.back().what);
+    };
+    const double own = plain.variance / 256;
+    add("exact reference, 16 replicates", true, [](SyntheticRender&) {});
+    for (const unsigned r : {2u, 3u, 5u})
+        add(fmt::format("{} replicates", r), true, [r](SyntheticRender& w) { w.replicates = r; });
+    add("2 replicates, unequal variances", true,
+        [](SyntheticRender& w) { w.replicates = 2, w.inequality = 100; });
+    add("one pixel", true, [](SyntheticRender& w) { w.pixels = 1; });
+    add("unequal variances, 100 : 1", true, [](SyntheticRender& w) { w.inequality = 100; });
+    add("reference as noisy as the images", true, [&](SyntheticRender& w) { w.reference_variance = own; });
+    add("reference noisier, four times the variance", true,
+        [&](SyntheticRender& w) { w.reference_variance = 4 * own; });
+    add("noisy reference, unequal variances", true,
+        [&](SyntheticRender& w) { w.reference_variance = own, w.inequality = 100; });
+    add("noisy reference, 4 replicates", true,
+        [&](SyntheticRender& w) { w.reference_variance = own, w.replicates = 4; });
+    add("noisy reference, one pixel", true,
+        [&](SyntheticRender& w) { w.reference_variance = own, w.pixels = 1; });
+    add("no reference", true, [](SyntheticRender& w) { w.has_reference = false; });
+    add("no reference, 3 replicates", true,
+        [](SyntheticRender& w) { w.has_reference = false, w.replicates = 3; });
+    add("a channel below 0, one of 0", true, [&](SyntheticRender& w) {
+        w.colour = {1.3, 0, -0.2}, w.reference_variance = own;
+    });
+    add("bias of 0.5 %, within the margin", true, [](SyntheticRender& w) { w.mean_bias = 0.005; });
+    add("bias of 1 %, on the margin", false, [](SyntheticRender& w) { w.mean_bias = 0.01; });
+    add("bias of 1.2 %, noisy reference", false,
+        [&](SyntheticRender& w) { w.mean_bias = 0.012, w.reference_variance = own; });
+    add("pixels off by 3 %, noisy reference", false,
+        [&](SyntheticRender& w) { w.bias = 0.03, w.reference_variance = own; });
+    add("bias of 1.5 % in a channel below 0", false, [](SyntheticRender& w) {
+        w.colour = {1.3, 0.9, -0.2}, w.colour_bias = {0, 0, 0.015};
+    });
+    return list;
+}
+
+void measure(const Situation& situation, int repeats) {
+    Tallies tallies;
+    for (int i = 0; i < repeats; ++i) {
+        const Run run = syntheticRun(situation.what, 7919u * static_cast<std::uint64_t>(i) + 13);
+        const ConfigurationFit fit = analyze(run).fits.at(0);
+        countIntervals(tallies, fit, situation.what);
+        if (situation.what.has_reference)
+            countVerdict(tallies, fit, situation.right, situation.what.mean_bias != 0);
+    }
+    tallies.print(situation.name);
+}
+
+Configuration configurationOf(const std::string& backend, const std::string& variant,
+                              const SyntheticRender& what) {
+    Configuration configuration;
+    configuration.key = {"scene", backend, variant};
+    configuration.width = what.pixels;
+    configuration.height = 1;
+    return configuration;
+}
+
+/// Four configurations that are alike but for their seeds: whoever is said to be ahead of another is a false alarm.
+void measureRanking(int repeats) {
+    SyntheticRender what;
+    what.variance = 0.02;
+    what.looks = 9;
+    what.has_reference = false;
+    Tallies tallies;
+    for (int i = 0; i < repeats; ++i) {
+        Run run;
+        for (int c = 0; c < 4; ++c) {
+            run.configurations.push_back(configurationOf("backend", fmt::format("variant={}", c), what));
+            const auto seed = static_cast<std::uint64_t>(100 * (4 * i + c));
+            for (Row& row : syntheticRows(run.configurations.back().key, what, seed))
+                run.rows.push_back(std::move(row));
+        }
+        std::string text;
+        for (const Finding& finding : findingsOfScene(run, analyze(run), "scene")) text += finding.text;
+        tallies.count("'times sooner than the next'", 0.05, text.find("times sooner") != std::string::npos);
+        tallies.count("'the most efficient'", 0.05, text.find("times the least") != std::string::npos);
+    }
+    tallies.print("four alike, without a reference");
+}
+
+/// Rows that are void, of a render that is right otherwise, and a bias far beyond the margin: both must fail, always.
+void measureFaults(int repeats) {
+    Tallies tallies;
+    for (int i = 0; i < repeats; ++i) {
+        SyntheticRender what;
+        what.variance = 0.02;
+        what.looks = 9;
+        const auto seed = static_cast<std::uint64_t>(7919 * i + 13);
+        Run run = syntheticRun(what, seed);
+        run.rows[static_cast<std::size_t>(i) % run.rows.size()].invalid_samples = 1;
+        tallies.count("no FAIL of a void row", 0,
+                      analyze(run).fits[0].judgement.verdict != stats::Verdict::Fail);
+        for (Row& row : run.rows) row.invalid_samples = 1;
+        tallies.count("no FAIL where all rows are void", 0,
+                      analyze(run).fits[0].judgement.verdict != stats::Verdict::Fail);
+        what.mean_bias = -0.05;
+        tallies.count("no FAIL of a bias of −5 %", 0,
+                      analyze(syntheticRun(what, seed)).fits[0].judgement.verdict != stats::Verdict::Fail);
+        what.mean_bias = 0;
+        what.colour = {1.3, 0.9, -0.2};
+        what.colour_bias = {0, 0, -0.05};
+        tallies.count("no FAIL of one of −5 % in a channel below 0", 0,
+                      analyze(syntheticRun(what, seed)).fits[0].judgement.verdict != stats::Verdict::Fail);
+        what.colour_bias = {0, 0, 0};
+        what.bias = 0.05;
+        tallies.count("no FAIL of pixels off by 5 %", 0,
+                      analyze(syntheticRun(what, seed)).fits[0].judgement.verdict != stats::Verdict::Fail);
+    }
+    tallies.print("what must fail");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    const int repeats = argc == 2 ? std::atoi(argv[1]) : 0;
+    if (repeats <= 0) {
+        std::fprintf(stderr, "false_alarms REPEATS\n");
+        return 2;
+    }
+    try {
+        for (const Situation& situation : situations()) measure(situation, repeats);
+        measureRanking(repeats);
+        measureFaults(repeats);
+        return 0;
+    } catch (const Error& error) {
+        std::fprintf(stderr, "false_alarms: %s\n", error.what());
+        return error.exitCode();
+    }
+}

@@ -1,0 +1,301 @@
+#include "converge/error_model.h"
+
+#include "stats/luminance_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace crt::converge {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Line through (x, y) whose errors are relative to y: weights 1/y², then 1/line², so that a low point does not weigh more
+/// for being low.
+stats::LineFit relativeLine(std::span<const double> x, std::span<const double> y) {
+    std::vector<double> weights(y.size());
+    std::transform(y.begin(), y.end(), weights.begin(), [](double value) { return 1 / (value * value); });
+    const stats::LineFit first = stats::weightedLine(x, y, weights);
+    for (std::size_t i = 0; i < x.size(); ++i)
+        if (const double on_line = first.at(x[i]); on_line > 0.25 * y[i])
+            weights[i] = 1 / (on_line * on_line);
+    return stats::weightedLine(x, y, weights);
+}
+
+}  // namespace
+
+RowList rowsOf(const std::map<std::uint32_t, const Row*>& of_replicates) {
+    RowList rows;
+    for (const auto& [replicate, row] : of_replicates) rows.push_back(row);
+    return rows;
+}
+
+RowsBySamples::const_reverse_iterator lastFullColumn(const RowsBySamples& by_samples) {
+    std::size_t most = 0;
+    for (const auto& [samples, rows] : by_samples) most = std::max(most, rows.size());
+    const std::size_t enough = std::max<std::size_t>(2, (3 * most + 3) / 4);
+    return std::find_if(by_samples.rbegin(), by_samples.rend(),
+                        [&](const auto& column) { return column.second.size() >= enough; });
+}
+
+Block balancedBlock(const RowsBySamples& by_samples) {
+    Block block;
+    const auto last = lastFullColumn(by_samples);
+    if (last == by_samples.rend()) return block;
+    block.rows.resize(last->second.size());
+    for (const auto& [samples, rows] : by_samples) {
+        if (samples > last->first) break;
+        const auto has = [&rows = rows](const auto& entry) { return rows.count(entry.first) == 1; };
+        if (!std::all_of(last->second.begin(), last->second.end(), has)) continue;
+        block.samples.push_back(static_cast<double>(samples));
+        std::size_t r = 0;
+        for (const auto& [replicate, row] : last->second) block.rows[r++].push_back(rows.at(replicate));
+    }
+    return block;
+}
+
+double meanOver(Indices replicates, const std::function<double(std::size_t)>& value) {
+    double sum = 0;
+    for (const std::size_t r : replicates) sum += value(r);
+    return sum / static_cast<double>(replicates.size());
+}
+
+double logSlope(const std::vector<double>& x, const std::vector<double>& y) {
+    std::vector<double> log_x, log_y;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        if (!(x[i] > 0) || !(y[i] > 0)) continue;
+        log_x.push_back(std::log(x[i]));
+        log_y.push_back(std::log(y[i]));
+    }
+    if (log_x.size() < 3) return kNaN;
+    return stats::weightedLine(log_x, log_y, std::vector<double>(log_x.size(), 1.0)).slope;
+}
+
+// ------------------------------------------------------------------------------------------------------ Measure
+
+Measure::Measure(const RowsBySamples& by_samples, const ReferenceInfo* reference, double pixels)
+    : pixels_(pixels) {
+    bool has_error =
+        reference != nullptr && reference->kind != ReferenceKind::None && reference->mean_luminance != 0;
+    bool has_folds = has_error && reference->fold_distance.size() >= 3;
+    double mean = 0;
+    for (const auto& [samples, rows] : by_samples) {
+        mean = 0;
+        for (const auto& [replicate, row] : rows) {
+            has_error = has_error && row->error.has_value();
+            has_folds = has_folds && row->fold_mse.size() == reference->fold_distance.size();
+            mean += row->mean_luminance /
+                    static_cast<double>(rows.size());  // What is left is that of the most samples.
+        }
+    }
+    scale_ = std::abs(mean);
+    if (!has_error) return;
+    source_ = ErrorSource::Reference;
+    reference_ = reference;
+    scale_ = std::abs(reference->mean_luminance);
+    if (has_folds) divideReference();
+}
+
+void Measure::divideReference() {
+    const std::size_t count = reference_->fold_distance.size();
+    for (std::size_t part = 0; part <= count; ++part) {
+        Part p;
+        for (std::size_t k = 0; k < count; ++k)
+            if (k + 1 != part) p.folds.push_back(k);
+        const auto m = static_cast<double>(p.folds.size());
+        double mean = 0;
+        for (const std::size_t k : p.folds) {
+            mean += reference_->fold_mean_luminance[k] / m;
+            for (const std::size_t l : p.folds)
+                p.pairs += reference_->fold_distance[k][l] / (2 * m * (m - 1));
+        }
+        p.scale = std::abs(mean);
+        parts_.push_back(std::move(p));
+    }
+}
+
+bool Measure::referenceIsNoisy(const RowList& column) const {
+    if (reference_ == nullptr || column.empty()) return false;
+    double mean = 0;
+    for (const Row* row : column) mean += variance(*row) / static_cast<double>(column.size());
+    return reference_->mean_variance / (scale_ * scale_) > 0.1 * mean;
+}
+
+SampleCounts Measure::countsOfBias(std::size_t replicates) const {
+    SampleCounts counts;
+    counts.errors = replicates;
+    counts.folds = parts_.empty() ? 0 : parts_.size() - 1;
+    return counts;
+}
+
+SampleCounts Measure::counts(std::size_t replicates) const {
+    if (source_ == ErrorSource::Reference) return countsOfBias(replicates);
+    // Deviations from a common mean are not independent of each other.
+    const double few = replicates > 2
+                           ? static_cast<double>(replicates - 1) / static_cast<double>(replicates - 2)
+                           : std::numeric_limits<double>::infinity();
+    SampleCounts counts;
+    counts.errors = replicates;
+    counts.widening = std::sqrt(few);
+    return counts;
+}
+
+double Measure::mse(const Row& row, std::size_t reference_part) const {
+    return source_ == ErrorSource::Reference ? referenceMse(row, reference_part) : variance(row);
+}
+
+double Measure::referenceMse(const Row& row, std::size_t reference_part) const {
+    if (parts_.empty()) return (row.error->mse - reference_->mean_variance) / (scale_ * scale_);
+    const Part& part = parts_[reference_part];
+    double sum = 0;
+    for (const std::size_t k : part.folds) sum += row.fold_mse[k];
+    return (sum / static_cast<double>(part.folds.size()) - part.pairs) / (part.scale * part.scale);
+}
+
+double Measure::variance(const Row& row) const {
+    return row.between_replicates_mse ? *row.between_replicates_mse / (scale_ * scale_) : kNaN;
+}
+
+Estimate Measure::noNarrowerThanNoBias(const Estimate& estimate, double variance, const Row& row,
+                                       std::size_t replicates, double confidence) const {
+    if (!std::isfinite(estimate.value) || replicates < 2 || reference_ == nullptr) return estimate;
+    const double of_mean = variance / static_cast<double>(replicates);
+    const double of_reference = reference_->mean_variance / (scale_ * scale_), sum = of_mean + of_reference;
+    if (!(sum > 0)) return estimate;
+    const double pixels = row.effective_pixels.value_or(pixels_),
+                 reference_pixels = reference_->effective_pixels.value_or(pixels_);
+    // Pixels where both are noisy count as much as they can (Cauchy and Schwarz), which makes the interval longer.
+    const double pixels_of_sum =
+        std::pow(sum / (of_mean / std::sqrt(pixels) + of_reference / std::sqrt(reference_pixels)), 2);
+    const double folds =
+        reference_->fold_distance.empty() ? 8 : static_cast<double>(reference_->fold_distance.size());
+    const double dof = sum * sum /
+                       (of_mean * of_mean / (pixels * static_cast<double>(replicates - 1)) +
+                        of_reference * of_reference / (reference_pixels * (folds - 1)));
+    const double above = sum * (stats::fisherQuantile(0.5 + 0.5 * confidence, pixels_of_sum, dof) - 1);
+    const double below = sum * (1 - stats::fisherQuantile(0.5 - 0.5 * confidence, pixels_of_sum, dof));
+    return {estimate.value, std::min(estimate.low, estimate.value - above),
+            std::max(estimate.high, estimate.value + below)};
+}
+
+// --------------------------------------------------------------------------------------------------- ErrorModel
+
+ErrorModel::ErrorModel(Block block, const Measure& measure) : block_(std::move(block)), measure_(measure) {
+    const std::vector<std::size_t> all = allOf(block_.replicates());
+    for (std::size_t i = 0; i < block_.columns(); ++i) {
+        const Statistic error = [&, i](const Resample& resample) { return errors(resample)[i]; };
+        seen_.push_back(error({all, {}, 0}) > 3 * foldError(counts(), error));
+    }
+}
+
+std::vector<double> ErrorModel::errors(const Resample& resample) const {
+    std::vector<double> means(block_.columns());
+    for (std::size_t i = 0; i < means.size(); ++i)
+        means[i] = meanOver(resample.errors, [&](std::size_t r) {
+            return measure_.mse(*block_.rows[r][i], resample.reference_part);
+        });
+    return means;
+}
+
+stats::LineFit ErrorModel::line(const Resample& resample) const {
+    std::vector<double> x, y;
+    const std::vector<double> mse = errors(resample);
+    for (std::size_t i = 0; i < mse.size(); ++i) {
+        if (!seen_[i]) continue;
+        if (!(mse[i] > 0)) return {kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, 0};
+        x.push_back(1 / block_.samples[i]);
+        y.push_back(mse[i]);
+    }
+    if (x.size() < 3) return {kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, 0};
+    return relativeLine(x, y);
+}
+
+double ErrorModel::slope(const Resample& resample) const {
+    std::vector<double> mse = errors(resample);
+    for (std::size_t i = 0; i < mse.size(); ++i) {
+        if (!seen_[i])
+            mse[i] = -1;
+        else if (!(mse[i] > 0))
+            return kNaN;
+    }
+    return logSlope(block_.samples, mse) / 2;
+}
+
+double ErrorModel::biasSquared(const Resample& resample) const {
+    std::vector<double> of_columns(block_.columns());
+    for (std::size_t i = 0; i < of_columns.size(); ++i)
+        of_columns[i] = meanOver(resample.errors, [&](std::size_t r) {
+            return measure_.biasSquared(*block_.rows[r][i], resample.reference_part);
+        });
+    return weighted(of_columns);
+}
+
+double ErrorModel::varianceOfBias() const {
+    const std::vector<std::size_t> all = allOf(block_.replicates());
+    std::vector<double> of_columns(block_.columns());
+    for (std::size_t i = 0; i < of_columns.size(); ++i)
+        of_columns[i] = meanOver(all, [&](std::size_t r) { return measure_.variance(*block_.rows[r][i]); });
+    return weighted(of_columns);
+}
+
+double ErrorModel::samplesTo(const Resample& resample, double target, bool extrapolate) const {
+    std::vector<double> mse = errors(resample);
+    if (mse[0] <= target) return block_.samples[0];
+    for (std::size_t i = 1; i < mse.size(); ++i) {
+        if (!(mse[i] <= target)) continue;
+        const double low = std::max(mse[i], 1e-3 * target);  // Not above 0 below the reference's noise.
+        const double share = std::log(target / mse[i - 1]) / std::log(low / mse[i - 1]);
+        return block_.samples[i - 1] * std::pow(block_.samples[i] / block_.samples[i - 1], share);
+    }
+    if (!extrapolate) return kNaN;
+    const auto first = static_cast<std::ptrdiff_t>(mse.size() > 4 ? mse.size() - 4 : 0);
+    const double slope =
+        logSlope({block_.samples.begin() + first, block_.samples.end()}, {mse.begin() + first, mse.end()});
+    return slope < -0.2 ? block_.samples.back() * std::pow(target / mse.back(), 1 / slope) : kNaN;
+}
+
+double ErrorModel::weighted(const std::vector<double>& of_columns) const {
+    double sum = 0, weights = 0;
+    for (std::size_t i = 0; i < of_columns.size(); ++i) {
+        const double weight = block_.samples[i] * block_.samples[i];
+        sum += weight * of_columns[i];
+        weights += weight;
+    }
+    return sum / weights;
+}
+
+// ---------------------------------------------------------------------------------------------------- TimeModel
+
+TimeModel::TimeModel(Block block) : block_(std::move(block)) {
+    std::vector<double> before;
+    for (const RowList& rows : block_.rows) before.push_back(rows.back()->seconds_before_first_sample);
+    const auto middle = before.begin() + static_cast<std::ptrdiff_t>(before.size() / 2);
+    std::nth_element(before.begin(), middle, before.end());
+    before_first_sample_ = *middle;
+}
+
+std::vector<double> TimeModel::renderSeconds(const Resample& resample) const {
+    std::vector<double> means(block_.columns());
+    for (std::size_t i = 0; i < means.size(); ++i)
+        means[i] =
+            meanOver(resample.times, [&](std::size_t r) { return block_.rows[r][i]->render_wall_seconds; });
+    return means;
+}
+
+stats::LineFit TimeModel::line(const Resample& resample) const {
+    return relativeLine(block_.samples, renderSeconds(resample));
+}
+
+double TimeModel::secondsTo(const Resample& resample, double samples) const {
+    if (!std::isfinite(samples)) return kNaN;
+    const std::vector<double> seconds = renderSeconds(resample);
+    const auto right = std::lower_bound(block_.samples.begin(), block_.samples.end(), samples);
+    if (right == block_.samples.end()) return before_first_sample_ + line(resample).at(samples);
+    const auto i = static_cast<std::size_t>(right - block_.samples.begin());
+    if (i == 0) return before_first_sample_ + seconds[0];
+    const double share = (samples - block_.samples[i - 1]) / (block_.samples[i] - block_.samples[i - 1]);
+    return before_first_sample_ + seconds[i - 1] + share * (seconds[i] - seconds[i - 1]);
+}
+
+}  // namespace crt::converge

@@ -1,0 +1,32 @@
+/// What `--vary` makes of a scene, and how large it is rendered.
+#pragma once
+
+#include "job.h"
+#include "scene.h"
+
+#include <string>
+#include <vector>
+
+namespace crt::converge {
+
+/// "sampler=sobol,independent": a key of the scene, or a short name of one, and the values it takes.
+struct Vary {
+    std::string key;   ///< As written, for labels.
+    std::string path;  ///< In the scene: "sampler.type".
+    std::vector<std::string> values;
+};
+/// Throws crt::Error(Usage).
+Vary parseVary(const std::string& text);
+
+/// One combination of what varies, as label and changes of the scene.
+struct Variant {
+    std::string label;
+    std::vector<SceneOverride> changes;
+};
+std::vector<Variant> variantsOf(const std::vector<Vary>& vary);
+
+/// The scene, its longer side of `resolution` pixels where nobody asked for a size (0: as it is): error against time does
+/// not need 2 million pixels.
+Scene loadSmall(SceneRequest request, const std::vector<SceneOverride>& changes, int resolution);
+
+}  // namespace crt::converge
