@@ -1,5 +1,6 @@
-// What crt converge says about renders whose truth is known by construction: one JSON object a line for every statement in
-// every situation, with how often it was wrong. bench/run false-alarms makes a page of them.
+// What crt converge says about renders whose truth is known by construction: one JSON object a line for
+// every statement in every situation, with how often it was wrong. bench/run false-alarms makes a page of
+// them.
 //
 //     false_alarms REPEATS
 #include "converge/findings.h"
@@ -159,7 +160,8 @@ Configuration configurationOf(const std::string& backend, const std::string& var
     return configuration;
 }
 
-/// Four configurations that are alike but for their seeds: whoever is said to be ahead of another is a false alarm.
+/// Four configurations that are alike but for their seeds: whoever is said to be ahead of another is a false
+/// alarm.
 void measureRanking(int repeats) {
     SyntheticRender what;
     what.variance = 0.02;
@@ -182,7 +184,8 @@ void measureRanking(int repeats) {
     tallies.print("four alike, without a reference");
 }
 
-/// Rows that are void, of a render that is right otherwise, and a bias far beyond the margin: both must fail, always.
+/// Rows that are void, of a render that is right otherwise, and a bias far beyond the margin: both must
+/// fail, always.
 void measureFaults(int repeats) {
     Tallies tallies;
     for (int i = 0; i < repeats; ++i) {

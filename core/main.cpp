@@ -375,7 +375,8 @@ private:
         });
         command->footer("\nRenders every scene with every backend and variant, again and again with other seeds, looks at 1, 2, 4 ... samples, and writes one\n"
                         "page: error against seconds with its interval, efficiency, bias, whether the images' own error estimates hold, where the time goes.\n"
-                        "Where no --reference is given, a quarter of --time makes one. docs/error.md explains the terms.\n"
+                        "Where no --reference is given, a quarter of --time makes one.\n"
+                        "docs/error.md explains the terms.\n"
                         "\nExamples:\n"
                         "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60 -o out/converge\n"
                         "  crt converge scene.yaml --vary sampler=sobol,independent --vary nee=true,false --reference ref.exr\n"
@@ -417,7 +418,8 @@ private:
         reader_.option(*command, "-o,--output", "DIR", "folder for report.html, results and figures (converge)",
                        [this](const std::string& text) { converge_.output = text; })
             ->group(group);
-        command->add_flag("--resume", converge_.resume, "go on with the run in that folder; refused where it is another experiment")->group(group);
+        command->add_flag("--resume", converge_.resume, "go on with the run in that folder, of the same experiment")
+            ->group(group);
         command->add_flag_callback("-q,--quiet", [this] { converge_.progress = ProgressMode::None; }, "no progress")->group(group);
     }
 

@@ -1,6 +1,6 @@
-/// Rows of renders that never were, with known variance, bias and cost: progressive means of normal samples, pixel by
-/// pixel, so that looks at one replicate are nested exactly as those of a render are; against a reference that is exact, or
-/// has noisy folds as `crt reference` makes them.
+/// Rows of renders that never were, with known variance, bias and cost: progressive means of normal samples,
+/// pixel by pixel, so that looks at one replicate are nested exactly as those of a render are; against a
+/// reference that is exact, or has noisy folds as `crt reference` makes them.
 #pragma once
 
 #include "converge/measurement.h"
@@ -26,7 +26,8 @@ struct SyntheticRender {
     double prediction = 1;  ///< Predicted over actual error.
     std::uint32_t replicates = 16, looks = 11, pixels = 64;
     bool has_reference = true;
-    /// Of the reference's own pixel, mean over the pixels, with the same inequality; 0: it is exact and has no folds.
+    /// Of the reference's own pixel, mean over the pixels, with the same inequality; 0: it is exact and has
+    /// no folds.
     double reference_variance = 0;
     /// R, G and B of an image whose luminance is 1, and what is added to each of the render's.
     std::array<double, 3> colour{1, 1, 1}, colour_bias{0, 0, 0};

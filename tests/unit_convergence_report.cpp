@@ -175,16 +175,23 @@ bool sameRow(const Row& a, const Row& b) {
     const auto same = [](const std::optional<Estimate>& x, const std::optional<Estimate>& y) {
         return x.has_value() == y.has_value() && (!x || (x->value == y->value && x->low == y->low && x->high == y->high));
     };
-    return a.key == b.key && a.seed == b.seed && a.replicate == b.replicate && a.samples == b.samples && a.render_wall_seconds == b.render_wall_seconds &&
-           a.render_device_seconds == b.render_device_seconds && a.seconds_before_first_sample == b.seconds_before_first_sample && a.paths == b.paths &&
-           a.closest_rays == b.closest_rays && a.shadow_rays == b.shadow_rays && a.error.has_value() == b.error.has_value() &&
-           (!a.error || (a.error->mse == b.error->mse && a.error->rmse == b.error->rmse && a.error->relative_rmse == b.error->relative_rmse &&
-                         a.error->relmse == b.error->relmse && a.error->smape == b.error->smape && a.error->mae == b.error->mae &&
-                         a.error->max_absolute == b.error->max_absolute && a.error->flip_mean == b.error->flip_mean &&
-                         a.error->delta_e2000_mean == b.error->delta_e2000_mean)) &&
-           a.between_replicates_mse == b.between_replicates_mse && a.fold_mse == b.fold_mse && a.effective_pixels == b.effective_pixels &&
-           a.mean_luminance == b.mean_luminance && same(a.predicted_relative_rmse, b.predicted_relative_rmse) && a.image_mean == b.image_mean &&
-           a.image_mean_standard_error == b.image_mean_standard_error && a.invalid_samples == b.invalid_samples && a.cpu_clock_mhz == b.cpu_clock_mhz &&
+    return a.key == b.key && a.seed == b.seed && a.replicate == b.replicate && a.samples == b.samples &&
+           a.render_wall_seconds == b.render_wall_seconds &&
+           a.render_device_seconds == b.render_device_seconds &&
+           a.seconds_before_first_sample == b.seconds_before_first_sample && a.paths == b.paths &&
+           a.closest_rays == b.closest_rays && a.shadow_rays == b.shadow_rays &&
+           a.error.has_value() == b.error.has_value() &&
+           (!a.error ||
+            (a.error->mse == b.error->mse && a.error->rmse == b.error->rmse &&
+             a.error->relative_rmse == b.error->relative_rmse && a.error->relmse == b.error->relmse &&
+             a.error->smape == b.error->smape && a.error->mae == b.error->mae &&
+             a.error->max_absolute == b.error->max_absolute && a.error->flip_mean == b.error->flip_mean &&
+             a.error->delta_e2000_mean == b.error->delta_e2000_mean)) &&
+           a.between_replicates_mse == b.between_replicates_mse && a.fold_mse == b.fold_mse &&
+           a.effective_pixels == b.effective_pixels && a.mean_luminance == b.mean_luminance &&
+           same(a.predicted_relative_rmse, b.predicted_relative_rmse) && a.image_mean == b.image_mean &&
+           a.image_mean_standard_error == b.image_mean_standard_error &&
+           a.invalid_samples == b.invalid_samples && a.cpu_clock_mhz == b.cpu_clock_mhz &&
            a.load_average == b.load_average && a.stop_reason == b.stop_reason;
 }
 
@@ -415,16 +422,19 @@ TEST_CASE("what is not reached is not ranked, and what is not distinguishable is
             configuration.width = what.pixels;
             configuration.height = 1;
             run.configurations.push_back(configuration);
-            for (Row& row : syntheticRows(configuration.key, what, 1000 * (4 * i + c))) run.rows.push_back(std::move(row));
+            for (Row& row : syntheticRows(configuration.key, what, 1000 * (4 * i + c)))
+                run.rows.push_back(std::move(row));
         }
         std::string text;
-        for (const Finding& finding : findingsOfScene(run, analyze(run), "scene")) text += finding.text + '\n';
+        for (const Finding& finding : findingsOfScene(run, analyze(run), "scene"))
+            text += finding.text + '\n';
         CHECK_THAT(text, !Contains("would be"));
         CHECK_THAT(text, Contains("No configuration reached 1 % relative RMSE.\n"));
         first += text.find("times sooner") != std::string::npos ? 1 : 0;
         most_efficient += text.find("times the least") != std::string::npos ? 1 : 0;
     }
-    // 5 % of 200 are 10; more than 20 are a chance of 0.1 %. Without regard to the four being picked from, it is 30 and more.
+    // 5 % of 200 are 10; more than 20 are a chance of 0.1 %. Without regard to the four being picked from,
+    // it is 30 and more.
     CHECK(first <= 20);
     CHECK(most_efficient <= 20);
 }
@@ -459,7 +469,8 @@ TEST_CASE("a configuration without a valid row has a line, a verdict and no numb
     const Analysis analysis = analyze(run);
     CHECK(analysis.fits[0].points.empty());
     CHECK(analysis.fits[0].judgement.verdict == stats::Verdict::Fail);
-    CHECK(verdictLine(analysis.fits[0]) == "scene backend: FAIL: 176 rows are void: samples were NaN or infinite.");
+    CHECK(verdictLine(analysis.fits[0]) ==
+          "scene backend: FAIL: 176 rows are void: samples were NaN or infinite.");
 }
 
 TEST_CASE("a run without rows still makes a report", "[converge]") {

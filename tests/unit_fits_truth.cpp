@@ -1,5 +1,5 @@
-// What converge says where the truth is known by construction: noisy references, unequal pixels, few replicates, colours
-// beyond the gamut. bench/false_alarms.cpp asks the same of more situations, more often.
+// What converge says where the truth is known by construction: noisy references, unequal pixels, few
+// replicates, colours beyond the gamut. bench/false_alarms.cpp asks the same of more situations, more often.
 #include "catch.h"
 #include "converge/error_model.h"
 #include "converge/fits.h"
@@ -60,7 +60,8 @@ TEST_CASE("a bias fails in a channel whose mean is 0 or below 0, too", "[fits]")
     }
 }
 
-// 500 repeats place 5 % of misses below 8 % at three standard deviations. Without the folds' part misses are 20 % and more.
+// 500 repeats place 5 % of misses below 8 % at three standard deviations. Without the folds' part misses are
+// 20 % and more.
 TEST_CASE("the noise of the reference is in every interval", "[fits]") {
     for (const double times : {0.08, 1.0, 4.0}) {
         SyntheticRender what = noisyReference();
@@ -169,14 +170,16 @@ TEST_CASE("the interval of the mean's bias knows that a reference has eight fold
     CHECK(missed <= 12);  // 4 are expected; more than 12 are a chance of 0.03 %.
 }
 
-// Estimates of b² around 0, of two replicates and of pixels one of which has most of the variance: the variance of s² and the
-// inequality of the pixels both count. The jackknife is left out by giving an estimate without width.
+// Estimates of b² around 0, of two replicates and of pixels one of which has most of the variance: the
+// variance of s² and the inequality of the pixels both count. The jackknife is left out by giving an
+// estimate without width.
 TEST_CASE("the interval of a bias that is not there has the width of its scatter", "[fits]") {
     std::mt19937_64 engine(6);
     std::normal_distribution<double> normal;
     for (const std::uint32_t replicates : {2u, 16u})
         for (const double inequality : {1.0, 100.0}) {
-            // Of two replicates the inequality itself is not known; the jackknife's one degree of freedom decides.
+            // Of two replicates the inequality itself is not known; the jackknife's one degree of freedom
+            // decides.
             if (replicates == 2 && inequality > 1) continue;
             SyntheticRender what;
             what.inequality = inequality;

@@ -1,6 +1,7 @@
-"""How often statements of `crt converge` are wrong where the truth is known by construction. The rows are not rendered: they are progressive means of
-normal samples, pixel by pixel, of known variance, bias and cost, against a reference that is exact or has eight noisy folds; they go through the
-same analysis and the same sentences as rows of renders. Nothing is timed: it may run on a busy machine."""
+"""How often statements of `crt converge` are wrong where the truth is known by construction. The rows are not
+rendered: they are progressive means of normal samples, pixel by pixel, of known variance, bias and cost, against a
+reference that is exact or has eight noisy folds; they go through the same analysis and the same sentences as rows of
+renders. Nothing is timed: it may run on a busy machine."""
 import json
 import math
 
@@ -19,17 +20,21 @@ def measure(program, arguments):
     results = Results(program, arguments, "false-alarms", "How often crt converge is wrong")
     results.paragraph(__doc__.replace("\n", " "))
     results.paragraph(
-        f"{repeats} repeats of each situation, 64 pixels, 16 replicates of 1 to 256 samples (relative RMSE 0.9 % at the end) unless it says otherwise. *Stated*: the part that may be wrong. "
-        "A part above what is stated by more than three standard errors of the counting is **bold**. Intervals of *b²* are wide on purpose: around 0 the "
-        "jackknife is too careful, and what it misses is covered by Fisher's F. *FAIL of what is right*, *a floor where there is none* and *PASS of what is "
-        "wrong* are claimed at 99.9 %. Intervals that have no bounds, because an error hides in the reference's noise, are not asked.")
+        f"{repeats} repeats of each situation, 64 pixels, 16 replicates of 1 to 256 samples (relative RMSE 0.9 % at the "
+        "end) unless it says otherwise. *Stated*: the part that may be wrong. A part above what is stated by more than "
+        "three standard errors of the counting is **bold**. Intervals of *b²* are wide on purpose: around 0 the "
+        "jackknife is too careful, and what it misses is covered by Fisher's F. *FAIL of what is right*, *a floor where "
+        "there is none* and *PASS of what is wrong* are claimed at 99.9 %. Intervals that have no bounds, because an "
+        "error hides in the reference's noise, are not asked.")
     for situation in dict.fromkeys(row["situation"] for row in rows):
         results.heading(situation[0].upper() + situation[1:])
-        results.table(["statement", "asked", "wrong", "part", "stated"], [cells(row) for row in rows if row["situation"] == situation])
+        results.table(["statement", "asked", "wrong", "part", "stated"],
+                      [cells(row) for row in rows if row["situation"] == situation])
     worse = [row for row in rows if excess(row)]
     results.heading("More often wrong than stated")
     if worse:
-        results.table(["situation", "statement", "part", "stated"], [[row["situation"], row["statement"], share(row), f"{row['stated']:.1%}"] for row in worse])
+        results.table(["situation", "statement", "part", "stated"],
+                      [[row["situation"], row["statement"], share(row), f"{row['stated']:.1%}"] for row in worse])
     else:
         results.paragraph("None.")
     results.data = {"repeats": repeats, "rows": rows}
@@ -49,4 +54,5 @@ def share(row):
 
 def cells(row):
     part = share(row)
-    return [row["statement"], row["asked"], row["wrong"], f"**{part}**" if excess(row) else part, f"{row['stated']:.1%}"]
+    part = f"**{part}**" if excess(row) else part
+    return [row["statement"], row["asked"], row["wrong"], part, f"{row['stated']:.1%}"]

@@ -93,7 +93,8 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     LookPlane luminance = stats::luminances(image.pixels, stats::luminanceWeights(scene_.film.color_space));
     row.mean_luminance = stats::meanLuminance(luminance);
     for (std::size_t p = 0; p < pixels; ++p)
-        for (std::size_t c = 0; c < 3; ++c) row.image_mean[c] += image.pixels[3 * p + c] / static_cast<double>(pixels);
+        for (std::size_t c = 0; c < 3; ++c)
+            row.image_mean[c] += image.pixels[3 * p + c] / static_cast<double>(pixels);
     const bool independent = scene_.sampler.type != SamplerType::Sobol;
     if (const std::optional<ErrorEstimate> own = estimateError(film, PixelSet::All, independent); own && own->known())
         row.predicted_relative_rmse = {own->relative_rmse, own->relative_rmse_95.lower, own->relative_rmse_95.upper};
@@ -147,7 +148,8 @@ void Contestant::prepare() {
 StoredReplicate Contestant::stored(std::uint32_t replicate) const {
     StoredReplicate stored;
     for (const auto& [samples, planes] : looks_)
-        if (const auto plane = planes.find(replicate); plane != planes.end()) stored.looks.emplace_back(samples, plane->second);
+        if (const auto plane = planes.find(replicate); plane != planes.end())
+            stored.looks.emplace_back(samples, plane->second);
     stored.rgb = last_image_.pixels;
     stored.standard_error = last_error_.values;
     return stored;

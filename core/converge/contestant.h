@@ -21,8 +21,8 @@ public:
     /// Loads the backend. Throws crt::Error when it cannot run.
     Contestant(Key key, Scene scene, const Reference* reference, const IntegratorOptions& options);
 
-    /// Compiles the scene and renders one sample that does not count: all that is needed before the first replicate, and
-    /// timed as the start of every one.
+    /// Compiles the scene and renders one sample that does not count: all that is needed before the first
+    /// replicate, and timed as the start of every one.
     void prepare();
 
     /// Renders seed number `replicate` to N = 1, 2, 4 … and gives each look to `found`, until `most_samples`, or (on the first replicate) until the
@@ -35,7 +35,8 @@ public:
     std::uint64_t samplesReached() const { return samples_reached_; }
     const Scene& scene() const { return scene_; }
     const Reference* reference() const { return reference_; }
-    /// The replicate that was rendered last, for a file; and one from a file, in its place. Requires prepare().
+    /// The replicate that was rendered last, for a file; and one from a file, in its place. Requires
+    /// prepare().
     StoredReplicate stored(std::uint32_t replicate) const;
     void restore(std::uint32_t replicate, const StoredReplicate& stored);
     std::size_t pixels() const { return std::size_t{configuration_.width} * configuration_.height; }

@@ -127,13 +127,15 @@ private:
     void claimFolder() {
         Experiment experiment{commonProperties(buildInfo(), request_.integrator)};
         for (std::size_t s = 0; s < scenes_.size(); ++s) {
-            const std::string reference = !references_[s]                        ? "made by the run"
-                                          : references_[s]->info.hash.empty() ? references_[s]->info.estimator
-                                                                              : references_[s]->info.hash;
+            const std::string reference = !references_[s] ? "made by the run"
+                                          : references_[s]->info.hash.empty()
+                                              ? references_[s]->info.estimator
+                                              : references_[s]->info.hash;
             for (const Variant& variant : variantsOf(request_.vary)) {
                 const Scene scene = loadSmall(request_.scenes[s], variant.changes, request_.resolution);
                 for (const std::string& backend : request_.backends)
-                    experiment.push_back(propertiesOf({names_[s], backend, variant.label}, scene, contentOf(s, variant.label, scene), reference));
+                    experiment.push_back(propertiesOf({names_[s], backend, variant.label}, scene,
+                                                      contentOf(s, variant.label, scene), reference));
             }
         }
         if (holds_rows_)
@@ -153,10 +155,12 @@ private:
         return {};
     }
 
-    /// Where no reference was given: one from a quarter of the time. It is of the same estimator, which has far less noise, and so is blind to a
-    /// bias that all light sampling shares; what it sees is a bias of sampler, roulette, seeds and backends.
+    /// Where no reference was given: one from a quarter of the time. It is of the same estimator, which has
+    /// far less noise, and so is blind to a bias that all light sampling shares; what it sees is a bias of
+    /// sampler, roulette, seeds and backends.
     void makeReferences() {
-        const auto missing = static_cast<std::size_t>(std::count(references_.begin(), references_.end(), nullptr));
+        const auto missing =
+            static_cast<std::size_t>(std::count(references_.begin(), references_.end(), nullptr));
         const std::string backend = missing > 0 ? runnableBackend() : std::string();
         for (std::size_t s = 0; s < scenes_.size() && !backend.empty(); ++s) {
             if (references_[s] || scenes_[s].integrator.type != IntegratorType::Path) continue;
@@ -168,26 +172,36 @@ private:
             request.same_estimator = true;
             request.progress = request_.progress;
             if (holds_rows_ && !fs::exists(request.output))
-                throw Error(ErrorKind::Usage, fmt::format("'{}' is missing, against which the rows of this run were measured: it cannot be resumed", request.output));
+                throw Error(ErrorKind::Usage, fmt::format("'{}' is missing, against which the rows of this "
+                                                          "run were measured: it cannot be resumed",
+                                                          request.output));
             if (!holds_rows_) {
                 const std::optional<MadeReference> made = renderReference(scenes_[s], request);
                 if (!made) return;
-                logInfo("{}: no reference was given; {} of the {} of --time made one: {} samples per pixel on {}{}", names_[s],
-                        durationText(made->seconds), durationText(request_.seconds), made->samples, backend,
-                        made->error ? ", its own " + crt::errorText(*made->error) : "");
+                logInfo(
+                    "{}: no reference was given; {} of the {} of --time made one: {} samples per pixel on "
+                    "{}{}",
+                    names_[s], durationText(made->seconds), durationText(request_.seconds), made->samples,
+                    backend, made->error ? ", its own " + crt::errorText(*made->error) : "");
             }
             references_[s] = std::make_unique<Reference>(readReference(request.output, scenes_[s]));
             references_[s]->info.scene = names_[s];
-            run_.notes.push_back(fmt::format("{}: no reference was given, so {} % of --time went into one, made with {} and the scene's own light sampling; "
-                                             "a bias that they share does not show against it ('crt reference' makes one that shares less)",
-                                             names_[s], 100 * kReferenceShare / static_cast<double>(missing), backend));
+            run_.notes.push_back(
+                fmt::format("{}: no reference was given, so {} % of --time went into one, made with {} and "
+                            "the scene's own light sampling; "
+                            "a bias that they share does not show against it ('crt reference' makes one "
+                            "that shares less)",
+                            names_[s], 100 * kReferenceShare / static_cast<double>(missing), backend));
         }
         for (std::size_t s = 0; s < scenes_.size(); ++s) {
             ReferenceInfo none;
             none.scene = names_[s];
             run_.references.push_back(references_[s] ? references_[s]->info : none);
             if (!references_[s])
-                run_.notes.push_back(fmt::format("{}: there is no reference, so errors are the spread between replicates, which no bias shows in", names_[s]));
+                run_.notes.push_back(
+                    fmt::format("{}: there is no reference, so errors are the spread between replicates, "
+                                "which no bias shows in",
+                                names_[s]));
         }
     }
 
@@ -198,23 +212,31 @@ private:
         return content;
     }
 
-    /// A reference judges only what has the same expected image: not a variant with another depth. A number is taken as it is.
+    /// A reference judges only what has the same expected image: not a variant with another depth. A number
+    /// is taken as it is.
     const Reference* referenceFor(std::size_t s, const Scene& variant, const Key& key) {
         const Reference* reference = references_[s].get();
         if (reference == nullptr || reference->info.kind == ReferenceKind::Analytic) return reference;
-        if (contentOf(s, key.variant, variant) == contentOf(s, {}, scenes_[s]) && colourText(variant) == colourText(scenes_[s])) return reference;
-        run_.notes.push_back(fmt::format("{}: '{}' shows another image than the reference, so it is measured without one", key.scene, key.variant));
+        if (contentOf(s, key.variant, variant) == contentOf(s, {}, scenes_[s]) &&
+            colourText(variant) == colourText(scenes_[s]))
+            return reference;
+        run_.notes.push_back(
+            fmt::format("{}: '{}' shows another image than the reference, so it is measured without one",
+                        key.scene, key.variant));
         return nullptr;
     }
 
-    /// Libraries, drivers and caches are warm before any start-up is timed: else whoever comes first pays for all. Where starts take so long that
-    /// little time would be left, it is not done, and said.
+    /// Libraries, drivers and caches are warm before any start-up is timed: else whoever comes first pays
+    /// for all. Where starts take so long that little time would be left, it is not done, and said.
     void warmUp(const Key& key, const Scene& scene) {
         if (elapsed() < (kReferenceShare + kWarmUpShare) * request_.seconds) {
             Contestant(key, scene, nullptr, request_.integrator).prepare();
             return;
         }
-        if (!left_cold_) run_.notes.push_back("start-up takes so long that it was not tried beforehand everywhere: start-up times cannot be compared");
+        if (!left_cold_)
+            run_.notes.push_back(
+                "start-up takes so long that it was not tried beforehand everywhere: start-up times cannot "
+                "be compared");
         left_cold_ = true;
     }
 
@@ -227,7 +249,8 @@ private:
                         Scene scene = loadSmall(request_.scenes[s], variant.changes, request_.resolution);
                         const Reference* reference = referenceFor(s, scene, key);
                         warmUp(key, scene);
-                        contestants_.push_back(std::make_unique<Contestant>(key, std::move(scene), reference, request_.integrator));
+                        contestants_.push_back(std::make_unique<Contestant>(key, std::move(scene), reference,
+                                                                            request_.integrator));
                         contestants_.back()->prepare();
                         order_.push_back({key, contestants_.back().get(), {}});
                     } catch (const Error& error) {
@@ -286,12 +309,14 @@ private:
     std::string replicateFile(const Key& key, std::uint32_t replicate) const {
         std::string name;
         for (const char c : fmt::format("{}-{}-{}", key.scene, key.backend, key.variant)) {
-            const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_' || c == '.' || c == ',';
+            const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_' ||
+                               c == '.' || c == ',';
             name += plain ? std::string(1, c) : fmt::format("%{:02x}", static_cast<unsigned char>(c));
         }
         return path(fmt::format("replicates/{}-{}.looks", name, replicate));
     }
-    /// Replicates that are whole, with a row for each of their looks; the rows of others are dropped, and rendered again.
+    /// Replicates that are whole, with a row for each of their looks; the rows of others are dropped, and
+    /// rendered again.
     void resumeReplicates() {
         std::vector<Row> kept;
         for (const auto& contestant : contestants_)
@@ -299,7 +324,8 @@ private:
                 std::vector<Row> rows;
                 for (const Row& row : run_.rows)
                     if (row.key == contestant->key() && row.replicate == replicate) rows.push_back(row);
-                const std::optional<StoredReplicate> stored = readReplicate(replicateFile(contestant->key(), replicate), contestant->pixels());
+                const std::optional<StoredReplicate> stored =
+                    readReplicate(replicateFile(contestant->key(), replicate), contestant->pixels());
                 if (!stored || !isWhole(*stored, rows, contestant->samplesReached())) break;
                 contestant->restore(replicate, *stored);
                 kept.insert(kept.end(), rows.begin(), rows.end());
@@ -310,7 +336,8 @@ private:
     static bool isWhole(const StoredReplicate& stored, const std::vector<Row>& rows, std::uint64_t reached) {
         if (reached > 0 && stored.looks.back().first != reached) return false;
         return std::all_of(stored.looks.begin(), stored.looks.end(), [&](const auto& look) {
-            return std::any_of(rows.begin(), rows.end(), [&](const Row& row) { return row.samples == look.first; });
+            return std::any_of(rows.begin(), rows.end(),
+                               [&](const Row& row) { return row.samples == look.first; });
         });
     }
 
@@ -341,7 +368,8 @@ private:
         writeManifest(path("manifest.json"), run_, files);
 
         const bool failed = printVerdicts(analysis);
-        logInfo("{} rounds of replicates in {}; wrote {}", rounds_, durationText(elapsed()), path("report.html"));
+        logInfo("{} rounds of replicates in {}; wrote {}", rounds_, durationText(elapsed()),
+                path("report.html"));
         if (stopped()) return 128 + InterruptGuard::signalReceived();
         return failed ? 7 : 0;
     }
@@ -374,8 +402,8 @@ private:
     const ConvergeRequest& request_;
     Clock::time_point start_;
     Run run_;
-    std::vector<std::string> names_;   ///< Of the scenes, in keys.
-    bool holds_rows_ = false;          ///< The folder did, when the run began.
+    std::vector<std::string> names_;  ///< Of the scenes, in keys.
+    bool holds_rows_ = false;         ///< The folder did, when the run began.
     bool left_cold_ = false;
     std::map<std::pair<std::size_t, std::string>, std::string> contents_;
     std::vector<Scene> scenes_;

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Line through (x, y) whose errors are relative to y: weights 1/y², then 1/line², so that a low point does not weigh more
-/// for being low.
+/// Line through (x, y) whose errors are relative to y: weights 1/y², then 1/line², so that a low point does
+/// not weigh more for being low.
 stats::LineFit relativeLine(std::span<const double> x, std::span<const double> y) {
     std::vector<double> weights(y.size());
     std::transform(y.begin(), y.end(), weights.begin(), [](double value) { return 1 / (value * value); });
@@ -72,7 +72,7 @@ double logSlope(const std::vector<double>& x, const std::vector<double>& y) {
     return stats::weightedLine(log_x, log_y, std::vector<double>(log_x.size(), 1.0)).slope;
 }
 
-// ------------------------------------------------------------------------------------------------------ Measure
+// ------------------------------------------------------------------------- Measure
 
 Measure::Measure(const RowsBySamples& by_samples, const ReferenceInfo* reference, double pixels)
     : pixels_(pixels) {
@@ -165,7 +165,8 @@ Estimate Measure::noNarrowerThanNoBias(const Estimate& estimate, double variance
     if (!(sum > 0)) return estimate;
     const double pixels = row.effective_pixels.value_or(pixels_),
                  reference_pixels = reference_->effective_pixels.value_or(pixels_);
-    // Pixels where both are noisy count as much as they can (Cauchy and Schwarz), which makes the interval longer.
+    // Pixels where both are noisy count as much as they can (Cauchy and Schwarz), which makes the interval
+    // longer.
     const double pixels_of_sum =
         std::pow(sum / (of_mean / std::sqrt(pixels) + of_reference / std::sqrt(reference_pixels)), 2);
     const double folds =
@@ -179,7 +180,7 @@ Estimate Measure::noNarrowerThanNoBias(const Estimate& estimate, double variance
             std::max(estimate.high, estimate.value + below)};
 }
 
-// --------------------------------------------------------------------------------------------------- ErrorModel
+// ------------------------------------------------------------------------- ErrorModel
 
 ErrorModel::ErrorModel(Block block, const Measure& measure) : block_(std::move(block)), measure_(measure) {
     const std::vector<std::size_t> all = allOf(block_.replicates());
@@ -265,7 +266,7 @@ double ErrorModel::weighted(const std::vector<double>& of_columns) const {
     return sum / weights;
 }
 
-// ---------------------------------------------------------------------------------------------------- TimeModel
+// ------------------------------------------------------------------------- TimeModel
 
 TimeModel::TimeModel(Block block) : block_(std::move(block)) {
     std::vector<double> before;

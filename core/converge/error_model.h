@@ -1,5 +1,5 @@
-/// From rows of one configuration to relative squared errors and seconds, and the curves through them, for any part of
-/// the replicates and of the reference. fits.h makes intervals of them.
+/// From rows of one configuration to relative squared errors and seconds, and the curves through them, for
+/// any part of the replicates and of the reference. fits.h makes intervals of them.
 ///
 /// With a reference of k folds F the squared error of an image I is the mean over pairs of folds of
 /// mean (I − F_i)(I − F_j): what the noise of the reference adds cancels, and leaving out a fold is cheap.
@@ -22,8 +22,8 @@ using RowList = std::vector<const Row*>;
 
 RowList rowsOf(const std::map<std::uint32_t, const Row*>& of_replicates);
 
-/// The largest N that at least three quarters of the replicates reached, and two at least: a budget ends in the middle of
-/// an N.
+/// The largest N that at least three quarters of the replicates reached, and two at least: a budget ends in
+/// the middle of an N.
 RowsBySamples::const_reverse_iterator lastFullColumn(const RowsBySamples& by_samples);
 
 /// The rows of one configuration that count; every replicate has every column.
@@ -42,14 +42,14 @@ double meanOver(Indices replicates, const std::function<double(std::size_t)>& va
 /// How rows of one configuration become relative errors. All are relative² where they are squares.
 class Measure {
 public:
-    /// Against the reference where there is one and every row knows its error, else between replicates. `pixels`: of an
-    /// image.
+    /// Against the reference where there is one and every row knows its error, else between replicates.
+    /// `pixels`: of an image.
     Measure(const RowsBySamples& by_samples, const ReferenceInfo* reference, double pixels);
 
     ErrorSource source() const { return source_; }
     bool hasReference() const { return reference_ != nullptr; }
-    /// Whether the reference's own variance is more than a tenth of that of the images in a column. Its noise would hide
-    /// their error.
+    /// Whether the reference's own variance is more than a tenth of that of the images in a column. Its
+    /// noise would hide their error.
     bool referenceIsNoisy(const RowList& column) const;
     /// Errors are the spread between replicates from now on; the reference judges bias only.
     void measureErrorsBetweenReplicates() { source_ = ErrorSource::BetweenReplicates; }
@@ -59,8 +59,8 @@ public:
     /// Of biasSquared(), which always knows the reference.
     SampleCounts countsOfBias(std::size_t replicates) const;
 
-    /// Relative mean squared error against part of the reference (Resample::reference_part), its noise subtracted. NaN
-    /// where the row does not say.
+    /// Relative mean squared error against part of the reference (Resample::reference_part), its noise
+    /// subtracted. NaN where the row does not say.
     double mse(const Row& row, std::size_t reference_part) const;
     /// Variance between replicates.
     double variance(const Row& row) const;
@@ -69,10 +69,11 @@ public:
         return referenceMse(row, reference_part) - variance(row);
     }
 
-    /// The interval that an estimate of b² would have where b = 0, from `variance` of one image, widens `estimate`. The
-    /// square of a mean that happens to be right hardly changes with any one replicate or fold, so that the jackknife
-    /// alone would be sure of a b² below 0. Under b = 0 the squared mean over its variance has Fisher's F distribution,
-    /// with the effective numbers of pixels as degrees of freedom; exactly so for one pixel.
+    /// The interval that an estimate of b² would have where b = 0, from `variance` of one image, widens
+    /// `estimate`. The square of a mean that happens to be right hardly changes with any one replicate or
+    /// fold, so that the jackknife alone would be sure of a b² below 0. Under b = 0 the squared mean over
+    /// its variance has Fisher's F distribution, with the effective numbers of pixels as degrees of freedom;
+    /// exactly so for one pixel.
     Estimate noNarrowerThanNoBias(const Estimate& estimate, double variance, const Row& row,
                                   std::size_t replicates, double confidence) const;
 
@@ -110,14 +111,16 @@ public:
     stats::LineFit line(const Resample& resample) const;
     double slope(const Resample& resample) const;
 
-    /// All columns weighted by N²: they are looks at the same renders, and the variance of b² falls with 1/N² or faster.
+    /// All columns weighted by N²: they are looks at the same renders, and the variance of b² falls with
+    /// 1/N² or faster.
     double biasSquared(const Resample& resample) const;
     double varianceOfBias() const;
     const Row& lastRow() const { return *block_.rows.front().back(); }
     const Measure& measure() const { return measure_; }
 
-    /// Samples at which the relative MSE falls to `target`: on the straight line between points in logarithms; beyond
-    /// the last, on the line of the last four where `extrapolate` allows it. NaN when it is not reached.
+    /// Samples at which the relative MSE falls to `target`: on the straight line between points in
+    /// logarithms; beyond the last, on the line of the last four where `extrapolate` allows it. NaN when it
+    /// is not reached.
     double samplesTo(const Resample& resample, double target, bool extrapolate) const;
 
 private:
@@ -149,8 +152,8 @@ private:
     double before_first_sample_ = 0;
 };
 
-/// Slope of a straight line through logarithms, all points alike; those not above 0 are left out. NaN with fewer than
-/// three.
+/// Slope of a straight line through logarithms, all points alike; those not above 0 are left out. NaN with
+/// fewer than three.
 double logSlope(const std::vector<double>& x, const std::vector<double>& y);
 
 }  // namespace crt::converge

@@ -35,40 +35,49 @@ const char* samplerName(SamplerType type) {
 }
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
-    throw Error(ErrorKind::Usage, fmt::format("'{}' holds another experiment: {}; choose another folder, or ask for the same",
-                                              fs::path(path).parent_path().string(), what));
+    throw Error(ErrorKind::Usage,
+                fmt::format("'{}' holds another experiment: {}; choose another folder, or ask for the same",
+                            fs::path(path).parent_path().string(), what));
 }
 
 Experiment readExperiment(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     if (!file)
-        throw Error(ErrorKind::Usage, fmt::format("'{}' does not say what experiment it holds (there is no experiment.json), so it cannot be resumed",
+        throw Error(ErrorKind::Usage, fmt::format("'{}' does not say what experiment it holds (there is no "
+                                                  "experiment.json), so it cannot be resumed",
                                                   fs::path(path).parent_path().string()));
     try {
         const Json json = Json::parse(file);
-        if (json.at("format") != kFormat) throw Error(ErrorKind::Usage, fmt::format("'{}' is of another crt", path));
+        if (json.at("format") != kFormat)
+            throw Error(ErrorKind::Usage, fmt::format("'{}' is of another crt", path));
         Experiment experiment;
         for (const Json& entry : json.at("properties")) {
             Properties p{{entry.at("scene"), entry.at("backend"), entry.at("variant")}, {}};
-            for (const auto& [name, text] : entry.at("values").items()) p.values.emplace_back(name, text.get<std::string>());
+            for (const auto& [name, text] : entry.at("values").items())
+                p.values.emplace_back(name, text.get<std::string>());
             experiment.push_back(std::move(p));
         }
         return experiment;
     } catch (const nlohmann::json::exception& e) {
-        throw Error(ErrorKind::Usage, fmt::format("'{}' cannot be read ({}), so the run cannot be resumed", path, e.what()), {path});
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' cannot be read ({}), so the run cannot be resumed", path, e.what()),
+                    {path});
     }
 }
 
 const Properties* find(const Experiment& experiment, const Key& key) {
-    const auto found = std::find_if(experiment.begin(), experiment.end(), [&](const Properties& p) { return p.key == key; });
+    const auto found = std::find_if(experiment.begin(), experiment.end(),
+                                    [&](const Properties& p) { return p.key == key; });
     return found == experiment.end() ? nullptr : &*found;
 }
 
 void requireSame(const std::string& path, const Properties& then, const Properties& now) {
     for (const auto& [name, text] : now.values) {
-        const auto found = std::find_if(then.values.begin(), then.values.end(), [&](const auto& value) { return value.first == name; });
+        const auto found = std::find_if(then.values.begin(), then.values.end(),
+                                        [&](const auto& value) { return value.first == name; });
         const std::string was = found == then.values.end() ? "unknown" : found->second;
-        if (was != text) refuse(path, fmt::format("{} of {} was {}, and is {} now", name, labelOf(now.key), was, text));
+        if (was != text)
+            refuse(path, fmt::format("{} of {} was {}, and is {} now", name, labelOf(now.key), was, text));
     }
 }
 
@@ -76,13 +85,15 @@ void requireSame(const std::string& path, const Properties& then, const Properti
 
 Properties commonProperties(const BuildInfo& build, const IntegratorOptions& options) {
     Properties p;
-    p.values = {{"the program", fmt::format("crt {} {}{}", CRT_VERSION, build.commit, build.dirty ? " with changes" : "")},
+    p.values = {{"the program",
+                 fmt::format("crt {} {}{}", CRT_VERSION, build.commit, build.dirty ? " with changes" : "")},
                 {"the number of threads", options.threads == 0 ? "all" : std::to_string(options.threads)},
                 {"the device", options.device.empty() ? "the first" : options.device}};
     return p;
 }
 
-Properties propertiesOf(const Key& key, const Scene& scene, const std::string& content, const std::string& reference) {
+Properties propertiesOf(const Key& key, const Scene& scene, const std::string& content,
+                        const std::string& reference) {
     const IntegratorSettings& integrator = scene.integrator;
     Properties p;
     p.key = key;
@@ -90,8 +101,10 @@ Properties propertiesOf(const Key& key, const Scene& scene, const std::string& c
                 {"the colour", colourText(scene)},
                 {"the maximum depth", std::to_string(integrator.max_depth)},
                 {"light sampling", integrator.nee ? "on" : "off"},
-                {"roulette", integrator.roulette ? fmt::format("from depth {} on", integrator.roulette_depth) : "off"},
-                {"the sampler", fmt::format("{}, {} replicates", samplerName(scene.sampler.type), scene.sampler.replicates)},
+                {"roulette",
+                 integrator.roulette ? fmt::format("from depth {} on", integrator.roulette_depth) : "off"},
+                {"the sampler", fmt::format("{}, {} replicates", samplerName(scene.sampler.type),
+                                            scene.sampler.replicates)},
                 {"the seed", std::to_string(scene.sampler.seed)},
                 {"the hash of what is to be seen", content},
                 {"the reference", reference}};
@@ -105,7 +118,10 @@ void writeExperiment(const std::string& path, const Experiment& experiment) {
     for (const Properties& p : experiment) {
         Json values = Json::object();
         for (const auto& [name, text] : p.values) values[name] = text;
-        json["properties"].push_back({{"scene", p.key.scene}, {"backend", p.key.backend}, {"variant", p.key.variant}, {"values", values}});
+        json["properties"].push_back({{"scene", p.key.scene},
+                                      {"backend", p.key.backend},
+                                      {"variant", p.key.variant},
+                                      {"values", values}});
     }
     const std::string text = json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n';
     AtomicFile file(path);
@@ -139,11 +155,13 @@ std::vector<std::string> namesOfScenes(const std::vector<SceneRequest>& scenes) 
     std::vector<std::string> unique = names;
     for (std::size_t i = 0; i < names.size(); ++i) {
         const auto same = [&](const std::string& other) { return slug(other) == slug(names[i]); };
-        if (std::count_if(names.begin(), names.end(), same) > 1) unique[i] = (files[i].parent_path().filename() / names[i]).string();
+        if (std::count_if(names.begin(), names.end(), same) > 1)
+            unique[i] = (files[i].parent_path().filename() / names[i]).string();
     }
     for (std::size_t i = 0; i < unique.size(); ++i)
-        for (std::size_t n = 2; std::any_of(unique.begin(), unique.begin() + static_cast<std::ptrdiff_t>(i),
-                                            [&](const std::string& other) { return slug(other) == slug(unique[i]); });
+        for (std::size_t n = 2;
+             std::any_of(unique.begin(), unique.begin() + static_cast<std::ptrdiff_t>(i),
+                         [&](const std::string& other) { return slug(other) == slug(unique[i]); });
              ++n)
             unique[i] = fmt::format("{} {}", names[i], n);
     return unique;

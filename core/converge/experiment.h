@@ -1,5 +1,5 @@
-/// What makes a run of `crt converge` the experiment that it is. It is written into the folder when the run begins, so that
-/// --resume can refuse to mix rows of two.
+/// What makes a run of `crt converge` the experiment that it is. It is written into the folder when the run
+/// begins, so that --resume can refuse to mix rows of two.
 #pragma once
 
 #include "converge/measurement.h"
@@ -22,16 +22,19 @@ using Experiment = std::vector<Properties>;
 
 /// What all configurations share: the program and how it is told to render.
 Properties commonProperties(const BuildInfo& build, const IntegratorOptions& options);
-/// Of a scene variant; `content`: its hashOfContent(); `reference`: what it is measured against, in words or as a hash.
-Properties propertiesOf(const Key& key, const Scene& scene, const std::string& content, const std::string& reference);
+/// Of a scene variant; `content`: its hashOfContent(); `reference`: what it is measured against, in words or
+/// as a hash.
+Properties propertiesOf(const Key& key, const Scene& scene, const std::string& content,
+                        const std::string& reference);
 
 void writeExperiment(const std::string& path, const Experiment& experiment);
 
-/// Throws crt::Error(Usage) that names what differs from the experiment in the file, or says that there is none.
+/// Throws crt::Error(Usage) that names what differs from the experiment in the file, or says that there is
+/// none.
 void requireSameExperiment(const std::string& path, const Experiment& experiment);
 
-/// One name for each scene: that of its file, with its folder where two files have the same. Throws crt::Error(Usage) when
-/// one file is named twice: its rows would be taken for replicates of each other.
+/// One name for each scene: that of its file, with its folder where two files have the same. Throws
+/// crt::Error(Usage) when one file is named twice: its rows would be taken for replicates of each other.
 std::vector<std::string> namesOfScenes(const std::vector<SceneRequest>& scenes);
 
 /// Throws crt::Error(Usage) when a name is in the list twice. `option`: e.g. "--backends".

@@ -14,12 +14,16 @@ namespace {
 
 using Fits = std::vector<const ConfigurationFit*>;
 
-/// Quotient of two independent positive estimates, as one of `comparisons` that are looked at: on a logarithmic scale half
-/// widths add in quadrature, and Student's quantile becomes that of confidence 1 − (1 − c)/comparisons (Bonferroni), so that
-/// who was picked because it came out first is not taken for first.
-Estimate quotient(const Estimate& a, const Estimate& b, std::size_t comparisons, std::uint32_t replicates, double confidence) {
-    const auto quantile = [&](double alpha) { return stats::studentQuantile(1 - alpha / 2, std::max(1.0, replicates - 1.0)); };
-    const double wider = quantile((1 - confidence) / static_cast<double>(comparisons)) / quantile(1 - confidence);
+/// Quotient of two independent positive estimates, as one of `comparisons` that are looked at: on a
+/// logarithmic scale half widths add in quadrature, and Student's quantile becomes that of confidence 1 − (1
+/// − c)/comparisons (Bonferroni), so that who was picked because it came out first is not taken for first.
+Estimate quotient(const Estimate& a, const Estimate& b, std::size_t comparisons, std::uint32_t replicates,
+                  double confidence) {
+    const auto quantile = [&](double alpha) {
+        return stats::studentQuantile(1 - alpha / 2, std::max(1.0, replicates - 1.0));
+    };
+    const double wider =
+        quantile((1 - confidence) / static_cast<double>(comparisons)) / quantile(1 - confidence);
     const double value = a.value / b.value;
     const double up = wider * std::hypot(std::log(a.high / a.value), std::log(b.value / b.low));
     const double down = wider * std::hypot(std::log(a.value / a.low), std::log(b.high / b.value));
@@ -35,20 +39,27 @@ std::uint32_t fewestReplicates(const Fits& fits) {
 }
 
 /// How many pairs there are, of which any could have come out as first and next.
-std::size_t pairsOf(const Fits& fits) { return std::max<std::size_t>(1, fits.size() * (fits.size() - 1) / 2); }
+std::size_t pairsOf(const Fits& fits) {
+    return std::max<std::size_t>(1, fits.size() * (fits.size() - 1) / 2);
+}
 
 /// Who reaches an error that all in `reached` measured, and how much sooner than the next.
-std::string order(Fits reached, const std::function<const Target&(const ConfigurationFit&)>& target, const std::string& goal, double confidence) {
-    std::sort(reached.begin(), reached.end(), [&](const auto* a, const auto* b) { return target(*a).seconds->value < target(*b).seconds->value; });
+std::string order(Fits reached, const std::function<const Target&(const ConfigurationFit&)>& target,
+                  const std::string& goal, double confidence) {
+    std::sort(reached.begin(), reached.end(), [&](const auto* a, const auto* b) {
+        return target(*a).seconds->value < target(*b).seconds->value;
+    });
     const Target& first = target(*reached[0]);
     std::string text = fmt::format("{} reaches {} relative RMSE first: {}{}, start-up included", labelOf(reached[0]->key), goal,
                                    first.at_first_point ? "at most " : "", secondsText(*first.seconds));
     if (reached.size() < 2) return text;
     const Target& next = target(*reached[1]);
-    const Estimate factor = quotient(*next.seconds, *first.seconds, pairsOf(reached), fewestReplicates(reached), confidence);
+    const Estimate factor =
+        quotient(*next.seconds, *first.seconds, pairsOf(reached), fewestReplicates(reached), confidence);
     // Where the fewest samples were enough, only a bound of the time is known.
     if (factor.low > 1 && !next.at_first_point)
-        return text + fmt::format(", {} times sooner than the next, {}", numberText(factor, 2), labelOf(reached[1]->key));
+        return text + fmt::format(", {} times sooner than the next, {}", numberText(factor, 2),
+                                  labelOf(reached[1]->key));
     return text + fmt::format("; the next, {}, is not distinguishable from it", labelOf(reached[1]->key));
 }
 
@@ -56,9 +67,11 @@ std::string order(Fits reached, const std::function<const Target&(const Configur
 Finding race(const Fits& fits, std::size_t which, double relative_rmse, double confidence) {
     Fits reached;
     for (const ConfigurationFit* fit : fits)
-        if (fit->fitted && fit->targets.at(which).seconds && fit->targets[which].reached) reached.push_back(fit);
+        if (fit->fitted && fit->targets.at(which).seconds && fit->targets[which].reached)
+            reached.push_back(fit);
     const std::string goal = percentText(relative_rmse, 1);
-    if (reached.empty()) return {Tone::Warning, fmt::format("No configuration reached {} relative RMSE.", goal)};
+    if (reached.empty())
+        return {Tone::Warning, fmt::format("No configuration reached {} relative RMSE.", goal)};
     const auto target = [which](const ConfigurationFit& fit) -> const Target& { return fit.targets[which]; };
     std::string text = order(reached, target, goal, confidence);
     if (reached.size() == 1 && fits.size() > 1) text += "; no other did";
@@ -73,7 +86,8 @@ std::vector<Finding> commonRace(const Fits& fits, double confidence) {
     if (reached.size() < 2) return {};
     const auto target = [](const ConfigurationFit& fit) -> const Target& { return fit.common; };
     const std::string goal = percentText(reached[0]->common.relative_rmse, 2);
-    return {{Tone::Neutral, fmt::format("Of the errors that all have reached, the least: {}.", order(reached, target, goal, confidence))}};
+    return {{Tone::Neutral, fmt::format("Of the errors that all have reached, the least: {}.",
+                                        order(reached, target, goal, confidence))}};
 }
 
 /// Render time alone, for the least error that all have reached: what is left when start-up is forgotten.
@@ -85,14 +99,21 @@ std::vector<Finding> efficiency(const Fits& fits, double confidence) {
     std::sort(fitted.begin(), fitted.end(), [](const auto* a, const auto* b) { return a->efficiency.value > b->efficiency.value; });
     const ConfigurationFit &most = *fitted.front(), &least = *fitted.back();
     const std::string error = percentText(most.common.relative_rmse, 2);
-    const Estimate factor = quotient(most.efficiency, least.efficiency, pairsOf(fitted), fewestReplicates(fitted), confidence);
+    const Estimate factor =
+        quotient(most.efficiency, least.efficiency, pairsOf(fitted), fewestReplicates(fitted), confidence);
     if (!(factor.low > 1))
-        return {{Tone::Neutral, fmt::format("Start-up aside, the efficiencies at {} relative RMSE are not distinguishable from each other.", error)}};
-    const Estimate lead = quotient(most.efficiency, fitted[1]->efficiency, pairsOf(fitted), fewestReplicates(fitted), confidence);
-    const std::string who = lead.low > 1 || fitted.size() == 2 ? fmt::format("{} is the most efficient", labelOf(most.key))
-                                                               : fmt::format("{} and {} are the most efficient", labelOf(most.key), labelOf(fitted[1]->key));
-    return {{Tone::Neutral, fmt::format("Start-up aside, {} at {} relative RMSE: {}{} times the least, {}.", who, error,
-                                        most.common.at_first_point ? "at least " : "", numberText(factor, 2), labelOf(least.key))}};
+        return {{Tone::Neutral, fmt::format("Start-up aside, the efficiencies at {} relative RMSE are not "
+                                            "distinguishable from each other.",
+                                            error)}};
+    const Estimate lead = quotient(most.efficiency, fitted[1]->efficiency, pairsOf(fitted),
+                                   fewestReplicates(fitted), confidence);
+    const std::string who =
+        lead.low > 1 || fitted.size() == 2
+            ? fmt::format("{} is the most efficient", labelOf(most.key))
+            : fmt::format("{} and {} are the most efficient", labelOf(most.key), labelOf(fitted[1]->key));
+    return {{Tone::Neutral, fmt::format("Start-up aside, {} at {} relative RMSE: {}{} times the least, {}.",
+                                        who, error, most.common.at_first_point ? "at least " : "",
+                                        numberText(factor, 2), labelOf(least.key))}};
 }
 
 /// Configurations that render the same bits share errors: whoever reads two equal slopes should know why.
@@ -104,7 +125,8 @@ std::vector<Finding> sameBits(const Fits& fits) {
         std::string names = labelOf(fit->key);
         for (const Key& key : fit->same_bits) names += " = " + labelOf(key);
         told.insert(told.end(), fit->same_bits.begin(), fit->same_bits.end());
-        findings.push_back({Tone::Good, fmt::format("The same bits, so one error, slope and verdict: {}.", names)});
+        findings.push_back(
+            {Tone::Good, fmt::format("The same bits, so one error, slope and verdict: {}.", names)});
     }
     return findings;
 }
@@ -126,9 +148,13 @@ std::vector<Finding> bias(const Fits& fits, double margin) {
         findings.push_back({Tone::Warning, fmt::format("{} is undecided: {}", labelOf(fit->key), fit->judgement.reason)});
     if (!blind.empty())
         findings.push_back({Tone::Warning, "There is no reference for this scene: errors are the spread between replicates, in which a bias does not show."});
-    const auto noisy = [](const ConfigurationFit* fit) { return fit->has_reference && fit->source == ErrorSource::BetweenReplicates; };
+    const auto noisy = [](const ConfigurationFit* fit) {
+        return fit->has_reference && fit->source == ErrorSource::BetweenReplicates;
+    };
     if (std::any_of(fits.begin(), fits.end(), noisy))
-        findings.push_back({Tone::Neutral, "The reference is too noisy to measure errors against: errors are the spread between replicates, and the reference judges bias."});
+        findings.push_back({Tone::Neutral,
+                            "The reference is too noisy to measure errors against: errors are the spread "
+                            "between replicates, and the reference judges bias."});
     for (const ConfigurationFit* fit : fits) {
         if (!fit->fitted || !fit->error.flattening) continue;
         const double floor = std::sqrt(std::max(fit->error.floor().value, 0.0));
@@ -148,27 +174,38 @@ std::vector<Finding> slopes(const Fits& fits) {
         fitted.begin(), fitted.end(), [](const auto* a, const auto* b) { return a->slope_samples.value < b->slope_samples.value; });
     std::string text = fmt::format("Error falls with samples to the power {} ({})", numberText((*steepest)->slope_samples), labelOf((*steepest)->key));
     if ((*steepest)->slope_samples.value != (*flattest)->slope_samples.value)
-        text += fmt::format(" to {} ({})", numberText((*flattest)->slope_samples), labelOf((*flattest)->key));
+        text +=
+            fmt::format(" to {} ({})", numberText((*flattest)->slope_samples), labelOf((*flattest)->key));
     return {{Tone::Neutral, text + "; independent samples have −0.5."}};
 }
 
-/// What an image says of its own error against what it is, by the interval that the figure shows: right as far as can be
-/// told, off but by less than a tenth, or wrong. A tenth is what one would act upon.
+/// What an image says of its own error against what it is, by the interval that the figure shows: right as
+/// far as can be told, off but by less than a tenth, or wrong. A tenth is what one would act upon.
 Finding trustIn(const ConfigurationFit& fit) {
     constexpr double kTenth = 1.1;
     const Estimate& ratio = *fit.points.back().calibration;
     const std::string name = labelOf(fit.key), text = numberText(ratio);
     if (!std::isfinite(ratio.high) || !(ratio.low > 0))
-        return {Tone::Warning, fmt::format("Whether the error that {} states of itself is right cannot be told: predicted over actual is {}.", name, text)};
+        return {Tone::Warning, fmt::format("Whether the error that {} states of itself is right cannot be "
+                                           "told: predicted over actual is {}.",
+                                           name, text)};
     const bool holds_one = ratio.low <= 1 && 1 <= ratio.high;
     if (holds_one && ratio.low > 1 / kTenth && ratio.high < kTenth)
-        return {Tone::Good, fmt::format("The error that {} states of itself can be trusted: predicted over actual is {}.", name, text)};
+        return {
+            Tone::Good,
+            fmt::format("The error that {} states of itself can be trusted: predicted over actual is {}.",
+                        name, text)};
     if (holds_one)
-        return {Tone::Neutral, fmt::format("The error that {} states of itself shows no fault, but is not known within a tenth: predicted over actual is {}.", name, text)};
+        return {Tone::Neutral, fmt::format("The error that {} states of itself shows no fault, but is not "
+                                           "known within a tenth: predicted over actual is {}.",
+                                           name, text)};
     const char* how = ratio.value < 1 ? "understates" : "overstates";
     if (ratio.value > 1 / kTenth && ratio.value < kTenth)
-        return {Tone::Neutral, fmt::format("{} {} its own error by less than a tenth: predicted over actual is {}.", name, how, text)};
-    return {Tone::Warning, fmt::format("{} {} its own error: predicted over actual is {}.", name, how, text)};
+        return {Tone::Neutral,
+                fmt::format("{} {} its own error by less than a tenth: predicted over actual is {}.", name,
+                            how, text)};
+    return {Tone::Warning,
+            fmt::format("{} {} its own error: predicted over actual is {}.", name, how, text)};
 }
 
 /// At the most samples. Of the same bits one speaks for all.
@@ -178,7 +215,9 @@ std::vector<Finding> trust(const Fits& fits) {
     for (const ConfigurationFit* fit : fits) {
         // An image cannot see its own bias; where there is one, that is said already.
         if (fit->points.empty() || !fit->points.back().calibration || fit->error.flattening) continue;
-        if (!std::isfinite(fit->points.back().calibration->value) || std::find(told.begin(), told.end(), fit->key) != told.end()) continue;
+        if (!std::isfinite(fit->points.back().calibration->value) ||
+            std::find(told.begin(), told.end(), fit->key) != told.end())
+            continue;
         told.insert(told.end(), fit->same_bits.begin(), fit->same_bits.end());
         findings.push_back(trustIn(*fit));
     }
@@ -206,7 +245,8 @@ std::vector<Finding> findingsOfScene(const Run& run, const Analysis& analysis, c
     std::vector<Finding> findings;
     if (!fits.empty())
         for (std::size_t which = 0; which < analysis.options.targets.size(); ++which)
-            findings.push_back(race(fits, which, analysis.options.targets[which], analysis.options.confidence));
+            findings.push_back(
+                race(fits, which, analysis.options.targets[which], analysis.options.confidence));
     append(findings, commonRace(fits, analysis.options.confidence));
     append(findings, efficiency(fits, analysis.options.confidence));
     append(findings, sameBits(fits));
@@ -227,8 +267,10 @@ std::vector<std::string> scenesOf(const Run& run) {
 std::string verdictLine(const ConfigurationFit& fit) {
     std::string text = fmt::format("{} {}: ", fit.key.scene, labelOf(fit.key));
     if (!fit.points.empty()) {
-        text += fmt::format("error {} at {} spp", errorText(fit.points.back().relative_rmse), fit.points.back().samples);
-        if (fit.fitted && std::isfinite(fit.slope_samples.value)) text += fmt::format(", slope {}", numberText(fit.slope_samples));
+        text += fmt::format("error {} at {} spp", errorText(fit.points.back().relative_rmse),
+                            fit.points.back().samples);
+        if (fit.fitted && std::isfinite(fit.slope_samples.value))
+            text += fmt::format(", slope {}", numberText(fit.slope_samples));
         text += ", ";
     }
     return text + fmt::format("{}: {}", stats::verdictName(fit.judgement.verdict), fit.judgement.reason);

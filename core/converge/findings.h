@@ -27,7 +27,8 @@ std::vector<Finding> findingsOfScene(const Run& run, const Analysis& analysis, c
 /// The scenes of a run, in the order of its configurations.
 std::vector<std::string> scenesOf(const Run& run);
 
-/// One line for the terminal: the error at the most samples and its slope as far as they are known, and the verdict.
+/// One line for the terminal: the error at the most samples and its slope as far as they are known, and the
+/// verdict.
 std::string verdictLine(const ConfigurationFit& fit);
 
 /// "embree, sampler=sobol": a configuration within its scene.

@@ -140,7 +140,7 @@ private:
     const FitOptions& options_;
 };
 
-// ------------------------------------------------------------------------------------------------ configurations
+// ------------------------------------------------------------------------- configurations
 
 bool sameBits(const Row& a, const Row& b) {
     const auto mse = [](const Row& row) { return row.error ? row.error->mse : -1; };
@@ -190,8 +190,9 @@ void collectRows(Subject& subject, const Run& run) {
     subject.errors = subject.own;
 }
 
-/// Of each number of samples the rows of whoever has most replicates there; they are not mixed, for the variance between
-/// them is of all replicates of one configuration. The tests of images are of whoever went farthest.
+/// Of each number of samples the rows of whoever has most replicates there; they are not mixed, for the
+/// variance between them is of all replicates of one configuration. The tests of images are of whoever went
+/// farthest.
 void shareSameBits(std::vector<Subject>& subjects) {
     const auto progress = [](const Subject& s) {
         return s.own.empty() ? std::pair<std::uint64_t, std::size_t>{}
@@ -241,8 +242,8 @@ void fitSubject(Subject& subject, const FitOptions& options) {
     for (const double target : options.targets) fit.targets.push_back(fitter.target(target, fit.error));
 }
 
-/// What a configuration's errors are measured by, its points and its fits. A reference that is noisier than the images judges
-/// bias only; unless it sees one, which is then part of the error.
+/// What a configuration's errors are measured by, its points and its fits. A reference that is noisier than
+/// the images judges bias only; unless it sees one, which is then part of the error.
 void measureAndFit(Subject& subject, const FitOptions& options) {
     const double pixels = static_cast<double>(subject.configuration->width) * subject.configuration->height;
     subject.measure.emplace(subject.errors, subject.reference, std::max(1.0, pixels));

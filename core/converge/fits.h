@@ -1,15 +1,17 @@
 /// From rows to statements: how fast a configuration converges, what it costs, whether it is right, and how sure all that is.
 ///
-/// Relative to the scene. Errors are of luminance, divided by the mean luminance of the reference (of the replicates,
-/// without one; stats/luminance_error.h), so mean squared errors here are relative² and 0.01² is "1 %". The reference's own
-/// variance is subtracted from every mean squared error.
+/// Relative to the scene. Errors are of luminance, divided by the mean luminance of the reference (of the
+/// replicates, without one; stats/luminance_error.h), so mean squared errors here are relative² and 0.01² is
+/// "1 %". The reference's own variance is subtracted from every mean squared error.
 ///
-/// Where intervals come from. Rows of one replicate are looks at one progressive render, so only replicates are
-/// independent, and so are the folds of a reference. Every interval is the jackknife over both (jackknife.h): leave one
-/// out, repeat the whole fit. Positive quantities are treated as logarithms. For means it is Student's interval exactly; for
-/// the rest unit_fits.cpp and docs/results/false-alarms.md measure the coverage.
+/// Where intervals come from. Rows of one replicate are looks at one progressive render, so only replicates
+/// are independent, and so are the folds of a reference. Every interval is the jackknife over both
+/// (jackknife.h): leave one out, repeat the whole fit. Positive quantities are treated as logarithms. For
+/// means it is Student's interval exactly; for the rest unit_fits.cpp and docs/results/false-alarms.md
+/// measure the coverage.
 ///
-/// Configurations that render the same bits share the errors of whichever has more of them; times are their own.
+/// Configurations that render the same bits share the errors of whichever has more of them; times are their
+/// own.
 ///
 /// Without a reference the error is the variance between replicates: unbiased for the variance, blind to bias. Deviations from their common mean are not
 /// independent; for normal errors intervals come out too short by √((R − 2)/(R − 1)), and are widened by that.
@@ -47,7 +49,8 @@ struct Point {
     Estimate seconds;            ///< What a user waits who asks for N: start-up and render.
     Estimate render_seconds;
     Estimate relative_rmse;      ///< 0, or from 0 on, where the reference's own noise hides the error.
-    Estimate efficiency;         ///< 1/(relative MSE × seconds), start-up included. 1/s. NaN where there is no error.
+    /// 1/(relative MSE × seconds), start-up included. 1/s. NaN where there is no error.
+    Estimate efficiency;
     std::optional<Estimate> mean_bias;      ///< Mean luminance over that of the reference, − 1.
     std::optional<Estimate> bias_squared;   ///< mean (E I − R)², relative²; may be below 0, which is how it contains it.
     std::optional<Estimate> calibration;    ///< Predicted over actual relative RMSE.
@@ -95,26 +98,28 @@ struct Judgement {
 /// All that is said about one configuration.
 struct ConfigurationFit {
     Key key;
-    std::vector<Key> same_bits;       ///< Others whose rows are the same bit for bit: errors and verdicts are shared.
+    /// Others whose rows are the same bit for bit: errors and verdicts are shared.
+    std::vector<Key> same_bits;
     std::uint32_t replicates = 0;     ///< In the fits; points may have more.
     std::uint32_t void_rows = 0;
     bool omitted = false;             ///< It was not measured; the judgement's reason says why.
-    /// Of the errors. BetweenReplicates, too, where the reference is noisier than a third of the images' own error and no
-    /// bias is seen against it.
+    /// Of the errors. BetweenReplicates, too, where the reference is noisier than a third of the images' own
+    /// error and no bias is seen against it.
     ErrorSource source = ErrorSource::BetweenReplicates;
     bool has_reference = false;       ///< Which judges bias.
     std::vector<Point> points;        ///< By samples. Those with two replicates at least.
-    bool fitted = false;              ///< Three points or more with two replicates each; else all below but the judgement is empty.
+    /// Three points or more with two replicates each; else all below but the judgement is empty.
+    bool fitted = false;
     TimeFit time;
     ErrorFit error;
     Estimate slope_samples;           ///< d log RMSE / d log N
     Estimate slope_seconds;           ///< d log RMSE / d log(t − t0)
     std::vector<Target> targets;      ///< As in FitOptions::targets.
-    /// The least error that every fitted configuration of the scene reached: where they can be compared without looking
-    /// beyond what was measured.
+    /// The least error that every fitted configuration of the scene reached: where they can be compared
+    /// without looking beyond what was measured.
     Target common;
-    /// 1/(e²·N·c) for the common error e, reached with N samples: 1/(v·c) where error falls as 1/√N. Start-up excluded. 1/s.
-    /// A lower bound where common.at_first_point.
+    /// 1/(e²·N·c) for the common error e, reached with N samples: 1/(v·c) where error falls as 1/√N.
+    /// Start-up excluded. 1/s. A lower bound where common.at_first_point.
     Estimate efficiency;
     Judgement judgement;
 };

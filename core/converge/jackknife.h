@@ -1,8 +1,9 @@
-/// Intervals of anything that is reckoned from replicates, by leaving parts of them out (Tukey 1958; Miller 1974).
+/// Intervals of anything that is reckoned from replicates, by leaving parts of them out (Tukey 1958; Miller
+/// 1974).
 ///
-/// Three samples are independent of each other: the replicates that errors are known from, those that times are known
-/// from, and the folds of the reference. Each is left out one by one, the variances add up, and Student's degrees of
-/// freedom are those of Satterthwaite 1946.
+/// Three samples are independent of each other: the replicates that errors are known from, those that times
+/// are known from, and the folds of the reference. Each is left out one by one, the variances add up, and
+/// Student's degrees of freedom are those of Satterthwaite 1946.
 #pragma once
 
 #include "converge/measurement.h"
@@ -32,12 +33,14 @@ struct SampleCounts {
 
 enum class Scale { Linear, Logarithmic };
 
-/// Without bounds (low −∞ or, on the logarithmic scale, 0; high ∞) where the statistic is not finite on some part, or
-/// one of the samples is a single one. NaN altogether where it is not finite on all. Of very many replicates whole
-/// groups are left out (Wolter, Introduction to Variance Estimation, 4.2): the time would grow with their square.
+/// Without bounds (low −∞ or, on the logarithmic scale, 0; high ∞) where the statistic is not finite on some
+/// part, or one of the samples is a single one. NaN altogether where it is not finite on all. Of very many
+/// replicates whole groups are left out (Wolter, Introduction to Variance Estimation, 4.2): the time would
+/// grow with their square.
 Estimate jackknife(const SampleCounts& counts, const Statistic& statistic, Scale scale, double confidence);
 
-/// Standard error of the same on a linear scale that the folds alone cause; 0 without folds, infinite where unknown.
+/// Standard error of the same on a linear scale that the folds alone cause; 0 without folds, infinite where
+/// unknown.
 double foldError(const SampleCounts& counts, const Statistic& statistic);
 
 /// 0, 1 … count − 1

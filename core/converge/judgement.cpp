@@ -52,7 +52,8 @@ double relativeVarianceOf(const ReferenceInfo& reference) {
 std::optional<Judgement> faultOf(const ConfigurationFit& fit, const ImageTests& tests, const Pooled& pooled,
                                  const ReferenceInfo& reference, const FitOptions& options) {
     const double margin = options.equivalence_margin, confidence = 100 * options.verdict_confidence;
-    // A few values that carry the answer make intervals too short and too long alike: no verdict could be trusted.
+    // A few values that carry the answer make intervals too short and too long alike: no verdict could be
+    // trusted.
     if (tests.largest_share && !(*tests.largest_share < 0.05))
         return Judgement{
             Verdict::Inconclusive,
@@ -81,8 +82,8 @@ std::optional<Judgement> faultOf(const ConfigurationFit& fit, const ImageTests& 
                                      *tests.smallest_tile_p),
                          {}};
     if (tests.smallest_pixel_p && *tests.smallest_pixel_p < options.family_alpha)
-        // No proof: where light is found by rare chance, a pixel's replicates may all have missed it and agree with each
-        // other on too little.
+        // No proof: where light is found by rare chance, a pixel's replicates may all have missed it and
+        // agree with each other on too little.
         return Judgement{Verdict::Inconclusive,
                          fmt::format("A pixel differs from the reference (p = {:.1e} after Šidák), or its "
                                      "replicates are too few to be normal. "

@@ -8,12 +8,13 @@
 
 namespace crt::converge {
 
-/// Relative bias of one channel's mean (in units of stats::channelScale) or, without `channel`, of mean luminance. The
-/// variances of replicates and of the reference add up, with Welch's degrees of freedom.
+/// Relative bias of one channel's mean (in units of stats::channelScale) or, without `channel`, of mean
+/// luminance. The variances of replicates and of the reference add up, with Welch's degrees of freedom.
 Estimate meanBias(const RowList& rows, const ReferenceInfo& reference, std::optional<std::size_t> channel,
                   double confidence);
 
-/// Void rows, heavy tails, pooled equivalence per channel, bias floor, tiles and pixels: the first that decides does.
+/// Void rows, heavy tails, pooled equivalence per channel, bias floor, tiles and pixels: the first that
+/// decides does.
 Judgement judge(const ConfigurationFit& fit, const ImageTests& tests, const RowsBySamples& by_samples,
                 const ReferenceInfo* reference, const FitOptions& options);
 

@@ -56,25 +56,27 @@ struct Row {
 
     double render_wall_seconds = 0;                    ///< Since the first chunk of this replicate, reading the film for looks left out.
     std::optional<double> render_device_seconds;       ///< The same by the device's clock.
-    /// Parse, build, compile, upload and the first sample, with libraries loaded and kernels in the cache: every start was
-    /// tried once before it was timed, so that it does not matter who is listed first.
+    /// Parse, build, compile, upload and the first sample, with libraries loaded and kernels in the cache:
+    /// every start was tried once before it was timed, so that it does not matter who is listed first.
     double seconds_before_first_sample = 0;
     std::uint64_t paths = 0;                           ///< Since the replicate began, as the two below.
     std::uint64_t closest_rays = 0, shadow_rays = 0;
 
     std::optional<ErrorMetrics> error;                 ///< Against the scene's reference.
-    /// Mean squared difference from each fold of the reference alone, absolute; empty where it has none. With
-    /// ReferenceInfo::fold_distance it says what the error would be against any of the folds.
+    /// Mean squared difference from each fold of the reference alone, absolute; empty where it has none.
+    /// With ReferenceInfo::fold_distance it says what the error would be against any of the folds.
     std::vector<double> fold_mse;
     /// (R − 1)/R · mean (I_r − Ī_r)², Ī_r the mean of the configuration's other R − 1 replicates at the same N. Its mean over replicates is their
     /// sample variance: unbiased for the variance of one image, blind to bias. It stands in for the error where there is no reference, and where
     /// there is one, mean(error->mse − between_replicates_mse) estimates bias². Known when all replicates have reached N.
     std::optional<double> between_replicates_mse;
-    std::optional<double> effective_pixels;            ///< stats::effectivePixels of that variance; known with it.
+    /// stats::effectivePixels of that variance; known with it.
+    std::optional<double> effective_pixels;
     std::optional<Estimate> predicted_relative_rmse;   ///< What the image says of itself, from its own scrambles.
 
     double mean_luminance = 0;
-    std::array<double, 3> image_mean{0, 0, 0};                      ///< R, G, B. Against a closed form, all three are mean luminance.
+    /// R, G, B. Against a closed form, all three are mean luminance.
+    std::array<double, 3> image_mean{0, 0, 0};
     std::optional<std::array<double, 3>> image_mean_standard_error; ///< As the image itself predicts it.
     std::uint64_t invalid_samples = 0;                 ///< NaN or infinite. Any makes the row void.
     std::optional<double> cpu_clock_mhz, load_average; ///< At the moment of the look.
@@ -157,12 +159,15 @@ struct ReferenceInfo {
     double mean_luminance_standard_error = 0;
     std::array<double, 3> image_mean{0, 0, 0};           ///< R, G, B.
     std::array<double, 3> image_mean_standard_error{0, 0, 0};
-    double mean_variance = 0;         ///< Mean over pixels of the variance of the reference's luminance: it is subtracted from errors.
-    double eightfold_spread = 0;      ///< Relative RMSE between eighths of the reference, divided by √8: its own relative error.
+    /// Mean over pixels of the variance of the reference's luminance: it is subtracted from errors.
+    double mean_variance = 0;
+    /// Relative RMSE between eighths of the reference, divided by √8: its own relative error.
+    double eightfold_spread = 0;
     /// What the folds (eighths) say of themselves; empty where there are none.
     std::vector<double> fold_mean_luminance;
-    std::vector<std::vector<double>> fold_distance;      ///< Mean squared difference of the luminances of two folds, absolute.
-    std::optional<double> effective_pixels;              ///< stats::effectivePixels of the reference's variance.
+    /// Mean squared difference of the luminances of two folds, absolute.
+    std::vector<std::vector<double>> fold_distance;
+    std::optional<double> effective_pixels;  ///< stats::effectivePixels of the reference's variance.
 };
 
 /// Where and how it all ran.

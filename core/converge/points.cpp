@@ -11,8 +11,8 @@ namespace {
 
 double secondsOf(const Row& row) { return row.seconds_before_first_sample + row.render_wall_seconds; }
 
-/// √ of a mean squared error. In logarithms where the error is known well; else from a line, which may begin at 0: below
-/// the reference's own noise there is no logarithm.
+/// √ of a mean squared error. In logarithms where the error is known well; else from a line, which may begin
+/// at 0: below the reference's own noise there is no logarithm.
 Estimate rootOf(const SampleCounts& counts, const Statistic& mse, double confidence) {
     const Estimate e = jackknife(counts, mse, Scale::Linear, confidence);
     if (e.low > 0.25 * e.value) {
@@ -35,7 +35,8 @@ std::optional<double> meanOfKnown(const RowList& rows, const Value& value) {
     return sum;
 }
 
-/// A column of errors and a column of times, which are of the same replicates or, with the same bits, of others.
+/// A column of errors and a column of times, which are of the same replicates or, with the same bits, of
+/// others.
 class PointMaker {
 public:
     PointMaker(const RowList& errors, const RowList& times, const Measure& measure,
@@ -108,8 +109,8 @@ private:
                                              options_.confidence);
     }
 
-    /// Predicted over actual error, both as root mean squares over replicates, and how often a prediction's interval holds
-    /// the actual error.
+    /// Predicted over actual error, both as root mean squares over replicates, and how often a prediction's
+    /// interval holds the actual error.
     void calibrate(Point& point) const {
         bool all_predict = true;
         for (const Row* row : errors_) {

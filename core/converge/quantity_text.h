@@ -22,7 +22,8 @@ std::string secondsText(const Estimate& estimate, int digits = 3);
 std::string percentText(const Estimate& estimate, int digits = 3);
 std::string numberText(const Estimate& estimate, int digits = 3);
 
-/// An error: as percentText, but "below 0.31 %" where the interval reaches 0 because the reference's own noise hides it.
+/// An error: as percentText, but "below 0.31 %" where the interval reaches 0 because the reference's own
+/// noise hides it.
 std::string errorText(const Estimate& relative_rmse, int digits = 3);
 
 }  // namespace crt::converge

@@ -53,7 +53,8 @@ std::vector<float> channelsOf(const Image& image, const std::array<std::string, 
 }
 
 /// Mean, variance and distances of the folds, from their luminances and colours.
-void describeFolds(ReferenceInfo& info, const std::vector<std::vector<float>>& luminances, const std::vector<std::vector<double>>& colours) {
+void describeFolds(ReferenceInfo& info, const std::vector<std::vector<float>>& luminances,
+                   const std::vector<std::vector<double>>& colours) {
     const std::size_t pixels = luminances.front().size();
     std::vector<double> variances(pixels);
     for (std::size_t p = 0; p < pixels; ++p) {
@@ -66,7 +67,8 @@ void describeFolds(ReferenceInfo& info, const std::vector<std::vector<float>>& l
     for (const std::vector<float>& a : luminances) {
         info.fold_mean_luminance.push_back(stats::meanLuminance(a));
         info.fold_distance.emplace_back();
-        for (const std::vector<float>& b : luminances) info.fold_distance.back().push_back(stats::meanSquaredDifference(a, b));
+        for (const std::vector<float>& b : luminances)
+            info.fold_distance.back().push_back(stats::meanSquaredDifference(a, b));
     }
     const stats::Summary luminance = stats::summarize(info.fold_mean_luminance);
     info.mean_luminance = luminance.mean;
@@ -75,7 +77,8 @@ void describeFolds(ReferenceInfo& info, const std::vector<std::vector<float>>& l
     for (std::size_t c = 0; c < 3; ++c) {
         std::array<double, kFolds> means{};
         for (std::uint32_t fold = 0; fold < kFolds; ++fold)
-            for (std::size_t p = 0; p < pixels; ++p) means[fold] += colours[fold][3 * p + c] / static_cast<double>(pixels);
+            for (std::size_t p = 0; p < pixels; ++p)
+                means[fold] += colours[fold][3 * p + c] / static_cast<double>(pixels);
         const stats::Summary summary = stats::summarize(means);
         info.image_mean[c] = summary.mean;
         info.image_mean_standard_error[c] = summary.standardError();
@@ -108,23 +111,30 @@ std::string hashOfContent(const Scene& scene) {
 }
 
 std::string colourText(const Scene& scene) {
-    const auto space = [](ColorSpace s) { return s == ColorSpace::LinearSrgb ? "linear sRGB" : s == ColorSpace::AcesCg ? "ACEScg" : "XYZ"; };
+    const auto space = [](ColorSpace s) {
+        return s == ColorSpace::LinearSrgb ? "linear sRGB" : s == ColorSpace::AcesCg ? "ACEScg" : "XYZ";
+    };
     std::string white = "no white balance";
     if (scene.film.white_balance) {
         const Vec3d xyz = spectrumToXyz(*scene.film.white_balance);
-        white = fmt::format("white balance from X : Y : Z = {:.6f} : 1 : {:.6f}", xyz[0] / xyz[1], xyz[2] / xyz[1]);
+        white = fmt::format("white balance from X : Y : Z = {:.6f} : 1 : {:.6f}", xyz[0] / xyz[1],
+                            xyz[2] / xyz[1]);
     }
-    return fmt::format("exposure {} EV, {}, {}", scene.film.exposure_ev, space(scene.film.color_space), white);
+    return fmt::format("exposure {} EV, {}, {}", scene.film.exposure_ev, space(scene.film.color_space),
+                       white);
 }
 
 int makeReference(const ReferenceRequest& request) {
     const InterruptGuard interrupt;
     const std::optional<MadeReference> made = renderReference(loadScene(request.scene), request);
     if (!made) return 128 + InterruptGuard::signalReceived();
-    logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, made->samples, kFolds, made->estimator, durationText(made->seconds));
+    logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, made->samples, kFolds,
+            made->estimator, durationText(made->seconds));
     if (made->error) logInfo("its own {}", errorText(*made->error));
     if (made->error && made->error->relative_rmse > 0.02)
-        logWarning("the reference is noisy itself; its variance is subtracted from errors, but more --time, or --same-estimator, makes them surer");
+        logWarning(
+            "the reference is noisy itself; its variance is subtracted from errors, but more --time, or "
+            "--same-estimator, makes them surer");
     return 0;
 }
 
@@ -136,8 +146,10 @@ struct RenderedFolds {
     std::vector<Image> images;
 };
 
-/// Each eighth has samples of its own. The first also finds out how many fit into the time. Nothing when a signal came.
-std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene& compiled, Integrator& integrator, const ReferenceRequest& request) {
+/// Each eighth has samples of its own. The first also finds out how many fit into the time. Nothing when a
+/// signal came.
+std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene& compiled,
+                                         Integrator& integrator, const ReferenceRequest& request) {
     const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
     Progress progress(request.progress);
     ProgressState state;
@@ -197,17 +209,22 @@ Image referenceImage(const RenderedFolds& folds, const Scene& scene) {
 
 std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request) {
     if (scene.integrator.type != IntegratorType::Path)
-        throw Error(ErrorKind::Usage, "a view has no noise and needs no reference: integrator.type must be path");
+        throw Error(ErrorKind::Usage,
+                    "a view has no noise and needs no reference: integrator.type must be path");
     if (std::filesystem::path(request.output).extension() != ".exr")
-        throw Error(ErrorKind::Usage, fmt::format("a reference holds its eighths beside the image, which only EXR can: '{}' should end in .exr", request.output));
-    if (request.samples > 0 && request.samples < kFolds) throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
+        throw Error(ErrorKind::Usage, fmt::format("a reference holds its eighths beside the image, which "
+                                                  "only EXR can: '{}' should end in .exr",
+                                                  request.output));
+    if (request.samples > 0 && request.samples < kFolds)
+        throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
     checkWritable(request.output);
     const auto started = std::chrono::steady_clock::now();
     const std::string content = hashOfContent(scene), colour = colourText(scene);
     scene = referenceScene(std::move(scene), request.same_estimator);
     const LoadedBackend backend = openBackend(request.backend);
     Integrator integrator(backend, request.integrator);
-    const std::optional<RenderedFolds> folds = renderFolds(scene, compileScene(scene, 0), integrator, request);
+    const std::optional<RenderedFolds> folds =
+        renderFolds(scene, compileScene(scene, 0), integrator, request);
     if (!folds) return std::nullopt;
     Image file = referenceImage(*folds, scene);
     file.metadata.emplace_back("Software", "crt " CRT_VERSION);
@@ -217,7 +234,8 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     file.metadata.emplace_back("crt/backend", backend.name);
     writeImage(request.output, OutputFormat::Exr, file);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-    return MadeReference{folds->film.samples.count(), estimatorText(scene), seconds, estimateError(folds->film, PixelSet::All, true)};
+    return MadeReference{folds->film.samples.count(), estimatorText(scene), seconds,
+                         estimateError(folds->film, PixelSet::All, true)};
 }
 
 Reference readReference(const std::string& text, const Scene& scene) {
@@ -240,10 +258,14 @@ Reference readReference(const std::string& text, const Scene& scene) {
         throw Error(ErrorKind::Usage, fmt::format("'{}' is a reference of another scene, or of this one with other settings or resolution", text));
     const std::string colour = metadataOf(image, kColourKey);
     if (colour.empty())
-        throw Error(ErrorKind::Usage, fmt::format("'{}' is of an earlier crt, which did not note exposure, colour space and white balance: make it again "
-                                                  "with 'crt reference'", text));
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is of an earlier crt, which did not note exposure, "
+                                                  "colour space and white balance: make it again "
+                                                  "with 'crt reference'",
+                                                  text));
     if (colour != colourText(scene))
-        throw Error(ErrorKind::Usage, fmt::format("'{}' is a reference in other colours: it has {}; the scene has {}", text, colour, colourText(scene)));
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' is a reference in other colours: it has {}; the scene has {}", text,
+                                colour, colourText(scene)));
     reference.width = image.width;
     reference.height = image.height;
     reference.rgb = channelsOf(image, {"R", "G", "B"});

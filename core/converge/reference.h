@@ -36,8 +36,8 @@ struct ReferenceRequest {
 /// Renders it and returns the exit code. Throws crt::Error.
 int makeReference(const ReferenceRequest& request);
 
-/// The same for a scene that is read already; `request.scene` does not matter. What it took and how noisy it is, or nothing
-/// when a signal stopped it.
+/// The same for a scene that is read already; `request.scene` does not matter. What it took and how noisy it
+/// is, or nothing when a signal stopped it.
 struct MadeReference {
     std::uint64_t samples = 0;  ///< Per pixel.
     std::string estimator;
@@ -49,8 +49,8 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
 /// The scene as a reference renders it: independent samples, another seed, light sampling switched, no roulette.
 Scene referenceScene(Scene scene, bool same_estimator);
 
-/// Hash of what is to be seen, without how: two scenes with it have the same expected light on the film. Their images are
-/// the same when colourText() is, too.
+/// Hash of what is to be seen, without how: two scenes with it have the same expected light on the film.
+/// Their images are the same when colourText() is, too.
 std::string hashOfContent(const Scene& scene);
 
 /// What becomes of that light in the image: "exposure 0 EV, linear sRGB, no white balance".

@@ -13,7 +13,7 @@ namespace crt::converge {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x32736b6f6f4c5243;  // "CRLooks2"
-using Header = std::array<std::uint64_t, 3>;           // Magic, pixels, looks.
+using Header = std::array<std::uint64_t, 3>;          // Magic, pixels, looks.
 
 }  // namespace
 
@@ -37,14 +37,17 @@ std::optional<StoredReplicate> readReplicate(const std::string& path, std::size_
     Header header{};
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(path, error);
-    const bool begins = !error && file.read(reinterpret_cast<char*>(header.data()), sizeof header) && header[0] == kMagic;
+    const bool begins =
+        !error && file.read(reinterpret_cast<char*>(header.data()), sizeof header) && header[0] == kMagic;
     // No more looks than powers of two, and exactly the bytes that they take.
     const bool fits = begins && header[1] == pixels && header[2] >= 1 && header[2] <= 64 &&
-                      bytes == sizeof header + header[2] * (sizeof(std::uint64_t) + pixels * sizeof(float)) + 4 * pixels * sizeof(float);
+                      bytes == sizeof header + header[2] * (sizeof(std::uint64_t) + pixels * sizeof(float)) +
+                                   4 * pixels * sizeof(float);
     StoredReplicate replicate;
     const auto read = [&](std::vector<float>& values, std::size_t count) {
         values.resize(count);
-        file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(float)));
+        file.read(reinterpret_cast<char*>(values.data()),
+                  static_cast<std::streamsize>(count * sizeof(float)));
     };
     for (std::uint64_t look = 0; fits && look < header[2]; ++look) {
         auto& [samples, plane] = replicate.looks.emplace_back();
@@ -56,8 +59,11 @@ std::optional<StoredReplicate> readReplicate(const std::string& path, std::size_
         read(replicate.standard_error, pixels);
     }
     if (!fits || !file)
-        throw Error(ErrorKind::Usage, fmt::format("'{}' is not a replicate of this run ({} pixels are expected); remove it, or choose another folder",
-                                                  path, pixels), {path});
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' is not a replicate of this run ({} pixels are expected); remove it, "
+                                "or choose another folder",
+                                path, pixels),
+                    {path});
     return replicate;
 }
 

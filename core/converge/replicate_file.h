@@ -1,5 +1,5 @@
-/// A replicate on disk, so that a run can go on: the luminances of every look, which the spread between replicates needs,
-/// and the last image with its own standard error, which the tests and maps need.
+/// A replicate on disk, so that a run can go on: the luminances of every look, which the spread between
+/// replicates needs, and the last image with its own standard error, which the tests and maps need.
 #pragma once
 
 #include <cstddef>
@@ -16,13 +16,14 @@ using LookPlane = std::vector<float>;
 
 struct StoredReplicate {
     std::vector<std::pair<std::uint64_t, LookPlane>> looks;  ///< (samples per pixel, luminances), ascending.
-    std::vector<float> rgb;             ///< Of the last look, [pixel][3].
+    std::vector<float> rgb;                                  ///< Of the last look, [pixel][3].
     std::vector<float> standard_error;  ///< Of the last look, relative to its mean luminance, [pixel].
 };
 
 void writeReplicate(const std::string& path, const StoredReplicate& replicate);
 
-/// Nothing where there is no file. Throws crt::Error(Usage) when the file is not a replicate of so many pixels.
+/// Nothing where there is no file. Throws crt::Error(Usage) when the file is not a replicate of so many
+/// pixels.
 std::optional<StoredReplicate> readReplicate(const std::string& path, std::size_t pixels);
 
 }  // namespace crt::converge

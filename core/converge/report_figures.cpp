@@ -62,9 +62,11 @@ Plot errorAgainstTime(const Subjects& subjects, const Analysis& analysis, const 
         PlotLine line = lineOf(subject);
         for (const Point& point : subject.fit->points) {
             const Estimate& e = point.relative_rmse;
-            if (!(e.value > 0)) continue;  // Hidden by the reference's own noise: a logarithmic axis has no place for it.
-            line.points.push_back({point.seconds.value, e.value, e.low, e.high,
-                                   tip(subject, point, errorText(e) + " after " + secondsText(point.seconds.value))});
+            if (!(e.value > 0))
+                continue;  // Hidden by the reference's own noise: a logarithmic axis has no place for it.
+            line.points.push_back(
+                {point.seconds.value, e.value, e.low, e.high,
+                 tip(subject, point, errorText(e) + " after " + secondsText(point.seconds.value))});
         }
         if (subject.fit->fitted && subject.fit->time.start() > 0) line.x_mark = subject.fit->time.start();
         line.floor = floorOf(subject);
@@ -86,7 +88,8 @@ Plot errorAgainstSamples(const Subjects& subjects, const std::string& scene) {
         for (const Point& point : subject.fit->points) {
             const Estimate& e = point.relative_rmse;
             if (!(e.value > 0)) continue;
-            line.points.push_back({static_cast<double>(point.samples), e.value, e.low, e.high, tip(subject, point, errorText(e))});
+            line.points.push_back({static_cast<double>(point.samples), e.value, e.low, e.high,
+                                   tip(subject, point, errorText(e))});
         }
         line.floor = floorOf(subject);
         plot.lines.push_back(std::move(line));
@@ -97,13 +100,19 @@ Plot errorAgainstSamples(const Subjects& subjects, const std::string& scene) {
 BarChart efficiencyBars(const Subjects& subjects, const std::string& scene) {
     BarChart chart;
     chart.title = "Efficiency, " + scene;
-    chart.description = "One over squared error times render seconds, start-up excluded, at the least error that all reached, with 95 % intervals. More is better.";
+    chart.description =
+        "One over squared error times render seconds, start-up excluded, at the least error that all "
+        "reached, with 95 % intervals. More is better.";
     chart.axis = {"efficiency 1/(e²·N·c), 1/s", AxisScale::Linear, numberTick, {}};
     for (const Subject& subject : subjects) {
         if (!subject.fit->fitted || !std::isfinite(subject.fit->efficiency.value)) continue;
         const Estimate& e = subject.fit->efficiency;
         const std::string bound = subject.fit->common.at_first_point ? "≥ " : "";
-        chart.bars.push_back({subject.label(), bound + numberText(e) + " /s", subject.style, {e.value}, std::pair{e.low, e.high}});
+        chart.bars.push_back({subject.label(),
+                              bound + numberText(e) + " /s",
+                              subject.style,
+                              {e.value},
+                              std::pair{e.low, e.high}});
     }
     std::stable_sort(chart.bars.begin(), chart.bars.end(), [](const Bar& a, const Bar& b) { return a.parts[0] > b.parts[0]; });
     return chart;
@@ -253,11 +262,14 @@ std::vector<Figure> figuresOfScene(const Run& run, const Analysis& analysis, con
     add_plot("samples", "Error against samples",
              "The cost of a sample left out. In brackets the slope; independent samples have −½.", errorAgainstSamples(subjects, scene));
     add_bars("efficiency", "Efficiency",
-             "Longer is better: twice the efficiency needs half the render time for the same error. e is the least error that all configurations of the scene "
-             "have reached, N the samples that it took, c the seconds of one. Start-up is excluded; whiskers hold 95 %.",
+             "Longer is better: twice the efficiency needs half the render time for the same error. e is "
+             "the least error that all configurations of the scene "
+             "have reached, N the samples that it took, c the seconds of one. Start-up is excluded; "
+             "whiskers hold 95 %.",
              efficiencyBars(subjects, scene));
     add_plot("calibration", "Can the image's own error estimate be trusted?",
-             "1 is right; below, images understate their error. Whiskers hold 95 %.", calibration(subjects, scene));
+             "1 is right; below, images understate their error. Whiskers hold 95 %.",
+             calibration(subjects, scene));
     add_plot("bias", "Bias of the image mean",
              "95 of 100 whiskers hold 0 when there is no bias. Those of few samples are cut off at the frame.", biasPerSamples(subjects, analysis, scene));
     add_bars("time", "Where the time goes", "One replicate, from the scene file to its last sample.", timeBudget(subjects, scene));

@@ -132,8 +132,10 @@ std::string metricTable(const Run& run, const Analysis& analysis, const std::str
     std::vector<std::string> rows;
     for (const ConfigurationFit* fit : fits) {
         const Point& p = fit->points.back();
-        rows.push_back(rowHead(run, fit->key) + cell("samples per pixel", h(countText(p.samples))) + cell("replicates", std::to_string(p.replicates)) +
-                       cell("seconds", withInterval(secondsText(p.seconds))) + cell("relative RMSE", withInterval(errorText(p.relative_rmse))));
+        rows.push_back(rowHead(run, fit->key) + cell("samples per pixel", h(countText(p.samples))) +
+                       cell("replicates", std::to_string(p.replicates)) +
+                       cell("seconds", withInterval(secondsText(p.seconds))) +
+                       cell("relative RMSE", withInterval(errorText(p.relative_rmse))));
     }
     for (const auto& [name, measure] : measures) {
         if (std::none_of(fits.begin(), fits.end(), [m = measure](const ConfigurationFit* fit) { return (fit->points.back().*m).has_value(); })) continue;
@@ -155,15 +157,22 @@ std::string testTable(const Run& run, const std::string& scene) {
     for (const Configuration& c : run.configurations) {
         const ImageTests& t = c.tests;
         if (c.key.scene != scene || !(t.smallest_tile_p || t.smallest_pixel_p || t.largest_share)) continue;
-        rows += "<tr>" + rowHead(run, c.key) + cell("smallest p of tiles", known(t.smallest_tile_p)) + cell("smallest p of pixels", known(t.smallest_pixel_p)) +
+        rows += "<tr>" + rowHead(run, c.key) + cell("smallest p of tiles", known(t.smallest_tile_p)) +
+                cell("smallest p of pixels", known(t.smallest_pixel_p)) +
                 cell("tiles’ p uniform", known(t.tile_p_uniformity)) +
-                cell("largest share", t.largest_share ? h(percentText(*t.largest_share, 2)) : "–") + "</tr>\n";
+                cell("largest share", t.largest_share ? h(percentText(*t.largest_share, 2)) : "–") +
+                "</tr>\n";
     }
     if (rows.empty()) return {};
-    return "<h3>Tests against the reference</h3>\n<p>Smallest p-values are adjusted for how many tiles and pixels there are: below 0.001, one differs. The largest share is "
+    return "<h3>Tests against the reference</h3>\n<p>Smallest p-values are adjusted for how many tiles and "
+           "pixels there are: below 0.001, one differs. The largest share is "
            "the part of all squared error that a single value carries.</p>\n" +
-           tableOf({{"configuration", ""}, {"smallest p of tiles", "num"}, {"smallest p of pixels", "num"}, {"tiles’ p uniform", "num"},
-                    {"largest share", "num"}}, rows);
+           tableOf({{"configuration", ""},
+                    {"smallest p of tiles", "num"},
+                    {"smallest p of pixels", "num"},
+                    {"tiles’ p uniform", "num"},
+                    {"largest share", "num"}},
+                   rows);
 }
 
 std::string voidTable(const Run& run, const std::string& scene) {
@@ -276,8 +285,10 @@ std::string referenceSentence(const Run& run, const std::string& scene) {
     if (!r->file.empty()) text += " (" + r->file + ")";
     text += ".";
     if (r->mean_variance > 0)
-        text += fmt::format(" Its own relative error is {}; it is subtracted, and part of every interval of what is measured against it.",
-                            percentText(stats::relativeRmse(r->mean_variance, r->mean_luminance), 2));
+        text += fmt::format(
+            " Its own relative error is {}; it is subtracted, and part of every interval of what is "
+            "measured against it.",
+            percentText(stats::relativeRmse(r->mean_variance, r->mean_luminance), 2));
     return text;
 }
 
@@ -341,19 +352,32 @@ std::string methodSection(const Analysis& analysis) {
     const FitOptions& o = analysis.options;
     return fmt::format(
         "<section id=\"method\"><h2>What the figures mean</h2>\n"
-        "<p><b>Relative RMSE</b> is the root mean square of image minus reference, of luminance, over all pixels, divided by the reference's mean luminance. The "
-        "reference's own variance is subtracted; where that leaves nothing, the error is below what the interval reaches.</p>\n"
-        "<p><b>Intervals</b> hold the truth in {0:.3g} of 100 repeats. They come from the spread between replicates, renders with seeds of their own, and from that "
-        "between the eighths of the reference, by the jackknife with Student’s t. Points along one curve belong to the same renders: they are not independent of "
+        "<p><b>Relative RMSE</b> is the root mean square of image minus reference, of luminance, over all "
+        "pixels, divided by the reference's mean luminance. The "
+        "reference's own variance is subtracted; where that leaves nothing, the error is below what the "
+        "interval reaches.</p>\n"
+        "<p><b>Intervals</b> hold the truth in {0:.3g} of 100 repeats. They come from the spread between "
+        "replicates, renders with seeds of their own, and from that "
+        "between the eighths of the reference, by the jackknife with Student’s t. Points along one curve "
+        "belong to the same renders: they are not independent of "
         "each other. Configurations that render the same bits share errors, slope and verdict.</p>\n"
-        "<p><b>Slope</b> is that of error over samples, both logarithmic. <b>Time to a target</b> includes start-up. <b>Efficiency</b> is 1/(e²·N·c): "
-        "e the least error that all configurations of the scene have reached, N the samples it took, c the seconds per sample, from t = t₀ + c·N. Who is first is "
-        "said of errors that were measured, never of those that were not reached; intervals of such comparisons allow for all pairs.</p>\n"
-        "<p><b>Error floor</b> is b, what would be left after infinitely many samples: with a reference, mean squared error minus the variance between "
+        "<p><b>Slope</b> is that of error over samples, both logarithmic. <b>Time to a target</b> includes "
+        "start-up. <b>Efficiency</b> is 1/(e²·N·c): "
+        "e the least error that all configurations of the scene have reached, N the samples it took, c the "
+        "seconds per sample, from t = t₀ + c·N. Who is first is "
+        "said of errors that were measured, never of those that were not reached; intervals of such "
+        "comparisons allow for all pairs.</p>\n"
+        "<p><b>Error floor</b> is b, what would be left after infinitely many samples: with a reference, "
+        "mean squared error minus the variance between "
         "replicates. It is called seen when its {1:.4g} % interval lies above 0.</p>\n"
-        "<p><b>Verdict</b>: PASS when the {1:.4g} % interval of the image mean’s bias lies within ±{2:.3g} % for every colour (of its own mean, or of "
-        "mean luminance where that is larger), and no tile or pixel differs from the reference; FAIL when all of it lies outside, the error floor lies above that margin and above the reference's own error, a tile differs, or a sample was NaN or infinite; else INCONCLUSIVE: more samples, or a reference, are needed.</p>\n"
-        "<p>All rows are in <code>results.jsonl</code> and <code>results.csv</code>, all fits in <code>summary.json</code>, hashes in <code>manifest.json</code>.</p>\n"
+        "<p><b>Verdict</b>: PASS when the {1:.4g} % interval of the image mean’s bias lies within ±{2:.3g} "
+        "% for every colour (of its own mean, or of "
+        "mean luminance where that is larger), and no tile or pixel differs from the reference; FAIL when "
+        "all of it lies outside, the error floor lies above that margin and above the reference's own "
+        "error, a tile differs, or a sample was NaN or infinite; else INCONCLUSIVE: more samples, or a "
+        "reference, are needed.</p>\n"
+        "<p>All rows are in <code>results.jsonl</code> and <code>results.csv</code>, all fits in "
+        "<code>summary.json</code>, hashes in <code>manifest.json</code>.</p>\n"
         "</section>\n",
         100 * o.confidence, 100 * o.verdict_confidence, 100 * o.equivalence_margin);
 }

@@ -9,8 +9,12 @@ namespace crt::converge {
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
-Json numbers(const std::array<double, 3>& values) { return Json::array({number(values[0]), number(values[1]), number(values[2])}); }
-Json interval(const Estimate& e) { return Json{{"value", number(e.value)}, {"low", number(e.low)}, {"high", number(e.high)}}; }
+Json numbers(const std::array<double, 3>& values) {
+    return Json::array({number(values[0]), number(values[1]), number(values[2])});
+}
+Json interval(const Estimate& e) {
+    return Json{{"value", number(e.value)}, {"low", number(e.low)}, {"high", number(e.high)}};
+}
 Json interval(const std::optional<Estimate>& e) { return e ? interval(*e) : Json(nullptr); }
 
 void writeWhole(const std::string& path, const std::string& text) {
@@ -36,20 +40,29 @@ Json referenceJson(const ReferenceInfo& r) {
 }
 
 Json environmentJson(const Environment& e) {
-    return {{"crt_version", e.crt_version},   {"commit", e.commit},
-            {"dirty", e.dirty},               {"compiler", e.compiler},
-            {"build_flags", e.build_flags},   {"cpu", e.cpu},
+    return {{"crt_version", e.crt_version},
+            {"commit", e.commit},
+            {"dirty", e.dirty},
+            {"compiler", e.compiler},
+            {"build_flags", e.build_flags},
+            {"cpu", e.cpu},
             {"operating_system", e.operating_system},
-            {"threads", e.threads},           {"load_start", e.load_start},
-            {"load_end", e.load_end},         {"working_directory", e.working_directory},
-            {"commands", e.commands},         {"started", e.started},
-            {"finished", e.finished},         {"budget_seconds", number(e.budget_seconds)},
+            {"threads", e.threads},
+            {"load_start", e.load_start},
+            {"load_end", e.load_end},
+            {"working_directory", e.working_directory},
+            {"commands", e.commands},
+            {"started", e.started},
+            {"finished", e.finished},
+            {"budget_seconds", number(e.budget_seconds)},
             {"spent_seconds", number(e.spent_seconds)}};
 }
 
 namespace {
 
-Json keyJson(const Key& key) { return {{"scene", key.scene}, {"backend", key.backend}, {"variant", key.variant}}; }
+Json keyJson(const Key& key) {
+    return {{"scene", key.scene}, {"backend", key.backend}, {"variant", key.variant}};
+}
 
 Json pointJson(const Point& p) {
     return {{"samples_per_pixel", p.samples},
@@ -89,7 +102,8 @@ Json fitJson(const ConfigurationFit& fit) {
     json["verdict_reason"] = fit.judgement.reason;
     json["relative_mean_bias_rgb"] = nullptr;
     if (const auto& bias = fit.judgement.mean_bias)
-        json["relative_mean_bias_rgb"] = Json::array({interval((*bias)[0]), interval((*bias)[1]), interval((*bias)[2])});
+        json["relative_mean_bias_rgb"] =
+            Json::array({interval((*bias)[0]), interval((*bias)[1]), interval((*bias)[2])});
     if (fit.fitted) {
         json["time"] = {{"before_first_sample_seconds", number(fit.time.before_first_sample)},
                         {"launch_seconds", interval(fit.time.launch)},
@@ -114,13 +128,16 @@ Json fitJson(const ConfigurationFit& fit) {
 
 Json featuresJson(const std::vector<Feature>& features) {
     Json json = Json::array();
-    for (const Feature& feature : features) json.push_back({{"what", feature.name}, {"why", feature.reason}});
+    for (const Feature& feature : features)
+        json.push_back({{"what", feature.name}, {"why", feature.reason}});
     return json;
 }
 
 Json stagesJson(const StageSeconds& s) {
-    return {{"parse", number(s.parse)},     {"build", number(s.build)},
-            {"compile", number(s.compile)}, {"upload", number(s.upload)},
+    return {{"parse", number(s.parse)},
+            {"build", number(s.build)},
+            {"compile", number(s.compile)},
+            {"upload", number(s.upload)},
             {"first_sample", number(s.first_sample)},
             {"render_wall", number(s.render_wall)},
             {"render_device", number(s.render_device)},
@@ -164,9 +181,11 @@ void writeSummary(const std::string& path, const Run& run, const Analysis& analy
                        {"family_alpha", analysis.options.family_alpha}};
     json["notes"] = run.notes;
     json["references"] = Json::array();
-    for (const ReferenceInfo& reference : run.references) json["references"].push_back(referenceJson(reference));
+    for (const ReferenceInfo& reference : run.references)
+        json["references"].push_back(referenceJson(reference));
     json["configurations"] = Json::array();
-    for (const Configuration& configuration : run.configurations) json["configurations"].push_back(configurationJson(configuration));
+    for (const Configuration& configuration : run.configurations)
+        json["configurations"].push_back(configurationJson(configuration));
     json["fits"] = Json::array();
     for (const ConfigurationFit& fit : analysis.fits) json["fits"].push_back(fitJson(fit));
     writeWhole(path, json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n');

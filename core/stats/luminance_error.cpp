@@ -31,7 +31,9 @@ Rgb luminanceWeights(ColorSpace space) {
 
 // Each primary's share of the white's luminance, without a division by its own y, which may be 0.
 Rgb luminanceWeights(const std::array<double, 8>& c) {
-    const auto point = [&c](std::size_t i) { return Rgb{c[2 * i], c[2 * i + 1], 1 - c[2 * i] - c[2 * i + 1]}; };
+    const auto point = [&c](std::size_t i) {
+        return Rgb{c[2 * i], c[2 * i + 1], 1 - c[2 * i] - c[2 * i + 1]};
+    };
     const Rgb r = point(0), g = point(1), b = point(2), white = point(3);
     const double all = determinant(r, g, b) * white[1];
     return {determinant(white, g, b) / all * r[1], determinant(r, white, b) / all * g[1],
@@ -52,7 +54,8 @@ double meanLuminance(std::span<const float> luminances) {
 }
 
 double meanSquaredDifference(std::span<const float> a, std::span<const float> b) {
-    if (a.size() != b.size() || a.empty()) throw Error(ErrorKind::Internal, "an error needs two images of one size");
+    if (a.size() != b.size() || a.empty())
+        throw Error(ErrorKind::Internal, "an error needs two images of one size");
     double squares = 0;
     for (std::size_t p = 0; p < a.size(); ++p) {
         const double difference = static_cast<double>(a[p]) - b[p];

@@ -62,7 +62,8 @@ class Converging(CliTest):
             self.assertEqual(both[key], value)
 
     def converge(self, *arguments, folder="out", expect=0, time="2s", spp="8"):
-        return self.crt("converge", *arguments, "--backends", self.backend, "--time", time, "--max-spp", spp, "-o", folder, expect=expect)
+        return self.crt("converge", *arguments, "--backends", self.backend, "--time", time, "--max-spp", spp,
+                        "-o", folder, expect=expect)
 
     def test_resume_refuses_what_is_not_the_same_experiment(self):
         self.converge("scene.yaml", *SMALL)
@@ -80,7 +81,8 @@ class Converging(CliTest):
         before = self.rows("out")
         for what, changed in cases:
             with self.subTest(what=what, changed=changed):
-                self.assert_one_error(self.converge("scene.yaml", *changed, "--resume", expect=2), "another experiment", what)
+                run = self.converge("scene.yaml", *changed, "--resume", expect=2)
+                self.assert_one_error(run, "another experiment", what)
         self.assertEqual(self.rows("out"), before)
         self.converge("scene.yaml", *SMALL, "--resume")
 
@@ -90,7 +92,8 @@ class Converging(CliTest):
         name = os.path.join(replicates, sorted(os.listdir(replicates))[0])
         with open(name, "r+b") as file:
             file.truncate(os.path.getsize(name) - 4)
-        self.assert_one_error(self.converge("scene.yaml", *SMALL, "--resume", expect=2), "is not a replicate of this run")
+        run = self.converge("scene.yaml", *SMALL, "--resume", expect=2)
+        self.assert_one_error(run, "is not a replicate of this run")
         os.remove(name)
         os.remove(self.path("out/experiment.json"))
         self.assert_one_error(self.converge("scene.yaml", *SMALL, "--resume", expect=2), "experiment.json")
@@ -102,7 +105,8 @@ class Converging(CliTest):
         again = self.summary("out")
         fit, fit_again = first["fits"][0], again["fits"][0]
         self.assertIn("error", fit)
-        for name in ("verdict", "verdict_reason", "error", "slope_against_samples", "relative_mean_bias_rgb", "points"):
+        for name in ("verdict", "verdict_reason", "error", "slope_against_samples", "relative_mean_bias_rgb",
+                     "points"):
             self.assertEqual(fit_again[name], fit[name], name)
         configuration, configuration_again = first["configurations"][0], again["configurations"][0]
         for name in ("width", "height", "image_tests", "scene_hash", "kept", "left_out"):
@@ -120,18 +124,24 @@ class Converging(CliTest):
         self.converge("a/scene.yaml", "b/scene.yaml", *SMALL)
         self.assertEqual({fit["scene"] for fit in self.summary("out")["fits"]}, {"a/scene", "b/scene"})
         rows = self.rows("out")
-        keys = [(row["scene"], row["replicate"], row["samples_per_pixel"]) for row in rows if row["between_replicates_mse"] is None]
+        keys = [(row["scene"], row["replicate"], row["samples_per_pixel"]) for row in rows
+                if row["between_replicates_mse"] is None]
         self.assertEqual(len(keys), len(set(keys)))
         self.assert_one_error(self.converge("scene.yaml", "./scene.yaml", folder="c", expect=2), "twice")
-        run = self.crt("converge", "scene.yaml", "--backends", f"{self.backend},{self.backend}", "-o", "d", expect=2)
+        twice = f"{self.backend},{self.backend}"
+        run = self.crt("converge", "scene.yaml", "--backends", twice, "-o", "d", expect=2)
         self.assert_one_error(run, "--backends", "twice")
-        self.assert_one_error(self.converge("scene.yaml", "--vary", "nee=true,true", folder="e", expect=2), "--vary nee", "twice")
+        run = self.converge("scene.yaml", "--vary", "nee=true,true", folder="e", expect=2)
+        self.assert_one_error(run, "--vary nee", "twice")
 
     def test_a_reference_of_other_colours_is_refused(self):
-        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", "64", "--same-estimator", "-b", self.backend, *SMALL)
-        for changed in ("film.exposure_ev=1", "film.color_space=acescg", "film.white_balance={illuminant: A}"):
+        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", "64", "--same-estimator", "-b", self.backend,
+                 *SMALL)
+        for changed in ("film.exposure_ev=1", "film.color_space=acescg",
+                        "film.white_balance={illuminant: A}"):
             with self.subTest(changed=changed):
-                run = self.converge("scene.yaml", "--reference", "ref.exr", "--set", changed, *SMALL, folder="o" + changed[5:8], expect=2)
+                run = self.converge("scene.yaml", "--reference", "ref.exr", "--set", changed, *SMALL,
+                                    folder="o" + changed[5:8], expect=2)
                 self.assert_one_error(run, "a reference in other colours")
 
     def test_a_variant_that_shows_another_image_is_not_held_against_the_reference(self):
@@ -141,7 +151,8 @@ class Converging(CliTest):
         self.assertIsNone(fits["depth=1"]["relative_mean_bias_rgb"])
         self.assertEqual(fits["depth=1"]["verdict"], "INCONCLUSIVE")
         self.assertIsNotNone(fits["depth=4"]["relative_mean_bias_rgb"])
-        self.assertTrue(any("'depth=1' shows another image" in note for note in self.summary("out")["notes"]))
+        notes = self.summary("out")["notes"]
+        self.assertTrue(any("'depth=1' shows another image" in note for note in notes), notes)
 
     def test_without_a_reference_one_is_made_within_the_time(self):
         run = self.converge("scene.yaml", *SMALL, time="4s", spp="64")
@@ -155,15 +166,16 @@ class Converging(CliTest):
         self.assertLess(summary["environment"]["spent_seconds"], 6)
 
     def test_void_rows_fail_in_text_and_exit_code(self):
-        run = self.crt("converge", "scene.yaml", "--backends", "fake", "--reference", "0.5", "--time", "2s", "--max-spp", "64", "-o", "out",
-                       "--set", "film.resolution=[8,8]", expect=7, CRT_FAKE_FAULT="nan")
+        run = self.crt("converge", "scene.yaml", "--backends", "fake", "--reference", "0.5", "--time", "2s",
+                       "--max-spp", "64", "-o", "out", "--set", "film.resolution=[8,8]", expect=7, CRT_FAKE_FAULT="nan")
         self.assertIn("FAIL", run.stderr)
         self.assertIn("void", run.stderr)
         self.assertEqual(self.summary("out")["fits"][0]["verdict"], "FAIL")
 
     def test_start_up_is_not_charged_to_whoever_is_first(self):
-        self.crt("converge", "scene.yaml", "--backends", "fake", "--reference", "5", "--vary", "roulette=true,false", "--time", "6s",
-                 "--max-spp", "8", "-o", "out", "--set", "film.resolution=[8,8]", expect=7, CRT_FAKE_FIRST_START_MS="700")
+        self.crt("converge", "scene.yaml", "--backends", "fake", "--reference", "5",
+                 "--vary", "roulette=true,false", "--time", "6s", "--max-spp", "8", "-o", "out",
+                 "--set", "film.resolution=[8,8]", expect=7, CRT_FAKE_FIRST_START_MS="700")
         starts = {row["variant"]: row["seconds_before_first_sample"] for row in self.rows("out")}
         self.assertEqual(len(starts), 2)
         self.assertLess(max(starts.values()), 0.5, starts)

@@ -8,7 +8,8 @@
 //   slow    2 ms a row, with a look at cancel after each
 //   hang    never comes back
 //   nan_film, count_film   the film that is handed over holds a NaN, or more samples than were asked for
-// CRT_FAKE_FIRST_START_MS: so long takes the first integrator of a process, as a driver does that is not loaded yet.
+// CRT_FAKE_FIRST_START_MS: so long takes the first integrator of a process, as a driver does that is not
+// loaded yet.
 #include "backend/plugin_guard.h"
 
 #include "fake_pattern.h"
@@ -42,7 +43,8 @@ public:
         : host_(host), device_(crt::plugin::chooseDevice(listDevices(host), info.device)) {
         static bool started = false;
         const char* delay = std::getenv("CRT_FAKE_FIRST_START_MS");
-        if (delay != nullptr && !started) std::this_thread::sleep_for(std::chrono::milliseconds(std::atoi(delay)));
+        if (delay != nullptr && !started)
+            std::this_thread::sleep_for(std::chrono::milliseconds(std::atoi(delay)));
         started = true;
     }
 
