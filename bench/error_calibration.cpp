@@ -33,7 +33,7 @@ constexpr std::uint64_t kReferenceSeed = 1'000'003;
 constexpr int kReferenceRenders = 8;
 
 struct Setup {
-    LoadedBackend backend;
+    Integrator* integrator;
     std::string file, sampler;
     int side;
 
@@ -45,10 +45,10 @@ struct Setup {
     bool independent() const { return sampler != "sobol"; }
 };
 
-/// Samples of one scene with one seed, range after range.
+/// Samples of one scene with one seed, range after range, on a device that is opened once.
 class Progressive {
 public:
-    Progressive(const Setup& setup, const Scene& scene) : integrator_(setup.backend, {}), compiled_(compileScene(scene, 0)) { integrator_.setScene(compiled_); }
+    Progressive(const Setup& setup, const Scene& scene) : integrator_(*setup.integrator), compiled_(compileScene(scene, 0)) { restart(); }
 
     void render(SampleRange range) {
         integrator_.render({.first_sample = range.first, .sample_count = range.second - range.first});
@@ -57,6 +57,7 @@ public:
     Film film() {
         Film film({compiled_.width, compiled_.height, compiled_.channels, compiled_.aovs});
         integrator_.readFilm(film);
+        film.samples = ranges_;
         return film;
     }
     void restart() {
@@ -65,7 +66,7 @@ public:
     }
 
 private:
-    Integrator integrator_;
+    Integrator& integrator_;
     CompiledScene compiled_;
     SampleRanges ranges_;
 };
@@ -149,16 +150,12 @@ void stated(const Setup& setup, std::uint64_t seeds) {
         for (const std::uint64_t samples : kSamples) {
             progressive.render({there, samples});
             there = samples;
-            Film film = progressive.film();
-            film.samples = SampleRanges({{0, samples}});
-            look(fmt::format("{}", samples), film);
+            look(fmt::format("{}", samples), progressive.film());
         }
         progressive.restart();
         progressive.render({0, 101});
         progressive.render({1000, 1233});
-        Film merged = progressive.film();
-        merged.samples = SampleRanges({{0, 101}, {1000, 1233}});
-        look("101 + 233", merged);
+        look("101 + 233", progressive.film());
     }
     for (const std::string& name : order) {
         const Images& all = images[name];
@@ -221,13 +218,12 @@ void stop(const Setup& setup, std::uint64_t seeds, double target, std::uint64_t 
         Progressive progressive(setup, setup.scene(seed));
         std::uint64_t there = 0;
         bool reached = false;
-        Film film({1, 1, 4, 0});
+        Film film = progressive.film();
         while (!reached && there < most) {
-            const std::uint64_t next = nextTargetCheck(there);
+            const std::uint64_t next = nextTargetCheck(there, film.counts.size());
             progressive.render({there, next});
             there = next;
             film = progressive.film();
-            film.samples = SampleRanges({{0, there}});
             reached = reachesTarget(film, target, setup.independent());
         }
         fmt::print("{{\"seed\": {}, \"samples\": {}, \"reached\": {}, \"actual\": {}}}\n", seed, there, reached, relativeDistance(luminanceOf(film), truth));
@@ -246,7 +242,8 @@ int main(int argc, char** argv) {
     }
     setLogLevel(LogLevel::Error);
     try {
-        const Setup setup{loadBackend(argv[2]), argv[3], argv[5], std::stoi(argv[4])};
+        Integrator integrator(loadBackend(argv[2]), {});
+        const Setup setup{&integrator, argv[3], argv[5], std::stoi(argv[4])};
         const std::uint64_t seeds = std::stoull(argv[6]);
         if (mode == "stated") stated(setup, seeds);
         else if (mode == "price") price(setup, seeds);

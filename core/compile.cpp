@@ -164,7 +164,7 @@ private:
         std::vector<kernel::CrtTriangle8> blocks((slots.size() + 7) / 8);
         for (kernel::CrtTriangle8& block : blocks) {
             std::fill(std::begin(block.slot), std::end(block.slot), CRT_NONE);
-            std::fill(std::begin(block.row[0][3]), std::end(block.row[0][3]), 1.0f);
+            std::fill(std::begin(block.row[0][3]), std::end(block.row[0][3]), CRT_UNUSED_HEIGHT);
         }
         for (std::size_t i = 0; i < slots.size(); ++i) {
             blocks[i / 8].slot[i % 8] = slots[i];

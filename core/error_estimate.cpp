@@ -186,7 +186,7 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, boo
     const double normal = 2 * sums.squares / (d + 2);
     double spread = normal;
     if (sums.known >= kPixelsToMeasure)
-        spread = std::max(normal, measuredSpread(film, variance, variances, which, sums, unit, luminance) + kUnseen * sums.most * sums.most);
+        spread = std::max(normal, measuredSpread(film, variance, variances, which, sums, unit, luminance) + (d < 3 ? kUnseen * sums.most * sums.most : 0));
     e.degrees_of_freedom = std::clamp(2 * sums.sum * sums.sum / spread, 1.0, d * sums.known);
     if (e.known() && e.degrees_of_freedom < std::min(kLeastDegreesOfFreedom, d * sums.known)) e.knowledge = ErrorKnowledge::NotYet;
     e.relative_rmse_95 = {e.relative_rmse * std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.975, e.degrees_of_freedom)),

@@ -16,7 +16,6 @@ double secondsSince(Clock::time_point start) { return std::chrono::duration<doub
 
 constexpr double kChunkSeconds = 0.4;       // Aimed at, so that the promised half second holds when a chunk is dearer than the last.
 constexpr std::uint64_t kChunkGrowth = 8;   // The first chunk may hold a kernel's warm-up; it says little about the next.
-constexpr double kDegreesOfFreedomToStop = 50;
 constexpr double kReadShare = 0.02;         // Of the time may go into reading the film back for safety and for the error estimate.
 constexpr double kReadBytesPerSecond = 2e9; // First guess of what reading costs; measured from then on.
 
@@ -94,20 +93,19 @@ private:
 
 }  // namespace
 
-std::uint64_t nextTargetCheck(std::uint64_t samples) {
-    constexpr std::uint64_t kFirstCheck = 64;
-    return samples < kFirstCheck ? kFirstCheck : std::bit_floor(samples) * 2;
+std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels) {
+    constexpr std::uint64_t kFirstCheck = 64, kPaths = 1u << 20;
+    const std::uint64_t first = std::bit_ceil(std::max(kFirstCheck, kPaths / std::max<std::uint64_t>(pixels, 1)));
+    return samples < first ? first : std::bit_floor(samples) * 2;
 }
 
 bool reachesTarget(const Film& film, double target, bool independent_samples) {
-    // Images of many pixels: fewer, and a caustic or a hidden lamp may have been met by next to no path yet. A single pixel has all that it can have.
-    const double least = std::min(kDegreesOfFreedomToStop, static_cast<double>(film.counts.size()) * LuminanceVariance(film).degreesOfFreedom() / 4);
-    const auto reached = [&](PixelSet which, double degrees_of_freedom) {
+    const auto reached = [&](PixelSet which) {
         const std::optional<ErrorEstimate> error = estimateError(film, which, independent_samples);
-        return error && error->known() && error->degrees_of_freedom >= degrees_of_freedom && error->half_width_95 <= target;
+        return error && error->known() && error->half_width_95 <= target;
     };
     const bool one_pixel = film.counts.size() == 1;
-    return reached(PixelSet::All, least) && reached(PixelSet::Even, least / 2) && (one_pixel || reached(PixelSet::Odd, least / 2));
+    return reached(PixelSet::All) && reached(PixelSet::Even) && (one_pixel || reached(PixelSet::Odd));
 }
 
 std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& there) {
@@ -138,10 +136,10 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
     state.target_error = plan.target_error;
     state.pixels = film.counts.size();
 
-    std::uint64_t check_at = nextTargetCheck(resumed > 0 ? resumed - 1 : 0);
+    std::uint64_t check_at = nextTargetCheck(resumed > 0 ? resumed - 1 : 0, film.counts.size());
     const auto targetReached = [&] {
         if (plan.target_error <= 0 || resumed + result.rendered < check_at) return false;
-        check_at = nextTargetCheck(resumed + result.rendered);
+        check_at = nextTargetCheck(resumed + result.rendered, film.counts.size());
         if (!reader.current()) reader.read();
         return reachesTarget(film, plan.target_error, plan.independent_samples);
     };

@@ -41,12 +41,13 @@ struct SamplingResult {
     double seconds = 0;
 };
 
-/// The target error is looked at when the film holds a power of two of samples, 64 or more: looking all the time would stop at the luckiest moment.
-std::uint64_t nextTargetCheck(std::uint64_t samples);
+/// The target error is looked at when the film holds a power of two of samples per pixel, at least 64 and a million paths in all: looking all the time
+/// would stop at the luckiest moment, and looking early before a caustic or a hidden lamp has been met at all.
+std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels);
 
 /// Whether half_width_95 is known and at most `target` for the image, and for its even and its odd pixels each: of two halves that are independent of
-/// each other, each can veto what the other would have stopped at by luck. An error that is not known (error_estimate.h) stops nothing; the wider the
-/// pixels' variances scatter, the more samples it takes until it is.
+/// each other, each can veto what the other would have stopped at by luck. An error that is not known (error_estimate.h) stops nothing; and the
+/// wider the pixels' variances scatter, the farther the half-width lies above the estimate.
 bool reachesTarget(const Film& film, double target, bool independent_samples = false);
 
 /// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at most a small part of the run

@@ -304,13 +304,17 @@ TEST_CASE("no forecast jumps by more than its interval while an image converges"
     }
 }
 
-TEST_CASE("target checks are at powers of two", "[error]") {
-    CHECK(nextTargetCheck(0) == 64);
-    CHECK(nextTargetCheck(63) == 64);
-    CHECK(nextTargetCheck(64) == 128);
-    CHECK(nextTargetCheck(257) == 512);
-    CHECK(nextTargetCheck(1023) == 1024);
-    CHECK(nextTargetCheck(1024) == 2048);
+TEST_CASE("target checks are at powers of two, after a million paths", "[error]") {
+    constexpr u64 kMillion = 1u << 20;
+    CHECK(nextTargetCheck(0, kMillion) == 64);
+    CHECK(nextTargetCheck(63, kMillion) == 64);
+    CHECK(nextTargetCheck(64, kMillion) == 128);
+    CHECK(nextTargetCheck(257, kMillion) == 512);
+    CHECK(nextTargetCheck(1024, kMillion) == 2048);
+    CHECK(nextTargetCheck(0, 64 * 64) == 256);
+    CHECK(nextTargetCheck(256, 64 * 64) == 512);
+    CHECK(nextTargetCheck(0, 100 * 100) == 128);
+    CHECK(nextTargetCheck(0, 1) == kMillion);
 }
 
 TEST_CASE("who stops when the target is reached has reached it, also where luck could stop early", "[error]") {
@@ -323,7 +327,7 @@ TEST_CASE("who stops when the target is reached has reached it, also where luck 
         const double sigma = 0.3 * std::pow(0.8 / 0.3, static_cast<double>(i) / kRepeats);  // 3,500 to 25,000 independent samples would do.
         Film film(shapeFor(1, 1, 4));
         std::normal_distribution<double> normal;
-        for (std::uint64_t check = nextTargetCheck(0); film.samples.count() < check; check = nextTargetCheck(check)) {
+        for (std::uint64_t check = 64; film.samples.count() < check; check *= 2) {
             const double each = static_cast<double>(check - film.samples.count()) / 16;  // Of a replicate, together; Y² is not looked at.
             for (u64 r = 0; r < 16; ++r) addSample(film, 0, r, each * kTruth + std::sqrt(each) * sigma * normal(random));
             film.counts[0] = check;

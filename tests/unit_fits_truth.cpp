@@ -233,7 +233,7 @@ TEST_CASE("two replicates without a reference have values without bounds, and no
     }
 }
 
-TEST_CASE("configurations that render the same bits share slope, error and verdict; times are their own",
+TEST_CASE("configurations that render the same bits share slope, error and verdict, and times are their own",
           "[fits]") {
     SyntheticRender what;
     what.variance = 0.02;

@@ -39,8 +39,9 @@ typedef struct CrtTriangle {
 CRT_ASSERT_SIZE(CrtTriangle, 48);
 
 /* Eight triangles side by side, for the brute-force loops. A row (x, y, z, w) is an affine function of a point p: x·p.x + y·p.y + z·p.z + w. Row 0 is
-   the height over the triangle's plane; rows 1 to 3 the distance from each edge, positive inside. Unused lanes have slot CRT_NONE and a plane of height 1
-   everywhere, which no ray meets. */
+   the height over the triangle's plane; rows 1 to 3 the distance from each edge, positive inside. Unused lanes have slot CRT_NONE and are CRT_UNUSED_HEIGHT
+   below every point: farther than the slack of any ray, whose origin may be far outside the scene. */
+#define CRT_UNUSED_HEIGHT 1e30f
 typedef struct CrtTriangle8 {
     f32 row[4][4][8];
     u32 slot[8]; /* in the triangle array */

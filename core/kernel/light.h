@@ -29,6 +29,9 @@ CRT_KERNEL_BEGIN
 typedef struct CrtLightSample {
     vec3 point;   /* on the emitter */
     vec3 wi;      /* unit, from the shaded point */
+    vec3 normal;  /* of the emitter */
+    f32 cosine;   /* of wi with the emitter's plane; above 0 */
+    f32 distance; /* of `point` */
     f32 reach;    /* share of the way to `point` that is sure to end before the emitter */
     f32 pdf;      /* per steradian, with the probability of choosing this emitter; 0: no light from here */
     u32 spectrum;
@@ -144,7 +147,7 @@ CRT_FN f32 crt_light_density(CrtLightView view, f32 area, f32 cosine, f32 distan
         const f32 omega = view.omega + view.omega_far;
         return omega > 0.0f ? 1.0f / omega : 0.0f;
     }
-    return crt_abs(cosine) > 0.0f ? distance * distance / (crt_abs(cosine) * area) : 0.0f;
+    return cosine > 0.0f ? distance * distance / (cosine * area) : 0.0f;
 }
 
 /* The part of v perpendicular to unit n, normalised. */
@@ -208,7 +211,8 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
     s.pdf = 0.0f;
     s.reach = 0.0f;
     s.point = p;
-    s.wi = shape.normal;
+    s.wi = s.normal = shape.normal;
+    s.cosine = s.distance = 0.0f;
     const int two_sided = (emitter->flags & CRT_EMITTER_TWO_SIDED) != 0u;
     /* Nothing to sample where the emitter's dark side is seen, or its plane. */
     if (view.technique == CRT_LIGHT_BY_CHANCE || !(view.height < 0.0f || (two_sided && view.height > 0.0f))) return s;
@@ -239,26 +243,33 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
         s.wi = d * (1.0f / distance);
         cosine = view.height / distance; /* the same for all points of the plane but for the distance */
     }
-    s.pdf = emitter->choice_probability * crt_light_density(view, shape.area, cosine, distance);
+    s.cosine = crt_abs(cosine);
+    s.distance = distance;
+    s.pdf = emitter->choice_probability * crt_light_density(view, shape.area, s.cosine, distance);
     /* The shadow ray stops short of the emitter by its clearance, measured along the ray. */
     CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
-    if (s.pdf > 0.0f) s.reach = 1.0f - face->clearance / (crt_abs(cosine) * distance);
+    if (s.pdf > 0.0f) s.reach = 1.0f - face->clearance / (s.cosine * distance);
     return s;
 }
 
-/* pdf per steradian with which crt_sample_light at p finds the point at distance t on an emitter. */
-CRT_FN f32 crt_light_pdf(const CrtContext *ctx, u32 emitter_index, vec3 p, f32 t) {
+/* A point of an emitter, met by a scattered ray, as crt_sample_light at p has it. */
+typedef struct CrtLightSeen {
+    f32 pdf;    /* per steradian at p; 0: light sampling does not find it */
+    f32 cosine; /* with the emitter's plane, of the direction from p */
+} CrtLightSeen;
+
+CRT_FN CrtLightSeen crt_light_seen(const CrtContext *ctx, u32 emitter_index, vec3 p, f32 distance) {
     CRT_GLOBAL const CrtEmitter *emitter = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + emitter_index;
     const CrtLightShape shape = crt_light_shape(ctx, emitter);
     const CrtLightView view = crt_light_view(shape, p);
-    return emitter->choice_probability * crt_light_density(view, shape.area, view.height / t, t);
+    CrtLightSeen seen;
+    seen.cosine = crt_abs(view.height) / distance;
+    seen.pdf = emitter->choice_probability * crt_light_density(view, shape.area, seen.cosine, distance);
+    return seen;
 }
 
-/* Veach's power heuristic for one sample of each technique, as a ratio so that a large pdf cannot overflow. */
-CRT_FN f32 crt_power_heuristic(f32 pdf, f32 other) {
-    const f32 ratio = other / pdf;
-    return 1.0f / (1.0f + ratio * ratio);
-}
+/* Veach's power heuristic for one sample of each of two techniques, by the ratio of the other's probability to one's own. */
+CRT_FN f32 crt_power_heuristic(f32 ratio) { return 1.0f / (1.0f + ratio * ratio); }
 
 CRT_KERNEL_END
 

@@ -31,6 +31,7 @@ typedef struct CrtPath {
     vec4 throughput;
     vec4 radiance;
     f32 scatter_pdf;  /* of the direction that led here; 0: camera or delta, no light sampling competes */
+    vec3 p;           /* where it was scattered: a clearance off the ray's origin */
     f32 eta_square;   /* product of squared relative indices crossed: roulette must not see the n² of being inside glass */
     u32 depth;        /* scattering events so far */
     int alone;        /* only the hero wavelength is alive */
@@ -54,6 +55,7 @@ CRT_FN CrtPath crt_path_begin(const CrtContext *ctx, u32 x, u32 y, u64 sample) {
     path.throughput = splat4(1.0f);
     path.radiance = splat4(0.0f);
     path.scatter_pdf = 0.0f;
+    path.p = path.ray.o;
     path.eta_square = 1.0f;
     path.depth = 0u;
     path.alone = 0;
@@ -71,9 +73,19 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, CrtSurface su
     if (!front && (emitter->flags & CRT_EMITTER_TWO_SIDED) == 0u) return;
     f32 weight = 1.0f;
     if (CRT_HAS(NEE) && ctx->scene->nee != CRT_NEE_NONE && path->scatter_pdf > 0.0f) {
-        const f32 light_pdf = crt_light_pdf(ctx, surface.emitter, path->ray.o, t);
-        if (ctx->scene->nee == CRT_NEE_ONLY) weight = light_pdf > 0.0f ? 0.0f : 1.0f;
-        else weight = crt_power_heuristic(path->scatter_pdf, light_pdf);
+        const f32 distance = length3(crt_fma3(path->ray.d, t, path->ray.o) - path->p);
+        const CrtLightSeen light = crt_light_seen(ctx, surface.emitter, path->p, distance);
+        if (light.pdf > 0.0f) {
+            /* The ray starts a clearance off p, from which lights are sampled. Close to a light that is another direction: both techniques estimate
+               what arrives at p, and are weighed by the area of the light per probability. */
+            const f32 nearer = t / distance;
+            const f32 area = light.cosine / crt_abs(dot3(surface.ng, path->ray.d)) * nearer * nearer;
+            const f32 ratio = light.pdf / path->scatter_pdf * area;
+            if (ctx->scene->nee == CRT_NEE_ONLY || !(ratio < 1e15f)) return;
+            const f32 clearance = length3(path->ray.o - path->p);
+            const f32 cosines = crt_fma(CRT_INV_PI / path->scatter_pdf, clearance, t) / distance; /* at p over that at the ray's origin */
+            weight = area * cosines * crt_power_heuristic(ratio);
+        }
     }
     path->radiance = path->radiance + path->throughput * crt_spectrum(ctx, emitter->spectrum, path->wavelengths.position) * weight;
 }
@@ -81,12 +93,11 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, CrtSurface su
 /* Next event estimation at a Lambertian vertex; ns and ng are on the side of w_o. */
 CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurface surface, vec3 ns, vec3 ng, vec4 reflectance, u32 dimension,
                                  CrtRayCount *rays) {
-    /* Scattered rays start there, too: both techniques must see the emitter from one point, or their weights do not add up to 1 close to it. */
-    CrtRay shadow;
-    shadow.o = crt_offset_origin(surface.p, surface.clearance, ng, ng);
-    const CrtLightSample light = crt_sample_light(ctx, &path->sampler, dimension, shadow.o);
+    const CrtLightSample light = crt_sample_light(ctx, &path->sampler, dimension, surface.p);
     const f32 cosine = dot3(light.wi, ns);
     if (!(light.pdf > 0.0f) || !(cosine > 0.0f) || !(dot3(light.wi, ng) > 0.0f)) return;
+    CrtRay shadow;
+    shadow.o = crt_offset_origin(surface.p, surface.clearance, ng, light.wi);
     shadow.d = light.point - shadow.o;
     shadow.reach = light.reach;
     /* Nothing fits in between where the emitter is nearer than its clearance. */
@@ -94,10 +105,16 @@ CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurfac
         rays->shadow += 1u;
         if (crt_trace_any(ctx, shadow)) return;
     }
-    const f32 scatter = crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction */
-    const f32 ratio = scatter / light.pdf;
-    /* The power heuristic times f·cos / pdf. */
-    const f32 weight = ctx->scene->nee == CRT_NEE_ONLY ? ratio : ratio / (1.0f + ratio * ratio);
+    const f32 scatter = crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction at p */
+    f32 weight = scatter / light.pdf;
+    if (ctx->scene->nee == CRT_NEE_MIS) {
+        /* By probabilities per area of the light (crt_add_emission). */
+        const f32 inverse = 1.0f / length3(shadow.d);
+        const f32 nearer = light.distance * inverse;
+        const f32 area = crt_abs(dot3(light.normal, shadow.d)) * inverse / light.cosine * nearer * nearer;
+        const f32 ratio = crt_lambert(crt_max(dot3(shadow.d, ns) * inverse, 0.0f)) / light.pdf * area;
+        weight = weight * crt_power_heuristic(ratio);
+    }
     path->radiance =
         path->radiance + path->throughput * reflectance * crt_spectrum(ctx, light.spectrum, path->wavelengths.position) * weight;
 }
@@ -172,6 +189,7 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
     }
     path->eta_square = path->eta_square * scatter.eta_square;
     path->scatter_pdf = scatter.pdf;
+    path->p = surface.p;
     path->ray.o = crt_offset_origin(surface.p, surface.clearance, surface.ng, scatter.wi);
     path->ray.d = scatter.wi;
     path->ray.reach = CRT_INFINITY;

@@ -345,8 +345,8 @@ class Rendering(CliTest):
             "rays": ["paths", "closest", "shadow"],
             "speed": ["mpaths_per_second", "mrays_per_second"],
             "memory": ["scene_bytes", "host_peak_bytes", "device_peak_bytes"],
-            "error": ["relative_rmse", "relative_rmse_95", "half_width_95", "mean_luminance", "mean_luminance_standard_error", "mean_luminance_95",
-                      "degrees_of_freedom", "is_upper_bound", "to_target"],
+            "error": ["knowledge", "mean_luminance", "degrees_of_freedom", "relative_rmse", "relative_rmse_95",
+                      "half_width_95", "mean_luminance_standard_error", "mean_luminance_95", "to_target"],
             "stop": ["reason", "signal", "failure", "exit_code"],
         }
         for section, keys in expected.items():

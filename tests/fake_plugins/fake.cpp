@@ -105,9 +105,15 @@ private:
             ++paths_;
             if (with_invalid && crt::fake::isInvalid(film_x, film_y, sample)) continue;
             ++counts_[pixel];
-            for (std::uint32_t c = 0; c < scene_.channels; ++c) {
-                addTo(&sums_[(pixel * scene_.channels + c) * 2], CRT_FAKE_FACTOR * crt::fake::sampleValue(seed, film_x, film_y, sample, c));
-            }
+            const std::uint32_t without = scene_.replicate_shift != 0 ? scene_.replicate_channel : scene_.channels;
+            const auto add = [&](std::uint32_t channel, std::uint32_t value) {
+                addTo(&sums_[(pixel * scene_.channels + channel) * 2],
+                      CRT_FAKE_FACTOR * crt::fake::sampleValue(seed, film_x, film_y, sample, value));
+            };
+            for (std::uint32_t c = 0; c < without; ++c) add(c, c);
+            // Y of the replicate whose turn it is; the last has no channel.
+            const auto replicate = static_cast<std::uint32_t>(sample % (std::uint64_t{1} << scene_.replicate_shift));
+            if (without + replicate < scene_.channels) add(without + replicate, 1);
         }
     }
 
