@@ -1,5 +1,6 @@
 // Scene → blob: which features a scene asks for, where the author's lengths and sides go, what lights, materials and tables come out, and what
 // is said to be left out.
+#include "near_surfaces.h"
 #include "kernel_test.h"
 
 #include "distributions.h"
@@ -831,5 +832,50 @@ TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]")
         CHECK(h.triangles.count == 8);
         CHECK(h.primitives.count == 8);
         CHECK(h.normals.count == 4);
+    }
+}
+
+TEST_CASE("a lamp in the plane of another surface that it overlaps is found, and nothing else", "[compile]") {
+    const auto quad = [](double x0, double x1, double y, double z0, double z1) {
+        crt::Mesh mesh;
+        mesh.positions = {{x0, y, z0}, {x1, y, z0}, {x1, y, z1}, {x0, y, z1}};
+        mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+        return mesh;
+    };
+    const auto found = [&](const crt::Mesh& lamp, bool many) {
+        Scene scene;
+        scene.camera.position = {0, 1, 0};
+        scene.emissions = {{crt::constantSpectrum(1), false}};
+        scene.materials.resize(1);
+        scene.meshes = {quad(-2, 2, 2, -2, 2), lamp, quad(-2, 2, 0, -2, 2)};
+        for (std::uint32_t i = 0; i < 3; ++i) {
+            crt::Object object;
+            object.mesh = i;
+            object.material = 0;
+            object.emission = i == 1 ? 0 : -1;
+            scene.objects.push_back(object);
+        }
+        scene.integrator.accelerator = many ? crt::Accelerator::Bvh : crt::Accelerator::None;
+        return crt::findCoplanarLight(crt::compileScene(scene, 0));
+    };
+    for (const bool tree : {false, true}) {
+        CAPTURE(tree);
+        // In the ceiling; partly; larger than the ceiling; turned over.
+        const std::optional<crt::CoplanarLight> inside = found(quad(-0.5, 0.5, 2, -0.5, 0.5), tree);
+        REQUIRE(inside);
+        CHECK((inside->light == 2 || inside->light == 3));
+        CHECK((inside->surface == 0 || inside->surface == 1));
+        CHECK(found(quad(1.5, 2.5, 2, -0.5, 0.5), tree));
+        CHECK(found(quad(-9, 9, 2, -9, 9), tree));
+        CHECK(found(quad(0.5, -0.5, 2, -0.5, 0.5), tree));
+        CHECK(found(quad(-0.5, 0.5, 2 - 1e-6, -0.5, 0.5), tree));  // below what rays can tell
+        // What is as far off as is advised, beside the ceiling, at its edge, or stands on the floor is right.
+        CHECK_FALSE(found(quad(-0.5, 0.5, 2 - 2 * inside->least_gap, -0.5, 0.5), tree));
+        CHECK_FALSE(found(quad(3, 4, 2, -0.5, 0.5), tree));
+        CHECK_FALSE(found(quad(2, 3, 2, -0.5, 0.5), tree));
+        crt::Mesh standing;
+        standing.positions = {{-0.5, 0, 0}, {0.5, 0, 0}, {0.5, 1, 0}, {-0.5, 1, 0}};
+        standing.triangles = {{0, 1, 2}, {0, 2, 3}};
+        CHECK_FALSE(found(standing, tree));
     }
 }

@@ -232,6 +232,24 @@ TEST_CASE("tree, boxes and lanes find what the plain loop finds, bit by bit", "[
 }
 
 #if CRT_SIMD8
+TEST_CASE("lanes without a triangle are no candidates, from wherever a ray comes", "[kernel][rays]") {
+    Random random(28);
+    // Five triangles: three lanes of the only block are unused.
+    const crt::CompiledScene compiled = ThreeWays::compiled(soup(random, 5), Accelerator::None);
+    const CrtContext ctx = contextOf(compiled);
+    REQUIRE(ctx.scene->triangles8.count == 1);
+    const auto* block = CRT_ARRAY(CrtTriangle8, ctx.blob, ctx.scene->triangles8);
+    u32 unused = 0;
+    for (u32 lane = 0; lane < 8; ++lane) unused |= block->slot[lane] == CRT_NONE ? 1u << lane : 0u;
+    REQUIRE(unused == 0xe0u);
+    for (const double distance : {0.0, 1.0, 1e3, 3e5, 1e8, 1e20})
+        for (int i = 0; i < 1000; ++i) {
+            const vec3 o = toFloat(times(random.direction(), distance));
+            const CrtRay ray = rayOf(o, toFloat(times(random.direction(), random.uniform(0.1, 3))));
+            REQUIRE((crt_candidates8(block, ray, crt_candidate_slack(o), CRT_INFINITY) & unused) == 0);
+        }
+}
+
 TEST_CASE(
     "eight triangles at a time refuse no hit of a ray that starts within rounding of a triangle's plane",
     "[kernel][rays]") {
