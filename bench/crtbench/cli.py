@@ -15,7 +15,7 @@ COMMANDS = {
     "figure2": (figure2, "render time against samples per pixel, at 1440² and 2880²"),
     "stability": (stability, "sweeps to where the arithmetic ends; --scenes names sweeps instead of scenes"),
     "robustness": (robustness, "what the watertight triangle test and the offsets cost, and what they buy"),
-    "calibration": (calibration, "does the error that an image states of itself hold? 400 repeats of each scene"),
+    "calibration": (calibration, "does the error that an image states of itself hold? 100 seeds of five scenes, many numbers of samples"),
     "false-alarms": (false_alarms, "statements of crt converge where the truth is known by construction: how often are they wrong?"),
     "power": (power, "planted faults: how many seconds until a check finds each"),
     "pictures": (pictures, "all scenes as PNG in out/pictures, to look at; measures nothing"),
@@ -30,7 +30,7 @@ def main():
         add_options(command, busy="a timed run is repeated")
         if name == "stability":
             command.add_argument("--times", type=float, default=1, metavar="N", help="so many times the rays of each point (1); 5 makes 1e8 of offset-safety")
-        if name in ("figure2", "stability"):
+        if name in ("calibration", "figure2", "stability"):
             command.add_argument("--rows", help="measurements made on another machine, JSON Lines")
         command.add_argument("--scenes", nargs="*", help="only these scenes, by name without .yaml")
     arguments = parser.parse_args()
