@@ -168,6 +168,8 @@ private:
         }
         for (std::size_t i = 0; i < slots.size(); ++i) {
             blocks[i / 8].slot[i % 8] = slots[i];
+            const Extent extent = extentOf(slots[i]);
+            blocks[i / 8].height_slack[i % 8] = kernel::crt_height_slack(static_cast<float>(extent.coordinate), static_cast<float>(extent.size));
             const Vec3d n = planeNormal(slots[i]);  // brute force keeps the author's order: slot and id are one
             setRow(blocks[i / 8], 0, i % 8, n, vertexOf(slots[i], 0));
             for (std::size_t v = 0; v < 3; ++v) {
@@ -209,17 +211,27 @@ private:
         return above && below;
     }
 
+    /// The largest coordinate of a triangle, and the largest extent of its two edges along an axis: what rounding depends on.
+    struct Extent {
+        double coordinate = 0, size = 0;
+    };
+    Extent extentOf(std::size_t i) const {
+        const Vec3d o = vertexOf(i, 0), a = vertexOf(i, 1) - o, b = vertexOf(i, 2) - o;
+        Extent e;
+        for (std::size_t k = 0; k < 3; ++k) {
+            e.coordinate = std::max({e.coordinate, std::abs(o[k]), std::abs(o[k] + a[k]), std::abs(o[k] + b[k])});
+            e.size = std::max(e.size, std::abs(a[k]) + std::abs(b[k]));
+        }
+        return e;
+    }
+
     kernel::CrtFace faceOf(std::size_t i) const {
         kernel::CrtFace face{};
         const Vec3d o = vertexOf(i, 0), a = vertexOf(i, 1) - o, b = vertexOf(i, 2) - o;
         const Vec3d n = cross(a, b);
         const double twice_area = std::sqrt(dot(n, n));
-        double coordinate = 0, size = 0;
-        for (std::size_t k = 0; k < 3; ++k) {
-            coordinate = std::max({coordinate, std::abs(o[k]), std::abs(o[k] + a[k]), std::abs(o[k] + b[k])});
-            size = std::max(size, std::abs(a[k]) + std::abs(b[k]));
-            face.normal[k] = twice_area > 0 ? static_cast<float>(n[k] / twice_area) : 0.0f;
-        }
+        const auto [coordinate, size] = extentOf(i);
+        for (std::size_t k = 0; k < 3; ++k) face.normal[k] = twice_area > 0 ? static_cast<float>(n[k] / twice_area) : 0.0f;
         face.clearance = kernel::crt_clearance(static_cast<float>(coordinate), static_cast<float>(size));
         face.margin = kernel::crt_edge_margin(static_cast<float>(coordinate), static_cast<float>(size), static_cast<float>(twice_area));
         return face;

@@ -44,9 +44,10 @@ CRT_ASSERT_SIZE(CrtTriangle, 48);
 #define CRT_UNUSED_HEIGHT 1e30f
 typedef struct CrtTriangle8 {
     f32 row[4][4][8];
-    u32 slot[8]; /* in the triangle array */
+    f32 height_slack[8]; /* how far the exact test of this triangle may take the wrong side of its plane; less than its clearance */
+    u32 slot[8];         /* in the triangle array */
 } CrtTriangle8;
-CRT_ASSERT_SIZE(CrtTriangle8, 544);
+CRT_ASSERT_SIZE(CrtTriangle8, 576);
 
 /* The plane of a triangle, by slot; how far off it a ray must start to be sure of its side, and how far from its edges, in barycentrics, to be
    sure of its neighbours' (surface.h). */

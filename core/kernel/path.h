@@ -108,11 +108,10 @@ CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurfac
     const f32 scatter = crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction at p */
     f32 weight = scatter / light.pdf;
     if (ctx->scene->nee == CRT_NEE_MIS) {
-        /* By probabilities per area of the light (crt_add_emission). */
-        const f32 inverse = 1.0f / length3(shadow.d);
-        const f32 nearer = light.distance * inverse;
-        const f32 area = crt_abs(dot3(light.normal, shadow.d)) * inverse / light.cosine * nearer * nearer;
-        const f32 ratio = crt_lambert(crt_max(dot3(shadow.d, ns) * inverse, 0.0f)) / light.pdf * area;
+        /* By probabilities per area of the light (crt_add_emission): of the scattered ray lambert(cos)·|n·d|/|d|³, of light sampling pdf·cos/distance². */
+        const f32 squared = dot3(shadow.d, shadow.d);
+        const f32 ratio = crt_lambert(crt_max(dot3(shadow.d, ns), 0.0f)) * crt_abs(dot3(light.normal, shadow.d)) * light.distance * light.distance /
+                          (light.pdf * light.cosine * squared * squared);
         weight = weight * crt_power_heuristic(ratio);
     }
     path->radiance =
