@@ -18,7 +18,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -103,7 +102,7 @@ public:
         for (std::size_t i = 0; i < sum_.size(); ++i) variance += (squares_[i] - sum_[i] * sum_[i] / count_) / (count_ - 1);
         return std::sqrt(variance / static_cast<double>(sum_.size())) / mean();
     }
-    /// Standard error of relativeRmse, relative to it: by halves of the seeds, jackknifed.
+    /// Standard error of relativeRmse, relative to it: from the spread of the seeds' own squared errors.
     double relativeError() const {
         const double all = relativeRmse();
         double squares = 0;

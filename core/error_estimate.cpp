@@ -43,6 +43,16 @@ public:
             for (std::uint32_t x = 0; x < width_; ++x) values_.push_back(function(x, y));
     }
     double at(std::uint32_t x, std::uint32_t y) const { return values_[std::size_t{y} * width_ + x]; }
+    /// Of what is known; 0 when nothing is.
+    double largest() const {
+        double largest = 0;
+        for (const double value : values_)
+            if (std::isfinite(value)) largest = std::max(largest, value);
+        return largest;
+    }
+    void divide(double unit) {
+        for (double& value : values_) value /= unit;
+    }
     bool known(std::uint32_t x, std::uint32_t y) const { return std::isfinite(at(x, y)); }
 
     /// Square of a value's deviation from the mean of its k neighbours in the set, times k/(k + 1): the value's variance, and more where neighbours have
@@ -84,14 +94,6 @@ VarianceSums sumsOf(const Film& film, const PixelMap& variances, PixelSet which)
             s.squares += v * v;
         }
     return s;
-}
-
-double largestOf(const Film& film, const LuminanceVariance& variance) {
-    double largest = 0;
-    for (std::uint32_t y = 0; y < film.shape().height; ++y)
-        for (std::uint32_t x = 0; x < film.shape().width; ++x)
-            if (const double v = variance(x, y); std::isfinite(v)) largest = std::max(largest, v);
-    return largest;
 }
 
 /// Variance of the sum S of variances, in their units, as it enters the relative error √S/M, whatever the distribution of samples.
@@ -164,8 +166,10 @@ double LuminanceVariance::varianceOfVariance(std::uint32_t x, std::uint32_t y, d
 
 std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, bool independent_samples) {
     const LuminanceVariance variance(film);
-    const double d = variance.degreesOfFreedom(), largest = largestOf(film, variance), unit = largest > 0 ? largest : 1;
-    const PixelMap variances(film, [&](std::uint32_t x, std::uint32_t y) { return variance(x, y) / unit; });
+    const double d = variance.degreesOfFreedom();
+    PixelMap variances(film, variance);
+    const double largest = variances.largest(), unit = largest > 0 ? largest : 1;
+    variances.divide(unit);
     const VarianceSums sums = sumsOf(film, variances, which);
     double luminance = 0;
     for (std::uint32_t y = 0; y < film.shape().height; ++y)

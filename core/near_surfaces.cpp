@@ -13,14 +13,19 @@
 namespace crt {
 namespace {
 
+kernel::CrtContext contextOf(const CompiledScene& scene) {
+    kernel::CrtContext context{};
+    context.blob = scene.data();
+    context.scene = reinterpret_cast<const kernel::CrtScene*>(scene.data());
+    return context;
+}
+
 /// As many rays as take some hundredths of a second: from every triangle in small scenes, from an even choice in large ones.
 constexpr std::uint64_t kTriangles = 10000;
 constexpr std::uint64_t kTriangleTests = 4000000;
 
 /// Emitters that are asked about coplanar surfaces, and pairs where there is no tree to find neighbours by.
 constexpr std::uint64_t kEmitters = 100000;
-
-using kernel::vec3;
 
 /// A triangle of the compiled scene, in double.
 struct Corners {
@@ -111,9 +116,7 @@ bool anyNeighbour(const kernel::CrtContext& context, const Corners& box, double 
 
 std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     using namespace kernel;
-    CrtContext context{};
-    context.blob = scene.data();
-    context.scene = reinterpret_cast<const CrtScene*>(scene.data());
+    const CrtContext context = contextOf(scene);
     const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
     const auto* primitives = CRT_ARRAY(CrtPrimitive, context.blob, context.scene->primitives);
     const bool tree = context.scene->accelerator == CRT_ACCELERATOR_BVH;
@@ -141,9 +144,7 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
 
 NearSurfaces findNearSurfaces(const CompiledScene& scene) {
     using namespace kernel;
-    CrtContext context{};
-    context.blob = scene.data();
-    context.scene = reinterpret_cast<const CrtScene*>(scene.data());
+    const CrtContext context = contextOf(scene);
     const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
     const auto* faces = CRT_ARRAY(CrtFace, context.blob, context.scene->faces);
     const u32 count = context.scene->triangle_count;
