@@ -479,8 +479,7 @@ private:
             case SamplerType::Independent: header_.sampler = CRT_SAMPLER_INDEPENDENT; break;
             case SamplerType::XorShift: header_.sampler = CRT_SAMPLER_XORSHIFT; break;
         }
-        header_.seed_low = static_cast<std::uint32_t>(scene_.sampler.seed);
-        header_.seed_high = static_cast<std::uint32_t>(scene_.sampler.seed >> 32);
+        header_.seed = kernel::crt_seed(static_cast<std::uint32_t>(scene_.sampler.seed), static_cast<std::uint32_t>(scene_.sampler.seed >> 32));
         header_.max_depth = static_cast<std::uint32_t>(scene_.integrator.max_depth);
         header_.roulette_depth = scene_.integrator.roulette ? static_cast<std::uint32_t>(scene_.integrator.roulette_depth) : CRT_NONE;
         header_.nee = !scene_.integrator.nee ? CRT_NEE_NONE : scene_.integrator.mis ? CRT_NEE_MIS : CRT_NEE_ONLY;

@@ -387,7 +387,7 @@ TEST_CASE("each replicate is a scrambled Sobol sequence, and no two are alike", 
     for (u32 r = 0; r < 1u << kShift; ++r) {
         std::vector<std::uint32_t> strata_x(kPoints), strata_y(kPoints), order;
         for (u64 i = 0; i < kPoints; ++i) {
-            kernel::CrtSampler s = kernel::crt_sampler_begin(CRT_SAMPLER_SOBOL, kShift, 7, 0, 3, (i << kShift) + r);
+            kernel::CrtSampler s = kernel::crt_sampler_begin(CRT_SAMPLER_SOBOL, kShift, kernel::crt_seed(7, 0), 3, (i << kShift) + r);
             const kernel::CrtRandom2 u = kernel::crt_sample_2d(&s, kDimension);
             ++strata_x[static_cast<std::size_t>(u.x * kPoints)];
             ++strata_y[static_cast<std::size_t>(u.y * kPoints)];
@@ -409,7 +409,7 @@ TEST_CASE("replicates are independent: their means scatter as the variance of on
     for (u32 pixel = 0; pixel < kPixels; ++pixel) {
         std::array<double, kReplicates> means{};
         for (u64 s = 0; s < kPoints * kReplicates; ++s) {
-            kernel::CrtSampler sampler = kernel::crt_sampler_begin(CRT_SAMPLER_SOBOL, kShift, 1, 0, pixel, s);
+            kernel::CrtSampler sampler = kernel::crt_sampler_begin(CRT_SAMPLER_SOBOL, kShift, kernel::crt_seed(1, 0), pixel, s);
             const kernel::CrtRandom2 u = kernel::crt_sample_2d(&sampler, 4);
             means[kernel::crt_replicate(s, kShift)] += static_cast<double>(u.x) * static_cast<double>(u.y) / kPoints;
         }

@@ -37,8 +37,8 @@ CompiledScene makeScene(std::uint32_t width, std::uint32_t height, std::uint32_t
     header.height = header.film_height = height;
     header.channels = channels;
     header.aovs = aovs;
-    header.seed_low = static_cast<std::uint32_t>(kSeed);
-    header.seed_high = static_cast<std::uint32_t>(kSeed >> 32);
+    header.seed.low = static_cast<std::uint32_t>(kSeed);
+    header.seed.high = static_cast<std::uint32_t>(kSeed >> 32);
 
     CompiledScene scene;
     scene.blob.resize((sizeof(header) + 63) / 64);

@@ -400,7 +400,7 @@ struct LitScene {
 };
 
 CrtLightSample sampleLight(const LitScene& scene, const Vec3d& p, u32 i) {
-    CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, 3, 4, i, 0);
+    CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, crt_seed(3, 4), i, 0);
     return crt_sample_light(&scene.ctx, &sampler, 8, toFloat(p));
 }
 

@@ -15,7 +15,7 @@ constexpr u32 kKinds[] = {CRT_SAMPLER_SOBOL, CRT_SAMPLER_INDEPENDENT, CRT_SAMPLE
 const char* const kNames[] = {"sobol", "independent", "xorshift"};
 
 CrtSampler begin(u32 kind, std::uint64_t seed, u32 pixel, u64 sample) {
-    return crt_sampler_begin(kind, 0, static_cast<u32>(seed), static_cast<u32>(seed >> 32), pixel, sample);
+    return crt_sampler_begin(kind, 0, crt_seed(static_cast<u32>(seed), static_cast<u32>(seed >> 32)), pixel, sample);
 }
 
 CrtRandom2 draw2(u32 kind, std::uint64_t seed, u32 pixel, u64 sample, u32 dimension) {
@@ -84,7 +84,7 @@ TEST_CASE("Philox 4x32-10 gives its authors' known answers", "[kernel][sampler]"
 TEST_CASE("the independent sampler is Philox of (pixel, sample, dimension) under the seed", "[kernel][sampler]") {
     const u32 pixel = 123456, seed_low = 7, seed_high = 9;
     const u64 sample = 0x500000003;
-    CrtSampler s = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, seed_low, seed_high, pixel, sample);
+    CrtSampler s = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, crt_seed(seed_low, seed_high), pixel, sample);
     // In any order, and again: nothing is used up.
     for (const u32 dimension : {0u, 1u, 6u, 7u, 6u, 0u, 4000000000u, 1u}) {
         const CrtPhilox r = crt_philox(pixel, 3, 5, dimension / 2, seed_low, seed_high);
@@ -306,12 +306,12 @@ TEST_CASE("xorshift is well seeded and never stuck", "[kernel][sampler]") {
     const u32 key = crt_pixel_key(crt_seed(6, 7), 5, 0);
     const u32 low = key ^ unhash(0u - crt_hash(key + 0x85ebca6bu));
     CHECK(crt_hash(crt_hash(low ^ key) + crt_hash(key + 0x85ebca6bu)) == 0);
-    CrtSampler stuck = crt_sampler_begin(CRT_SAMPLER_XORSHIFT, 0, 6, 7, 5, low);
+    CrtSampler stuck = crt_sampler_begin(CRT_SAMPLER_XORSHIFT, 0, crt_seed(6, 7), 5, low);
     CHECK(stuck.b0 == 0x6c078965u);
     CHECK(stuck.b0 != 0);
     CHECK(crt_sample_1d(&stuck, 0) != crt_sample_1d(&stuck, 0));
     // Marsaglia 2003, "Xorshift RNGs": from y = 2463534242 by 13, 17, 5 follows 723471715.
-    CrtSampler s = crt_sampler_begin(CRT_SAMPLER_XORSHIFT, 0, 0, 0, 0, 0);
+    CrtSampler s = crt_sampler_begin(CRT_SAMPLER_XORSHIFT, 0, crt_seed(0, 0), 0, 0);
     s.b0 = 2463534242u;
     CHECK(crt_xorshift(&s) == 723471715u);
     // Seeds 1 … 1024 used as they are have a mean of .03; hashed, ½ ± 1/√(12n).

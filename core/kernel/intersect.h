@@ -117,9 +117,6 @@ CRT_FN CrtHit crt_no_hit(f32 reach) {
    coordinates being within ±1) and what the exact test accepts outside an edge. */
 CRT_FN f32 crt_candidate_slack(vec3 o) { return 64.0f * CRT_EPSILON * (1.0f + crt_abs(V3X(o)) + crt_abs(V3Y(o)) + crt_abs(V3Z(o))); }
 
-/* Least height, for rounding, of an origin o that lies in a plane: −4 · 2^-24 (|ox| + |oy| + |oz|), from the slack. */
-CRT_FN f32 crt_height_error(f32 slack) { return 4.0f * CRT_EPSILON - 0.0625f * slack; }
-
 /* row · (x, y, z, w) for eight triangles. */
 CRT_FN vec8 crt_row8(CRT_GLOBAL const f32 *row, vec8 x, vec8 y, vec8 z, vec8 w) {
     return crt_fma8(crt_load8(row), x, crt_fma8(crt_load8(row + 8), y, crt_fma8(crt_load8(row + 16), z, crt_load8(row + 24) * w)));
@@ -128,7 +125,7 @@ CRT_FN vec8 crt_row8(CRT_GLOBAL const f32 *row, vec8 x, vec8 y, vec8 z, vec8 w) 
 /* Lanes of eight triangles that the ray may hit before `limit`. In homogeneous form, without a division: with h the height of the origin over the
    plane and n the height gained per length of the ray, the ray meets the plane at (n·o − h·d) / n. It may name a triangle that
    crt_intersect_triangle refuses, never miss one that it accepts: close to a plane the sign of h is not known. The slack there is
-   smaller than the clearance of the triangle's own rays, or each would be a candidate of the triangle that it leaves. */
+   smaller than the clearance of the triangle's own rays, or each would be a candidate of the triangle that it leaves: crt_height_slack. */
 CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtRay ray, f32 slack, f32 limit) {
     CRT_GLOBAL const f32 *row = &block->row[0][0][0];
     const vec8 ox = splat8(V3X(ray.o)), oy = splat8(V3Y(ray.o)), oz = splat8(V3Z(ray.o));
@@ -138,11 +135,11 @@ CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtRay ray, f32
     const vec8 x = crt_fma8(ox, n, -h * dx);
     const vec8 y = crt_fma8(oy, n, -h * dy);
     const vec8 z = crt_fma8(oz, n, -h * dz);
-    const vec8 inside = crt_min8(crt_flip8(crt_row8(row + 32, x, y, z, n), crt_sign8(n)),
+    const vec8 edges = crt_min8(crt_flip8(crt_row8(row + 32, x, y, z, n), crt_sign8(n)),
                         crt_min8(crt_flip8(crt_row8(row + 64, x, y, z, n), crt_sign8(n)), crt_flip8(crt_row8(row + 96, x, y, z, n), crt_sign8(n))));
-    const vec8 t = crt_flip8(-h, crt_sign8(n)); /* times |n| */
-    const vec8 reach = crt_fma8(crt_flip8(n, crt_sign8(n)), splat8(crt_min(limit, 1e30f)), splat8(slack));
-    return mask8_bits((inside > splat8(-slack)) & (t > splat8(crt_height_error(slack)) - crt_load8(block->height_slack)) & (t < reach));
+    const vec8 behind = crt_flip8(h, crt_sign8(n)); /* how far the origin is past the plane */
+    const vec8 inside = crt_min8(edges, crt_fma8(behind, splat8(-CRT_HEIGHT_SCALE), crt_load8(block->height_slack)));
+    return mask8_bits((inside > splat8(-slack)) & (behind > crt_fma8(crt_flip8(n, crt_sign8(n)), splat8(-crt_min(limit, 1e30f)), splat8(-slack))));
 }
 #endif
 

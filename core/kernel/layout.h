@@ -42,9 +42,10 @@ CRT_ASSERT_SIZE(CrtTriangle, 48);
    the height over the triangle's plane; rows 1 to 3 the distance from each edge, positive inside. Unused lanes have slot CRT_NONE and are CRT_UNUSED_HEIGHT
    below every point: farther than the slack of any ray, whose origin may be far outside the scene. */
 #define CRT_UNUSED_HEIGHT 1e30f
+#define CRT_HEIGHT_SCALE 16.0f /* of heights that are compared with the slack of a ray */
 typedef struct CrtTriangle8 {
     f32 row[4][4][8];
-    f32 height_slack[8]; /* how far the exact test of this triangle may take the wrong side of its plane; less than its clearance */
+    f32 height_slack[8]; /* crt_height_slack (surface.h) */
     u32 slot[8];         /* in the triangle array */
 } CrtTriangle8;
 CRT_ASSERT_SIZE(CrtTriangle8, 576);
@@ -165,6 +166,12 @@ CRT_ASSERT_SIZE(CrtCamera, 96);
    the sum of all (docs/decisions/0007-replicates.md). */
 #define CRT_REPLICATES_MAX 16u
 
+/* A seed, and two words that differ for any two seeds, hashed from it once (crt_seed in sampler.h). */
+typedef struct CrtSeed {
+    u32 low, high;
+    u32 first, second;
+} CrtSeed;
+
 typedef struct CrtScene {
     u32 magic;
     u32 features; /* of the scene; the kernel has at least these */
@@ -183,11 +190,10 @@ typedef struct CrtScene {
 
     f32 depth_scale;             /* scene units per length here: a power of two */
     u32 replicate_shift;         /* there are 2^shift replicates; 0: one sequence */
-    u32 padding[2];
-
     u32 sampler;
-    u32 seed_low, seed_high;
     u32 max_depth;               /* scattering events */
+
+    CrtSeed seed;
 
     u32 roulette_depth;          /* CRT_NONE: never */
     u32 nee;

@@ -106,20 +106,21 @@ CRT_FN f32 crt_edge_distance2(CrtLightShape s, vec3 p) {
     return crt_min(at_o, crt_min(crt_segment_distance2(s.o + s.a, s.b, p), crt_segment_distance2(s.o + s.b, s.a, p)));
 }
 
-CRT_FN CrtLightView crt_light_view(CrtLightShape shape, vec3 p) {
+/* By pointer: called twice, it is not inlined, and copies of the shape in wide words wait for its narrow stores. */
+CRT_FN CrtLightView crt_light_view(const CrtLightShape *shape, vec3 p) {
     CrtLightView v;
     v.technique = CRT_LIGHT_BY_AREA;
-    v.height = dot3(shape.normal, shape.o - p);
+    v.height = dot3(shape->normal, shape->o - p);
     v.omega = v.omega_far = v.triple = v.triple_far = 0.0f;
-    if (!crt_seen_large(shape, p)) return v;
-    const vec3 o = shape.o - p;
-    const vec3 a = o + shape.a, b = o + shape.b, far = a + shape.b;
+    if (!crt_seen_large(*shape, p)) return v;
+    const vec3 o = shape->o - p;
+    const vec3 a = o + shape->a, b = o + shape->b, far = a + shape->b;
     const f32 oo = dot3(o, o), aa = dot3(a, a), bb = dot3(b, b), ff = dot3(far, far);
     const f32 height = crt_abs(v.height);
-    const f32 farthest2 = crt_max(crt_max(oo, crt_max(aa, bb)), shape.parallelogram ? ff : 0.0f);
+    const f32 farthest2 = crt_max(crt_max(oo, crt_max(aa, bb)), shape->parallelogram ? ff : 0.0f);
     if (!(height * height > CRT_SOLID_ANGLE_HEIGHT * CRT_SOLID_ANGLE_HEIGHT * farthest2)) {
-        const f32 distance2 = crt_edge_distance2(shape, p);
-        const f32 weight = shape.area * height;
+        const f32 distance2 = crt_edge_distance2(*shape, p);
+        const f32 weight = shape->area * height;
         if (!(weight <= CRT_AREA_WEIGHT_MAX * distance2 * crt_sqrt(distance2))) v.technique = CRT_LIGHT_BY_CHANCE;
         return v;
     }
@@ -129,10 +130,10 @@ CRT_FN CrtLightView crt_light_view(CrtLightShape shape, vec3 p) {
     v.b = b * inverse_b;
     v.far = far * inverse_f;
     /* Six times the volume of p and the triangle: from height and area, since a product of vectors near one plane would be rounding. */
-    const f32 volume = height * shape.area * (shape.parallelogram ? 1.0f : 2.0f) * (inverse_a * inverse_b);
+    const f32 volume = height * shape->area * (shape->parallelogram ? 1.0f : 2.0f) * (inverse_a * inverse_b);
     v.triple = volume * inverse_o;
     v.omega = crt_solid_angle(v.triple, v.o, v.a, v.b);
-    if (shape.parallelogram) {
+    if (shape->parallelogram) {
         v.triple_far = volume * inverse_f;
         v.omega_far = crt_solid_angle(v.triple_far, v.far, v.b, v.a);
     }
@@ -205,7 +206,7 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
     }
     CRT_GLOBAL const CrtEmitter *emitter = emitters + index;
     const CrtLightShape shape = crt_light_shape(ctx, emitter);
-    const CrtLightView view = crt_light_view(shape, p);
+    const CrtLightView view = crt_light_view(&shape, p);
     CrtLightSample s;
     s.spectrum = emitter->spectrum;
     s.pdf = 0.0f;
@@ -261,7 +262,7 @@ typedef struct CrtLightSeen {
 CRT_FN CrtLightSeen crt_light_seen(const CrtContext *ctx, u32 emitter_index, vec3 p, f32 distance) {
     CRT_GLOBAL const CrtEmitter *emitter = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + emitter_index;
     const CrtLightShape shape = crt_light_shape(ctx, emitter);
-    const CrtLightView view = crt_light_view(shape, p);
+    const CrtLightView view = crt_light_view(&shape, p);
     CrtLightSeen seen;
     seen.cosine = crt_abs(view.height) / distance;
     seen.pdf = emitter->choice_probability * crt_light_density(view, shape.area, seen.cosine, distance);

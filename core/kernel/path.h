@@ -38,32 +38,30 @@ typedef struct CrtPath {
     CrtFirstHit first;
 } CrtPath;
 
-CRT_FN CrtPath crt_path_begin(const CrtContext *ctx, u32 x, u32 y, u64 sample) {
+/* Written in place: a path that is returned is copied in wide words, which wait for its narrow stores. */
+CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u64 sample) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     const u32 pixel_x = scene->crop_x + x;
     const u32 pixel_y = scene->crop_y + y;
-    CrtPath path;
-    path.sampler = crt_sampler_begin(scene->sampler, scene->replicate_shift, scene->seed_low, scene->seed_high,
-                                     pixel_y * scene->film_width + pixel_x, sample);
-    path.ray = crt_camera_ray(ctx, &path.sampler, pixel_x, pixel_y);
-    path.wavelengths = crt_sample_wavelengths(ctx, crt_sample_1d(&path.sampler, CRT_DIM_WAVELENGTH));
-    path.hero = make_vec4(1.0f, 0.0f, 0.0f, 0.0f);
+    path->sampler = crt_sampler_begin(scene->sampler, scene->replicate_shift, scene->seed, pixel_y * scene->film_width + pixel_x, sample);
+    path->ray = crt_camera_ray(ctx, &path->sampler, pixel_x, pixel_y);
+    path->wavelengths = crt_sample_wavelengths(ctx, crt_sample_1d(&path->sampler, CRT_DIM_WAVELENGTH));
+    path->hero = make_vec4(1.0f, 0.0f, 0.0f, 0.0f);
     if (CRT_HAS(DISPERSION) && (scene->features & (u32)CRT_FEATURE_DISPERSION) != 0u) {
-        const u32 lane = crt_sample_bits(&path.sampler, CRT_DIM_HERO) >> 30;
-        path.hero = make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f, lane == 3u ? 1.0f : 0.0f);
+        const u32 lane = crt_sample_bits(&path->sampler, CRT_DIM_HERO) >> 30;
+        path->hero = make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f, lane == 3u ? 1.0f : 0.0f);
     }
-    path.throughput = splat4(1.0f);
-    path.radiance = splat4(0.0f);
-    path.scatter_pdf = 0.0f;
-    path.p = path.ray.o;
-    path.eta_square = 1.0f;
-    path.depth = 0u;
-    path.alone = 0;
-    path.first.albedo = splat4(0.0f);
-    path.first.normal = make_vec3(0.0f, 0.0f, 0.0f);
-    path.first.depth = 0.0f;
-    path.first.primitive = CRT_NONE;
-    return path;
+    path->throughput = splat4(1.0f);
+    path->radiance = splat4(0.0f);
+    path->scatter_pdf = 0.0f;
+    path->p = path->ray.o;
+    path->eta_square = 1.0f;
+    path->depth = 0u;
+    path->alone = 0;
+    path->first.albedo = splat4(0.0f);
+    path->first.normal = make_vec3(0.0f, 0.0f, 0.0f);
+    path->first.depth = 0.0f;
+    path->first.primitive = CRT_NONE;
 }
 
 /* Emission met by the ray, weighted against the chance that light sampling had found it. */
@@ -345,7 +343,7 @@ CRT_FN void crt_add_sample(const CrtContext *ctx, CrtPixelWork *work, vec4 xyz) 
 /* Takes the pixel one vertex further, into its next sample where a path has ended. Returns 0 when the last sample is done. */
 CRT_FN int crt_pixel_vertex(const CrtContext *ctx, CrtPixelWork *work, CrtRayCount *rays) {
     if (work->done >= work->sample_count) return 0;
-    if (!work->alive) work->path = crt_path_begin(ctx, work->x, work->y, work->first_sample + work->done);
+    if (!work->alive) crt_path_begin(ctx, &work->path, work->x, work->y, work->first_sample + work->done);
     vec4 xyz = splat4(0.0f);
     if (CRT_HAS(VIEW) && ctx->scene->view != CRT_VIEW_PATH) {
         xyz = crt_view(ctx, &work->path, rays);

@@ -46,13 +46,11 @@ CRT_FN u32 crt_hash(u32 x) {
     return x;
 }
 
-/* Two words that differ for any two seeds: two rounds of a Feistel network, a bijection on 64 bits, each word hashed. */
-typedef struct CrtSeed {
-    u32 first, second;
-} CrtSeed;
-
+/* Two rounds of a Feistel network, a bijection on 64 bits, each word hashed. */
 CRT_FN CrtSeed crt_seed(u32 low, u32 high) {
     CrtSeed s;
+    s.low = low;
+    s.high = high;
     s.first = low ^ crt_hash(high + 0x9e3779b9u);
     s.second = high ^ crt_hash(s.first + 0x85ebca6bu);
     s.first ^= crt_hash(s.second + 0xc2b2ae35u);
@@ -124,7 +122,7 @@ CRT_FN u64 crt_index_in_replicate(u64 sample, u32 shift) { return sample >> shif
  * sequences that are each scrambled on their own (Owen 1997, "Monte Carlo variance of scrambled net quadrature", section 3). The other samplers'
  * samples are independent as it is.
  */
-CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, u32 seed_low, u32 seed_high, u32 pixel, u64 sample) {
+CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, CrtSeed seed, u32 pixel, u64 sample) {
     CrtSampler s;
     const u32 low = (u32)sample;
     const u32 high = (u32)(sample >> 32);
@@ -132,8 +130,8 @@ CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, u32 seed_low,
     s.pixel_key = pixel;
     s.index = low;
     s.index_high = high;
-    s.seed_low = seed_low;
-    s.seed_high = seed_high;
+    s.seed_low = seed.low;
+    s.seed_high = seed.high;
     s.block = CRT_NONE;
     s.b0 = s.b1 = s.b2 = s.b3 = 0u;
     if (CRT_HAS(SOBOL) && kind == CRT_SAMPLER_SOBOL) {
@@ -141,12 +139,12 @@ CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, u32 seed_low,
         const u64 index = crt_index_in_replicate(sample, shift);
         /* A sequence has 2^32 points; what lies beyond them begins another. */
         const u32 sequence = ((u32)(index >> 32) << shift) + crt_replicate(sample, shift);
-        s.pixel_key = crt_pixel_key(crt_seed(seed_low, seed_high), pixel, sequence);
+        s.pixel_key = crt_pixel_key(seed, pixel, sequence);
         s.index = crt_reverse_bits((u32)index);
     }
     if (CRT_HAS(XORSHIFT) && kind == CRT_SAMPLER_XORSHIFT) {
         /* Marsaglia's xorshift32 has one bad state, 0, and neighbouring seeds give neighbouring streams: seed it with a hash. */
-        const u32 key = crt_pixel_key(crt_seed(seed_low, seed_high), pixel, high);
+        const u32 key = crt_pixel_key(seed, pixel, high);
         /* Not + crt_hash(key), which would be the same for key and key ^ low. */
         const u32 h = crt_hash(crt_hash(low ^ key) + crt_hash(key + 0x85ebca6bu));
         s.b0 = h != 0u ? h : 0x6c078965u;

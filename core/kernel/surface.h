@@ -33,8 +33,12 @@ CRT_FN vec3 crt_triangle_vertex(CRT_GLOBAL const CrtTriangle *triangle, u32 i) {
    size in every axis counts. √3: both are per axis. */
 CRT_FN f32 crt_clearance(f32 coordinate, f32 size) { return 1.7320509f * (coordinate * CRT_GAMMA(9.0f) + size * CRT_TEST_ERROR); }
 
-/* Part of the clearance within which the triangle test may be wrong about the side that an origin is on (intersect.h, eight triangles at a time). */
-CRT_FN f32 crt_height_slack(f32 coordinate, f32 size) { return CRT_GAMMA(1.0f) * coordinate + CRT_GAMMA(8.0f) * size; }
+/* A ray's origin o may be taken for the wrong side of a triangle's plane within γ(1)·coordinate + γ(8)·size, by the triangle test, and 4 · 2^-24
+   (|ox| + |oy| + |oz|), by rounding of its height: less than the clearance. Eight triangles at a time (intersect.h) compare CRT_HEIGHT_SCALE times
+   the height with the slack of a ray, which is 64 · 2^-24 (1 + |ox| + |oy| + |oz|): this is what is left of the sum. */
+CRT_FN f32 crt_height_slack(f32 coordinate, f32 size) {
+    return CRT_HEIGHT_SCALE * (CRT_GAMMA(1.0f) * coordinate + CRT_GAMMA(8.0f) * size) - 64.0f * CRT_EPSILON;
+}
 
 /* How far from its edges, in barycentrics, a path may start: a few ulp of the position against the triangle's height. A start in a corner within
    rounding of the other wall might lie behind that wall, and leave a closed room. */

@@ -170,7 +170,7 @@ void draws(Context& context) {
         constexpr std::uint32_t dimensions = 6;
         std::vector<std::vector<double>> u(dimensions);
         for (std::uint32_t i = 0; i < count; ++i) {
-            CrtSampler s = crt_sampler_begin(kind, 0, 7, 0, i, 3);
+            CrtSampler s = crt_sampler_begin(kind, 0, crt_seed(7, 0), i, 3);
             for (std::uint32_t d = 0; d < dimensions; ++d) u[d].push_back(crt_sample_1d(&s, d));
         }
         for (std::uint32_t d = 0; d < dimensions; ++d) {
@@ -210,7 +210,7 @@ void sobol(Context& context) {
                 for (int k = 0; k <= m; ++k) {
                     std::vector<int> count(std::size_t{1} << m);
                     for (std::uint64_t i = 0; i < (1u << m); ++i) {
-                        CrtSampler s = crt_sampler_begin(CRT_SAMPLER_SOBOL, 0, 1, 2, 77, first + i);
+                        CrtSampler s = crt_sampler_begin(CRT_SAMPLER_SOBOL, 0, crt_seed(1, 2), 77, first + i);
                         const CrtRandom2 u = crt_sample_2d(&s, dimension);
                         const auto x = static_cast<std::size_t>(std::ldexp(u.x, k)), y = static_cast<std::size_t>(std::ldexp(u.y, m - k));
                         ++count[(x << (m - k)) + y];

@@ -25,8 +25,9 @@ public:
     Vec3d origin() const { return origin_; }
     /// Direction of sample 0 of a pixel.
     Vec3d direction(int x, int y) const {
-        const kernel::CrtRay ray = kernel::crt_path_begin(&context_, static_cast<kernel::u32>(x), static_cast<kernel::u32>(y), 0).ray;
-        return {ray.d.x, ray.d.y, ray.d.z};
+        kernel::CrtPath path;
+        kernel::crt_path_begin(&context_, &path, static_cast<kernel::u32>(x), static_cast<kernel::u32>(y), 0);
+        return {path.ray.d.x, path.ray.d.y, path.ray.d.z};
     }
     /// Direction through a film point, not normalised.
     Vec3d through(double x, double y) const {

@@ -60,7 +60,7 @@ public:
         const std::string fault = wantedFault();
         while (fault == "hang") std::this_thread::sleep_for(std::chrono::seconds(1));
         const auto start = std::chrono::steady_clock::now();
-        const std::uint64_t seed = (std::uint64_t{scene_.seed_high} << 32) | scene_.seed_low;
+        const std::uint64_t seed = (std::uint64_t{scene_.seed.high} << 32) | scene_.seed.low;
         for (std::uint32_t y = range.y0; y < range.y1; ++y) {
             const double done = double(y - range.y0) / (range.y1 - range.y0);
             if (done >= 0.5 && fault == "oom") throw PluginError(CRT_OUT_OF_MEMORY, "the device has no memory left for 12 more rows");
