@@ -29,7 +29,7 @@
 
 namespace crt {
 
-inline constexpr std::uint32_t kCheckpointVersion = 2;
+inline constexpr std::uint32_t kCheckpointVersion = 3;
 inline constexpr const char* kCheckpointExtension = ".crtfilm";
 
 /// Refuses to go on from `path` when it holds other bits or another scene than `expected`: crt::Error(Usage)

@@ -65,7 +65,7 @@ public:
     Compiler(const Scene& scene, std::uint32_t aovs) : scene_(scene) {
         header_.magic = CRT_SCENE_MAGIC;
         out_.aovs = aovs & kAovsOfFirstHits;
-        if (replicatesOf(scene_) > 1) out_.aovs |= kAovReplicates;
+        out_.aovs |= replicatesOf(scene_) > 1 ? kAovReplicates : kAovSquares;
     }
 
     CompiledScene run() {

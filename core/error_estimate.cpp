@@ -117,9 +117,9 @@ double measuredSpread(const Film& film, const LuminanceVariance& variance, const
 
 }  // namespace
 
-LuminanceVariance::LuminanceVariance(const Film& film) : film_(film), from_replicates_(balanced(film)) {
+LuminanceVariance::LuminanceVariance(const Film& film) : film_(film), from_replicates_(balanced(film)), squares_(firstChannel(film.shape().aovs, kAovSquares)) {
     if (!from_replicates_) {
-        dof_ = static_cast<double>(film.samples.count()) - 1;
+        dof_ = squares_ != 0 ? static_cast<double>(film.samples.count()) - 1 : 0;
         return;
     }
     for (std::uint32_t r = 0; r < film.replicates(); ++r) samples_[r] = static_cast<double>(film.replicateSamples(r));
@@ -146,7 +146,7 @@ double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
     if (n < 2) return kUnknown;
     const double mean = film_.mean(x, y, 1);
     // Rounding can push the difference of nearly equal numbers below zero.
-    const double spread = std::max(0.0, film_.mean(x, y, 3) - mean * mean);
+    const double spread = std::max(0.0, film_.mean(x, y, squares_) - mean * mean);
     return spread / static_cast<double>(n - 1);
 }
 

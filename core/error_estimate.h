@@ -32,6 +32,7 @@ private:
 
     const Film& film_;
     bool from_replicates_;
+    std::uint32_t squares_;  ///< Channel of Y²; 0: the film has none.
     std::array<double, 16> samples_{};  ///< Of each replicate.
     double dof_ = 0;
 };

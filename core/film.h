@@ -38,7 +38,7 @@ private:
 
 struct FilmShape {
     std::uint32_t width = 0, height = 0;
-    std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, Y², then AOV channels, then replicates.
+    std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, then those of kernel/channels.h.
     std::uint32_t aovs = 0;       ///< Bits of Aov that need film channels or the primitive plane, kAovReplicates among them.
     /// Independent sequences that samples take turns between (layout.h); 1: the film does not tell them apart.
     std::uint32_t replicates() const;

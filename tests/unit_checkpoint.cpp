@@ -77,7 +77,7 @@ TEST_CASE("a checkpoint comes back bit for bit", "[checkpoint]") {
 TEST_CASE("films without samples or ids are checkpoints too", "[checkpoint]") {
     const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
-    const FilmShape shape{4, 4, 4, 0};
+    const FilmShape shape{4, 4, 4, kAovSquares};
     writeCheckpoint(path, Film(shape), {kIdentity.scene_hash, ""});
     const auto [back, identity] = readCheckpoint(path);
     CHECK(back.shape() == shape);
@@ -89,7 +89,7 @@ TEST_CASE("films without samples or ids are checkpoints too", "[checkpoint]") {
 TEST_CASE("a checkpoint of a film with an impossible side is refused", "[checkpoint]") {
     const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
-    for (const FilmShape shape : {FilmShape{0, 0x81000000u, 4, 0}, FilmShape{0x81000000u, 0, 4, 0}, FilmShape{0, 0, 4, 0}, FilmShape{65536, 1, 4, 0}}) {
+    for (const FilmShape shape : {FilmShape{0, 0x81000000u, 4, kAovSquares}, FilmShape{0x81000000u, 0, 4, kAovSquares}, FilmShape{0, 0, 4, kAovSquares}, FilmShape{65536, 1, 4, kAovSquares}}) {
         writeCheckpoint(path, Film(shape), kIdentity);
         CHECK_THROWS_WITH(readCheckpoint(path), Contains(path) && Contains("1 to 65535 a side"));
     }
@@ -99,16 +99,16 @@ TEST_CASE("the largest film of a scene file is the largest of a checkpoint", "[c
     const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
     const auto most = static_cast<std::uint32_t>(schemaSection("film").find("resolution")->range.max);
-    writeCheckpoint(path, Film({most, 1, 4, 0}), kIdentity);
+    writeCheckpoint(path, Film({most, 1, 4, kAovSquares}), kIdentity);
     CHECK(readCheckpoint(path).first.shape().width == most);
-    writeCheckpoint(path, Film({most + 1, 1, 4, 0}), kIdentity);
+    writeCheckpoint(path, Film({most + 1, 1, 4, kAovSquares}), kIdentity);
     CHECK_THROWS_WITH(readCheckpoint(path), Contains("a side"));
 }
 
 TEST_CASE("the format is what checkpoint.h says", "[checkpoint]") {
     const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
-    Film film({1, 1, 4, 0});
+    Film film({1, 1, 4, kAovSquares});
     film.sums[0] = 1.5;
     film.counts[0] = 2;
     film.samples.add({3, 5});
@@ -209,7 +209,7 @@ TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpo
     CHECK(warningCount() == warnings + 1);
     setLogLevel(LogLevel::Info);
     const TemporaryFolder directory;
-    CHECK_THROWS_AS(writeCheckpoint(directory / "x.crtfilm", Film({1, 1, 4, 0}), {"no hash", "0.1.0"}), Error);
+    CHECK_THROWS_AS(writeCheckpoint(directory / "x.crtfilm", Film({1, 1, 4, kAovSquares}), {"no hash", "0.1.0"}), Error);
 }
 
 TEST_CASE("films of other bits are neither gone on with nor merged", "[checkpoint]") {

@@ -624,11 +624,14 @@ TEST_CASE("AOVs take channels in order, and only those that are asked for", "[co
         scene.sampler.replicates = 1;
         return compiled(scene, aovs);
     };
-    CHECK(single(0).channels == CRT_CHANNELS_BASE);
+    // The variance of a film of one sequence is that of its samples; of one with replicates, theirs.
+    CHECK(single(0).channels == CRT_CHANNELS_BASE + 1);
+    CHECK(headerOf(single(0)).square_channel == CRT_CHANNELS_BASE);
     Scene sixteen = litFloor();
     sixteen.sampler.replicates = 16;
     const CompiledScene replicates = compiled(sixteen);
     CHECK(headerOf(replicates).replicate_shift == 4);
+    CHECK(headerOf(replicates).square_channel == 0);
     CHECK(headerOf(replicates).replicate_channel == CRT_CHANNELS_BASE);
     CHECK(replicates.channels == CRT_CHANNELS_BASE + 15);
     // Each behind the one before it, in the order of the list, which is that of film files.
@@ -637,12 +640,12 @@ TEST_CASE("AOVs take channels in order, and only those that are asked for", "[co
     CHECK(headerOf(all).normal_channel == CRT_CHANNELS_BASE + 3);
     CHECK(headerOf(all).depth_channel == CRT_CHANNELS_BASE + 6);
     CHECK(headerOf(all).replicate_channel == CRT_CHANNELS_BASE + 7);
-    CHECK(all.channels == CRT_CHANNELS_MAX);
+    CHECK(all.channels == CRT_CHANNELS_MAX - 1);
     const CompiledScene depth = single(crt::kAovDepth);
     CHECK(headerOf(depth).albedo_channel == 0);
-    CHECK(headerOf(depth).depth_channel == CRT_CHANNELS_BASE);
+    CHECK(headerOf(depth).depth_channel == CRT_CHANNELS_BASE + 1);
     CHECK(headerOf(depth).replicate_channel == 0);
-    CHECK(depth.channels == CRT_CHANNELS_BASE + 1);
+    CHECK(depth.channels == CRT_CHANNELS_BASE + 2);
 }
 
 TEST_CASE("the bits of AOVs never change: film files hold them", "[compile]") {

@@ -24,13 +24,16 @@ using kernel::u64;
 namespace {
 
 /// A film for 2^shift replicates, whose last has no channel of its own.
-FilmShape shapeFor(u32 width, u32 height, u32 shift) { return {width, height, CRT_CHANNELS_BASE + (1u << shift) - 1, shift > 0 ? kAovReplicates : 0u}; }
+FilmShape shapeFor(u32 width, u32 height, u32 shift) {
+    const u32 aovs = shift > 0 ? kAovReplicates : kAovSquares;
+    return {width, height, channelsFor(aovs, 1u << shift), aovs};
+}
 
 void addSample(Film& film, std::size_t pixel, u64 sample, double y) {
     const u32 channels = film.shape().channels, replicates = film.replicates();
     double* pairs = &film.sums[pixel * channels * 2];
     pairs[2] += y;
-    pairs[6] += y * y;
+    if (replicates == 1) pairs[2 * firstChannel(film.shape().aovs, kAovSquares)] += y * y;
     const u32 replicate = static_cast<u32>(sample % replicates);
     if (replicate + 1 < replicates) pairs[2 * (CRT_CHANNELS_BASE + replicate)] += y;
 }

@@ -19,7 +19,7 @@ using namespace crt;
 
 namespace {
 
-constexpr FilmShape kOnePixel{1, 1, 4, 0};
+constexpr FilmShape kOnePixel{1, 1, 4, kAovSquares};
 
 /// A film of one pixel that holds one sample.
 Film oneSample(std::uint64_t index, float x, float y, float z) {
@@ -156,7 +156,7 @@ TEST_CASE("a sum keeps what one double would lose", "[film]") {
 TEST_CASE("films of overlapping ranges or other shapes are refused and change nothing", "[film]") {
     Film film = oneSample(7, 1, 2, 3);
     CHECK_THROWS_WITH(film.add(oneSample(7, 1, 1, 1)), Contains("7-8"));
-    CHECK_THROWS_AS(film.add(Film({2, 1, 4, 0})), Error);
+    CHECK_THROWS_AS(film.add(Film({2, 1, 4, kAovSquares})), Error);
     CHECK_THROWS_AS(film.add(Film({1, 1, 5, kAovDepth})), Error);
     CHECK(film.sum(0, 0, 0) == 1.0);
     CHECK(film.counts[0] == 1);
@@ -171,15 +171,15 @@ TEST_CASE("films of overlapping ranges or other shapes are refused and change no
 
 TEST_CASE("a film refuses a channel count that its AOVs do not explain", "[film]") {
     CHECK_NOTHROW(Film({3, 2, 11, kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive}));
-    CHECK_THROWS_AS(Film({3, 2, 4, kAovAlbedo}), Error);
+    CHECK_THROWS_AS(Film({3, 2, 4, kAovSquares | kAovAlbedo}), Error);
     CHECK_THROWS_AS(Film({3, 2, 0, 0}), Error);
-    const Film film({3, 2, 4, kAovPrimitive});
+    const Film film({3, 2, 4, kAovSquares | kAovPrimitive});
     CHECK(film.primitives == std::vector<std::uint32_t>(6, 0xffffffffu));
-    CHECK(Film({3, 2, 4, 0}).primitives.empty());
+    CHECK(Film({3, 2, 4, kAovSquares}).primitives.empty());
 }
 
 TEST_CASE("primitive ids come from the film with the lower first sample, whoever is added to whom", "[film]") {
-    const FilmShape shape{1, 1, 4, kAovPrimitive};
+    const FilmShape shape{1, 1, 4, kAovSquares | kAovPrimitive};
     Film early(shape), late(shape);
     early.primitives[0] = 11;
     early.samples.add({0, 4});
@@ -196,7 +196,7 @@ TEST_CASE("primitive ids come from the film with the lower first sample, whoever
 
 TEST_CASE("counts beyond 2^32 samples are kept", "[film]") {
     constexpr std::uint64_t kHalf = 3'000'000'000u;  // Beyond an int, and twice it beyond 32 bits.
-    Film film({1, 1, 4, 0}), more({1, 1, 4, 0});
+    Film film({1, 1, 4, kAovSquares}), more({1, 1, 4, kAovSquares});
     film.counts[0] = more.counts[0] = kHalf;
     film.sums[2] = more.sums[2] = 0.25 * kHalf;
     film.samples.add({0, kHalf});
@@ -209,7 +209,7 @@ TEST_CASE("counts beyond 2^32 samples are kept", "[film]") {
 }
 
 TEST_CASE("dropped samples are counted", "[film]") {
-    Film film({2, 2, 4, 0});
+    Film film({2, 2, 4, kAovSquares});
     film.samples.add({0, 100});
     film.counts = {100, 97, 100, 0};
     CHECK(film.invalidSamples() == 103);

@@ -4,8 +4,8 @@
  * all made from these rows.
  *
  * CRT_CHANNEL_LIST(C) calls C(bit, NAME, Name, stem, width, SOURCE, "name in scenes", "EXR channels") for
- * what has film channels of its own, in the order in which the film holds them, after X, Y, Z and Y².
- * `width` is their number; films of fewer replicates than there can be have fewer of those, which come last. CrtScene::<stem>_channel is the first of them. SOURCE says which kernel code adds
+ * what has film channels of its own, in the order in which the film holds them, after X, Y and Z. `width` is
+ * their number; films of fewer replicates than there can be have fewer of those, which come last. CrtScene::<stem>_channel is the first of them. SOURCE says which kernel code adds
  * to them: FIRST_HIT has a function crt_first_hit_<stem> in path.h, SAMPLES is added by crt_add_sample.
  *
  * CRT_PLANE_LIST(P) calls P(bit, NAME, Name, TYPE, SOURCE, "name in scenes", "EXR channels") for what has
@@ -19,6 +19,7 @@
 #define CRT_CHANNELS_H
 
 #define CRT_CHANNEL_LIST(C)                                                                        \
+    C(8, SQUARES, Squares, square, 1u, SAMPLES, "", "")                                            \
     C(0, ALBEDO, Albedo, albedo, 3u, FIRST_HIT, "albedo", "Albedo.R,Albedo.G,Albedo.B")            \
     C(1, NORMAL, Normal, normal, 3u, FIRST_HIT, "normal", "Ns.X,Ns.Y,Ns.Z")                        \
     C(2, DEPTH, Depth, depth, 1u, FIRST_HIT, "depth", "Z")                                         \
@@ -34,8 +35,8 @@
 #define CRT_PLANE_ENUM(bit, NAME, Name, TYPE, SOURCE, name, exr) CRT_AOV_##NAME = 1 << bit,
 enum CrtAov { CRT_CHANNEL_LIST(CRT_CHANNEL_ENUM) CRT_PLANE_LIST(CRT_PLANE_ENUM) CRT_AOV_END };
 
-/* X, Y, Z and Y² of each sample. */
-#define CRT_CHANNELS_BASE 4u
+/* X, Y and Z of each sample. SQUARES is Y² of each, of which films without replicates know their variance. */
+#define CRT_CHANNELS_BASE 3u
 
 /* Of a film with everything. */
 #define CRT_CHANNEL_WIDTH(bit, NAME, Name, stem, width, SOURCE, name, exr) +(width)

@@ -191,14 +191,16 @@ typedef struct CrtScene {
     f32 depth_scale;             /* scene units per length here: a power of two */
     u32 replicate_shift;         /* there are 2^shift replicates; 0: one sequence */
     u32 sampler;
+
     u32 max_depth;               /* scattering events */
-
-    CrtSeed seed;
-
     u32 roulette_depth;          /* CRT_NONE: never */
     u32 nee;
     u32 environment;             /* spectrum, or CRT_NONE */
+
+    CrtSeed seed;
+
     u32 triangle_count;
+    u32 padding[3];
 
     CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
     CrtSpan faces;               /* CrtFace, by slot */
@@ -217,7 +219,7 @@ typedef struct CrtScene {
 
     CrtCamera camera;
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 320);
+CRT_ASSERT_SIZE(CrtScene, 336);
 
 CRT_KERNEL_END
 

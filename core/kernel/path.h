@@ -326,7 +326,7 @@ CRT_FN void crt_add_sample(const CrtContext *ctx, CrtPixelWork *work, vec4 xyz) 
         crt_film_add(pairs + 0, (f64)V4X(xyz));
         crt_film_add(pairs + 2, luminance);
         crt_film_add(pairs + 4, (f64)V4Z(xyz));
-        crt_film_add(pairs + 6, luminance * luminance);
+        if (scene->square_channel != 0u) crt_film_add(pairs + 2u * scene->square_channel, luminance * luminance);
         if (CRT_HAS(REPLICATES) && scene->replicate_shift != 0u) {
             const u32 replicate = crt_replicate(work->first_sample + work->done, scene->replicate_shift);
             if (replicate + 1u < 1u << scene->replicate_shift) crt_film_add(pairs + 2u * (scene->replicate_channel + replicate), luminance);

@@ -289,7 +289,7 @@ double worstRatio(const Film& film, const Film& unit, double factor) {
 
 double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y) {
     const double mean = film.mean(x, y, 1);
-    return film.mean(x, y, 3) - mean * mean;
+    return film.mean(x, y, firstChannel(film.shape().aovs, kAovSquares)) - mean * mean;
 }
 
 double pathVariance(const Film& film) {

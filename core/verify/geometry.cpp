@@ -101,7 +101,7 @@ void slivers(Context& context) {
                 // The hit's distance lies between those of the sphere around its triangle.
                 const Vec3d &a = corners[3 * id], &b = corners[3 * id + 1];
                 const double radius = 0.51 * length(b - a), centre = length((a + b) * 0.5 - scene.camera.position);
-                const double off = std::abs(film.mean(x, y, CRT_CHANNELS_BASE + 3) - centre) - radius;
+                const double off = std::abs(film.mean(x, y, firstChannel(film.shape().aovs, kAovDepth)) - centre) - radius;
                 hits.failures += !(off <= 1e-5);
             });
         }

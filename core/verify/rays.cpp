@@ -113,7 +113,7 @@ void grazingRays(Context& context) {
                 ++wrong.rays;
                 // The sky after one reflection: a ray that met the floor again brings at most 2.
                 wrong.failures += radiance(film, x, y) < 100;
-                farthest = fartherFrom(0, farthest, film.mean(x, y, CRT_CHANNELS_BASE));
+                farthest = fartherFrom(0, farthest, film.mean(x, y, firstChannel(film.shape().aovs, kAovDepth)));
             }
         rareFailures(context, fmt::format("reflected at {:g} rad", angle), wrong, 1e-5, "a grazing ray meets the plane that it leaves");
         context.holds(fmt::format("distances at {:g} rad", angle), farthest <= 0.5 + 0.82 * std::sqrt(2.0), "within the floor",

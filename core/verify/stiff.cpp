@@ -154,7 +154,8 @@ void slits(Context& context) {
                                 .set("environment", "{radiance: 1}")
                                 .set("sampler", "{type: independent}")
                                 .yaml();
-    const double second = context.render(sky, {.samples = 65536}).mean(0, 0, 3);
+    const Film sky_film = context.render(sky, {.samples = 65536});
+    const double second = sky_film.mean(0, 0, firstChannel(sky_film.shape().aovs, kAovSquares));
     struct Slit {
         double width;
         Level level;
