@@ -120,7 +120,8 @@ private:
     /// no such file. Names with blanks are longer than they look, so the longest that is there wins.
     std::size_t wordsOfOneName(const std::vector<std::string_view>& words, std::size_t first, int line) {
         constexpr std::size_t kMostWords = 12;
-        for (std::size_t count = std::min(words.size() - first, kMostWords); count > 0; --count) {
+        const std::size_t most = sameLetters(fs::path(words[first]).extension().string(), ".mtl") ? 1 : kMostWords;
+        for (std::size_t count = std::min(words.size() - first, most); count > 0; --count) {
             const char* end = words[first + count - 1].data() + words[first + count - 1].size();
             const std::string name(
                 unquoted({words[first].data(), static_cast<std::size_t>(end - words[first].data())}));
@@ -136,6 +137,9 @@ private:
         if (name.empty()) return std::nullopt;
         if (isFile(folder_ / name)) return folder_ / name;
         std::string slashed = name;
+        // As tinyobjloader and its users write a blank.
+        for (std::size_t at = 0; (at = slashed.find("\\ ", at)) != std::string::npos; ++at) slashed.erase(at, 1);
+        if (isFile(folder_ / slashed)) return folder_ / slashed;
         std::replace(slashed.begin(), slashed.end(), '\\', '/');
         if (isFile(folder_ / slashed)) return folder_ / slashed;
         const fs::path path(slashed);
@@ -155,8 +159,8 @@ private:
         const std::string file = path.string();
         if (std::find(out_.files.begin(), out_.files.end(), file) != out_.files.end()) return;
         if (path != folder_ / name)
-            logWarning("{}:{}: there is no material file '{}'; read '{}' in its place", obj_path_, line,
-                       name, file);
+            logWarning("{}:{}: there is no material file {}; read {} in its place", obj_path_, line,
+                       inQuotes(name), inQuotes(file));
         std::string text;
         try {
             text = readTextFile(file, "material file", {obj_path_, line});

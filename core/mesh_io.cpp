@@ -209,11 +209,18 @@ private:
                        counted(triangulator_.crossingPolygons(), "polygon"));
     }
 
+    /// "'a.mtl' or 'b.mtl'"
+    std::string missingFiles() const {
+        std::vector<std::string> names;
+        for (const std::string& name : files_.missing) names.push_back(inQuotes(name));
+        return fmt::format("{}", fmt::join(names, " or "));
+    }
+
     /// One line about all materials of the file, with what else crt has no place for.
     void sayMaterials() const {
         std::vector<std::string> undefined;
         for (const LoadedMaterial& m : out_.materials)
-            if (!m.mtl) undefined.push_back(m.name.empty() ? "''" : fmt::format("'{}'", m.name));
+            if (!m.mtl) undefined.push_back(inQuotes(m.name));
         const auto bare = std::count_if(
             out_.mesh.material.begin(), out_.mesh.material.end(),
             [&](std::int32_t m) { return m >= 0 && !out_.materials[static_cast<std::size_t>(m)].mtl; });
@@ -226,12 +233,10 @@ private:
                        more > 0                ? fmt::format(" and {} more are", more)
                        : undefined.size() == 1 ? " is"
                                                : " are",
-                       files_.missing.empty()
-                           ? ""
-                           : fmt::format(", and no file '{}' is there", fmt::join(files_.missing, "' or '")),
+                       files_.missing.empty() ? "" : fmt::format(", and no file {} is there", missingFiles()),
                        bare, counted(out_.mesh.triangles.size(), "triangle"));
         } else if (!files_.missing.empty()) {
-            logWarning("{}: the material file '{}' is not there", path_, fmt::join(files_.missing, "', '"));
+            logWarning("{}: no material file {} is there", path_, missingFiles());
         }
         std::vector<std::string> left_out = otherGeometry();
         if (obj_.vertex_colors) left_out.push_back("colours of vertices");

@@ -65,8 +65,8 @@ private:
             }
             loss.add(lines_.number(),
                      field.empty() ? fmt::format("{} needs three numbers", what)
-                     : value       ? fmt::format("the numbers of {} must be finite, found '{}'", what, field)
-                                   : fmt::format("expected a number, found '{}'", field));
+                     : value       ? fmt::format("the numbers of {} must be finite, found {}", what, inQuotes(field))
+                                   : fmt::format("expected a number, found {}", inQuotes(field)));
             return {kNan, kNan, kNan};
         }
         return v;
@@ -87,8 +87,8 @@ private:
         const std::string_view position = field.substr(0, field.find('/'));
         std::int64_t at = 0;
         if (!readIndex(position, at))
-            fail(fmt::format("'{}' is not a corner of a face (v, v/vt, v//vn or v/vt/vn, counted from 1)",
-                             field));
+            fail(fmt::format("{} is not a corner of a face (v, v/vt, v//vn or v/vt/vn, counted from 1)",
+                             inQuotes(field)));
         const auto fromZero = [](std::int64_t i, std::size_t count) {
             return i > 0 ? i - 1 : static_cast<std::int64_t>(count) + i;
         };

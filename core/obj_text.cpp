@@ -64,6 +64,11 @@ std::string_view trimmed(std::string_view text) {
     return text.substr(first, text.find_last_not_of(kBlankOrEnd) + 1 - first);
 }
 
+std::string inQuotes(std::string_view name) {
+    constexpr std::size_t kLongest = 120;
+    return name.size() <= kLongest ? fmt::format("'{}'", name) : fmt::format("'{}…'", name.substr(0, kLongest));
+}
+
 std::optional<double> numberOf(std::string_view field) {
     const std::string_view digits = field.substr(field.starts_with('+') ? 1 : 0);
     double number = 0.0;

@@ -19,6 +19,9 @@ std::string_view nextField(std::string_view& line);
 /// The text without the blanks at both ends.
 std::string_view trimmed(std::string_view text);
 
+/// A name in quotes, for messages; of a very long one the beginning.
+std::string inQuotes(std::string_view name);
+
 /// A field as a number, correctly rounded; what is too large for a double is infinite. Nothing for "1,5",
 /// "-1.#IND00" and the like; "nan" and "inf" are read.
 std::optional<double> numberOf(std::string_view field);

@@ -3,6 +3,7 @@
 #include "scene_objects.h"
 
 #include "log.h"
+#include "obj_text.h"
 
 #include <fmt/format.h>
 
@@ -156,7 +157,7 @@ void ObjectReader::checkMaterials(const SectionReader& object, const LoadedMesh&
     const std::string reason =
         loaded.missing_files.empty()
             ? ""
-            : fmt::format(" (the OBJ names '{}', which is not there)", loaded.missing_files.front());
+            : fmt::format(" (the OBJ names {}, which is not there)", inQuotes(loaded.missing_files.front()));
     object.error(
         object.has("material") ? "material" : "obj",
         fmt::format("{} of {} triangles of {} have no material{}; give them one with 'material: NAME'", bare,

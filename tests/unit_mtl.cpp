@@ -111,7 +111,7 @@ TEST_CASE("names of material files are forgiven backslashes, case, folders and q
                           {"\"Blue Paint.MTL\"", 0},
                           {"blue paint.mtl", 1},
                           {"C:\\art\\blue paint.mtl", 1},
-                          {"/home/me/Blue Paint.MTL", 1}}) {
+                          {"/home/me/Blue Paint.MTL", 1}, {"Blue\\ Paint.MTL", 1}}) {
         CAPTURE(c.name);
         const CapturedLog log;
         CHECK(isDefined(loadObj(

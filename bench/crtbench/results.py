@@ -20,6 +20,7 @@ class Results:
         self.lines = [f"# {title}", ""]
         self.data = {}
         self.commands = []
+        self.shown = {}   # Arguments of the command line that the page shows in other words.
         self.load = os.getloadavg()[0]
         self.started = datetime.datetime.now(datetime.timezone.utc)
 
@@ -45,7 +46,7 @@ class Results:
     def write(self):
         facts = provenance(self.program)
         facts["command"] = self.tool + " " + shlex.join(
-            self.program.plain(a) if not a.startswith(str(self.arguments.results)) else "RESULTS" for a in sys.argv[1:])
+            self.shown.get(a) or self.program.plain(a) if not a.startswith(str(self.arguments.results)) else "RESULTS" for a in sys.argv[1:])
         facts["date"] = self.started.strftime("%Y-%m-%d %H:%M UTC")
         facts["load_at_start"] = self.load
         facts["timed_runs"] = self.program.timed
@@ -61,7 +62,7 @@ class Results:
         rows += [("Processor", f"{processor()}, {facts['memory_gb']} GB"),
                  ("GPU", facts["gpu"] or "none"),
                  ("System", facts["os"])]
-        rows += [(f"Backend `{name}`", text) for name, text in facts["backends"].items()]
+        rows += [(f"Backend `{name}`", self.program.plain(text)) for name, text in facts["backends"].items()]
         if facts["timed_runs"]:
             rows.append(("Disturbance", f"load {self.load:.1f} at the start; {facts['timed_runs']} timed runs, {facts['repeated_because_disturbed']} of "
                          f"them repeated because other processes took over {self.program.busy_share:.0%} of the processor"))
