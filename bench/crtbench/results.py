@@ -62,7 +62,7 @@ class Results:
         rows += [("Processor", f"{processor()}, {facts['memory_gb']} GB"),
                  ("GPU", facts["gpu"] or "none"),
                  ("System", facts["os"])]
-        rows += [(f"Backend `{name}`", self.program.plain(text)) for name, text in facts["backends"].items()]
+        rows += [(f"Backend `{name}`", text) for name, text in facts["backends"].items()]
         if facts["timed_runs"]:
             rows.append(("Disturbance", f"load {self.load:.1f} at the start; {facts['timed_runs']} timed runs, {facts['repeated_because_disturbed']} of "
                          f"them repeated because other processes took over {self.program.busy_share:.0%} of the processor"))
@@ -91,7 +91,7 @@ def provenance(program):
     for name in shown:
         if name in statuses:
             status = statuses[name]
-            backends[name] = f"{status['version']}; " + ("; ".join(status["devices"]) or status.get("reason", "no device"))
+            backends[name] = program.plain(f"{status['version']}; " + ("; ".join(status["devices"]) or status.get("reason", "no device")))
     gpus = [d for name in ("cuda", "opencl") for d in statuses.get(name, {"devices": []})["devices"] if re.search(r"NVIDIA|AMD Radeon|GPU", d)]
     memory_kb = int(re.search(r"MemTotal:\s+(\d+)", pathlib.Path("/proc/meminfo").read_text())[1])
     # Results are what the measurements write; they do not change what is measured.
