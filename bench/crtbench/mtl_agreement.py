@@ -118,5 +118,6 @@ def measure(program, arguments):
     reference = mitsuba.luminance("scalar_spectral", "cornell_original")
     results.data = {"relative_difference": rows, "patches": {name: {"x_y_width_height": where, "mitsuba_luminance": mean(reference, *where)}
                                                              for name, where in {"whole image": (0, 0, SIZE, SIZE), **PATCHES}.items()}}
+    results.shown = {arguments.python: "PYTHON"}
     results.command(f"crt render {FOLDER}/cornell_original.yaml --backend {backend} --spp {samples} -o IMAGE.pfm")
     results.write()
