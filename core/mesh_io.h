@@ -1,24 +1,41 @@
-/// Mesh files → Mesh. OBJ and MTL by tinyobjloader; every index is checked here because tinyobjloader does not.
+/// OBJ files, with the materials of their MTL → Mesh.
 #pragma once
 
+#include "mtl_material.h"
 #include "scene.h"
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace crt {
 
-/// What an OBJ file brought: the mesh, and the materials of its MTL mapped to ours.
-struct LoadedMesh {
-    Mesh mesh;                          ///< mesh.material indexes `materials` below, or is empty; mesh.emission indexes `emissions`.
-    std::vector<Material> materials;    ///< Only those that faces use.
-    std::vector<Emission> emissions;    ///< From Ke.
-    std::vector<std::string> files;     ///< The OBJ and its MTLs.
-    std::uint64_t degenerate_faces = 0; ///< Zero-area triangles, left out with a warning.
+struct ObjOptions {
+    bool use_mtl = true;                ///< Reads mtllib and usemtl.
+    MtlColor color = MtlColor::Linear;  ///< What Kd, Ks and Ke are.
 };
 
-/// Reads an OBJ. `use_mtl` false ignores usemtl/mtllib. Throws crt::Error(Scene) with file:line for a missing file, NaN or infinite
-/// coordinates, indices out of range, a file without faces; warns about zero-area faces (dropped) and faces of a missing material.
-LoadedMesh loadObj(const std::string& path, bool use_mtl);
+/// A name that usemtl gives to faces.
+struct LoadedMaterial {
+    std::string name;
+    std::optional<MtlMaterial> mtl;  ///< Nothing where no material file defines the name.
+};
+
+/// What an OBJ file brought.
+struct LoadedMesh {
+    Mesh mesh;  ///< mesh.material indexes `materials` below, −1 none, or is empty; mesh.emission is empty.
+    std::vector<LoadedMaterial> materials;   ///< Only those that faces use, in the order in which they do.
+    std::vector<std::string> missing_files;  ///< MTLs that the OBJ names and that are not there.
+    std::vector<std::string> files;          ///< The OBJ, its MTLs and their spectra.
+    std::uint64_t degenerate_faces = 0;      ///< Zero-area triangles, left out with a warning.
+};
+
+/// Reads an OBJ. Throws crt::Error(Scene) with file:line for a file that is missing, has another format, has
+/// no face that can be seen, or whose faces name vertices that are not there. What costs less than the file
+/// is a warning: faces of vertices that are no numbers (left out), of no area (left out), of normals that
+/// are not there or have no direction (shaded flat); names that no MTL defines; what crt has no place for.
+/// One line says what became of the materials.
+LoadedMesh loadObj(const std::string& path, const ObjOptions& options = {});
 
 }  // namespace crt

@@ -1,150 +1,278 @@
 #include "mtl_material.h"
 
 #include "error.h"
-#include "log.h"
+#include "obj_text.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <iterator>
+#include <set>
+#include <utility>
 #include <vector>
 
 namespace crt {
 namespace {
 
-using MtlColour = const tinyobj::real_t (&)[3];
+constexpr double kMaxIndex = 1e3;    // As `ior` of a scene file.
+constexpr double kUnstatedKd = 0.6;  // As tinyobjloader and assimp assume.
+constexpr double kVisibleRoughness = 0.05;
 
-/// MTL colours are numbers between 0 and 1 that come out of colour pickers: sRGB-encoded by habit, and read as such.
-Vec3d linearColour(MtlColour encoded) {
+double brightest(const Vec3d& c) { return std::max({c[0], c[1], c[2]}); }
+bool isGrey(const Vec3d& c, double level) { return c == Vec3d{level, level, level}; }
+
+/// Beyond 1, where an exporter multiplied a colour by a strength, the colour is decoded and the strength
+/// stays linear.
+Vec3d srgbDecoded(const Vec3d& encoded) {
+    const double strength = std::max(1.0, brightest(encoded));
     Vec3d rgb;
-    for (int i = 0; i < 3; ++i) rgb[i] = srgbToLinear(std::clamp(encoded[i], 0.0, 1.0));
+    for (std::size_t i = 0; i < 3; ++i) rgb[i] = strength * srgbToLinear(encoded[i] / strength);
     return rgb;
 }
 
-/// Ke goes beyond 1 where an exporter multiplied it by a strength: the colour is decoded, the strength stays linear.
-Vec3d linearEmission(MtlColour encoded) {
-    const double strength = std::max({1.0, encoded[0], encoded[1], encoded[2]});
-    Vec3d rgb;
-    for (int i = 0; i < 3; ++i) rgb[i] = strength * srgbToLinear(std::max(0.0, encoded[i]) / strength);
-    return rgb;
-}
-
-double brightest(MtlColour c) { return std::max({c[0], c[1], c[2]}); }
-
-bool inRange(MtlColour c) {
-    return std::all_of(std::begin(c), std::end(c), [](double x) { return x >= 0.0 && x <= 1.0; });
-}
-
-/// Maps one material, and gathers what is lost on the way.
+/// Maps one material.
 class MaterialMapper {
 public:
-    MaterialMapper(const tinyobj::material_t& mtl, const MtlSource& source) : mtl_(mtl), source_(source) {}
+    MaterialMapper(const MtlText& mtl, MtlColor color, MtlSummary& summary)
+        : mtl_(mtl), color_(color), summary_(summary) {
+        kd_ = colour("Kd");
+        ks_ = colour("Ks");
+        ke_ = colour("Ke");
+        tf_ = colour("Tf");
+        ni_ = number("Ni");
+        pm_ = number("Pm");
+        opacity_ = number("d");
+        if (const std::optional<double> transparency = number("Tr"); transparency && !opacity_)
+            opacity_ = 1.0 - *transparency;
+        illum_ = number("illum");
+    }
 
     MtlMaterial map() {
         MtlMaterial mapped;
-        mapped.material = material();
-        if (brightest(mtl_.emission) > 0.0) mapped.emission = Emission{rgbEmission(linearEmission(mtl_.emission)), false};
-        mapped.spectrum_file = spectrum_file_;
-        return mapped;
-    }
-
-private:
-    Material material() {
-        for (const double x : {mtl_.diffuse[0], mtl_.diffuse[1], mtl_.diffuse[2], mtl_.specular[0], mtl_.specular[1],
-                               mtl_.specular[2], mtl_.emission[0], mtl_.emission[1], mtl_.emission[2], mtl_.dissolve, mtl_.ior,
-                               mtl_.shininess, mtl_.roughness, mtl_.metallic})
-            if (!std::isfinite(x)) refuse("a number that is not finite");
-
-        Material m;
+        Material& m = mapped.material;
         m.name = mtl_.name;
-        m.place = {source_.file, source_.line};
-        const bool glass = mtl_.dissolve < 1.0 || mtl_.illum == 4 || mtl_.illum == 6 || mtl_.illum == 7 || mtl_.illum == 9;
-        const bool metallic = mtl_.metallic >= 0.5;
-        const bool polished = (mtl_.illum == 3 || mtl_.illum == 5) && brightest(mtl_.diffuse) <= 0.1 &&
-                              brightest(mtl_.specular) > 0.0;
-        if (glass)
-            dielectric(m);
+        m.place = {mtl_.file, mtl_.line};
+        const bool metallic = pm_.value_or(0.0) >= 0.5;
+        const bool polished = illumIs({3, 5}) && brightest(kd_.value_or(Vec3d{})) <= 0.1 &&
+                              brightest(ks_.value_or(Vec3d{})) > 0.0;
+        if (lightPasses() && refracts())
+            glass(m);
         else if (metallic || polished)
             mirror(m, metallic);
         else
             diffuse(m);
-        if (!mtl_.diffuse_texname.empty() || !mtl_.specular_texname.empty() || !mtl_.emissive_texname.empty() ||
-            !mtl_.alpha_texname.empty() || !mtl_.bump_texname.empty() || !mtl_.normal_texname.empty() ||
-            !mtl_.roughness_texname.empty() || !mtl_.metallic_texname.empty())
-            lost_.push_back("its textures are left out");
-        if (!lost_.empty())
-            logWarning("{}:{}: material '{}' is approximated: {}", source_.file, source_.line, mtl_.name, fmt::join(lost_, "; "));
-        return m;
+        if (emits()) {
+            mapped.emission = Emission{rgbEmission(linear(*ke_)), false};
+            summary_.became("emitting");
+        }
+        mapped.spectrum_file = spectrum_file_;
+        dropRest();
+        return mapped;
     }
 
-    bool has(const char* statement) const { return source_.statements.contains(statement); }
+private:
+    // ---- Statements ----
 
-    [[noreturn]] void refuse(const std::string& what) const {
-        throw Error(ErrorKind::Scene, fmt::format("material '{}' has {}", mtl_.name, what), {source_.file, source_.line});
+    /// Nothing where the keyword is absent or no number follows it; the latter is noted.
+    std::optional<double> number(const char* keyword) const {
+        const MtlStatement* s = mtl_.find(keyword);
+        if (s == nullptr) return std::nullopt;
+        std::string_view rest = s->arguments;
+        std::string_view field = nextField(rest);
+        if (field == "-halo") field = nextField(rest);  // d -halo factor: opacity that depends on the angle.
+        const std::optional<double> value = numberOf(field);
+        if (value && std::isfinite(*value)) return value;
+        summary_.unreadable(mtl_, keyword);
+        return std::nullopt;
     }
 
-    void dielectric(Material& m) {
+    /// Three numbers that are not negative, or one for all three.
+    std::optional<Vec3d> colour(const char* keyword) const {
+        const MtlStatement* s = mtl_.find(keyword);
+        if (s == nullptr) return std::nullopt;
+        std::string_view rest = s->arguments;
+        std::vector<double> values;
+        for (std::string_view field = nextField(rest); !field.empty() && values.size() < 3;
+             field = nextField(rest)) {
+            const std::optional<double> value = numberOf(field);
+            if (!value || !std::isfinite(*value)) {
+                const bool form = values.empty() && (field == "spectral" || field == "xyz");
+                summary_.unreadable(mtl_, form ? fmt::format("{} {}", keyword, field) : keyword);
+                return std::nullopt;
+            }
+            values.push_back(std::max(*value, 0.0));
+        }
+        if (values.size() == 1) values.resize(3, values[0]);
+        if (values.size() == 3) return Vec3d{values[0], values[1], values[2]};
+        summary_.unreadable(mtl_, keyword);
+        return std::nullopt;
+    }
+
+    bool illumIs(const std::set<double>& models) const { return illum_ && models.contains(*illum_); }
+    bool has(const char* keyword) const { return mtl_.find(keyword) != nullptr; }
+
+    /// 3ds Max and Maya state a white Tf for everything, others a black one.
+    bool filters() const { return tf_ && !isGrey(*tf_, 0.0) && !isGrey(*tf_, 1.0); }
+    bool lightPasses() const { return opacity_.value_or(1.0) < 1.0 || filters() || illumIs({4, 6, 7, 9}); }
+    bool refracts() const { return ni_.value_or(1.0) > 1.0 && *ni_ <= kMaxIndex; }
+    bool emits() const { return ke_ && brightest(*ke_) > 0.0; }
+
+    // ---- Kinds ----
+
+    void glass(Material& m) {
+        summary_.became("glass");
         m.type = MaterialType::Dielectric;
-        const double index = has("Ni") ? mtl_.ior : 1.5;
-        if (!(index > 0.0)) refuse(fmt::format("a refractive index Ni of {}", index));
-        m.eta = constantSpectrum(index);
-        if (mtl_.dissolve > 0.0 && mtl_.dissolve < 1.0) lost_.push_back(fmt::format("d = {:g} becomes clear glass", mtl_.dissolve));
-        if (has("Tf") && !(mtl_.transmittance[0] == 1.0 && mtl_.transmittance[1] == 1.0 && mtl_.transmittance[2] == 1.0))
-            lost_.push_back("the filter colour Tf is left out");
-        if (has("crt_reflectance")) lost_.push_back("glass has no crt_reflectance");
+        m.eta = constantSpectrum(*ni_);
+        if (opacity_ && *opacity_ > 0.0 && *opacity_ < 1.0)
+            summary_.decided("d between 0 and 1 with Ni above 1 read as clear glass");
+        if (filters()) summary_.dropped("Tf");
+        if (has("crt_reflectance")) summary_.dropped("crt_reflectance");
         smooth();
     }
 
     void mirror(Material& m, bool metallic) {
+        summary_.became("mirror");
         m.type = MaterialType::Mirror;
-        m.reflectance = reflectance(metallic ? mtl_.diffuse : mtl_.specular, metallic ? "Kd" : "Ks");
-        if (metallic && mtl_.metallic < 1.0) lost_.push_back(fmt::format("metalness {:g} is taken as 1", mtl_.metallic));
+        m.reflectance = metallic ? reflectance(kdOrGrey(), "Kd") : reflectance(*ks_, "Ks");
+        if (metallic && *pm_ < 1.0) summary_.decided("Pm from 0.5 to 1 read as 1");
+        opaque();
         smooth();
     }
 
     void diffuse(Material& m) {
+        summary_.became("diffuse");
         m.type = MaterialType::Diffuse;
-        m.reflectance = reflectance(mtl_.diffuse, "Kd");
-        if (mtl_.metallic > 0.0) lost_.push_back(fmt::format("metalness {:g} is taken as 0", mtl_.metallic));
+        m.reflectance = reflectance(kdOrGrey(), "Kd");
+        if (pm_.value_or(0.0) > 0.0) summary_.decided("Pm below 0.5 read as 0");
+        opaque();
         // illum 0 and 1 say that there is no highlight, whatever Ks holds.
-        if (mtl_.illum >= 2 && brightest(mtl_.specular) > 0.0)
-            lost_.push_back(fmt::format("its gloss (Ks{}) is left out",
-                                        roughness() ? fmt::format(", roughness {:.2g}", *roughness()) : ""));
+        if (illumIs({0, 1}) || brightest(ks_.value_or(Vec3d{})) == 0.0) return;
+        summary_.dropped("Ks");
+        for (const char* roughness : {"Ns", "Pr"})
+            if (has(roughness)) summary_.dropped(roughness);
+    }
+
+    /// What says that light passes, where it does not.
+    void opaque() const {
+        if (opacity_.value_or(1.0) < 1.0)
+            summary_.decided(fmt::format("{} without Ni above 1 read as opaque (crt has no opacity)",
+                                         has("d") ? "d below 1" : "Tr above 0"));
+        else if (illumIs({4, 6, 7, 9}))
+            summary_.decided(fmt::format("illum {} without Ni above 1 read as opaque", *illum_));
+        if (filters()) summary_.dropped("Tf");
     }
 
     /// Pr, or what Blender's exporter makes of roughness in Ns = 1000 (1 − roughness)².
-    std::optional<double> roughness() const {
-        if (has("Pr")) return mtl_.roughness;
-        if (has("Ns")) return 1.0 - std::sqrt(std::clamp(mtl_.shininess / 1000.0, 0.0, 1.0));
-        return std::nullopt;
-    }
-
     void smooth() {
-        constexpr double kVisible = 0.05;
-        if (roughness().value_or(0.0) > kVisible) lost_.push_back(fmt::format("roughness {:.2g} is taken as 0", *roughness()));
+        const std::optional<double> pr = number("Pr"), ns = number("Ns");
+        if (pr && *pr > kVisibleRoughness)
+            summary_.dropped("Pr");
+        else if (!pr && ns && 1.0 - std::sqrt(std::clamp(*ns / 1000.0, 0.0, 1.0)) > kVisibleRoughness)
+            summary_.dropped("Ns");
     }
 
-    Spectrum reflectance(MtlColour colour, const char* name) {
-        if (has("crt_reflectance")) {
-            spectrum_file_ = (std::filesystem::path(source_.file).parent_path() / source_.measured_reflectance).string();
-            const Spectrum s = readSpectrumFile(spectrum_file_, Outside::Clamp);
-            if (s.min() < 0.0 || s.max() > 1.0) throw Error(ErrorKind::Scene, "a reflectance must lie in [0, 1]", {spectrum_file_});
-            return s;
+    // ---- Colours ----
+
+    Vec3d linear(const Vec3d& stated) const {
+        return color_ == MtlColor::Srgb ? srgbDecoded(stated) : stated;
+    }
+
+    Vec3d kdOrGrey() const {
+        if (kd_) return *kd_;
+        if (emits() || has("crt_reflectance")) return {};
+        summary_.decided(fmt::format("no Kd read as grey {}", kUnstatedKd));
+        return {kUnstatedKd, kUnstatedKd, kUnstatedKd};
+    }
+
+    Spectrum reflectance(const Vec3d& stated, const char* keyword) {
+        if (const MtlStatement* s = mtl_.find("crt_reflectance")) {
+            spectrum_file_ = (std::filesystem::path(mtl_.file).parent_path() / s->arguments).string();
+            const Spectrum measured = readSpectrumFile(spectrum_file_, Outside::Clamp);
+            if (measured.min() < 0.0 || measured.max() > 1.0)
+                throw Error(ErrorKind::Scene, "a reflectance must lie in [0, 1]", {spectrum_file_});
+            return measured;
         }
-        if (!inRange(colour)) lost_.push_back(fmt::format("{} is clamped to [0, 1]", name));
-        return rgbReflectance(linearColour(colour));
+        if (brightest(stated) > 1.0) summary_.decided(fmt::format("{} above 1 clamped", keyword));
+        return rgbReflectance(
+            linear({std::min(stated[0], 1.0), std::min(stated[1], 1.0), std::min(stated[2], 1.0)}));
     }
 
-    const tinyobj::material_t& mtl_;
-    const MtlSource& source_;
+    // ---- The rest ----
+
+    /// Keywords that no rule above reads: textures, and numbers that are not 0.
+    void dropRest() const {
+        static const std::set<std::string, std::less<>> read_above{
+            "Kd", "Ke", "Ks", "Ni", "d", "Tr", "Tf", "illum", "Pm", "crt_reflectance", "Ns", "Pr"};
+        static const std::set<std::string, std::less<>> ignored{"Ka", "map_Ka", "sharpness", "map_aat"};
+        for (const auto& [keyword, statement] : mtl_.statements) {
+            if (read_above.contains(keyword) || ignored.contains(keyword) || statement.arguments.empty())
+                continue;
+            std::string_view rest = statement.arguments;
+            if (findMtlKey(keyword) == nullptr)
+                summary_.unknown(keyword);
+            else if (numberOf(nextField(rest)) != 0.0)
+                summary_.dropped(keyword);
+        }
+    }
+
+    const MtlText& mtl_;
+    MtlColor color_;
+    MtlSummary& summary_;
+    std::optional<Vec3d> kd_, ks_, ke_, tf_;
+    std::optional<double> ni_, pm_, opacity_, illum_;
     std::string spectrum_file_;
-    std::vector<std::string> lost_;
 };
 
 }  // namespace
 
-MtlMaterial mapMtlMaterial(const tinyobj::material_t& mtl, const MtlSource& source) { return MaterialMapper(mtl, source).map(); }
+void MtlSummary::unreadable(const MtlText& material, const std::string& what) {
+    const MtlStatement* statement = material.find(what.substr(0, what.find(' ')));
+    if (++unreadable_[what] == 1)
+        unreadable_at_[what] =
+            fmt::format("{}:{}", std::filesystem::path(material.file).filename().string(), statement->line);
+}
+
+/// The most frequent first: "Ks (20), map_Kd (18)".
+std::string MtlSummary::list(const Counts& counts) {
+    constexpr std::size_t kMostNamed = 12;  // Hostile files have any number of keywords.
+    std::vector<std::pair<std::string, int>> sorted(counts.begin(), counts.end());
+    std::stable_sort(sorted.begin(), sorted.end(),
+                     [](const auto& a, const auto& b) { return a.second > b.second; });
+    std::vector<std::string> words;
+    for (const auto& [what, n] : sorted) {
+        if (words.size() == kMostNamed) break;
+        words.push_back(fmt::format("{} ({})", what, n));
+    }
+    const std::size_t more = sorted.size() - words.size();
+    return fmt::format("{}{}", fmt::join(words, ", "), more > 0 ? fmt::format(" and {} more", more) : "");
+}
+
+std::string MtlSummary::text() const {
+    int materials = 0;
+    std::vector<std::string> kinds;
+    for (const char* kind : {"diffuse", "mirror", "glass"}) {
+        const auto found = kinds_.find(kind);
+        if (found == kinds_.end()) continue;
+        materials += found->second;
+        kinds.push_back(fmt::format("{} {}", found->second, kind));
+    }
+    std::string text =
+        fmt::format("{} material{}: {}", materials, materials == 1 ? "" : "s", fmt::join(kinds, ", "));
+    if (const auto emitting = kinds_.find("emitting"); emitting != kinds_.end())
+        text += fmt::format(", {} of them emitting", emitting->second);
+    if (!decisions_.empty()) text += "; " + list(decisions_);
+    if (!dropped_.empty()) text += "; dropped: " + list(dropped_);
+    if (!unknown_.empty()) text += "; unknown: " + list(unknown_);
+    if (!unreadable_.empty()) text += "; not understood:";
+    for (const auto& [what, n] : unreadable_)
+        text += fmt::format(" {} ({}, first at {})", what, n, unreadable_at_.at(what));
+    return text;
+}
+
+MtlMaterial mapMtlMaterial(const MtlText& mtl, MtlColor color, MtlSummary& summary) {
+    return MaterialMapper(mtl, color, summary).map();
+}
 
 }  // namespace crt

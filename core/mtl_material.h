@@ -1,24 +1,18 @@
-/// MTL materials, as tinyobjloader reads them → ours.
+/// Materials of an MTL file → ours, and what was lost on the way.
 #pragma once
 
+#include "mtl_file.h"
 #include "scene.h"
 
-#define TINYOBJLOADER_USE_DOUBLE
-#include <tiny_obj_loader.h>
-
+#include <map>
 #include <optional>
-#include <set>
 #include <string>
 
 namespace crt {
 
-/// Where a material stands and which statements it has; tinyobjloader keeps only values, and a default looks like any other.
-struct MtlSource {
-    std::string file;
-    int line = 0;
-    std::set<std::string, std::less<>> statements;
-    std::string measured_reflectance;  ///< Argument of crt_reflectance: a file of a spectrum, relative to `file`.
-};
+/// What the numbers of Kd, Ks and Ke are: linear, as Mitsuba, pbrt and Blender take them, or sRGB-encoded as
+/// colour pickers show them.
+enum class MtlColor { Linear, Srgb };
 
 struct MtlMaterial {
     Material material;
@@ -26,16 +20,45 @@ struct MtlMaterial {
     std::string spectrum_file;         ///< Read for crt_reflectance; empty without it.
 };
 
-/// An MTL material as one of ours, by these rules, the first that fits:
+/// The materials of one file together: what they became and what was left out, each with the number of
+/// materials.
+class MtlSummary {
+public:
+    void became(const std::string& kind) { ++kinds_[kind]; }
+    /// A statement that was not taken at its word: "d without Ni above 1 read as opaque".
+    void decided(const std::string& what) { ++decisions_[what]; }
+    /// A keyword without effect that would be seen.
+    void dropped(const std::string& keyword) { ++dropped_[keyword]; }
+    /// A keyword that crt does not know.
+    void unknown(const std::string& keyword) { ++unknown_[keyword]; }
+    /// A statement without the numbers that it needs; `what` begins with its keyword.
+    void unreadable(const MtlText& material, const std::string& what);
+
+    bool empty() const { return kinds_.empty(); }
+    /// Whether anything is other than the file says.
+    bool lossy() const {
+        return !(decisions_.empty() && dropped_.empty() && unknown_.empty() && unreadable_.empty());
+    }
+    /// "25 materials: 22 diffuse, 3 glass; dropped: Ks (20), map_Kd (18)"
+    std::string text() const;
+
+private:
+    using Counts = std::map<std::string, int>;
+    static std::string list(const Counts& counts);
+
+    Counts kinds_, decisions_, dropped_, unknown_, unreadable_;
+    std::map<std::string, std::string> unreadable_at_;  ///< By the keys of `unreadable_`: the first.
+};
+
+/// A material of an MTL file as one of ours, by these rules, the first that fits (in full: mtlKeys()):
 ///
-///  1. d < 1 (Tr > 0) or illum 4, 6, 7, 9: Dielectric, smooth and clear, index Ni or 1.5. Ni alone says nothing: Blender
-///     writes it for everything.
+///  1. Ni above 1, and light passes (d < 1, or Tr > 0 without d; a Tf that is neither black nor white;
+///     illum 4, 6, 7 or 9): Dielectric, smooth and clear.
 ///  2. Pm ≥ 0.5: Mirror with reflectance Kd. illum 3 or 5 with Kd ≤ 0.1 and a Ks: Mirror with reflectance Ks.
-///  3. Diffuse with reflectance Kd (black when there is none).
+///  3. Diffuse with reflectance Kd.
 ///
-/// `crt_reflectance file.spd` replaces Kd or Ks of 2 and 3 by a measured spectrum. Ke, if not black, becomes the radiance of
-/// a one-sided emitter. Ka is ignored. Whatever is lost on the way (roughness, gloss, partial transparency, textures) is
-/// named in one warning. Throws crt::Error(Scene) for numbers that are none or make no sense, and for a spectrum that cannot be read.
-MtlMaterial mapMtlMaterial(const tinyobj::material_t& mtl, const MtlSource& source);
+/// A statement that cannot be read is as if it were left out. Adds what was decided and lost to `summary`.
+/// Throws crt::Error(Scene) for a spectrum (crt_reflectance) that cannot be read or leaves [0, 1].
+MtlMaterial mapMtlMaterial(const MtlText& mtl, MtlColor color, MtlSummary& summary);
 
 }  // namespace crt

@@ -1,4 +1,5 @@
 /// The schema told to people (docs/scene.md) and to editors (JSON Schema). Nothing here knows a key: it all comes from the table.
+#include "mtl_file.h"
 #include "scene_schema.h"
 #include "scene_yaml.h"
 
@@ -262,6 +263,31 @@ std::string keyTable(const SectionSchema& section) {
     return text;
 }
 
+/// What becomes of each keyword of an MTL, from the table that its reader uses.
+std::string mtlTable() {
+    std::string text =
+        "\nMaterials of an OBJ come from the files that its `mtllib` names: all of them are read, and the "
+        "first definition of a name counts. `\\` in a name is read as `/`; letters of another case, folders "
+        "that are not there, and an MTL that was renamed together with its OBJ are forgiven, each with a "
+        "warning. A file that is missing costs its materials, not the mesh: `material` fills the faces. "
+        "A material is, by the first rule that fits,\n\n"
+        "1. glass (dielectric, smooth and clear), if `Ni` is above 1 and the material says that light "
+        "passes: `d` below 1, `Tr` above 0 without `d`, a `Tf` that is "
+        "neither black nor white, or `illum` 4, 6, 7 or 9;\n"
+        "2. a mirror, if `Pm` is 0.5 or more, or `illum` is 3 or 5 with Kd ≤ 0.1 and a Ks;\n"
+        "3. diffuse.\n\n"
+        "crt says in one line a file what its materials became and what was left out. A statement whose "
+        "numbers cannot be read counts as left out. Keywords that "
+        "are not in this table are named in that line.\n\n"
+        "| MTL | Arguments | What crt makes of it |\n|---|---|---|\n";
+    for (const MtlKey& key : mtlKeys()) {
+        std::string words = fmt::format("`{}`", key.keyword);
+        for (const std::string& alias : key.aliases) words += fmt::format(", `{}`", alias);
+        text += fmt::format("| {} | {} | {} |\n", words, key.arguments, key.doc);
+    }
+    return text;
+}
+
 std::string ruleText(const KeyRule& rule) {
     switch (rule.kind) {
         case KeyRule::Kind::ExactlyOne: return fmt::format("Exactly one of `{}` is required.", fmt::join(rule.keys, "`, `"));
@@ -300,6 +326,7 @@ std::string sceneReferenceMarkdown() {
         if (!section.doc.empty()) text += section.doc + "\n\n";
         text += keyTable(section);
         for (const KeyRule& rule : section.rules) text += fmt::format("\n{}\n", ruleText(rule));
+        if (section.name == "mtl") text += mtlTable();
     }
     return text;
 }

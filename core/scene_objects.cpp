@@ -1,14 +1,12 @@
 #include "scene_objects.h"
 
 #include "log.h"
-#include "mesh_io.h"
 #include "vec3d.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numbers>
 
 namespace crt {
@@ -303,76 +301,6 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
     return static_cast<std::uint32_t>(scene_.meshes.size() - 1);
 }
 
-ObjectReader::Overrides ObjectReader::readOverrides(const SectionReader& object) {
-    Overrides overrides;
-    const YamlNode* map = object.map("material_overrides");
-    if (map == nullptr) return overrides;
-    for (const YamlEntry& entry : map->entries) {
-        std::string name;
-        if (!readText(out_, *entry.value, entry.place, fmt::format("the material in place of '{}'", entry.key), name)) continue;
-        if (const std::optional<std::int32_t> index = findMaterial(name, entry.place, false)) overrides[entry.key] = *index;
-    }
-    return overrides;
-}
-
-std::optional<std::uint32_t> ObjectReader::readObj(const SectionReader& object, bool from_mtl, const Overrides& overrides) {
-    std::string name;
-    if (!object.read("obj", name)) return std::nullopt;
-    const std::optional<std::string> path = files_.locate(name, object.place("obj"), out_);
-    if (!path) return std::nullopt;
-
-    const auto [file, fresh] = loaded_.try_emplace({*path, from_mtl});
-    if (fresh) {
-        try {
-            file->second = std::make_unique<LoadedMesh>(loadObj(*path, from_mtl));
-            for (const std::string& read : file->second->files) files_.note(read);
-        } catch (const Error& e) {
-            if (e.kind() == ErrorKind::Internal) throw;
-            object.error("obj", sentenceWithPlace(e));
-        }
-    }
-    if (!file->second) return std::nullopt;
-    const LoadedMesh& loaded = *file->second;
-
-    for (const auto& [mtl_name, index] : overrides) {
-        std::vector<std::string> names;
-        for (const Material& m : loaded.materials) names.push_back(m.name);
-        if (std::find(names.begin(), names.end(), mtl_name) != names.end()) continue;
-        const YamlEntry* entry = object.map("material_overrides")->find(mtl_name);
-        out_.error(entry->key_place, fmt::format("no face of '{}' has a material '{}'", name, mtl_name), didYouMean(mtl_name, names));
-    }
-
-    // One mesh for all objects that ask for the same thing; an OBJ without materials is the same either way.
-    const bool own_materials = !loaded.materials.empty() || !loaded.emissions.empty();
-    const auto [known, first] = meshes_.try_emplace({*path, own_materials, overrides});
-    if (!first) return known->second;
-
-    Mesh mesh = loaded.mesh;
-    std::vector<std::int32_t> material_index;  // Index in `loaded` → index in the scene.
-    const std::string file_name = std::filesystem::path(*path).filename().string();
-    for (const Material& m : loaded.materials) {
-        if (const auto replaced = overrides.find(m.name); replaced != overrides.end()) {
-            material_index.push_back(replaced->second);
-            continue;
-        }
-        material_index.push_back(static_cast<std::int32_t>(scene_.materials.size()));
-        scene_.materials.push_back(m);
-        scene_.materials.back().name = fmt::format("{}:{}", file_name, m.name);
-    }
-    const auto emission_base = static_cast<std::int32_t>(scene_.emissions.size());
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-        const std::int32_t mtl = mesh.material.empty() ? -1 : mesh.material[t];
-        // A material that is replaced is replaced as a whole, so its glow (Ke) goes with it.
-        const bool replaced = mtl >= 0 && overrides.contains(loaded.materials[static_cast<std::size_t>(mtl)].name);
-        if (mtl >= 0) mesh.material[t] = material_index[static_cast<std::size_t>(mtl)];
-        if (!mesh.emission.empty() && mesh.emission[t] >= 0) mesh.emission[t] = replaced ? -1 : mesh.emission[t] + emission_base;
-    }
-    scene_.emissions.insert(scene_.emissions.end(), loaded.emissions.begin(), loaded.emissions.end());
-    scene_.meshes.push_back(std::move(mesh));
-    known->second = static_cast<std::uint32_t>(scene_.meshes.size() - 1);
-    return known->second;
-}
-
 // ---- Objects ---------------------------------------------------------------------------------------------------------
 
 void ObjectReader::readObjects(const YamlNode& list) {
@@ -393,21 +321,18 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     std::string material_name;
     const bool material_given = section.read("material", material_name);
     const bool named = material_given && material_name != "from_mtl";
-    if (named) object.material = findMaterial(material_name, section.place("material"), section.has("obj")).value_or(-1);
-    const Overrides overrides = readOverrides(section);
+    if (named)
+        object.material =
+            findMaterial(material_name, section.place("material"), section.has("obj")).value_or(-1);
 
     std::optional<std::uint32_t> mesh;
     if (section.has("obj") && !section.has("mesh")) {
-        if (named && section.has("material_overrides"))
-            section.error("material_overrides",
-                          "a named material covers the whole object; overrides need 'material: from_mtl'");
-        mesh = readObj(section, !named, named ? Overrides{} : overrides);
-        if (mesh && !named) checkMtl(section, *mesh);
+        mesh = readObj(section, readObjUse(section, material_name));
     } else if (const std::optional<SectionReader> written = section.section("mesh", fmt::format("the mesh of {}", section.subject()))) {
         mesh = readMesh(*written);
         if (!section.has("material")) out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
         if (material_given && !named) section.error("material", "only an OBJ has materials of its own");
-        if (section.has("material_overrides")) section.error("material_overrides", "only an OBJ has materials to override");
+        refuseObjKeys(section);
     }
 
     if (const std::optional<SectionReader> light = section.section("emission", fmt::format("the emission of {}", section.subject()))) {
@@ -419,17 +344,6 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     }
     object.mesh = mesh.value_or(0);
     scene_.objects.push_back(std::move(object));
-}
-
-/// An object that relies on its MTL must have a material on every face.
-void ObjectReader::checkMtl(const SectionReader& object, std::uint32_t mesh_index) {
-    const Mesh& mesh = scene_.meshes[mesh_index];
-    const auto bare = mesh.material.empty() ? static_cast<std::ptrdiff_t>(mesh.triangles.size())
-                                            : std::count_if(mesh.material.begin(), mesh.material.end(), [](std::int32_t m) { return m < 0; });
-    if (bare == 0) return;
-    object.error(object.has("material") ? "material" : "obj",
-                 fmt::format("{} of {} triangles of {} have no material in the OBJ; name one with 'material:'", bare,
-                             mesh.triangles.size(), object.subject()));
 }
 
 }  // namespace crt

@@ -1,6 +1,7 @@
 /// Materials and objects of a scene: meshes read and checked, names looked up, placements multiplied out.
 #pragma once
 
+#include "mesh_io.h"
 #include "scene.h"
 #include "scene_spectra.h"
 
@@ -10,11 +11,10 @@
 #include <optional>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 namespace crt {
-
-struct LoadedMesh;
 
 class ObjectReader {
 public:
@@ -28,12 +28,25 @@ public:
     void finish() const;
 
 private:
-    using Overrides = std::map<std::string, std::int32_t>;  ///< Name in the MTL → index of our material.
+    using Overrides = std::map<std::string, std::int32_t>;  ///< Name in the OBJ → index of our material.
+
+    /// What an object wants of its OBJ.
+    struct ObjUse {
+        ObjOptions options;
+        Overrides overrides;
+        std::string material;  ///< For the faces that have none; empty: there must be no such faces.
+    };
 
     void readMaterial(const YamlEntry& entry);
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
-    std::optional<std::uint32_t> readObj(const SectionReader& object, bool from_mtl, const Overrides& overrides);
-    void checkMtl(const SectionReader& object, std::uint32_t mesh_index);
+    ObjUse readObjUse(const SectionReader& object, const std::string& material);
+    void refuseObjKeys(const SectionReader& object) const;
+    const LoadedMesh* load(const SectionReader& object, const std::string& path, const ObjOptions& options);
+    std::optional<std::uint32_t> readObj(const SectionReader& object, const ObjUse& use);
+    Mesh withSceneMaterials(const LoadedMesh& loaded, const std::string& path, const Overrides& overrides);
+    void checkOverrides(const SectionReader& object, const LoadedMesh& loaded, const Overrides& overrides);
+    void checkMaterials(const SectionReader& object, const LoadedMesh& loaded, const Mesh& mesh,
+                        const ObjUse& use) const;
     std::optional<std::uint32_t> readMesh(const SectionReader& mesh);
     std::optional<std::int32_t> findMaterial(const std::string& name, const YamlPlace& place, bool from_mtl_possible);
     Overrides readOverrides(const SectionReader& object);
@@ -52,9 +65,10 @@ private:
     Scene& scene_;
     std::map<std::string, NamedMaterial> materials_;
     std::vector<std::string> material_names_;  ///< In the order of the file.
-    /// Meshes by file, with or without the materials of the MTL, and what replaces those.
-    std::map<std::tuple<std::string, bool, Overrides>, std::uint32_t> meshes_;
-    std::map<std::pair<std::string, bool>, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.
+    /// By file, whether its own materials are read, and what their colours are.
+    using FileUse = std::tuple<std::string, bool, MtlColor>;
+    std::map<FileUse, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.
+    std::map<std::pair<FileUse, Overrides>, std::uint32_t> meshes_;
 };
 
 }  // namespace crt

@@ -258,10 +258,13 @@ void addObjects(std::vector<SectionSchema>& all) {
                        {.name = "obj", .doc = "A Wavefront OBJ file, looked up beside the scene, then in CRT_MESH_PATH."},
                        {.name = "mesh", .kind = Kind::Section, .section = "mesh", .doc = "Or the geometry written out."},
                        {.name = "material",
-                        .doc = "A name in `materials`, for the whole object, or `from_mtl`: the materials of the OBJ. May be left out for an "
-                               "OBJ that has its own."},
+                        .doc = "A name in `materials`. An OBJ's faces get it where its own materials (usemtl, MTL) give them none; left "
+                               "out, or `from_mtl`, each face must have its own."},
+                       {.name = "override", .kind = Kind::Boolean, .fallback = "false",
+                        .doc = "Use `material` for all faces of the OBJ; its own materials are not read."},
                        {.name = "material_overrides", .shape = Shape::Map,
-                        .doc = "With the materials of an OBJ: name in the MTL → name in `materials`, used in its place."},
+                        .doc = "Name that the OBJ uses (usemtl) → name in `materials`, used in its place, also where no MTL defines it."},
+                       {.name = "mtl", .kind = Kind::Section, .section = "mtl", .doc = "How the MTL of the OBJ is read."},
                        {.name = "transform", .kind = Kind::Section, .shape = Shape::List, .section = "transform", .fallback = "[]",
                         .doc = "One placement: steps applied in order, the first one first."},
                        {.name = "transforms", .kind = Kind::Section, .shape = Shape::Lists, .section = "transform",
@@ -269,6 +272,10 @@ void addObjects(std::vector<SectionSchema>& all) {
                        {.name = "emission", .kind = Kind::Section, .section = "emission", .doc = "Makes the surface a light."},
                    },
                    {{KeyRule::Kind::ExactlyOne, {"obj", "mesh"}}, {KeyRule::Kind::AtMostOne, {"transform", "transforms"}}}});
+    all.push_back({"mtl", "an mtl", "",
+                   {{.name = "color", .kind = Kind::Choice, .choices = {"linear", "srgb"}, .fallback = "linear",
+                     .doc = "What Kd, Ks and Ke are: linear, as Mitsuba, pbrt and Blender read them, or sRGB-encoded. Of an encoded "
+                            "Ke above 1 the colour is decoded and the strength stays."}}});
     all.push_back({"mesh", "a mesh", "",
                    {
                        {.name = "positions", .kind = Kind::Number, .shape = Shape::Lists, .count_min = 3, .count_max = 3,

@@ -298,7 +298,7 @@ TEST_CASE("and on the meshes that crt makes", "[kernel][rays]") {
     Random random(22);
     std::uint64_t hits = 0;
     for (const char* name : {"sphere", "prism", "figure", "dragon"}) {
-        const crt::LoadedMesh file = crt::loadObj(std::string(CRT_BUILD_DIR) + "/share/crt/meshes/" + name + ".obj", false);
+        const crt::LoadedMesh file = crt::loadObj(std::string(CRT_BUILD_DIR) + "/share/crt/meshes/" + name + ".obj");
         const int rays = static_cast<int>(std::min<std::size_t>(10000, 20000000 / file.mesh.triangles.size()));
         INFO(name);
         CHECK(disagreements(ThreeWays(file.mesh), random, rays, &hits) == 0);

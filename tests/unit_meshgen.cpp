@@ -84,7 +84,7 @@ constexpr Expected kExpected[] = {
 TEST_CASE("generated meshes are what scenes expect", "[meshgen]") {
     for (const Expected& e : kExpected) {
         CAPTURE(e.file);
-        const LoadedMesh loaded = loadObj(kMeshes + e.file, true);
+        const LoadedMesh loaded = loadObj(kMeshes + e.file);
         const Mesh& m = loaded.mesh;
         CHECK(m.triangles.size() == e.triangles);
         CHECK(loaded.degenerate_faces == 0);
@@ -121,7 +121,7 @@ TEST_CASE("normals are written with unit length", "[meshgen]") {
 }
 
 TEST_CASE("the sphere is one", "[meshgen]") {
-    const Mesh m = loadObj(kMeshes + "sphere.obj", true).mesh;
+    const Mesh m = loadObj(kMeshes + "sphere.obj").mesh;
     const Vec3d centre{0, .5, 0};
     for (const Vec3d& p : m.positions) CHECK(std::sqrt(dot(minus(p, centre), minus(p, centre))) == Approx(.5).epsilon(1e-8));
     CHECK(agreement(m) == 1.0);
@@ -133,7 +133,7 @@ TEST_CASE("the sphere is one", "[meshgen]") {
 }
 
 TEST_CASE("the dragon is an uneven load", "[meshgen]") {
-    const Mesh m = loadObj(kMeshes + "dragon.obj", true).mesh;
+    const Mesh m = loadObj(kMeshes + "dragon.obj").mesh;
     std::vector<double> area;
     for (const auto& t : m.triangles) area.push_back(std::sqrt(dot(areaVector(m, t), areaVector(m, t))));
     std::sort(area.begin(), area.end());

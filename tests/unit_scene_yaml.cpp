@@ -1,5 +1,6 @@
 // Scene YAML: what good scenes become, and for every kind of mistake that the message names place, reason and remedy.
 #include "aov.h"
+#include "captured_log.h"
 #include "catch.h"
 #include "film.h"
 #include "log.h"
@@ -16,6 +17,7 @@
 #include <map>
 
 using namespace crt;
+using crt::test::CapturedLog;
 using crt::verify::TemporaryFolder;
 
 namespace {
@@ -47,6 +49,13 @@ Error refusal(const std::string& yaml, const std::vector<SceneOverride>& overrid
 /// What is said about a scene whose second line onwards is `body`.
 std::string refused(const std::string& body, const std::vector<SceneOverride>& overrides = {}, const std::string& directory = ".") {
     return refusal("crt: 1\n" + body, overrides, directory).what();
+}
+
+/// What the log says about a scene that is accepted.
+std::string saidOf(const std::string& body, const std::string& directory) {
+    const CapturedLog log;
+    parseScene("crt: 1\n" + body, "scene.yaml", directory, {});
+    return log.text();
 }
 
 /// What is said about a reflectance.
@@ -353,7 +362,14 @@ TEST_CASE("an OBJ named twice is loaded once", "[scene_yaml][mtl]") {
     CHECK(scene.meshes.size() == 1);
     CHECK(scene.objects[1].mesh == 0);
     CHECK(scene.files_read == std::vector<std::string>{folder.path() + "/plain.obj"});
-    CHECK_THAT(refused("objects: [{obj: plain.obj}]", {}, folder.path()), Contains("scene.yaml:2:17: error: 1 of 1 triangles of object 0"));
+    CHECK_THAT(
+        refused("objects: [{obj: plain.obj}]", {}, folder.path()),
+        Contains("scene.yaml:2:17: error: 1 of 1 triangles of object 0 have no material; give them one with "
+                 "'material: NAME'") &&
+            Contains(
+                "for instance 'materials: {grey: {type: diffuse, reflectance: 0.5}}' and 'material: grey'"));
+    CHECK_THAT(refused(kGrey + "objects: [{obj: plain.obj}]", {}, folder.path()),
+               Contains("for instance 'material: grey'"));
 }
 
 TEST_CASE("materials of an OBJ can be kept, replaced or ignored", "[scene_yaml][mtl]") {
@@ -369,16 +385,92 @@ TEST_CASE("materials of an OBJ can be kept, replaced or ignored", "[scene_yaml][
     const Scene replaced = parse(kGrey + "objects: [{obj: two.obj, material_overrides: {Lamp.001: grey}}]", {}, folder.path());
     CHECK(replaced.materials.size() == 2);
     CHECK(replaced.meshes.at(0).material == std::vector<std::int32_t>{1, 0});
-    CHECK(replaced.meshes[0].emission == std::vector<std::int32_t>{-1, -1});
+    CHECK(replaced.meshes[0].emission.empty());
 
-    const Scene ignored = parse(kGrey + "objects: [{obj: two.obj, material: grey}]", {}, folder.path());
+    const Scene ignored =
+        parse(kGrey + "objects: [{obj: two.obj, material: grey, override: true}]", {}, folder.path());
     CHECK(ignored.meshes.at(0).material.empty());
     CHECK(ignored.materials.size() == 1);
+    CHECK(ignored.objects.at(0).material == 0);
 
     CHECK_THAT(refused(kGrey + "objects: [{obj: two.obj, material_overrides: {Lmap.001: grey}}]", {}, folder.path()),
                Contains("scene.yaml:3:47: error: no face of 'two.obj' has a material 'Lmap.001'") && Contains("did you mean 'Lamp.001'?"));
-    CHECK_THAT(refused(kGrey + "objects: [{obj: two.obj, material: grey, material_overrides: {body: grey}}]", {}, folder.path()),
-               Contains("overrides need 'material: from_mtl'"));
+    CHECK_THAT(refused(kGrey + "objects: [{obj: two.obj, material: grey, override: true, "
+                               "material_overrides: {body: grey}}]",
+                       {}, folder.path()),
+               Contains("'override: true' replaces all materials of the OBJ; none is left for this"));
+    CHECK_THAT(refused("objects: [{obj: two.obj, override: true}]", {}, folder.path()),
+               Contains("name a material with 'material:'"));
+    CHECK_THAT(refused("objects: [{obj: two.obj, material: from_mtl, override: true}]", {}, folder.path()),
+               Contains("name a material with 'material:'"));
+    for (const char* key : {"override: true", "mtl: {color: srgb}", "material_overrides: {a: grey}"})
+        CHECK_THAT(
+            refused(fmt::format("{}objects: [{{mesh: {}, material: grey, {}}}]\n", kGrey, kTriangle, key)),
+            Contains("only an OBJ has"));
+}
+
+TEST_CASE("the material of an object fills the faces of an OBJ that have none", "[scene_yaml][mtl]") {
+    const TemporaryFolder folder;
+    folder.write("some.mtl", "newmtl body\nKd 0.5 0.5 0.5\nKe 1 1 1\n");
+    folder.write("some.obj",
+                 "mtllib some.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl body\nf 3 2 1\nusemtl "
+                 "(null)\nf 2 3 1\n");
+    const Scene filled = parse(kGrey + "objects: [{obj: some.obj, material: grey}]", {}, folder.path());
+    CHECK(filled.materials.size() == 2);
+    CHECK(filled.objects.at(0).material == 0);
+    CHECK(filled.meshes.at(0).material == std::vector<std::int32_t>{-1, 1, -1});
+    CHECK(filled.meshes[0].emission == std::vector<std::int32_t>{-1, 0, -1});
+    // Names that no MTL defines can be given a material too.
+    const Scene named = parse(
+        kGrey + "objects: [{obj: some.obj, material: grey, material_overrides: {(null): grey, body: grey}}]",
+        {}, folder.path());
+    CHECK(named.meshes.at(0).material == std::vector<std::int32_t>{-1, 0, 0});
+    CHECK(named.meshes[0].emission.empty());
+    CHECK_THAT(refused(kGrey + "objects: [{obj: some.obj}]", {}, folder.path()),
+               Contains("2 of 3 triangles of object 0 have no material"));
+    CHECK_THAT(
+        refused(kGrey + "objects: [{obj: some.obj, material_overrides: {(null): grey}}]", {}, folder.path()),
+        Contains("1 of 3 triangles of object 0 have no material"));
+    CHECK_THAT(saidOf(kGrey + "objects: [{obj: some.obj, material: grey}]", folder.path()),
+               !Contains("has no face for material"));
+
+    folder.write("all.obj", "mtllib some.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl body\nf 3 2 1\n");
+    CHECK(parse(kGrey + "objects: [{obj: all.obj, material: grey}]", {}, folder.path())
+              .meshes.at(0)
+              .material == std::vector<std::int32_t>{1});
+    CHECK_THAT(saidOf(kGrey + "objects: [{obj: all.obj, material: grey}]", folder.path()),
+               Contains("scene.yaml:3:36: object 0 has no face for material 'grey': the OBJ gives each its "
+                        "own; 'override: true' replaces them all"));
+}
+
+TEST_CASE("an OBJ whose MTL is missing needs a material, and says which file is missing",
+          "[scene_yaml][mtl]") {
+    const TemporaryFolder folder;
+    folder.write("lost.obj", "mtllib lost.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl body\nf 3 2 1\n");
+    CHECK_THAT(refused(kGrey + "objects: [{obj: lost.obj}]", {}, folder.path()),
+               Contains("1 of 1 triangles of object 0 have no material (the OBJ names 'lost.mtl', which is "
+                        "not there); give them one with 'material: NAME'"));
+    CHECK(parse(kGrey + "objects: [{obj: lost.obj, material: grey}]", {}, folder.path())
+              .meshes.at(0)
+              .material == std::vector<std::int32_t>{-1});
+    CHECK(parse(kGrey + "objects: [{obj: lost.obj, material_overrides: {body: grey}}]", {}, folder.path())
+              .meshes.at(0)
+              .material == std::vector<std::int32_t>{0});
+}
+
+TEST_CASE("an object says what the colours of its MTL are", "[scene_yaml][mtl]") {
+    const TemporaryFolder folder;
+    folder.write("a.mtl", "newmtl m\nKd 0.5 0.5 0.5\n");
+    folder.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
+    const Scene scene = parse(
+        "objects: [{obj: a.obj}, {obj: a.obj, mtl: {color: srgb}}, {obj: a.obj, mtl: {color: linear}}]", {},
+        folder.path());
+    CHECK(scene.meshes.size() == 2);
+    CHECK(scene.objects.at(2).mesh == scene.objects.at(0).mesh);
+    CHECK(scene.materials.at(0).reflectance == constantSpectrum(.5));
+    CHECK(scene.materials.at(1).reflectance == constantSpectrum(srgbToLinear(.5)));
+    CHECK_THAT(refused("objects: [{obj: a.obj, mtl: {color: gamma}}]", {}, folder.path()),
+               Contains("linear") && Contains("srgb"));
 }
 
 TEST_CASE("unused names are warnings, not errors", "[scene_yaml]") {

@@ -1,9 +1,10 @@
 """The command line: picks a measurement, brings the build up to date, writes what was seen."""
 import argparse
 import os
+import pathlib
 import sys
 
-from . import accelerators, calibration, cpu_speed, false_alarms, figure2, leave_out, pictures, power, robustness, same_bits, stability, start
+from . import accelerators, calibration, cpu_speed, false_alarms, figure2, leave_out, meshes, mtl_agreement, pictures, power, robustness, same_bits, stability, start
 from .command import add_options, exit_code, program_for
 
 COMMANDS = {
@@ -18,6 +19,8 @@ COMMANDS = {
     "calibration": (calibration, "does the error that an image states of itself hold? 100 seeds of five scenes, many numbers of samples"),
     "false-alarms": (false_alarms, "statements of crt converge where the truth is known by construction: how often are they wrong?"),
     "power": (power, "planted faults: how many seconds until a check finds each"),
+    "meshes": (meshes, "OBJ files of other people, in folders: which render, which are refused and why"),
+    "mtl-agreement": (mtl_agreement, "the same OBJ and MTL in crt and in Mitsuba 3: is the luminance the same?"),
     "pictures": (pictures, "all scenes as PNG in out/pictures, to look at; measures nothing"),
 }
 
@@ -32,6 +35,15 @@ def main():
             command.add_argument("--times", type=float, default=1, metavar="N", help="so many times the rays of each point (1); 5 makes 1e8 of offset-safety")
         if name in ("calibration", "figure2", "stability"):
             command.add_argument("--rows", help="measurements made on another machine, JSON Lines")
+        if name == "meshes":
+            command.add_argument("folders", nargs="+", type=pathlib.Path, metavar="FOLDER",
+                                 help="looked through for *.obj; named REPOSITORY@COMMIT")
+            command.add_argument("--note", help="a paragraph for the page, about what is in the folders")
+            continue
+        if name == "mtl-agreement":
+            command.add_argument("--python", help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in out/peers-venv")
+            command.add_argument("--samples", type=int, default=1024, help="per pixel, in both programs (1024)")
+            continue
         command.add_argument("--scenes", nargs="*", help="only these scenes, by name without .yaml")
     arguments = parser.parse_args()
     try:

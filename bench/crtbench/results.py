@@ -20,6 +20,7 @@ class Results:
         self.lines = [f"# {title}", ""]
         self.data = {}
         self.commands = []
+        self.shown = {}   # Arguments of the command line that the page shows in other words.
         self.load = os.getloadavg()[0]
         self.started = datetime.datetime.now(datetime.timezone.utc)
 
@@ -45,7 +46,7 @@ class Results:
     def write(self):
         facts = provenance(self.program)
         facts["command"] = self.tool + " " + shlex.join(
-            self.program.plain(a) if not a.startswith(str(self.arguments.results)) else "RESULTS" for a in sys.argv[1:])
+            self.shown.get(a) or self.program.plain(a) if not a.startswith(str(self.arguments.results)) else "RESULTS" for a in sys.argv[1:])
         facts["date"] = self.started.strftime("%Y-%m-%d %H:%M UTC")
         facts["load_at_start"] = self.load
         facts["timed_runs"] = self.program.timed
@@ -90,7 +91,7 @@ def provenance(program):
     for name in shown:
         if name in statuses:
             status = statuses[name]
-            backends[name] = f"{status['version']}; " + ("; ".join(status["devices"]) or status.get("reason", "no device"))
+            backends[name] = program.plain(f"{status['version']}; " + ("; ".join(status["devices"]) or status.get("reason", "no device")))
     gpus = [d for name in ("cuda", "opencl") for d in statuses.get(name, {"devices": []})["devices"] if re.search(r"NVIDIA|AMD Radeon|GPU", d)]
     memory_kb = int(re.search(r"MemTotal:\s+(\d+)", pathlib.Path("/proc/meminfo").read_text())[1])
     # Results are what the measurements write; they do not change what is measured.

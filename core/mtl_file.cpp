@@ -1,0 +1,145 @@
+#include "mtl_file.h"
+
+#include "log.h"
+#include "obj_text.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace crt {
+namespace {
+
+bool sameWord(std::string_view a, std::string_view b) {
+    const auto lower = [](char c) { return std::tolower(static_cast<unsigned char>(c)); };
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [&](char x, char y) { return lower(x) == lower(y); });
+}
+
+}  // namespace
+
+const std::vector<MtlKey>& mtlKeys() {
+    static const std::vector<MtlKey> keys{
+        {"Kd",
+         {},
+         "r g b, or one number for grey",
+         "Reflectance of a diffuse surface, and of a mirror by `Pm`. 0.6 where it is left out, 0 if the "
+         "material emits. Clamped to [0, 1], with a warning. `Kd spectral` and `Kd xyz` are not read, with "
+         "a warning."},
+        {"Ke",
+         {},
+         "r g b, or one number",
+         "Radiance, emitted on the front side: 1 1 1 is the spectrum of D65 with luminance 1. Black is no "
+         "light."},
+        {"Ks",
+         {},
+         "r g b, or one number",
+         "Reflectance of a mirror by `illum` 3 or 5. Elsewhere a highlight, which is left out: "
+         "`illum` 0 and 1 say that there is none, other values bring a warning."},
+        {"Ka", {}, "r g b", "Ignored: light that comes from nowhere has no place in light transport."},
+        {"Ni",
+         {},
+         "n",
+         "Refractive index. Glass needs one above 1 (at most 1000); alone it makes none, because Blender "
+         "and 3ds Max write it for everything."},
+        {"d",
+         {},
+         "opacity",
+         "Below 1, and with `Ni` above 1: clear glass. Without `Ni` it is opacity, which crt does not have: "
+         "the surface is opaque, with a warning."},
+        {"Tr",
+         {},
+         "1 − opacity",
+         "As `d`, which wins where both are there. MeshLab, vcglib and OpenMVS write `Tr 1` for opaque "
+         "surfaces, without `Ni`."},
+        {"Tf",
+         {"Kt"},
+         "r g b, or one number",
+         "Says that light passes, and with `Ni` above 1 makes clear glass, unless it is black or white: "
+         "3ds Max and Maya write `Tf 1 1 1` for everything. Its colour is left out, with a warning."},
+        {"illum",
+         {},
+         "0 to 10",
+         "4, 6, 7 and 9 with `Ni` above 1: glass. 3 and 5 with Kd ≤ 0.1 and a Ks: mirror. Maya writes "
+         "`illum 4` with `Ni 1` for opaque surfaces."},
+        {"Pm",
+         {},
+         "metalness",
+         "0.5 and more: a mirror with reflectance Kd, else diffuse. Values between 0 and 1 bring a "
+         "warning."},
+        {"crt_reflectance",
+         {},
+         "file",
+         "A measured spectrum (`.spd`, `.csv`) in place of Kd or Ks, looked up beside the MTL; clamped "
+         "beyond its ends. Known to crt only."},
+        {"Ns",
+         {},
+         "exponent",
+         "Left out: highlights are, and mirrors and glass are smooth. A warning where Ns or Pr make them "
+         "visibly rough."},
+        {"Pr", {}, "roughness", "As `Ns`."},
+        {"Ps", {}, "sheen", "Left out, with a warning if not 0."},
+        {"Pc", {}, "coat thickness", "Left out, with a warning if not 0."},
+        {"Pcr", {}, "coat roughness", "Left out, with a warning if not 0."},
+        {"aniso", {}, "anisotropy", "Left out, with a warning if not 0."},
+        {"anisor", {}, "its angle", "Left out, with a warning if not 0."},
+        {"map_Kd", {}, "image", "Textures are left out, with a warning; the numbers beside them count."},
+        {"map_Ka", {}, "image", "Ignored, as `Ka`."},
+        {"map_Ks", {}, "image", "Left out, with a warning."},
+        {"map_Ns", {}, "image", "Left out, with a warning."},
+        {"map_Ke", {}, "image", "Left out, with a warning."},
+        {"map_d",
+         {"map_Tr", "map_opacity"},
+         "image",
+         "Left out, with a warning: leaves and fences fill their whole outline."},
+        {"map_Pr", {}, "image", "Left out, with a warning."},
+        {"map_Pm", {}, "image", "Left out, with a warning."},
+        {"map_Ps", {}, "image", "Left out, with a warning."},
+        {"map_refl", {"refl"}, "image", "Left out, with a warning."},
+        {"map_bump", {"bump"}, "image", "Left out, with a warning."},
+        {"disp", {"map_disp"}, "image", "Left out, with a warning."},
+        {"decal", {"map_decal"}, "image", "Left out, with a warning."},
+        {"norm", {"map_Kn", "map_norm"}, "image", "Left out, with a warning."},
+        {"sharpness", {}, "number", "Ignored: it belongs to reflection maps."},
+        {"map_aat", {}, "on or off", "Ignored: it belongs to textures."},
+    };
+    return keys;
+}
+
+const MtlKey* findMtlKey(std::string_view keyword) {
+    for (const MtlKey& key : mtlKeys())
+        if (sameWord(key.keyword, keyword) ||
+            std::any_of(key.aliases.begin(), key.aliases.end(),
+                        [&](const std::string& a) { return sameWord(a, keyword); }))
+            return &key;
+    return nullptr;
+}
+
+const MtlStatement* MtlText::find(std::string_view keyword) const {
+    const auto found = statements.find(keyword);
+    return found == statements.end() ? nullptr : &found->second;
+}
+
+std::vector<MtlText> readMtl(std::string_view text, const std::string& path) {
+    std::vector<MtlText> materials;
+    int lost = 0, first_lost = 0;
+    TextLines lines(text);
+    while (lines.next()) {
+        if (sameWord(lines.keyword(), "newmtl")) {
+            materials.push_back({std::string(lines.arguments()), path, lines.number(), {}});
+            continue;
+        }
+        if (materials.empty()) {
+            if (++lost == 1) first_lost = lines.number();
+            continue;
+        }
+        const MtlKey* key = findMtlKey(lines.keyword());
+        materials.back().statements[std::string(key != nullptr ? key->keyword : lines.keyword())] = {
+            std::string(lines.arguments()), lines.number()};
+    }
+    if (lost > 0 && !materials.empty())
+        logWarning("{}:{}: {} statement{} before the first newmtl left out", path, first_lost, lost,
+                   lost == 1 ? "" : "s");
+    return materials;
+}
+
+}  // namespace crt

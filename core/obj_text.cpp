@@ -1,0 +1,118 @@
+#include "obj_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+namespace crt {
+namespace {
+
+constexpr std::string_view kBlank = " \t\v\f";
+
+/// UTF-16 with its mark of order as UTF-8. Surrogates stay apart: they stand in names at most, and the same
+/// name gives the same bytes.
+std::string fromUtf16(std::string_view text) {
+    const bool big_endian = text.starts_with("\xFE\xFF");
+    std::string utf8;
+    for (std::size_t i = 2; i + 1 < text.size(); i += 2) {
+        const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[i + k]); };
+        const unsigned unit = big_endian ? byte(0) * 256u + byte(1) : byte(1) * 256u + byte(0);
+        const auto put = [&](unsigned bits) { utf8 += static_cast<char>(bits); };
+        if (unit < 0x80) {
+            put(unit);
+        } else if (unit < 0x800) {
+            put(0xC0 | unit >> 6), put(0x80 | (unit & 0x3F));
+        } else {
+            put(0xE0 | unit >> 12), put(0x80 | (unit >> 6 & 0x3F)), put(0x80 | (unit & 0x3F));
+        }
+    }
+    return utf8;
+}
+
+}  // namespace
+
+std::string readTextFile(const std::string& path, const char* kind, const SourcePlace& named_at) {
+    const auto refuse = [&](const char* why) {
+        throw Error(ErrorKind::Scene, fmt::format("{} '{}' {}", kind, path, why), named_at);
+    };
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) refuse("is a directory");
+    std::ifstream in(path, std::ios::binary);
+    if (!in) refuse("cannot be opened");
+    std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    if (in.bad()) refuse("cannot be read");
+    return text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF") ? fromUtf16(text) : text;
+}
+
+std::string_view nextField(std::string_view& line) {
+    line.remove_prefix(std::min(line.find_first_not_of(kBlank), line.size()));
+    if (line.starts_with('#')) line = {};
+    const std::string_view field = line.substr(0, line.find_first_of(kBlank));
+    line.remove_prefix(field.size());
+    return field;
+}
+
+std::string_view trimmed(std::string_view text) {
+    constexpr std::string_view kBlankOrEnd = " \t\v\f\r";
+    const std::size_t first = text.find_first_not_of(kBlankOrEnd);
+    if (first == std::string_view::npos) return {};
+    return text.substr(first, text.find_last_not_of(kBlankOrEnd) + 1 - first);
+}
+
+std::string inQuotes(std::string_view name) {
+    constexpr std::size_t kLongest = 120;
+    return name.size() <= kLongest ? fmt::format("'{}'", name) : fmt::format("'{}…'", name.substr(0, kLongest));
+}
+
+std::optional<double> numberOf(std::string_view field) {
+    const std::string_view digits = field.substr(field.starts_with('+') ? 1 : 0);
+    double number = 0.0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    if (end != digits.data() + digits.size() || error == std::errc::invalid_argument) return std::nullopt;
+    // Beyond a double: with a negative exponent that is zero, else infinite.
+    if (error == std::errc::result_out_of_range)
+        return digits.find('-', 1) != std::string_view::npos ? 0.0 : std::numeric_limits<double>::infinity();
+    return number;
+}
+
+TextLines::TextLines(std::string_view text) : rest_(text) {
+    if (rest_.starts_with("\xEF\xBB\xBF")) rest_.remove_prefix(3);
+}
+
+/// Takes one line of the file off the text.
+std::string_view TextLines::physicalLine() {
+    const std::size_t end = std::min(rest_.find_first_of("\r\n"), rest_.size());
+    const std::string_view line = trimmed(rest_.substr(0, end));
+    rest_.remove_prefix(end);
+    rest_.remove_prefix(rest_.starts_with("\r\n") ? 2 : std::min<std::size_t>(1, rest_.size()));
+    ++lines_taken_;
+    return line;
+}
+
+bool TextLines::next() {
+    while (!rest_.empty()) {
+        number_ = lines_taken_ + 1;
+        std::string_view line = physicalLine();
+        if (line.empty() || line.starts_with('#')) continue;
+        if (line.ends_with('\\')) {
+            joined_.clear();
+            for (bool more = true; more; line = more ? physicalLine() : line) {
+                more = line.ends_with('\\') && !rest_.empty();
+                joined_ += line.substr(0, line.size() - (line.ends_with('\\') ? 1 : 0));
+                joined_ += ' ';
+            }
+            line = trimmed(joined_);
+        }
+        keyword_ = line.substr(0, line.find_first_of(kBlank));
+        arguments_ = trimmed(line.substr(keyword_.size()));
+        if (!keyword_.empty()) return true;
+    }
+    return false;
+}
+
+}  // namespace crt
