@@ -1,6 +1,7 @@
 #include "bvh_build.h"
 
 #include "kernel/bvh.h"
+#include "stage.h"
 
 #include <algorithm>
 #include <cmath>
@@ -67,6 +68,8 @@ public:
         for (std::size_t i = 0; i < triangles.size(); ++i)
             for (std::size_t k = 0; k < 3; ++k) centroids_[i][k] = 0.5f * (triangles[i].lower[k] + triangles[i].upper[k]);
         nodes_.reserve(triangles.size());
+        Stage stage("building the BVH", static_cast<double>(triangles.size()));
+        stage_ = &stage;
         build(0, static_cast<std::uint32_t>(triangles.size()));
     }
 
@@ -77,6 +80,7 @@ private:
     // Depth is bounded by the caller's retry with median splits, so recursion is safe: a median tree has at most 31 levels, and a SAH
     // split always leaves triangles on both sides.
     std::uint32_t build(std::uint32_t begin, std::uint32_t end, int depth = 0) {
+        stage_->at(begin);  // what lies before it is done
         const auto index = static_cast<std::uint32_t>(nodes_.size());
         nodes_.emplace_back();
         Box box, centroid_box;
@@ -164,6 +168,7 @@ private:
 
     const std::vector<TriangleBounds>& triangles_;
     bool median_only_;
+    Stage* stage_ = nullptr;
     std::vector<std::uint32_t> order_;
     std::vector<std::array<float, 3>> centroids_;
     std::vector<BinaryNode> nodes_;

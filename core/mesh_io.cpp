@@ -2,6 +2,7 @@
 
 #include "error.h"
 #include "log.h"
+#include "stage.h"
 #include "triangulate.h"
 #include "vec3d.h"
 
@@ -20,6 +21,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <streambuf>
@@ -67,6 +69,8 @@ public:
         if (rest_.starts_with("\xEF\xBB\xBF")) rest_.remove_prefix(3);
     }
 
+    /// Bytes that are not handed out yet.
+    std::size_t bytesLeft() const { return rest_.size(); }
     /// Number of the line last handed out, counted from 1; the first of those joined.
     int lineNumber() const { return line_number_; }
     /// The line last handed out without its keyword.
@@ -205,7 +209,10 @@ private:
 /// missing) into 0 without a word, so each line is read again here: strictly, and correctly rounded.
 class ObjReader {
 public:
-    ObjReader(const std::string& path, std::string_view text, bool use_mtl) : path_(path), lines_(text), use_mtl_(use_mtl) {}
+    ObjReader(const std::string& path, std::string_view text, bool use_mtl, Stage& stage)
+        : path_(path), lines_(text), use_mtl_(use_mtl), stage_(stage), bytes_(text.size()) {
+        stage_.setAmount(static_cast<double>(bytes_));
+    }
 
     ObjContents read() {
         obj_.files.push_back(path_);
@@ -248,6 +255,7 @@ private:
     }
 
     void position() {
+        stage_.at(static_cast<double>(bytes_ - lines_.bytesLeft()));
         const Vec3d p = threeNumbers("vertex");
         for (const double x : p)
             if (!std::isfinite(x)) fail("the coordinates of a vertex must be finite", path_, lines_.lineNumber());
@@ -282,6 +290,7 @@ private:
     }
 
     void face() {
+        stage_.at(static_cast<double>(bytes_ - lines_.bytesLeft()));
         Face f{obj_.corners.size(), 0, material_, lines_.lineNumber()};
         std::string_view rest = lines_.arguments();
         for (std::string_view field = nextField(rest); !field.empty() && field[0] != '#'; field = nextField(rest)) {
@@ -303,6 +312,8 @@ private:
     const std::string& path_;
     LineSource lines_;
     bool use_mtl_;
+    Stage& stage_;
+    std::size_t bytes_;
     ObjContents obj_;
     std::int32_t material_ = -1;
     std::set<std::string> undefined_materials_;
@@ -341,13 +352,18 @@ bool isDegenerate(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
 }  // namespace
 
 LoadedMesh loadObj(const std::string& path, bool use_mtl) {
+    const std::string name = std::filesystem::path(path).filename().string();
+    std::optional<Stage> stage(std::in_place, "reading " + name);
     const std::string text = readText(path, "mesh", {path});
-    ObjContents obj = ObjReader(path, text, use_mtl).read();
+    ObjContents obj = ObjReader(path, text, use_mtl, *stage).read();
     if (obj.faces.empty()) fail("this mesh has no faces", path);
     checkIndices(obj, path);
 
     LoadedMesh out;
     out.files = obj.files;
+    stage.reset();
+    Stage splitting("making triangles of " + name, static_cast<double>(obj.faces.size()));
+    double split = 0;
 
     // Normals of unit length; those without a direction are remembered as such.
     std::vector<bool> usable_normal(obj.normals.size());
@@ -382,6 +398,7 @@ LoadedMesh loadObj(const std::string& path, bool use_mtl) {
     std::uint64_t flat_faces = 0;
     bool any_smooth = false;
     for (const Face& face : obj.faces) {
+        splitting.at(++split);
         std::int32_t material = -1, emission = -1;
         if (face.material >= 0) {
             const auto mtl = static_cast<std::size_t>(face.material);

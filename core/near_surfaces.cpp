@@ -112,7 +112,15 @@ bool anyNeighbour(const kernel::CrtContext& context, const Corners& box, double 
     return false;
 }
 
+/// Every how-manieth of `count` to look at, for at least `wanted` of them.
+std::uint64_t stepFor(std::uint64_t count, std::uint64_t wanted) {
+    return std::max<std::uint64_t>(1, count / std::max<std::uint64_t>(wanted, 1));
+}
+
 }  // namespace
+
+std::uint64_t nearSurfacesStep(std::uint64_t triangles) { return stepFor(triangles, kTriangles); }
+std::uint64_t coplanarLightStep(std::uint64_t emitters) { return stepFor(emitters, kEmitters); }
 
 std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     using namespace kernel;
@@ -121,8 +129,8 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     const auto* primitives = CRT_ARRAY(CrtPrimitive, context.blob, context.scene->primitives);
     const bool tree = context.scene->accelerator == CRT_ACCELERATOR_BVH;
     const std::uint64_t count = context.scene->triangle_count;
-    const std::uint64_t wanted = tree ? kEmitters : kTriangleTests / std::max<std::uint64_t>(count, 1);
-    const std::uint64_t step = std::max<std::uint64_t>(1, scene.emitters / std::max<std::uint64_t>(wanted, 1));
+    const std::uint64_t step = tree ? coplanarLightStep(scene.emitters)
+                                    : stepFor(scene.emitters, kTriangleTests / std::max<std::uint64_t>(count, 1));
     std::optional<CoplanarLight> found;
     for (std::uint32_t slot = 0; slot < count && !found; ++slot) {
         const CrtPrimitive& light = primitives[triangles[slot].id];
@@ -153,9 +161,10 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
 
     NearSurfaces found;
     const bool tree = context.scene->accelerator == CRT_ACCELERATOR_BVH;
-    const std::uint64_t wanted = std::min(kTriangles, tree ? kTriangles : kTriangleTests / std::max(count, 1u));
-    const u32 step = static_cast<u32>(std::max<std::uint64_t>(1, count / std::max<std::uint64_t>(wanted, 1)));
-    for (u32 slot = 0; slot < count; slot += step) {
+    const std::uint64_t step = tree ? nearSurfacesStep(scene.triangles)
+                                    : stepFor(count, std::min(kTriangles, kTriangleTests / std::max(count, 1u)));
+    for (u32 slot = 0; slot < count; ++slot) {
+        if (triangles[slot].id % step != 0) continue;  // by id: in every order of slots the same
         const vec3 normal = crt_load3(faces[slot].normal);
         if (dot3(normal, normal) == 0.0f) continue;  // no area
         ++found.asked;

@@ -14,6 +14,10 @@ struct NearSurfaces {
     double nearest_clearance = 0;  ///< The largest clearance that was too large for its neighbour, in the author's units.
 };
 
+/// Of a scene with a BVH, every how-manieth triangle, by id, is asked about, and every how-manieth emitter.
+std::uint64_t nearSurfacesStep(std::uint64_t triangles);
+std::uint64_t coplanarLightStep(std::uint64_t emitters);
+
 /// A lamp in the plane of another surface, which it overlaps: rays meet both at one distance but for rounding, and see now one, now the other.
 struct CoplanarLight {
     std::uint32_t light = 0, surface = 0;  ///< Primitive ids of one such pair.
