@@ -250,8 +250,13 @@ private:
         reader_.option(*render, "-t,--threads", "N", "threads of the processor; 0 for all",
                        [this](const std::string& text) { job_.integrator.threads = smallCount(text, "--threads", 0); })
             ->group(group);
-        reader_.option(*render, "--kernel", "lean|full", "lean leaves out what the scene does not need; same bits",
-                       [this](const std::string& text) { job_.integrator.kernel = text == "full" ? CRT_KERNEL_FULL : text == "lean-only" ? CRT_KERNEL_LEAN_ONLY : CRT_KERNEL_LEAN; })
+        reader_.option(*render, "--kernel", "KIND",
+                       "lean: without what the scene does not need; full: with it; lean-only: waits for lean to be compiled; same bits",
+                       [this](const std::string& text) {
+                           job_.integrator.kernel = text == "full"        ? CRT_KERNEL_FULL
+                                                    : text == "lean-only" ? CRT_KERNEL_LEAN_ONLY
+                                                                          : CRT_KERNEL_LEAN;
+                       })
             ->check(oneOf({"lean", "full", "lean-only"}))
             ->group(group);
         reader_.option(*render, "--tile", "N", "pixels along the side of a tile; never changes the image",

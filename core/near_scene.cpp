@@ -3,6 +3,7 @@
 #include "blob_writer.h"
 #include "bvh_build.h"
 #include "kernel/surface.h"
+#include "log.h"
 #include "near_surfaces.h"
 
 #include <algorithm>
@@ -106,21 +107,21 @@ std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kern
     // largest clearance, and begin some epsilon off.
     const float reach = 2 * largest + 64 * CRT_EPSILON;
 
-    const std::uint64_t surface_step = nearSurfacesStep(scene.triangles), light_step = coplanarLightStep(scene.emitters);
     MarkedCells cells(count);
+    const std::uint64_t step = askedEmitterStep(scene.emitters);
     bool all = false;
-    for (std::uint32_t slot = 0; slot < count && !all; ++slot) {
-        const CrtTriangle& triangle = triangles[slot];
-        const std::uint32_t emitter = primitives[triangle.id].emitter;
-        if (emitter != CRT_NONE && emitter % light_step == 0) all = !cells.mark(boundsOf(triangle, reach));
-        if (all || triangle.id % surface_step != 0) continue;
+    for (std::uint32_t slot = 0; slot < count && scene.emitters > 0 && !all; ++slot) {
+        const std::uint32_t emitter = primitives[triangles[slot].id].emitter;
+        if (emitter != CRT_NONE && emitter % step == 0) all = !cells.mark(boundsOf(triangles[slot], reach));
+    }
+    for (const std::uint32_t id : askedTriangles(scene.triangles)) {
         TriangleBounds middle{};
         for (std::size_t k = 0; k < 3; ++k) {
-            const float* p = triangle.p + 3 * k;
+            const float* p = triangles[id].p + 3 * k;  // without nodes a triangle's slot is its id
             middle.lower[k] = (p[0] + p[1] + p[2]) / 3 - reach;
             middle.upper[k] = (p[0] + p[1] + p[2]) / 3 + reach;
         }
-        all = !cells.mark(middle);
+        all = !cells.mark(middle) || all;
     }
     std::vector<std::uint32_t> near;
     for (std::uint32_t slot = 0; slot < count; ++slot)
@@ -140,7 +141,8 @@ CompiledScene nearScene(const CompiledScene& scene) {
     std::vector<TriangleBounds> bounds;
     bounds.reserve(near.size());
     for (const std::uint32_t slot : near) bounds.push_back(boundsOf(triangles[slot], 0));
-    const Bvh bvh = buildBvh(bounds, CRT_BOX_PADDING);
+    logDebug("{} of {} triangles lie where surfaces are asked for neighbours", near.size(), scene.triangles);
+    const Bvh bvh = buildBvh(bounds, CRT_BOX_PADDING, "looking for surfaces too near to each other");
 
     std::vector<CrtTriangle> near_triangles;
     std::vector<CrtFace> near_faces;

@@ -23,16 +23,18 @@ import unittest
 
 CRT = CONFIG_DIR = FAKE_DIR = None  # From the command line.
 
-SCENE = """\
+EMPTY = """\
 crt: 1
-camera: {position: [0, 1, -4], target: [0, 0.5, 0], fov: 40}
+camera: {position: [0.5, 1, -1.5], target: [0.5, 0, 0.5], fov: 40}
 film: {resolution: [24, 16]}
 sampler: {samples: 8}
 environment: {radiance: 1}
-materials: {white: {type: diffuse, reflectance: 0.7}}
 """
 
-EMPTY = SCENE + "objects: []\n"
+MESH = EMPTY + """\
+materials: {white: {type: diffuse, reflectance: 0.7}}
+objects: [{name: sheet, obj: sheet.obj, material: white}]
+"""
 SUMMARY = "samples per pixel"
 
 
@@ -75,7 +77,7 @@ class Waiting(unittest.TestCase):
 
     def write_mesh_scene(self, side):
         write_grid(self.path("sheet.obj"), side)
-        self.write("mesh.yaml", SCENE + "objects: [{name: sheet, obj: sheet.obj, material: white}]\n")
+        self.write("mesh.yaml", MESH)
 
     def crt(self, *arguments, expect=0, **changes):
         run = subprocess.run([CRT, *arguments], cwd=self.directory, env=environment(**changes), stdin=subprocess.DEVNULL,
