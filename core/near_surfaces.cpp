@@ -164,7 +164,8 @@ kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::Cr
 /// Slots by id; CRT_NONE for triangles that a reduced scene (near_scene.h) lacks. By ids, so that every order of slots is
 /// asked about the same triangles.
 std::vector<std::uint32_t> slotsOf(const CompiledScene& scene, const kernel::CrtContext& context) {
-    const auto* triangles = CRT_ARRAY(kernel::CrtTriangle, context.blob, context.scene->triangles);
+    using namespace kernel;
+    const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
     std::vector<std::uint32_t> slots(scene.triangles, CRT_NONE);
     for (std::uint32_t slot = 0; slot < context.scene->triangle_count; ++slot) slots[triangles[slot].id] = slot;
     return slots;
