@@ -40,10 +40,11 @@ public:
                                                            64, 1024))),
           bits_(kBits / 64) {}
 
-    /// Returns false when the box has so many cells that marking them is no use.
+    /// Returns false when so many cells are marked that it is no use.
     bool mark(const TriangleBounds& box) {
         const Range range = rangeOf(box);
-        if (range.cells() > kMostCells) return false;
+        marked_ += range.cells();
+        if (marked_ > kMostMarked) return false;
         forEach(range, [&](std::uint64_t bit) {
             bits_[bit / 64] |= std::uint64_t{1} << bit % 64;
             return false;
@@ -53,12 +54,14 @@ public:
 
     bool anyMarked(const TriangleBounds& box) const {
         const Range range = rangeOf(box);
-        return range.cells() > kMostCells || forEach(range, [&](std::uint64_t bit) { return (bits_[bit / 64] >> bit % 64 & 1) != 0; });
+        return range.cells() > kMostLooks || forEach(range, [&](std::uint64_t bit) { return (bits_[bit / 64] >> bit % 64 & 1) != 0; });
     }
 
 private:
-    static constexpr std::uint64_t kBits = std::uint64_t{1} << 24;
-    static constexpr std::uint64_t kMostCells = 4096;
+    static constexpr int kLogBits = 26;  // 8 MB
+    static constexpr std::uint64_t kBits = std::uint64_t{1} << kLogBits;
+    static constexpr std::uint64_t kMostMarked = kBits / 16;
+    static constexpr std::uint64_t kMostLooks = 4096;
 
     struct Range {
         std::array<std::uint32_t, 3> first, last;
@@ -86,12 +89,13 @@ private:
             for (std::uint32_t y = range.first[1]; y <= range.last[1]; ++y)
                 for (std::uint32_t x = range.first[0]; x <= range.last[0]; ++x) {
                     const std::uint64_t cell = (std::uint64_t{z} << 20 | std::uint64_t{y} << 10 | x) + 1;
-                    if (visit(cell * 0x9e3779b97f4a7c15ull >> 40)) return true;  // 24 bits: Fibonacci hashing
+                    if (visit(cell * 0x9e3779b97f4a7c15ull >> (64 - kLogBits))) return true;  // Fibonacci hashing
                 }
         return false;
     }
 
     float side_;
+    std::uint64_t marked_ = 0;
     std::vector<std::uint64_t> bits_;
 };
 

@@ -177,13 +177,13 @@ TEST_CASE("films of format 2, which were not packed, are read", "[checkpoint]") 
 
 TEST_CASE("films are packed without loss, in blocks, into less", "[checkpoint]") {
     // Two whole blocks and a short one, of everything that there is: noise, what is the same everywhere, what hardly differs.
-    Film film({kPackedPixels / 64, 130, 6, kAovPrimitive});
+    Film film({kPackedPixels / 64, 130, 4, kAovPrimitive});
     std::mt19937_64 generator(1);
     for (std::size_t i = 0; i < film.sums.size(); ++i) {
         const std::uint64_t noise = generator();
-        if (i % 12 == 0) std::memcpy(&film.sums[i], &noise, sizeof noise);  // every bit pattern, NaN among them
-        if (i % 12 == 2) film.sums[i] = 1 + static_cast<double>(noise % 1000) / 1000;
-        if (i % 12 == 4) film.sums[i] = -0.0;
+        if (i % 8 == 0) std::memcpy(&film.sums[i], &noise, sizeof noise);  // every bit pattern, NaN among them
+        if (i % 8 == 2) film.sums[i] = 1 + static_cast<double>(noise % 1024) / 1024;
+        if (i % 8 == 4) film.sums[i] = -0.0;
     }
     for (std::size_t i = 0; i < film.counts.size(); ++i) {
         film.counts[i] = 64 - (i % 977 == 0);
@@ -191,7 +191,7 @@ TEST_CASE("films are packed without loss, in blocks, into less", "[checkpoint]")
     }
     const std::vector<unsigned char> packed = packFilm(film);
     const std::size_t raw = film.sums.size() * 8 + film.counts.size() * 8 + film.primitives.size() * 4;
-    CHECK(packed.size() < raw / 4);
+    CHECK(packed.size() < raw / 5);  // 8 of 76 bytes are noise, and 10 bits of another 8.
     CHECK(leastPackedBytes(film.shape()) < packed.size());
     Film back(film.shape());
     REQUIRE(unpackFilm(packed, back));
