@@ -16,10 +16,10 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <memory>
 #include <set>
 #include <string_view>
+#include <sys/stat.h>
 
 namespace crt {
 namespace {
@@ -163,9 +163,11 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
 std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rbe"));
     if (!file) refuse(path, fmt::format("cannot be opened: {}", std::strerror(errno)));
-    std::error_code size_error;
-    const std::uint64_t actual_bytes = std::filesystem::file_size(path, size_error);
-    if (size_error) refuse(path, fmt::format("cannot be read: {}", size_error.message()));
+    // Of the file that is open: a render may put another in its place meanwhile.
+    struct stat status {};
+    if (::fstat(::fileno(file.get()), &status) != 0) refuse(path, fmt::format("cannot be read: {}", std::strerror(errno)));
+    if (S_ISDIR(status.st_mode)) refuse(path, "is a directory");
+    const auto actual_bytes = static_cast<std::uint64_t>(status.st_size);
     if (actual_bytes == 0) refuse(path, "is empty, not a crt film");
 
     Header header{};

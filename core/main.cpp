@@ -251,7 +251,7 @@ private:
                        [this](const std::string& text) { job_.integrator.threads = smallCount(text, "--threads", 0); })
             ->group(group);
         reader_.option(*render, "--kernel", "KIND",
-                       "lean: without what the scene does not need; full: with it; lean-only: waits for lean to be compiled; same bits",
+                       "lean: only what the scene needs; full; lean-only: waits for the compiler; same bits",
                        [this](const std::string& text) {
                            job_.integrator.kernel = text == "full"        ? CRT_KERNEL_FULL
                                                     : text == "lean-only" ? CRT_KERNEL_LEAN_ONLY
