@@ -30,7 +30,9 @@ bool CheckpointWriter::idle() const {
 void CheckpointWriter::save(const Film& film, FilmIdentity identity) {
     finish();
     copy_ = film;
-    writing_ = std::async(std::launch::async, [this, identity = std::move(identity)] { return tryToWrite(path_, *copy_, identity); });
+    writing_ = std::async(std::launch::async, [this, identity = std::move(identity)] {
+        return tryToWrite(path_, *copy_, identity);
+    });
 }
 
 void CheckpointWriter::finish() {

@@ -16,7 +16,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "films are packed as little-endian");
 
-constexpr int kLevel = 1;  // Noise does not get smaller by trying harder: level 9 saves 1 % and takes five times as long.
+constexpr int kLevel = 1;  // Noise does not get smaller by trying harder.
 constexpr std::size_t kLeastPlane = sizeof(std::uint32_t) + 1;
 
 struct FreeContext {
@@ -37,7 +37,8 @@ std::array<Section<Byte>, 3> sectionsOf(AnyFilm& film) {
     const auto section = [](auto& values, std::size_t pixels) {
         using Value = typename std::remove_reference_t<decltype(values)>::value_type;
         const std::size_t bytes = values.size() * sizeof(Value);
-        return Section<Byte>{reinterpret_cast<Byte*>(values.data()), pixels, pixels == 0 ? 0 : bytes / pixels};
+        return Section<Byte>{reinterpret_cast<Byte*>(values.data()), pixels,
+                             pixels == 0 ? 0 : bytes / pixels};
     };
     const std::size_t pixels = film.counts.size();
     return {section(film.sums, pixels), section(film.counts, pixels), section(film.primitives, pixels)};
@@ -64,10 +65,14 @@ public:
 
 private:
     void addPlane() {
-        if (std::all_of(plane_.begin(), plane_.end(), [this](unsigned char b) { return b == plane_.front(); })) return append(plane_.data(), 1);
-        const std::size_t size =
-            ZSTD_compressCCtx(context_.get(), packed_.data(), packed_.size(), plane_.data(), plane_.size(), kLevel);
-        if (ZSTD_isError(size)) throw Error(ErrorKind::Internal, fmt::format("zstd cannot pack a film: {}", ZSTD_getErrorName(size)));
+        if (std::all_of(plane_.begin(), plane_.end(),
+                        [this](unsigned char b) { return b == plane_.front(); }))
+            return append(plane_.data(), 1);
+        const std::size_t size = ZSTD_compressCCtx(context_.get(), packed_.data(), packed_.size(),
+                                                   plane_.data(), plane_.size(), kLevel);
+        if (ZSTD_isError(size))
+            throw Error(ErrorKind::Internal,
+                        fmt::format("zstd cannot pack a film: {}", ZSTD_getErrorName(size)));
         if (size < plane_.size()) return append(packed_.data(), size);
         append(plane_.data(), plane_.size());
     }
@@ -118,7 +123,8 @@ private:
             std::copy(packed.begin(), packed.end(), plane_.begin());
             return true;
         }
-        return ZSTD_decompressDCtx(context_.get(), plane_.data(), plane_.size(), packed.data(), size) == plane_.size();
+        return ZSTD_decompressDCtx(context_.get(), plane_.data(), plane_.size(), packed.data(), size) ==
+               plane_.size();
     }
 
     std::unique_ptr<ZSTD_DCtx, FreeContext> context_;
@@ -130,7 +136,8 @@ private:
 
 std::vector<unsigned char> packFilm(const Film& film) {
     Packer packer;
-    for (const Section<const unsigned char>& section : sectionsOf<const unsigned char>(film)) packer.add(section);
+    for (const Section<const unsigned char>& section : sectionsOf<const unsigned char>(film))
+        packer.add(section);
     return packer.take();
 }
 

@@ -30,14 +30,15 @@ TriangleBounds boundsOf(const CrtTriangle& triangle, float padding) {
     return b;
 }
 
-/// Space within ±1 as cells, some of them marked. Cells share the bits of a hash table, so that an unmarked one may look
-/// marked, never the other way round.
+/// Space within ±1 as cells, some of them marked. Cells share the bits of a hash table, so that an unmarked
+/// one may look marked, never the other way round.
 class MarkedCells {
 public:
     /// Cells about as large as the triangles of a surface of so many.
     explicit MarkedCells(std::size_t triangles)
-        : side_(static_cast<float>(std::clamp<std::size_t>(std::bit_ceil(static_cast<std::size_t>(std::sqrt(static_cast<double>(triangles)))),
-                                                           64, 1024))),
+        : side_(static_cast<float>(std::clamp<std::size_t>(
+              std::bit_ceil(static_cast<std::size_t>(std::sqrt(static_cast<double>(triangles)))), 64,
+              1024))),
           bits_(kBits / 64) {}
 
     /// Returns false when so many cells are marked that it is no use.
@@ -54,7 +55,8 @@ public:
 
     bool anyMarked(const TriangleBounds& box) const {
         const Range range = rangeOf(box);
-        return range.cells() > kMostLooks || forEach(range, [&](std::uint64_t bit) { return (bits_[bit / 64] >> bit % 64 & 1) != 0; });
+        return range.cells() > kMostLooks ||
+               forEach(range, [&](std::uint64_t bit) { return (bits_[bit / 64] >> bit % 64 & 1) != 0; });
     }
 
 private:
@@ -73,7 +75,9 @@ private:
     };
 
     Range rangeOf(const TriangleBounds& box) const {
-        const auto cell = [&](float x) { return static_cast<std::uint32_t>(std::clamp((x + 1) * 0.5f * side_, 0.0f, side_ - 1)); };
+        const auto cell = [&](float x) {
+            return static_cast<std::uint32_t>(std::clamp((x + 1) * 0.5f * side_, 0.0f, side_ - 1));
+        };
         Range range{};
         for (std::size_t k = 0; k < 3; ++k) {
             range.first[k] = cell(box.lower[k]);
@@ -89,7 +93,8 @@ private:
             for (std::uint32_t y = range.first[1]; y <= range.last[1]; ++y)
                 for (std::uint32_t x = range.first[0]; x <= range.last[0]; ++x) {
                     const std::uint64_t cell = (std::uint64_t{z} << 20 | std::uint64_t{y} << 10 | x) + 1;
-                    if (visit(cell * 0x9e3779b97f4a7c15ull >> (64 - kLogBits))) return true;  // Fibonacci hashing
+                    if (visit(cell * 0x9e3779b97f4a7c15ull >> (64 - kLogBits)))
+                        return true;  // Fibonacci hashing
                 }
         return false;
     }
@@ -107,8 +112,8 @@ std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kern
     const std::uint32_t count = header.triangle_count;
     float largest = 0;
     for (std::uint32_t slot = 0; slot < count; ++slot) largest = std::max(largest, faces[slot].clearance);
-    // Whatever near_surfaces.h reaches for begins within this of the triangle that it asks about: rays go as far as the
-    // largest clearance, and begin some epsilon off.
+    // Whatever near_surfaces.h reaches for begins within this of the triangle that it asks about: rays go as
+    // far as the largest clearance, and begin some epsilon off.
     const float reach = 2 * largest + 64 * CRT_EPSILON;
 
     MarkedCells cells(count);

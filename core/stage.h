@@ -1,5 +1,5 @@
-/// Long work before the first sample, and how far it is: reading meshes, building the BVH, setting up the device.
-/// Whoever works says so with a Stage; whoever owns the terminal shows it with a StageProgress.
+/// Long work before the first sample, and how far it is: reading meshes, building the BVH, setting up the
+/// device. Whoever works says so with a Stage; whoever owns the terminal shows it with a StageProgress.
 #pragma once
 
 #include "progress.h"
@@ -14,7 +14,8 @@ namespace crt {
 /// One piece of work, for as long as it lives. Cheap: nothing is drawn here. [any thread]
 class Stage {
 public:
-    /// `what` as in "reading bunny.obj". `amount` is how much there is to do, in any unit; 0: how far it is cannot be told.
+    /// `what` as in "reading bunny.obj". `amount` is how much there is to do, in any unit; 0: how far it is
+    /// cannot be told.
     explicit Stage(std::string what, double amount = 0);
     ~Stage();
     Stage(const Stage&) = delete;
@@ -34,8 +35,8 @@ private:
     const Clock::time_point start_ = Clock::now();
 };
 
-/// Shows the innermost stage while it lives: on a terminal the line that rendering has too, in a log a line for each stage
-/// that takes long and one every ten seconds. Work that is done at once is not mentioned.
+/// Shows the innermost stage while it lives: on a terminal the line that rendering has too, in a log a line
+/// for each stage that takes long and one every ten seconds. Work that is done at once is not mentioned.
 class StageProgress {
 public:
     explicit StageProgress(ProgressMode mode);

@@ -65,7 +65,9 @@ public:
         for (std::size_t done = 0; done < bytes_.size();) {
             const ssize_t n = ::write(descriptor, bytes_.data() + done, bytes_.size() - done);
             if (n < 0 && errno == EINTR) continue;
-            if (n <= 0) throw std::runtime_error(std::string("cannot write to the compiler's process: ") + std::strerror(errno));
+            if (n <= 0)
+                throw std::runtime_error(std::string("cannot write to the compiler's process: ") +
+                                         std::strerror(errno));
             done += static_cast<std::size_t>(n);
         }
     }
@@ -73,11 +75,13 @@ public:
     /// The message that a file holds from its beginning. Throws std::runtime_error.
     static Message readFrom(int descriptor) {
         struct stat status {};
-        if (::fstat(descriptor, &status) != 0) throw std::runtime_error("the compiler's process cannot be heard");
+        if (::fstat(descriptor, &status) != 0)
+            throw std::runtime_error("the compiler's process cannot be heard");
         Message message;
         message.bytes_.resize(static_cast<std::size_t>(status.st_size));
         for (std::size_t done = 0; done < message.bytes_.size();) {
-            const ssize_t n = ::pread(descriptor, message.bytes_.data() + done, message.bytes_.size() - done, static_cast<off_t>(done));
+            const ssize_t n = ::pread(descriptor, message.bytes_.data() + done, message.bytes_.size() - done,
+                                      static_cast<off_t>(done));
             if (n < 0 && errno == EINTR) continue;
             if (n <= 0) throw std::runtime_error("the compiler's process cannot be heard");
             done += static_cast<std::size_t>(n);
@@ -86,10 +90,12 @@ public:
     }
     std::vector<unsigned char> next() {
         std::uint64_t length = 0;
-        if (bytes_.size() - taken_ < sizeof length) throw std::runtime_error("the compiler's process gave half an answer");
+        if (bytes_.size() - taken_ < sizeof length)
+            throw std::runtime_error("the compiler's process gave half an answer");
         std::memcpy(&length, bytes_.data() + taken_, sizeof length);
         taken_ += sizeof length;
-        if (bytes_.size() - taken_ < length) throw std::runtime_error("the compiler's process gave half an answer");
+        if (bytes_.size() - taken_ < length)
+            throw std::runtime_error("the compiler's process gave half an answer");
         const auto begin = bytes_.begin() + static_cast<std::ptrdiff_t>(taken_);
         taken_ += length;
         return {begin, begin + static_cast<std::ptrdiff_t>(length)};
@@ -102,7 +108,8 @@ public:
     Number nextNumber() {
         const std::vector<unsigned char> bytes = next();
         Number number{};
-        if (bytes.size() != sizeof number) throw std::runtime_error("the compiler's process is of another version");
+        if (bytes.size() != sizeof number)
+            throw std::runtime_error("the compiler's process is of another version");
         std::memcpy(&number, bytes.data(), sizeof number);
         return number;
     }
@@ -119,17 +126,22 @@ private:
 /// Memory with a descriptor, which two processes share without either waiting for the other.
 int sharedMemory(const char* name) {
     const int descriptor = ::memfd_create(name, MFD_CLOEXEC);
-    if (descriptor < 0) throw std::runtime_error(std::string("no memory to share with the compiler's process: ") + std::strerror(errno));
+    if (descriptor < 0)
+        throw std::runtime_error(std::string("no memory to share with the compiler's process: ") +
+                                 std::strerror(errno));
     return descriptor;
 }
 
-/// Processes that were left behind. Those that have ended meanwhile are forgotten by the system when they are asked for.
+/// Processes that were left behind. Those that have ended meanwhile are forgotten by the system when they
+/// are asked for.
 void leaveBehind(pid_t process) {
     static std::mutex mutex;
     static auto* const left = new std::vector<pid_t>;  // never destroyed: an integrator may be static itself
     const std::lock_guard<std::mutex> lock(mutex);
     if (process >= 0) left->push_back(process);
-    left->erase(std::remove_if(left->begin(), left->end(), [](pid_t p) { return ::waitpid(p, nullptr, WNOHANG) != 0; }), left->end());
+    left->erase(std::remove_if(left->begin(), left->end(),
+                               [](pid_t p) { return ::waitpid(p, nullptr, WNOHANG) != 0; }),
+                left->end());
 }
 
 /// posix_spawn's settings, given back at the end.
@@ -163,17 +175,20 @@ pid_t spawn(const std::string& program, int job, int answer) {
     sigfillset(&all);
     posix_spawnattr_setsigmask(&settings.attributes, &none);
     posix_spawnattr_setsigdefault(&settings.attributes, &all);
-    posix_spawnattr_setflags(&settings.attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    posix_spawnattr_setflags(&settings.attributes,
+                             POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
     char* const arguments[] = {const_cast<char*>(program.c_str()), nullptr};
     pid_t process = -1;
-    const int error = ::posix_spawn(&process, program.c_str(), &settings.actions, &settings.attributes, arguments, environ);
+    const int error = ::posix_spawn(&process, program.c_str(), &settings.actions, &settings.attributes,
+                                    arguments, environ);
     if (error != 0) throw std::runtime_error("cannot start '" + program + "': " + std::strerror(error));
     return process;
 }
 
 }  // namespace
 
-CompileProcess::CompileProcess(const std::string& program, const CompileJob& job) : fills_cache_(!job.cache_directory.empty()) {
+CompileProcess::CompileProcess(const std::string& program, const CompileJob& job)
+    : fills_cache_(!job.cache_directory.empty()) {
     Message message;
     message.add(job.nvrtc_path);
     message.add(job.text);
@@ -205,7 +220,8 @@ std::optional<CompiledKernel> CompileProcess::poll() {
     leaveBehind(-1);
     // A host that ignores SIGCHLD has no status to ask for: then the answer alone tells.
     if (ended > 0 && WIFSIGNALED(status))
-        throw std::runtime_error("the compiler's process was ended by signal " + std::to_string(WTERMSIG(status)));
+        throw std::runtime_error("the compiler's process was ended by signal " +
+                                 std::to_string(WTERMSIG(status)));
     Message message = Message::readFrom(answer_);
     const std::string failure = message.nextText();
     if (!failure.empty()) throw std::runtime_error(failure);
@@ -218,7 +234,9 @@ std::optional<CompiledKernel> CompileProcess::poll() {
 
 std::string compileProgram() {
     Dl_info library{};
-    if (::dladdr(reinterpret_cast<const void*>(&compileProgram), &library) == 0 || library.dli_fname == nullptr) return "crt_nvrtc";
+    if (::dladdr(reinterpret_cast<const void*>(&compileProgram), &library) == 0 ||
+        library.dli_fname == nullptr)
+        return "crt_nvrtc";
     const std::string path = library.dli_fname;
     const std::size_t slash = path.rfind('/');
     return (slash == std::string::npos ? std::string() : path.substr(0, slash + 1)) + "crt_nvrtc";
@@ -243,7 +261,8 @@ int runCompileProcess(int job_descriptor, int answer_descriptor) {
         const Cubin cubin = compileLean(Nvrtc::open({job.nvrtc_path}), job.text, job.arch, job.features);
         const double compile_seconds = secondsSince(compiling);
         const auto storing = std::chrono::steady_clock::now();
-        KernelCache(job.cache_directory.empty() ? nullptr : job.cache_directory.c_str()).store(job.key, cubin.bytes.data(), cubin.bytes.size());
+        KernelCache(job.cache_directory.empty() ? nullptr : job.cache_directory.c_str())
+            .store(job.key, cubin.bytes.data(), cubin.bytes.size());
         answer.add(std::string());
         answer.add(cubin.bytes.data(), cubin.bytes.size());
         answer.addNumber(compile_seconds);

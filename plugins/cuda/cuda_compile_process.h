@@ -1,9 +1,10 @@
 /// A compilation by NVRTC in a process of its own (the program crt_nvrtc beside the plugin).
 ///
-/// NVRTC cannot be told to stop, and a process cannot end while one of its threads is inside of it: destructors of static
-/// objects would take the library apart under that thread. So whoever rendered with the precompiled kernel meanwhile would
-/// wait for a kernel that it no longer needs. A process of its own is left behind instead: it puts the kernel into the cache,
-/// for the next run, and ends (docs/decisions/0011-compiler-process.md).
+/// NVRTC cannot be told to stop, and a process cannot end while one of its threads is inside of it:
+/// destructors of static objects would take the library apart under that thread. So whoever rendered with
+/// the precompiled kernel meanwhile would wait for a kernel that it no longer needs. A process of its own is
+/// left behind instead: it puts the kernel into the cache, for the next run, and ends
+/// (docs/decisions/0011-compiler-process.md).
 #pragma once
 
 #include "cuda_nvrtc.h"
@@ -20,11 +21,12 @@ namespace crt::cuda {
 
 /// What to compile, and where to keep it.
 struct CompileJob {
-    std::string nvrtc_path;       ///< As Nvrtc::path() has it.
+    std::string nvrtc_path;  ///< As Nvrtc::path() has it.
     std::string text;
     int arch = 0;
     std::uint32_t features = 0;
-    std::string cache_directory;  ///< Empty: none; then nobody could use the kernel but the one who waits for it.
+    std::string
+        cache_directory;  ///< Empty: none; then nobody could use the kernel but the one who waits for it.
     plugin::KernelCache::Key key{};
 };
 
@@ -54,7 +56,8 @@ private:
 /// crt_nvrtc in the folder of the library that this code is part of.
 std::string compileProgram();
 
-/// The other side: reads a job from one descriptor, compiles, stores, writes the answer to the other. The exit status.
+/// The other side: reads a job from one descriptor, compiles, stores, writes the answer to the other. The
+/// exit status.
 int runCompileProcess(int job, int answer);
 
 }  // namespace crt::cuda

@@ -1,5 +1,6 @@
-// A libnvrtc.so.13 for tests: takes CRT_FAKE_NVRTC_SECONDS to compile anything, and gives what the fake driver takes for
-// machine code. With "fail" in place of the seconds it refuses at once, with "crash" it ends its process.
+// A libnvrtc.so.13 for tests: takes CRT_FAKE_NVRTC_SECONDS to compile anything, and gives what the fake
+// driver takes for machine code. With "fail" in place of the seconds it refuses at once, with "crash" it
+// ends its process.
 #include <nvrtc.h>
 
 #include <chrono>
@@ -10,7 +11,9 @@
 
 namespace {
 
-constexpr char kCubin[] = "\x7f" "ELF of the fake compiler";
+constexpr char kCubin[] =
+    "\x7f"
+    "ELF of the fake compiler";
 constexpr char kLog[] = "fake.cu(1): error: told by the fake compiler\n";
 
 std::string behaviour() {
@@ -38,7 +41,8 @@ CRT_FAKE nvrtcResult nvrtcGetSupportedArchs(int* archs) {
     *archs = 90;
     return NVRTC_SUCCESS;
 }
-CRT_FAKE nvrtcResult nvrtcCreateProgram(nvrtcProgram* program, const char*, const char*, int, const char* const*, const char* const*) {
+CRT_FAKE nvrtcResult nvrtcCreateProgram(nvrtcProgram* program, const char*, const char*, int,
+                                        const char* const*, const char* const*) {
     *program = reinterpret_cast<nvrtcProgram>(new int);
     return NVRTC_SUCCESS;
 }
