@@ -143,10 +143,12 @@ private:
             for (std::size_t i = 0; i < count; ++i) bounds[i] = boundsOf(i);
             Bvh bvh = buildBvh(bounds, CRT_BOX_PADDING);
             order = std::move(bvh.order);
+            reserveBlob(bvh.nodes.size());
             header_.nodes = blob_.append(bvh.nodes);
             out_.nodes = bvh.nodes.size();
             out_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         }
+        if (out_.nodes == 0) reserveBlob(0);
         slot_of_.resize(count);
         std::vector<kernel::CrtTriangle> slots(count);
         for (std::size_t slot = 0; slot < count; ++slot) {
@@ -171,6 +173,16 @@ private:
             occluders_ = occluders.size();
         }
         writeObjects();
+    }
+
+    /// For what grows with the number of triangles, and some tables.
+    void reserveBlob(std::size_t nodes) {
+        constexpr std::size_t kTables = std::size_t{1} << 20;
+        std::size_t bytes = kTables + nodes * sizeof(kernel::CrtNode4);
+        for (const FlatTriangle& t : flat_.triangles)
+            bytes += sizeof(kernel::CrtTriangle) + sizeof(kernel::CrtFace) + sizeof(kernel::CrtPrimitive) +
+                     (t.smooth ? sizeof(kernel::CrtNormals) : 0);
+        blob_.reserve(bytes);
     }
 
     std::vector<kernel::CrtTriangle8> blocksOf(const std::vector<std::uint32_t>& slots) const {
@@ -557,11 +569,9 @@ private:
     }
 
     void finish() {
-        const std::vector<unsigned char> bytes = blob_.finish(header_);
-        out_.size_bytes = bytes.size();
+        out_.blob = blob_.finish(header_);
+        out_.size_bytes = out_.blob.size() * sizeof(CompiledScene::Line);
         out_.triangles = flat_.triangles.size();
-        out_.blob.resize(bytes.size() / sizeof(CompiledScene::Line));
-        std::memcpy(out_.blob.data(), bytes.data(), bytes.size());
         out_.hash = sceneIdentity(out_.data(), flat_.positions);
     }
 

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <vector>
 
 namespace crt {
@@ -167,10 +166,8 @@ CompiledScene nearScene(const CompiledScene& scene) {
     header.primitives = blob.append(std::span<const CrtPrimitive>(primitives, header.primitives.count));
 
     CompiledScene reduced;
-    const std::vector<unsigned char> bytes = blob.finish(header);
-    reduced.size_bytes = bytes.size();
-    reduced.blob.resize(bytes.size() / sizeof(CompiledScene::Line));
-    std::memcpy(reduced.blob.data(), bytes.data(), bytes.size());
+    reduced.blob = blob.finish(header);
+    reduced.size_bytes = reduced.blob.size() * sizeof(CompiledScene::Line);
     reduced.features = scene.features;
     reduced.triangles = scene.triangles;
     reduced.emitters = scene.emitters;

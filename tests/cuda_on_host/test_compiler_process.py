@@ -86,5 +86,5 @@ class CompilerProcess(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    CRT, SCENE, FAKE_CUDA, FAKE_NVRTC = sys.argv[1:5]
+    CRT, SCENE, FAKE_CUDA, FAKE_NVRTC = map(os.path.abspath, sys.argv[1:5])
     unittest.main(argv=[sys.argv[0], *sys.argv[5:]], verbosity=2)
