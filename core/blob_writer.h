@@ -1,6 +1,7 @@
 /// The block of memory that a compiled scene is (kernel/layout.h), while it grows.
 #pragma once
 
+#include "compile.h"
 #include "error.h"
 #include "kernel/layout.h"
 
@@ -17,18 +18,20 @@ namespace crt {
 /// Arrays are appended behind the header, each on a 64-byte boundary.
 class BlobWriter {
 public:
-    BlobWriter() : bytes_(sizeof(kernel::CrtScene)) {}
+    BlobWriter() { grow(sizeof(kernel::CrtScene)); }
+
+    /// Room for so many bytes in all, so that hundreds of megabytes are not moved while they grow.
+    void reserve(std::size_t bytes) { lines_.reserve(linesFor(bytes)); }
 
     template <class T>
     kernel::CrtSpan append(std::span<const T> items) {
         if (items.empty()) return {0, 0};
-        bytes_.resize((bytes_.size() + 63) / 64 * 64);
-        const std::size_t offset = bytes_.size();
+        const std::size_t offset = lines_.size() * sizeof(Line);
         // 64 GiB is what offsets of 16 bytes in 32 bits reach.
         if ((offset + items.size_bytes()) / 16 > std::numeric_limits<std::uint32_t>::max())
             throw Error(ErrorKind::Scene, "the scene is too large: its compiled form exceeds 64 GiB");
-        bytes_.resize(offset + items.size_bytes());
-        std::memcpy(bytes_.data() + offset, items.data(), items.size_bytes());
+        grow(items.size_bytes());
+        std::memcpy(bytes() + offset, items.data(), items.size_bytes());
         return {static_cast<std::uint32_t>(offset / 16), static_cast<std::uint32_t>(items.size())};
     }
 
@@ -37,14 +40,18 @@ public:
         return append(std::span<const T>(items));
     }
 
-    std::vector<unsigned char> finish(const kernel::CrtScene& header) {
-        std::memcpy(bytes_.data(), &header, sizeof(header));
-        bytes_.resize((bytes_.size() + 63) / 64 * 64);
-        return std::move(bytes_);
+    std::vector<CompiledScene::Line> finish(const kernel::CrtScene& header) {
+        std::memcpy(bytes(), &header, sizeof(header));
+        return std::move(lines_);
     }
 
 private:
-    std::vector<unsigned char> bytes_;
+    using Line = CompiledScene::Line;
+    static std::size_t linesFor(std::size_t bytes) { return (bytes + sizeof(Line) - 1) / sizeof(Line); }
+    unsigned char* bytes() { return reinterpret_cast<unsigned char*>(lines_.data()); }
+    void grow(std::size_t bytes) { lines_.resize(lines_.size() + linesFor(bytes)); }
+
+    std::vector<Line> lines_;
 };
 
 }  // namespace crt

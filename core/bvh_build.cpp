@@ -1,6 +1,7 @@
 #include "bvh_build.h"
 
 #include "kernel/bvh.h"
+#include "stage.h"
 
 #include <algorithm>
 #include <cmath>
@@ -61,8 +62,8 @@ struct Split {
 
 class Builder {
 public:
-    Builder(const std::vector<TriangleBounds>& triangles, bool median_only)
-        : triangles_(triangles), median_only_(median_only), order_(triangles.size()), centroids_(triangles.size()) {
+    Builder(const std::vector<TriangleBounds>& triangles, bool median_only, Stage& stage)
+        : triangles_(triangles), median_only_(median_only), stage_(stage), order_(triangles.size()), centroids_(triangles.size()) {
         std::iota(order_.begin(), order_.end(), 0u);
         for (std::size_t i = 0; i < triangles.size(); ++i)
             for (std::size_t k = 0; k < 3; ++k) centroids_[i][k] = 0.5f * (triangles[i].lower[k] + triangles[i].upper[k]);
@@ -77,6 +78,7 @@ private:
     // Depth is bounded by the caller's retry with median splits, so recursion is safe: a median tree has at most 31 levels, and a SAH
     // split always leaves triangles on both sides.
     std::uint32_t build(std::uint32_t begin, std::uint32_t end, int depth = 0) {
+        stage_.at(begin);  // what lies before it is done
         const auto index = static_cast<std::uint32_t>(nodes_.size());
         nodes_.emplace_back();
         Box box, centroid_box;
@@ -164,6 +166,7 @@ private:
 
     const std::vector<TriangleBounds>& triangles_;
     bool median_only_;
+    Stage& stage_;
     std::vector<std::uint32_t> order_;
     std::vector<std::array<float, 3>> centroids_;
     std::vector<BinaryNode> nodes_;
@@ -235,9 +238,10 @@ private:
 
 }  // namespace
 
-Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding) {
+Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding, const std::string& what) {
+    Stage stage(what, static_cast<double>(triangles.size()));
     for (const bool median_only : {false, true}) {
-        Builder builder(triangles, median_only);
+        Builder builder(triangles, median_only, stage);
         Collapser collapser(builder.nodes(), padding);
         if (collapser.depth() > kMaxBvhDepth) continue;
         Bvh bvh;

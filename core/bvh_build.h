@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace crt {
@@ -25,6 +26,7 @@ inline constexpr int kMaxBvhDepth = 31;
 
 /// `padding` is added around every box: the triangle test rounds the ray's offset to a vertex to a few 2^-24 of the coordinates, and a box must
 /// contain whatever the test may accept. At least one triangle.
-Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding);
+/// `stage` is what progress calls it (stage.h).
+Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding, const std::string& stage = "building the BVH");
 
 }  // namespace crt

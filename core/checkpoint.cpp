@@ -1,6 +1,7 @@
 #include "checkpoint.h"
 
 #include "atomic_file.h"
+#include "film_pack.h"
 #include "log.h"
 
 #include <fmt/format.h>
@@ -15,10 +16,10 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <memory>
 #include <set>
 #include <string_view>
+#include <sys/stat.h>
 
 namespace crt {
 namespace {
@@ -108,14 +109,19 @@ bool isHexHash(const char* digits, std::size_t size) {
            });
 }
 
-/// Size of the file that a header describes; 0 when that does not fit in 63 bits (then the header is not one of ours).
-std::uint64_t describedBytes(const Header& h) {
-    using Wide = unsigned __int128;
+using Wide = unsigned __int128;
+
+/// Size of the part before the film.
+Wide headBytes(const Header& h) { return sizeof(Header) + Wide{h.range_count} * 16 + roundUp8(h.version_bytes); }
+
+/// Whether the header can describe a file of its size.
+bool sizesFit(const Header& h) {
+    if (h.header_bytes != headBytes(h)) return false;
+    if (h.format_version > kCheckpointVersionUnpacked)
+        return h.file_bytes >= headBytes(h) + leastPackedBytes({h.width, h.height, h.channels, h.aovs});
     const Wide pixels = Wide{h.width} * h.height;
-    Wide bytes = sizeof(Header) + Wide{h.range_count} * 16 + roundUp8(h.version_bytes);
-    bytes += pixels * h.channels * 16 + pixels * 8;
-    if (h.aovs & kAovPrimitive) bytes += (pixels * 4 + 7) / 8 * 8;
-    return bytes >> 63 ? 0 : static_cast<std::uint64_t>(bytes);
+    const Wide ids = (h.aovs & kAovPrimitive) != 0 ? (pixels * 4 + 7) / 8 * 8 : 0;
+    return h.file_bytes == headBytes(h) + pixels * h.channels * 16 + pixels * 8 + ids;
 }
 
 }  // namespace
@@ -139,52 +145,44 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
     header.version_bytes = static_cast<std::uint32_t>(identity.version.size());
     header.range_count = static_cast<std::uint32_t>(film.samples.ranges().size());
     header.bits_version = identity.bits_version;
-    header.file_bytes = describedBytes(header);
-
-    // Hashed first and written second, straight from the film: a gigabyte of sums is not copied to be saved.
-    const std::size_t primitive_bytes = film.primitives.size() * sizeof(std::uint32_t);
-    const std::uint64_t zero = 0;
-    const struct {
-        const void* bytes;
-        std::size_t size;
-    } sections[] = {{tail.data(), tail.size()},
-                    {film.sums.data(), film.sums.size() * sizeof(double)},
-                    {film.counts.data(), film.counts.size() * sizeof(std::uint64_t)},
-                    {film.primitives.data(), primitive_bytes},
-                    {&zero, roundUp8(primitive_bytes) - primitive_bytes}};
+    AtomicFile file(path);  // Where it cannot be written, nothing need be packed.
+    const std::vector<unsigned char> packed = packFilm(film);
+    header.file_bytes = header.header_bytes + packed.size();
     Checksum checksum;
     checksum.update(header);
-    for (const auto& section : sections) checksum.update(section.bytes, section.size);
+    checksum.update(tail.data(), tail.size());
+    checksum.update(packed.data(), packed.size());
     header.checksum = checksum.value();
 
-    AtomicFile file(path);
     file.write(&header, sizeof header);
-    for (const auto& section : sections) file.write(section.bytes, section.size);
+    file.write(tail.data(), tail.size());
+    file.write(packed.data(), packed.size());
     file.commit();
 }
 
 std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rbe"));
     if (!file) refuse(path, fmt::format("cannot be opened: {}", std::strerror(errno)));
-    std::error_code size_error;
-    const std::uint64_t actual_bytes = std::filesystem::file_size(path, size_error);
-    if (size_error) refuse(path, fmt::format("cannot be read: {}", size_error.message()));
+    // Of the file that is open: a render may put another in its place meanwhile.
+    struct stat status {};
+    if (::fstat(::fileno(file.get()), &status) != 0) refuse(path, fmt::format("cannot be read: {}", std::strerror(errno)));
+    if (S_ISDIR(status.st_mode)) refuse(path, "is a directory");
+    const auto actual_bytes = static_cast<std::uint64_t>(status.st_size);
     if (actual_bytes == 0) refuse(path, "is empty, not a crt film");
 
     Header header{};
     readExactly(file.get(), path, &header, std::min<std::uint64_t>(actual_bytes, sizeof header));
     if (std::memcmp(header.magic.data(), kMagic.data(), std::min<std::uint64_t>(actual_bytes, kMagic.size())) != 0)
         refuse(path, "is not a crt film: it does not begin with the mark of one");
-    if (actual_bytes >= 12 && header.format_version != kCheckpointVersion)
-        refuse(path, fmt::format("is a crt film of format {}; this crt reads format {}", header.format_version, kCheckpointVersion));
+    if (actual_bytes >= 12 && header.format_version != kCheckpointVersion && header.format_version != kCheckpointVersionUnpacked)
+        refuse(path, fmt::format("is a crt film of format {}; this crt reads formats {} and {}", header.format_version,
+                                 kCheckpointVersionUnpacked, kCheckpointVersion));
     if (actual_bytes < sizeof header)
         refuse(path, fmt::format("is truncated: it has {} bytes and its header alone takes {}", actual_bytes, sizeof header));
     // Sizes before anything is allocated: a damaged width must not ask for a terabyte.
     if (actual_bytes < header.file_bytes)
         refuse(path, fmt::format("is truncated: it has {} of {} bytes", actual_bytes, header.file_bytes));
-    if (actual_bytes > header.file_bytes || header.file_bytes != describedBytes(header) || header.version_bytes > kVersionBytesMax ||
-        header.range_count > kRangesMax ||
-        header.header_bytes != sizeof(Header) + header.range_count * std::uint64_t{16} + roundUp8(header.version_bytes))
+    if (actual_bytes > header.file_bytes || header.version_bytes > kVersionBytesMax || header.range_count > kRangesMax || !sizesFit(header))
         refuse(path, "is damaged: its header contradicts its size");
     // A side of no pixels makes any other side fit the size; walking four thousand million empty rows would take a minute.
     if (std::min(header.width, header.height) < 1 || std::max(header.width, header.height) > kSideMax)
@@ -197,10 +195,19 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     readExactly(file.get(), path, tail.data(), tail.size());
     checksum.update(tail.data(), tail.size());
 
-    // The shape is used before the checksum is known; Film refuses one that cannot be.
+    std::vector<unsigned char> packed;
+    if (header.format_version > kCheckpointVersionUnpacked) {
+        packed.resize(header.file_bytes - header.header_bytes);
+        readExactly(file.get(), path, packed.data(), packed.size());
+        checksum.update(packed.data(), packed.size());
+        if (checksum.value() != header.checksum) refuse(path, kBadChecksum);
+    }
+
+    // The shape of an unpacked film is used before the checksum is known; Film refuses one that cannot be.
     const auto make_film = [&] {
         try {
-            return Film({header.width, header.height, header.channels, header.aovs});
+            const bool squares = header.format_version == kCheckpointVersionUnpacked;
+            return Film({header.width, header.height, header.channels, header.aovs | (squares ? kAovSquares : 0u)});
         } catch (const Error&) {
             refuse(path, kBadChecksum);
         }
@@ -212,12 +219,16 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         checksum.update(values.data(), bytes);
         return bytes;
     };
-    read_section(film.sums);
-    read_section(film.counts);
-    const std::size_t primitive_bytes = read_section(film.primitives);
-    std::vector<unsigned char> padding(roundUp8(primitive_bytes) - primitive_bytes);
-    read_section(padding);
-    if (checksum.value() != header.checksum) refuse(path, kBadChecksum);
+    if (header.format_version > kCheckpointVersionUnpacked) {
+        if (!unpackFilm(packed, film)) refuse(path, "is damaged: its film cannot be unpacked");
+    } else {
+        read_section(film.sums);
+        read_section(film.counts);
+        const std::size_t primitive_bytes = read_section(film.primitives);
+        std::vector<unsigned char> padding(roundUp8(primitive_bytes) - primitive_bytes);
+        read_section(padding);
+        if (checksum.value() != header.checksum) refuse(path, kBadChecksum);
+    }
 
     // From here on the file is what a crt wrote; what is checked still is what could only be a bug of that crt.
     FilmIdentity identity{

@@ -1,10 +1,10 @@
 /// What surrounds the checkpoint files of film.h (writeCheckpoint, readCheckpoint): refusing films of another scene, and merging.
 ///
-/// A .crtfilm file, little-endian, every section a multiple of 8 bytes:
+/// A .crtfilm file, little-endian:
 ///
 ///     0   magic          89 "CRTF" 0D 0A 1A    (8 bytes; damaged by any transfer that is not binary)
 ///     8   u32            format version, kCheckpointVersion
-///     12  u32            header size in bytes: where the sums begin
+///     12  u32            header size in bytes: where the film begins
 ///     16  u64            file size in bytes
 ///     24  u64            XXH3-64 of the whole file without these 8 bytes
 ///     32  u32 × 4        width, height, channels, AOV mask
@@ -15,9 +15,13 @@
 ///     92  u32            0
 ///     96  u64 × 2 each   sample ranges, first and end
 ///         char[]         crt version, zero-padded to 8
-///         f64 × 2 each   sums, hi and lo, [height][width][channels]
-///         u64 each       counts, [height][width]
-///         u32 each       primitive ids, [height][width], zero-padded to 8; only when the AOV mask has them
+///         bytes          to the end of the file: the film, packed (film_pack.h). Its sections are
+///             f64 × 2 each   sums, hi and lo, [height][width][channels]
+///             u64 each       counts, [height][width]
+///             u32 each       primitive ids, [height][width]; only when the AOV mask has them
+///
+/// Version 2, which is read still, has these sections as they are, the last zero-padded to 8 bytes, and its
+/// films hold squares (kernel/channels.h) without a bit that says so.
 #pragma once
 
 #include "film.h"
@@ -30,6 +34,8 @@
 namespace crt {
 
 inline constexpr std::uint32_t kCheckpointVersion = 3;
+/// The last version whose films are not packed.
+inline constexpr std::uint32_t kCheckpointVersionUnpacked = 2;
 inline constexpr const char* kCheckpointExtension = ".crtfilm";
 
 /// Refuses to go on from `path` when it holds other bits or another scene than `expected`: crt::Error(Usage)

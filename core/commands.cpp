@@ -9,11 +9,13 @@
 #include "log.h"
 #include "outputs.h"
 #include "progress.h"
+#include "stage.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 namespace crt {
@@ -98,8 +100,10 @@ std::string acceleratorText(const CompiledScene& compiled) {
 }
 
 void showScene(const SceneRequest& what) {
+    std::optional<StageProgress> progress(std::in_place, ProgressMode::Auto);
     const Scene scene = loadScene(what);
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
+    progress.reset();
     fmt::print("{}{}\n", what.file, scene.title.empty() ? "" : ": " + scene.title);
     row("film", filmText(scene));
     row("camera", cameraText(scene.camera));

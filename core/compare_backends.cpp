@@ -56,7 +56,7 @@ public:
 
     Film render(std::uint64_t seed, std::uint64_t samples) {
         scene_.sampler.seed = seed;
-        const CompiledScene compiled = compileScene(scene_, 0);
+        const CompiledScene compiled = compileScene(scene_, 0, integrator_.compileOptions());
         integrator_.setScene(compiled);
         const auto show = [this, samples](double done) {
             progress_.show(done, samples);

@@ -8,8 +8,10 @@
 #include "kernel/layout.h"
 #include "kernel/surface.h"
 #include "log.h"
+#include "near_scene.h"
 #include "near_surfaces.h"
 #include "scene_identity.h"
+#include "stage.h"
 #include "vec3d.h"
 
 #include <algorithm>
@@ -62,13 +64,14 @@ private:
 /// Everything between Scene and blob, step by step in the order of the calls in compileScene.
 class Compiler {
 public:
-    Compiler(const Scene& scene, std::uint32_t aovs) : scene_(scene) {
+    Compiler(const Scene& scene, std::uint32_t aovs, const CompileOptions& options) : scene_(scene), options_(options) {
         header_.magic = CRT_SCENE_MAGIC;
         out_.aovs = aovs & kAovsOfFirstHits;
         out_.aovs |= replicatesOf(scene_) > 1 ? kAovReplicates : kAovSquares;
     }
 
     CompiledScene run() {
+        const Stage stage("compiling the scene");
         const auto start = std::chrono::steady_clock::now();
         flatten();
         chooseAccelerator();
@@ -110,6 +113,15 @@ private:
         if (flat_.triangles.empty() || scene_.integrator.type == IntegratorType::Aabb) header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;
     }
 
+    /// Whether the backend finds all hits itself: rays start at the camera or at a surface, and surfaces lie within 1.
+    bool backendFindsHits() const {
+        double farthest = 1;
+        for (std::size_t k = 0; k < 3; ++k)
+            farthest = std::max(farthest, std::abs(scene_.camera.position[k] - out_.centre[k]) * scale_ + scene_.camera.aperture_radius * scale_);
+        // A little less, for what is rounded on the way to the ray.
+        return farthest < options_.accelerator_reach * (1 - 1e-6);
+    }
+
     TriangleBounds boundsOf(std::size_t i) const {
         TriangleBounds b{};
         for (std::size_t k = 0; k < 3; ++k) {
@@ -124,16 +136,19 @@ private:
         const std::size_t count = flat_.triangles.size();
         std::vector<std::uint32_t> order(count);
         for (std::size_t i = 0; i < count; ++i) order[i] = static_cast<std::uint32_t>(i);
-        if (header_.accelerator == CRT_ACCELERATOR_BVH) {
+        out_.without_nodes = header_.accelerator == CRT_ACCELERATOR_BVH && backendFindsHits();
+        if (header_.accelerator == CRT_ACCELERATOR_BVH && !out_.without_nodes) {
             const auto start = std::chrono::steady_clock::now();
             std::vector<TriangleBounds> bounds(count);
             for (std::size_t i = 0; i < count; ++i) bounds[i] = boundsOf(i);
             Bvh bvh = buildBvh(bounds, CRT_BOX_PADDING);
             order = std::move(bvh.order);
+            reserveBlob(bvh.nodes.size());
             header_.nodes = blob_.append(bvh.nodes);
             out_.nodes = bvh.nodes.size();
             out_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         }
+        if (out_.nodes == 0) reserveBlob(0);
         slot_of_.resize(count);
         std::vector<kernel::CrtTriangle> slots(count);
         for (std::size_t slot = 0; slot < count; ++slot) {
@@ -158,6 +173,16 @@ private:
             occluders_ = occluders.size();
         }
         writeObjects();
+    }
+
+    /// For what grows with the number of triangles, and some tables.
+    void reserveBlob(std::size_t nodes) {
+        constexpr std::size_t kTables = std::size_t{1} << 20;
+        std::size_t bytes = kTables + nodes * sizeof(kernel::CrtNode4);
+        for (const FlatTriangle& t : flat_.triangles)
+            bytes += sizeof(kernel::CrtTriangle) + sizeof(kernel::CrtFace) + sizeof(kernel::CrtPrimitive) +
+                     (t.smooth ? sizeof(kernel::CrtNormals) : 0);
+        blob_.reserve(bytes);
     }
 
     std::vector<kernel::CrtTriangle8> blocksOf(const std::vector<std::uint32_t>& slots) const {
@@ -519,6 +544,7 @@ private:
             left_out("BVH", scene_.integrator.accelerator == Accelerator::Auto
                                 ? fmt::format("{} triangles: testing all of them is faster (up to {})", flat_.triangles.size(), kBruteForceTriangles)
                                 : std::string("integrator.accelerator asks for another"));
+        if (out_.without_nodes) left_out("BVH", "the backend builds an acceleration structure of its own");
         if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders_ < flat_.triangles.size())
             left_out("shadow tests", fmt::format("{} of {} triangles have the whole scene on one side and cannot come between",
                                                  flat_.triangles.size() - occluders_, flat_.triangles.size()));
@@ -542,15 +568,14 @@ private:
     }
 
     void finish() {
-        const std::vector<unsigned char> bytes = blob_.finish(header_);
-        out_.size_bytes = bytes.size();
+        out_.blob = blob_.finish(header_);
+        out_.size_bytes = out_.blob.size() * sizeof(CompiledScene::Line);
         out_.triangles = flat_.triangles.size();
-        out_.blob.resize(bytes.size() / sizeof(CompiledScene::Line));
-        std::memcpy(out_.blob.data(), bytes.data(), bytes.size());
         out_.hash = sceneIdentity(out_.data(), flat_.positions);
     }
 
     const Scene& scene_;
+    const CompileOptions options_;
     CompiledScene out_;
     kernel::CrtScene header_{};
     BlobWriter blob_;
@@ -577,15 +602,19 @@ std::string objectOf(const Scene& scene, const CompiledScene& compiled, std::uin
     return "a surface";
 }
 
-CompiledScene compileScene(const Scene& scene, std::uint32_t aovs) {
-    CompiledScene compiled = Compiler(scene, aovs).run();
-    if (scene.integrator.type == IntegratorType::Path)
-        if (const std::optional<CoplanarLight> found = findCoplanarLight(compiled))
-            logWarning("{} lies in the plane of {} and overlaps it: rounding decides which of them is seen, and the image is wrong there; move the lamp {:.3g} "
+CompiledScene compileScene(const Scene& scene, std::uint32_t aovs, const CompileOptions& options) {
+    CompiledScene compiled = Compiler(scene, aovs, options).run();
+    if (scene.integrator.type != IntegratorType::Path) return compiled;
+    const Stage stage("looking for surfaces too near to each other");
+    std::optional<CompiledScene> reduced;
+    if (compiled.without_nodes) reduced = nearScene(compiled);
+    const CompiledScene& searched = reduced ? *reduced : compiled;
+    if (const std::optional<CoplanarLight> found = findCoplanarLight(searched))
+        logWarning("{} lies in the plane of {} and overlaps it: rounding decides which of them is seen, and the image is wrong there; move the lamp {:.3g} "
                        "or more towards the side that it lights, or cut a hole for it",
                        objectOf(scene, compiled, found->light), objectOf(scene, compiled, found->surface), found->least_gap);
-    if (scene.integrator.type == IntegratorType::Path && scene.integrator.max_depth > 0)
-        if (const NearSurfaces found = findNearSurfaces(compiled); found.near > 0)
+    if (scene.integrator.max_depth > 0)
+        if (const NearSurfaces found = findNearSurfaces(searched); found.near > 0)
             logWarning("{} of {} triangles looked at have another surface nearer than single precision can tell for triangles of this size (up to {:.3g} "
                        "apart): light between them may be lost; divide the larger triangles there, or move the surfaces apart or together",
                        found.near, found.asked, found.nearest_clearance);

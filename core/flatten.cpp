@@ -2,6 +2,7 @@
 
 #include "error.h"
 #include "log.h"
+#include "stage.h"
 #include "vec3d.h"
 
 #include <algorithm>
@@ -25,7 +26,7 @@ Matrix3d cofactors(const Matrix4d& m) {
 }
 
 /// Appends the mesh of an object as one of its transforms places it.
-void place(const Object& object, const Mesh& mesh, const Matrix4d& transform, FlatScene& flat) {
+void place(const Object& object, const Mesh& mesh, const Matrix4d& transform, FlatScene& flat, Stage& stage) {
     const Matrix3d normal_matrix = cofactors(transform);
     const Vec3d first_row{transform[0], transform[1], transform[2]};
     // A mirroring transform turns the order of vertices round; turning it back keeps the outside outside.
@@ -52,6 +53,7 @@ void place(const Object& object, const Mesh& mesh, const Matrix4d& transform, Fl
             }
         }
         flat.triangles.push_back(t);
+        stage.at(static_cast<double>(flat.triangles.size()));
     }
     if (flat.triangles.size() >= kMostTriangles) throw Error(ErrorKind::Scene, "the scene is too large: more than 268 million triangles");
     ++flat.placements;
@@ -126,8 +128,12 @@ void normaliseLengths(FlatScene& flat) {
 
 FlatScene flattenScene(const Scene& scene) {
     FlatScene flat;
+    double count = 0;
     for (const Object& object : scene.objects)
-        for (const Matrix4d& transform : object.transforms) place(object, scene.meshes[object.mesh], transform, flat);
+        count += static_cast<double>(object.transforms.size()) * static_cast<double>(scene.meshes[object.mesh].triangles.size());
+    Stage stage("placing triangles", count);
+    for (const Object& object : scene.objects)
+        for (const Matrix4d& transform : object.transforms) place(object, scene.meshes[object.mesh], transform, flat, stage);
     normaliseLengths(flat);
     return flat;
 }

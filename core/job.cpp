@@ -3,18 +3,21 @@
 #include "atomic_file.h"
 #include "backend/loader.h"
 #include "checkpoint.h"
+#include "checkpoint_writer.h"
 #include "compile.h"
 #include "interrupt.h"
 #include "log.h"
 #include "outputs.h"
 #include "report.h"
 #include "sampling.h"
+#include "stage.h"
 
 #include <fmt/format.h>
 
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <set>
 
 namespace crt {
@@ -75,11 +78,20 @@ void requireReplicates(Scene& scene) {
     scene.sampler.replicates = 2;
 }
 
+/// What an earlier run left, with what it was rendered from.
+using EarlierFilm = std::optional<std::pair<Film, FilmIdentity>>;
+
+EarlierFilm readEarlierFilm(const Files& files) {
+    if (files.resume.empty()) return std::nullopt;
+    const Stage stage("reading " + files.resume);
+    return readCheckpoint(files.resume);
+}
+
 /// An empty film, or what an earlier run of the same scene left; then `identity` names its version too.
-Film openFilm(const Files& files, const CompiledScene& compiled, FilmIdentity& identity) {
+Film openFilm(const Files& files, const EarlierFilm& there, const CompiledScene& compiled, FilmIdentity& identity) {
     Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
-    if (files.resume.empty()) return film;
-    const auto [earlier, found] = readCheckpoint(files.resume);
+    if (!there) return film;
+    const auto& [earlier, found] = *there;
     requireSameScene(files.resume, found, identity);
     film.add(earlier);
     identity.version = joinVersions(found.version, identity.version);
@@ -87,8 +99,8 @@ Film openFilm(const Files& files, const CompiledScene& compiled, FilmIdentity& i
     return film;
 }
 
-/// Which of the samples asked for the film lacks, and when to stop before they are all there.
-SamplingPlan planSamples(const Job& job, const Scene& scene, const Film& film, const Files& files) {
+/// Which of the samples asked for are not there, and when to stop before they are all there.
+SamplingPlan planSamples(const Job& job, const Scene& scene, const SampleRanges& there, const Files& files) {
     SamplingPlan plan;
     plan.time_limit_seconds = job.time_limit_seconds;
     plan.target_error = job.target_error;
@@ -97,16 +109,16 @@ SamplingPlan planSamples(const Job& job, const Scene& scene, const Film& film, c
     if (files.checkpoint_wanted) plan.checkpoint_interval_seconds = job.checkpoint_interval_seconds;
     if (job.samples) {
         // An exact range says exactly which samples are new; those that the checkpoint has already would count twice.
-        SampleRanges together = film.samples;
+        SampleRanges together = there;
         together.add(*job.samples);
         plan.ranges = {*job.samples};
         plan.target = together.count();
         return plan;
     }
     const bool endless = !job.spp && (job.time_limit_seconds > 0 || job.target_error > 0);
-    plan.ranges = missingSamples({0, endless ? kEndlessSamples : job.spp.value_or(scene.sampler.samples)}, film.samples);
+    plan.ranges = missingSamples({0, endless ? kEndlessSamples : job.spp.value_or(scene.sampler.samples)}, there);
     if (endless) return plan;
-    plan.target = film.samples.count();
+    plan.target = there.count();
     for (const auto& [first, end] : plan.ranges) plan.target += end - first;
     return plan;
 }
@@ -130,26 +142,55 @@ void askForReport(Integrator& integrator, RunFacts& facts) {
     }
 }
 
-/// CompiledScene → Film, by a backend. Returns what failed while sampling, if anything did; the film holds what there is.
-std::optional<Error> renderSamples(const Job& job, const CompiledScene& compiled, const SamplingPlan& plan, Film& film,
-                                   const std::function<void()>& save_checkpoint, RunFacts& facts) {
+/// The backend that is asked for, when it has something to do.
+std::optional<LoadedBackend> openBackendFor(const Job& job, const SamplingPlan& plan, RunFacts& facts) {
+    if (plan.ranges.empty()) return std::nullopt;
+    const Stage stage("opening the backend");
     const Stopwatch opening;
     const LoadedBackend backend = openBackend(job.backend);
+    facts.open_seconds = opening.seconds();
+    return backend;
+}
+
+/// Nothing is built for a backend that brings it, nor where none will render.
+CompileOptions compileOptionsFor(const std::optional<LoadedBackend>& backend) {
+    constexpr double kNobodyTraces = std::numeric_limits<double>::infinity();
+    return backend ? compileOptionsFor(*backend) : CompileOptions{.accelerator_reach = kNobodyTraces};
+}
+
+/// What waits for the first sample, and what begins with it.
+struct Start {
+    std::optional<StageProgress> stages;      ///< Shown until then.
+    std::optional<InterruptGuard> interrupt;  ///< From then on there is something to lose: a signal no longer just ends the process.
+};
+
+/// CompiledScene → Film, by a backend. Returns what failed while sampling, if anything did; the film holds what there is.
+std::optional<Error> renderSamples(const Job& job, const LoadedBackend& backend, const CompiledScene& compiled, const SamplingPlan& plan,
+                                   Film& film, Start& start, const std::function<void()>& save_checkpoint, RunFacts& facts) {
+    std::optional<Stage> stage(std::in_place, "opening the device");
+    const Stopwatch opening;
     const std::vector<CrtDevice> devices = probeDevices(backend);  // Says better than a failing create() why there is none.
     Integrator integrator(backend, job.integrator);
-    facts.open_seconds = opening.seconds();
+    facts.open_seconds += opening.seconds();
     facts.backend_name = backend.name;
     facts.backend_path = backend.path;
     facts.backend_version = textOrEmpty(backend.table->version);
     facts.backend_build = textOrEmpty(backend.table->build);
 
+    stage.emplace("preparing the scene for " + backend.name);
     const Stopwatch preparing;
-    integrator.setScene(compiled);
+    integrator.setScene(compiled, [&](double done) {
+        stage->setAmount(1);
+        stage->at(done);
+    });
     facts.prepare_seconds = preparing.seconds();
+    stage.reset();
+    start.stages.reset();
     askForReport(integrator, facts);
     facts.driver = driverOf(devices, arrayText(facts.backend.device));
     logInfo("{} on {}", backend.name, arrayText(facts.backend.device));
 
+    start.interrupt.emplace();
     SamplingResult result;
     {
         Progress progress(job.progress);
@@ -265,6 +306,7 @@ void tellTarget(const RunFacts& facts) {
 }  // namespace
 
 Scene loadScene(const SceneRequest& request) {
+    const Stage stage("reading " + request.file);
     Scene scene = loadScene(request.file, request.overrides);
     if (request.seed) scene.sampler.seed = *request.seed;
     if (request.crop) {
@@ -282,34 +324,37 @@ int runJob(const Job& job) {
     RunFacts facts;
     facts.command = job.command;
 
+    Start start;
+    start.stages.emplace(job.progress);
+
     // What is to be seen, and where it is to be written.
     Scene scene = loadScene(job.scene);
     if (job.target_error > 0) requireReplicates(scene);
     const Files files = planFiles(job, scene);
 
+    // What is there already, and what is missing.
+    EarlierFilm earlier = readEarlierFilm(files);
+    SamplingPlan plan = planSamples(job, scene, earlier ? earlier->first.samples : SampleRanges(), files);
+    facts.target_samples = plan.target;
+    const std::optional<LoadedBackend> backend = openBackendFor(job, plan, facts);
+
     // What it takes to see it: one flat blob, and the mask of what it needs.
-    const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
+    const CompiledScene compiled = compileScene(scene, requestedAovs(scene), compileOptionsFor(backend));
     FilmIdentity identity{compiled.hash, CRT_VERSION};
     logDebug("scene {} needs {}", compiled.hash, featureNames(compiled.features));
 
-    // What is there already, and what is missing.
-    Film film = openFilm(files, compiled, identity);
+    Film film = openFilm(files, earlier, compiled, identity);
+    earlier.reset();
     facts.resumed_samples = film.samples.count();
-    const SamplingPlan plan = planSamples(job, scene, film, files);
-    facts.target_samples = plan.target;
-
-    // From here on there is something to lose, so a signal no longer just ends the process.
-    const InterruptGuard interrupt;
-    const auto saveCheckpoint = [&] {
-        try {
-            writeCheckpoint(files.checkpoint, film, identity);
-        } catch (const Error& error) {
-            logWarning("{}; rendering goes on, and so do the attempts", error.what());
-        }
-    };
+    CheckpointWriter checkpoint(files.checkpoint);
+    const auto saveCheckpoint = [&] { checkpoint.save(film, identity); };
+    plan.checkpoint_possible = [&] { return checkpoint.idle(); };
 
     // Samples, from a backend into the film. None is opened when none is missing.
-    FirstFailure failure(plan.ranges.empty() ? std::nullopt : renderSamples(job, compiled, plan, film, saveCheckpoint, facts));
+    FirstFailure failure(backend ? renderSamples(job, *backend, compiled, plan, film, start, saveCheckpoint, facts) : std::nullopt);
+    start.stages.reset();
+    if (!start.interrupt) start.interrupt.emplace();
+    checkpoint.finish();
     facts.samples = film.samples;
     facts.invalid_samples = film.invalidSamples();
     const bool independent = scene.sampler.type != SamplerType::Sobol;

@@ -250,9 +250,14 @@ private:
         reader_.option(*render, "-t,--threads", "N", "threads of the processor; 0 for all",
                        [this](const std::string& text) { job_.integrator.threads = smallCount(text, "--threads", 0); })
             ->group(group);
-        reader_.option(*render, "--kernel", "lean|full", "lean leaves out what the scene does not need; same bits",
-                       [this](const std::string& text) { job_.integrator.kernel = text == "full" ? CRT_KERNEL_FULL : CRT_KERNEL_LEAN; })
-            ->check(oneOf({"lean", "full"}))
+        reader_.option(*render, "--kernel", "KIND",
+                       "lean: only what the scene needs; full; lean-only: waits for the compiler; same bits",
+                       [this](const std::string& text) {
+                           job_.integrator.kernel = text == "full"        ? CRT_KERNEL_FULL
+                                                    : text == "lean-only" ? CRT_KERNEL_LEAN_ONLY
+                                                                          : CRT_KERNEL_LEAN;
+                       })
+            ->check(oneOf({"lean", "full", "lean-only"}))
             ->group(group);
         reader_.option(*render, "--tile", "N", "pixels along the side of a tile; never changes the image",
                        [this](const std::string& text) { job_.integrator.tile_size = smallCount(text, "--tile", 1); })

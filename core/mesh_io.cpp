@@ -6,6 +6,7 @@
 #include "mesh_format.h"
 #include "obj_reader.h"
 #include "obj_text.h"
+#include "stage.h"
 #include "triangulate.h"
 #include "vec3d.h"
 
@@ -14,7 +15,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -60,7 +63,13 @@ public:
         normaliseNormals();
         if (options_.use_mtl) files_ = readMaterialFiles(obj_, path_);
         material_index_.assign(obj_.material_names.size(), -1);
-        for (const ObjFace& face : obj_.faces) add(face);
+        Stage stage("making triangles of " + std::filesystem::path(path_).filename().string(),
+                    static_cast<double>(obj_.faces.size()));
+        double done = 0;
+        for (const ObjFace& face : obj_.faces) {
+            add(face);
+            stage.at(++done);
+        }
         if (out_.mesh.triangles.empty()) failForWantOfFaces();
         finish();
         return std::move(out_);
@@ -271,10 +280,12 @@ private:
 }  // namespace
 
 LoadedMesh loadObj(const std::string& path, const ObjOptions& options) {
+    std::optional<Stage> stage(std::in_place, "reading " + std::filesystem::path(path).filename().string());
     const std::string text = readTextFile(path, "mesh", {path});
     if (const std::string format = otherFormat(text); !format.empty())
         fail(fmt::format("this is {}; crt reads OBJ", format), path);
-    ObjContents obj = readObj(text, path);
+    ObjContents obj = readObj(text, path, *stage);
+    stage.reset();
     if (obj.faces.empty() && looksLikeMtl(text))
         fail("this is a material file (MTL); name the OBJ that uses it", path);
     return MeshBuilder(std::move(obj), path, options).build();

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 namespace crt {
 
@@ -14,17 +15,23 @@ struct NearSurfaces {
     double nearest_clearance = 0;  ///< The largest clearance that was too large for its neighbour, in the author's units.
 };
 
+/// Ids of the triangles that findNearSurfaces asks about, in its order.
+std::vector<std::uint32_t> askedTriangles(std::uint64_t triangles);
+/// findCoplanarLight asks about emitters whose numbers are multiples of this.
+std::uint64_t askedEmitterStep(std::uint64_t emitters);
+
 /// A lamp in the plane of another surface, which it overlaps: rays meet both at one distance but for rounding, and see now one, now the other.
 struct CoplanarLight {
     std::uint32_t light = 0, surface = 0;  ///< Primitive ids of one such pair.
     double least_gap = 0;                  ///< So far apart, in the author's units, they would be told apart.
 };
 
-/// The first such pair, by the order of emitters; nothing where there is none. Of very many emitters an even choice is looked at.
+/// One such pair; nothing where there is none. Of very many emitters, or of many on one spot, an even choice is looked at: the time is
+/// bounded, whatever the scene.
 std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene);
 
 /// From the middle of each triangle along its normal, to both sides. Surfaces within a few ulp of each other touch, as a box does that stands
-/// on a floor; that is what an author means, and is safe.
+/// on a floor; that is what an author means, and is safe. The time is bounded as above; `asked` says how many it was enough for.
 NearSurfaces findNearSurfaces(const CompiledScene& scene);
 
 }  // namespace crt

@@ -21,10 +21,16 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 class ObjReader {
 public:
-    ObjReader(std::string_view text, const std::string& path) : lines_(text), path_(path) {}
+    ObjReader(std::string_view text, const std::string& path, Stage& stage)
+        : lines_(text), path_(path), stage_(stage), bytes_(text.size()) {
+        stage_.setAmount(static_cast<double>(bytes_));
+    }
 
     ObjContents read() {
-        while (lines_.next()) statement(lines_.keyword());
+        while (lines_.next()) {
+            statement(lines_.keyword());
+            stage_.at(static_cast<double>(bytes_ - lines_.bytesLeft()));
+        }
         return std::move(obj_);
     }
 
@@ -145,6 +151,8 @@ private:
 
     TextLines lines_;
     const std::string& path_;
+    Stage& stage_;
+    std::size_t bytes_;
     ObjContents obj_;
     std::set<std::string> libraries_;
     std::int32_t material_ = -1;
@@ -153,6 +161,8 @@ private:
 
 }  // namespace
 
-ObjContents readObj(std::string_view text, const std::string& path) { return ObjReader(text, path).read(); }
+ObjContents readObj(std::string_view text, const std::string& path, Stage& stage) {
+    return ObjReader(text, path, stage).read();
+}
 
 }  // namespace crt

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "spectra.h"
+#include "stage.h"
 
 #include <cstdint>
 #include <string>
@@ -55,8 +56,8 @@ struct ObjContents {
     bool vertex_colors = false;
 };
 
-/// Reads an OBJ. Numbers are correctly rounded. Throws crt::Error(Scene) with file:line for a corner of a
-/// face that names no vertex.
-ObjContents readObj(std::string_view text, const std::string& path);
+/// Reads an OBJ and says in `stage` how far it is. Numbers are correctly rounded. Throws crt::Error(Scene)
+/// with file:line for a corner of a face that names no vertex.
+ObjContents readObj(std::string_view text, const std::string& path, Stage& stage);
 
 }  // namespace crt

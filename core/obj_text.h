@@ -36,6 +36,8 @@ public:
     /// Goes to the next line that is neither blank nor a comment; false at the end of the text.
     bool next();
 
+    /// Bytes of the text that are still to come.
+    std::size_t bytesLeft() const { return rest_.size(); }
     /// Of the current line, counted from 1; the first of those joined.
     int number() const { return number_; }
     /// Its first word.

@@ -130,8 +130,12 @@ std::string bytesText(double bytes) {
 }
 
 std::string progressText(const ProgressState& state) {
+    if (!state.label.empty() && state.target == 0) return fmt::format("{}  {}", state.label, clockText(state.elapsed_seconds));
+    // What is left cannot be told from nothing.
+    if (!state.label.empty() && state.secondsLeft() < 0)
+        return fmt::format("{:3.0f} %  {}", std::floor(state.fraction() * 100), state.label);
     if (!state.label.empty())
-        return fmt::format("{:3.0f} %  {}  {} left", std::floor(state.fraction() * 100), state.label, clockText(std::max(0.0, state.secondsLeft())));
+        return fmt::format("{:3.0f} %  {}  {} left", std::floor(state.fraction() * 100), state.label, clockText(state.secondsLeft()));
     std::string text = fmt::format("{:3.0f} %  {:.0f}", std::floor(state.fraction() * 100), std::floor(state.samples));
     text += state.target > 0 ? fmt::format("/{} spp", state.target) : std::string(" spp");
     if (state.pathsPerSecond() > 0) text += "  " + rateText(state.pathsPerSecond(), "paths/s");
@@ -141,13 +145,20 @@ std::string progressText(const ProgressState& state) {
     return text;
 }
 
+std::string progressLine(const ProgressState& state) {
+    std::string text = progressText(state);
+    text.erase(0, text.find_first_not_of(' '));
+    return text;
+}
+
 std::string progressBar(const ProgressState& state, int columns) {
     const std::string text = progressText(state);
     // One column stays free: a character in the last one makes some terminals wrap, and the line could not be cleared.
     const int room = columns - 1 - static_cast<int>(text.size());
     if (room < 0) return text.substr(0, static_cast<std::size_t>(std::max(0, columns - 1)));
     const int cells = std::min(room - 3, 40);  // Two brackets and a space.
-    if (cells < 6) return text;
+    const bool unknown = !state.label.empty() && state.target == 0;
+    if (cells < 6 || unknown) return text;
     const auto full = static_cast<std::size_t>(std::floor(state.fraction() * cells));
     std::string bar(static_cast<std::size_t>(cells), ' ');
     std::fill_n(bar.begin(), full, '=');
@@ -174,9 +185,7 @@ void Progress::update(const ProgressState& state) {
     if (mode_ == ProgressMode::Lines) {
         if (now - shown_at_ < kLineInterval) return;
         shown_at_ = now;
-        std::string text = progressText(state);
-        text.erase(0, text.find_first_not_of(' '));  // The bar's alignment has no place in a log.
-        logInfo("{}", text);
+        logInfo("{}", progressLine(state));
         return;
     }
     if (!text_.empty() && now - shown_at_ < kBarInterval) return;

@@ -25,7 +25,8 @@ struct ProgressState {
     double elapsed_seconds = 0;      ///< Of this run.
     double time_limit_seconds = 0;   ///< 0: none.
     std::uint64_t pixels = 0;        ///< Of the crop window.
-    std::string label;               ///< In place of the samples, for work that is not one render.
+    std::string label;               ///< In place of the samples, for work that is not one render; with target 0 how far
+                                     ///< it is cannot be told.
     double target_error = 0;         ///< half_width_95 to stop at; 0: none.
     std::optional<ErrorEstimate> error;  ///< Of the image so far.
 
@@ -39,6 +40,8 @@ struct ProgressState {
 
 /// "43 %  28/64 spp  12.3 Mpaths/s  0:42 left  error 1.90 % (1.86-1.94)  1 % at 54-110 spp, in 0:40-2:12"; a target error stands instead of 1 %.
 std::string progressText(const ProgressState& state);
+/// The same for a log: not aligned.
+std::string progressLine(const ProgressState& state);
 /// The same behind a bar, fitted into `columns`.
 std::string progressBar(const ProgressState& state, int columns);
 
@@ -68,6 +71,9 @@ public:
 
     /// Shows `state` if the last one has been shown long enough. Cheap otherwise. [any thread]
     void update(const ProgressState& state);
+
+    /// Never Auto.
+    ProgressMode mode() const { return mode_; }
 
 private:
     using Clock = std::chrono::steady_clock;

@@ -123,17 +123,24 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
                           {"kept", featureList(compiled.features)},
                           {"left_out", std::move(left_out)}};
 
+    // parse, build, compile, open, prepare, sampling, write and other make up the total. The others are parts of these, or ran
+    // beside them: kernel_compile, cache and upload of prepare, and render of sampling.
+    const double build = compiled.build_seconds + b.build_seconds;
+    const double prepare = facts.prepare_seconds - b.build_seconds;
+    const double told = scene.parse_seconds + build + compiled.compile_seconds + facts.open_seconds + prepare + facts.sampling_seconds +
+                        facts.write_seconds;
     report["seconds"] = {{"parse", scene.parse_seconds},
-                         {"build", compiled.build_seconds + b.build_seconds},
+                         {"build", build},
                          {"compile", compiled.compile_seconds},
                          {"open", facts.open_seconds},
-                         {"prepare", facts.prepare_seconds},
+                         {"prepare", prepare},
                          {"kernel_compile", b.compile_seconds},
                          {"cache", b.cache_seconds},
                          {"upload", b.upload_seconds},
                          {"render", render_seconds},
                          {"sampling", facts.sampling_seconds},
                          {"write", facts.write_seconds},
+                         {"other", facts.total_seconds - told},
                          {"total", facts.total_seconds}};
 
     Json ranges = Json::array();

@@ -31,7 +31,7 @@ struct RunFacts {
     CrtBackendReport backend{};
 
     double open_seconds = 0;      ///< Loading the plugin and opening its device.
-    double prepare_seconds = 0;   ///< set_scene: upload, acceleration structure and kernel as the backend reports them.
+    double prepare_seconds = 0;   ///< All of set_scene: upload, acceleration structure, kernel.
     double sampling_seconds = 0;  ///< From the first chunk to the last, reading the film included.
     double write_seconds = 0;     ///< Images and checkpoints.
     double total_seconds = 0;     ///< From the command line to this report.

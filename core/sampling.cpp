@@ -1,6 +1,7 @@
 #include "sampling.h"
 
 #include "interrupt.h"
+#include "log.h"
 
 #include <algorithm>
 #include <bit>
@@ -58,6 +59,13 @@ public:
     /// film = what was there before + what the device has by now.
     void read() {
         const Clock::time_point start = Clock::now();
+        copy();
+        estimate();
+        read_seconds_ = secondsSince(start);
+    }
+
+    /// The same without looking at the error: the device waits for no more than the copy.
+    void copy() {
         if (film_.samples.count() == 0) {
             integrator_.readFilm(film_);
         } else {
@@ -68,8 +76,6 @@ public:
             if (before_) next_->add(*before_);
             std::swap(film_, *next_);
         }
-        error_ = estimateError(film_, PixelSet::All, independent_samples_);
-        read_seconds_ = secondsSince(start);
         read_at_ = Clock::now();
         current_ = true;
     }
@@ -81,6 +87,11 @@ public:
     const std::optional<ErrorEstimate>& error() const { return error_; }
 
 private:
+    void estimate() {
+        error_ = estimateError(film_, PixelSet::All, independent_samples_);
+        read_at_ = Clock::now();
+    }
+
     Integrator& integrator_;
     Film& film_;
     bool independent_samples_;
@@ -169,11 +180,13 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
         ++result.chunks;
         reader.deviceAdvanced();
         if (reader.due()) reader.read();
-        if (plan.checkpoint_interval_seconds > 0 &&
-            std::chrono::duration<double>(Clock::now() - checkpoint_at).count() >= plan.checkpoint_interval_seconds) {
-            if (!reader.current()) reader.read();
+        if (plan.checkpoint_interval_seconds > 0 && secondsSince(checkpoint_at) >= plan.checkpoint_interval_seconds &&
+            (!plan.checkpoint_possible || plan.checkpoint_possible())) {
+            const Clock::time_point pause = Clock::now();
+            if (!reader.current()) reader.copy();
             checkpoint();
             checkpoint_at = Clock::now();
+            logDebug("checkpoint: the device waited for {:.3f} s", secondsSince(pause));
         }
         state.samples = state.start_samples + static_cast<double>(result.rendered);
         state.error = reader.error();

@@ -30,6 +30,7 @@ struct SamplingPlan {
     double target_error = 0;             ///< Stop when half_width_95 (error_estimate.h) is at most this; 0: never.
     std::uint64_t chunk = 0;             ///< Samples per chunk; 0: adaptive, at most half a second.
     double checkpoint_interval_seconds = 0;  ///< 0: never call `checkpoint`.
+    std::function<bool()> checkpoint_possible{};  ///< When set and false, a checkpoint that is due waits for the next chunk.
 };
 
 struct SamplingResult {

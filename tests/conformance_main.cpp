@@ -38,8 +38,8 @@ bool oneKernel() { return one_kernel; }
 
 crt::Film render(const crt::LoadedBackend& with, const crt::Scene& scene, const Run& run,
                  CrtBackendReport* report) {
-    const crt::CompiledScene compiled = crt::compileScene(scene, run.aovs);
     crt::Integrator integrator(with, run.options);
+    const crt::CompiledScene compiled = crt::compileScene(scene, run.aovs, integrator.compileOptions());
     integrator.setScene(compiled);
     crt::RenderRange range;
     range.first_sample = run.first_sample;

@@ -1,6 +1,8 @@
 // Checkpoint files: bit for bit there and back, and every kind of damage its own sentence.
 #include "catch.h"
 #include "checkpoint.h"
+#include "checkpoint_writer.h"
+#include "film_pack.h"
 #include "log.h"
 #include "scene_schema.h"
 #include "verify/temporary_folder.h"
@@ -12,6 +14,9 @@
 #include <fstream>
 #include <random>
 #include <unistd.h>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
 
 using namespace crt;
 using crt::verify::TemporaryFolder;
@@ -116,7 +121,8 @@ TEST_CASE("the format is what checkpoint.h says", "[checkpoint]") {
     const std::string bytes = slurp(path);
     const auto u32 = [&](std::size_t at) { std::uint32_t v; std::memcpy(&v, &bytes[at], 4); return v; };
     const auto u64 = [&](std::size_t at) { std::uint64_t v; std::memcpy(&v, &bytes[at], 8); return v; };
-    REQUIRE(bytes.size() == 96 + 16 + 8 + 4 * 16 + 8);
+    // Of one pixel every plane is one byte, behind its length.
+    REQUIRE(bytes.size() == 96 + 16 + 8 + (4 * 16 + 8) * 5);
     CHECK(bytes.substr(0, 8) == "\x89" "CRTF\r\n\x1a");
     CHECK(u32(8) == kCheckpointVersion);
     CHECK(u32(12) == 96 + 16 + 8);
@@ -128,8 +134,115 @@ TEST_CASE("the format is what checkpoint.h says", "[checkpoint]") {
     CHECK(u64(96) == 3);
     CHECK(u64(104) == 5);
     CHECK(bytes.substr(112, 8) == std::string("0.1.0\0\0\0", 8));
-    CHECK(u64(120) == 0x3ff8000000000000u);
-    CHECK(u64(184) == 2);
+    const auto plane = [&](std::size_t number) {
+        CHECK(u32(120 + number * 5) == 1);
+        return static_cast<unsigned char>(bytes[124 + number * 5]);
+    };
+    CHECK(plane(7) == 0x3f);  // 1.5 is 0x3ff8000000000000.
+    CHECK(plane(6) == 0xf8);
+    CHECK(plane(5) == 0);
+    CHECK(plane(64) == 2);
+}
+
+TEST_CASE("films of format 2, which were not packed, are read", "[checkpoint]") {
+    const TemporaryFolder directory;
+    const std::string path = directory / "part.crtfilm";
+    Film film = randomFilm(kShape, {3, 67}, 10);
+    writeCheckpoint(path, film, kIdentity);
+    std::string bytes = slurp(path).substr(0, 96 + 16 + 8);
+    const auto append = [&](const auto& values) {
+        bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));
+    };
+    append(film.sums);
+    append(film.counts);
+    append(film.primitives);
+    bytes.resize((bytes.size() + 7) / 8 * 8);
+    const std::uint32_t version = 2;
+    const std::uint64_t size = bytes.size();
+    std::memcpy(&bytes[8], &version, 4);
+    std::memcpy(&bytes[16], &size, 8);
+    const std::string hashed = bytes.substr(0, 24) + bytes.substr(32);
+    const std::uint64_t checksum = XXH3_64bits(hashed.data(), hashed.size());
+    std::memcpy(&bytes[24], &checksum, 8);
+    spit(path, bytes);
+    const auto [back, identity] = readCheckpoint(path);
+    CHECK(sameBits(back.sums, film.sums));
+    CHECK(back.counts == film.counts);
+    CHECK(back.primitives == film.primitives);
+    CHECK(back.samples.text() == "3-67");
+    bytes[200] = static_cast<char>(~bytes[200]);
+    spit(path, bytes);
+    CHECK_THROWS_WITH(readCheckpoint(path), Contains("checksum"));
+}
+
+TEST_CASE("films are packed without loss, in blocks, into less", "[checkpoint]") {
+    // Two whole blocks and a short one, of everything that there is: noise, what is the same everywhere, what hardly differs.
+    Film film({kPackedPixels / 64, 130, 4, kAovPrimitive});
+    std::mt19937_64 generator(1);
+    for (std::size_t i = 0; i < film.sums.size(); ++i) {
+        const std::uint64_t noise = generator();
+        if (i % 8 == 0) std::memcpy(&film.sums[i], &noise, sizeof noise);  // every bit pattern, NaN among them
+        if (i % 8 == 2) film.sums[i] = 1 + static_cast<double>(noise % 1024) / 1024;
+        if (i % 8 == 4) film.sums[i] = -0.0;
+    }
+    for (std::size_t i = 0; i < film.counts.size(); ++i) {
+        film.counts[i] = 64 - (i % 977 == 0);
+        film.primitives[i] = static_cast<std::uint32_t>(i / 50);
+    }
+    const std::vector<unsigned char> packed = packFilm(film);
+    const std::size_t raw = film.sums.size() * 8 + film.counts.size() * 8 + film.primitives.size() * 4;
+    CHECK(packed.size() < raw / 5);  // 8 of 76 bytes are noise, and 10 bits of another 8.
+    CHECK(leastPackedBytes(film.shape()) < packed.size());
+    Film back(film.shape());
+    REQUIRE(unpackFilm(packed, back));
+    CHECK(sameBits(back.sums, film.sums));
+    CHECK(back.counts == film.counts);
+    CHECK(back.primitives == film.primitives);
+
+    // What is not a film of this shape is refused, wherever it ends and whatever it holds.
+    for (std::size_t size = 0; size < packed.size(); size += 1 + packed.size() / 200)
+        CHECK_FALSE(unpackFilm(std::span(packed).first(size), back));
+    std::vector<unsigned char> longer = packed;
+    longer.push_back(0);
+    CHECK_FALSE(unpackFilm(longer, back));
+    for (int i = 0; i < 200; ++i) {
+        std::vector<unsigned char> damaged = packed;
+        damaged[generator() % damaged.size()] ^= static_cast<unsigned char>(1 + generator() % 255);
+        unpackFilm(damaged, back);  // to no harm
+    }
+    // A header that promises more than the file can hold is found out before anything is allocated.
+    CHECK(leastPackedBytes({65535, 65535, 100, 0}) > 1000000000);
+}
+
+TEST_CASE("a checkpoint is written beside the render, and its failures are told", "[checkpoint]") {
+    const TemporaryFolder directory;
+    const std::string path = directory / "part.crtfilm";
+    {
+        CheckpointWriter writer(path);
+        CHECK(writer.idle());
+        Film film = randomFilm(kShape, {0, 8}, 11);
+        const Film first = film;
+        writer.save(film, kIdentity);
+        film.sums.assign(film.sums.size(), 0.0);  // What happens to the film afterwards does not show.
+        writer.finish();
+        CHECK(writer.idle());
+        CHECK(sameBits(readCheckpoint(path).first.sums, first.sums));
+        writer.save(randomFilm(kShape, {0, 16}, 12), kIdentity);
+    }  // The last one is waited for.
+    CHECK(readCheckpoint(path).first.samples.count() == 16);
+
+    setLogLevel(LogLevel::Off);
+    const int warnings = warningCount();
+    CheckpointWriter nowhere(directory / "no/such/part.crtfilm");
+    nowhere.save(randomFilm(kShape, {0, 8}, 13), kIdentity);
+    nowhere.finish();
+    CHECK(warningCount() == warnings + 1);
+    nowhere.save(randomFilm(kShape, {0, 8}, 13), kIdentity);
+    nowhere.save(randomFilm(kShape, {0, 8}, 13), kIdentity);
+    CHECK(warningCount() == warnings + 2);
+    nowhere.finish();
+    CHECK(warningCount() == warnings + 3);
+    setLogLevel(LogLevel::Info);
 }
 
 TEST_CASE("a truncated checkpoint is refused wherever it ends", "[checkpoint]") {
@@ -190,7 +303,7 @@ TEST_CASE("what is wrong with a checkpoint is said", "[checkpoint]") {
     };
     CHECK_THROWS_WITH(
         readCheckpoint(with(8, 9)),
-        Contains("format 9") && Contains("reads format " + std::to_string(kCheckpointVersion)));
+        Contains("format 9") && Contains("reads formats 2 and " + std::to_string(kCheckpointVersion)));
     CHECK_THROWS_WITH(readCheckpoint(with(0, 'x')), Contains("not a crt film"));
     CHECK_THROWS_WITH(readCheckpoint(with(35, 0x7f)), Contains("damaged: its header"));  // Two thousand million pixels wide.
     CHECK_THROWS_WITH(readCheckpoint(with(whole.size() / 2, static_cast<char>(~whole[whole.size() / 2]))), Contains("checksum"));

@@ -238,6 +238,29 @@ TEST_CASE("devices are chosen by number or by name", "[integrator]") {
     CHECK(kindOfFailure([&] { device("third"); }, "no device matches 'third'; there is 0 'pattern', 1 'second pattern'") == ErrorKind::Backend);
 }
 
+TEST_CASE("a scene without a BVH is for backends that bring one", "[integrator]") {
+    CompiledScene without = makeScene(4, 3);
+    without.without_nodes = true;
+    Integrator fake(openFake("fake"), {});
+    CHECK(fake.compileOptions().accelerator_reach == 0);
+    CHECK(kindOfFailure([&] { fake.setScene(without); }, "backend 'fake' needs the BVH that was left out of this scene") == ErrorKind::Internal);
+    fake.setScene(makeScene(4, 3));
+    Integrator brings(openFake("many_devices"), {});
+    CHECK(brings.compileOptions().accelerator_reach == 2);
+    brings.setScene(without);
+}
+
+TEST_CASE("a backend tells how far set_scene is", "[integrator]") {
+    setenv("CRT_FAKE_SCENE_SECONDS", "0.01", 1);
+    Integrator fake(openFake("fake"), {});
+    std::vector<double> told;
+    fake.setScene(makeScene(4, 3), [&](double done) { told.push_back(done); });
+    unsetenv("CRT_FAKE_SCENE_SECONDS");
+    REQUIRE(told.size() == 100);
+    CHECK(told[0] == 0);
+    CHECK(told[50] == 0.5);
+}
+
 TEST_CASE("a plugin that throws at its host is named", "[integrator]") {
     CHECK(kindOfFailure([] { Integrator(openFake("throws_in_create"), {}); },
                         "broke the contract: an exception crossed the border from create (create fell over)") == ErrorKind::Internal);

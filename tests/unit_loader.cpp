@@ -90,7 +90,7 @@ TEST_CASE("a library that is no plugin of this version", "[loader]") {
                                          Contains("undefined symbol: crt_backend_v1"));
     CHECK_THAT(
         refusal("wrong_abi"),
-        Contains("speaks version 2.1 of the plugin interface and this crt speaks 1.1: rebuild the plugin"));
+        Contains("speaks version 2.2 of the plugin interface and this crt speaks 1.2: rebuild the plugin"));
     CHECK_THAT(refusal("no_table"), Contains("crt_backend_v1 returned no table"));
     CHECK_THAT(refusal("small_table"), Contains("its table has 32 bytes where version 1 needs " +
                                                 std::to_string(offsetof(CrtBackend, bits_version))));
@@ -119,6 +119,14 @@ TEST_CASE("a plugin that renders other bits is refused by both versions and both
     check("wrong_bits", CRT_BITS_VERSION + 1);
     check("no_bits", 1);  // its table ends before the version
     CHECK(refusal("fake").empty());
+}
+
+TEST_CASE("what a backend brings is read from tables that have it, and must reach the scene", "[loader]") {
+    const ScopedVariable path("CRT_BACKEND_PATH", CRT_FAKE_PLUGIN_DIR);
+    CHECK_THAT(refusal("short_reach"), Contains("it brings an acceleration structure that reaches 0.5, and scenes reach 1"));
+    CHECK(acceleratorReach(loadBackend("many_devices")) == 2);
+    CHECK(acceleratorReach(loadBackend("version_1_1")) == 0);  // its table ends before
+    CHECK(acceleratorReach(loadBackend("fake")) == 0);
 }
 
 TEST_CASE("no device is an answer with a reason", "[loader]") {
@@ -165,7 +173,7 @@ TEST_CASE("the list of backends has the known ones, the found ones and every rea
     CHECK(list["fake"].reason.empty());
     CHECK(list["fake"].version == CRT_HEADERS_VERSION);
     CHECK(list["fake"].devices.size() == 2);
-    CHECK_THAT(list["wrong_abi"].reason, Contains("version 2.1"));
+    CHECK_THAT(list["wrong_abi"].reason, Contains("version 2.2"));
     CHECK_THAT(list["no_device"].reason, Contains("older than 1.2"));
     CHECK(list["no_device"].build == "an old compiler");
 }

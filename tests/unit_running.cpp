@@ -135,6 +135,20 @@ TEST_CASE("progress: numbers and texts") {
     CHECK(percentText(0.0004) == "0.040 %");
 }
 
+TEST_CASE("progress of a stage: how far it is, or for how long it has gone on") {
+    ProgressState state;
+    state.label = "reading bunny.obj";
+    state.elapsed_seconds = 63;
+    CHECK(progressText(state) == "reading bunny.obj  1:03");
+    CHECK(progressBar(state, 120) == "reading bunny.obj  1:03");
+    state.target = 1000;
+    CHECK(progressText(state) == "  0 %  reading bunny.obj");  // Nothing can be told from nothing.
+    state.samples = 250;
+    CHECK(progressText(state) == " 25 %  reading bunny.obj  3:09 left");
+    CHECK(progressLine(state) == "25 %  reading bunny.obj  3:09 left");
+    for (int columns = 1; columns < 200; ++columns) CHECK(static_cast<int>(progressBar(state, columns).size()) < columns);
+}
+
 TEST_CASE("the first signal is remembered, and the handlers go with the guard") {
     struct sigaction before {};
     sigaction(SIGTERM, nullptr, &before);

@@ -24,7 +24,8 @@ extern "C" {
 #endif
 
 #define CRT_ABI_MAJOR 1
-#define CRT_ABI_MINOR 1 /* 1: CrtBackend::bits_version */
+#define CRT_ABI_MINOR 2 /* 1: CrtBackend::bits_version; 2: CrtBackend::brings, progress() during set_scene,
+                           CRT_KERNEL_LEAN_ONLY */
 
 /* The entry symbol carries the major version: a plugin of another major version simply does not have it. */
 #define CRT_BACKEND_ENTRY crt_backend_v1
@@ -58,7 +59,8 @@ typedef struct CrtHost {
     void *user; /* first argument of the functions below */
     /* One line, no newline. [any thread] */
     void (*log)(void *user, CrtLogLevel level, const char *message);
-    /* `done` in [0,1] of the running render call. Non-zero: stop soon and return CRT_CANCELLED. [any thread] */
+    /* `done` in [0,1] of the running render call. Non-zero: stop soon and return CRT_CANCELLED. Since 1.2 set_scene may call
+       it too, to say how far it is; what it returns then may be ignored. [any thread] */
     int32_t (*progress)(void *user, double done);
     /* Directory for compiled kernels, existing and writable, or null when caching is off. */
     const char *cache_directory;
@@ -81,7 +83,9 @@ typedef struct CrtDevice {
 typedef int32_t CrtKernelChoice;
 enum {
     CRT_KERNEL_LEAN = 0, /* the smallest that covers the scene's features (default) */
-    CRT_KERNEL_FULL = 1  /* everything compiled in: the same bits, only slower; used to prove that */
+    CRT_KERNEL_FULL = 1, /* everything compiled in: the same bits, only slower; used to prove that */
+    CRT_KERNEL_LEAN_ONLY = 2 /* since 1.2: lean from the first sample on, even if it must be compiled first: for measurements. A
+                                backend that runs no other kernel meanwhile need not know it: whatever is not FULL is lean. */
 };
 
 typedef struct CrtCreateInfo {
@@ -159,6 +163,16 @@ typedef struct CrtIntegrator {
     void (*destroy)(CrtIntegratorState *state);
 } CrtIntegrator;
 
+/*
+ * What a backend brings itself, so that the host does not make it: bits of CrtBackend::brings.
+ *
+ * CRT_BRINGS_ACCELERATOR: it finds hits with an acceleration structure of its own wherever the scene says CRT_ACCELERATOR_BVH,
+ * for every ray whose origin lies within accelerator_reach of 0 on each axis (lengths as in the blob: the scene lies within 1).
+ * A scene whose rays all start there may then come without a BVH: CrtScene::nodes is empty, and the slots of triangles are
+ * in the order of their ids. A scene whose camera stands farther away comes with nodes.
+ */
+#define CRT_BRINGS_ACCELERATOR ((uint64_t)1)
+
 /* The table behind the entry symbol. Static; lives as long as the library, which is never unloaded. */
 typedef struct CrtBackend {
     uint32_t struct_size;
@@ -178,6 +192,9 @@ typedef struct CrtBackend {
     /* Since 1.1: CRT_BITS_VERSION (kernel/bits_version.h) of the headers it was built with. Without it: 1. */
     uint32_t bits_version;
     uint32_t reserved;
+    /* Since 1.2: bits of CRT_BRINGS_…, and what belongs to them. Without it: nothing. */
+    uint64_t brings;
+    double accelerator_reach; /* with CRT_BRINGS_ACCELERATOR: at least 1 */
 } CrtBackend;
 
 typedef const CrtBackend *(*CrtBackendEntry)(void);

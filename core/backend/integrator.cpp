@@ -118,7 +118,7 @@ struct Integrator::Impl {
     /// A cancelled or failed render leaves part of a range in the backend's film: nothing can be read until the next setScene.
     bool film_is_whole = true;
 
-    // Of the render in progress. Plugins may report from any of their threads; the caller's function sees one at a time.
+    // Of the call in progress. Plugins may report from any of their threads; the caller's function sees one at a time.
     std::mutex progress_mutex;
     const std::function<bool(double)>* progress = nullptr;
     bool cancelled = false;
@@ -185,6 +185,28 @@ struct Integrator::Impl {
         }
     }
 
+    void listen(const std::function<bool(double)>* listener) {
+        const std::lock_guard lock(progress_mutex);
+        progress = listener;
+        if (listener == nullptr) return;
+        cancelled = false;
+        progress_error = nullptr;
+    }
+
+    /// The same, while what the plugin reports goes to `listener`.
+    template <class Call>
+    CrtStatus whileListening(const std::function<bool(double)>& listener, const char* verb, Call&& body) {
+        listen(&listener);
+        try {
+            const CrtStatus status = call(verb, body);
+            listen(nullptr);
+            return status;
+        } catch (...) {
+            listen(nullptr);
+            throw;
+        }
+    }
+
     /// Throws unless the verb succeeded, with the plugin's sentence.
     void check(CrtStatus status) {
         if (status == CRT_OK) return;
@@ -248,11 +270,18 @@ Integrator::~Integrator() = default;
 Integrator::Integrator(Integrator&&) noexcept = default;
 Integrator& Integrator::operator=(Integrator&&) noexcept = default;
 
-void Integrator::setScene(const CompiledScene& scene) {
+CompileOptions compileOptionsFor(const LoadedBackend& backend) { return {.accelerator_reach = acceleratorReach(backend)}; }
+
+CompileOptions Integrator::compileOptions() const { return compileOptionsFor(impl_->backend); }
+
+void Integrator::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
     Impl& self = *impl_;
     const std::uint64_t lacking = scene.features & ~self.backend.table->features;
     if (lacking != 0) {
         throw Error(ErrorKind::Backend, fmt::format("backend '{}' cannot render this scene: it lacks {}", self.backend.name, featureNames(lacking)));
+    }
+    if (scene.without_nodes && acceleratorReach(self.backend) == 0) {
+        throw Error(ErrorKind::Internal, fmt::format("backend '{}' needs the BVH that was left out of this scene", self.backend.name));
     }
     CrtSceneBlob blob{};
     blob.struct_size = sizeof(blob);
@@ -260,7 +289,13 @@ void Integrator::setScene(const CompiledScene& scene) {
     blob.size_bytes = scene.size_bytes;
 
     self.has_scene = false;
-    self.check(self.call("set_scene", [&] { return self.table.set_scene(self.table.state, &blob); }));
+    const std::function<bool(double)> show = [&progress](double done) {
+        if (progress) progress(done);
+        return false;  // A scene is always set as a whole.
+    };
+    const CrtStatus status = self.whileListening(show, "set_scene", [&] { return self.table.set_scene(self.table.state, &blob); });
+    if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
+    self.check(status);
     self.width = scene.width;
     self.height = scene.height;
     self.channels = scene.channels;
@@ -296,24 +331,8 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
     request.first_sample = range.first_sample;
     request.sample_count = range.sample_count;
 
-    const auto listen = [&](const std::function<bool(double)>* listener) {
-        const std::lock_guard lock(self.progress_mutex);
-        self.progress = listener;
-        if (listener != nullptr) {
-            self.cancelled = false;
-            self.progress_error = nullptr;
-        }
-    };
-    listen(&progress);
     self.film_is_whole = false;  // until the range is in it as a whole
-    CrtStatus status = CRT_INTERNAL;
-    try {
-        status = self.call("render", [&] { return self.table.render(self.table.state, &request); });
-    } catch (...) {
-        listen(nullptr);
-        throw;
-    }
-    listen(nullptr);
+    const CrtStatus status = self.whileListening(progress, "render", [&] { return self.table.render(self.table.state, &request); });
     if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
     if (status == CRT_CANCELLED && self.cancelled) return false;
     self.check(status);

@@ -21,6 +21,9 @@ struct IntegratorOptions {
     bool use_cache = true;
 };
 
+/// What a scene for this backend need not bring.
+CompileOptions compileOptionsFor(const LoadedBackend& backend);
+
 struct RenderRange {
     std::array<std::uint32_t, 4> rectangle{0, 0, 0, 0};  ///< x0, y0, x1, y1 within the crop window; all zero: all of it.
     std::uint64_t first_sample = 0;
@@ -36,8 +39,11 @@ public:
     Integrator(Integrator&&) noexcept;
     Integrator& operator=(Integrator&&) noexcept;
 
-    /// The scene must outlive nothing: what is needed is copied. Clears the film.
-    void setScene(const CompiledScene& scene);
+    CompileOptions compileOptions() const;
+
+    /// The scene must outlive nothing: what is needed is copied. Clears the film. `progress` gets [0,1] from backends that
+    /// tell how far they are.
+    void setScene(const CompiledScene& scene, const std::function<void(double)>& progress = {});
 
     /// Adds a range to the backend's film. `progress` gets [0,1] and returns true to cancel. Returns false when cancelled.
     bool render(const RenderRange& range, const std::function<bool(double)>& progress = {});

@@ -96,6 +96,11 @@ std::uint32_t bitsVersionOf(const CrtBackend& table) {
     return table.struct_size >= needed ? table.bits_version : 1;
 }
 
+/// Of a table of version 1.2 or newer; older ones bring nothing.
+bool hasBrings(const CrtBackend& table) {
+    return table.struct_size >= offsetof(CrtBackend, accelerator_reach) + sizeof(CrtBackend::accelerator_reach);
+}
+
 /// The checks between dlsym and the first use of the table. `name` is what the user asked for.
 void checkTable(const std::string& name, const std::string& path, const CrtBackend* table) {
     if (table == nullptr) refuse(fmt::format("backend '{}' ({}) broke the contract: {} returned no table", name, path, CRT_BACKEND_ENTRY_NAME));
@@ -121,6 +126,11 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
             "samples would be "
             "others; rebuild the plugin",
             name, path, bitsVersionOf(*table), orUnknown(table->build), CRT_BITS_VERSION, kHostBuild));
+    }
+    // Not a number is no reach either.
+    if (hasBrings(*table) && (table->brings & CRT_BRINGS_ACCELERATOR) != 0 && !(table->accelerator_reach >= 1)) {
+        refuse(fmt::format("backend '{}' ({}) broke the contract: it brings an acceleration structure that reaches {}, and scenes reach 1", name,
+                           path, table->accelerator_reach));
     }
     if (table->name == nullptr || table->probe == nullptr || table->create == nullptr) {
         refuse(fmt::format("backend '{}' ({}) broke the contract: its table lacks {}", name, path,
@@ -208,6 +218,11 @@ std::vector<std::string> backendDirectories() {
     const fs::path program = fs::read_symlink("/proc/self/exe", unreadable);
     if (!unreadable) directories.push_back((program.parent_path().parent_path() / "lib" / "crt").string());
     return directories;
+}
+
+double acceleratorReach(const LoadedBackend& backend) {
+    const CrtBackend& table = *backend.table;
+    return hasBrings(table) && (table.brings & CRT_BRINGS_ACCELERATOR) != 0 ? table.accelerator_reach : 0;
 }
 
 LoadedBackend loadBackend(const std::string& name) {

@@ -18,6 +18,9 @@ struct LoadedBackend {
     const CrtBackend* table = nullptr;
 };
 
+/// CrtBackend::accelerator_reach of a backend that brings an acceleration structure of its own, else 0.
+double acceleratorReach(const LoadedBackend& backend);
+
 /// Directories searched, in order: each of CRT_BACKEND_PATH (colon-separated), then lib/crt beside the program's bin/.
 std::vector<std::string> backendDirectories();
 

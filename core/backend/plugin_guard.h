@@ -12,6 +12,11 @@
 ///
 ///     CRT_DEFINE_BACKEND(MyIntegrator, probeDevices, "mine", "1.0.0", CRT_FEATURES_ALL)
 ///
+/// An integrator with an acceleration structure of its own says so, and gets no BVH in scenes whose rays all start
+/// within reach (CRT_BRINGS_ACCELERATOR):
+///
+///         static constexpr double kAcceleratorReach = 4;
+///
 /// Any of these may throw: PluginError for a failure with a status and a sentence of its own, std::bad_alloc, or anything. The table
 /// made here turns every exception into a status and a message, so that none crosses the border. It also looks after struct_size in
 /// both directions: the class always sees whole structs of the headers it was compiled with, and the host's are never overrun.
@@ -325,6 +330,12 @@ CrtStatus probe(const CrtHost* host, CrtDevice* devices, std::uint32_t capacity,
     });
 }
 
+/// I::kAcceleratorReach; 0 for a class that has none.
+template <class I, class = void>
+constexpr double kAcceleratorReachOf = 0;
+template <class I>
+inline constexpr double kAcceleratorReachOf<I, std::void_t<decltype(I::kAcceleratorReach)>> = I::kAcceleratorReach;
+
 /// The table of a backend whose integrator is the class `I`.
 template <class I, std::vector<CrtDevice> (*List)(const Host&)>
 constexpr CrtBackend makeBackend(const char* name, const char* version, const char* build, std::uint64_t features) noexcept {
@@ -340,6 +351,8 @@ constexpr CrtBackend makeBackend(const char* name, const char* version, const ch
     table.probe = probe<List>;
     table.create = IntegratorVerbs<I>::create;
     table.bits_version = CRT_BITS_VERSION;
+    table.brings = kAcceleratorReachOf<I> > 0 ? CRT_BRINGS_ACCELERATOR : 0;
+    table.accelerator_reach = kAcceleratorReachOf<I>;
     return table;
 }
 

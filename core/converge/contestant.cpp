@@ -139,7 +139,7 @@ void Contestant::warmUp(const CompiledScene& compiled) {
 
 void Contestant::prepare() {
     const Clock::time_point setup = Clock::now();
-    const CompiledScene compiled = compileScene(scene_, 0);
+    const CompiledScene compiled = compileScene(scene_, 0, integrator_->compileOptions());
     integrator_->setScene(compiled);
     describe(compiled, secondsSince(setup));
     warmUp(compiled);
@@ -171,7 +171,7 @@ void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored)
 bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
                            const std::function<bool()>& stop) {
     scene_.sampler.seed = seed_ + 1 + replicate;
-    const CompiledScene compiled = compileScene(scene_, 0);
+    const CompiledScene compiled = compileScene(scene_, 0, integrator_->compileOptions());
     integrator_->setScene(compiled);
     const Clock::time_point start = Clock::now();
 

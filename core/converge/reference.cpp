@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 
 namespace crt::converge {
 namespace {
@@ -107,7 +108,8 @@ std::string hashOfContent(const Scene& scene) {
     canonical.integrator.roulette = false;
     canonical.integrator.nee = true;
     canonical.integrator.accelerator = Accelerator::Bvh;
-    return compileScene(canonical, 0).hash;
+    // The hash alone: nobody will trace through it.
+    return compileScene(canonical, 0, {.accelerator_reach = std::numeric_limits<double>::infinity()}).hash;
 }
 
 std::string colourText(const Scene& scene) {
@@ -224,7 +226,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     const LoadedBackend backend = openBackend(request.backend);
     Integrator integrator(backend, request.integrator);
     const std::optional<RenderedFolds> folds =
-        renderFolds(scene, compileScene(scene, 0), integrator, request);
+        renderFolds(scene, compileScene(scene, 0, integrator.compileOptions()), integrator, request);
     if (!folds) return std::nullopt;
     Image file = referenceImage(*folds, scene);
     file.metadata.emplace_back("Software", "crt " CRT_VERSION);

@@ -100,8 +100,8 @@ Film Context::renderRaw(const Scene& original, const Render& how) {
         with_seed.sampler.seed = *how.seed;
         what = &with_seed;
     }
-    const CompiledScene compiled = compileScene(*what, how.aovs);
     Integrator& integrator = integratorFor(how);
+    const CompiledScene compiled = compileScene(*what, how.aovs, integrator.compileOptions());
     integrator.setScene(compiled);
     integrator.render({.first_sample = how.first_sample, .sample_count = how.samples});
     Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});

@@ -240,13 +240,7 @@ void unusedThings(Context& context) {
 
 /// Whether the lean kernel was another than the full one.
 bool prunes(Context& c, const std::string& name, const Scene& scene, std::uint32_t aovs) {
-    Film lean = c.render(scene, samples(4, aovs));
-    if (c.report().kernel_features == CRT_FEATURES_ALL) {
-        // A kernel that is compiled meanwhile is in the cache when its integrator has ended, and the full
-        // kernel needs another integrator.
-        c.render(scene, {.samples = 1, .aovs = aovs, .kernel = CRT_KERNEL_FULL});
-        lean = c.render(scene, samples(4, aovs));
-    }
+    const Film lean = c.render(scene, {.samples = 4, .aovs = aovs, .kernel = CRT_KERNEL_LEAN_ONLY});
     const std::uint64_t left = c.report().kernel_features;
     c.sameBits(name, lean, c.render(scene, {.samples = 4, .aovs = aovs, .kernel = CRT_KERNEL_FULL}),
                "leaving out what a scene does not need changes what is left: is a feature's test not the "

@@ -37,8 +37,6 @@ void loadBuiltins(const std::string& nvrtc_path, int major, int minor) {
     dlopen((nvrtc_path.substr(0, slash + 1) + name).c_str(), RTLD_NOW | RTLD_LOCAL);
 }
 
-int isAbandoned(void* flag, void*) { return static_cast<const std::atomic<bool>*>(flag)->load() ? 1 : 0; }
-
 }  // namespace
 
 std::vector<std::string> nvrtcCandidates(const char* cuda_home) {
@@ -77,7 +75,6 @@ Nvrtc Nvrtc::open(const std::vector<std::string>& candidates) {
         loadBuiltins(path, nvrtc.major_, nvrtc.minor_);
         nvrtc.archs_.resize(static_cast<std::size_t>(count));
         if (count > 0) nvrtc.nvrtcGetSupportedArchs_(nvrtc.archs_.data());
-        nvrtc.set_flow_callback_ = reinterpret_cast<SetFlowCallback>(dlsym(library, "nvrtcSetFlowCallback"));
         nvrtc.path_ = path;
         return nvrtc;
     }
@@ -88,15 +85,12 @@ std::string Nvrtc::name() const { return "NVRTC " + std::to_string(major_) + "."
 
 bool Nvrtc::supports(int arch) const { return std::find(archs_.begin(), archs_.end(), arch) != archs_.end(); }
 
-Cubin Nvrtc::compile(const std::string& text, const std::string& file, const std::vector<std::string>& options,
-                     const std::atomic<bool>* abandoned) const {
+Cubin Nvrtc::compile(const std::string& text, const std::string& file, const std::vector<std::string>& options) const {
     const auto check = [&](nvrtcResult result, const char* what) {
         if (result != NVRTC_SUCCESS) throw std::runtime_error(name() + " cannot " + what + ": " + nvrtcGetErrorString_(result));
     };
     ProgramOwner owner{nullptr, nvrtcDestroyProgram_};
     check(nvrtcCreateProgram_(&owner.program, text.c_str(), file.c_str(), 0, nullptr, nullptr), "create a program");
-    if (abandoned != nullptr && set_flow_callback_ != nullptr)
-        check(set_flow_callback_(owner.program, isAbandoned, const_cast<std::atomic<bool>*>(abandoned)), "be made to stop early");
 
     std::vector<const char*> arguments;
     for (const std::string& option : options) arguments.push_back(option.c_str());

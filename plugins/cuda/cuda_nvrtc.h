@@ -3,7 +3,6 @@
 
 #include <nvrtc.h>
 
-#include <atomic>
 #include <string>
 #include <vector>
 
@@ -38,10 +37,8 @@ public:
     /// Whether it makes machine code for compute capability arch / 10.
     bool supports(int arch) const;
 
-    /// Compiles `text`, whose errors call it `file`. Throws std::runtime_error with the first 20 lines of the log. When `abandoned` becomes
-    /// true meanwhile, it may stop early and throw. [any thread]
-    Cubin compile(const std::string& text, const std::string& file, const std::vector<std::string>& options,
-                  const std::atomic<bool>* abandoned = nullptr) const;
+    /// Compiles `text`, whose errors call it `file`. Throws std::runtime_error with the first 20 lines of the log. [any thread]
+    Cubin compile(const std::string& text, const std::string& file, const std::vector<std::string>& options) const;
 
 private:
     Nvrtc() = default;
@@ -49,9 +46,6 @@ private:
 #define CRT_NVRTC_MEMBER(name) decltype(&::name) name##_ = nullptr;
     CRT_NVRTC_FUNCTIONS(CRT_NVRTC_MEMBER)
 #undef CRT_NVRTC_MEMBER
-    using SetFlowCallback = nvrtcResult (*)(nvrtcProgram, int (*)(void*, void*), void*);
-    SetFlowCallback set_flow_callback_ = nullptr;  ///< Null before CUDA 12.9: then a compilation runs to its end.
-
     std::string path_;
     int major_ = 0, minor_ = 0;
     std::vector<int> archs_;

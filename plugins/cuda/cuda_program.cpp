@@ -13,6 +13,7 @@
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <thread>
 
 namespace crt::cuda {
 
@@ -88,10 +89,10 @@ ResourceUse resourceUse(const std::string& log, const std::string& kernel) {
     return use;
 }
 
-Cubin compileLean(const Nvrtc& compiler, const std::string& text, int arch, std::uint32_t features, const std::atomic<bool>* abandoned) {
+Cubin compileLean(const Nvrtc& compiler, const std::string& text, int arch, std::uint32_t features) {
     Cubin cubin;
     for (const int blocks : kBlocksPerMultiprocessor) {
-        cubin = compiler.compile(text, "path.h", nvrtcOptions(arch, features, blocks), abandoned);
+        cubin = compiler.compile(text, "path.h", nvrtcOptions(arch, features, blocks));
         if (resourceUse(cubin.log, "crt_render").spill_bytes == 0) break;
     }
     return cubin;
@@ -176,38 +177,41 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ui
     if (lean_) return;
 
     const char* directory = host_.cacheDirectory();
-    compiling_ = std::async(std::launch::async, [this, compiler, text, key, directory, arch = device.arch, features = features_] {
-        Compiled compiled;
-        const Stopwatch compile_time;
-        compiled.cubin = compileLean(*compiler, text, arch, features, directory == nullptr ? &abandoned_ : nullptr);
-        compiled.compile_seconds = compile_time.seconds();
-        const Stopwatch store_time;
-        KernelCache(directory).store(key, compiled.cubin.bytes.data(), compiled.cubin.bytes.size());
-        compiled.cache_seconds = store_time.seconds();
-        return compiled;
-    });
+    try {
+        compiling_ = std::make_unique<CompileProcess>(
+            compileProgram(), CompileJob{compiler->path(), text, device.arch, features_, directory != nullptr ? directory : "", key});
+        if (choice == CRT_KERNEL_LEAN_ONLY) {
+            std::optional<CompiledKernel> compiled;
+            while (!(compiled = compiling_->poll())) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+            compiling_.reset();
+            takeLean(*compiled);
+            return;
+        }
+    } catch (const std::runtime_error& error) {
+        compiling_.reset();
+        host_.log(CRT_LOG_WARNING, std::string("cuda: using the precompiled kernel with everything in: ") + error.what());
+    }
     loadPrecompiled();
 }
 
-CudaProgram::~CudaProgram() {
-    abandoned_ = true;
-    if (compiling_.valid()) compiling_.wait();
-}
-
-void CudaProgram::takeLean() {
-    try {
-        const Compiled compiled = compiling_.get();
-        compile_seconds_ = compiled.compile_seconds;
-        cache_seconds_ += compiled.cache_seconds;
-        lean_ = Module(compiled.cubin.bytes.data(), features_, lean_name_);
-    } catch (const std::exception& error) {
-        // The precompiled kernel gives the same image.
-        host_.log(CRT_LOG_WARNING, std::string("cuda: going on with the precompiled kernel: ") + error.what());
-    }
+void CudaProgram::takeLean(const CompiledKernel& compiled) {
+    compile_seconds_ = compiled.compile_seconds;
+    cache_seconds_ += compiled.cache_seconds;
+    lean_ = Module(compiled.cubin.data(), features_, lean_name_);
 }
 
 const Module& CudaProgram::current() {
-    if (compiling_.valid() && compiling_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) takeLean();
+    if (!compiling_) return lean_ ? lean_ : precompiled_;
+    try {
+        const std::optional<CompiledKernel> compiled = compiling_->poll();
+        if (!compiled) return precompiled_;
+        compiling_.reset();
+        takeLean(*compiled);
+    } catch (const std::exception& error) {
+        // The precompiled kernel gives the same image.
+        compiling_.reset();
+        host_.log(CRT_LOG_WARNING, std::string("cuda: going on with the precompiled kernel: ") + error.what());
+    }
     return lean_ ? lean_ : precompiled_;
 }
 

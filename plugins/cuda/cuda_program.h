@@ -1,16 +1,16 @@
-/// From a feature mask to a kernel that can be launched: the precompiled one at once, and the lean one from the disk cache or, compiled on a
-/// thread of its own, as soon as it is ready. Both give the same bits, so a render may go over from one to the other between launches.
+/// From a feature mask to a kernel that can be launched: the precompiled one at once, and the lean one from the disk cache or, compiled by a
+/// process of its own, as soon as it is ready. Both give the same bits, so a render may go over from one to the other between launches.
 #pragma once
 
+#include "cuda_compile_process.h"
 #include "cuda_device.h"
 #include "cuda_nvrtc.h"
 
 #include "backend/kernel_cache.h"
 #include "backend/plugin_guard.h"
 
-#include <atomic>
 #include <cstdint>
-#include <future>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -44,7 +44,7 @@ struct ResourceUse {
 ResourceUse resourceUse(const std::string& log, const std::string& kernel);
 
 /// Machine code for a mask, with as many blocks on a multiprocessor as go without spilling. Throws std::runtime_error. [any thread]
-Cubin compileLean(const Nvrtc& nvrtc, const std::string& text, int arch, std::uint32_t features, const std::atomic<bool>* abandoned = nullptr);
+Cubin compileLean(const Nvrtc& nvrtc, const std::string& text, int arch, std::uint32_t features);
 
 /// The kernels of one loaded module.
 class Module {
@@ -77,8 +77,6 @@ private:
 class CudaProgram {
 public:
     CudaProgram(const plugin::Host& host, const Device& device, std::uint32_t scene_features, CrtKernelChoice choice);
-    /// Waits for a compilation that is under way, if the cache will keep it: the next run then starts with it. Else it is given up.
-    ~CudaProgram();
     CudaProgram(const CudaProgram&) = delete;
     CudaProgram& operator=(const CudaProgram&) = delete;
 
@@ -93,11 +91,7 @@ public:
     std::string description() const;
 
 private:
-    struct Compiled {
-        Cubin cubin;
-        double compile_seconds = 0, cache_seconds = 0;
-    };
-    void takeLean();
+    void takeLean(const CompiledKernel& compiled);
 
     plugin::Host host_;
     std::uint32_t features_;
@@ -105,8 +99,7 @@ private:
     Module precompiled_, lean_;
     bool from_cache_ = false;
     double compile_seconds_ = 0, cache_seconds_ = 0;
-    std::atomic<bool> abandoned_{false};
-    std::future<Compiled> compiling_;
+    std::unique_ptr<CompileProcess> compiling_;
 };
 
 }  // namespace crt::cuda

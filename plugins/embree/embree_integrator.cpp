@@ -52,8 +52,9 @@ EmbreeIntegrator::EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo
 
 void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
     tracer_.reset();
-    blob_.resize((scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line));
-    std::memcpy(blob_.data(), scene_blob.data, scene_blob.size_bytes);
+    // Not a vector: it would write zeros over hundreds of megabytes first.
+    blob_.reset(new Line[(scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line)]);
+    std::memcpy(blob_.get(), scene_blob.data, scene_blob.size_bytes);
     program_ = &chooseProgram(scene().features, info_.kernel);
     build_seconds_ = render_seconds_ = 0;
     paths_ = 0;
@@ -63,7 +64,8 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
         const auto start = Clock::now();
         if (!device_) device_ = std::make_unique<Device>();
         const auto* triangles = CRT_ARRAY(kernel::CrtTriangle, blob(), scene().triangles);
-        arena_.execute([&] { tracer_ = std::make_unique<Tracer>(*device_, triangles, scene().triangle_count); });
+        const auto progress = [this](double done) { host_.cancelled(done); };
+        arena_.execute([&] { tracer_ = std::make_unique<Tracer>(*device_, triangles, scene().triangle_count, progress); });
         build_seconds_ = secondsSince(start);
     }
 

@@ -20,6 +20,8 @@ std::vector<CrtDevice> probeDevices(const plugin::Host& host);
 
 class EmbreeIntegrator {
 public:
+    static constexpr double kAcceleratorReach = static_cast<double>(Tracer::kReach);
+
     EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo& info);
 
     void setScene(const CrtSceneBlob& scene);
@@ -31,8 +33,8 @@ private:
     struct alignas(64) Line {
         unsigned char bytes[64];
     };
-    const kernel::CrtScene& scene() const { return *reinterpret_cast<const kernel::CrtScene*>(blob_.data()); }
-    const unsigned char* blob() const { return reinterpret_cast<const unsigned char*>(blob_.data()); }
+    const kernel::CrtScene& scene() const { return *reinterpret_cast<const kernel::CrtScene*>(blob_.get()); }
+    const unsigned char* blob() const { return reinterpret_cast<const unsigned char*>(blob_.get()); }
     std::uint32_t tileSize(const CrtRenderRange& range) const;
 
     plugin::Host host_;
@@ -43,7 +45,7 @@ private:
     std::unique_ptr<Device> device_;  ///< Opened when a scene needs it.
     std::unique_ptr<Tracer> tracer_;
     const Program* program_ = nullptr;
-    std::vector<Line> blob_;
+    std::unique_ptr<Line[]> blob_;
     std::vector<double> sums_;
     std::vector<kernel::u64> counts_;
     std::vector<std::uint32_t> primitives_;

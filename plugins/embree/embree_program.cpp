@@ -23,7 +23,7 @@ constexpr std::array<Program, 3> kPrograms{{
 }  // namespace
 
 const Program& chooseProgram(std::uint32_t scene_features, CrtKernelChoice choice) {
-    if (choice == CRT_KERNEL_LEAN)
+    if (choice != CRT_KERNEL_FULL)
         for (const Program& program : kPrograms)
             if ((scene_features & ~program.features) == 0) return program;
     return kPrograms.back();

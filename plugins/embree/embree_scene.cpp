@@ -24,10 +24,9 @@ using kernel::CrtTriangle;
 constexpr float kReachSlack = 1.0f + 1e-5f;
 
 /// Embree tests the boxes of user primitives without its robust mode's care: planes err by some 7 · 2^-24 of the coordinates that take part,
-/// whatever the scene's flags say. For rays that start within kNear of the scene (which lies within ±1) this holds what they touch, with room
+/// whatever the scene's flags say. For rays that start within Tracer::kReach of the scene (which lies within ±1) this holds what they touch, with room
 /// to spare.
 constexpr float kBoxPadding = 8 * CRT_BOX_PADDING;
-constexpr float kNear = 4.0f;
 
 #if RTC_VERSION_MAJOR >= 4
 using QueryContext = RTCRayQueryContext;
@@ -101,6 +100,12 @@ RTCRay embreeRay(const CrtRay& ray) {
     return r;
 }
 
+/// Called by Embree's threads while it builds; true means to go on.
+bool reportProgress(void* progress, double done) {
+    (*static_cast<const std::function<void(double)>*>(progress))(done);
+    return true;
+}
+
 std::string errorText(RTCDevice device, const char* what) {
     const RTCError code = rtcGetDeviceError(device);
     return std::string(what) + " (Embree error " + std::to_string(static_cast<int>(code)) + ")";
@@ -129,7 +134,8 @@ struct Tracer::Impl {
     const CrtTriangle* triangles = nullptr;
 };
 
-Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t count) : impl_(new Impl) {
+Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t count, const std::function<void(double)>& progress)
+    : impl_(new Impl) {
     RTCDevice rtc = device.impl_->device;
     impl_->triangles = triangles;
     impl_->scene = rtcNewScene(rtc);
@@ -142,7 +148,9 @@ Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(impl_->scene, geometry);
     rtcReleaseGeometry(geometry);
+    rtcSetSceneProgressMonitorFunction(impl_->scene, reportProgress, const_cast<std::function<void(double)>*>(&progress));
     rtcCommitScene(impl_->scene);
+    rtcSetSceneProgressMonitorFunction(impl_->scene, nullptr, nullptr);
     if (rtcGetDeviceError(rtc) != RTC_ERROR_NONE) {
         rtcReleaseScene(impl_->scene);
         throw plugin::PluginError(CRT_DEVICE_FAILED, errorText(rtc, "Embree could not build its scene"));
@@ -154,8 +162,8 @@ Tracer::~Tracer() { rtcReleaseScene(impl_->scene); }
 bool Tracer::takes(const CrtRay& ray) {
     using namespace kernel;
     const vec3 o = abs3(ray.o), d = abs3(ray.d);
-    const bool near = o.x <= kNear && o.y <= kNear && o.z <= kNear;  // false for NaN
-    return near && d.x <= kNear && d.y <= kNear && d.z <= kNear;
+    const bool near = o.x <= kReach && o.y <= kReach && o.z <= kReach;  // false for NaN
+    return near && d.x <= kReach && d.y <= kReach && d.z <= kReach;
 }
 
 CrtHit Tracer::closest(const CrtRay& ray) const {

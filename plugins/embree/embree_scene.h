@@ -10,6 +10,7 @@ class Tracer;
 #define CRT_BACKEND_TRACE
 #include "kernel/surface.h"
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -36,11 +37,14 @@ private:
 /// An Embree BVH over the triangle slots of a blob, which must outlive it. Throws PluginError when Embree cannot build it.
 class Tracer {
 public:
-    Tracer(const Device& device, const kernel::CrtTriangle* triangles, std::uint32_t count);
+    /// `progress` gets the part of it that is built, in [0,1], from any thread.
+    Tracer(const Device& device, const kernel::CrtTriangle* triangles, std::uint32_t count, const std::function<void(double)>& progress);
     ~Tracer();
     Tracer(const Tracer&) = delete;
     Tracer& operator=(const Tracer&) = delete;
 
+    /// Rays that start within this of 0 on each axis are taken.
+    static constexpr float kReach = 4;
     /// Whether Embree is sure to find what this ray meets: not for rays from far outside the scene, and those that are none.
     static bool takes(const kernel::CrtRay& ray);
     kernel::CrtHit closest(const kernel::CrtRay& ray) const;

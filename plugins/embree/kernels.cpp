@@ -9,14 +9,44 @@
 
 namespace crt::kernel {
 
-// A handful of triangles is tested eight at a time without Embree; its BVH begins to pay above that. Rays that Embree does not take go through the blob's.
+namespace {
+
+// A scene whose rays all start where Embree takes them comes without nodes. Should a ray be another nevertheless, every triangle
+// is tested: slow, and right.
+bool lacksNodes(const CrtContext* ctx) { return ctx->tracer != nullptr && ctx->scene->nodes.count == 0; }
+
+CrtHit testAllClosest(const CrtContext* ctx, CrtRay ray) {
+    const CrtTriangle* triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
+    const CrtShear shear = crt_shear(ray);
+    CrtHit best = crt_no_hit(ray.reach);
+    if (!crt_is_ray(ray)) return best;
+    for (u32 slot = 0; slot < ctx->scene->triangle_count; ++slot) crt_test_closest(triangles, slot, shear, &best);
+    return best;
+}
+
+int testAllAny(const CrtContext* ctx, CrtRay ray) {
+    const CrtTriangle* triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
+    const CrtShear shear = crt_shear(ray);
+    CrtHit hit;
+    if (!crt_is_ray(ray)) return 0;
+    for (u32 slot = 0; slot < ctx->scene->triangle_count; ++slot)
+        if (crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit)) return 1;
+    return 0;
+}
+
+}  // namespace
+
+// A handful of triangles is tested eight at a time without Embree; its BVH begins to pay above that. Rays that Embree does not
+// take go through the blob's.
 CRT_FN CrtHit crt_trace_closest(const CrtContext* ctx, CrtRay ray) {
     if (CRT_HAS(BVH) && ctx->tracer != nullptr && embree::Tracer::takes(ray)) return ctx->tracer->closest(ray);
+    if (CRT_HAS(BVH) && lacksNodes(ctx)) return testAllClosest(ctx, ray);
     return crt_software_closest(ctx, ray);
 }
 
 CRT_FN int crt_trace_any(const CrtContext* ctx, CrtRay ray) {
     if (CRT_HAS(BVH) && ctx->tracer != nullptr && embree::Tracer::takes(ray)) return ctx->tracer->any(ray);
+    if (CRT_HAS(BVH) && lacksNodes(ctx)) return testAllAny(ctx, ray);
     return crt_software_any(ctx, ray);
 }
 

@@ -339,7 +339,7 @@ class Rendering(CliTest):
                         "spill_bytes"],
             "scene": ["file", "title", "hash", "files_read", "width", "height", "objects", "triangles", "emitters", "nodes", "seed"],
             "features": ["mask", "kept", "left_out"],
-            "seconds": ["parse", "build", "compile", "open", "prepare", "kernel_compile", "cache", "upload", "render", "sampling", "write",
+            "seconds": ["parse", "build", "compile", "open", "prepare", "kernel_compile", "cache", "upload", "render", "sampling", "write", "other",
                         "total"],
             "samples": ["target", "per_pixel", "resumed", "rendered", "ranges", "chunks", "invalid"],
             "rays": ["paths", "closest", "shadow"],

@@ -17,6 +17,8 @@ enum Defect {
     wrong_layout,
     wrong_bits,
     no_bits,
+    short_reach,
+    version_1_1,
     no_create,
     no_device,
     many_devices,
@@ -65,6 +67,7 @@ CrtStatus create(const CrtHost*, const CrtCreateInfo*, CrtIntegrator* integrator
 const CrtBackend kTable = {
     kDefect == small_table ? 32
     : kDefect == no_bits   ? offsetof(CrtBackend, bits_version)
+    : kDefect == version_1_1 ? offsetof(CrtBackend, brings)
                            : sizeof(CrtBackend),
     kDefect == wrong_abi ? CRT_ABI_MAJOR + 1 : CRT_ABI_MAJOR,
     CRT_ABI_MINOR,
@@ -77,6 +80,8 @@ const CrtBackend kTable = {
     kDefect == no_create ? nullptr : create,
     kDefect == wrong_bits ? CRT_BITS_VERSION + 1 : CRT_BITS_VERSION,
     0,
+    CRT_BRINGS_ACCELERATOR,
+    kDefect == short_reach ? 0.5 : 2,
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 //   slow    2 ms a row, with a look at cancel after each
 //   hang    never comes back
 //   nan_film, count_film   the film that is handed over holds a NaN, or more samples than were asked for
+// CRT_FAKE_SCENE_SECONDS: so long takes set_scene, which says how far it is.
 // CRT_FAKE_FIRST_START_MS: so long takes the first integrator of a process, as a driver does that is not
 // loaded yet.
 #include "backend/plugin_guard.h"
@@ -50,6 +51,11 @@ public:
 
     void setScene(const CrtSceneBlob& blob) {
         std::memcpy(&scene_, blob.data, sizeof(scene_));
+        const char* seconds = std::getenv("CRT_FAKE_SCENE_SECONDS");
+        for (int i = 0; seconds != nullptr && i < 100; ++i) {
+            host_.cancelled(i / 100.0);
+            std::this_thread::sleep_for(std::chrono::duration<double>(std::atof(seconds) / 100));
+        }
         const std::size_t pixels = std::size_t{scene_.width} * scene_.height;
         sums_.assign(pixels * scene_.channels * 2, 0.0);
         counts_.assign(pixels, 0);

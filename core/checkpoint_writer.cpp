@@ -1,0 +1,44 @@
+#include "checkpoint_writer.h"
+
+#include "log.h"
+
+#include <chrono>
+#include <exception>
+#include <utility>
+
+namespace crt {
+namespace {
+
+/// What went wrong, if anything did.
+std::optional<Error> tryToWrite(const std::string& path, const Film& film, const FilmIdentity& identity) {
+    try {
+        writeCheckpoint(path, film, identity);
+        return std::nullopt;
+    } catch (const Error& error) {
+        return error;
+    } catch (const std::exception& error) {  // Out of memory while packing.
+        return Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, error.what()), {path});
+    }
+}
+
+}  // namespace
+
+bool CheckpointWriter::idle() const {
+    return !writing_.valid() || writing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
+
+void CheckpointWriter::save(const Film& film, FilmIdentity identity) {
+    finish();
+    copy_ = film;
+    writing_ = std::async(std::launch::async, [this, identity = std::move(identity)] {
+        return tryToWrite(path_, *copy_, identity);
+    });
+}
+
+void CheckpointWriter::finish() {
+    if (!writing_.valid()) return;
+    if (const std::optional<Error> failure = writing_.get())
+        logWarning("{}; rendering goes on, and so do the attempts", failure->what());
+}
+
+}  // namespace crt

@@ -1,0 +1,37 @@
+/// Checkpoints while a render goes on: the film is copied, and another thread packs and writes the copy.
+#pragma once
+
+#include "error.h"
+#include "film.h"
+
+#include <future>
+#include <optional>
+#include <string>
+
+namespace crt {
+
+/// Writes one file again and again; one copy at a time. [one thread]
+class CheckpointWriter {
+public:
+    explicit CheckpointWriter(std::string path) : path_(std::move(path)) {}
+    /// Waits for the copy that is being written.
+    ~CheckpointWriter() { finish(); }
+    CheckpointWriter(const CheckpointWriter&) = delete;
+    CheckpointWriter& operator=(const CheckpointWriter&) = delete;
+
+    /// Whether the last copy is written, so that save() need not wait for it.
+    bool idle() const;
+    /// Takes a copy of the film and begins to write it. Warns when the copy before could not be written:
+    /// rendering goes on, and so do the attempts.
+    void save(const Film& film, FilmIdentity identity);
+    /// Waits for the copy that is being written, and warns when that fails. Whoever writes the same file
+    /// next calls this first: otherwise the older film could end up in it.
+    void finish();
+
+private:
+    std::string path_;
+    std::optional<Film> copy_;  ///< Of the last save(); kept, since another of its size is needed soon.
+    std::future<std::optional<Error>> writing_;
+};
+
+}  // namespace crt
