@@ -12,9 +12,10 @@
 ///     80  u32            bytes of the crt version text
 ///     84  u32            number of sample ranges
 ///     88  u32            version of the bits (kernel/bits_version.h)
-///     92  u32            0
+///     92  u32            bytes of the record
 ///     96  u64 × 2 each   sample ranges, first and end
 ///         char[]         crt version, zero-padded to 8
+///         char[]         record (film_record.h), zero-padded to 8
 ///         f64 × 2 each   sums, hi and lo, [height][width][channels]
 ///         u64 each       counts, [height][width]
 ///         u32 each       primitive ids, [height][width], zero-padded to 8; only when the AOV mask has them
@@ -29,7 +30,9 @@
 
 namespace crt {
 
-inline constexpr std::uint32_t kCheckpointVersion = 2;
+inline constexpr std::uint32_t kCheckpointVersion = 3;
+/// Like the present one but without a record; read still.
+inline constexpr std::uint32_t kCheckpointVersionWithoutRecord = 2;
 inline constexpr const char* kCheckpointExtension = ".crtfilm";
 
 /// Refuses to go on from `path` when it holds other bits or another scene than `expected`: crt::Error(Usage)

@@ -88,7 +88,7 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     row.load_average = loadAverage();
     row.cpu_clock_mhz = clockMhz();
 
-    const Image image = resolveImage(film, scene_, 0);
+    const Image image = resolveImage(film, developmentOf(scene_).forFloats(), 0);
     const std::size_t pixels = film.counts.size();
     LookPlane luminance = stats::luminances(image.pixels, stats::luminanceWeights(scene_.film.color_space));
     row.mean_luminance = stats::meanLuminance(luminance);

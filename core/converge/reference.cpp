@@ -182,7 +182,7 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene
         integrator.readFilm(part);
         if (part.invalidSamples() > 0)
             throw Error(ErrorKind::Device, fmt::format("{} samples of the reference were NaN or infinite: it would be worth nothing", part.invalidSamples()));
-        folds.images.push_back(resolveImage(part, scene, 0));
+        folds.images.push_back(resolveImage(part, developmentOf(scene).forFloats(), 0));
         folds.film.add(part);
     }
     return folds;
@@ -190,7 +190,7 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene
 
 /// R, G and B of the mean, then of each eighth.
 Image referenceImage(const RenderedFolds& folds, const Scene& scene) {
-    const Image mean = resolveImage(folds.film, scene, 0);
+    const Image mean = resolveImage(folds.film, developmentOf(scene).forFloats(), 0);
     Image file = mean;
     file.pixels.clear();
     file.channels = {"R", "G", "B"};
@@ -232,6 +232,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     file.metadata.emplace_back(kColourKey, colour);
     file.metadata.emplace_back(kEstimatorKey, estimatorText(scene));
     file.metadata.emplace_back("crt/backend", backend.name);
+    file.metadata.emplace_back("crt/seed", std::to_string(scene.sampler.seed));
     writeImage(request.output, OutputFormat::Exr, file);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     return MadeReference{folds->film.samples.count(), estimatorText(scene), seconds,
