@@ -182,9 +182,8 @@ std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reaso
         }
         spec.attribute("compression", "zip");
         if (image->chromaticities != nullptr) spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), image->chromaticities);
-        // OpenImageIO's names for worldToCamera and worldToNDC.
-        if (image->world_to_camera != nullptr) spec.attribute("worldtocamera", TypeDesc::TypeMatrix, image->world_to_camera);
-        if (image->world_to_ndc != nullptr) spec.attribute("worldtoscreen", TypeDesc::TypeMatrix, image->world_to_ndc);
+        if (image->world_to_camera != nullptr) spec.attribute("worldToCamera", TypeDesc::TypeMatrix, image->world_to_camera);
+        if (image->world_to_ndc != nullptr) spec.attribute("worldToNDC", TypeDesc::TypeMatrix, image->world_to_ndc);
         if (image->adopted_neutral != nullptr)
             spec.attribute("adoptedNeutral", TypeDesc(TypeDesc::FLOAT, TypeDesc::VEC2), image->adopted_neutral);
         // Left to itself the library stamps the present time on every EXR, and the same image would never be the same file.
