@@ -2,6 +2,7 @@
 #include "checkpoint.h"
 #include "commands.h"
 #include "error_estimate.h"
+#include "light_checks.h"
 #include "log.h"
 #include "outputs.h"
 #include "progress.h"
@@ -152,6 +153,7 @@ int develop(const DevelopArguments& arguments) {
         if (image.format == OutputFormat::Exr && arguments.aovs.empty()) image.aovs = record.aovs;
         writeOutput(image, film, identity);
     }
+    if (film.samples.count() > 0 && isBlack(film)) logWarning("the image is black: no path met a light while the film was rendered");
     const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, record.independent_samples);
     logInfo("{} × {} pixels, {} samples per pixel{}", film.shape().width, film.shape().height, film.samples.count(),
             error ? ", " + errorText(*error) : "");

@@ -3,6 +3,7 @@
 #include "aov.h"
 #include "error.h"
 #include "scene.h"
+#include "vec3d.h"
 #include "yaml_reader.h"
 
 #include <fmt/format.h>
@@ -13,7 +14,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdlib>
 #include <ctime>
 #include <memory>
@@ -29,15 +29,7 @@ constexpr int kRecordVersion = 1;
 
 // ---- Camera ------------------------------------------------------------------------------------------------------------
 
-double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Vec3d normalised(Vec3d v) {
-    const double length = std::sqrt(dot(v, v));
-    for (double& component : v) component /= length;
-    return v;
-}
+Vec3d normalised(const Vec3d& v) { return v * (1 / length(v)); }
 
 /// p · M has the components dot(axis, p − origin) + offset·w, one for each column.
 struct Column {
@@ -54,18 +46,14 @@ RowMatrix4d matrixOf(const std::array<Column, 4>& columns, const Vec3d& origin) 
 }
 
 void addCamera(FilmRecord& record, const Camera& camera) {
-    const Vec3d view = normalised({camera.target[0] - camera.position[0], camera.target[1] - camera.position[1],
-                                   camera.target[2] - camera.position[2]});
+    const Vec3d view = normalised(camera.target - camera.position);
     const Vec3d right = normalised(cross(view, camera.up)), up = cross(right, view);
     const Vec3d back{-view[0], -view[1], -view[2]};
     record.world_to_camera = matrixOf({{{right}, {up}, {back}, {{}, 1}}}, camera.position);
     // x / depth runs from −tan_half_width to tan_half_width, and depth is w. The depth of the result is 1 / depth:
     // nobody needs it, but a matrix that has an inverse is of more use than one that has none.
-    Vec3d x{}, y{};
-    for (std::size_t k = 0; k < 3; ++k) {
-        x[k] = right[k] / (2 * camera.tan_half_width) + view[k] / 2;
-        y[k] = view[k] / 2 - up[k] / (2 * camera.tan_half_height);
-    }
+    const Vec3d x = right * (0.5 / camera.tan_half_width) + view * 0.5;
+    const Vec3d y = view * 0.5 - up * (0.5 / camera.tan_half_height);
     record.world_to_ndc = matrixOf({{{x}, {y}, {{}, 1}, {view}}}, camera.position);
 }
 

@@ -250,6 +250,15 @@ std::array<float, Size> floatsOf(const std::optional<std::array<double, Size>>& 
     return floats;
 }
 
+/// Of R, G and B; at least 0.
+double largestColor(const Image& image) {
+    const std::array<std::size_t, 3> color = colorChannels(image);
+    double largest = 0;
+    for (std::size_t p = 0; p < image.pixels.size(); p += image.channels.size())
+        for (const std::size_t c : color) largest = std::max(largest, double{image.pixels[p + c]});
+    return largest;
+}
+
 using Reason = std::array<char, 512>;
 
 void writeExr(const std::string& path, const Image& image) {
@@ -410,6 +419,9 @@ void writeImage(const std::string& path, OutputFormat format, const Image& image
     } else {
         writePpm(path, image, encoded);
     }
+    if (const double brightest = largestColor(image); brightest > 0 && std::all_of(encoded.rgb.begin(), encoded.rgb.end(), [](std::uint8_t v) { return v == 0; }))
+        logWarning("'{}' is black: its brightest value is {:.2g}, too dark for 8 bits; about {} stops more of film.exposure_ev would show it", path,
+                   brightest, std::ceil(std::log2(0.5 / brightest)));
     if (encoded.clipped_values > 0)
         logInfo("'{}': {:.2g} % of the colour values lie outside what 8 bits can show and were clipped", path,
                 100.0 * static_cast<double>(encoded.clipped_values) / static_cast<double>(encoded.rgb.size()));

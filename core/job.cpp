@@ -5,6 +5,7 @@
 #include "checkpoint.h"
 #include "compile.h"
 #include "interrupt.h"
+#include "light_checks.h"
 #include "log.h"
 #include "outputs.h"
 #include "report.h"
@@ -294,6 +295,7 @@ int runJob(const Job& job) {
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
     FilmIdentity identity{.scene_hash = compiled.hash, .version = CRT_VERSION, .record = recordOf(scene)};
     logDebug("scene {} needs {}", compiled.hash, featureNames(compiled.features));
+    warnOfIdleLamps(scene);
 
     // What is there already, and what is missing.
     Film film = openFilm(files, compiled, identity);
@@ -323,6 +325,7 @@ int runJob(const Job& job) {
         facts.deciding = estimateError(film, PixelSet::Even, independent);
         facts.judging = estimateError(film, PixelSet::Odd, independent);
     }
+    warnOfBlackFilm(film, scene);
     if (facts.invalid_samples > 0) logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
 
     // Images, and the report of how they came about.

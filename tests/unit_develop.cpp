@@ -4,6 +4,7 @@
 #include "film_record.h"
 #include "image_io.h"
 #include "image_metadata.h"
+#include "light_checks.h"
 #include "outputs.h"
 #include "scene_yaml.h"
 
@@ -241,5 +242,38 @@ TEST_CASE("whatever makes a film another one is said in words", "[develop]") {
         const Scene other = parsed({change});
         CHECK(compileScene(other, requestedAovs(other)).hash == hash);
         CHECK(differingTraits(record, recordOf(other)).empty());
+    }
+}
+
+TEST_CASE("a lamp with nothing in front of it is named, and no other", "[develop]") {
+    const auto named = [](const std::vector<SceneOverride>& changes) { return idleLamps(parsed(changes)); };
+    const std::vector<std::string> lamp{"'lamp'"};
+    const SceneOverride away{"objects.1.mesh.faces", "[[3, 2, 1, 0]]"};
+    CHECK(named({}).empty());
+    // The camera at height 2 is in the plane of the lamp, and not in front of it.
+    CHECK(named({away}) == lamp);
+    CHECK(named({away, {"camera.position", "[1, 2.5, -4]"}}).empty());
+    CHECK(named({away, {"camera.aperture_radius", "0.1"}}).empty());
+    CHECK(named({away, {"objects.1.emission.two_sided", "true"}}).empty());
+    CHECK(named({away, {"integrator.type", "normals"}}).empty());
+    CHECK(named({away, {"objects.0.transform", "[{translate: [0, 2, 0]}]"}}) == lamp);   // In its plane.
+    CHECK(named({away, {"objects.0.transform", "[{translate: [0, 2.001, 0]}]"}}).empty());
+    CHECK(named({away, {"objects.0.transform", "[{rotate: {axis: [1, 0, 0], angle_deg: 80}}]"}}) == lamp);
+    CHECK(named({away, {"objects.0.transform", "[{rotate: {axis: [1, 0, 0], angle_deg: 80}}, {scale: [1, 2, 1]}]"}}).empty());
+    // A mirroring transform keeps the outside outside.
+    CHECK(named({{"objects.1.transform", "[{scale: [-1, 1, 1]}]"}}).empty());
+    CHECK(named({away, {"objects.1.transform", "[{scale: [-1, 1, 1]}]"}}) == lamp);
+    CHECK(named({{"objects.1.transform", "[{scale: [1, -1, 1]}]"}}).empty());  // At −2, it lights upwards.
+    // Tilted, at rounding's mercy: its own corners are not in front of it.
+    for (int degrees = 1; degrees < 30; degrees += 3)
+        CHECK(named({away, {"objects.1.transform", "[{rotate: {axis: [1, 0, 0.3], angle_deg: " + std::to_string(degrees) + "}}, {translate: [0, 9, 0]}]"}}) == lamp);
+}
+
+TEST_CASE("a film is black when no pixel has any of X, Y and Z", "[develop]") {
+    for (std::size_t c = 0; c < 3; ++c) {
+        Film film = oneColor(7, 5, {0, 0, 0});
+        CHECK(isBlack(film));
+        film.sums[(34 * film.shape().channels + c) * 2] = 1e-300;
+        CHECK_FALSE(isBlack(film));
     }
 }

@@ -24,6 +24,7 @@ namespace {
 /// Far from the seeds of `crt converge`, which follow the scene's one by one.
 constexpr std::uint64_t kReferenceSeedOffset = std::uint64_t{1} << 40;
 constexpr const char* kContentKey = "crt/referenceContent";
+constexpr const char* kRecordKey = "crt/referenceRecord";  // film_record.h
 constexpr const char* kColourKey = "crt/referenceColour";
 constexpr const char* kEstimatorKey = "crt/referenceEstimator";
 
@@ -35,6 +36,20 @@ std::string metadataOf(const Image& image, const char* key) {
     for (const auto& [name, value] : image.metadata)
         if (name == key) return value;
     return {};
+}
+
+/// In what the scene of a reference differs from another, in words, apart from what a reference does not depend on.
+std::vector<std::string> differingContent(const Image& reference, const Scene& scene) {
+    const std::string text = metadataOf(reference, kRecordKey);
+    if (text.empty()) return {};
+    const auto withoutSampling = [](FilmRecord record) {
+        std::erase_if(record.traits, [](const SceneTrait& trait) {
+            return trait.name == "the seed" || trait.name == "the sampler" || trait.name == "the replicates" ||
+                   trait.name == "roulette" || trait.name == "nee" || trait.name == "the AOVs of first hits";
+        });
+        return record;
+    };
+    return differingTraits(withoutSampling(readRecord(text)), withoutSampling(recordOf(scene)));
 }
 
 /// Values of three channels of an image, or nothing when one is missing.
@@ -114,14 +129,12 @@ std::string colourText(const Scene& scene) {
     const auto space = [](ColorSpace s) {
         return s == ColorSpace::LinearSrgb ? "linear sRGB" : s == ColorSpace::AcesCg ? "ACEScg" : "XYZ";
     };
+    const Development development = developmentOf(scene).forFloats();
     std::string white = "no white balance";
-    if (scene.film.white_balance) {
-        const Vec3d xyz = spectrumToXyz(*scene.film.white_balance);
-        white = fmt::format("white balance from X : Y : Z = {:.6f} : 1 : {:.6f}", xyz[0] / xyz[1],
-                            xyz[2] / xyz[1]);
-    }
-    return fmt::format("exposure {} EV, {}, {}", scene.film.exposure_ev, space(scene.film.color_space),
-                       white);
+    if (development.white)
+        white = fmt::format("white balance from X : Y : Z = {:.6f} : 1 : {:.6f}", (*development.white)[0],
+                            (*development.white)[2]);
+    return fmt::format("exposure {} EV, {}, {}", development.exposure_ev, space(development.color_space), white);
 }
 
 int makeReference(const ReferenceRequest& request) {
@@ -219,7 +232,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
         throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
     checkWritable(request.output);
     const auto started = std::chrono::steady_clock::now();
-    const std::string content = hashOfContent(scene), colour = colourText(scene);
+    const std::string content = hashOfContent(scene), colour = colourText(scene), record = recordText(recordOf(scene));
     scene = referenceScene(std::move(scene), request.same_estimator);
     const LoadedBackend backend = openBackend(request.backend);
     Integrator integrator(backend, request.integrator);
@@ -229,6 +242,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     Image file = referenceImage(*folds, scene);
     file.metadata.emplace_back("Software", "crt " CRT_VERSION);
     file.metadata.emplace_back(kContentKey, content);
+    file.metadata.emplace_back(kRecordKey, record);
     file.metadata.emplace_back(kColourKey, colour);
     file.metadata.emplace_back(kEstimatorKey, estimatorText(scene));
     file.metadata.emplace_back("crt/backend", backend.name);
@@ -255,8 +269,12 @@ Reference readReference(const std::string& text, const Scene& scene) {
     const std::string content = metadataOf(image, kContentKey);
     if (content.empty())
         throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: make one with 'crt reference {} -o {}'", text, scene.file, text));
-    if (content != hashOfContent(scene))
-        throw Error(ErrorKind::Usage, fmt::format("'{}' is a reference of another scene, or of this one with other settings or resolution", text));
+    if (content != hashOfContent(scene)) {
+        const std::vector<std::string> differences = differingContent(image, scene);
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' is a reference of another scene, or of this one with other settings: {}", text,
+                                differences.empty() ? "what differs was not noted" : fmt::format("{}", fmt::join(differences, "; "))));
+    }
     const std::string colour = metadataOf(image, kColourKey);
     if (colour.empty())
         throw Error(ErrorKind::Usage, fmt::format("'{}' is of an earlier crt, which did not note exposure, "

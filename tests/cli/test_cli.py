@@ -375,6 +375,21 @@ class Rendering(CliTest):
 
 
 class Outputs(CliTest):
+    def test_no_folder_is_made_of_a_typing_error(self):
+        os.mkdir(self.path("out"))
+        for option in (["-o", "oit/a.pfm"], ["-o", "a.pfm", "--report", "oit/r.json"], ["-o", "a.pfm", "--checkpoint", "oit/a.crtfilm"]):
+            self.assert_one_error(self.crt("scene.yaml", "-b", "nonsense", *option, expect=6), "no folder 'oit'", "did you mean 'out'?")
+        self.crt("scene.yaml", "-b", "fake", "-o", "out/a.pfm", "-o", "out/a.crtfilm")
+        self.assert_one_error(self.crt("develop", "out/a.crtfilm", "-o", "oit/a.pfm", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("merge", "out/a.crtfilm", "-o", "oit/a.pfm", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("compare", "out/a.pfm", "out/a.pfm", "--diff", "oit/d.pfm", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("reference", "scene.yaml", "-o", "oit/r.exr", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("converge", "scene.yaml", "--backends", "fake", "-o", "oit/c", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("verify", "--backend", "fake", "--case", "A01", "-o", "oit/v", expect=6), "did you mean 'out'?")
+        self.assertFalse(os.path.exists(self.path("oit")))
+        self.write("with.yaml", SCENE + "outputs:\n  - {file: sub/beside.pfm}\n")
+        self.assert_one_error(self.crt("with.yaml", "-b", "nonsense", expect=6), "no folder 'sub'", "mkdir -p 'sub'")
+
     def test_unwritable_is_found_before_anything_is_opened(self):
         # A backend that does not exist would be exit code 4: the output is looked at earlier.
         for arguments in (["-o", "/nowhere/at/all/a.pfm"], ["-o", "scene.yaml/a.pfm"], ["-o", "a.pfm", "--report", "/nowhere/at/all/r.json"],
@@ -901,6 +916,32 @@ class Light(CliTest):
         self.assertIn("crt: warning:", run.stderr)
         _, _, values = read_pfm(self.path("a.pfm"))
         self.assertEqual(set(values), {0.0})
+
+    def test_a_black_image_says_what_to_look_at(self):
+        run = self.crt("scene.yaml", "-b", self.backend, "-o", "a.pfm", "-o", "a.crtfilm")
+        self.assertNotIn("black", run.stderr)
+        self.assertNotIn("lights nothing", run.stderr)
+        # Turned round, and with the camera below.
+        self.write("away.yaml", SCENE.replace("[1, 2, 1], [-1, 2, 1]], faces: [[0, 1, 2, 3]]", "[1, 2, 1], [-1, 2, 1]], faces: [[3, 2, 1, 0]]"))
+        run = self.crt("away.yaml", "-b", self.backend, "-o", "a.pfm", "-o", "a.crtfilm")
+        self.assertIn("warning: 'lamp' lights nothing", run.stderr)
+        self.assertRegex(run.stderr, r"warning: the image is black: no path met a light; 'lamp' may face away")
+        self.assertEqual(set(read_pfm(self.path("a.pfm"))[2]), {0.0})
+        self.assertIn("warning: the image is black", self.crt("develop", "a.crtfilm", "-o", "b.pfm").stderr)
+        self.assertNotIn("black", self.crt("away.yaml", "-b", self.backend, "-o", "a.pfm", "--set", "objects.1.emission.two_sided=true").stderr)
+        # Black on the screen alone: there is light, and too little exposure.
+        run = self.crt("scene.yaml", "-b", self.backend, "-o", "a.png", "-o", "a.exr", "--set", "film.exposure_ev=-30")
+        self.assertNotIn("no path met", run.stderr)
+        stops = int(re.search(r"'a.png' is black: .* about (\d+) stops more", run.stderr).group(1))
+        self.assertNotIn("black", self.crt("scene.yaml", "-b", self.backend, "-o", "a.png", "--set", f"film.exposure_ev={stops - 30}").stderr)
+
+    def test_a_gpu_that_is_not_there_is_no_news(self):
+        if os.path.exists("/dev/nvidiactl"):
+            self.skipTest("there is a GPU")
+        run = self.crt("scene.yaml", "-o", "a.pfm", CRT_BACKEND_PATH="")
+        self.assertNotIn("NVIDIA", run.stderr)
+        self.assertNotIn("cuda", run.stderr)
+        self.assertIn("crt: debug: backend 'cuda'", self.crt("scene.yaml", "-v", "-o", "a.pfm", CRT_BACKEND_PATH="").stderr)
 
     def test_halves_kernels_and_chunks_give_the_same_bits(self):
         self.crt("scene.yaml", "-b", self.backend, "-o", "whole.pfm")

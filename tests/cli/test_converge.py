@@ -75,7 +75,10 @@ class Converging(CliTest):
                  ("light sampling", [*SMALL, "--set", "integrator.nee=false"]),
                  ("the colour", [*SMALL, "--set", "film.exposure_ev=1", "--set", "film.apply_to_float=true"]),
                  ("the colour", [*SMALL, "--set", "film.color_space=acescg"]),
-                 ("the hash of what is to be seen", [*SMALL, "--set", "camera.fov=20"]),
+                 ("the camera", [*SMALL, "--set", "camera.fov=20"]),
+                 ("the geometry of scene, %s was another (4 triangles in 2 objects in both)" % self.backend,
+                  [*SMALL, "--set", "objects.0.mesh.positions.0.0=-1"]),
+                 ("the materials of scene, %s was another" % self.backend, [*SMALL, "--set", "materials.floor.reflectance=0.2"]),
                  ("the reference", [*SMALL, "--reference", "0.5"]),
                  ("the number of threads", [*SMALL, "-t", "1"]),
                  ("it has no", [*SMALL, "--vary", "roulette=true,false"])]
@@ -146,6 +149,16 @@ class Converging(CliTest):
                                     *SMALL, folder="o" + changed[5:8], expect=2)
                 self.assert_one_error(run, "a reference in other colours")
         self.converge("scene.yaml", "--reference", "ref.exr", "--set", "film.exposure_ev=1", *SMALL, folder="same")
+
+    def test_a_reference_of_another_scene_says_what_differs(self):
+        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", "64", "--same-estimator", "-b", self.backend, *SMALL)
+        for change, words in (("film.resolution=[8,8]", "the resolution is 16 × 16, not 8 × 8"),
+                              ("integrator.max_depth=3", "max_depth is 16, not 3"), ("camera.fov=20", "the camera is at"),
+                              ("materials.floor.reflectance=0.2", "the materials are others")):
+            with self.subTest(change=change):
+                run = self.converge("scene.yaml", "--reference", "ref.exr", *SMALL, "--set", change, folder="o", expect=2)
+                self.assert_one_error(run, "a reference of another scene", words)
+                self.assertNotIn("the seed", run.stderr)
 
     def test_a_variant_that_shows_another_image_is_not_held_against_the_reference(self):
         depths = ["--set", "integrator.max_depth=4", "--vary", "depth=1,4"]
