@@ -416,10 +416,10 @@ private:
                         "Where no --reference is given, a quarter of --time makes one.\n"
                         "docs/error.md explains the terms.\n"
                         "\nExamples:\n"
-                        "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60 -o out/converge\n"
+                        "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60 -o converge_box\n"
                         "  crt converge scene.yaml --vary sampler=sobol,independent --vary nee=true,false --reference ref.exr\n"
                         "  crt converge configs/analytic/direct_light.yaml --reference 0.2394564705\n"
-                        "  crt converge a.yaml b.yaml c.yaml --time 10m -o out/night       then, cut short: the same with --resume\n");
+                        "  crt converge a.yaml b.yaml c.yaml --time 10m -o night       then, cut short: the same with --resume\n");
         command->add_option("SCENE", converge_files_, "scene files (YAML)")->required();
         const char* group = "What is measured";
         reader_.option(*command, "--backends", "X,Y", "of these; one that cannot run is left out and named (embree,opencl,cuda)",

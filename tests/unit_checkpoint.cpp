@@ -225,6 +225,43 @@ TEST_CASE("what is wrong with a checkpoint is said", "[checkpoint]") {
     CHECK_THROWS_AS(readCheckpoint(directory.path()), Error);
 }
 
+TEST_CASE("the record of a merged film is that of the first samples, with every run in it", "[checkpoint]") {
+    const TemporaryFolder directory;
+    const auto write = [&](const char* name, SampleRange range, double exposure_ev, const char* backend, const char* date) {
+        FilmIdentity identity = kIdentity;
+        identity.record.emplace();
+        identity.record->width = identity.record->height = 1;
+        identity.record->window = {0, 0, 1, 1};
+        identity.record->development.exposure_ev = exposure_ev;
+        identity.record->backend = backend;
+        identity.record->date_utc = date;
+        identity.record->complete = true;
+        writeCheckpoint(directory / name, randomFilm({1, 1, 4, 0}, range, 1), identity);
+        return directory / name;
+    };
+    const std::string a = write("a.crtfilm", {8, 16}, 1, "embree", "2026:01:01 00:00:00"), b = write("b.crtfilm", {0, 8}, 2, "cuda", "2025:01:01 00:00:00"),
+                      c = write("c.crtfilm", {16, 20}, 3, "embree", "2024:01:01 00:00:00");
+    writeCheckpoint(directory / "old.crtfilm", randomFilm({1, 1, 4, 0}, {100, 101}, 1), kIdentity);
+    std::string text;
+    for (const std::vector<std::string>& order : {std::vector{a, b, c}, {c, b, a}, {b, directory / "old.crtfilm", c, a}, {directory / "old.crtfilm", c, a, b}}) {
+        const std::optional<FilmRecord> record = mergeCheckpoints(order).second.record;
+        REQUIRE(record);
+        CHECK(record->development.exposure_ev == 2);
+        CHECK(record->backend == "cuda and embree");
+        CHECK(record->date_utc == "2026:01:01 00:00:00");
+        CHECK_FALSE(record->complete);
+        CHECK((text.empty() || recordText(*record) == text));
+        text = recordText(*record);
+    }
+    // A record of a film of another size is none of this film.
+    FilmIdentity wrong = kIdentity;
+    wrong.record.emplace();
+    wrong.record->width = wrong.record->height = 2;
+    wrong.record->window = {0, 0, 2, 1};
+    writeCheckpoint(directory / "wrong.crtfilm", Film({1, 1, 4, 0}), wrong);
+    CHECK_THROWS_WITH(readCheckpoint(directory / "wrong.crtfilm"), Contains("record of its scene that is of a film of another size"));
+}
+
 TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpoint]") {
     const FilmIdentity other{"ffffffffffffffffffffffffffffffff", "0.1.0"};
     CHECK_NOTHROW(requireSameScene("a.crtfilm", kIdentity, kIdentity));
