@@ -1,6 +1,7 @@
 #include "atomic_file.h"
 
 #include "error.h"
+#include "yaml_reader.h"
 
 #include <fmt/format.h>
 
@@ -11,6 +12,7 @@
 #include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
+#include <vector>
 
 namespace crt {
 namespace fs = std::filesystem;
@@ -19,6 +21,25 @@ namespace {
 std::string directoryOf(const std::string& path) {
     const std::string parent = fs::path(path).parent_path().string();
     return parent.empty() ? "." : parent;
+}
+
+/// "there is no folder 'ou'; did you mean 'out'?": nothing is made of what may be a typing error.
+std::string missingFolder(const std::string& directory) {
+    std::error_code error;
+    fs::path missing = fs::path(directory).lexically_normal();
+    if (!missing.has_filename()) missing = missing.parent_path();
+    fs::path above = directoryOf(missing.string());
+    while (!fs::exists(above, error) && above.has_parent_path() && above != above.parent_path()) {
+        missing = above;
+        above = directoryOf(above.string());
+    }
+    constexpr std::size_t kMostNeighbours = 1000;
+    std::vector<std::string> neighbours;
+    for (fs::directory_iterator entry(above, error), end; !error && entry != end && neighbours.size() < kMostNeighbours; entry.increment(error))
+        if (std::error_code ignored; entry->is_directory(ignored)) neighbours.push_back(entry->path().filename().string());
+    const std::string hint = didYouMean(missing.filename().string(), neighbours);
+    return fmt::format("there is no folder '{}'; {}", missing.string(),
+                       hint.empty() ? fmt::format("make it first: mkdir -p '{}'", directory) : hint);
 }
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
@@ -92,17 +113,23 @@ void AtomicFile::commit() {
 void checkWritable(const std::string& path) {
     const std::string directory = directoryOf(path);
     std::error_code error;
-    if (!fs::exists(directory, error)) {
-        // One level only: a typing mistake at the root of a long path should not grow a tree.
-        const std::string above = directoryOf(fs::path(directory).lexically_normal().string());
-        if (!fs::is_directory(above, error))
-            refuse(path, fmt::format("neither the directory '{}' nor '{}' exists", directory, above));
-        if (!fs::create_directory(directory, error) && error)
-            refuse(path, fmt::format("the directory '{}' cannot be created: {}", directory, error.message()));
-    } else if (!fs::is_directory(directory, error)) {
-        refuse(path, fmt::format("'{}' is not a directory", directory));
-    }
+    if (!fs::exists(directory, error)) refuse(path, missingFolder(directory));
+    if (!fs::is_directory(directory, error)) refuse(path, fmt::format("'{}' is not a directory", directory));
     const AtomicFile probe(path);  // Removed again by its destructor.
+}
+
+void makeOutputFolder(const std::string& path) {
+    std::error_code error;
+    if (fs::is_directory(path, error)) return;
+    const auto cannot = [&path](const std::string& why) {
+        throw Error(ErrorKind::Output, fmt::format("cannot make the folder '{}': {}", path, why), {path});
+    };
+    if (fs::exists(path, error)) cannot("there is a file of this name");
+    fs::path folder = fs::path(path).lexically_normal();
+    if (!folder.has_filename()) folder = folder.parent_path();
+    const std::string above = directoryOf(folder.string());
+    if (!fs::exists(above, error)) cannot(missingFolder(above));
+    if (!fs::create_directory(folder, error) && error) cannot(error.message());
 }
 
 }  // namespace crt

@@ -35,9 +35,12 @@ private:
     bool committed_ = false;
 };
 
-/// Finds out before a render, rather than after it, that `path` cannot be written: creates its directory when only the last level is
-/// missing (so that "out/image.exr" works in a fresh checkout), and creates and removes a temporary file there. Throws crt::Error(Output)
-/// with one sentence. What can still go wrong later is a full disk.
+/// Finds out before a render, rather than after it, that `path` cannot be written: creates and removes a temporary file
+/// beside it. Makes no folder, which would hide a typing error. Throws crt::Error(Output) with one sentence. What can still
+/// go wrong later is a full disk.
 void checkWritable(const std::string& path);
+
+/// Makes the folder that a command fills, in one that is there already. Throws crt::Error(Output).
+void makeOutputFolder(const std::string& path);
 
 }  // namespace crt

@@ -30,6 +30,7 @@ static_assert(std::endian::native == std::endian::little, "checkpoints are littl
 constexpr std::array<unsigned char, 8> kMagic{0x89, 'C', 'R', 'T', 'F', 0x0d, 0x0a, 0x1a};
 constexpr std::size_t kHashDigits = 32;
 constexpr std::size_t kVersionBytesMax = 255;
+constexpr std::uint32_t kRecordBytesMax = 1u << 28;
 constexpr std::uint32_t kRangesMax = 1u << 20;
 constexpr std::uint32_t kSideMax = 65535;  // Of a film, as scene files have it.
 
@@ -45,7 +46,7 @@ struct Header {
     std::uint32_t version_bytes;
     std::uint32_t range_count;
     std::uint32_t bits_version;
-    std::uint32_t reserved;
+    std::uint32_t record_bytes;
 };
 static_assert(sizeof(Header) == 96 && offsetof(Header, checksum) == 24 &&
               offsetof(Header, scene_hash) == 48);
@@ -76,16 +77,18 @@ private:
     std::unique_ptr<XXH3_state_t, Free> state_;
 };
 
-/// Sample ranges and version text: the part of the header whose size varies.
-std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identity) {
+/// Sample ranges, version and record: the part of the header whose size varies.
+std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identity, const std::string& record) {
     const auto& ranges = film.samples.ranges();
     const std::size_t range_bytes = ranges.size() * 16;
-    std::vector<unsigned char> bytes(range_bytes + roundUp8(identity.version.size()), 0);
+    const std::size_t record_begin = range_bytes + roundUp8(identity.version.size());
+    std::vector<unsigned char> bytes(record_begin + roundUp8(record.size()), 0);
     for (std::size_t i = 0; i < ranges.size(); ++i) {
         std::memcpy(&bytes[i * 16], &ranges[i].first, 8);
         std::memcpy(&bytes[i * 16 + 8], &ranges[i].second, 8);
     }
     if (!identity.version.empty()) std::memcpy(&bytes[range_bytes], identity.version.data(), identity.version.size());
+    if (!record.empty()) std::memcpy(&bytes[record_begin], record.data(), record.size());
     return bytes;
 }
 
@@ -111,8 +114,13 @@ bool isHexHash(const char* digits, std::size_t size) {
 
 using Wide = unsigned __int128;
 
+/// Sample ranges, version and record.
+std::uint64_t tailBytes(const Header& h) {
+    return h.range_count * std::uint64_t{16} + roundUp8(h.version_bytes) + roundUp8(h.record_bytes);
+}
+
 /// Size of the part before the film.
-Wide headBytes(const Header& h) { return sizeof(Header) + Wide{h.range_count} * 16 + roundUp8(h.version_bytes); }
+Wide headBytes(const Header& h) { return Wide{tailBytes(h)} + sizeof(Header); }
 
 /// Whether the header can describe a file of its size.
 bool sizesFit(const Header& h) {
@@ -121,7 +129,20 @@ bool sizesFit(const Header& h) {
         return h.file_bytes >= headBytes(h) + leastPackedBytes({h.width, h.height, h.channels, h.aovs});
     const Wide pixels = Wide{h.width} * h.height;
     const Wide ids = (h.aovs & kAovPrimitive) != 0 ? (pixels * 4 + 7) / 8 * 8 : 0;
-    return h.file_bytes == headBytes(h) + pixels * h.channels * 16 + pixels * 8 + ids;
+    return h.record_bytes == 0 && h.file_bytes == headBytes(h) + pixels * h.channels * 16 + pixels * 8 + ids;
+}
+
+FilmRecord readRecordOf(const std::string& path, const std::vector<unsigned char>& tail, const Header& h) {
+    const auto* text = reinterpret_cast<const char*>(tail.data()) + h.range_count * std::size_t{16} + roundUp8(h.version_bytes);
+    try {
+        FilmRecord record = readRecord({text, h.record_bytes});
+        const auto& [x0, y0, x1, y1] = record.window;
+        if (static_cast<std::uint32_t>(x1 - x0) != h.width || static_cast<std::uint32_t>(y1 - y0) != h.height)
+            throw Error(ErrorKind::Usage, "is of a film of another size");
+        return record;
+    } catch (const Error& error) {
+        refuse(path, fmt::format("holds a record of its scene that {}", error.what()));
+    }
 }
 
 }  // namespace
@@ -132,7 +153,9 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
     if (identity.version.size() > kVersionBytesMax || film.samples.ranges().size() > kRangesMax)
         throw Error(ErrorKind::Internal, "the film has too many sample ranges, or crt too long a version, for a checkpoint");
 
-    const std::vector<unsigned char> tail = packTail(film, identity);
+    const std::string record = identity.record ? recordText(*identity.record) : std::string();
+    if (record.size() > kRecordBytesMax) throw Error(ErrorKind::Internal, "the film has too long a record for a checkpoint");
+    const std::vector<unsigned char> tail = packTail(film, identity, record);
     Header header{};
     header.magic = kMagic;
     header.format_version = kCheckpointVersion;
@@ -145,6 +168,7 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
     header.version_bytes = static_cast<std::uint32_t>(identity.version.size());
     header.range_count = static_cast<std::uint32_t>(film.samples.ranges().size());
     header.bits_version = identity.bits_version;
+    header.record_bytes = static_cast<std::uint32_t>(record.size());
     AtomicFile file(path);  // Where it cannot be written, nothing need be packed.
     const std::vector<unsigned char> packed = packFilm(film);
     header.file_bytes = header.header_bytes + packed.size();
@@ -182,7 +206,8 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     // Sizes before anything is allocated: a damaged width must not ask for a terabyte.
     if (actual_bytes < header.file_bytes)
         refuse(path, fmt::format("is truncated: it has {} of {} bytes", actual_bytes, header.file_bytes));
-    if (actual_bytes > header.file_bytes || header.version_bytes > kVersionBytesMax || header.range_count > kRangesMax || !sizesFit(header))
+    if (actual_bytes > header.file_bytes || header.version_bytes > kVersionBytesMax || header.range_count > kRangesMax ||
+        header.record_bytes > kRecordBytesMax || !sizesFit(header))
         refuse(path, "is damaged: its header contradicts its size");
     // A side of no pixels makes any other side fit the size; walking four thousand million empty rows would take a minute.
     if (std::min(header.width, header.height) < 1 || std::max(header.width, header.height) > kSideMax)
@@ -236,6 +261,7 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         std::string(reinterpret_cast<const char*>(tail.data()) + header.range_count * std::size_t{16},
                     header.version_bytes),
         header.bits_version};
+    if (header.record_bytes > 0) identity.record = readRecordOf(path, tail, header);
     if (!isHexHash(identity.scene_hash.data(), identity.scene_hash.size())) refuse(path, "holds a scene hash that is not one");
     try {
         for (std::uint32_t i = 0; i < header.range_count; ++i) {
@@ -250,6 +276,19 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     return {std::move(film), std::move(identity)};
 }
 
+namespace {
+
+/// What `found` has and `expected` has not, in words.
+std::string differenceText(const FilmIdentity& found, const FilmIdentity& expected) {
+    std::vector<std::string> differences;
+    if (found.record && expected.record) differences = differingTraits(*found.record, *expected.record);
+    if (differences.empty())
+        return fmt::format("its hash is {}, expected is {}", found.scene_hash, expected.scene_hash);
+    return fmt::format("{}", fmt::join(differences, "; "));
+}
+
+}  // namespace
+
 void requireSameScene(const std::string& path, const FilmIdentity& found, const FilmIdentity& expected) {
     // Before the hash, which covers the version too and could not say what differs.
     if (found.bits_version != expected.bits_version)
@@ -258,8 +297,7 @@ void requireSameScene(const std::string& path, const FilmIdentity& found, const 
                                  "versions do not make one image; render it anew",
                                  found.bits_version, found.version, expected.bits_version));
     if (found.scene_hash != expected.scene_hash)
-        refuse(path, fmt::format("is of another scene, seed or film: its hash is {}, expected is {}", found.scene_hash,
-                                 expected.scene_hash));
+        refuse(path, fmt::format("is of another scene, seed or film: {}", differenceText(found, expected)));
     if (found.version != expected.version)
         logWarning("'{}' was rendered by crt {}, this is {}: samples may differ between versions", path, found.version, expected.version);
 }
@@ -279,6 +317,22 @@ std::string joinVersions(const std::string& a, const std::string& b) {
     return fmt::format("{}{}{}", joined.substr(0, end), kBetween, kMore);
 }
 
+namespace {
+
+std::uint64_t firstSample(const Film& film) {
+    return film.samples.ranges().empty() ? ~std::uint64_t{0} : film.samples.ranges().front().first;
+}
+
+/// The record of the film with the lower first sample leads, so that the order of the films does not show.
+void addRecord(std::pair<Film, FilmIdentity>& merged, const Film& film, const FilmIdentity& identity) {
+    std::optional<FilmRecord>& record = merged.second.record;
+    std::optional<FilmRecord> other = identity.record;
+    if (!record || (other && firstSample(film) < firstSample(merged.first))) std::swap(record, other);
+    if (record && other) record->addRun(*other);
+}
+
+}  // namespace
+
 std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& paths) {
     if (paths.empty()) throw Error(ErrorKind::Usage, "nothing to merge: name at least one .crtfilm file");
     std::pair<Film, FilmIdentity> merged = readCheckpoint(paths.front());
@@ -294,11 +348,12 @@ std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& p
                 {paths[i]});
         if (identity.scene_hash != merged.second.scene_hash)
             throw Error(ErrorKind::Usage,
-                        fmt::format("'{}' and '{}' are of different scenes, seeds or films: their hashes are {} and {}", paths.front(), paths[i],
-                                    merged.second.scene_hash, identity.scene_hash),
+                        fmt::format("'{}' is of another scene, seed or film than '{}': {}", paths[i], paths.front(),
+                                    differenceText(identity, merged.second)),
                         {paths[i]});
         requireSameScene(paths[i], identity, merged.second);
         merged.second.version = joinVersions(merged.second.version, identity.version);
+        addRecord(merged, film, identity);
         try {
             merged.first.add(film);
         } catch (const Error& error) {

@@ -12,16 +12,17 @@
 ///     80  u32            bytes of the crt version text
 ///     84  u32            number of sample ranges
 ///     88  u32            version of the bits (kernel/bits_version.h)
-///     92  u32            0
+///     92  u32            bytes of the record
 ///     96  u64 × 2 each   sample ranges, first and end
 ///         char[]         crt version, zero-padded to 8
+///         char[]         record (film_record.h), zero-padded to 8
 ///         bytes          to the end of the file: the film, packed (film_pack.h). Its sections are
 ///             f64 × 2 each   sums, hi and lo, [height][width][channels]
 ///             u64 each       counts, [height][width]
 ///             u32 each       primitive ids, [height][width]; only when the AOV mask has them
 ///
-/// Version 2, which is read still, has these sections as they are, the last zero-padded to 8 bytes, and its
-/// films hold squares (kernel/channels.h) without a bit that says so.
+/// Version 2, which is read still, has these sections as they are, the last zero-padded to 8 bytes, and no
+/// record; its films hold squares (kernel/channels.h) without a bit that says so.
 #pragma once
 
 #include "film.h"
@@ -34,7 +35,7 @@
 namespace crt {
 
 inline constexpr std::uint32_t kCheckpointVersion = 3;
-/// The last version whose films are not packed.
+/// The last version whose films are not packed, and have no record.
 inline constexpr std::uint32_t kCheckpointVersionUnpacked = 2;
 inline constexpr const char* kCheckpointExtension = ".crtfilm";
 

@@ -5,6 +5,7 @@
 #include "checkpoint.h"
 #include "compile.h"
 #include "image_io.h"
+#include "image_metadata.h"
 #include "kernel/features.h"
 #include "log.h"
 #include "outputs.h"
@@ -130,15 +131,44 @@ std::string aovText(std::uint32_t aovs) {
     return text.empty() ? "none" : text;
 }
 
+std::string developmentText(const Development& development) {
+    const char* const space = development.color_space == ColorSpace::LinearSrgb ? "linear sRGB"
+                              : development.color_space == ColorSpace::AcesCg   ? "ACEScg"
+                                                                                : "XYZ";
+    return fmt::format("{}, exposure {:+g} EV, white balance {}{}", space, development.exposure_ev,
+                       development.white ? "of " + whiteBalanceText(development) : "none",
+                       development.apply_to_float ? ", in files of floats too" : "");
+}
+
+void showRecord(const FilmRecord& record) {
+    const auto optional_row = [](const char* name, const std::string& value) {
+        if (!value.empty()) row(name, value);
+    };
+    optional_row("title", record.title);
+    if (record.isCropped())
+        row("window", fmt::format("[{}, {}) x [{}, {}) of {} x {} pixels", record.window[0], record.window[2], record.window[1],
+                                  record.window[3], record.width, record.height));
+    row("developed in", developmentText(record.development));
+    std::vector<std::string> lights;
+    for (const auto& [name, white] : record.whites) lights.push_back(name);
+    optional_row("lights", fmt::format("{}", fmt::join(lights, ", ")));
+    row("seed", std::to_string(record.seed));
+    optional_row("rendered by", record.backend);
+    optional_row("on", record.device);
+    optional_row("at", record.date_utc.empty() ? "" : record.date_utc + " UTC");
+}
+
 void showFilm(const std::string& file) {
     const auto [film, identity] = readCheckpoint(file);
-    const std::optional<ErrorEstimate> error = estimateError(film);
-    fmt::print("{}: partial render\n", file);
+    const bool independent = identity.record && identity.record->independent_samples;
+    const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, independent);
+    fmt::print("{}: {}\n", file, identity.record && identity.record->complete == true ? "film" : "partial render");
     row("film", fmt::format("{} x {} pixels", film.shape().width, film.shape().height));
     row("aovs", aovText(film.shape().aovs));
     row("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
     row("invalid", counted(film.invalidSamples(), "sample", "samples"));
     row("error", error ? errorText(*error).substr(6) : "unknown");
+    if (identity.record) showRecord(*identity.record);
     row("scene hash", identity.scene_hash);
     row("written by", fmt::format("crt {}, bits version {}", identity.version, identity.bits_version));
 }
@@ -167,25 +197,28 @@ int showInfo(const SceneRequest& what) {
 
 int mergeFilms(const MergeArguments& arguments) {
     // Everything that can be refused is refused before the parts, which may be large, are read.
+    const bool has_scene = !arguments.scene.file.empty();
     Scene scene;
-    if (!arguments.scene.file.empty()) scene = loadScene(arguments.scene);
-    const OutputPlan plan = planOutputs(arguments.outputs, scene);
-    if (!plan.images.empty() && arguments.scene.file.empty())
-        throw Error(ErrorKind::Usage, fmt::format("'{}' needs --scene: colour space and exposure are in the scene, not in its films",
-                                                  plan.images.front().file));
+    if (has_scene) scene = loadScene(arguments.scene);
+    OutputPlan plan = planOutputs(arguments.outputs, scene);
     for (const Output& image : plan.images) checkWritable(image.file);
     for (const std::string& film : plan.films) checkWritable(film);
 
-    const auto [film, identity] = mergeCheckpoints(arguments.parts);
-    if (!arguments.scene.file.empty())
-        requireSameScene(arguments.parts.front(), identity, {compileScene(scene, requestedAovs(scene)).hash, CRT_VERSION});
+    auto [film, identity] = mergeCheckpoints(arguments.parts);
+    if (has_scene) {
+        FilmRecord record = recordOf(scene);
+        requireSameScene(arguments.parts.front(), identity,
+                         {.scene_hash = compileScene(scene, requestedAovs(scene)).hash, .version = CRT_VERSION, .record = record});
+        if (identity.record) record.addRun(*identity.record);
+        identity.record = std::move(record);
+    }
+    if (!plan.images.empty()) requireRecord(arguments.parts.front(), identity);
 
-    // The version of the samples; who merged them is the software.
-    const Metadata metadata{{"Software", "crt " CRT_VERSION},
-                            {"crt/version", identity.version},
-                            {"crt/sceneHash", identity.scene_hash}};
     for (const std::string& name : plan.films) writeCheckpoint(name, film, identity);
-    for (const Output& output : plan.images) writeOutput(output, film, scene, metadata);
+    for (Output& output : plan.images) {
+        if (output.format == OutputFormat::Exr) output.aovs = identity.record->aovs;
+        writeOutput(output, film, identity);
+    }
     logInfo("{} samples per pixel from {} to {}", film.samples.count(), counted(arguments.parts.size(), "part", "parts"),
             fmt::join(arguments.outputs, ", "));
     return 0;

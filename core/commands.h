@@ -5,6 +5,8 @@
 #include "compare_backends.h"
 #include "job.h"
 
+#include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,13 +29,24 @@ struct CompareArguments {
 };
 int compare(const CompareArguments& arguments);
 
-/// `crt merge`: disjoint partial films into one film, or into the images of a scene.
+/// `crt merge`: disjoint partial films into one film, or into images.
 struct MergeArguments {
     std::vector<std::string> parts;
     std::vector<std::string> outputs;
-    SceneRequest scene;  ///< As rendered; an empty name means none, and then there are no images.
+    SceneRequest scene;  ///< As rendered, for films that do not say themselves how to develop them; an empty name means none.
 };
 int mergeFilms(const MergeArguments& arguments);
+
+/// `crt develop`: images of films, with other exposure, white balance, colour space or crop window than the scene's,
+/// and without a backend or the scene. Films of disjoint samples are added up first.
+struct DevelopArguments {
+    std::vector<std::string> films;
+    std::vector<std::string> outputs;
+    std::vector<SceneOverride> changes;      ///< Keys of `film` that no sample depends on; others are refused.
+    std::optional<std::array<int, 4>> crop;  ///< Of the whole film; x0, y0, x1, y1, half open.
+    std::vector<std::string> aovs;           ///< Of EXR files; empty: those of the scene. "none": none.
+};
+int develop(const DevelopArguments& arguments);
 
 /// `crt plugins`: every backend, its devices, or the one reason why it cannot run.
 int listPlugins();

@@ -104,6 +104,19 @@ void addLooks(CompareResult& result, const Image& a, const Image& b, bool displa
     result.looks = *seen_a == *seen_b ? Looks{0, !display_referred, 0, 0} : compareLooks(*seen_a, *seen_b, a.width, a.height, display_referred);
 }
 
+/// Why pixels of two crop windows of one picture do not belong together; empty when they do, or when one does not say
+/// which part of a picture it is.
+std::string windowConflict(const Image& a, const Image& b) {
+    if (a.whole_width == 0 || b.whole_width == 0) return {};
+    const auto same = [](const Image& i) { return std::array<std::int64_t, 4>{i.left, i.top, i.whole_width, i.whole_height}; };
+    if (same(a) == same(b)) return {};
+    const auto window = [](const Image& i) {
+        return fmt::format("[{}, {}) × [{}, {}) of {} × {} pixels", i.left, i.left + std::int64_t{i.width}, i.top, i.top + std::int64_t{i.height},
+                           i.whole_width, i.whole_height);
+    };
+    return fmt::format("A and B are different parts of a picture: {} and {}", window(a), window(b));
+}
+
 /// The colour of both images side by side; throws when they do not match.
 struct ColorPair {
     std::array<Plane, 3> a, b;
@@ -144,6 +157,8 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
         result.mismatch = fmt::format("the images differ in size: {} × {} and {} × {} pixels", a.width, a.height, b.width, b.height);
         return result;
     }
+    result.mismatch = windowConflict(a, b);
+    if (!result.mismatch.empty()) return result;
     result.width = a.width;
     result.height = a.height;
     result.other_channels = missingFrom(a, b);

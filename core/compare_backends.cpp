@@ -108,7 +108,7 @@ std::uint64_t seedAfter(std::uint64_t seed, std::uint64_t index) {
 
 /// With the scene's seed, and then with as many others as there are replicates, no two backends with the same.
 Renders renderAll(Contestant& contestant, const Scene& scene, const BackendComparison& plan, std::size_t backend) {
-    Renders renders{resolveImage(contestant.render(plan.seed, plan.samples), scene, 0), {plan.width, plan.height, kColors}, {}, 0};
+    Renders renders{resolveImage(contestant.render(plan.seed, plan.samples), developmentOf(scene).forFloats(), 0), {plan.width, plan.height, kColors}, {}, 0};
     for (std::uint64_t r = 0; r < plan.replicates; ++r)
         renders.replicates.add(colorsOf(contestant.render(seedAfter(plan.seed, backend * plan.replicates + r), plan.samples)));
     renders.device = contestant.device();

@@ -173,7 +173,32 @@ std::uint64_t Film::invalidSamples() const {
     return invalid;
 }
 
-Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
+Film cropped(const Film& film, const std::array<int, 4>& window) {
+    const FilmShape& whole = film.shape();
+    const auto& [x0, y0, x1, y1] = window;
+    if (x0 < 0 || y0 < 0 || x0 >= x1 || y0 >= y1 || static_cast<std::uint32_t>(x1) > whole.width ||
+        static_cast<std::uint32_t>(y1) > whole.height)
+        throw Error(ErrorKind::Internal, "a film was cropped beyond its edge");
+    FilmShape shape = whole;
+    shape.width = static_cast<std::uint32_t>(x1 - x0);
+    shape.height = static_cast<std::uint32_t>(y1 - y0);
+    Film part(shape);
+    part.samples = film.samples;
+    const auto copyRows = [&](const auto& from, auto& to, std::size_t values_a_pixel) {
+        if (from.empty()) return;
+        for (std::size_t y = 0; y < shape.height; ++y) {
+            const std::size_t first = (static_cast<std::size_t>(y0) + y) * whole.width + static_cast<std::size_t>(x0);
+            std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first * values_a_pixel), shape.width * values_a_pixel,
+                        to.begin() + static_cast<std::ptrdiff_t>(y * shape.width * values_a_pixel));
+        }
+    };
+    copyRows(film.sums, part.sums, std::size_t{2} * whole.channels);
+    copyRows(film.counts, part.counts, 1);
+    copyRows(film.primitives, part.primitives, 1);
+    return part;
+}
+
+Image resolveImage(const Film& film, const Development& development, std::uint32_t aovs) {
     const FilmShape& shape = film.shape();
     for (const AovRow& row : kAovRows)
         if ((aovs & kAovsOfFirstHits & ~shape.aovs & row.aov) != 0)
@@ -181,19 +206,13 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
                         fmt::format("an output asks for the {} plane, but the film was rendered without it",
                                     row.name));
 
-    const ColorSpace space = scene.film.color_space;
-    const double exposure = std::exp2(scene.film.exposure_ev);
+    const ColorSpace space = development.color_space;
+    const double exposure = std::exp2(development.exposure_ev);
     const Matrix3d to_rgb = xyzToRgb(space);
     Matrix3d color = to_rgb;
     // To D65 in every space: it is the white of sRGB, xyzToRgb takes it to ACEScg's own, and an XYZ image then still becomes the sRGB one by
     // the standard matrix.
-    if (scene.film.white_balance) {
-        Vec3d white = spectrumToXyz(*scene.film.white_balance);
-        const double luminance = white[1];
-        if (!(luminance > 0)) throw Error(ErrorKind::Scene, "the white balance illuminant has no visible light", {scene.file});
-        for (double& component : white) component /= luminance;
-        color = multiply(color, bradfordAdaptation(white, d65WhiteXyz()));
-    }
+    if (development.white) color = multiply(color, bradfordAdaptation(*development.white, d65WhiteXyz()));
     for (Vec3d& row : color)
         for (double& entry : row) entry *= exposure;
     // The film has the noise of Y alone, and a white balance mixes X, Y and Z: what becomes of that noise is
@@ -201,7 +220,7 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
     // was.
     const stats::Rgb luminance_weights = stats::luminanceWeights(space);
     const auto luminanceGain = [&](const Vec3d& xyz) {
-        if (!scene.film.white_balance || !(xyz[1] > 0)) return exposure;
+        if (!development.white || !(xyz[1] > 0)) return exposure;
         return std::abs(stats::luminance(multiply(color, xyz), luminance_weights)) / xyz[1];
     };
     // Albedo is a reflectance: the film has it as XYZ under equal-energy light, and a perfect white must come out as (1,1,1) in the RGB spaces
@@ -257,20 +276,15 @@ Image resolveImage(const Film& film, const Scene& scene, std::uint32_t aovs) {
         }
 
     image.chromaticities = chromaticities(space);
-    // What the film and the scene know of themselves; who rendered it, where and when is for the caller to add.
-    image.metadata = {{"colorInteropID", spaceName(space)},
+    // Who rendered it, where and when is for the caller to add.
+    image.metadata = {{kColorInteropIdKey, spaceName(space)},
                       {"crt/spp", std::to_string(film.samples.count())},
                       {"crt/sampleRanges", film.samples.text()},
-                      {"crt/seed", std::to_string(scene.sampler.seed)},
-                      {kExposureKey, fmt::format("{}", scene.film.exposure_ev)},
-                      {kWhiteBalanceKey, whiteBalanceText(scene)},
+                      {kExposureKey, fmt::format("{}", development.exposure_ev)},
+                      {kWhiteBalanceKey, whiteBalanceText(development)},
                       {"crt/invalidSamples", std::to_string(film.invalidSamples())}};
     if ((aovs & (kAovVariance | kAovError)) && variance.degreesOfFreedom() >= 1)
         image.metadata.emplace_back(kErrorDofKey, fmt::format("{:.6g}", variance.degreesOfFreedom()));
-    const auto& crop = scene.film.crop;
-    if (crop != std::array<int, 4>{0, 0, 0, 0})
-        image.metadata.emplace_back("crt/crop", fmt::format("{},{},{},{} of {}x{}", crop[0], crop[1], crop[2], crop[3], scene.film.width,
-                                                            scene.film.height));
     return image;
 }
 

@@ -2,6 +2,7 @@
 
 #include "backend/loader.h"
 #include "error.h"
+#include "image_metadata.h"
 #include "image_module.h"
 #include "log.h"
 
@@ -240,6 +241,24 @@ std::vector<const char*> pointers(const std::vector<std::string>& names) {
     return list;
 }
 
+/// Zeros for none.
+template <std::size_t Size>
+std::array<float, Size> floatsOf(const std::optional<std::array<double, Size>>& values) {
+    std::array<float, Size> floats{};
+    if (values)
+        std::transform(values->begin(), values->end(), floats.begin(), [](double v) { return static_cast<float>(v); });
+    return floats;
+}
+
+/// Of R, G and B; at least 0.
+double largestColor(const Image& image) {
+    const std::array<std::size_t, 3> color = colorChannels(image);
+    double largest = 0;
+    for (std::size_t p = 0; p < image.pixels.size(); p += image.channels.size())
+        for (const std::size_t c : color) largest = std::max(largest, double{image.pixels[p + c]});
+    return largest;
+}
+
 using Reason = std::array<char, 512>;
 
 void writeExr(const std::string& path, const Image& image) {
@@ -247,9 +266,7 @@ void writeExr(const std::string& path, const Image& image) {
     const CrtImageModule& module = imageModule(path, ErrorKind::Output);
     const std::vector<const char*> float_names = pointers(image.channels), integer_names = pointers(image.integer_channels);
     const std::vector<CrtImageText> metadata = texts(image);
-    std::array<float, 8> primaries{};
-    if (image.chromaticities)
-        std::transform(image.chromaticities->begin(), image.chromaticities->end(), primaries.begin(), [](double v) { return static_cast<float>(v); });
+    const std::array<float, 8> primaries = floatsOf(image.chromaticities);
 
     CrtImagePlanes planes{};
     planes.width = image.width;
@@ -263,6 +280,15 @@ void writeExr(const std::string& path, const Image& image) {
     planes.metadata = metadata.data();
     planes.metadata_count = static_cast<std::uint32_t>(metadata.size());
     planes.chromaticities = image.chromaticities ? primaries.data() : nullptr;
+    planes.left = image.left;
+    planes.top = image.top;
+    planes.whole_width = image.whole_width;
+    planes.whole_height = image.whole_height;
+    const auto to_camera = floatsOf(image.world_to_camera), to_ndc = floatsOf(image.world_to_ndc);
+    const auto neutral = floatsOf(image.adopted_neutral);
+    planes.world_to_camera = image.world_to_camera ? to_camera.data() : nullptr;
+    planes.world_to_ndc = image.world_to_ndc ? to_ndc.data() : nullptr;
+    planes.adopted_neutral = image.adopted_neutral ? neutral.data() : nullptr;
 
     AtomicFile file(path);
     Reason reason{};
@@ -272,7 +298,10 @@ void writeExr(const std::string& path, const Image& image) {
 
 void writePng(const std::string& path, const Image& image, const EncodedImage& encoded) {
     const CrtImageModule& module = imageModule(path, ErrorKind::Output);
-    const std::vector<CrtImageText> metadata = texts(image);
+    std::vector<CrtImageText> metadata = texts(image);
+    // The colour space of the image is not that of the pixels any more.
+    for (CrtImageText& text : metadata)
+        if (std::strcmp(text.name, kColorInteropIdKey) == 0) text.value = kDisplaySrgbId;
     AtomicFile file(path);
     Reason reason{};
     if (module.write_png(file.temporaryPath().c_str(), image.width, image.height, encoded.rgb.data(), metadata.data(),
@@ -297,6 +326,14 @@ Image readWithModule(const std::string& path) {
     image.pixels.assign(planes->floats, planes->floats + pixels * planes->float_channel_count);
     image.integers.assign(planes->integers, planes->integers + pixels * planes->integer_channel_count);
     for (std::uint32_t i = 0; i < planes->metadata_count; ++i) image.metadata.emplace_back(planes->metadata[i].name, planes->metadata[i].value);
+    const bool is_part = planes->whole_width != planes->width || planes->whole_height != planes->height ||
+                         planes->left != 0 || planes->top != 0;
+    if (is_part) {
+        image.left = planes->left;
+        image.top = planes->top;
+        image.whole_width = planes->whole_width;
+        image.whole_height = planes->whole_height;
+    }
     if (planes->chromaticities != nullptr) {
         image.chromaticities.emplace();
         std::copy_n(planes->chromaticities, 8, image.chromaticities->begin());
@@ -382,6 +419,9 @@ void writeImage(const std::string& path, OutputFormat format, const Image& image
     } else {
         writePpm(path, image, encoded);
     }
+    if (const double brightest = largestColor(image); brightest > 0 && std::all_of(encoded.rgb.begin(), encoded.rgb.end(), [](std::uint8_t v) { return v == 0; }))
+        logWarning("'{}' is black: its brightest value is {:.2g}, too dark for 8 bits; about {} stops more of film.exposure_ev would show it", path,
+                   brightest, std::ceil(std::log2(0.5 / brightest)));
     if (encoded.clipped_values > 0)
         logInfo("'{}': {:.2g} % of the colour values lie outside what 8 bits can show and were clipped", path,
                 100.0 * static_cast<double>(encoded.clipped_values) / static_cast<double>(encoded.rgb.size()));

@@ -31,7 +31,7 @@ using OIIO::ImageSpec;
 using OIIO::TypeDesc;
 
 /// Metadata that readers expect as a number; everything else is text.
-constexpr const char* kFloatAttributes[] = {"renderTimeSeconds"};
+constexpr const char* kFloatAttributes[] = {"renderTimeSeconds", "utcOffset"};
 constexpr const char* kIntAttributes[] = {"samplesPerPixel"};
 
 template <class Names>
@@ -174,8 +174,18 @@ std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reaso
             if (spec.channelnames[c] == "Z") spec.z_channel = static_cast<int>(c);
             if (spec.channelnames[c] == "A") spec.alpha_channel = static_cast<int>(c);
         }
+        spec.x = image->left;
+        spec.y = image->top;
+        if (image->whole_width > 0) {
+            spec.full_width = static_cast<int>(image->whole_width);
+            spec.full_height = static_cast<int>(image->whole_height);
+        }
         spec.attribute("compression", "zip");
         if (image->chromaticities != nullptr) spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), image->chromaticities);
+        if (image->world_to_camera != nullptr) spec.attribute("worldToCamera", TypeDesc::TypeMatrix, image->world_to_camera);
+        if (image->world_to_ndc != nullptr) spec.attribute("worldToNDC", TypeDesc::TypeMatrix, image->world_to_ndc);
+        if (image->adopted_neutral != nullptr)
+            spec.attribute("adoptedNeutral", TypeDesc(TypeDesc::FLOAT, TypeDesc::VEC2), image->adopted_neutral);
         // Left to itself the library stamps the present time on every EXR, and the same image would never be the same file.
         spec.attribute("DateTime", "");
         addMetadata(spec, image->metadata, image->metadata_count);
@@ -262,6 +272,10 @@ std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* rea
         crt::image::checkRows(width, height, spec.pixel_bytes(true));
 
         auto owned = std::make_unique<OwnedImage>();
+        owned->left = spec.x - spec.full_x;
+        owned->top = spec.y - spec.full_y;
+        owned->whole_width = static_cast<std::uint32_t>(std::max(spec.full_width, 0));
+        owned->whole_height = static_cast<std::uint32_t>(std::max(spec.full_height, 0));
         // The names of a format without named channels follow from their number.
         for (int c = 0; c < spec.nchannels; ++c)
             (isInteger(spec, c) ? owned->integer_names : owned->float_names).push_back(spec.channel_name(c));

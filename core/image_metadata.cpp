@@ -61,11 +61,9 @@ bool sameBalance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-std::string whiteBalanceText(const Scene& scene) {
-    if (!scene.film.white_balance) return kNoWhiteBalance;
-    const Vec3d white = spectrumToXyz(*scene.film.white_balance);
-    if (!(white[1] > 0))
-        throw Error(ErrorKind::Scene, "the white balance illuminant has no visible light", {scene.file});
+std::string whiteBalanceText(const Development& development) {
+    if (!development.white) return kNoWhiteBalance;
+    const Vec3d& white = *development.white;
     const double sum = white[0] + white[1] + white[2];
     return fmt::format("{:.6f},{:.6f}", white[0] / sum, white[1] / sum);
 }
@@ -86,10 +84,6 @@ ColorConditions colorConditions(const Image& image) {
     const std::string balance = metadataValue(image, kWhiteBalanceKey);
     return {numberOf(image, kExposureKey), balance.empty() ? std::nullopt : std::optional(balance),
             image.chromaticities};
-}
-
-ColorConditions colorConditions(const Scene& scene) {
-    return {scene.film.exposure_ev, whiteBalanceText(scene), chromaticities(scene.film.color_space)};
 }
 
 std::string conflictOf(const ColorConditions& of_a, const std::string& a, const ColorConditions& of_b,

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "film.h"
-#include "scene.h"
 
 #include <array>
 #include <optional>
@@ -16,11 +15,18 @@ inline constexpr const char* kExposureKey =
     "crt/exposure";  ///< Stops: values were multiplied by 2 to this power.
 inline constexpr const char* kWhiteBalanceKey =
     "crt/whiteBalance";  ///< "none", or "x,y": chromaticity of the light that became white.
+/// Colour space of the pixels, by the names of the Color Interop Forum
+/// (https://github.com/AcademySoftwareFoundation/ColorInterop).
+inline constexpr const char* kColorInteropIdKey = "colorInteropID";
+inline constexpr const char* kDisplaySrgbId = "srgb_rec709_display";
+/// What display formats get, in files of floats that got neither: as the two above.
+inline constexpr const char* kDisplayExposureKey = "crt/displayExposure";
+inline constexpr const char* kDisplayWhiteBalanceKey = "crt/displayWhiteBalance";
 /// Of the variance behind one pixel's StdError.Y or Variance.Y.
 inline constexpr const char* kErrorDofKey = "crt/errorDegreesOfFreedom";
 
-/// Value of kWhiteBalanceKey for a scene. Throws crt::Error(Scene) when the illuminant has no visible light.
-std::string whiteBalanceText(const Scene& scene);
+/// Value of kWhiteBalanceKey.
+std::string whiteBalanceText(const Development& development);
 
 /// By kErrorDofKey. Nothing without it, or when it is no number of 1 or more.
 std::optional<double> errorDegreesOfFreedom(const Image& image);
@@ -35,8 +41,6 @@ struct ColorConditions {
     std::optional<std::array<double, 8>> chromaticities;  ///< Nothing: the file does not say.
 };
 ColorConditions colorConditions(const Image& image);
-/// Those with which the scene's film is resolved.
-ColorConditions colorConditions(const Scene& scene);
 
 /// Why values under the one and the other cannot be compared, one sentence without a full stop, in which `a`
 /// and `b` name them: other exposure, white balance or colour space. Empty when both say the same, or

@@ -16,8 +16,8 @@ extern "C" {
 
 #define CRT_IMAGE_MODULE_FILE "crt_image_oiio.so"
 /* The symbol carries the version: a module of another version does not have it. */
-#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v1
-#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v1"
+#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v2
+#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v2"
 
 typedef struct CrtImageText {
     const char *name;
@@ -36,6 +36,13 @@ typedef struct CrtImagePlanes {
     uint32_t metadata_count;
     uint32_t srgb_encoded;             /* read only: 1 when R, G and B are 8- or 16-bit sRGB codes scaled to [0,1], 0 when they are linear */
     const float *chromaticities;       /* {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy}, or null */
+    /* The pixels are [left, left + width) × [top, top + height) of a picture of whole_width × whole_height, which is
+       0 × 0 where they are all of it. EXR: data window and display window. */
+    int32_t left, top;
+    uint32_t whole_width, whole_height;
+    /* EXR, to write only: 4 × 4, row-major, for points as rows, as OpenEXR defines the attributes of these names; or null. */
+    const float *world_to_camera, *world_to_ndc;
+    const float *adopted_neutral;      /* to write only: {x, y}, or null */
 } CrtImagePlanes;
 
 typedef struct CrtImageModule {

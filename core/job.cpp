@@ -6,6 +6,7 @@
 #include "checkpoint_writer.h"
 #include "compile.h"
 #include "interrupt.h"
+#include "light_checks.h"
 #include "log.h"
 #include "outputs.h"
 #include "report.h"
@@ -61,6 +62,7 @@ Files planFiles(const Job& job, const Scene& scene) {
     }
     files.report = job.report_file ? *job.report_file : besideOutput(files.outputs.first, ".report.json");
 
+    dateUtc();  // Refuses a SOURCE_DATE_EPOCH that is none.
     for (const Output& image : files.outputs.images) checkWritable(image.file);
     for (const std::string& film : files.outputs.films) checkWritable(film);
     checkWritable(files.checkpoint);
@@ -95,6 +97,7 @@ Film openFilm(const Files& files, const EarlierFilm& there, const CompiledScene&
     requireSameScene(files.resume, found, identity);
     film.add(earlier);
     identity.version = joinVersions(found.version, identity.version);
+    if (found.record) identity.record->addRun(*found.record);
     logInfo("resuming '{}' after {} samples per pixel", files.resume, film.samples.count());
     return film;
 }
@@ -230,22 +233,23 @@ private:
     std::optional<Error> first_;
 };
 
+/// Who renders, and when. A film that was complete before this run is written without any backend.
+void describeRun(FilmIdentity& identity, const RunFacts& facts) {
+    if (facts.backend_name.empty()) return;
+    FilmRecord run;
+    run.backend = facts.backend_name + " " + facts.backend_version;
+    run.device = arrayText(facts.backend.device);
+    run.date_utc = dateUtc();
+    identity.record->addRun(run);
+}
+
 /// Film → images and checkpoints; their names go to facts.outputs.
-void writeFiles(const Files& files, const Scene& scene, const Film& film, const FilmIdentity& identity, RunFacts& facts,
-                FirstFailure& failure) {
+void writeFiles(const Files& files, const Film& film, FilmIdentity& identity, RunFacts& facts, FirstFailure& failure) {
     const Stopwatch writing;
     // With nothing but a time to go by, the end of the time is the end of the work.
     const bool complete = facts.stop == StopReason::Samples || facts.stop == StopReason::Target || (facts.stop == StopReason::Time && facts.target_samples == 0);
-    Metadata metadata{{"Software", "crt " CRT_VERSION},
-                      {"crt/version", identity.version},
-                      {"crt/sceneHash", identity.scene_hash},
-                      {"crt/complete", complete ? "1" : "0"}};
-    if (!scene.title.empty()) metadata.emplace_back("ImageDescription", scene.title);
-    // A film that was complete before this run is written without any backend.
-    if (!facts.backend_name.empty()) {
-        metadata.emplace_back("crt/backend", facts.backend_name + " " + facts.backend_version);
-        metadata.emplace_back("crt/device", arrayText(facts.backend.device));
-    }
+    describeRun(identity, facts);
+    identity.record->complete = complete;
 
     std::set<std::string> films(files.outputs.films.begin(), files.outputs.films.end());
     const bool stopped_short = facts.stop == StopReason::Interrupted || facts.stop == StopReason::Failed;
@@ -259,7 +263,7 @@ void writeFiles(const Files& files, const Scene& scene, const Film& film, const 
     for (const std::string& name : films) writeFilm(name);  // First: everything else can be made from a film.
     for (const Output& output : files.outputs.images)
         failure.attempt([&] {
-            writeOutput(output, film, scene, metadata);
+            writeOutput(output, film, identity);
             facts.outputs.push_back(output.file);
         });
     // Hours of work must not be lost because one image could not be written.
@@ -340,14 +344,18 @@ int runJob(const Job& job) {
 
     // What it takes to see it: one flat blob, and the mask of what it needs.
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene), compileOptionsFor(backend));
-    FilmIdentity identity{compiled.hash, CRT_VERSION};
+    FilmIdentity identity{.scene_hash = compiled.hash, .version = CRT_VERSION, .record = recordOf(scene)};
     logDebug("scene {} needs {}", compiled.hash, featureNames(compiled.features));
+    warnOfIdleLamps(scene);
 
     Film film = openFilm(files, earlier, compiled, identity);
     earlier.reset();
     facts.resumed_samples = film.samples.count();
     CheckpointWriter checkpoint(files.checkpoint);
-    const auto saveCheckpoint = [&] { checkpoint.save(film, identity); };
+    const auto saveCheckpoint = [&] {
+        describeRun(identity, facts);
+        checkpoint.save(film, identity);
+    };
     plan.checkpoint_possible = [&] { return checkpoint.idle(); };
 
     // Samples, from a backend into the film. None is opened when none is missing.
@@ -364,10 +372,11 @@ int runJob(const Job& job) {
         facts.deciding = estimateError(film, PixelSet::Even, independent);
         facts.judging = estimateError(film, PixelSet::Odd, independent);
     }
+    warnOfBlackFilm(film, scene);
     if (facts.invalid_samples > 0) logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
 
     // Images, and the report of how they came about.
-    if (film.samples.count() > 0) writeFiles(files, scene, film, identity, facts, failure);
+    if (film.samples.count() > 0) writeFiles(files, film, identity, facts, failure);
     facts.warnings = warningCount();
     facts.total_seconds = total.seconds();
     facts.failure = failure.get() ? failure.get()->what() : "";

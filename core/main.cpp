@@ -39,7 +39,10 @@ Examples:
 Half of the samples here and half on another machine, then both together:
   crt scene.yaml --samples 0:512 -o a.crtfilm
   crt scene.yaml --samples 512:1024 -o b.crtfilm
-  crt merge --scene scene.yaml -o scene.exr a.crtfilm b.crtfilm
+  crt merge -o scene.exr a.crtfilm b.crtfilm
+
+Another exposure without another render:
+  crt develop a.crtfilm -o a.png --set film.exposure_ev=1
 )";
 
 constexpr const char* kExitCodes = R"(
@@ -137,6 +140,7 @@ public:
         addInfo();
         addCompare();
         addMerge();
+        addDevelop();
         addConverge();
         addReference();
         addVerify();
@@ -357,15 +361,49 @@ private:
         CLI::App* merge = addCommand("merge", "add partial renders of disjoint samples", [this] { return mergeFilms(merge_); });
         merge->footer("\nExamples:\n"
                       "  crt merge -o all.crtfilm a.crtfilm b.crtfilm\n"
-                      "  crt merge --scene scene.yaml -o scene.exr -o scene.png a.crtfilm b.crtfilm\n");
+                      "  crt merge -o scene.exr -o scene.png a.crtfilm b.crtfilm\n"
+                      "  crt merge --scene scene.yaml -o scene.exr a.crtfilm b.crtfilm      films of an earlier crt, which need it\n");
         merge->add_option("PART", merge_.parts, "films (.crtfilm) of one scene")->required();
-        reader_.repeatable(*merge, "-o,--output", "FILE", ".crtfilm, or with --scene an image; repeatable",
+        reader_.repeatable(*merge, "-o,--output", "FILE", ".crtfilm, or an image (.exr .png .ppm .pfm); repeatable",
                        [this](const std::string& text) { merge_.outputs.push_back(text); })
             ->required();
-        reader_.option(*merge, "--scene", "SCENE", "the scene they are of: needed for images",
+        reader_.option(*merge, "--scene", "SCENE", "the scene they are of: only for films that do not know how to develop them",
                        [this](const std::string& text) { merge_.scene.file = text; });
         addSceneChanges(*merge, merge_.scene, "The scene, changed as it was for rendering");
         merge->add_flag_callback("-q,--quiet", [this] { beQuiet(); }, "only warnings and errors");
+    }
+
+    void addDevelop() {
+        CLI::App* command = addCommand("develop", "make images of a film again, with other exposure, white balance, colours or crop",
+                                       [this] { return develop(develop_); });
+        command->footer("\nA film (.crtfilm, from -o or --checkpoint) holds every sample's sum, so exposure, white balance, colour space and crop can be\n"
+                        "chosen after the render. No backend is opened and no scene is read. PNG and PPM get exposure and white balance; EXR and PFM\n"
+                        "hold the radiance of the scene unless film.apply_to_float is true. Several films of disjoint samples are added up, as by merge.\n"
+                        "\nKeys of --set:\n"
+                        "  film.exposure_ev=1.5                 stops\n"
+                        "  film.white_balance=lamp              a named light of the scene, an illuminant (A, D50, D65, F2, F7, F11),\n"
+                        "                                       a spectrum such as {blackbody: 3200}, or null for none\n"
+                        "  film.color_space=acescg              srgb, acescg or xyz\n"
+                        "  film.crop=[0,0,256,256]              the same as --crop 0,0,256,256\n"
+                        "  film.apply_to_float=true             exposure and white balance in EXR and PFM too\n"
+                        "\nExamples:\n"
+                        "  crt scene.yaml -o scene.crtfilm                                       render once\n"
+                        "  crt develop scene.crtfilm -o a.png --set film.exposure_ev=1           one stop brighter\n"
+                        "  crt develop scene.crtfilm -o b.png --set film.white_balance=D50\n"
+                        "  crt develop scene.crtfilm -o c.exr -o c.png --crop 100,50,300,250\n"
+                        "  crt develop scene.crtfilm -o d.exr --aovs albedo,normal,error,samples\n"
+                        "  crt develop a.crtfilm b.crtfilm -o both.exr                           two halves of the samples\n");
+        command->add_option("FILM", develop_.films, "films (.crtfilm) of one scene")->required();
+        reader_.repeatable(*command, "-o,--output", "FILE", ".exr .png .ppm or .pfm; repeatable",
+                           [this](const std::string& text) { develop_.outputs.push_back(text); })
+            ->required();
+        reader_.repeatable(*command, "--set", "KEY=VALUE", "change how it is developed, e.g. film.exposure_ev=1; repeatable",
+                           [this](const std::string& text) { develop_.changes.push_back(parseOverride(text)); });
+        reader_.option(*command, "--crop", "X0,Y0,X1,Y1", "only these pixels of the film, X1 and Y1 excluded",
+                       [this](const std::string& text) { develop_.crop = parseRectangle(text, "--crop"); });
+        reader_.option(*command, "--aovs", "A,B", "what .exr files hold beside the image (what the scene asks for), or none",
+                       [this](const std::string& text) { develop_.aovs = parseList(text, "--aovs"); });
+        command->add_flag_callback("-q,--quiet", [this] { beQuiet(); }, "only warnings and errors");
     }
 
     void addConverge() {
@@ -383,10 +421,10 @@ private:
                         "Where no --reference is given, a quarter of --time makes one.\n"
                         "docs/error.md explains the terms.\n"
                         "\nExamples:\n"
-                        "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60 -o out/converge\n"
+                        "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60 -o converge_box\n"
                         "  crt converge scene.yaml --vary sampler=sobol,independent --vary nee=true,false --reference ref.exr\n"
                         "  crt converge configs/analytic/direct_light.yaml --reference 0.2394564705\n"
-                        "  crt converge a.yaml b.yaml c.yaml --time 10m -o out/night       then, cut short: the same with --resume\n");
+                        "  crt converge a.yaml b.yaml c.yaml --time 10m -o night       then, cut short: the same with --resume\n");
         command->add_option("SCENE", converge_files_, "scene files (YAML)")->required();
         const char* group = "What is measured";
         reader_.option(*command, "--backends", "X,Y", "of these; one that cannot run is left out and named (embree,opencl,cuda)",
@@ -538,6 +576,7 @@ private:
     SceneRequest info_;
     CompareArguments compare_;
     MergeArguments merge_;
+    DevelopArguments develop_;
     verify::Arguments verify_;
     converge::ConvergeRequest converge_;
     converge::ReferenceRequest reference_;

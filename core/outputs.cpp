@@ -2,11 +2,13 @@
 
 #include "checkpoint.h"
 #include "image_io.h"
+#include "image_metadata.h"
 
 #include <fmt/format.h>
 
 #include <filesystem>
 #include <set>
+#include <utility>
 
 namespace crt {
 
@@ -50,10 +52,58 @@ std::string besideOutput(const std::string& output, const char* suffix) {
     return std::filesystem::path(output).replace_extension().string() + suffix;
 }
 
-void writeOutput(const Output& output, const Film& film, const Scene& scene, const Metadata& metadata) {
-    Image image = resolveImage(film, scene, output.aovs);
-    image.metadata.insert(image.metadata.end(), metadata.begin(), metadata.end());
-    writeImage(output.file, output.format, image);
+Image developedImage(const Output& output, const Film& film, const FilmIdentity& identity) {
+    if (!identity.record) throw Error(ErrorKind::Internal, "a film without a record cannot be developed");
+    const FilmRecord& record = *identity.record;
+    const Development& wanted = record.development;
+    const bool floats = output.format == OutputFormat::Exr || output.format == OutputFormat::Pfm;
+    const Development applied = floats ? wanted.forFloats() : wanted;
+    Image image = resolveImage(film, applied, output.aovs);
+
+    const auto add = [&image](const char* key, std::string value) {
+        if (!value.empty()) image.metadata.emplace_back(key, std::move(value));
+    };
+    add("Software", "crt " CRT_VERSION);
+    add("crt/version", identity.version);  // Of the samples; who made this file of them is the software.
+    add("crt/sceneHash", identity.scene_hash);
+    add("crt/seed", std::to_string(record.seed));
+    if (record.complete) add("crt/complete", *record.complete ? "1" : "0");
+    add("ImageDescription", record.title);
+    add("crt/backend", record.backend);
+    add("crt/device", record.device);
+    add("DateTime", record.date_utc);  // capDate in EXR, tIME in PNG.
+    if (!record.date_utc.empty()) add("utcOffset", "0");
+    if (!(applied == wanted)) {
+        add(kDisplayExposureKey, fmt::format("{}", wanted.exposure_ev));
+        add(kDisplayWhiteBalanceKey, whiteBalanceText(wanted));
+    }
+
+    const auto& [x0, y0, x1, y1] = record.window;
+    if (record.isCropped()) add("crt/crop", fmt::format("{},{},{},{} of {}x{}", x0, y0, x1, y1, record.width, record.height));
+    image.left = x0;
+    image.top = y0;
+    image.whole_width = static_cast<std::uint32_t>(record.width);
+    image.whole_height = static_cast<std::uint32_t>(record.height);
+    image.world_to_camera = record.world_to_camera;
+    image.world_to_ndc = record.world_to_ndc;
+    if (wanted.white && !applied.white) {
+        const Vec3d& white = *wanted.white;
+        const double sum = white[0] + white[1] + white[2];
+        image.adopted_neutral = {white[0] / sum, white[1] / sum};
+    }
+    return image;
+}
+
+void requireRecord(const std::string& path, const FilmIdentity& identity) {
+    if (!identity.record)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' is of an earlier crt, whose films do not say in which colours to develop them; name its scene: "
+                                "crt merge --scene SCENE -o IMAGE {}",
+                                path, path));
+}
+
+void writeOutput(const Output& output, const Film& film, const FilmIdentity& identity) {
+    writeImage(output.file, output.format, developedImage(output, film, identity));
 }
 
 }  // namespace crt

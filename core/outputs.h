@@ -1,4 +1,4 @@
-/// Which files a run writes, and writing them: shared by rendering and merging.
+/// Which files a run writes, and writing them: shared by rendering, merging and developing.
 #pragma once
 
 #include "film.h"
@@ -6,7 +6,6 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace crt {
@@ -29,10 +28,14 @@ OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene
 /// "out/cornell.exr" → "out/cornell<suffix>".
 std::string besideOutput(const std::string& output, const char* suffix);
 
-/// Names and values for an image file.
-using Metadata = std::vector<std::pair<std::string, std::string>>;
+/// The image that `output` holds: the film developed for its format, with everything that its identity knows as
+/// metadata. The identity must have a record. Throws crt::Error(Usage) for an AOV that the film lacks.
+Image developedImage(const Output& output, const Film& film, const FilmIdentity& identity);
 
-/// Film → one image file, with `metadata` added to what the film itself knows. Throws crt::Error(Output).
-void writeOutput(const Output& output, const Film& film, const Scene& scene, const Metadata& metadata);
+/// Refuses to develop a film that does not know how: crt::Error(Usage).
+void requireRecord(const std::string& path, const FilmIdentity& identity);
+
+/// Film → one image file. Throws as developedImage, and crt::Error(Output).
+void writeOutput(const Output& output, const Film& film, const FilmIdentity& identity);
 
 }  // namespace crt

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,6 +44,7 @@ struct FilmSettings {
     ColorSpace color_space = ColorSpace::LinearSrgb;
     std::optional<Spectrum> white_balance;  ///< Adapt from this illuminant's white to the colour space's.
     double exposure_ev = 0;                 ///< The image is multiplied by 2^ev.
+    bool apply_to_float = false;            ///< EXR and PFM get white balance and exposure too.
 };
 
 enum class IntegratorType { Path, Normals, Aabb };
@@ -130,6 +132,7 @@ struct Scene {
     std::vector<Object> objects;
     std::optional<Environment> environment;
     std::vector<Output> outputs;
+    std::map<std::string, Vec3d> whites;  ///< Named spectra that are lights, with luminance: XYZ with Y = 1.
     std::vector<std::string> files_read;  ///< Every file that went into the scene, the YAML first.
     double parse_seconds = 0;
 };

@@ -124,9 +124,12 @@ SectionSchema film() {
                 {.name = "color_space", .kind = Kind::Choice, .choices = spaces, .fallback = yaml(spaces, d.color_space),
                  .doc = "What the three channels mean: linear sRGB (Rec. 709), ACEScg (AP1), or CIE XYZ."},
                 {.name = "white_balance", .kind = Kind::Spectrum, .fallback = "null", .nullable = true,
-                 .doc = "Adapts this illuminant's white to the white of the colour space. The name of an illuminant or a spectrum."},
+                 .doc = "Adapts this illuminant's white to the white of the colour space. The name of an illuminant or a spectrum. For PNG and PPM; for EXR and "
+                        "PFM see `apply_to_float`."},
                 {.name = "exposure_ev", .kind = Kind::Number, .range = {-100, 100, false, false}, .unit = "stops",
-                 .fallback = yaml(d.exposure_ev), .doc = "The image is multiplied by 2 to this power."},
+                 .fallback = yaml(d.exposure_ev), .doc = "The image is multiplied by 2 to this power. For PNG and PPM; for EXR and PFM see `apply_to_float`."},
+                {.name = "apply_to_float", .kind = Kind::Boolean, .fallback = yaml(d.apply_to_float),
+                 .doc = "EXR and PFM get `white_balance` and `exposure_ev` too. Without it they hold the radiance of the scene, in `color_space`."},
             }};
 }
 

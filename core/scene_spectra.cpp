@@ -74,6 +74,16 @@ void SpectrumReader::finish() {
     }
 }
 
+std::map<std::string, Vec3d> SpectrumReader::whites() const {
+    std::map<std::string, Vec3d> whites;
+    for (const auto& [key, spectrum] : resolved_) {
+        if (!spectrum || (key.second != SpectrumUse::Emission && key.second != SpectrumUse::White)) continue;
+        const Vec3d xyz = spectrumToXyz(*spectrum);
+        if (xyz[1] > 0) whites[key.first] = {xyz[0] / xyz[1], 1, xyz[2] / xyz[1]};
+    }
+    return whites;
+}
+
 std::optional<Spectrum> SpectrumReader::resolve(const YamlNode& node, const YamlPlace& place, const std::string& what, SpectrumUse use) {
     if (node.kind == YamlKind::Map) {
         const std::optional<SectionReader> form = openVariant(out_, node, place, "spectrum", what);

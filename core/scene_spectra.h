@@ -25,6 +25,9 @@ public:
     /// Checks the named spectra that nothing used, and warns about them.
     void finish();
 
+    /// The named spectra that light or a white balance was made of and that can be seen: XYZ with Y = 1.
+    std::map<std::string, Vec3d> whites() const;
+
 private:
     /// `what` names the value in messages: "'reflectance' of material 'white'", "spectrum 'white'".
     std::optional<Spectrum> resolve(const YamlNode& node, const YamlPlace& place, const std::string& what, SpectrumUse use);

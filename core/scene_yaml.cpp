@@ -173,6 +173,7 @@ void readFilm(const SectionReader& section, SpectrumReader& spectra, FilmSetting
     if (film.white_balance && !(spectrumToXyz(*film.white_balance)[1] > 0))
         section.error("white_balance", "this spectrum has no luminance, so it has no white");
     section.read("exposure_ev", film.exposure_ev);
+    section.read("apply_to_float", film.apply_to_float);
 }
 
 double length(const Vec3d& v) { return std::hypot(v[0], v[1], v[2]); }
@@ -313,6 +314,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
                        scene.outputs);
 
     spectra.finish();
+    scene.whites = spectra.whites();
     if (!out.failed()) objects.finish();
 }
 

@@ -245,6 +245,33 @@ TEST_CASE("a checkpoint is written beside the render, and its failures are told"
     setLogLevel(LogLevel::Info);
 }
 
+/// Written by the last crt whose films had no record: one pixel, two samples, 3 and 4.
+TEST_CASE("films of format 2 are read still", "[checkpoint]") {
+    const TemporaryFolder directory;
+    const std::string path = directory / "old.crtfilm";
+    const unsigned char kOld[] = {
+        0x89, 0x43, 0x52, 0x54, 0x46, 0x0d, 0x0a, 0x1a, 0x02, 0x00, 0x00, 0x00, 0x78, 0x00, 0x00, 0x00,
+        0xc0, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0xa0, 0x7c, 0x53, 0xa2, 0xd2, 0xfe, 0x44, 0xe4,
+        0x01, 0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, 0x04, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+        0x30, 0x31, 0x32, 0x33, 0x34, 0x35, 0x36, 0x37, 0x38, 0x39, 0x61, 0x62, 0x63, 0x64, 0x65, 0x66,
+        0x30, 0x31, 0x32, 0x33, 0x34, 0x35, 0x36, 0x37, 0x38, 0x39, 0x61, 0x62, 0x63, 0x64, 0x65, 0x66,
+        0x05, 0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, 0x02, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+        0x03, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x05, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+        0x30, 0x2e, 0x31, 0x2e, 0x30, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0xf8, 0x3f,
+        0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+        0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+        0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+        0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x02, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+    };
+    spit(path, {reinterpret_cast<const char*>(kOld), sizeof kOld});
+    const auto [film, identity] = readCheckpoint(path);
+    CHECK(film.samples.text() == "3-5");
+    CHECK(film.sums[0] == 1.5);
+    CHECK(film.counts[0] == 2);
+    CHECK(identity.scene_hash == kIdentity.scene_hash);
+    CHECK_FALSE(identity.record);
+}
+
 TEST_CASE("a truncated checkpoint is refused wherever it ends", "[checkpoint]") {
     const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
@@ -309,6 +336,43 @@ TEST_CASE("what is wrong with a checkpoint is said", "[checkpoint]") {
     CHECK_THROWS_WITH(readCheckpoint(with(whole.size() / 2, static_cast<char>(~whole[whole.size() / 2]))), Contains("checksum"));
     CHECK_THROWS_WITH(readCheckpoint(directory / "absent.crtfilm"), Contains("absent.crtfilm") && Contains("No such file"));
     CHECK_THROWS_AS(readCheckpoint(directory.path()), Error);
+}
+
+TEST_CASE("the record of a merged film is that of the first samples, with every run in it", "[checkpoint]") {
+    const TemporaryFolder directory;
+    const auto write = [&](const char* name, SampleRange range, double exposure_ev, const char* backend, const char* date) {
+        FilmIdentity identity = kIdentity;
+        identity.record.emplace();
+        identity.record->width = identity.record->height = 1;
+        identity.record->window = {0, 0, 1, 1};
+        identity.record->development.exposure_ev = exposure_ev;
+        identity.record->backend = backend;
+        identity.record->date_utc = date;
+        identity.record->complete = true;
+        writeCheckpoint(directory / name, randomFilm({1, 1, 4, 0}, range, 1), identity);
+        return directory / name;
+    };
+    const std::string a = write("a.crtfilm", {8, 16}, 1, "embree", "2026:01:01 00:00:00"), b = write("b.crtfilm", {0, 8}, 2, "cuda", "2025:01:01 00:00:00"),
+                      c = write("c.crtfilm", {16, 20}, 3, "embree", "2024:01:01 00:00:00");
+    writeCheckpoint(directory / "old.crtfilm", randomFilm({1, 1, 4, 0}, {100, 101}, 1), kIdentity);
+    std::string text;
+    for (const std::vector<std::string>& order : {std::vector{a, b, c}, {c, b, a}, {b, directory / "old.crtfilm", c, a}, {directory / "old.crtfilm", c, a, b}}) {
+        const std::optional<FilmRecord> record = mergeCheckpoints(order).second.record;
+        REQUIRE(record);
+        CHECK(record->development.exposure_ev == 2);
+        CHECK(record->backend == "cuda and embree");
+        CHECK(record->date_utc == "2026:01:01 00:00:00");
+        CHECK_FALSE(record->complete);
+        CHECK((text.empty() || recordText(*record) == text));
+        text = recordText(*record);
+    }
+    // A record of a film of another size is none of this film.
+    FilmIdentity wrong = kIdentity;
+    wrong.record.emplace();
+    wrong.record->width = wrong.record->height = 2;
+    wrong.record->window = {0, 0, 2, 1};
+    writeCheckpoint(directory / "wrong.crtfilm", Film({1, 1, 4, 0}), wrong);
+    CHECK_THROWS_WITH(readCheckpoint(directory / "wrong.crtfilm"), Contains("record of its scene that is of a film of another size"));
 }
 
 TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpoint]") {

@@ -248,13 +248,13 @@ TEST_CASE("nothing is claimed about an error that is not known", "[film]") {
 TEST_CASE("D65 white resolves to (1,1,1) in the RGB spaces and to itself in XYZ", "[film]") {
     const Vec3d white = d65WhiteXyz();
     for (const ColorSpace space : {ColorSpace::LinearSrgb, ColorSpace::AcesCg}) {
-        const Image image = resolveImage(filmOf(white), sceneIn(space), 0);
+        const Image image = resolveImage(filmOf(white), developmentOf(sceneIn(space)), 0);
         REQUIRE(image.channels == std::vector<std::string>{"R", "G", "B"});
         for (int c = 0; c < 3; ++c) CHECK(image.pixels[c] == Approx(1.0).margin(2e-7));
         REQUIRE(image.chromaticities);
         CHECK(*image.chromaticities == chromaticities(space));
     }
-    const Image xyz = resolveImage(filmOf(white), sceneIn(ColorSpace::Xyz), 0);
+    const Image xyz = resolveImage(filmOf(white), developmentOf(sceneIn(ColorSpace::Xyz)), 0);
     for (int c = 0; c < 3; ++c) CHECK(xyz.pixels[c] == static_cast<float>(white[c]));
 }
 
@@ -262,23 +262,23 @@ TEST_CASE("white balance maps the illuminant to white and exposure scales", "[fi
     Scene scene = sceneIn(ColorSpace::LinearSrgb);
     const Spectrum lamp = *illuminantSpectrum("A");
     const Film film = filmOf(spectrumToXyz(lamp));
-    const Image orange = resolveImage(film, scene, 0);
+    const Image orange = resolveImage(film, developmentOf(scene), 0);
     CHECK(orange.pixels[0] > 2 * orange.pixels[2]);
 
     scene.film.white_balance = lamp;
     scene.film.exposure_ev = -3;
     for (const ColorSpace space : {ColorSpace::LinearSrgb, ColorSpace::AcesCg}) {
         scene.film.color_space = space;
-        const Image balanced = resolveImage(film, scene, 0);
+        const Image balanced = resolveImage(film, developmentOf(scene), 0);
         for (int c = 0; c < 3; ++c) CHECK(balanced.pixels[c] == Approx(0.125).epsilon(1e-6));
     }
     // In XYZ the balanced white is D65's, so that the standard matrix still gives the sRGB image.
     scene.film.color_space = ColorSpace::Xyz;
-    const Image xyz = resolveImage(film, scene, 0);
+    const Image xyz = resolveImage(film, developmentOf(scene), 0);
     for (int c = 0; c < 3; ++c) CHECK(xyz.pixels[c] == Approx(0.125 * d65WhiteXyz()[c]).epsilon(1e-6));
 
     scene.film.white_balance = constantSpectrum(0.0);
-    CHECK_THROWS_AS(resolveImage(film, scene, 0), Error);
+    CHECK_THROWS_AS(resolveImage(film, developmentOf(scene), 0), Error);
 }
 
 TEST_CASE(
@@ -305,12 +305,12 @@ TEST_CASE(
             // The same by resolving every sample as an image of its own.
             std::vector<double> luminances;
             for (const double b : brightness) {
-                const Image one = resolveImage(filmOf({color[0] * b, color[1] * b, color[2] * b}), scene, 0);
+                const Image one = resolveImage(filmOf({color[0] * b, color[1] * b, color[2] * b}), developmentOf(scene), 0);
                 luminances.push_back(
                     stats::luminance({one.pixels[0], one.pixels[1], one.pixels[2]}, weights));
             }
             const double expected = stats::summarize(luminances).standardError();
-            const Image image = resolveImage(film, scene, kAovVariance | kAovError);
+            const Image image = resolveImage(film, developmentOf(scene), kAovVariance | kAovError);
             REQUIRE(image.channels[4] == "StdError.Y");
             CHECK(image.pixels[4] == Approx(expected).epsilon(1e-4));
             CHECK(image.pixels[3] == Approx(expected * expected).epsilon(1e-4));
@@ -318,9 +318,9 @@ TEST_CASE(
     // The white balance of A moves this colour's luminance by much more than the tolerance above.
     scene.film.color_space = ColorSpace::LinearSrgb;
     scene.film.white_balance = illuminantSpectrum("A");
-    const double balanced = resolveImage(film, scene, kAovError).pixels[3];
+    const double balanced = resolveImage(film, developmentOf(scene), kAovError).pixels[3];
     scene.film.white_balance.reset();
-    CHECK(std::abs(balanced / resolveImage(film, scene, kAovError).pixels[3] - 1) > 0.03);
+    CHECK(std::abs(balanced / resolveImage(film, developmentOf(scene), kAovError).pixels[3] - 1) > 0.03);
 }
 
 TEST_CASE("an image says under which conditions its values came about, and how surely its error is known",
@@ -329,19 +329,19 @@ TEST_CASE("an image says under which conditions its values came about, and how s
     for (std::uint64_t i = 0; i < 9; ++i) film.add(oneSample(i, 1, static_cast<float>(i), 1));
     Scene scene = sceneIn(ColorSpace::AcesCg);
     scene.film.exposure_ev = -1.5;
-    const Image plain = resolveImage(film, scene, 0);
+    const Image plain = resolveImage(film, developmentOf(scene), 0);
     CHECK(metadataValue(plain, kExposureKey) == "-1.5");
     CHECK(metadataValue(plain, kWhiteBalanceKey) == "none");
     CHECK(metadataValue(plain, kErrorDofKey).empty());  // It states no error.
     scene.film.white_balance = illuminantSpectrum("A");
-    const Image with_error = resolveImage(film, scene, kAovError);
+    const Image with_error = resolveImage(film, developmentOf(scene), kAovError);
     // CIE 15: illuminant A has x = 0.44758, y = 0.40745; the sums here go to 830 nm in steps of 1 nm.
     CHECK_THAT(metadataValue(with_error, kWhiteBalanceKey), Contains("0.4475") && Contains(",0.4074"));
     CHECK(errorDegreesOfFreedom(with_error) == LuminanceVariance(film).degreesOfFreedom());
-    CHECK(errorDegreesOfFreedom(resolveImage(film, scene, kAovVariance)) ==
+    CHECK(errorDegreesOfFreedom(resolveImage(film, developmentOf(scene), kAovVariance)) ==
           LuminanceVariance(film).degreesOfFreedom());
     CHECK_FALSE(errorDegreesOfFreedom(
-        resolveImage(oneSample(0, 1, 1, 1), scene, kAovError)));  // One sample knows nothing.
+        resolveImage(oneSample(0, 1, 1, 1), developmentOf(scene), kAovError)));  // One sample knows nothing.
 }
 
 TEST_CASE("AOV planes carry their names, types and values", "[film]") {
@@ -354,9 +354,8 @@ TEST_CASE("AOV planes carry their names, types and values", "[film]") {
     film.primitives[0] = 17;
     Scene scene = sceneIn(ColorSpace::LinearSrgb);
     scene.film.exposure_ev = 1;
-    scene.sampler.seed = 99;
 
-    const Image image = resolveImage(film, scene, in_film | kAovVariance | kAovSamples);
+    const Image image = resolveImage(film, developmentOf(scene), in_film | kAovVariance | kAovSamples);
     REQUIRE(image.channels == std::vector<std::string>{"R", "G", "B", "Albedo.R", "Albedo.G", "Albedo.B", "Ns.X", "Ns.Y", "Ns.Z", "Z",
                                                        "Variance.Y"});
     REQUIRE(image.integer_channels == std::vector<std::string>{"id.primitive", "sampleCount"});
@@ -376,13 +375,12 @@ TEST_CASE("AOV planes carry their names, types and values", "[film]") {
     };
     CHECK(value("crt/spp") == "5");
     CHECK(value("crt/sampleRanges") == "0-5");
-    CHECK(value("crt/seed") == "99");
     CHECK(value("crt/invalidSamples") == "1");
 
     // A subset leaves out exactly what was not asked for, wherever it lies in the film.
-    const Image depth = resolveImage(film, scene, kAovDepth);
+    const Image depth = resolveImage(film, developmentOf(scene), kAovDepth);
     CHECK(depth.channels == std::vector<std::string>{"R", "G", "B", "Z"});
     CHECK(depth.pixels[3] == 42.5f);
     CHECK(depth.integers.empty());
-    CHECK_THROWS_WITH(resolveImage(Film(kOnePixel), scene, kAovNormal), Contains("normal"));
+    CHECK_THROWS_WITH(resolveImage(Film(kOnePixel), developmentOf(scene), kAovNormal), Contains("normal"));
 }

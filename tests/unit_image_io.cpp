@@ -340,14 +340,38 @@ TEST_CASE("an image that lacks what it must have is refused", "[image_io]") {
     CHECK(directory.fileCount() == 0);
 }
 
+TEST_CASE("a folder that a command fills is made, and none above it", "[image_io]") {
+    const TemporaryFolder directory;
+    for (const char* name : {"a", "b/", "./c/."}) {
+        makeOutputFolder(directory / name);
+        makeOutputFolder(directory / name);
+        CHECK(fs::is_directory(directory / name));
+    }
+    CHECK_THROWS_WITH(makeOutputFolder(directory / "one/two"), Contains("one/two") && Contains("no folder '" + (directory / "one") + "'"));
+    CHECK_THROWS_WITH(makeOutputFolder(directory / "one/two/"), Contains("no folder '" + (directory / "one") + "'"));
+    CHECK_FALSE(fs::exists(directory / "one"));
+    spit(directory / "file", "x");
+    CHECK_THROWS_WITH(makeOutputFolder(directory / "file"), Contains("there is a file of this name"));
+    try {
+        makeOutputFolder(directory / "file");
+    } catch (const Error& error) {
+        CHECK(error.kind() == ErrorKind::Output);
+    }
+}
+
 TEST_CASE("unwritable outputs are found before anything is rendered", "[image_io]") {
     const TemporaryFolder directory;
     CHECK_NOTHROW(checkWritable(directory / "image.exr"));
     CHECK(directory.fileCount() == 0);
+    // No folder is made: it may be a typing error.
+    fs::create_directory(directory / "out");
     CHECK_NOTHROW(checkWritable(directory / "out/image.exr"));
-    CHECK(fs::is_directory(directory / "out"));
-    CHECK_THROWS_WITH(checkWritable(directory / "one/two/image.exr"), Contains("one/two") && Contains("exists"));
+    CHECK_THROWS_WITH(checkWritable(directory / "oit/image.exr"), Contains("no folder '" + (directory / "oit") + "'") && Contains("did you mean 'out'?"));
+    CHECK_THROWS_WITH(checkWritable(directory / "one/two/image.exr"),
+                      Contains("no folder '" + (directory / "one") + "'") && Contains("mkdir -p '" + (directory / "one/two") + "'"));
+    CHECK_FALSE(fs::exists(directory / "oit"));
     CHECK_FALSE(fs::exists(directory / "one"));
+    CHECK(fs::is_empty(directory / "out"));
     CHECK_THROWS_WITH(checkWritable(directory / "out"), Contains("is a directory"));
     CHECK_THROWS_WITH(checkWritable("/dev/null"), Contains("not a regular file"));
     CHECK_THROWS_AS(checkWritable(""), Error);

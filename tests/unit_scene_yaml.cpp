@@ -107,7 +107,7 @@ TEST_CASE("writing every default of the schema out changes nothing", "[scene_yam
     }
     for (const KeySchema& key : schemaSection("").keys)
         if (!key.fallback.empty()) text += key.name + ": " + key.fallback + "\n", ++written;
-    CHECK(written == 25);
+    CHECK(written == 26);
 
     const Scene a = parse(""), b = parse(text);
     CHECK(a.camera.position == b.camera.position);
@@ -126,6 +126,7 @@ TEST_CASE("writing every default of the schema out changes nothing", "[scene_yam
     CHECK(a.film.color_space == b.film.color_space);
     CHECK(a.film.white_balance == b.film.white_balance);
     CHECK(a.film.exposure_ev == b.film.exposure_ev);
+    CHECK(a.film.apply_to_float == b.film.apply_to_float);
     CHECK(a.integrator.type == b.integrator.type);
     CHECK(a.integrator.max_depth == b.integrator.max_depth);
     CHECK(a.integrator.roulette_depth == b.integrator.roulette_depth);
@@ -219,7 +220,7 @@ TEST_CASE("every AOV is written by its name in a scene, alone and together", "[s
         // Read from the scene, resolved from a film that has what the scene asks for: the channels that the
         // row names, and no others.
         const std::uint32_t in_film = output.aovs & kAovsOfFirstHits;
-        const Image image = resolveImage(Film({2, 1, channelsFor(in_film), in_film}), Scene{}, output.aovs);
+        const Image image = resolveImage(Film({2, 1, channelsFor(in_film), in_film}), Development{}, output.aovs);
         std::vector<std::string> channels = {"R", "G", "B"};
         const std::vector<std::string> own = exrNames(row);
         CHECK_FALSE(own.empty());
@@ -746,7 +747,7 @@ TEST_CASE("errors in overrides name the argument", "[scene_yaml][override][refus
           "--set film.resolutoin: error: unknown key 'resolutoin' in film\n"
           "      | film.resolutoin=[1,1]\n"
           "      |      ^~~~~~~~~~ did you mean 'resolution'?\n"
-          "      = keys of film: resolution, crop, filter, color_space, white_balance, exposure_ev");
+          "      = keys of film: resolution, crop, filter, color_space, white_balance, exposure_ev, apply_to_float");
     CHECK_THAT(refusedOverride(body, "flim.resolution=[1,1]"), Contains("--set flim.resolution: error: unknown key 'flim' in the scene") && Contains("did you mean 'film'?"));
     CHECK_THAT(refusedOverride(body, "film.resolution=[0,1]"), Contains("--set film.resolution: error: value 1 of 'resolution' is 0") &&
                                                                Contains("\n      | film.resolution=[0,1]\n      |                  ^"));

@@ -101,6 +101,12 @@ bool hasBrings(const CrtBackend& table) {
     return table.struct_size >= offsetof(CrtBackend, accelerator_reach) + sizeof(CrtBackend::accelerator_reach);
 }
 
+/// Whether a driver for a GPU runs here: then a backend without a device is worth a word.
+bool hasGpuDriver() {
+    std::error_code unreadable;
+    return fs::exists("/dev/nvidiactl", unreadable) || fs::exists("/dev/dxg", unreadable) || fs::exists("/dev/kfd", unreadable);
+}
+
 /// The checks between dlsym and the first use of the table. `name` is what the user asked for.
 void checkTable(const std::string& name, const std::string& path, const CrtBackend* table) {
     if (table == nullptr) refuse(fmt::format("backend '{}' ({}) broke the contract: {} returned no table", name, path, CRT_BACKEND_ENTRY_NAME));
@@ -313,26 +319,28 @@ std::vector<BackendStatus> listBackends() {
     return list;
 }
 
-LoadedBackend chooseBackend(std::vector<std::string>& reasons) {
+LoadedBackend chooseBackend(std::vector<PassedOver>& reasons) {
     for (const char* name : kKnownBackends) {
+        bool absent = !findPlugin(name);
         try {
             LoadedBackend backend = loadBackend(name);
+            absent = !hasGpuDriver();
             probeDevices(backend);
             return backend;
         } catch (const Error& error) {
-            reasons.emplace_back(error.what());
+            reasons.push_back({error.what(), absent});
         }
     }
     std::string all;
-    for (const std::string& reason : reasons) all += "\n  " + reason;
+    for (const PassedOver& passed : reasons) all += "\n  " + passed.reason;
     refuse("no backend can run here:" + all);
 }
 
 LoadedBackend openBackend(const std::string& name) {
     if (name != "auto") return loadBackend(name);
-    std::vector<std::string> passed_over;
+    std::vector<PassedOver> passed_over;
     LoadedBackend backend = chooseBackend(passed_over);
-    for (const std::string& reason : passed_over) logInfo("{}", reason);
+    for (const PassedOver& passed : passed_over) logMessage(passed.is_absent ? LogLevel::Debug : LogLevel::Info, passed.reason);
     return backend;
 }
 

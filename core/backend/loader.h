@@ -44,10 +44,16 @@ struct BackendStatus {
 /// Every backend known (cuda, embree, opencl) or found in the directories, usable or not. Opens each.
 std::vector<BackendStatus> listBackends();
 
-/// Picks a backend for `auto`: cuda, embree, opencl in that order, the first with a device. `reasons` gets a line for each one passed over.
-LoadedBackend chooseBackend(std::vector<std::string>& reasons);
+struct PassedOver {
+    std::string reason;
+    bool is_absent = false;  ///< Not installed, or for hardware of which nothing is there: as expected.
+};
 
-/// What --backend asks for: the one of that name, or for "auto" what chooseBackend picks, with a line in the log for each one passed over.
+/// Picks a backend for `auto`: cuda, embree, opencl in that order, the first with a device. `reasons` gets those passed over.
+LoadedBackend chooseBackend(std::vector<PassedOver>& reasons);
+
+/// What --backend asks for: the one of that name, or for "auto" what chooseBackend picks, with a line in the log for each one passed over
+/// (only with -v for what is absent).
 LoadedBackend openBackend(const std::string& name);
 
 /// Text of a fixed array that a plugin filled, not necessarily up to a terminator.

@@ -88,7 +88,7 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     row.load_average = loadAverage();
     row.cpu_clock_mhz = clockMhz();
 
-    const Image image = resolveImage(film, scene_, 0);
+    const Image image = resolveImage(film, developmentOf(scene_).forFloats(), 0);
     const std::size_t pixels = film.counts.size();
     LookPlane luminance = stats::luminances(image.pixels, stats::luminanceWeights(scene_.film.color_space));
     row.mean_luminance = stats::meanLuminance(luminance);
@@ -119,7 +119,7 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
         last_error_ = {image.width, image.height, std::vector<float>(pixels)};
         const LuminanceVariance variance(film);
         const double mean = row.mean_luminance;
-        const double exposure = std::exp2(scene_.film.exposure_ev);
+        const double exposure = std::exp2(developmentOf(scene_).forFloats().exposure_ev);
         for (std::uint32_t y = 0; y < image.height; ++y)
             for (std::uint32_t x = 0; x < image.width; ++x)
                 last_error_.values[std::size_t{y} * image.width + x] = static_cast<float>(std::sqrt(variance(x, y)) * exposure / mean);

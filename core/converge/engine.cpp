@@ -1,5 +1,6 @@
 #include "converge/engine.h"
 
+#include "atomic_file.h"
 #include "backend/loader.h"
 #include "converge/contestant.h"
 #include "converge/experiment.h"
@@ -75,9 +76,7 @@ private:
     }
 
     void openFolder() {
-        std::error_code error;
-        fs::create_directories(request_.output, error);
-        if (error) throw Error(ErrorKind::Output, fmt::format("cannot make the folder '{}': {}", request_.output, error.message()));
+        makeOutputFolder(request_.output);
         if (fs::exists(path("results.jsonl")) && fs::file_size(path("results.jsonl")) > 0) {
             holds_rows_ = true;
             if (!request_.resume)

@@ -4,6 +4,7 @@
 #include "converge/reference.h"
 #include "converge/report_maps.h"
 #include "error.h"
+#include "film_record.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -65,6 +66,10 @@ Experiment readExperiment(const std::string& path) {
     }
 }
 
+constexpr const char* kDigestMark = " #";  // Between the words of a trait and the digest of what they leave out.
+
+std::string withoutDigest(const std::string& text) { return text.substr(0, text.rfind(kDigestMark)); }
+
 const Properties* find(const Experiment& experiment, const Key& key) {
     const auto found = std::find_if(experiment.begin(), experiment.end(),
                                     [&](const Properties& p) { return p.key == key; });
@@ -76,8 +81,10 @@ void requireSame(const std::string& path, const Properties& then, const Properti
         const auto found = std::find_if(then.values.begin(), then.values.end(),
                                         [&](const auto& value) { return value.first == name; });
         const std::string was = found == then.values.end() ? "unknown" : found->second;
+        if (was != text && withoutDigest(was) == withoutDigest(text))
+            refuse(path, fmt::format("{} of {} was another ({} in both)", name, labelOf(now.key), withoutDigest(text)));
         if (was != text)
-            refuse(path, fmt::format("{} of {} was {}, and is {} now", name, labelOf(now.key), was, text));
+            refuse(path, fmt::format("{} of {} was {}, and is {} now", name, labelOf(now.key), withoutDigest(was), withoutDigest(text)));
     }
 }
 
@@ -106,8 +113,13 @@ Properties propertiesOf(const Key& key, const Scene& scene, const std::string& c
                 {"the sampler", fmt::format("{}, {} replicates", samplerName(scene.sampler.type),
                                             scene.sampler.replicates)},
                 {"the seed", std::to_string(scene.sampler.seed)},
-                {"the hash of what is to be seen", content},
                 {"the reference", reference}};
+    // What is to be seen, in words where there are any; the hash has the last word.
+    for (const SceneTrait& trait : recordOf(scene).traits)
+        for (const char* name : {"the crop window", "the filter", "the camera", "the geometry", "the materials", "the light"})
+            if (trait.name == name)
+                p.values.emplace_back(name, trait.digest.empty() ? trait.text : fmt::format("{}{}{}", trait.text, kDigestMark, trait.digest));
+    p.values.emplace_back("the hash of what is to be seen", content);
     return p;
 }
 

@@ -25,6 +25,7 @@ namespace {
 /// Far from the seeds of `crt converge`, which follow the scene's one by one.
 constexpr std::uint64_t kReferenceSeedOffset = std::uint64_t{1} << 40;
 constexpr const char* kContentKey = "crt/referenceContent";
+constexpr const char* kRecordKey = "crt/referenceRecord";  // film_record.h
 constexpr const char* kColourKey = "crt/referenceColour";
 constexpr const char* kEstimatorKey = "crt/referenceEstimator";
 
@@ -36,6 +37,20 @@ std::string metadataOf(const Image& image, const char* key) {
     for (const auto& [name, value] : image.metadata)
         if (name == key) return value;
     return {};
+}
+
+/// In what the scene of a reference differs from another, in words, apart from what a reference does not depend on.
+std::vector<std::string> differingContent(const Image& reference, const Scene& scene) {
+    const std::string text = metadataOf(reference, kRecordKey);
+    if (text.empty()) return {};
+    const auto withoutSampling = [](FilmRecord record) {
+        std::erase_if(record.traits, [](const SceneTrait& trait) {
+            return trait.name == "the seed" || trait.name == "the sampler" || trait.name == "the replicates" ||
+                   trait.name == "roulette" || trait.name == "nee" || trait.name == "the AOVs of first hits";
+        });
+        return record;
+    };
+    return differingTraits(withoutSampling(readRecord(text)), withoutSampling(recordOf(scene)));
 }
 
 /// Values of three channels of an image, or nothing when one is missing.
@@ -116,14 +131,12 @@ std::string colourText(const Scene& scene) {
     const auto space = [](ColorSpace s) {
         return s == ColorSpace::LinearSrgb ? "linear sRGB" : s == ColorSpace::AcesCg ? "ACEScg" : "XYZ";
     };
+    const Development development = developmentOf(scene).forFloats();
     std::string white = "no white balance";
-    if (scene.film.white_balance) {
-        const Vec3d xyz = spectrumToXyz(*scene.film.white_balance);
-        white = fmt::format("white balance from X : Y : Z = {:.6f} : 1 : {:.6f}", xyz[0] / xyz[1],
-                            xyz[2] / xyz[1]);
-    }
-    return fmt::format("exposure {} EV, {}, {}", scene.film.exposure_ev, space(scene.film.color_space),
-                       white);
+    if (development.white)
+        white = fmt::format("white balance from X : Y : Z = {:.6f} : 1 : {:.6f}", (*development.white)[0],
+                            (*development.white)[2]);
+    return fmt::format("exposure {} EV, {}, {}", development.exposure_ev, space(development.color_space), white);
 }
 
 int makeReference(const ReferenceRequest& request) {
@@ -184,7 +197,7 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene
         integrator.readFilm(part);
         if (part.invalidSamples() > 0)
             throw Error(ErrorKind::Device, fmt::format("{} samples of the reference were NaN or infinite: it would be worth nothing", part.invalidSamples()));
-        folds.images.push_back(resolveImage(part, scene, 0));
+        folds.images.push_back(resolveImage(part, developmentOf(scene).forFloats(), 0));
         folds.film.add(part);
     }
     return folds;
@@ -192,7 +205,7 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene
 
 /// R, G and B of the mean, then of each eighth.
 Image referenceImage(const RenderedFolds& folds, const Scene& scene) {
-    const Image mean = resolveImage(folds.film, scene, 0);
+    const Image mean = resolveImage(folds.film, developmentOf(scene).forFloats(), 0);
     Image file = mean;
     file.pixels.clear();
     file.channels = {"R", "G", "B"};
@@ -221,7 +234,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
         throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
     checkWritable(request.output);
     const auto started = std::chrono::steady_clock::now();
-    const std::string content = hashOfContent(scene), colour = colourText(scene);
+    const std::string content = hashOfContent(scene), colour = colourText(scene), record = recordText(recordOf(scene));
     scene = referenceScene(std::move(scene), request.same_estimator);
     const LoadedBackend backend = openBackend(request.backend);
     Integrator integrator(backend, request.integrator);
@@ -231,9 +244,11 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     Image file = referenceImage(*folds, scene);
     file.metadata.emplace_back("Software", "crt " CRT_VERSION);
     file.metadata.emplace_back(kContentKey, content);
+    file.metadata.emplace_back(kRecordKey, record);
     file.metadata.emplace_back(kColourKey, colour);
     file.metadata.emplace_back(kEstimatorKey, estimatorText(scene));
     file.metadata.emplace_back("crt/backend", backend.name);
+    file.metadata.emplace_back("crt/seed", std::to_string(scene.sampler.seed));
     writeImage(request.output, OutputFormat::Exr, file);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     return MadeReference{folds->film.samples.count(), estimatorText(scene), seconds,
@@ -256,8 +271,12 @@ Reference readReference(const std::string& text, const Scene& scene) {
     const std::string content = metadataOf(image, kContentKey);
     if (content.empty())
         throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: make one with 'crt reference {} -o {}'", text, scene.file, text));
-    if (content != hashOfContent(scene))
-        throw Error(ErrorKind::Usage, fmt::format("'{}' is a reference of another scene, or of this one with other settings or resolution", text));
+    if (content != hashOfContent(scene)) {
+        const std::vector<std::string> differences = differingContent(image, scene);
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' is a reference of another scene, or of this one with other settings: {}", text,
+                                differences.empty() ? "what differs was not noted" : fmt::format("{}", fmt::join(differences, "; "))));
+    }
     const std::string colour = metadataOf(image, kColourKey);
     if (colour.empty())
         throw Error(ErrorKind::Usage, fmt::format("'{}' is of an earlier crt, which did not note exposure, "

@@ -95,7 +95,7 @@ void sodium(Context& context) {
     const Scene scene = context.scene(lamp(line(589, 1)));
     const Film film = context.render(scene, {.samples = 65536});
     chromaticityOf(context, film, 589, 0.5690, 0.4303, 0.002, "(CIE 1931)");
-    const Image image = resolveImage(film, scene, 0);
+    const Image image = resolveImage(film, developmentOf(scene).forFloats(), 0);
     const double scale = cieYIntegral();
     const Vec3d xyz = integrate([](double nm) { return std::max(0.0, 1 - std::abs(nm - 589)); }, 588, 590, 0.01);
     constexpr std::array<Vec3d, 3> kToSrgb{

@@ -95,11 +95,7 @@ int verify(const Arguments& arguments) {
         fmt::print("{}", listText(cases));
         return 0;
     }
-    if (!arguments.output.empty()) {
-        std::error_code error;
-        std::filesystem::create_directories(arguments.output, error);
-        if (error) throw Error(ErrorKind::Output, fmt::format("cannot make the directory '{}': {}", arguments.output, error.message()));
-    }
+    if (!arguments.output.empty()) makeOutputFolder(arguments.output);
     if (!arguments.plugin_path.empty()) lookFirstIn(arguments.plugin_path);
     const LoadedBackend backend = openBackend(arguments.backend);
     // Cases warn about scenes that are odd on purpose.

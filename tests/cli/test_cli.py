@@ -158,7 +158,7 @@ class Help(CliTest):
         self.assertLess(max(map(len, text.splitlines())), 120)
 
     def test_every_command_has_help(self):
-        for command in ("render", "compare", "merge", "info", "plugins", "schema"):
+        for command in ("render", "compare", "merge", "develop", "info", "plugins", "schema"):
             self.assertIn(f"{command}", self.crt(command, "--help").stdout.splitlines()[0])
 
     def test_version(self):
@@ -205,9 +205,6 @@ class WrongCommandLine(CliTest):
 
     def test_the_same_output_twice(self):
         self.assert_one_error(self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "-o", "./a.pfm", expect=2), "a.pfm")
-
-    def test_merge_into_an_image_needs_the_scene(self):
-        self.assert_one_error(self.crt("merge", "-o", "a.pfm", "a.crtfilm", expect=2), "--scene")
 
 
 class WrongScene(CliTest):
@@ -378,6 +375,21 @@ class Rendering(CliTest):
 
 
 class Outputs(CliTest):
+    def test_no_folder_is_made_of_a_typing_error(self):
+        os.mkdir(self.path("out"))
+        for option in (["-o", "oit/a.pfm"], ["-o", "a.pfm", "--report", "oit/r.json"], ["-o", "a.pfm", "--checkpoint", "oit/a.crtfilm"]):
+            self.assert_one_error(self.crt("scene.yaml", "-b", "nonsense", *option, expect=6), "no folder 'oit'", "did you mean 'out'?")
+        self.crt("scene.yaml", "-b", "fake", "-o", "out/a.pfm", "-o", "out/a.crtfilm")
+        self.assert_one_error(self.crt("develop", "out/a.crtfilm", "-o", "oit/a.pfm", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("merge", "out/a.crtfilm", "-o", "oit/a.pfm", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("compare", "out/a.pfm", "out/a.pfm", "--diff", "oit/d.pfm", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("reference", "scene.yaml", "-o", "oit/r.exr", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("converge", "scene.yaml", "--backends", "fake", "-o", "oit/c", expect=6), "did you mean 'out'?")
+        self.assert_one_error(self.crt("verify", "--backend", "fake", "--case", "A01", "-o", "oit/v", expect=6), "did you mean 'out'?")
+        self.assertFalse(os.path.exists(self.path("oit")))
+        self.write("with.yaml", SCENE + "outputs:\n  - {file: sub/beside.pfm}\n")
+        self.assert_one_error(self.crt("with.yaml", "-b", "nonsense", expect=6), "no folder 'sub'", "mkdir -p 'sub'")
+
     def test_unwritable_is_found_before_anything_is_opened(self):
         # A backend that does not exist would be exit code 4: the output is looked at earlier.
         for arguments in (["-o", "/nowhere/at/all/a.pfm"], ["-o", "scene.yaml/a.pfm"], ["-o", "a.pfm", "--report", "/nowhere/at/all/r.json"],
@@ -548,6 +560,160 @@ class Merging(CliTest):
         self.crt("merge", "--scene", "scene.yaml", "--seed", "3", "-o", "m.pfm", "c.crtfilm")
 
 
+LIT = SCENE.replace("radiance: {blackbody: 4000, scale: 5}", "radiance: glow").replace(
+    "materials:", "spectra: {glow: {blackbody: 4000, scale: 5}}\nmaterials:")
+WITH_AOVS = LIT + "outputs: [{file: scene.exr, aovs: [albedo, normal, depth, primitive, variance, samples, error]}]\n"
+
+
+# A film of format 2, which held no record.
+OLD_FILM = """
+89435254460d0a1a0200000078000000c000000000000000a07c53a2d2fe44e401000000010000000400000000000000
+303132333435363738396162636465663031323334353637383961626364656605000000010000000200000000000000
+03000000000000000500000000000000302e312e30000000000000000000f83f00000000000000000000000000000000
+000000000000000000000000000000000000000000000000000000000000000000000000000000000200000000000000
+"""
+
+
+class Developing(CliTest):
+    """What a film says of its scene is enough to make every image of it again."""
+
+    def setUp(self):
+        super().setUp()
+        self.write("lit.yaml", WITH_AOVS)
+
+    def crt(self, *arguments, **others):
+        others.setdefault("SOURCE_DATE_EPOCH", "1700000000")
+        return super().crt(*arguments, **others)
+
+    def render_film(self, *options):
+        self.crt("lit.yaml", "-b", "fake", "--spp", "64", "-o", "a.crtfilm", *options)
+        os.rename(self.path("lit.yaml"), self.path("away.yaml"))  # The film is all there is.
+
+    def assert_same_files(self, *names):
+        for name in names:
+            self.assertEqual(read_bytes(self.path("r" + name)), read_bytes(self.path("d" + name)), name)
+
+    def test_every_file_is_that_of_a_render_with_these_settings(self):
+        self.render_film()
+        files = [".exr", ".png", ".pfm", ".ppm"]
+        for changes in ([], ["film.exposure_ev=1.3"], ["film.white_balance=glow"], ["film.white_balance=D50"],
+                        ["film.white_balance={blackbody: 3000}", "film.exposure_ev=-2"], ["film.color_space=acescg"],
+                        ["film.color_space=xyz", "film.white_balance=A"],
+                        ["film.apply_to_float=true", "film.exposure_ev=2", "film.white_balance=glow"],
+                        ["film.white_balance=A", "film.white_balance=glow"], ["film.white_balance=glow", "film.white_balance=null"]):
+            with self.subTest(changes=changes):
+                sets = [word for change in changes for word in ("--set", change)]
+                self.crt("away.yaml", "-b", "fake", "--spp", "64", *sets, *[w for f in files for w in ("-o", "r" + f)])
+                self.crt("develop", "a.crtfilm", *sets, *[w for f in files for w in ("-o", "d" + f)], CRT_BACKEND_PATH="/nowhere")
+                self.assert_same_files(*files)
+        self.assertIn("StdError.Y", self.crt("info", "d.exr").stdout)
+
+    def test_films_that_were_interrupted_resumed_or_merged(self):
+        self.crt("lit.yaml", "-b", "fake", "--samples", "0:24", "-o", "a.crtfilm")
+        self.crt("lit.yaml", "-b", "fake", "--samples", "24:64", "-o", "b.crtfilm")
+        self.crt("lit.yaml", "-b", "fake", "--spp", "64", "-o", "r.pfm", "-o", "r.png", "--resume", "a.crtfilm")
+        self.crt("lit.yaml", "-b", "fake", "--samples", "0:24", "-o", "a.crtfilm")
+        self.crt("develop", "b.crtfilm", "a.crtfilm", "-o", "d.pfm")
+        self.assert_same_files(".pfm")
+        self.crt("merge", "b.crtfilm", "a.crtfilm", "-o", "m.crtfilm", "-o", "d.pfm")
+        self.assert_same_files(".pfm")
+        self.crt("develop", "m.crtfilm", "-o", "d.pfm")
+        self.assert_same_files(".pfm")
+
+    def test_crop_is_the_window_of_a_cropped_render(self):
+        self.crt("lit.yaml", "-b", "fake", "--spp", "64", "-o", "r.exr", "-o", "r.pfm", "-o", "r.crtfilm", "--crop", "4,2,10,5")
+        self.render_film()
+        for crop in (["--crop", "4,2,10,5"], ["--set", "film.crop=[4, 2, 10, 5]"]):
+            self.crt("develop", "a.crtfilm", "-o", "d.exr", "-o", "d.pfm", *crop)
+            self.assert_same_files(".pfm")
+            self.crt("compare", "--all-channels", "r.exr", "d.exr")
+        # A film that is itself a window, in pixels of the whole.
+        self.crt("develop", "r.crtfilm", "-o", "r.pfm", "--crop", "5,3,8,5")
+        self.crt("develop", "a.crtfilm", "-o", "d.pfm", "--crop", "5,3,8,5")
+        self.assert_same_files(".pfm")
+        self.assert_one_error(self.crt("develop", "r.crtfilm", "-o", "d.pfm", "--crop", "0,0,8,5", expect=2), "4,2,10,5", "24 × 16")
+        self.assert_one_error(self.crt("develop", "a.crtfilm", "-o", "d.pfm", "--crop", "0,0,25,5", expect=2), "0,0,25,5")
+
+    def test_other_aovs_than_the_scenes(self):
+        self.render_film("--set", "outputs.0.aovs=[depth]")
+        self.crt("develop", "a.crtfilm", "-o", "d.exr")
+        self.assertRegex(self.crt("info", "d.exr").stdout, r"channels +R, G, B, Z\n")
+        self.crt("develop", "a.crtfilm", "-o", "d.exr", "--aovs", "error,samples")
+        self.assertRegex(self.crt("info", "d.exr").stdout, r"channels +R, G, B, StdError.Y\n *integers +sampleCount\n")
+        self.crt("develop", "a.crtfilm", "-o", "d.exr", "--aovs", "none")
+        self.assertRegex(self.crt("info", "d.exr").stdout, r"channels +R, G, B\n")
+        self.assert_one_error(self.crt("develop", "a.crtfilm", "-o", "d.exr", "--aovs", "normal", expect=2), "normal", "rendered without")
+        self.assert_one_error(self.crt("develop", "a.crtfilm", "-o", "d.exr", "--aovs", "eror", expect=2), "did you mean 'error'?")
+        self.assert_one_error(self.crt("develop", "a.crtfilm", "-o", "d.png", "--aovs", "error", expect=2), "only .exr")
+
+    def test_what_needs_a_render_and_what_is_no_key(self):
+        self.render_film()
+        for key in ("sampler.samples=4", "sampler.seed=4", "camera.fov=30", "film.filter=gaussian", "film.resolution=[8,8]",
+                    "integrator.max_depth=3", "materials.floor.reflectance=0", "spectra.glow=1", "objects.0.name=x", "film={}"):
+            with self.subTest(key=key):
+                run = self.crt("develop", "a.crtfilm", "-o", "d.pfm", "--set", key, expect=2)
+                self.assert_one_error(run, "needs a render", key.split("=")[0])
+        for key, hint in (("film.exposure_eb=1", "film.exposure_ev"), ("exposure_ev=1", "film.exposure_ev"), ("camra.fov=1", "there is no key")):
+            self.assert_one_error(self.crt("develop", "a.crtfilm", "-o", "d.pfm", "--set", key, expect=2), hint)
+        self.assert_one_error(self.crt("develop", "a.crtfilm", "-o", "d.pfm", "--set", "film.white_balance=glwo", expect=2), "did you mean 'glow'?")
+        self.assert_one_error(self.crt("develop", "a.crtfilm", "-o", "d.pfm", "--set", "film.exposure_ev=much", expect=3), "expected a number")
+        self.assert_one_error(self.crt("develop", "a.crtfilm", "-o", "d.crtfilm", expect=2), "crt merge")
+        self.assert_one_error(self.crt("develop", "away.yaml", "-o", "d.pfm", expect=2), "not a crt film")
+        self.assertFalse(os.path.exists(self.path("d.pfm")))
+
+    def test_a_film_without_a_record_asks_for_its_scene(self):
+        self.render_film()
+        with open(self.path("a.crtfilm"), "rb") as file:
+            self.assertIn(b'"exposure_ev"', file.read(4096))
+        # Of the format before records; one pixel.
+        with open(self.path("old.crtfilm"), "wb") as file:
+            file.write(bytes.fromhex(OLD_FILM))
+        self.assertIn("1 x 1 pixels", self.crt("info", "old.crtfilm").stdout)
+        for command in ("develop", "merge"):
+            self.assert_one_error(self.crt(command, "old.crtfilm", "-o", "d.pfm", expect=2), "--scene")
+        self.crt("merge", "old.crtfilm", "-o", "m.crtfilm")
+
+    def test_a_wrong_date_is_refused_before_the_render(self):
+        self.assert_one_error(self.crt("lit.yaml", "-b", "nonsense", "-o", "a.pfm", expect=2, SOURCE_DATE_EPOCH="today"), "SOURCE_DATE_EPOCH")
+
+
+class FloatFiles(CliTest):
+    """EXR and PFM hold the radiance of the scene; exposure and white balance are for the screen."""
+
+    def test_exposure_and_white_balance_go_where_they_belong(self):
+        self.write("lit.yaml", WITH_AOVS)
+        changes = ["--set", "film.exposure_ev=1", "--set", "film.white_balance=glow"]
+        render = ["lit.yaml", "-b", "fake", "--spp", "64", "--report", "none"]
+        self.crt(*render, "-o", "plain.pfm", "-o", "plain.exr", "-o", "plain.ppm")
+        self.crt(*render, "-o", "a.pfm", "-o", "a.exr", "-o", "a.ppm", *changes)
+        self.assertEqual(read_bytes(self.path("plain.pfm")), read_bytes(self.path("a.pfm")))
+        self.crt("compare", "--all-channels", "plain.exr", "a.exr")
+        self.assertNotEqual(read_bytes(self.path("plain.ppm")), read_bytes(self.path("a.ppm")))
+        info = self.crt("info", "a.exr").stdout
+        for line in (r"crt/exposure +0\n", r"crt/whiteBalance +none\n", r"crt/displayExposure +1\n", r"crt/displayWhiteBalance +0\.3"):
+            self.assertRegex(info, line)
+        self.crt(*render, "-o", "b.pfm", "-o", "b.exr", "-o", "b.ppm", *changes, "--set", "film.apply_to_float=true")
+        self.assertNotEqual(read_bytes(self.path("plain.pfm")), read_bytes(self.path("b.pfm")))
+        self.assertEqual(read_bytes(self.path("a.ppm")), read_bytes(self.path("b.ppm")))
+        info = self.crt("info", "b.exr").stdout
+        self.assertRegex(info, r"crt/exposure +1\n")
+        self.assertNotIn("displayExposure", info)
+        self.assertIn("differ in exposure", self.crt("compare", "a.exr", "b.exr", expect=7).stdout)
+
+    def test_exposure_doubles_error_and_image_alike(self):
+        self.write("lit.yaml", WITH_AOVS)
+        render = ["lit.yaml", "-b", "fake", "--spp", "64", "--report", "none", "--set", "film.apply_to_float=true"]
+        for ev in "0", "1":
+            self.crt(*render, "-o", ev + ".exr", "--set", "film.exposure_ev=" + ev)
+            self.crt(*render, "-o", ev + "_other.exr", "--set", "film.exposure_ev=" + ev, "--seed", "5")
+        # What noise compare sees does not depend on the exposure of both.
+        seen = [json.loads(self.crt("compare", e + ".exr", e + "_other.exr", "--json", expect=7).stdout) for e in "01"]
+        self.assertEqual(2 * seen[0]["metrics"]["rmse"], seen[1]["metrics"]["rmse"])
+        self.assertEqual(seen[0]["metrics"]["relative_rmse"], seen[1]["metrics"]["relative_rmse"])
+        for what in ("rms_z", "tiles", "pixels"):
+            self.assertEqual(seen[0]["noise"][what], seen[1]["noise"][what], what)
+
+
 class Comparing(CliTest):
     def test_same_and_different(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "-o", "b.pfm")
@@ -598,13 +764,14 @@ class Comparing(CliTest):
 
     def test_other_exposure_white_balance_and_colour_space_are_refused(self):
         changes = {"exposure": "film.exposure_ev=1", "white balance": "film.white_balance=A", "colour space": "film.color_space=acescg"}
+        to_floats = ["--set", "film.apply_to_float=true"]
         for ending in ("exr", "png"):
             self.crt("scene.yaml", "-b", "fake", "-o", "a." + ending)
             self.crt("scene.yaml", "-b", "fake", "--seed", "1", "-o", "c." + ending)
             for what, change in changes.items():
                 if ending == "png" and what == "colour space":
                     continue  # All PNG files are sRGB.
-                self.crt("scene.yaml", "-b", "fake", "--set", change, "-o", "b." + ending)
+                self.crt("scene.yaml", "-b", "fake", "--set", change, *to_floats, "-o", "b." + ending)
                 text = self.crt("compare", "a." + ending, "b." + ending, "--tolerance", "1e9", expect=7).stdout
                 self.assertIn("different: A and B differ in " + what, text)
                 run = self.crt("compare", "a." + ending, "c." + ending, "--reference", "b." + ending, expect=2)
@@ -749,6 +916,32 @@ class Light(CliTest):
         self.assertIn("crt: warning:", run.stderr)
         _, _, values = read_pfm(self.path("a.pfm"))
         self.assertEqual(set(values), {0.0})
+
+    def test_a_black_image_says_what_to_look_at(self):
+        run = self.crt("scene.yaml", "-b", self.backend, "-o", "a.pfm", "-o", "a.crtfilm")
+        self.assertNotIn("black", run.stderr)
+        self.assertNotIn("lights nothing", run.stderr)
+        # Turned round, and with the camera below.
+        self.write("away.yaml", SCENE.replace("[1, 2, 1], [-1, 2, 1]], faces: [[0, 1, 2, 3]]", "[1, 2, 1], [-1, 2, 1]], faces: [[3, 2, 1, 0]]"))
+        run = self.crt("away.yaml", "-b", self.backend, "-o", "a.pfm", "-o", "a.crtfilm")
+        self.assertIn("warning: 'lamp' lights nothing", run.stderr)
+        self.assertRegex(run.stderr, r"warning: the image is black: no path met a light; 'lamp' may face away")
+        self.assertEqual(set(read_pfm(self.path("a.pfm"))[2]), {0.0})
+        self.assertIn("warning: the image is black", self.crt("develop", "a.crtfilm", "-o", "b.pfm").stderr)
+        self.assertNotIn("black", self.crt("away.yaml", "-b", self.backend, "-o", "a.pfm", "--set", "objects.1.emission.two_sided=true").stderr)
+        # Black on the screen alone: there is light, and too little exposure.
+        run = self.crt("scene.yaml", "-b", self.backend, "-o", "a.png", "-o", "a.exr", "--set", "film.exposure_ev=-30")
+        self.assertNotIn("no path met", run.stderr)
+        stops = int(re.search(r"'a.png' is black: .* about (\d+) stops more", run.stderr).group(1))
+        self.assertNotIn("black", self.crt("scene.yaml", "-b", self.backend, "-o", "a.png", "--set", f"film.exposure_ev={stops - 30}").stderr)
+
+    def test_a_gpu_that_is_not_there_is_no_news(self):
+        if os.path.exists("/dev/nvidiactl"):
+            self.skipTest("there is a GPU")
+        run = self.crt("scene.yaml", "-o", "a.pfm", CRT_BACKEND_PATH="")
+        self.assertNotIn("NVIDIA", run.stderr)
+        self.assertNotIn("cuda", run.stderr)
+        self.assertIn("crt: debug: backend 'cuda'", self.crt("scene.yaml", "-v", "-o", "a.pfm", CRT_BACKEND_PATH="").stderr)
 
     def test_halves_kernels_and_chunks_give_the_same_bits(self):
         self.crt("scene.yaml", "-b", self.backend, "-o", "whole.pfm")

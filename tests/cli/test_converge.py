@@ -73,8 +73,12 @@ class Converging(CliTest):
                  ("the sampler", ["--set", "film.resolution=[16,16]"]),
                  ("the seed", [*SMALL, "--set", "sampler.seed=77"]),
                  ("light sampling", [*SMALL, "--set", "integrator.nee=false"]),
-                 ("the colour", [*SMALL, "--set", "film.exposure_ev=1"]),
-                 ("the hash of what is to be seen", [*SMALL, "--set", "camera.fov=20"]),
+                 ("the colour", [*SMALL, "--set", "film.exposure_ev=1", "--set", "film.apply_to_float=true"]),
+                 ("the colour", [*SMALL, "--set", "film.color_space=acescg"]),
+                 ("the camera", [*SMALL, "--set", "camera.fov=20"]),
+                 ("the geometry of scene, %s was another (4 triangles in 2 objects in both)" % self.backend,
+                  [*SMALL, "--set", "objects.0.mesh.positions.0.0=-1"]),
+                 ("the materials of scene, %s was another" % self.backend, [*SMALL, "--set", "materials.floor.reflectance=0.2"]),
                  ("the reference", [*SMALL, "--reference", "0.5"]),
                  ("the number of threads", [*SMALL, "-t", "1"]),
                  ("it has no", [*SMALL, "--vary", "roulette=true,false"])]
@@ -84,7 +88,8 @@ class Converging(CliTest):
                 run = self.converge("scene.yaml", *changed, "--resume", expect=2)
                 self.assert_one_error(run, "another experiment", what)
         self.assertEqual(self.rows("out"), before)
-        self.converge("scene.yaml", *SMALL, "--resume")
+        # What is measured is scene radiance, whatever a screen is shown.
+        self.converge("scene.yaml", *SMALL, "--set", "film.exposure_ev=1", "--set", "film.white_balance=A", "--resume")
 
     def test_resume_refuses_what_it_cannot_read(self):
         self.converge("scene.yaml", *SMALL)
@@ -140,9 +145,20 @@ class Converging(CliTest):
         for changed in ("film.exposure_ev=1", "film.color_space=acescg",
                         "film.white_balance={illuminant: A}"):
             with self.subTest(changed=changed):
-                run = self.converge("scene.yaml", "--reference", "ref.exr", "--set", changed, *SMALL,
-                                    folder="o" + changed[5:8], expect=2)
+                run = self.converge("scene.yaml", "--reference", "ref.exr", "--set", changed, "--set", "film.apply_to_float=true",
+                                    *SMALL, folder="o" + changed[5:8], expect=2)
                 self.assert_one_error(run, "a reference in other colours")
+        self.converge("scene.yaml", "--reference", "ref.exr", "--set", "film.exposure_ev=1", *SMALL, folder="same")
+
+    def test_a_reference_of_another_scene_says_what_differs(self):
+        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", "64", "--same-estimator", "-b", self.backend, *SMALL)
+        for change, words in (("film.resolution=[8,8]", "the resolution is 16 × 16, not 8 × 8"),
+                              ("integrator.max_depth=3", "max_depth is 16, not 3"), ("camera.fov=20", "the camera is at"),
+                              ("materials.floor.reflectance=0.2", "the materials are others")):
+            with self.subTest(change=change):
+                run = self.converge("scene.yaml", "--reference", "ref.exr", *SMALL, "--set", change, folder="o", expect=2)
+                self.assert_one_error(run, "a reference of another scene", words)
+                self.assertNotIn("the seed", run.stderr)
 
     def test_a_variant_that_shows_another_image_is_not_held_against_the_reference(self):
         depths = ["--set", "integrator.max_depth=4", "--vary", "depth=1,4"]

@@ -47,7 +47,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         if (resumed.samples.ranges() != film.samples.ranges()) fuzz::finding("film", "samples got lost while adding");
         (void)crt::estimateError(resumed);
         (void)resumed.invalidSamples();
-        const Image image = resolveImage(resumed, Scene{}, film.shape().aovs);
+        const Image image = resolveImage(resumed, Development{}, film.shape().aovs);
         if (image.width != film.shape().width || image.height != film.shape().height) fuzz::finding("film", "resolves to another size");
         if (mergeCheckpoints({path}).first.samples.ranges() != film.samples.ranges()) fuzz::finding("film", "a merge of one is not that one");
     });

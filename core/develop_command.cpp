@@ -1,0 +1,164 @@
+#include "atomic_file.h"
+#include "checkpoint.h"
+#include "commands.h"
+#include "error_estimate.h"
+#include "light_checks.h"
+#include "log.h"
+#include "outputs.h"
+#include "progress.h"
+#include "scene_schema.h"
+#include "yaml_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+namespace crt {
+namespace {
+
+constexpr std::array<const char*, 5> kDevelopmentKeys{"film.exposure_ev", "film.white_balance", "film.color_space", "film.crop",
+                                                      "film.apply_to_float"};
+
+bool isSceneKey(std::string_view path) {
+    const std::string_view first = path.substr(0, path.find('.'));
+    const KeySchema* key = schemaSection("").find(first);
+    if (key == nullptr) return false;
+    if (key->shape != ValueShape::One || key->kind != ValueKind::Section || first.size() == path.size()) return true;
+    const std::string_view rest = path.substr(first.size() + 1);
+    return schemaSection(key->section).find(rest.substr(0, rest.find('.'))) != nullptr;
+}
+
+/// Refuses what the samples of a film have decided already, and what is no key at all.
+void requireDevelopmentKey(const std::string& path) {
+    if (std::find(kDevelopmentKeys.begin(), kDevelopmentKeys.end(), path) != kDevelopmentKeys.end()) return;
+    const std::string offer = fmt::format("crt develop changes {}", fmt::join(kDevelopmentKeys, ", "));
+    if (isSceneKey(path))
+        throw Error(ErrorKind::Usage, fmt::format("--set {}: the samples of a film depend on '{}', so this needs a render ('crt render'); {}", path,
+                                                  path, offer));
+    const std::vector<std::string> keys(kDevelopmentKeys.begin(), kDevelopmentKeys.end());
+    const bool short_form = std::find(keys.begin(), keys.end(), "film." + path) != keys.end();
+    const std::string hint = short_form ? fmt::format("did you mean 'film.{}'?", path) : didYouMean(path, keys);
+    throw Error(ErrorKind::Usage, fmt::format("--set {}: there is no key '{}'; {}", path, path, hint.empty() ? offer : hint));
+}
+
+/// The name in `film.white_balance=lamp`; empty for other forms of a spectrum.
+std::string nameIn(std::string value) {
+    const auto strip = [&value](const char* characters) {
+        const std::size_t first = value.find_first_not_of(characters), last = value.find_last_not_of(characters);
+        value = first == std::string::npos ? "" : value.substr(first, last - first + 1);
+    };
+    strip(" \t");
+    strip("'\"");
+    const bool plain = value.find_first_of("{}[]:,# ") == std::string::npos;
+    return plain && value != "null" && !looksLikeNumber(value) ? value : std::string();
+}
+
+/// The white that a name says: a light of the film's scene, or an illuminant (nothing: let the reader find it).
+std::optional<Vec3d> namedWhite(const FilmRecord& record, const std::string& name) {
+    if (const auto found = record.whites.find(name); found != record.whites.end()) return found->second;
+    if (name.empty() || illuminantSpectrum(name)) return std::nullopt;
+    std::vector<std::string> known = illuminantNames();
+    for (const auto& [light, white] : record.whites) known.push_back(light);
+    const std::string hint = didYouMean(name, known);
+    throw Error(ErrorKind::Usage,
+                fmt::format("--set film.white_balance: the film knows no light '{}'; {}", name,
+                            hint.empty() ? fmt::format("it knows {}", fmt::join(known, ", ")) : hint));
+}
+
+void setWindow(FilmRecord& record, const std::array<int, 4>& window) {
+    const auto& [x0, y0, x1, y1] = window;
+    const auto& [left, top, right, bottom] = record.window;
+    if (x0 < left || y0 < top || x1 > right || y1 > bottom || x0 >= x1 || y0 >= y1)
+        throw Error(ErrorKind::Usage, fmt::format("the crop window {},{},{},{} is no rectangle within {},{},{},{}, which the film holds "
+                                                  "of {} × {} pixels",
+                                                  x0, y0, x1, y1, left, top, right, bottom, record.width, record.height));
+    record.window = window;
+}
+
+/// Changes the record as the scene's `film` section would be. The scene's own reader reads the values.
+void applyChanges(FilmRecord& record, const DevelopArguments& arguments) {
+    std::vector<SceneOverride> to_read;
+    std::optional<Vec3d> white;
+    for (const SceneOverride& change : arguments.changes) {
+        if (change.path != "film.white_balance") {
+            to_read.push_back(change);
+            continue;
+        }
+        white = namedWhite(record, nameIn(change.value));
+        std::erase_if(to_read, [](const SceneOverride& earlier) { return earlier.path == "film.white_balance"; });
+        if (!white) to_read.push_back(change);
+    }
+    const std::string film = fmt::format("crt: 1\nfilm: {{resolution: [{}, {}]}}\n", record.width, record.height);
+    const Scene scene = parseScene(film, arguments.films.front(), ".", to_read);
+    const Development read = developmentOf(scene);
+    Development& development = record.development;
+    for (const SceneOverride& change : to_read) {
+        if (change.path == "film.exposure_ev") development.exposure_ev = read.exposure_ev;
+        if (change.path == "film.white_balance") development.white = read.white;
+        if (change.path == "film.color_space") development.color_space = read.color_space;
+        if (change.path == "film.apply_to_float") development.apply_to_float = read.apply_to_float;
+        if (change.path == "film.crop" && scene.film.crop[2] > 0) setWindow(record, scene.film.crop);
+    }
+    if (white) development.white = white;
+    if (arguments.crop) setWindow(record, *arguments.crop);
+}
+
+/// The bits of --aovs.
+std::uint32_t aovsNamed(const std::vector<std::string>& names) {
+    if (names == std::vector<std::string>{"none"}) return 0;
+    std::uint32_t aovs = 0;
+    for (const std::string& name : names) {
+        const std::uint32_t bit = aovNamed(name);
+        if (bit == 0) {
+            const std::string hint = didYouMean(name, aovNames());
+            throw Error(ErrorKind::Usage, fmt::format("--aovs: there is no AOV '{}'; {}", name,
+                                                      hint.empty() ? fmt::format("there are {}", fmt::join(aovNames(), ", ")) : hint));
+        }
+        aovs |= bit;
+    }
+    return aovs;
+}
+
+/// What can be refused before films, which may be large, are read.
+OutputPlan planDevelopment(const DevelopArguments& arguments) {
+    OutputPlan plan = planOutputs(arguments.outputs, Scene{});
+    if (!plan.films.empty())
+        throw Error(ErrorKind::Usage, fmt::format("'{}': crt develop makes images; 'crt merge' adds films to one", plan.films.front()));
+    const bool has_exr = std::any_of(plan.images.begin(), plan.images.end(), [](const Output& o) { return o.format == OutputFormat::Exr; });
+    if (!arguments.aovs.empty() && !has_exr) throw Error(ErrorKind::Usage, "--aovs: only .exr files hold more than the image, and no output is one");
+    for (const SceneOverride& change : arguments.changes) requireDevelopmentKey(change.path);
+    const std::uint32_t aovs = aovsNamed(arguments.aovs);
+    for (Output& image : plan.images)
+        if (image.format == OutputFormat::Exr) image.aovs = aovs;
+    for (const Output& image : plan.images) checkWritable(image.file);
+    return plan;
+}
+
+}  // namespace
+
+int develop(const DevelopArguments& arguments) {
+    OutputPlan plan = planDevelopment(arguments);
+    auto [film, identity] = mergeCheckpoints(arguments.films);
+    requireRecord(arguments.films.front(), identity);
+    FilmRecord& record = *identity.record;
+    const std::array<int, 4> held = record.window;
+    applyChanges(record, arguments);
+    if (record.window != held)
+        film = cropped(film, {record.window[0] - held[0], record.window[1] - held[1], record.window[2] - held[0], record.window[3] - held[1]});
+
+    for (Output& image : plan.images) {
+        if (image.format == OutputFormat::Exr && arguments.aovs.empty()) image.aovs = record.aovs;
+        writeOutput(image, film, identity);
+    }
+    if (film.samples.count() > 0 && isBlack(film)) logWarning("the image is black: no path met a light while the film was rendered");
+    const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, record.independent_samples);
+    logInfo("{} × {} pixels, {} samples per pixel{}", film.shape().width, film.shape().height, film.samples.count(),
+            error ? ", " + errorText(*error) : "");
+    logInfo("wrote {}", fmt::join(arguments.outputs, ", "));
+    return 0;
+}
+
+}  // namespace crt

@@ -1,0 +1,360 @@
+#include "film_record.h"
+
+#include "aov.h"
+#include "error.h"
+#include "scene.h"
+#include "vec3d.h"
+#include "yaml_reader.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <ctime>
+#include <memory>
+#include <new>
+#include <set>
+
+namespace crt {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kRecordVersion = 1;
+
+// ---- Camera ------------------------------------------------------------------------------------------------------------
+
+Vec3d normalised(const Vec3d& v) { return v * (1 / length(v)); }
+
+/// p · M has the components dot(axis, p − origin) + offset·w, one for each column.
+struct Column {
+    Vec3d axis{};
+    double offset = 0;
+};
+RowMatrix4d matrixOf(const std::array<Column, 4>& columns, const Vec3d& origin) {
+    RowMatrix4d m{};
+    for (std::size_t c = 0; c < 4; ++c) {
+        for (std::size_t r = 0; r < 3; ++r) m[r * 4 + c] = columns[c].axis[r];
+        m[12 + c] = columns[c].offset - dot(columns[c].axis, origin);
+    }
+    return m;
+}
+
+void addCamera(FilmRecord& record, const Camera& camera) {
+    const Vec3d view = normalised(camera.target - camera.position);
+    const Vec3d right = normalised(cross(view, camera.up)), up = cross(right, view);
+    const Vec3d back{-view[0], -view[1], -view[2]};
+    record.world_to_camera = matrixOf({{{right}, {up}, {back}, {{}, 1}}}, camera.position);
+    // x / depth runs from −tan_half_width to tan_half_width, and depth is w. The depth of the result is 1 / depth:
+    // nobody needs it, but a matrix that has an inverse is of more use than one that has none.
+    const Vec3d x = right * (0.5 / camera.tan_half_width) + view * 0.5;
+    const Vec3d y = view * 0.5 - up * (0.5 / camera.tan_half_height);
+    record.world_to_ndc = matrixOf({{{x}, {y}, {{}, 1}, {view}}}, camera.position);
+}
+
+// ---- Traits ------------------------------------------------------------------------------------------------------------
+
+class Digest {
+public:
+    Digest() : state_(XXH3_createState()) {
+        if (!state_) throw std::bad_alloc();
+        XXH3_64bits_reset(state_.get());
+    }
+    template <class Number>
+    void add(Number number) {
+        XXH3_64bits_update(state_.get(), &number, sizeof number);
+    }
+    /// The size goes first, so that no item moves from one array to the next unseen.
+    template <class Item>
+    void add(const std::vector<Item>& items) {
+        add(std::uint64_t{items.size()});
+        if (!items.empty()) XXH3_64bits_update(state_.get(), items.data(), items.size() * sizeof(Item));
+    }
+    void add(const Spectrum& spectrum) { XXH3_64bits_update(state_.get(), spectrum.values.data(), sizeof spectrum.values); }
+    std::string digits() const { return fmt::format("{:016x}", XXH3_64bits_digest(state_.get())); }
+
+private:
+    struct Free {
+        void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
+    };
+    std::unique_ptr<XXH3_state_t, Free> state_;
+};
+
+std::string vectorText(const Vec3d& v) { return fmt::format("({}, {}, {})", v[0], v[1], v[2]); }
+
+std::string cameraText(const Camera& c) {
+    std::string text = fmt::format("at {} looking at {}, up {}, {:.4g} × {:.4g} wide at distance 1", vectorText(c.position),
+                                   vectorText(c.target), vectorText(c.up), 2 * c.tan_half_width, 2 * c.tan_half_height);
+    if (c.aperture_radius > 0) text += fmt::format(", lens of radius {} focused at {}", c.aperture_radius, c.focus_distance);
+    return text;
+}
+
+std::string filterText(const FilmSettings& film) {
+    switch (film.filter) {
+        case PixelFilter::Box: return fmt::format("box of radius {}", film.filter_radius);
+        case PixelFilter::Gaussian: return fmt::format("gaussian of radius {} and sigma {}", film.filter_radius, film.filter_sigma);
+        case PixelFilter::BlackmanHarris: break;
+    }
+    return fmt::format("Blackman-Harris of radius {}", film.filter_radius);
+}
+
+const char* integratorText(IntegratorType type) {
+    return type == IntegratorType::Path ? "path" : type == IntegratorType::Normals ? "normals" : "aabb";
+}
+const char* samplerText(SamplerType type) {
+    return type == SamplerType::Sobol ? "sobol" : type == SamplerType::Independent ? "independent" : "xorshift";
+}
+std::string counted(std::uint64_t n, const char* one, const char* many) { return fmt::format("{} {}", n, n == 1 ? one : many); }
+const char* onOff(bool on) { return on ? "on" : "off"; }
+
+std::string planesText(std::uint32_t aovs) {
+    std::string text;
+    for (const AovRow& row : kAovRows)
+        if ((aovs & kAovsOfFirstHits & row.aov) != 0) text += fmt::format("{}{}", text.empty() ? "" : ", ", row.name);
+    return text.empty() ? "none" : text;
+}
+
+SceneTrait geometryTrait(const Scene& scene) {
+    Digest digest;
+    std::uint64_t triangles = 0, placements = 0;
+    for (const Mesh& mesh : scene.meshes) {
+        digest.add(mesh.positions);
+        digest.add(mesh.normals);
+        digest.add(mesh.triangles);
+        digest.add(mesh.normal_index);
+        digest.add(mesh.material);
+        digest.add(mesh.emission);
+    }
+    for (const Object& object : scene.objects) {
+        digest.add(object.mesh);
+        digest.add(object.transforms);
+        digest.add(object.material);
+        digest.add(object.emission);
+        placements += object.transforms.size();
+        triangles += object.transforms.size() * scene.meshes[object.mesh].triangles.size();
+    }
+    return {"the geometry", fmt::format("{} in {}", counted(triangles, "triangle", "triangles"), counted(placements, "object", "objects")), digest.digits()};
+}
+
+SceneTrait materialsTrait(const Scene& scene) {
+    Digest digest;
+    for (const Material& material : scene.materials) {
+        digest.add(material.type);
+        for (const Spectrum* spectrum : {&material.reflectance, &material.eta, &material.k}) digest.add(*spectrum);
+    }
+    return {"the materials", counted(scene.materials.size(), "material", "materials"), digest.digits()};
+}
+
+SceneTrait lightsTrait(const Scene& scene) {
+    Digest digest;
+    for (const Emission& emission : scene.emissions) {
+        digest.add(emission.two_sided);
+        digest.add(emission.radiance);
+    }
+    if (scene.environment) digest.add(scene.environment->radiance);
+    return {"the light",
+            fmt::format("{}, {} environment", counted(scene.emissions.size(), "kind of lamp", "kinds of lamp"), scene.environment ? "an" : "no"),
+            digest.digits()};
+}
+
+std::vector<SceneTrait> traitsOf(const Scene& scene, std::uint32_t aovs) {
+    const auto& [x0, y0, x1, y1] = scene.film.crop;
+    const IntegratorSettings& i = scene.integrator;
+    return {{"the resolution", fmt::format("{} × {}", scene.film.width, scene.film.height), {}},
+            {"the crop window", x1 > x0 ? fmt::format("[{}, {}, {}, {}]", x0, y0, x1, y1) : "the whole film", {}},
+            {"the filter", filterText(scene.film), {}},
+            {"the seed", std::to_string(scene.sampler.seed), {}},
+            {"the sampler", samplerText(scene.sampler.type), {}},
+            {"the replicates", std::to_string(replicatesOf(scene)), {}},
+            {"the integrator", integratorText(i.type), {}},
+            {"max_depth", std::to_string(i.max_depth), {}},
+            {"roulette", i.roulette ? fmt::format("on from depth {}", i.roulette_depth) : "off", {}},
+            {"nee", onOff(i.nee), {}},
+            {"mis", onOff(i.mis), {}},
+            {"the camera", cameraText(scene.camera), {}},
+            geometryTrait(scene),
+            materialsTrait(scene),
+            lightsTrait(scene),
+            {"the AOVs of first hits", planesText(aovs), {}}};
+}
+
+// ---- JSON --------------------------------------------------------------------------------------------------------------
+
+constexpr std::array<const char*, 3> kSpaceNames{"srgb", "acescg", "xyz"};  // In the order of ColorSpace.
+
+Json developmentJson(const Development& development) {
+    Json json{{"color_space", kSpaceNames[static_cast<std::size_t>(development.color_space)]},
+              {"exposure_ev", development.exposure_ev},
+              {"apply_to_float", development.apply_to_float}};
+    if (development.white) json["white_xyz"] = *development.white;
+    return json;
+}
+
+/// Numbers that an image is made with must be ones that a scene could have.
+double inRange(const Json& json, double least, double most) {
+    const double value = json.get<double>();
+    if (!(value >= least && value <= most)) throw Error(ErrorKind::Usage, fmt::format("has {} for a number", value));
+    return value;
+}
+
+Vec3d whiteFrom(const Json& json) {
+    constexpr double kMost = 1e12;  // Of a colour with Y = 1.
+    Vec3d white{};
+    for (std::size_t c = 0; c < 3; ++c) white[c] = inRange(json.at(c), c == 1 ? 1 : -kMost, c == 1 ? 1 : kMost);
+    return white;
+}
+
+Development developmentFrom(const Json& json) {
+    Development development;
+    const auto name = json.at("color_space").get<std::string>();
+    const auto found = std::find(kSpaceNames.begin(), kSpaceNames.end(), name);
+    if (found == kSpaceNames.end()) throw Error(ErrorKind::Usage, fmt::format("names the unknown colour space '{}'", name));
+    development.color_space = static_cast<ColorSpace>(found - kSpaceNames.begin());
+    development.exposure_ev = inRange(json.at("exposure_ev"), -100, 100);
+    development.apply_to_float = json.at("apply_to_float").get<bool>();
+    if (json.contains("white_xyz")) development.white = whiteFrom(json.at("white_xyz"));
+    return development;
+}
+
+std::vector<std::string> aovNamesOf(std::uint32_t aovs) {
+    std::vector<std::string> names;
+    for (const AovRow& row : kAovRows)
+        if ((aovs & row.aov) != 0 && !row.name.empty()) names.emplace_back(row.name);
+    return names;
+}
+
+/// "embree and opencl": both names, each once.
+std::string joinNames(const std::string& a, const std::string& b) {
+    if (a.empty() || a == b) return b;
+    if (b.empty()) return a;
+    constexpr std::string_view kBetween = " and ";
+    std::set<std::string> names;
+    for (const std::string& text : {a, b})
+        for (std::size_t begin = 0; begin < text.size();) {
+            const std::size_t end = std::min(text.find(kBetween, begin), text.size());
+            names.insert(text.substr(begin, end - begin));
+            begin = end + kBetween.size();
+        }
+    return fmt::format("{}", fmt::join(names, kBetween));
+}
+
+FilmRecord recordFrom(const Json& json) {
+    FilmRecord record;
+    record.title = json.at("title").get<std::string>();
+    record.seed = json.at("seed").get<std::uint64_t>();
+    record.independent_samples = json.at("independent_samples").get<bool>();
+    record.width = json.at("resolution").at(0).get<int>();
+    record.height = json.at("resolution").at(1).get<int>();
+    record.window = json.at("window").get<std::array<int, 4>>();
+    for (const Json& name : json.at("aovs")) record.aovs |= aovNamed(name.get<std::string>());
+    record.development = developmentFrom(json.at("development"));
+    for (const auto& [name, white] : json.at("lights_xyz").items()) record.whites[name] = whiteFrom(white);
+    record.world_to_camera = json.at("world_to_camera").get<RowMatrix4d>();
+    record.world_to_ndc = json.at("world_to_ndc").get<RowMatrix4d>();
+    for (const Json& trait : json.at("traits"))
+        record.traits.push_back({trait.at(0).get<std::string>(), trait.at(1).get<std::string>(), trait.at(2).get<std::string>()});
+    record.backend = json.at("backend").get<std::string>();
+    record.device = json.at("device").get<std::string>();
+    record.date_utc = json.at("date_utc").get<std::string>();
+    if (json.contains("complete")) record.complete = json.at("complete").get<bool>();
+
+    const auto& [x0, y0, x1, y1] = record.window;
+    if (x0 < 0 || y0 < 0 || x0 >= x1 || y0 >= y1 || x1 > record.width || y1 > record.height)
+        throw Error(ErrorKind::Usage, "has a window that is none of its film");
+    return record;
+}
+
+}  // namespace
+
+FilmRecord recordOf(const Scene& scene) {
+    FilmRecord record;
+    record.title = scene.title;
+    record.seed = scene.sampler.seed;
+    record.independent_samples = scene.sampler.type != SamplerType::Sobol;
+    record.width = scene.film.width;
+    record.height = scene.film.height;
+    record.window = scene.film.crop[2] > scene.film.crop[0] ? scene.film.crop
+                                                            : std::array<int, 4>{0, 0, scene.film.width, scene.film.height};
+    for (const Output& output : scene.outputs) record.aovs |= output.aovs;
+    record.development = developmentOf(scene);
+    record.whites = scene.whites;
+    addCamera(record, scene.camera);
+    record.traits = traitsOf(scene, record.aovs);
+    return record;
+}
+
+std::string recordText(const FilmRecord& record) {
+    Json json{{"record", kRecordVersion},
+              {"title", record.title},
+              {"seed", record.seed},
+              {"independent_samples", record.independent_samples},
+              {"resolution", {record.width, record.height}},
+              {"window", record.window},
+              {"aovs", aovNamesOf(record.aovs)},
+              {"development", developmentJson(record.development)},
+              {"lights_xyz", Json::object()},
+              {"world_to_camera", record.world_to_camera},
+              {"world_to_ndc", record.world_to_ndc},
+              {"traits", Json::array()},
+              {"backend", record.backend},
+              {"device", record.device},
+              {"date_utc", record.date_utc}};
+    for (const auto& [name, white] : record.whites) json["lights_xyz"][name] = white;
+    for (const SceneTrait& trait : record.traits) json["traits"].push_back({trait.name, trait.text, trait.digest});
+    if (record.complete) json["complete"] = *record.complete;
+    // Titles are bytes, not necessarily UTF-8.
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+FilmRecord readRecord(std::string_view text) {
+    try {
+        return recordFrom(Json::parse(text));
+    } catch (const Json::exception& error) {
+        throw Error(ErrorKind::Usage, fmt::format("cannot be read ({})", error.what()));
+    }
+}
+
+std::vector<std::string> differingTraits(const FilmRecord& found, const FilmRecord& expected) {
+    std::vector<std::string> sentences;
+    for (const SceneTrait& want : expected.traits) {
+        const auto have = std::find_if(found.traits.begin(), found.traits.end(),
+                                       [&](const SceneTrait& trait) { return trait.name == want.name; });
+        if (have == found.traits.end() || *have == want) continue;
+        const bool plural = want.name.back() == 's' && want.name != "mis";
+        if (have->text != want.text)
+            sentences.push_back(fmt::format("{} {} {}, not {}", want.name, plural ? "are" : "is", have->text, want.text));
+        else
+            sentences.push_back(fmt::format("{} {} ({} in both)", want.name, plural ? "are others" : "is another", have->text));
+    }
+    return sentences;
+}
+
+void FilmRecord::addRun(const FilmRecord& other) {
+    backend = joinNames(backend, other.backend);
+    device = joinNames(device, other.device);
+    date_utc = std::max(date_utc, other.date_utc);
+    complete.reset();
+}
+
+std::string dateUtc() {
+    std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+    if (const char* epoch = std::getenv("SOURCE_DATE_EPOCH"); epoch != nullptr && *epoch != '\0') {
+        constexpr std::uint64_t kYear9999 = 253402300799;
+        const Parsed<std::uint64_t> seconds = parseUnsigned(epoch);
+        if (!seconds.value || *seconds.value > kYear9999)
+            throw Error(ErrorKind::Usage, fmt::format("SOURCE_DATE_EPOCH is '{}', and not the seconds since 1970 that it should be", epoch));
+        now = static_cast<std::time_t>(*seconds.value);
+    }
+    std::tm utc{};
+    gmtime_r(&now, &utc);
+    char text[32];
+    const std::size_t length = std::strftime(text, sizeof text, "%Y:%m:%d %H:%M:%S", &utc);
+    return {text, length};
+}
+
+}  // namespace crt

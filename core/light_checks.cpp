@@ -1,0 +1,162 @@
+#include "light_checks.h"
+
+#include "log.h"
+#include "vec3d.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace crt {
+namespace {
+
+Vec3d placed(const Matrix4d& m, const Vec3d& p) {
+    return {m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
+            m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]};
+}
+
+bool mirrors(const Matrix4d& m) {
+    return dot(Vec3d{m[0], m[1], m[2]}, cross(Vec3d{m[4], m[5], m[6]}, Vec3d{m[8], m[9], m[10]})) < 0;
+}
+
+/// A face that emits on one side, that to which its unit normal points.
+struct Face {
+    Vec3d point;
+    Vec3d normal;
+};
+
+/// Emission of a triangle; null when it emits nothing.
+const Emission* emissionOf(const Scene& scene, const Object& object, const Mesh& mesh, std::size_t triangle) {
+    const std::int32_t own = mesh.emission.empty() ? -1 : mesh.emission[triangle];
+    const std::int32_t index = own >= 0 ? own : object.emission;
+    if (index < 0) return nullptr;
+    const Emission& emission = scene.emissions[static_cast<std::size_t>(index)];
+    return emission.radiance.max() > 0 ? &emission : nullptr;
+}
+
+/// Faces of a lamp, wherever it is placed. Nothing when one of them lights both sides, or none emits.
+std::vector<Face> oneSidedFaces(const Scene& scene, const Object& object) {
+    const Mesh& mesh = scene.meshes[object.mesh];
+    std::vector<Face> faces;
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const Emission* emission = emissionOf(scene, object, mesh, t);
+        if (emission == nullptr) continue;
+        if (emission->two_sided) return {};
+        for (const Matrix4d& transform : object.transforms) {
+            std::array<Vec3d, 3> p;
+            for (std::size_t v = 0; v < 3; ++v) p[v] = placed(transform, mesh.positions[mesh.triangles[t][v]]);
+            Vec3d normal = cross(p[1] - p[0], p[2] - p[0]);
+            const double norm = length(normal);
+            if (!(norm > 0)) continue;
+            faces.push_back({p[0], normal * ((mirrors(transform) ? -1 : 1) / norm)});
+        }
+    }
+    return faces;
+}
+
+/// Is anything in front of a face? `budget` counts down the points that may still be looked at.
+class Front {
+public:
+    explicit Front(const Scene& scene) : scene_(scene) {
+        for (const Object& object : scene.objects) {
+            const Mesh& mesh = scene.meshes[object.mesh];
+            for (const Matrix4d& transform : object.transforms) {
+                if (points_ += mesh.positions.size(); points_ > kMostPoints) return;
+                for (const Vec3d& p : mesh.positions)
+                    for (const double x : placed(transform, p)) largest_ = std::max(largest_, std::abs(x));
+            }
+        }
+    }
+
+    bool tooManyPoints() const { return points_ > kMostPoints; }
+    bool gaveUp() const { return looks_ > kMostLooks; }
+
+    bool isEmpty(const Face& face) {
+        constexpr double kRounding = 1e-12;  // Of double, many times over.
+        const double least = kRounding * std::max(largest_, length(face.point));
+        const auto inFront = [&](const Vec3d& p, double reach) { return dot(p - face.point, face.normal) + reach > least; };
+        if (inFront(scene_.camera.position, scene_.camera.aperture_radius)) return false;
+        for (const Object& object : scene_.objects)
+            for (const Matrix4d& transform : object.transforms)
+                for (const Vec3d& p : scene_.meshes[object.mesh].positions) {
+                    if (++looks_ > kMostLooks || inFront(placed(transform, p), 0)) return false;
+                }
+        return true;
+    }
+
+private:
+    static constexpr std::uint64_t kMostPoints = 20'000'000, kMostLooks = 100'000'000;
+    const Scene& scene_;
+    std::uint64_t points_ = 0, looks_ = 0;
+    double largest_ = 0;
+};
+
+std::string nameOf(const Object& object) { return object.name.empty() ? "an object without a name" : fmt::format("'{}'", object.name); }
+
+/// What may be wrong in this scene.
+std::vector<std::string> reasonsForBlack(const Scene& scene) {
+    std::vector<std::string> lamps, one_sided;
+    for (const Object& object : scene.objects) {
+        const Mesh& mesh = scene.meshes[object.mesh];
+        bool emits = false;
+        for (std::size_t t = 0; t < mesh.triangles.size() && !emits; ++t) emits = emissionOf(scene, object, mesh, t) != nullptr;
+        if (!emits) continue;
+        lamps.push_back(nameOf(object));
+        if (!oneSidedFaces(scene, object).empty()) one_sided.push_back(nameOf(object));
+    }
+    const bool sky = scene.environment && scene.environment->radiance.max() > 0;
+    if (lamps.empty() && !sky) return {"the scene has no light"};
+    std::vector<std::string> reasons;
+    if (!one_sided.empty()) {
+        constexpr std::size_t kShown = 3;
+        const std::size_t shown = std::min(one_sided.size(), kShown);
+        reasons.push_back(fmt::format("{}{} may face away: a lamp lights the side from which its vertices run counter-clockwise, with "
+                                      "'two_sided: true' both",
+                                      fmt::join(one_sided.begin(), one_sided.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+                                      shown < one_sided.size() ? fmt::format(" and {} more", one_sided.size() - shown) : ""));
+    }
+    if (scene.integrator.max_depth == 0) reasons.emplace_back("'max_depth: 0' shows lamps and no light on anything");
+    if (!scene.integrator.nee && !sky) reasons.emplace_back("with 'nee: false' few paths meet a small lamp");
+    reasons.emplace_back("the camera may be inside an object, or look past the scene");
+    return reasons;
+}
+
+}  // namespace
+
+std::vector<std::string> idleLamps(const Scene& scene) {
+    std::vector<std::string> idle;
+    if (scene.integrator.type != IntegratorType::Path) return idle;
+    Front front(scene);
+    if (front.tooManyPoints()) return idle;
+    for (const Object& object : scene.objects) {
+        const std::vector<Face> faces = oneSidedFaces(scene, object);
+        if (!faces.empty() && std::all_of(faces.begin(), faces.end(), [&](const Face& face) { return front.isEmpty(face); }))
+            idle.push_back(nameOf(object));
+        if (front.gaveUp()) break;
+    }
+    return idle;
+}
+
+void warnOfIdleLamps(const Scene& scene) {
+    for (const std::string& lamp : idleLamps(scene))
+        logWarning("{} lights nothing: it emits on one side only, and neither a surface nor the camera is on that side; reverse the order "
+                   "of its vertices, or say 'two_sided: true'",
+                   lamp);
+}
+
+bool isBlack(const Film& film) {
+    const std::size_t stride = std::size_t{2} * film.shape().channels;
+    for (std::size_t pixel = 0; pixel < film.sums.size(); pixel += stride)
+        for (std::size_t i = 0; i < 6; ++i)  // X, Y and Z, each hi and lo.
+            if (film.sums[pixel + i] != 0) return false;
+    return true;
+}
+
+void warnOfBlackFilm(const Film& film, const Scene& scene) {
+    if (scene.integrator.type != IntegratorType::Path || film.samples.count() == 0 || !isBlack(film)) return;
+    logWarning("the image is black: no path met a light; {}", fmt::join(reasonsForBlack(scene), "; "));
+}
+
+}  // namespace crt

@@ -1,0 +1,26 @@
+/// Warnings about light that gets nowhere.
+#pragma once
+
+#include "film.h"
+#include "scene.h"
+
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// Names of the objects that emit and light nothing: one-sided, with neither a vertex of the scene nor the lens in
+/// front of any of their emitting faces. Exact but for rounding; empty for a scene in which looking would take more than
+/// about a second.
+std::vector<std::string> idleLamps(const Scene& scene);
+
+/// One warning for each of them.
+void warnOfIdleLamps(const Scene& scene);
+
+/// Has no pixel got any light?
+bool isBlack(const Film& film);
+
+/// Warns when no pixel of the film has got any light, with what may be the reason in this scene.
+void warnOfBlackFilm(const Film& film, const Scene& scene);
+
+}  // namespace crt

@@ -1,0 +1,279 @@
+// What a film knows of its scene (film_record.h), and what becomes of it in files.
+#include "catch.h"
+#include "compile.h"
+#include "film_record.h"
+#include "image_io.h"
+#include "image_metadata.h"
+#include "light_checks.h"
+#include "outputs.h"
+#include "scene_yaml.h"
+
+#include <cmath>
+
+using namespace crt;
+
+namespace {
+
+const std::string kScene = R"(crt: 1
+title: "Röhre"
+camera: {position: [1, 2, -4], target: [0.5, 0, 3], fov: 40}
+film: {resolution: [64, 48], crop: [8, 4, 40, 36], white_balance: glow, exposure_ev: 0.1}
+sampler: {seed: 18446744073709551615}
+spectra: {glow: {blackbody: 4000, scale: 5}}
+materials: {floor: {type: diffuse, reflectance: 0.7}, glass: {type: dielectric, ior: 1.5}}
+objects:
+  - name: floor
+    mesh: {positions: [[-2, 0, -2], [-2, 0, 2], [2, 0, 2], [2, 0, -2]], faces: [[0, 1, 2, 3]]}
+    material: floor
+  - name: lamp
+    mesh: {positions: [[-1, 2, -1], [1, 2, -1], [1, 2, 1], [-1, 2, 1]], faces: [[0, 1, 2, 3]]}
+    material: floor
+    emission: {radiance: glow}
+outputs: [{file: a.exr, aovs: [depth, error]}]
+)";
+
+Scene parsed(const std::vector<SceneOverride>& overrides = {}) {
+    return parseScene(kScene, "scene.yaml", ".", overrides);
+}
+
+/// p · M, divided by its fourth component.
+Vec3d transformed(const Vec3d& p, const RowMatrix4d& m) {
+    std::array<double, 4> r{};
+    for (std::size_t c = 0; c < 4; ++c) r[c] = p[0] * m[c] + p[1] * m[4 + c] + p[2] * m[8 + c] + m[12 + c];
+    return {r[0] / r[3], r[1] / r[3], r[2] / r[3]};
+}
+
+Film oneColor(std::uint32_t width, std::uint32_t height, const Vec3d& xyz, std::uint32_t aovs = 0) {
+    Film film({width, height, channelsFor(aovs), aovs});
+    for (std::size_t p = 0; p < film.counts.size(); ++p) {
+        film.counts[p] = 2;
+        double* sums = &film.sums[p * film.shape().channels * 2];
+        for (std::size_t c = 0; c < 3; ++c) sums[2 * c] = 2 * xyz[c];
+        sums[6] = 2.5 * xyz[1] * xyz[1];  // Y²: one sample of 1.5 times and one of half the mean.
+    }
+    film.samples.add({0, 2});
+    return film;
+}
+
+}  // namespace
+
+TEST_CASE("a record comes back from its text with every bit", "[develop]") {
+    FilmRecord record = recordOf(parsed());
+    record.backend = "embree 1.0";
+    record.device = "a processor";
+    record.date_utc = "2026:11:22 05:40:00";
+    record.complete = false;
+    const FilmRecord back = readRecord(recordText(record));
+    CHECK(back.title == "Röhre");
+    CHECK(back.seed == 18446744073709551615ull);
+    CHECK(back.window == std::array<int, 4>{8, 4, 40, 36});
+    CHECK(back.width == 64);
+    CHECK(back.height == 48);
+    CHECK(back.aovs == (kAovDepth | kAovError));
+    CHECK(back.development == record.development);
+    CHECK(back.development.white);
+    CHECK(back.whites == record.whites);
+    CHECK(back.whites.count("glow") == 1);
+    CHECK(back.world_to_camera == record.world_to_camera);
+    CHECK(back.world_to_ndc == record.world_to_ndc);
+    CHECK(back.traits == record.traits);
+    CHECK(back.backend == record.backend);
+    CHECK(back.device == record.device);
+    CHECK(back.date_utc == record.date_utc);
+    CHECK(back.complete == record.complete);
+    CHECK(back.independent_samples == record.independent_samples);
+    CHECK(readRecord(recordText(recordOf(parsed({{"sampler.type", "independent"}})))).independent_samples);
+    CHECK(recordText(back) == recordText(record));
+}
+
+TEST_CASE("a text that is no record is refused, whatever of it is missing or wrong", "[develop]") {
+    const std::string whole = recordText(recordOf(parsed()));
+    for (const char* key : {"title", "seed", "independent_samples", "resolution", "window", "aovs", "development", "lights_xyz",
+                            "world_to_camera", "world_to_ndc", "traits", "backend", "device", "date_utc", "exposure_ev", "color_space",
+                            "apply_to_float"}) {
+        INFO(key);
+        std::string without = whole;
+        const std::size_t at = without.find("\"" + std::string(key) + "\"");
+        REQUIRE(at != std::string::npos);
+        without[at + 1] = '_';
+        CHECK_THROWS_AS(readRecord(without), Error);
+    }
+    const auto with = [&](const std::string& what, const std::string& instead) {
+        std::string text = whole;
+        REQUIRE(text.find(what) != std::string::npos);
+        return text.replace(text.find(what), what.size(), instead);
+    };
+    CHECK_THROWS_AS(readRecord(with("\"exposure_ev\":0.1", "\"exposure_ev\":1e9")), Error);
+    CHECK_THROWS_AS(readRecord(with("\"color_space\":\"srgb\"", "\"color_space\":\"cmyk\"")), Error);
+    CHECK_THROWS_AS(readRecord(with("\"window\":[8,4,40,36]", "\"window\":[8,4,80,36]")), Error);
+    CHECK_THROWS_AS(readRecord(with("\"window\":[8,4,40,36]", "\"window\":[8,4,8,36]")), Error);
+    CHECK_THROWS_AS(readRecord(""), Error);
+    CHECK_THROWS_AS(readRecord(std::string(100000, '[')), Error);
+}
+
+TEST_CASE("files of floats hold the radiance of the scene, display formats what exposure and white balance make of it",
+          "[develop]") {
+    const Scene scene = parsed();
+    const Vec3d color{0.4, 0.5, 0.2};
+    const Film film = oneColor(32, 32, color);
+    FilmIdentity identity{.scene_hash = "h", .version = "v", .record = recordOf(scene)};
+    const auto image = [&](OutputFormat format) { return developedImage({.file = "a", .format = format, .aovs = kAovError, .place = {}}, film, identity); };
+    const Image plain = resolveImage(film, {}, kAovError);
+    const Image shown = resolveImage(film, developmentOf(scene), kAovError);
+    REQUIRE(plain.pixels != shown.pixels);
+    for (const OutputFormat format : {OutputFormat::Exr, OutputFormat::Pfm}) {
+        const Image floats = image(format);
+        CHECK(floats.pixels == plain.pixels);  // StdError.Y among them.
+        CHECK(metadataValue(floats, kExposureKey) == "0");
+        CHECK(metadataValue(floats, kWhiteBalanceKey) == "none");
+        CHECK(metadataValue(floats, kDisplayExposureKey) == "0.1");
+        CHECK(metadataValue(floats, kDisplayWhiteBalanceKey) == whiteBalanceText(developmentOf(scene)));
+        REQUIRE(floats.adopted_neutral);
+        CHECK((*floats.adopted_neutral)[0] == Approx(0.3804).margin(1e-3));  // A black body of 4000 K.
+    }
+    for (const OutputFormat format : {OutputFormat::Png, OutputFormat::Ppm}) {
+        const Image display = image(format);
+        CHECK(display.pixels == shown.pixels);
+        CHECK(metadataValue(display, kExposureKey) == "0.1");
+        CHECK(metadataValue(display, kDisplayExposureKey).empty());
+    }
+    identity.record->development.apply_to_float = true;
+    for (const OutputFormat format : {OutputFormat::Exr, OutputFormat::Pfm, OutputFormat::Png, OutputFormat::Ppm}) {
+        const Image all = image(format);
+        CHECK(all.pixels == shown.pixels);
+        CHECK(metadataValue(all, kExposureKey) == "0.1");
+        CHECK_FALSE(all.adopted_neutral);
+    }
+}
+
+TEST_CASE("a part of a film is the film of that part", "[develop]") {
+    const std::uint32_t aovs = kAovDepth | kAovPrimitive;
+    Film film({5, 4, channelsFor(aovs), aovs});
+    for (std::size_t i = 0; i < film.sums.size(); ++i) film.sums[i] = static_cast<double>(i);
+    for (std::size_t p = 0; p < 20; ++p) film.counts[p] = 100 + p, film.primitives[p] = static_cast<std::uint32_t>(p);
+    film.samples.add({3, 9});
+    const Film part = cropped(film, {1, 2, 4, 4});
+    CHECK(part.shape() == FilmShape{3, 2, channelsFor(aovs), aovs});
+    CHECK(part.samples.text() == "3-9");
+    for (std::uint32_t y = 0; y < 2; ++y)
+        for (std::uint32_t x = 0; x < 3; ++x) {
+            for (std::uint32_t c = 0; c < film.shape().channels; ++c) CHECK(part.sum(x, y, c) == film.sum(x + 1, y + 2, c));
+            CHECK(part.counts[y * 3 + x] == film.counts[(y + 2) * 5 + x + 1]);
+            CHECK(part.primitives[y * 3 + x] == film.primitives[(y + 2) * 5 + x + 1]);
+        }
+    CHECK_THROWS_AS(cropped(film, {1, 2, 6, 4}), Error);
+    CHECK_THROWS_AS(cropped(film, {1, 2, 1, 4}), Error);
+}
+
+TEST_CASE("the matrices of the camera put points where its pixels see them", "[develop]") {
+    const Scene scene = parsed();
+    const FilmRecord record = recordOf(scene);
+    const Camera& camera = scene.camera;
+    const Vec3d d{camera.target[0] - camera.position[0], camera.target[1] - camera.position[1], camera.target[2] - camera.position[2]};
+    const double distance = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    const auto near = [](const Vec3d& a, const Vec3d& b) {
+        for (std::size_t k = 0; k < 3; ++k)
+            if (std::abs(a[k] - b[k]) > 1e-12 * 10) return false;
+        return true;
+    };
+    CHECK(near(transformed(camera.position, record.world_to_camera), {0, 0, 0}));
+    CHECK(near(transformed(camera.target, record.world_to_camera), {0, 0, -distance}));
+    const Vec3d centre = transformed(camera.target, record.world_to_ndc);
+    CHECK(centre[0] == Approx(0.5));
+    CHECK(centre[1] == Approx(0.5));
+
+    // The ray of a film position is what compile.cpp makes of it: corner + x · step_x + y · step_y.
+    const CompiledScene compiled = compileScene(scene, 0);
+    const kernel::CrtCamera& rays = reinterpret_cast<const kernel::CrtScene*>(compiled.data())->camera;
+    for (const auto& [x, y] : {std::pair{0.0, 0.0}, {64.0, 0.0}, {0.0, 48.0}, {20.5, 40.25}}) {
+        Vec3d p{};
+        for (std::size_t k = 0; k < 3; ++k)
+            p[k] = camera.position[k] + 7 * (rays.corner[k] + x * rays.step_x[k] + y * rays.step_y[k]);
+        const Vec3d ndc = transformed(p, record.world_to_ndc);
+        CHECK(ndc[0] == Approx(x / 64).margin(1e-6));
+        CHECK(ndc[1] == Approx(y / 48).margin(1e-6));
+        const Vec3d seen = transformed(p, record.world_to_camera);
+        CHECK(seen[2] == Approx(-7).epsilon(1e-6));
+        CHECK(seen[0] == Approx((2 * x / 64 - 1) * 7 * camera.tan_half_width).margin(1e-5));
+        CHECK(seen[1] == Approx((1 - 2 * y / 48) * 7 * camera.tan_half_height).margin(1e-5));
+    }
+}
+
+TEST_CASE("whatever makes a film another one is said in words", "[develop]") {
+    const Scene scene = parsed();
+    const std::string hash = compileScene(scene, requestedAovs(scene)).hash;
+    const FilmRecord record = recordOf(scene);
+    const std::vector<std::pair<SceneOverride, std::string>> changes{
+        {{"film.resolution", "[128, 96]"}, "the resolution is 64 × 48, not 128 × 96"},
+        {{"film.crop", "null"}, "the crop window is [8, 4, 40, 36], not the whole film"},
+        {{"film.filter", "gaussian"}, "the filter is box of radius 0.5, not gaussian"},
+        {{"sampler.seed", "3"}, "the seed is 18446744073709551615, not 3"},
+        {{"sampler.type", "independent"}, "the sampler is sobol, not independent"},
+        {{"sampler.replicates", "8"}, "the replicates are 2, not 8"},
+        {{"integrator.type", "normals"}, "the integrator is path, not normals"},
+        {{"integrator.max_depth", "3"}, "max_depth is 16, not 3"},
+        {{"integrator.roulette", "false"}, "roulette is on from depth 4, not off"},
+        {{"integrator.roulette_depth", "7"}, "roulette is on from depth 4, not on from depth 7"},
+        {{"integrator.nee", "false"}, "nee is on, not off"},
+        {{"integrator.mis", "false"}, "mis is on, not off"},
+        {{"camera.fov", "41"}, "the camera is at"},
+        {{"camera.position", "[1, 2, -4.0000001]"}, "not at (1, 2, -4.0000001)"},
+        {{"camera.aperture_radius", "0.1"}, "lens of radius 0.1"},
+        {{"objects.0.mesh.positions.0.0", "-2.5"}, "the geometry is another (4 triangles in 2 objects in both)"},
+        {{"objects.0.transform", "[{translate: [0, 0.5, 0]}]"}, "the geometry is another"},
+        {{"objects.0.material", "glass"}, "the geometry is another"},
+        {{"materials.floor.reflectance", "0.6"}, "the materials are others (2 materials in both)"},
+        {{"spectra.glow.scale", "6"}, "the light is another"},
+        {{"objects.1.emission.two_sided", "true"}, "the light is another"},
+        {{"environment", "{radiance: 1}"}, "the light is 1 kind of lamp, no environment, not 1 kind of lamp, an environment"},
+        {{"outputs.0.aovs", "[normal]"}, "the AOVs of first hits are depth, not normal"},
+    };
+    for (const auto& [change, words] : changes) {
+        INFO(change.path << " = " << change.value);
+        const Scene other = parsed({change});
+        CHECK(compileScene(other, requestedAovs(other)).hash != hash);
+        const std::vector<std::string> differences = differingTraits(record, recordOf(other));
+        std::string all;
+        for (const std::string& difference : differences) all += difference + "; ";
+        CHECK_THAT(all, Contains(words));
+    }
+    // What no sample depends on is no difference.
+    for (const SceneOverride& change : {SceneOverride{"film.exposure_ev", "2"}, {"film.color_space", "xyz"}, {"title", "other"}, {"sampler.samples", "7"}}) {
+        const Scene other = parsed({change});
+        CHECK(compileScene(other, requestedAovs(other)).hash == hash);
+        CHECK(differingTraits(record, recordOf(other)).empty());
+    }
+}
+
+TEST_CASE("a lamp with nothing in front of it is named, and no other", "[develop]") {
+    const auto named = [](const std::vector<SceneOverride>& changes) { return idleLamps(parsed(changes)); };
+    const std::vector<std::string> lamp{"'lamp'"};
+    const SceneOverride away{"objects.1.mesh.faces", "[[3, 2, 1, 0]]"};
+    CHECK(named({}).empty());
+    // The camera at height 2 is in the plane of the lamp, and not in front of it.
+    CHECK(named({away}) == lamp);
+    CHECK(named({away, {"camera.position", "[1, 2.5, -4]"}}).empty());
+    CHECK(named({away, {"camera.aperture_radius", "0.1"}}).empty());
+    CHECK(named({away, {"objects.1.emission.two_sided", "true"}}).empty());
+    CHECK(named({away, {"integrator.type", "normals"}}).empty());
+    CHECK(named({away, {"objects.0.transform", "[{translate: [0, 2, 0]}]"}}) == lamp);   // In its plane.
+    CHECK(named({away, {"objects.0.transform", "[{translate: [0, 2.001, 0]}]"}}).empty());
+    CHECK(named({away, {"objects.0.transform", "[{rotate: {axis: [1, 0, 0], angle_deg: 80}}]"}}) == lamp);
+    CHECK(named({away, {"objects.0.transform", "[{rotate: {axis: [1, 0, 0], angle_deg: 80}}, {scale: [1, 2, 1]}]"}}).empty());
+    // A mirroring transform keeps the outside outside.
+    CHECK(named({{"objects.1.transform", "[{scale: [-1, 1, 1]}]"}}).empty());
+    CHECK(named({away, {"objects.1.transform", "[{scale: [-1, 1, 1]}]"}}) == lamp);
+    CHECK(named({{"objects.1.transform", "[{scale: [1, -1, 1]}]"}}).empty());  // At −2, it lights upwards.
+    // Tilted, at rounding's mercy: its own corners are not in front of it.
+    for (int degrees = 1; degrees < 30; degrees += 3)
+        CHECK(named({away, {"objects.1.transform", "[{rotate: {axis: [1, 0, 0.3], angle_deg: " + std::to_string(degrees) + "}}, {translate: [0, 9, 0]}]"}}) == lamp);
+}
+
+TEST_CASE("a film is black when no pixel has any of X, Y and Z", "[develop]") {
+    for (std::size_t c = 0; c < 3; ++c) {
+        Film film = oneColor(7, 5, {0, 0, 0});
+        CHECK(isBlack(film));
+        film.sums[(34 * film.shape().channels + c) * 2] = 1e-300;
+        CHECK_FALSE(isBlack(film));
+    }
+}
