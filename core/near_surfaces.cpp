@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 namespace crt {
@@ -20,12 +21,42 @@ kernel::CrtContext contextOf(const CompiledScene& scene) {
     return context;
 }
 
-/// As many rays as take some hundredths of a second: from every triangle in small scenes, from an even choice in large ones.
+/// Triangles that are asked at most, in large scenes an even choice of them.
 constexpr std::uint64_t kTriangles = 10000;
+constexpr std::uint64_t kEmitters = 100000;
+
+/// Tests of a triangle against another, some hundredths of a second of them. Where thousands lie on one spot each is a neighbour of each: then fewer
+/// triangles are asked, and the time stays what it is.
 constexpr std::uint64_t kTriangleTests = 4000000;
 
-/// Emitters that are asked about coplanar surfaces, and pairs where there is no tree to find neighbours by.
-constexpr std::uint64_t kEmitters = 100000;
+/// All of [0, count) in an order whose every beginning is spread evenly: multiples of the golden section, modulo count.
+class EvenOrder {
+public:
+    explicit EvenOrder(std::uint64_t count) : count_(count), step_(static_cast<std::uint64_t>(static_cast<double>(count) * 0.6180339887498949)) {
+        while (count_ > 1 && std::gcd(step_, count_) != 1) ++step_;
+    }
+    std::uint64_t operator[](std::uint64_t i) const { return static_cast<std::uint64_t>(static_cast<unsigned __int128>(i) * step_ % count_); }
+
+private:
+    std::uint64_t count_, step_;
+};
+
+/// An axis-aligned box.
+struct Box {
+    Vec3d lower, upper;
+
+    void add(const Vec3d& p, double padding) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            lower[k] = std::min(lower[k], p[k] - padding);
+            upper[k] = std::max(upper[k], p[k] + padding);
+        }
+    }
+};
+Box boxAround(const Vec3d& p, double padding) {
+    Box box{p, p};
+    box.add(p, padding);
+    return box;
+}
 
 /// A triangle of the compiled scene, in double.
 struct Corners {
@@ -77,22 +108,18 @@ bool overlap(const Corners& a, const Corners& b) {
     return dot(a.normal, a.normal) > 0 && dot(b.normal, b.normal) > 0 && !apart(a, b) && !apart(b, a);
 }
 
-/// Slots whose bounding boxes come within `padding` of that of `box`, until `visit` returns true.
+/// Slots whose bounding boxes meet `box`, until `visit` returns true or no test is left in `tests`.
 template <class Visit>
-bool anyNeighbour(const kernel::CrtContext& context, const Corners& box, double padding, const Visit& visit) {
+void visitNeighbours(const kernel::CrtContext& context, const Box& box, std::uint64_t& tests, const Visit& visit) {
     using namespace kernel;
     const CrtScene& scene = *context.scene;
+    // A false answer goes on; so do the tests, while there are any.
+    const auto stops = [&](std::uint32_t slot) { return tests == 0 || (--tests, visit(slot)); };
     if (scene.accelerator != CRT_ACCELERATOR_BVH) {
         for (std::uint32_t slot = 0; slot < scene.triangle_count; ++slot)
-            if (visit(slot)) return true;
-        return false;
+            if (stops(slot)) return;
+        return;
     }
-    Vec3d lower = box.p[0], upper = box.p[0];
-    for (const Vec3d& corner : box.p)
-        for (std::size_t k = 0; k < 3; ++k) {
-            lower[k] = std::min(lower[k], corner[k] - padding);
-            upper[k] = std::max(upper[k], corner[k] + padding);
-        }
     const auto* nodes = CRT_ARRAY(CrtNode4, context.blob, scene.nodes);
     std::vector<std::uint32_t> open{0};
     while (!open.empty()) {
@@ -101,15 +128,37 @@ bool anyNeighbour(const kernel::CrtContext& context, const Corners& box, double 
         for (std::size_t child = 0; child < 4; ++child) {
             bool meets = true;
             for (std::size_t k = 0; k < 3; ++k)
-                meets = meets && static_cast<double>(node.bounds[2 * k][child]) <= upper[k] && static_cast<double>(node.bounds[2 * k + 1][child]) >= lower[k];
+                meets = meets && static_cast<double>(node.bounds[2 * k][child]) <= box.upper[k] &&
+                        static_cast<double>(node.bounds[2 * k + 1][child]) >= box.lower[k];
             if (!meets) continue;
             const std::uint32_t index = node.child[child] >> 4, count = node.child[child] & 15u;
             if (count == 0) open.push_back(index);
             for (std::uint32_t slot = index; slot < index + count; ++slot)
-                if (visit(slot)) return true;
+                if (stops(slot)) return;
         }
     }
-    return false;
+}
+
+/// The closest triangle that a ray meets within its reach, which is short.
+kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::CrtRay& ray, std::uint64_t& tests) {
+    using namespace kernel;
+    const Vec3d o{ray.o.x, ray.o.y, ray.o.z}, d{ray.d.x, ray.d.y, ray.d.z};
+    const auto point = [&](double t) {
+        Vec3d p;
+        for (std::size_t k = 0; k < 3; ++k) p[k] = o[k] + t * d[k];
+        return p;
+    };
+    const auto reach = static_cast<double>(ray.reach);
+    Box box = boxAround(point(0), reach * 1e-3);
+    box.add(point(reach), reach * 1e-3);
+    const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
+    const CrtShear shear = crt_shear(ray);
+    CrtHit best = crt_no_hit(ray.reach);
+    visitNeighbours(context, box, tests, [&](std::uint32_t slot) {
+        crt_test_closest(triangles, slot, shear, &best);
+        return false;
+    });
+    return best;
 }
 
 }  // namespace
@@ -119,16 +168,19 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     const CrtContext context = contextOf(scene);
     const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
     const auto* primitives = CRT_ARRAY(CrtPrimitive, context.blob, context.scene->primitives);
-    const bool tree = context.scene->accelerator == CRT_ACCELERATOR_BVH;
     const std::uint64_t count = context.scene->triangle_count;
-    const std::uint64_t wanted = tree ? kEmitters : kTriangleTests / std::max<std::uint64_t>(count, 1);
-    const std::uint64_t step = std::max<std::uint64_t>(1, scene.emitters / std::max<std::uint64_t>(wanted, 1));
+    const std::uint64_t step = std::max<std::uint64_t>(1, scene.emitters / kEmitters);
+    std::uint64_t tests = kTriangleTests;
     std::optional<CoplanarLight> found;
-    for (std::uint32_t slot = 0; slot < count && !found; ++slot) {
+    const EvenOrder order(count);
+    for (std::uint64_t i = 0; i < count && !found && tests > 0; ++i) {
+        const auto slot = static_cast<std::uint32_t>(order[i]);
         const CrtPrimitive& light = primitives[triangles[slot].id];
         if (light.emitter == CRT_NONE || light.emitter % step != 0) continue;
         const Corners own = cornersOf(context, slot);
-        anyNeighbour(context, own, 2 * own.clearance, [&](std::uint32_t other) {
+        Box box = boxAround(own.p[0], 2 * own.clearance);
+        for (const Vec3d& corner : own.p) box.add(corner, 2 * own.clearance);
+        visitNeighbours(context, box, tests, [&](std::uint32_t other) {
             // Of one lamp's halves, and of two lamps that shine alike, it does not matter which is seen.
             const CrtPrimitive& surface = primitives[triangles[other].id];
             if (other == slot || surface.emitter == light.emitter) return false;
@@ -152,10 +204,10 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
     for (u32 slot = 0; slot < count; ++slot) largest = std::max(largest, faces[slot].clearance);
 
     NearSurfaces found;
-    const bool tree = context.scene->accelerator == CRT_ACCELERATOR_BVH;
-    const std::uint64_t wanted = std::min(kTriangles, tree ? kTriangles : kTriangleTests / std::max(count, 1u));
-    const u32 step = static_cast<u32>(std::max<std::uint64_t>(1, count / std::max<std::uint64_t>(wanted, 1)));
-    for (u32 slot = 0; slot < count; slot += step) {
+    const EvenOrder order(count);
+    std::uint64_t tests = kTriangleTests;
+    for (std::uint64_t i = 0; i < std::min<std::uint64_t>(count, kTriangles) && tests > 0; ++i) {
+        const auto slot = static_cast<u32>(order[i]);
         const vec3 normal = crt_load3(faces[slot].normal);
         if (dot3(normal, normal) == 0.0f) continue;  // no area
         ++found.asked;
@@ -169,7 +221,7 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
             CrtRay beyond = ray;
             beyond.o = ray.o + ray.d * touching;
             beyond.reach = largest;
-            const CrtHit hit = crt_software_closest(&context, beyond);
+            const CrtHit hit = closestWithin(context, beyond, tests);
             if (hit.slot == CRT_NONE || hit.slot == slot) continue;
             const float clearance = std::max(faces[slot].clearance, faces[hit.slot].clearance);
             if (hit.t + touching > clearance) continue;

@@ -20,11 +20,12 @@ struct CoplanarLight {
     double least_gap = 0;                  ///< So far apart, in the author's units, they would be told apart.
 };
 
-/// The first such pair, by the order of emitters; nothing where there is none. Of very many emitters an even choice is looked at.
+/// One such pair; nothing where there is none. Of very many emitters, or of many on one spot, an even choice is looked at: the time is
+/// bounded, whatever the scene.
 std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene);
 
 /// From the middle of each triangle along its normal, to both sides. Surfaces within a few ulp of each other touch, as a box does that stands
-/// on a floor; that is what an author means, and is safe.
+/// on a floor; that is what an author means, and is safe. The time is bounded as above; `asked` says how many it was enough for.
 NearSurfaces findNearSurfaces(const CompiledScene& scene);
 
 }  // namespace crt
