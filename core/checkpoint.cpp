@@ -1,6 +1,7 @@
 #include "checkpoint.h"
 
 #include "atomic_file.h"
+#include "input_file.h"
 #include "log.h"
 
 #include <fmt/format.h>
@@ -15,10 +16,11 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <memory>
+#include <new>
 #include <set>
 #include <string_view>
+#include <sys/stat.h>
 
 namespace crt {
 namespace {
@@ -96,6 +98,16 @@ struct CloseFile {
     void operator()(std::FILE* file) const { std::fclose(file); }
 };
 
+std::unique_ptr<std::FILE, CloseFile> openFilm(const std::string& path) {
+    try {
+        std::FILE* const file = ::fdopen(openInput(path), "rb");
+        if (file == nullptr) throw std::bad_alloc();
+        return std::unique_ptr<std::FILE, CloseFile>(file);
+    } catch (const InputRefused& refused) {
+        refuse(path, refused.what());
+    }
+}
+
 void readExactly(std::FILE* file, const std::string& path, void* bytes, std::size_t size) {
     if (size == 0 || std::fread(bytes, 1, size, file) == size) return;
     if (std::ferror(file)) refuse(path, fmt::format("cannot be read: {}", std::strerror(errno)));
@@ -164,11 +176,10 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
 }
 
 std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
-    const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rbe"));
-    if (!file) refuse(path, fmt::format("cannot be opened: {}", std::strerror(errno)));
-    std::error_code size_error;
-    const std::uint64_t actual_bytes = std::filesystem::file_size(path, size_error);
-    if (size_error) refuse(path, fmt::format("cannot be read: {}", size_error.message()));
+    const std::unique_ptr<std::FILE, CloseFile> file = openFilm(path);
+    struct stat status {};
+    if (::fstat(::fileno(file.get()), &status) != 0) refuse(path, fmt::format("cannot be read: {}", std::strerror(errno)));
+    const auto actual_bytes = static_cast<std::uint64_t>(status.st_size);
     if (actual_bytes == 0) refuse(path, "is empty, not a crt film");
 
     Header header{};

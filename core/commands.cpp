@@ -7,8 +7,10 @@
 #include "image_io.h"
 #include "kernel/features.h"
 #include "log.h"
+#include "output_guard.h"
 #include "outputs.h"
 #include "progress.h"
+#include "standard_output.h"
 
 #include <fmt/format.h>
 
@@ -27,7 +29,7 @@ void row(const char* name, const std::string& value) {
         indented += c;
         if (c == '\n') indented.append(kColumn + 2, ' ');
     }
-    fmt::print("  {:<{}} {}\n", name, kColumn - 1, indented);
+    printOut("  {:<{}} {}\n", name, kColumn - 1, indented);
 }
 
 std::string counted(std::uint64_t n, const char* one, const char* many) { return fmt::format("{} {}", n, n == 1 ? one : many); }
@@ -100,7 +102,7 @@ std::string acceleratorText(const CompiledScene& compiled) {
 void showScene(const SceneRequest& what) {
     const Scene scene = loadScene(what);
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
-    fmt::print("{}{}\n", what.file, scene.title.empty() ? "" : ": " + scene.title);
+    printOut("{}{}\n", what.file, scene.title.empty() ? "" : ": " + scene.title);
     row("film", filmText(scene));
     row("camera", cameraText(scene.camera));
     row("geometry", counted(compiled.objects, "object", "objects") + ", " + counted(compiled.triangles, "triangle", "triangles"));
@@ -129,7 +131,7 @@ std::string aovText(std::uint32_t aovs) {
 void showFilm(const std::string& file) {
     const auto [film, identity] = readCheckpoint(file);
     const std::optional<ErrorEstimate> error = estimateError(film);
-    fmt::print("{}: partial render\n", file);
+    printOut("{}: partial render\n", file);
     row("film", fmt::format("{} x {} pixels", film.shape().width, film.shape().height));
     row("aovs", aovText(film.shape().aovs));
     row("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
@@ -141,7 +143,7 @@ void showFilm(const std::string& file) {
 
 void showImage(const std::string& file) {
     const Image image = readImage(file);
-    fmt::print("{}: image\n", file);
+    printOut("{}: image\n", file);
     row("size", fmt::format("{} x {} pixels", image.width, image.height));
     row("channels", fmt::format("{}", fmt::join(image.channels, ", ")));
     if (!image.integer_channels.empty()) row("integers", fmt::format("{}", fmt::join(image.integer_channels, ", ")));
@@ -169,10 +171,17 @@ int mergeFilms(const MergeArguments& arguments) {
     if (!plan.images.empty() && arguments.scene.file.empty())
         throw Error(ErrorKind::Usage, fmt::format("'{}' needs --scene: colour space and exposure are in the scene, not in its films",
                                                   plan.images.front().file));
+    std::vector<std::string> inputs = arguments.parts, images;
+    inputs.insert(inputs.end(), scene.files_read.begin(), scene.files_read.end());
+    for (const Output& image : plan.images) images.push_back(image.file);
+    refuseOverInputs(inputs, images, plan.films);
+    FilmGuard films;
+    for (const std::string& film : plan.films) films.look(film, true, arguments.overwrite);
     for (const Output& image : plan.images) checkWritable(image.file);
     for (const std::string& film : plan.films) checkWritable(film);
 
     const auto [film, identity] = mergeCheckpoints(arguments.parts);
+    films.requireRoom(film.samples.count());
     if (!arguments.scene.file.empty())
         requireSameScene(arguments.parts.front(), identity, {compileScene(scene, requestedAovs(scene)).hash, CRT_VERSION});
 
@@ -189,7 +198,7 @@ int mergeFilms(const MergeArguments& arguments) {
 
 int listPlugins() {
     for (const BackendStatus& status : listBackends()) {
-        fmt::print("{}{}\n", status.name, status.version.empty() ? "" : " " + status.version);
+        printOut("{}{}\n", status.name, status.version.empty() ? "" : " " + status.version);
         if (!status.path.empty()) row("file", status.path);
         if (!status.build.empty()) row("built with", status.build);
         for (const CrtDevice& device : status.devices) {
@@ -198,14 +207,14 @@ int listPlugins() {
             if (*device.driver != '\0') text += fmt::format(", {}", device.driver);
             row("device", text);
         }
-        if (!status.reason.empty()) row("cannot run", status.reason);
+        if (!status.reason.empty()) row(status.refused ? "refused" : "cannot run", status.reason);
     }
     return 0;
 }
 
 int printSchema(bool markdown) {
     const std::string text = markdown ? sceneReferenceMarkdown() : sceneJsonSchema();
-    fmt::print("{}{}", text, !text.empty() && text.back() == '\n' ? "" : "\n");
+    printOut("{}{}", text, !text.empty() && text.back() == '\n' ? "" : "\n");
     return 0;
 }
 

@@ -31,6 +31,7 @@ int compare(const CompareArguments& arguments);
 struct MergeArguments {
     std::vector<std::string> parts;
     std::vector<std::string> outputs;
+    bool overwrite = false;  ///< Also over a film of more samples.
     SceneRequest scene;  ///< As rendered; an empty name means none, and then there are no images.
 };
 int mergeFilms(const MergeArguments& arguments);

@@ -6,6 +6,7 @@
 #include "compile.h"
 #include "interrupt.h"
 #include "log.h"
+#include "output_guard.h"
 #include "outputs.h"
 #include "report.h"
 #include "sampling.h"
@@ -33,9 +34,17 @@ struct Files {
     OutputPlan outputs;
     std::string checkpoint;          ///< Where a checkpoint goes if one is written.
     bool checkpoint_wanted = false;  ///< Also when nothing stops the render short.
+    std::string saved;               ///< Where it was written in the end.
     std::string resume;              ///< Empty: start from nothing.
     std::string report;              ///< Empty: none.
+    FilmGuard films;                 ///< What lies where films will be written.
 };
+
+std::vector<std::string> imageNames(const OutputPlan& plan) {
+    std::vector<std::string> names;
+    for (const Output& image : plan.images) names.push_back(image.file);
+    return names;
+}
 
 /// Names them, and finds out now what cannot be written: nobody should learn after an hour that a directory is missing.
 Files planFiles(const Job& job, const Scene& scene) {
@@ -57,6 +66,15 @@ Files planFiles(const Job& job, const Scene& scene) {
         }
     }
     files.report = job.report_file ? *job.report_file : besideOutput(files.outputs.first, ".report.json");
+
+    std::vector<std::string> written = imageNames(files.outputs), films = files.outputs.films;
+    if (!files.report.empty()) written.push_back(files.report);
+    films.push_back(files.checkpoint);
+    refuseOverInputs(scene.files_read, written, films);
+    for (const std::string& film : films) {
+        const bool wanted = film != files.checkpoint || files.checkpoint_wanted;
+        if (files.resume.empty() || film != files.resume) files.films.look(film, wanted, job.overwrite);
+    }
 
     for (const Output& image : files.outputs.images) checkWritable(image.file);
     for (const std::string& film : files.outputs.films) checkWritable(film);
@@ -189,8 +207,16 @@ private:
     std::optional<Error> first_;
 };
 
+/// Where it was written: a larger film that lies there stays.
+std::string writeFilm(FilmGuard& films, const std::string& name, const Film& film, const FilmIdentity& identity) {
+    const std::string place = films.placeFor(name, film.samples.count());
+    writeCheckpoint(place, film, identity);
+    if (place == name) films.written(name);
+    return place;
+}
+
 /// Film → images and checkpoints; their names go to facts.outputs.
-void writeFiles(const Files& files, const Scene& scene, const Film& film, const FilmIdentity& identity, RunFacts& facts,
+void writeFiles(Files& files, const Scene& scene, const Film& film, const FilmIdentity& identity, RunFacts& facts,
                 FirstFailure& failure) {
     const Stopwatch writing;
     // With nothing but a time to go by, the end of the time is the end of the work.
@@ -209,13 +235,14 @@ void writeFiles(const Files& files, const Scene& scene, const Film& film, const 
     std::set<std::string> films(files.outputs.films.begin(), files.outputs.films.end());
     const bool stopped_short = facts.stop == StopReason::Interrupted || facts.stop == StopReason::Failed;
     if (files.checkpoint_wanted || stopped_short) films.insert(files.checkpoint);
-    const auto writeFilm = [&](const std::string& name) {
+    const auto attemptFilm = [&](const std::string& name) {
         failure.attempt([&] {
-            writeCheckpoint(name, film, identity);
-            facts.outputs.push_back(name);
+            const std::string place = writeFilm(files.films, name, film, identity);
+            facts.outputs.push_back(place);
+            if (name == files.checkpoint) files.saved = place;
         });
     };
-    for (const std::string& name : films) writeFilm(name);  // First: everything else can be made from a film.
+    for (const std::string& name : films) attemptFilm(name);  // First: everything else can be made from a film.
     for (const Output& output : files.outputs.images)
         failure.attempt([&] {
             writeOutput(output, film, scene, metadata);
@@ -223,7 +250,7 @@ void writeFiles(const Files& files, const Scene& scene, const Film& film, const 
         });
     // Hours of work must not be lost because one image could not be written.
     const bool image_failed = failure.get() && failure.get()->kind() == ErrorKind::Output;
-    if (image_failed && films.count(files.checkpoint) == 0) writeFilm(files.checkpoint);
+    if (image_failed && films.count(files.checkpoint) == 0) attemptFilm(files.checkpoint);
     facts.write_seconds = writing.seconds();
 }
 
@@ -285,7 +312,7 @@ int runJob(const Job& job) {
     // What is to be seen, and where it is to be written.
     Scene scene = loadScene(job.scene);
     if (job.target_error > 0) requireReplicates(scene);
-    const Files files = planFiles(job, scene);
+    Files files = planFiles(job, scene);
 
     // What it takes to see it: one flat blob, and the mask of what it needs.
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
@@ -297,12 +324,13 @@ int runJob(const Job& job) {
     facts.resumed_samples = film.samples.count();
     const SamplingPlan plan = planSamples(job, scene, film, files);
     facts.target_samples = plan.target;
+    if (plan.target > 0) files.films.requireRoom(plan.target);
 
     // From here on there is something to lose, so a signal no longer just ends the process.
     const InterruptGuard interrupt;
     const auto saveCheckpoint = [&] {
         try {
-            writeCheckpoint(files.checkpoint, film, identity);
+            writeFilm(files.films, files.checkpoint, film, identity);
         } catch (const Error& error) {
             logWarning("{}; rendering goes on, and so do the attempts", error.what());
         }
@@ -336,7 +364,7 @@ int runJob(const Job& job) {
     if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
     if (failure.get()) throw *failure.get();
     if (facts.stop == StopReason::Interrupted)
-        logInfo("stopped by {}; the same command with --resume {} goes on from here", signalName(facts.signal), files.checkpoint);
+        logInfo("stopped by {}; the same command with --resume {} goes on from here", signalName(facts.signal), files.saved);
     return facts.exit_code;
 }
 

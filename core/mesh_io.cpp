@@ -1,6 +1,7 @@
 #include "mesh_io.h"
 
 #include "error.h"
+#include "input_file.h"
 #include "log.h"
 #include "triangulate.h"
 #include "vec3d.h"
@@ -16,7 +17,6 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -34,15 +34,12 @@ constexpr std::string_view kBlank = " \t\v\f";
     throw Error(ErrorKind::Scene, sentence, {file, line});
 }
 
-std::string readText(const std::string& path, const char* kind, const SourcePlace& named_at) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored))
-        throw Error(ErrorKind::Scene, fmt::format("{} '{}' is a directory", kind, path), named_at);
-    std::ifstream in(path, std::ios::binary);
-    if (!in) throw Error(ErrorKind::Scene, fmt::format("cannot open {} '{}'", kind, path), named_at);
-    std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-    if (in.bad()) throw Error(ErrorKind::Scene, fmt::format("cannot read {} '{}'", kind, path), named_at);
-    return text;
+std::string readText(const std::string& path, const char* kind, std::uint64_t most_bytes, const SourcePlace& named_at) {
+    try {
+        return readInput(path, most_bytes);
+    } catch (const InputRefused& refused) {
+        throw Error(ErrorKind::Scene, fmt::format("{} '{}' {}", kind, path, refused.what()), named_at);
+    }
 }
 
 /// Takes the next field off the front of `line`; empty at its end.
@@ -167,7 +164,7 @@ private:
     void read(std::string_view name, std::vector<tinyobj::material_t>& materials, std::map<std::string, int>& by_name) {
         const std::string path = besideObj(name);
         if (std::find(obj_.files.begin(), obj_.files.end(), path) != obj_.files.end()) return;
-        const std::string text = readText(path, "material file", {obj_path_, obj_lines_.lineNumber()});
+        const std::string text = readText(path, "material file", kMostMaterialBytes, {obj_path_, obj_lines_.lineNumber()});
         obj_.files.push_back(path);
 
         LineSource lines(text);
@@ -341,7 +338,7 @@ bool isDegenerate(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
 }  // namespace
 
 LoadedMesh loadObj(const std::string& path, bool use_mtl) {
-    const std::string text = readText(path, "mesh", {path});
+    const std::string text = readText(path, "mesh", kMostMeshBytes, {path});
     ObjContents obj = ObjReader(path, text, use_mtl).read();
     if (obj.faces.empty()) fail("this mesh has no faces", path);
     checkIndices(obj, path);

@@ -185,7 +185,7 @@ TEST_CASE("triangles without area are dropped and counted", "[mesh_io]") {
 
 // Found by fuzzing: asking whether a file of such a name exists is an error of its own, which came out as std::filesystem::filesystem_error.
 TEST_CASE("an mtllib whose name no file can have is refused with its line", "[mesh_io]") {
-    CHECK_THROWS_WITH(loadText("v 0 0 0\nmtllib " + std::string(300, 'a') + "\n"), Contains("cannot open material file"));
+    CHECK_THROWS_WITH(loadText("v 0 0 0\nmtllib " + std::string(300, 'a') + "\n"), Contains("material file") && Contains("cannot be opened"));
 }
 
 // Found by fuzzing: tinyobjloader reads the first material of an mtllib that brought none.
@@ -226,7 +226,7 @@ TEST_CASE("bad meshes are refused with their line", "[mesh_io]") {
 
     const TemporaryFolder folder;
     CHECK_THROWS_WITH(loadObj(folder.path(), true), Contains("directory"));
-    CHECK_THROWS_WITH(loadObj(folder.path() + "/none.obj", true), Contains("cannot open"));
+    CHECK_THROWS_WITH(loadObj(folder.path() + "/none.obj", true), Contains("cannot be opened"));
 }
 
 TEST_CASE("material files are found, shared and may be ignored", "[mesh_io]") {
