@@ -212,7 +212,8 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     const auto make_film = [&] {
         try {
             return Film({header.width, header.height, header.channels, header.aovs});
-        } catch (const Error&) {
+        } catch (const Error& error) {
+            if (error.kind() != ErrorKind::Internal) throw;  // Too large for this machine is not damaged.
             refuse(path, kBadChecksum);
         }
     };

@@ -14,6 +14,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <utility>
@@ -80,9 +81,11 @@ std::string filmText(const Scene& scene) {
 }
 
 std::string materialsText(const Scene& scene) {
+    constexpr std::size_t kShown = 100;
     std::string text;
-    for (const Material& material : scene.materials)
-        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", material.name, name(material.type));
+    for (std::size_t i = 0; i < std::min(kShown, scene.materials.size()); ++i)
+        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", scene.materials[i].name, name(scene.materials[i].type));
+    if (scene.materials.size() > kShown) text += fmt::format(" and {} more", scene.materials.size() - kShown);
     return text.empty() ? "none" : text;
 }
 

@@ -2,7 +2,10 @@
 
 #include "error.h"
 #include "log.h"
+#include "scene_limits.h"
 #include "vec3d.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -53,7 +56,6 @@ void place(const Object& object, const Mesh& mesh, const Matrix4d& transform, Fl
         }
         flat.triangles.push_back(t);
     }
-    if (flat.triangles.size() >= kMostTriangles) throw Error(ErrorKind::Scene, "the scene is too large: more than 268 million triangles");
     ++flat.placements;
 }
 
@@ -125,7 +127,16 @@ void normaliseLengths(FlatScene& flat) {
 }  // namespace
 
 FlatScene flattenScene(const Scene& scene) {
+    // Before anything is written out.
+    std::uint64_t count = 0;
+    for (const Object& object : scene.objects) count += std::uint64_t{scene.meshes[object.mesh].triangles.size()} * object.transforms.size();
+    if (count >= kMostTriangles) throw Error(ErrorKind::Scene, fmt::format("written out, the scene has {} triangles; crt renders up to 268 million", count));
+    if (scene.input_bytes > 0)
+        if (const std::string why = ExpansionLimit(scene.input_bytes).refusal(count, "triangles", kBytesPerTriangle); !why.empty())
+            throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", scene.file, why), {scene.file});
+
     FlatScene flat;
+    flat.triangles.reserve(count);
     for (const Object& object : scene.objects)
         for (const Matrix4d& transform : object.transforms) place(object, scene.meshes[object.mesh], transform, flat);
     normaliseLengths(flat);

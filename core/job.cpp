@@ -69,10 +69,12 @@ Files planFiles(const Job& job, const Scene& scene) {
 
     std::vector<std::string> written = imageNames(files.outputs), films = files.outputs.films;
     if (!files.report.empty()) written.push_back(files.report);
+    // The last; crt chose its name, unless it is also one of the others.
     films.push_back(files.checkpoint);
     refuseOverInputs(scene.files_read, written, films);
-    for (const std::string& film : films) {
-        const bool wanted = film != files.checkpoint || files.checkpoint_wanted;
+    for (std::size_t i = 0; i < films.size(); ++i) {
+        const std::string& film = films[i];
+        const bool wanted = i + 1 < films.size() || files.checkpoint_wanted;
         if (files.resume.empty() || film != files.resume) files.films.look(film, wanted, job.overwrite);
     }
 

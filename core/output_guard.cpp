@@ -5,38 +5,23 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <limits>
-#include <optional>
 #include <sys/stat.h>
 #include <system_error>
-#include <utility>
 
 namespace crt {
 namespace fs = std::filesystem;
 namespace {
 
-using FileIdentity = std::pair<dev_t, ino_t>;
-
-/// Of the file that a name leads to, through links; nothing while there is none.
-std::optional<FileIdentity> identityOf(const std::string& path) {
+/// The same for all names of one file: by device and number of the file that is there, or by the name that it will have.
+std::string identityOf(const std::string& path) {
     struct stat status {};
-    if (::stat(path.c_str(), &status) != 0) return std::nullopt;
-    return FileIdentity{status.st_dev, status.st_ino};
-}
-
-/// The same for two names of a file that is still to be written.
-std::string finalName(const std::string& path) {
+    if (::stat(path.c_str(), &status) == 0) return fmt::format("{}:{}", status.st_dev, status.st_ino);
     std::error_code unknown;
     const fs::path absolute = fs::absolute(path, unknown);
     const fs::path canonical = fs::weakly_canonical(absolute, unknown);
     return (unknown ? absolute.lexically_normal() : canonical).string();
-}
-
-bool sameFile(const std::string& a, const std::string& b) {
-    const std::optional<FileIdentity> one = identityOf(a), other = identityOf(b);
-    return one || other ? one == other : finalName(a) == finalName(b);
 }
 
 constexpr std::uint64_t kNoFilm = std::numeric_limits<std::uint64_t>::max();  // Larger than any, so that it is never replaced.
@@ -44,25 +29,30 @@ constexpr std::uint64_t kNoFilm = std::numeric_limits<std::uint64_t>::max();  //
 }  // namespace
 
 void refuseOverInputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs, const std::vector<std::string>& films) {
-    std::vector<std::string> all = outputs;
-    all.insert(all.end(), films.begin(), films.end());
-    for (const std::string& output : all)
-        for (const std::string& input : inputs) {
-            const std::optional<FileIdentity> there = identityOf(output);
-            if (there && there == identityOf(input))
-                throw Error(ErrorKind::Usage,
-                            output == input ? fmt::format("the output '{}' would replace a file that is read", output)
-                                            : fmt::format("the output '{}' would replace '{}', which is read: they are one file", output, input),
-                            {output});
-        }
-    for (std::size_t i = 0; i < all.size(); ++i)
-        for (std::size_t j = 0; j < i && j < outputs.size(); ++j)
-            if (sameFile(all[i], all[j]))
-                throw Error(ErrorKind::Usage, all[i] == all[j] ? fmt::format("two outputs have the same name '{}'", all[i])
-                                                               : fmt::format("the outputs '{}' and '{}' are one file", all[j], all[i]));
+    std::map<std::string, std::string> read, written;  // By identity, the name.
+    for (const std::string& input : inputs) read.emplace(identityOf(input), input);
+    const auto check = [&](const std::string& output) {
+        const std::string identity = identityOf(output);
+        if (const auto input = read.find(identity); input != read.end())
+            throw Error(ErrorKind::Usage,
+                        output == input->second
+                            ? fmt::format("the output '{}' would replace a file that is read", output)
+                            : fmt::format("the output '{}' would replace '{}', which is read: they are one file", output, input->second),
+                        {output});
+        if (const auto other = written.find(identity); other != written.end())
+            throw Error(ErrorKind::Usage, output == other->second ? fmt::format("two outputs have the same name '{}'", output)
+                                                                  : fmt::format("the outputs '{}' and '{}' are one file", other->second, output));
+        return identity;
+    };
+    for (const std::string& output : outputs) written.emplace(check(output), output);
+    for (const std::string& film : films) check(film);
 }
 
 void FilmGuard::look(const std::string& path, bool wanted, bool replace) {
+    if (const auto known = places_.find(path); known != places_.end()) {
+        known->second.wanted = known->second.wanted || wanted;
+        return;
+    }
     std::error_code unreadable;
     Place place;
     place.wanted = wanted;

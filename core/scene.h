@@ -131,6 +131,7 @@ struct Scene {
     std::optional<Environment> environment;
     std::vector<Output> outputs;
     std::vector<std::string> files_read;  ///< Every file that went into the scene, the YAML first.
+    std::uint64_t input_bytes = 0;        ///< Of all of them; 0 for a scene made in memory.
     double parse_seconds = 0;
 };
 

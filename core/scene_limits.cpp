@@ -2,11 +2,20 @@
 
 #include "error.h"
 #include "log.h"
+#include "progress.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
 #include <limits>
+#include <map>
+#include <set>
+#include <string_view>
+#include <system_error>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -24,13 +33,15 @@ std::vector<Light> lightsOf(const Scene& scene) {
     const auto add = [&](double radiance, std::string name, const SourcePlace& place) {
         if (radiance > 0) lights.push_back({radiance, std::move(name), place});
     };
+    std::map<std::uint32_t, std::set<std::int32_t>> emissions_of;  // By mesh, which many objects may share.
     for (const Object& object : scene.objects) {
         if (object.emission >= 0)
             add(scene.emissions[static_cast<std::size_t>(object.emission)].radiance.max(), fmt::format("'{}'", object.name), object.place);
-        std::vector<bool> seen(scene.emissions.size(), false);
-        for (const std::int32_t emission : scene.meshes[object.mesh].emission) {
-            if (emission < 0 || seen[static_cast<std::size_t>(emission)]) continue;
-            seen[static_cast<std::size_t>(emission)] = true;
+        const std::vector<std::int32_t>& by_triangle = scene.meshes[object.mesh].emission;
+        const auto [known, first] = emissions_of.try_emplace(object.mesh);
+        if (first) known->second.insert(by_triangle.begin(), by_triangle.end());
+        for (const std::int32_t emission : known->second) {
+            if (emission < 0) continue;
             add(scene.emissions[static_cast<std::size_t>(emission)].radiance.max(), fmt::format("a material (Ke) of '{}'", object.name), object.place);
         }
     }
@@ -48,6 +59,26 @@ std::string at(const SourcePlace& place) {
 }
 
 }  // namespace
+
+ExpansionLimit::ExpansionLimit(std::uint64_t input_bytes) : bytes_(1'500'000'000 + 50 * input_bytes) {
+    const char* const text = std::getenv("CRT_SCENE_MEMORY");
+    if (text == nullptr || *text == '\0') return;
+    double size = 0;
+    const std::string_view all(text);
+    const auto [end, problem] = std::from_chars(all.data(), all.data() + all.size(), size);
+    const std::string_view unit = all.substr(static_cast<std::size_t>(end - all.data()));
+    const double factor = unit == "MB" ? 1e6 : unit == "GB" ? 1e9 : unit == "TB" ? 1e12 : 0;
+    if (problem != std::errc() || !(size > 0) || factor == 0 || size * factor > 1e18)
+        throw Error(ErrorKind::Usage, fmt::format("CRT_SCENE_MEMORY is '{}'; expected a size such as 20GB", all));
+    bytes_ = static_cast<std::uint64_t>(size * factor);
+}
+
+std::string ExpansionLimit::refusal(std::uint64_t count, const std::string& things, std::uint64_t bytes_each) const {
+    const double needed = static_cast<double>(count) * static_cast<double>(bytes_each);
+    if (needed <= static_cast<double>(bytes_)) return {};
+    return fmt::format("written out, the scene has {} {}, which take {} of memory, and its files allow {}; set CRT_SCENE_MEMORY={}GB to allow it", count, things,
+                       bytesText(needed), bytesText(static_cast<double>(bytes_)), std::ceil(needed / 1e9));
+}
 
 void checkRadiance(const Scene& scene) {
     const std::vector<Light> lights = lightsOf(scene);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "scene.h"
+#include "scene_limits.h"
 #include "scene_spectra.h"
 
 #include <cstdint>
@@ -39,6 +40,8 @@ private:
     Overrides readOverrides(const SectionReader& object);
     std::optional<Matrix4d> readPlacement(const YamlNode& list, const YamlPlace& place, const std::string& subject);
     std::vector<Matrix4d> readPlacements(const SectionReader& object);
+    /// Stops when what was read so far is too large to be written out.
+    void requireRoom(const YamlPlace& place);
 
     struct NamedMaterial {
         std::int32_t index = -1;  ///< −1: known, but wrong.
@@ -54,6 +57,11 @@ private:
     std::vector<std::string> material_names_;  ///< In the order of the file.
     /// Meshes by file, with or without the materials of the MTL, and what replaces those.
     std::map<std::tuple<std::string, bool, Overrides>, std::uint32_t> meshes_;
+    /// By node: what an alias repeats is read once.
+    std::map<const YamlNode*, std::optional<std::uint32_t>> written_meshes_;
+    std::map<const YamlNode*, std::optional<Matrix4d>> written_placements_;
+    ExpansionLimit limit_;
+    std::uint64_t placements_ = 0, triangles_ = 0;  ///< Read so far.
     std::map<std::pair<std::string, bool>, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.
 };
 

@@ -327,6 +327,7 @@ Scene parse(const std::string& yaml, const std::string& name, const std::vector<
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = name;
+    scene.input_bytes = yaml.size();
     const YamlSource source(name, yaml);
     std::deque<YamlSource> override_sources;  // Places point to them: they must not move.
     Diagnostics out;
@@ -340,6 +341,9 @@ Scene parse(const std::string& yaml, const std::string& name, const std::vector<
     out.throwIfFailed();
     checkRadiance(scene);
     scene.files_read = files.read();
+    std::error_code unknown;
+    for (const std::string& file : scene.files_read)
+        if (file != name) scene.input_bytes += std::filesystem::file_size(file, unknown);
     scene.parse_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return scene;
 }

@@ -9,14 +9,18 @@
 #include "yaml_reader.h"
 
 #include <dlfcn.h>
+#include <elf.h>
+#include <link.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -130,6 +134,22 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
     }
 }
 
+/// Whether a library has all the bytes that its segments take. dlopen maps them unasked, and the first touch of one behind the end of the file is a SIGBUS.
+bool isCut(const std::string& file) {
+    std::ifstream in(file, std::ios::binary);
+    ElfW(Ehdr) header{};
+    std::error_code unknown;
+    const std::uintmax_t bytes = fs::file_size(file, unknown);
+    if (!in.read(reinterpret_cast<char*>(&header), sizeof header) || unknown || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0) return false;  // dlopen knows.
+    for (unsigned i = 0; i < header.e_phnum; ++i) {
+        ElfW(Phdr) segment{};
+        in.seekg(static_cast<std::streamoff>(header.e_phoff + std::uint64_t{i} * sizeof segment));
+        if (!in.read(reinterpret_cast<char*>(&segment), sizeof segment)) return true;
+        if (segment.p_type == PT_LOAD && (segment.p_offset > bytes || segment.p_filesz > bytes - segment.p_offset)) return true;
+    }
+    return false;
+}
+
 /// What could have been written by others is not run.
 void refuseUntrusted(const std::string& name, const std::string& path) {
     std::error_code unreadable;
@@ -241,6 +261,7 @@ LoadedBackend loadBackend(const std::string& name) {
     std::error_code unknown;
     const fs::path real = fs::canonical(path, unknown);
     const std::string file = unknown ? fs::absolute(path).string() : real.string();
+    if (isCut(file)) refuse(fmt::format("backend '{}' ({}) cannot be opened: the file is cut short", name, path));
     // NOW: a missing symbol is told here and not in the middle of a render. LOCAL: the libraries of one plugin are not those of another.
     void* library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
