@@ -94,7 +94,9 @@ std::optional<Spectrum> SpectrumReader::resolve(const YamlNode& node, const Yaml
         double value = 0;
         const KeySchema any{.name = "spectrum", .kind = ValueKind::Number};
         if (!readScalar(out_, node, place, any, what, value)) return std::nullopt;
-        return constantSpectrum(value);
+        const auto [known, fresh] = constants_.try_emplace(value);
+        if (fresh) known->second = constantSpectrum(value);
+        return known->second;
     }
     return resolveName(node.text, place, use);
 }

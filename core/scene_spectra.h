@@ -42,6 +42,7 @@ private:
     const YamlNode* named_;
     std::unordered_map<std::string_view, const YamlEntry*> entry_of_;  ///< Of named_, which may hold a hundred thousand.
     std::map<std::pair<std::string, SpectrumUse>, std::optional<Spectrum>> resolved_;
+    std::map<double, Spectrum> constants_;
     std::map<std::pair<Vec3d, bool>, Spectrum> colors_;  ///< Of linear sRGB, as reflectance or as emission.
     std::set<std::string> used_;
     std::set<std::string> open_;  ///< Names being resolved: meeting one again is a cycle.
