@@ -200,10 +200,14 @@ def scene_cases():
     scene("an output of a kind unknown", HEAD + "outputs: [{file: a.docx}]\n", words="does not end in")
     scene("an output twice", HEAD + "outputs: [{file: a.exr}, {file: a.exr}]\n", words="written twice")
     placement = "[{translate: [1, 2, 3]}]"
-    scene("10,000 placements behind 1,000 aliases (44 kB)",
+    scene("10,000 moved placements behind 1,000 aliases (44 kB)",
+          HEAD + MATERIALS + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n" + "- *o\n" * 1000,
+          words=("values behind aliases, which take", "CRT_SCENE_MEMORY="))
+    placement = "[]"  # A single value, so that there may be more of them.
+    scene("10,000 placements behind 1,000 aliases",
           HEAD + MATERIALS + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n" + "- *o\n" * 1000,
           words=("placements, which take", "CRT_SCENE_MEMORY="))
-    scene("the same, allowed but for its triangles", HEAD + MATERIALS + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n" +
+    scene("the same behind 500, allowed but for its triangles", HEAD + MATERIALS + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n" +
           "- *o\n" * 500, words=("triangles, which take", "CRT_SCENE_MEMORY="))
     scene("a face of 5,000 corners behind 20,000 aliases (167 kB)",
           HEAD + MATERIALS + "objects: [{material: m, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [&f [" + ",".join(["0,1,2"] * 1700) + "]" + ", *f" * 20000 + "]}}]\n",
@@ -771,7 +775,7 @@ def sentence(result):
     lines = [line for line in result["text"].splitlines() if "error:" in line and not line.endswith("as it is:")]
     lines = lines or [line for line in result["text"].splitlines() if "stopped by" in line]
     text = lines[0].replace("crt: error: ", "").replace("crt: info: ", "") if lines else ""
-    text = text.replace(WORK, "…").replace(FAKE, "…").replace("|", "\\|")
+    text = text.replace(WORK, "…").replace(FAKE, "…").replace(os.path.dirname(os.path.dirname(CRT)), "…").replace("|", "\\|")
     return text if len(text) <= 160 else text[:159] + "…"
 
 
