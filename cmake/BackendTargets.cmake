@@ -15,7 +15,7 @@ target_include_directories(crt_backend_headers INTERFACE
 set_target_properties(crt_backend_headers PROPERTIES EXPORT_NAME backend_headers)
 
 # Uses nothing of the core, and XXH3 by its header alone, so that it can be compiled into any plugin.
-add_library(crt_kernel_cache STATIC ${PROJECT_SOURCE_DIR}/core/backend/kernel_cache.cpp)
+add_library(crt_kernel_cache STATIC ${PROJECT_SOURCE_DIR}/core/backend/kernel_cache.cpp ${PROJECT_SOURCE_DIR}/core/backend/code_trust.cpp)
 add_library(crt::kernel_cache ALIAS crt_kernel_cache)
 target_link_libraries(crt_kernel_cache PUBLIC crt_backend_headers PRIVATE $<BUILD_INTERFACE:crt_flags>)
 target_compile_features(crt_kernel_cache PUBLIC cxx_std_17)

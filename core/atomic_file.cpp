@@ -46,15 +46,26 @@ std::string missingFolder(const std::string& directory) {
     throw Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, why), {path});
 }
 
+/// Where a link leads in the end, also when nothing is there yet: std::filesystem takes such a link for a file that is to be made.
+std::string targetOf(const std::string& path) {
+    constexpr int kMostLinks = 40;  // As many as Linux follows.
+    std::error_code ignored;
+    fs::path at = path;
+    for (int i = 0; fs::is_symlink(at, ignored); ++i) {
+        if (i == kMostLinks) refuse(path, "it is a link that leads to itself");
+        const fs::path next = fs::read_symlink(at, ignored);
+        if (ignored) refuse(path, fmt::format("it is a link that cannot be read: {}", ignored.message()));
+        at = at.parent_path() / next;  // An absolute target replaces the folder.
+    }
+    return at.string();
+}
+
 }  // namespace
 
 AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
     if (path.empty()) throw Error(ErrorKind::Output, "cannot write an output without a file name");
     std::error_code ignored;
-    if (fs::is_symlink(path, ignored)) {
-        const fs::path target = fs::weakly_canonical(path, ignored);
-        if (!ignored && !target.empty()) final_ = target.string();
-    }
+    final_ = targetOf(path);
     // Renaming over these would replace a device node or fail at the very end of a render.
     if (fs::is_directory(final_, ignored)) refuse(path_, "it is a directory");
     if (fs::exists(final_, ignored) && !fs::is_regular_file(final_, ignored)) refuse(path_, "it is not a regular file");
@@ -65,8 +76,9 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
         descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         const int error_number = errno;
         if (descriptor_ >= 0 || error_number == EINTR || (error_number == EEXIST && attempt < 1000)) continue;
-        if (error_number == ENOENT)
-            refuse(path_, fmt::format("the directory '{}' does not exist", directoryOf(final_)));
+        if (error_number == ENOENT && final_ != path_)
+            refuse(path_, fmt::format("it is a link to '{}', whose directory does not exist", final_));
+        if (error_number == ENOENT) refuse(path_, fmt::format("the directory '{}' does not exist", directoryOf(final_)));
         fail("cannot write", error_number);
     }
 }

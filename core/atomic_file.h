@@ -11,7 +11,8 @@ namespace crt {
 /// One file on its way to its final name. Every failure is a crt::Error(Output) naming the final file. [one thread]
 class AtomicFile {
 public:
-    /// Opens the temporary. A symbolic link is followed, so that the link stays and its target is replaced.
+    /// Opens the temporary. A symbolic link is followed, so that the link stays and its target is replaced, or made
+    /// where the link led to nothing.
     explicit AtomicFile(const std::string& path);
     /// Removes the temporary unless commit() succeeded.
     ~AtomicFile();

@@ -2,6 +2,7 @@
 
 #include "atomic_file.h"
 #include "film_pack.h"
+#include "input_file.h"
 #include "log.h"
 
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <new>
 #include <set>
 #include <string_view>
 #include <sys/stat.h>
@@ -99,6 +101,16 @@ std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identi
 struct CloseFile {
     void operator()(std::FILE* file) const { std::fclose(file); }
 };
+
+std::unique_ptr<std::FILE, CloseFile> openFilm(const std::string& path) {
+    try {
+        std::FILE* const file = ::fdopen(openInput(path), "rb");
+        if (file == nullptr) throw std::bad_alloc();
+        return std::unique_ptr<std::FILE, CloseFile>(file);
+    } catch (const InputRefused& refused) {
+        refuse(path, refused.what());
+    }
+}
 
 void readExactly(std::FILE* file, const std::string& path, void* bytes, std::size_t size) {
     if (size == 0 || std::fread(bytes, 1, size, file) == size) return;
@@ -185,12 +197,9 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
 }
 
 std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
-    const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rbe"));
-    if (!file) refuse(path, fmt::format("cannot be opened: {}", std::strerror(errno)));
-    // Of the file that is open: a render may put another in its place meanwhile.
+    const std::unique_ptr<std::FILE, CloseFile> file = openFilm(path);
     struct stat status {};
     if (::fstat(::fileno(file.get()), &status) != 0) refuse(path, fmt::format("cannot be read: {}", std::strerror(errno)));
-    if (S_ISDIR(status.st_mode)) refuse(path, "is a directory");
     const auto actual_bytes = static_cast<std::uint64_t>(status.st_size);
     if (actual_bytes == 0) refuse(path, "is empty, not a crt film");
 
@@ -233,7 +242,8 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         try {
             const bool squares = header.format_version == kCheckpointVersionUnpacked;
             return Film({header.width, header.height, header.channels, header.aovs | (squares ? kAovSquares : 0u)});
-        } catch (const Error&) {
+        } catch (const Error& error) {
+            if (error.kind() != ErrorKind::Internal) throw;  // Too large for this machine is not damaged.
             refuse(path, kBadChecksum);
         }
     };

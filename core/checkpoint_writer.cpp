@@ -10,18 +10,21 @@ namespace crt {
 namespace {
 
 /// What went wrong, if anything did.
-std::optional<Error> tryToWrite(const std::string& path, const Film& film, const FilmIdentity& identity) {
+std::optional<Error> tryTo(const CheckpointWriter::Write& write, const Film& film, const FilmIdentity& identity) {
     try {
-        writeCheckpoint(path, film, identity);
+        write(film, identity);
         return std::nullopt;
     } catch (const Error& error) {
         return error;
     } catch (const std::exception& error) {  // Out of memory while packing.
-        return Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, error.what()), {path});
+        return Error(ErrorKind::Output, fmt::format("cannot write a checkpoint: {}", error.what()));
     }
 }
 
 }  // namespace
+
+CheckpointWriter::CheckpointWriter(const std::string& path)
+    : CheckpointWriter([path](const Film& film, const FilmIdentity& identity) { writeCheckpoint(path, film, identity); }) {}
 
 bool CheckpointWriter::idle() const {
     return !writing_.valid() || writing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
@@ -31,7 +34,7 @@ void CheckpointWriter::save(const Film& film, FilmIdentity identity) {
     finish();
     copy_ = film;
     writing_ = std::async(std::launch::async, [this, identity = std::move(identity)] {
-        return tryToWrite(path_, *copy_, identity);
+        return tryTo(write_, *copy_, identity);
     });
 }
 

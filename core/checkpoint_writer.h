@@ -4,16 +4,21 @@
 #include "error.h"
 #include "film.h"
 
+#include <functional>
 #include <future>
 #include <optional>
 #include <string>
 
 namespace crt {
 
-/// Writes one file again and again; one copy at a time. [one thread]
+/// Writes a film again and again; one copy at a time. [one thread]
 class CheckpointWriter {
 public:
-    explicit CheckpointWriter(std::string path) : path_(std::move(path)) {}
+    using Write = std::function<void(const Film&, const FilmIdentity&)>;
+
+    explicit CheckpointWriter(const std::string& path);
+    /// `write` is called on another thread, and throws crt::Error(Output) when it cannot.
+    explicit CheckpointWriter(Write write) : write_(std::move(write)) {}
     /// Waits for the copy that is being written.
     ~CheckpointWriter() { finish(); }
     CheckpointWriter(const CheckpointWriter&) = delete;
@@ -29,7 +34,7 @@ public:
     void finish();
 
 private:
-    std::string path_;
+    Write write_;
     std::optional<Film> copy_;  ///< Of the last save(); kept, since another of its size is needed soon.
     std::future<std::optional<Error>> writing_;
 };

@@ -8,12 +8,15 @@
 #include "image_metadata.h"
 #include "kernel/features.h"
 #include "log.h"
+#include "output_guard.h"
 #include "outputs.h"
 #include "progress.h"
 #include "stage.h"
+#include "standard_output.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -30,7 +33,7 @@ void row(const char* name, const std::string& value) {
         indented += c;
         if (c == '\n') indented.append(kColumn + 2, ' ');
     }
-    fmt::print("  {:<{}} {}\n", name, kColumn - 1, indented);
+    printOut("  {:<{}} {}\n", name, kColumn - 1, indented);
 }
 
 std::string counted(std::uint64_t n, const char* one, const char* many) { return fmt::format("{} {}", n, n == 1 ? one : many); }
@@ -81,9 +84,11 @@ std::string filmText(const Scene& scene) {
 }
 
 std::string materialsText(const Scene& scene) {
+    constexpr std::size_t kShown = 100;
     std::string text;
-    for (const Material& material : scene.materials)
-        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", material.name, name(material.type));
+    for (std::size_t i = 0; i < std::min(kShown, scene.materials.size()); ++i)
+        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", scene.materials[i].name, name(scene.materials[i].type));
+    if (scene.materials.size() > kShown) text += fmt::format(" and {} more", scene.materials.size() - kShown);
     return text.empty() ? "none" : text;
 }
 
@@ -105,7 +110,7 @@ void showScene(const SceneRequest& what) {
     const Scene scene = loadScene(what);
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
     progress.reset();
-    fmt::print("{}{}\n", what.file, scene.title.empty() ? "" : ": " + scene.title);
+    printOut("{}{}\n", what.file, scene.title.empty() ? "" : ": " + scene.title);
     row("film", filmText(scene));
     row("camera", cameraText(scene.camera));
     row("geometry", counted(compiled.objects, "object", "objects") + ", " + counted(compiled.triangles, "triangle", "triangles"));
@@ -162,7 +167,7 @@ void showFilm(const std::string& file) {
     const auto [film, identity] = readCheckpoint(file);
     const bool independent = identity.record && identity.record->independent_samples;
     const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, independent);
-    fmt::print("{}: {}\n", file, identity.record && identity.record->complete == true ? "film" : "partial render");
+    printOut("{}: {}\n", file, identity.record && identity.record->complete == true ? "film" : "partial render");
     row("film", fmt::format("{} x {} pixels", film.shape().width, film.shape().height));
     row("aovs", aovText(film.shape().aovs));
     row("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
@@ -175,7 +180,7 @@ void showFilm(const std::string& file) {
 
 void showImage(const std::string& file) {
     const Image image = readImage(file);
-    fmt::print("{}: image\n", file);
+    printOut("{}: image\n", file);
     row("size", fmt::format("{} x {} pixels", image.width, image.height));
     row("channels", fmt::format("{}", fmt::join(image.channels, ", ")));
     if (!image.integer_channels.empty()) row("integers", fmt::format("{}", fmt::join(image.integer_channels, ", ")));
@@ -201,10 +206,17 @@ int mergeFilms(const MergeArguments& arguments) {
     Scene scene;
     if (has_scene) scene = loadScene(arguments.scene);
     OutputPlan plan = planOutputs(arguments.outputs, scene);
+    std::vector<std::string> inputs = arguments.parts, images;
+    inputs.insert(inputs.end(), scene.files_read.begin(), scene.files_read.end());
+    for (const Output& image : plan.images) images.push_back(image.file);
+    refuseOverInputs(inputs, images, plan.films);
+    FilmGuard films;
+    for (const std::string& film : plan.films) films.look(film, true, arguments.overwrite);
     for (const Output& image : plan.images) checkWritable(image.file);
     for (const std::string& film : plan.films) checkWritable(film);
 
     auto [film, identity] = mergeCheckpoints(arguments.parts);
+    films.requireRoom(film.samples.count());
     if (has_scene) {
         FilmRecord record = recordOf(scene);
         requireSameScene(arguments.parts.front(), identity,
@@ -226,7 +238,7 @@ int mergeFilms(const MergeArguments& arguments) {
 
 int listPlugins() {
     for (const BackendStatus& status : listBackends()) {
-        fmt::print("{}{}\n", status.name, status.version.empty() ? "" : " " + status.version);
+        printOut("{}{}\n", status.name, status.version.empty() ? "" : " " + status.version);
         if (!status.path.empty()) row("file", status.path);
         if (!status.build.empty()) row("built with", status.build);
         for (const CrtDevice& device : status.devices) {
@@ -235,14 +247,14 @@ int listPlugins() {
             if (*device.driver != '\0') text += fmt::format(", {}", device.driver);
             row("device", text);
         }
-        if (!status.reason.empty()) row("cannot run", status.reason);
+        if (!status.reason.empty()) row(status.refused ? "refused" : "cannot run", status.reason);
     }
     return 0;
 }
 
 int printSchema(bool markdown) {
     const std::string text = markdown ? sceneReferenceMarkdown() : sceneJsonSchema();
-    fmt::print("{}{}", text, !text.empty() && text.back() == '\n' ? "" : "\n");
+    printOut("{}{}", text, !text.empty() && text.back() == '\n' ? "" : "\n");
     return 0;
 }
 

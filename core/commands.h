@@ -33,6 +33,7 @@ int compare(const CompareArguments& arguments);
 struct MergeArguments {
     std::vector<std::string> parts;
     std::vector<std::string> outputs;
+    bool overwrite = false;  ///< Also over a film of more samples.
     SceneRequest scene;  ///< As rendered, for films that do not say themselves how to develop them; an empty name means none.
 };
 int mergeFilms(const MergeArguments& arguments);

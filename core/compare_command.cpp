@@ -4,6 +4,8 @@
 #include "compare_text.h"
 #include "error.h"
 #include "image_io.h"
+#include "output_guard.h"
+#include "standard_output.h"
 
 #include <fmt/format.h>
 
@@ -34,7 +36,7 @@ void writeText(const std::string& file, const std::string& text) {
 
 /// Text to stdout and JSON to its file, or JSON to stdout.
 void print(const CompareArguments& arguments, const std::string& text, const std::string& json) {
-    fmt::print("{}\n", arguments.json_file == "-" ? json : text);
+    printOut("{}\n", arguments.json_file == "-" ? json : text);
     if (!arguments.json_file.empty() && arguments.json_file != "-") writeText(arguments.json_file, json + "\n");
 }
 
@@ -50,12 +52,24 @@ void requireNothingMore(const CompareArguments& arguments, const std::string& mi
                         fmt::format("{}: there is no {}, because {}", option, what, mismatch));
 }
 
+std::vector<std::string> named(const std::vector<std::string>& files) {
+    std::vector<std::string> names;
+    for (const std::string& file : files)
+        if (!file.empty() && file != "-") names.push_back(file);
+    return names;
+}
+std::vector<std::string> inputs(const CompareArguments& arguments) { return named({arguments.first, arguments.second, arguments.reference}); }
+std::vector<std::string> outputs(const CompareArguments& arguments) {
+    return named({arguments.difference_file, arguments.map_file, arguments.json_file});
+}
+
 int compareFiles(const CompareArguments& arguments) {
     if (arguments.second.empty())
         throw Error(ErrorKind::Usage, fmt::format("there is nothing to compare '{}' with; name a second image, or backends with --backends",
                                                   arguments.first));
     if (arguments.scene.seed || arguments.scene.crop || !arguments.scene.overrides.empty())
         throw Error(ErrorKind::Usage, "--set, --seed and --crop change a scene, and need --backends");
+    refuseOverInputs(inputs(arguments), outputs(arguments));
     const Image a = readImage(arguments.first), b = readImage(arguments.second);
     std::optional<Image> reference_image;
     if (!arguments.reference.empty()) reference_image = readImage(arguments.reference);
@@ -90,7 +104,9 @@ int compareBackends(const CompareArguments& arguments) {
         throw Error(ErrorKind::Usage, fmt::format("--backends takes one scene: '{}' is one too many", arguments.second));
     SceneRequest request = arguments.scene;
     request.file = arguments.first;
-    const BackendComparison comparison = compareBackends(loadScene(request), arguments.backends);
+    const Scene scene = loadScene(request);
+    refuseOverInputs(scene.files_read, outputs(arguments));
+    const BackendComparison comparison = compareBackends(scene, arguments.backends);
     print(arguments, backendComparisonText(comparison), backendComparisonJson(comparison));
     return comparison.passes() ? 0 : kDifferent;
 }

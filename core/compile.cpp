@@ -57,7 +57,7 @@ public:
     std::uint32_t count() const { return static_cast<std::uint32_t>(index_.size()); }
 
 private:
-    std::map<std::array<double, kSpectrumSize>, std::uint32_t> index_;
+    std::map<SpectrumValues, std::uint32_t> index_;
     std::vector<float> floats_;
 };
 

@@ -2,6 +2,7 @@
 
 #include "aov.h"
 #include "error_estimate.h"
+#include "host.h"
 #include "image_metadata.h"
 #include "kernel/layout.h"
 #include "stats/luminance_error.h"
@@ -107,6 +108,14 @@ Film::Film(FilmShape shape) : shape_(shape) {
     if (!hasRightChannels(shape))
         throw Error(ErrorKind::Internal, fmt::format("a film with AOV mask {:#x} cannot have {} channels", shape.aovs, shape.channels));
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
+    // Said beforehand: a system that promises memory which it does not have would end the process in the middle.
+    const std::uint64_t bytes = std::uint64_t{pixels} * (16 * std::uint64_t{shape.channels} + 8);
+    constexpr std::uint64_t kWorthAsking = std::uint64_t{1} << 28;
+    if (bytes > kWorthAsking && bytes > availableHostMemory())
+        throw Error(ErrorKind::Device, fmt::format("a film of {} × {} pixels with {} channels takes {:.1f} GB of memory, and {:.1f} GB are free; make it smaller, or "
+                                                   "render parts of it with --crop",
+                                                   shape.width, shape.height, shape.channels, static_cast<double>(bytes) / 1e9,
+                                                   static_cast<double>(availableHostMemory()) / 1e9));
     sums.assign(pixels * shape.channels * 2, 0.0);
     counts.assign(pixels, 0);
     if (shape.aovs & kAovPrimitive) primitives.assign(pixels, CRT_NONE);

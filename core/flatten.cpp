@@ -3,7 +3,10 @@
 #include "error.h"
 #include "log.h"
 #include "stage.h"
+#include "scene_limits.h"
 #include "vec3d.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -55,7 +58,6 @@ void place(const Object& object, const Mesh& mesh, const Matrix4d& transform, Fl
         flat.triangles.push_back(t);
         stage.at(static_cast<double>(flat.triangles.size()));
     }
-    if (flat.triangles.size() >= kMostTriangles) throw Error(ErrorKind::Scene, "the scene is too large: more than 268 million triangles");
     ++flat.placements;
 }
 
@@ -127,11 +129,17 @@ void normaliseLengths(FlatScene& flat) {
 }  // namespace
 
 FlatScene flattenScene(const Scene& scene) {
+    // Before anything is written out.
+    std::uint64_t count = 0;
+    for (const Object& object : scene.objects) count += std::uint64_t{scene.meshes[object.mesh].triangles.size()} * object.transforms.size();
+    if (count >= kMostTriangles) throw Error(ErrorKind::Scene, fmt::format("written out, the scene has {} triangles; crt renders up to 268 million", count));
+    if (scene.input_bytes > 0)
+        if (const std::string why = ExpansionLimit(scene.input_bytes).refusal(count, "triangles", kBytesPerTriangle); !why.empty())
+            throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", scene.file, why), {scene.file});
+
     FlatScene flat;
-    double count = 0;
-    for (const Object& object : scene.objects)
-        count += static_cast<double>(object.transforms.size()) * static_cast<double>(scene.meshes[object.mesh].triangles.size());
-    Stage stage("placing triangles", count);
+    flat.triangles.reserve(count);
+    Stage stage("placing triangles", static_cast<double>(count));
     for (const Object& object : scene.objects)
         for (const Matrix4d& transform : object.transforms) place(object, scene.meshes[object.mesh], transform, flat, stage);
     normaliseLengths(flat);

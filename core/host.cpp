@@ -3,14 +3,18 @@
 #include "build_info.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <sys/utsname.h>
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
+#include <limits>
 #include <string_view>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -62,6 +66,34 @@ std::uint64_t peakHostMemory() {
     std::uint64_t kilobytes = 0;
     std::from_chars(text.data(), text.data() + text.size(), kilobytes);
     return kilobytes * 1024;
+}
+
+std::uint64_t availableHostMemory() {
+    const auto kilobytesIn = [](const char* path, std::string_view key) {
+        const std::string text = valueInFile(path, key, ':');
+        std::uint64_t kilobytes = 0;
+        std::from_chars(text.data(), text.data() + text.size(), kilobytes);
+        return kilobytes;
+    };
+    const auto numberIn = [](const char* path) {
+        std::ifstream file(path);
+        std::uint64_t number = std::numeric_limits<std::uint64_t>::max();  // Also where the file says "max".
+        file >> number;
+        return file ? number : std::numeric_limits<std::uint64_t>::max();
+    };
+    const auto left = [](std::uint64_t limit, std::uint64_t used) { return limit > used ? limit - used : 0; };
+
+    std::uint64_t bytes = std::numeric_limits<std::uint64_t>::max();
+    if (const std::uint64_t kilobytes = kilobytesIn("/proc/meminfo", "MemAvailable:"); kilobytes > 0) bytes = kilobytes * 1024;
+    // Inside a container its own group is the root of what it sees. Version 2, then version 1.
+    for (const auto& [limit, used] : {std::pair{"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"},
+                                      std::pair{"/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"}})
+        if (const std::uint64_t most = numberIn(limit); most != std::numeric_limits<std::uint64_t>::max())
+            bytes = std::min(bytes, left(most, numberIn(used)));
+    rlimit address_space{};
+    if (getrlimit(RLIMIT_AS, &address_space) == 0 && address_space.rlim_cur != RLIM_INFINITY)
+        bytes = std::min<std::uint64_t>(bytes, left(address_space.rlim_cur, kilobytesIn("/proc/self/status", "VmSize:") * 1024));
+    return bytes;
 }
 
 BuildInfo buildInfo() { return {CRT_COMMIT, CRT_COMMIT_DIRTY != 0, CRT_COMPILER, CRT_COMPILER_FLAGS}; }

@@ -1,9 +1,11 @@
 #include "image_io.h"
 
+#include "backend/code_trust.h"
 #include "backend/loader.h"
 #include "error.h"
 #include "image_metadata.h"
 #include "image_module.h"
+#include "input_file.h"
 #include "log.h"
 
 #include <fmt/format.h>
@@ -204,6 +206,10 @@ const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {
             const std::string file = directory + "/" CRT_IMAGE_MODULE_FILE;
             std::error_code ignored;
             if (!std::filesystem::exists(file, ignored)) continue;
+            if (const std::string why = trust::whyNotByName(file); !why.empty()) {
+                o.reason = fmt::format("the image module is refused: {}", why);
+                return o;
+            }
             void* const library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
             if (library == nullptr) {
                 o.reason = fmt::format("the image module cannot be opened ({})", ::dlerror());
@@ -428,19 +434,24 @@ void writeImage(const std::string& path, OutputFormat format, const Image& image
 }
 
 Image readImage(const std::string& path) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) refuseToRead(path, "it is a directory");
+    try {
+        requireInput(path);
+    } catch (const InputRefused& refused) {
+        refuseToRead(path, fmt::format("it {}", refused.what()));
+    }
     std::ifstream file(path, std::ios::binary);
-    if (!file) refuseToRead(path, std::strerror(errno));
     char mark[2] = {};
     file.read(mark, 2);
     if (!file) refuseToRead(path, "it is empty");
     const bool pfm = mark[0] == 'P' && (mark[1] == 'F' || mark[1] == 'f');
     const bool ppm = mark[0] == 'P' && mark[1] == '6';
     if (!pfm && !ppm) return readWithModule(path);
-    file.seekg(0);
-    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-    return pfm ? readPfm(path, bytes) : readPpm(path, bytes);
+    try {
+        const std::string bytes = readInput(path, kMostImageBytes);
+        return pfm ? readPfm(path, bytes) : readPpm(path, bytes);
+    } catch (const InputRefused& refused) {
+        refuseToRead(path, fmt::format("it {}", refused.what()));
+    }
 }
 
 std::string metadataValue(const Image& image, const std::string& key) {

@@ -30,6 +30,8 @@ std::int64_t monotonicNanoseconds() {
 extern "C" void onSignal(int signal) {
     const int saved_errno = errno;
     if (g_signal != 0) {
+        // The system repeats SIGXCPU every second until the hard limit: no wish to leave at once.
+        if (signal == SIGXCPU) return;
         if (monotonicNanoseconds() - g_first_at >= kOneWishNanoseconds) _exit(signalExitCode(signal));
         errno = saved_errno;
         return;
@@ -49,7 +51,7 @@ extern "C" void onSignal(int signal) {
 
 InterruptGuard::InterruptGuard() {
     g_signal = 0;
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGXCPU}) {
         struct sigaction before {};
         sigaction(signal, nullptr, &before);
         if (before.sa_handler == SIG_IGN) continue;
@@ -66,6 +68,10 @@ InterruptGuard::~InterruptGuard() {
     for (const Saved& s : saved_) sigaction(s.signal, &s.action, nullptr);
 }
 
+void ignoreWriteSignals() {
+    for (const int signal : {SIGPIPE, SIGXFSZ}) std::signal(signal, SIG_IGN);
+}
+
 int InterruptGuard::signalReceived() { return g_signal.load(std::memory_order_relaxed); }
 
 std::string signalName(int signal) {
@@ -73,6 +79,7 @@ std::string signalName(int signal) {
         case SIGINT: return "SIGINT";
         case SIGTERM: return "SIGTERM";
         case SIGHUP: return "SIGHUP";
+        case SIGXCPU: return "SIGXCPU (the limit on processor time)";
         default: return "signal " + std::to_string(signal);
     }
 }

@@ -8,7 +8,7 @@
 
 namespace crt {
 
-/// Catches SIGINT, SIGTERM and SIGHUP for as long as it lives; one at a time. Outside it the signals end the process as usual,
+/// Catches SIGINT, SIGTERM, SIGHUP and SIGXCPU (the soft limit on processor time: the hard one, which follows, kills) for as long as it lives; one at a time. Outside it the signals end the process as usual,
 /// which is right while there is nothing to save. A signal that the parent had set to be ignored (nohup, a background job of a
 /// shell script) stays ignored.
 class InterruptGuard {
@@ -29,10 +29,14 @@ private:
     std::vector<Saved> saved_;
 };
 
+/// From now on, writing to a pipe that nobody reads (`crt … -v 2>&1 | head -1`) or beyond the limit on file sizes (ulimit -f) fails as writing
+/// to a full disk does, and no longer ends the process before its image is written.
+void ignoreWriteSignals();
+
 /// "SIGINT", "SIGTERM", "SIGHUP".
 std::string signalName(int signal);
 
-/// The exit code of a process that a signal ended, as shells have it: 130 for SIGINT, 143 for SIGTERM.
+/// The exit code of a process that a signal ended, as shells have it: 130 for SIGINT, 143 for SIGTERM, 152 for SIGXCPU.
 inline int signalExitCode(int signal) { return 128 + signal; }
 
 }  // namespace crt

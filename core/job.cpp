@@ -8,6 +8,7 @@
 #include "interrupt.h"
 #include "light_checks.h"
 #include "log.h"
+#include "output_guard.h"
 #include "outputs.h"
 #include "report.h"
 #include "sampling.h"
@@ -37,9 +38,17 @@ struct Files {
     OutputPlan outputs;
     std::string checkpoint;          ///< Where a checkpoint goes if one is written.
     bool checkpoint_wanted = false;  ///< Also when nothing stops the render short.
+    std::string saved;               ///< Where it was written in the end.
     std::string resume;              ///< Empty: start from nothing.
     std::string report;              ///< Empty: none.
+    FilmGuard films;                 ///< What lies where films will be written.
 };
+
+std::vector<std::string> imageNames(const OutputPlan& plan) {
+    std::vector<std::string> names;
+    for (const Output& image : plan.images) names.push_back(image.file);
+    return names;
+}
 
 /// Names them, and finds out now what cannot be written: nobody should learn after an hour that a directory is missing.
 Files planFiles(const Job& job, const Scene& scene) {
@@ -63,6 +72,17 @@ Files planFiles(const Job& job, const Scene& scene) {
     files.report = job.report_file ? *job.report_file : besideOutput(files.outputs.first, ".report.json");
 
     dateUtc();  // Refuses a SOURCE_DATE_EPOCH that is none.
+    std::vector<std::string> written = imageNames(files.outputs), films = files.outputs.films;
+    if (!files.report.empty()) written.push_back(files.report);
+    // The last; crt chose its name, unless it is also one of the others.
+    films.push_back(files.checkpoint);
+    refuseOverInputs(scene.files_read, written, films);
+    for (std::size_t i = 0; i < films.size(); ++i) {
+        const std::string& film = films[i];
+        const bool wanted = i + 1 < films.size() || files.checkpoint_wanted;
+        if (files.resume.empty() || film != files.resume) files.films.look(film, wanted, job.overwrite);
+    }
+
     for (const Output& image : files.outputs.images) checkWritable(image.file);
     for (const std::string& film : files.outputs.films) checkWritable(film);
     checkWritable(files.checkpoint);
@@ -243,8 +263,16 @@ void describeRun(FilmIdentity& identity, const RunFacts& facts) {
     identity.record->addRun(run);
 }
 
+/// Where it was written: a larger film that lies there stays.
+std::string writeFilm(FilmGuard& films, const std::string& name, const Film& film, const FilmIdentity& identity) {
+    const std::string place = films.placeFor(name, film.samples.count());
+    writeCheckpoint(place, film, identity);
+    if (place == name) films.written(name);
+    return place;
+}
+
 /// Film → images and checkpoints; their names go to facts.outputs.
-void writeFiles(const Files& files, const Film& film, FilmIdentity& identity, RunFacts& facts, FirstFailure& failure) {
+void writeFiles(Files& files, const Film& film, FilmIdentity& identity, RunFacts& facts, FirstFailure& failure) {
     const Stopwatch writing;
     // With nothing but a time to go by, the end of the time is the end of the work.
     const bool complete = facts.stop == StopReason::Samples || facts.stop == StopReason::Target || (facts.stop == StopReason::Time && facts.target_samples == 0);
@@ -254,13 +282,14 @@ void writeFiles(const Files& files, const Film& film, FilmIdentity& identity, Ru
     std::set<std::string> films(files.outputs.films.begin(), files.outputs.films.end());
     const bool stopped_short = facts.stop == StopReason::Interrupted || facts.stop == StopReason::Failed;
     if (files.checkpoint_wanted || stopped_short) films.insert(files.checkpoint);
-    const auto writeFilm = [&](const std::string& name) {
+    const auto attemptFilm = [&](const std::string& name) {
         failure.attempt([&] {
-            writeCheckpoint(name, film, identity);
-            facts.outputs.push_back(name);
+            const std::string place = writeFilm(files.films, name, film, identity);
+            facts.outputs.push_back(place);
+            if (name == files.checkpoint) files.saved = place;
         });
     };
-    for (const std::string& name : films) writeFilm(name);  // First: everything else can be made from a film.
+    for (const std::string& name : films) attemptFilm(name);  // First: everything else can be made from a film.
     for (const Output& output : files.outputs.images)
         failure.attempt([&] {
             writeOutput(output, film, identity);
@@ -268,7 +297,7 @@ void writeFiles(const Files& files, const Film& film, FilmIdentity& identity, Ru
         });
     // Hours of work must not be lost because one image could not be written.
     const bool image_failed = failure.get() && failure.get()->kind() == ErrorKind::Output;
-    if (image_failed && films.count(files.checkpoint) == 0) writeFilm(files.checkpoint);
+    if (image_failed && films.count(files.checkpoint) == 0) attemptFilm(files.checkpoint);
     facts.write_seconds = writing.seconds();
 }
 
@@ -334,12 +363,13 @@ int runJob(const Job& job) {
     // What is to be seen, and where it is to be written.
     Scene scene = loadScene(job.scene);
     if (job.target_error > 0) requireReplicates(scene);
-    const Files files = planFiles(job, scene);
+    Files files = planFiles(job, scene);
 
     // What is there already, and what is missing.
     EarlierFilm earlier = readEarlierFilm(files);
     SamplingPlan plan = planSamples(job, scene, earlier ? earlier->first.samples : SampleRanges(), files);
     facts.target_samples = plan.target;
+    if (plan.target > 0) files.films.requireRoom(plan.target);
     const std::optional<LoadedBackend> backend = openBackendFor(job, plan, facts);
 
     // What it takes to see it: one flat blob, and the mask of what it needs.
@@ -351,7 +381,7 @@ int runJob(const Job& job) {
     Film film = openFilm(files, earlier, compiled, identity);
     earlier.reset();
     facts.resumed_samples = film.samples.count();
-    CheckpointWriter checkpoint(files.checkpoint);
+    CheckpointWriter checkpoint([&files](const Film& copy, const FilmIdentity& of) { writeFilm(files.films, files.checkpoint, copy, of); });
     const auto saveCheckpoint = [&] {
         describeRun(identity, facts);
         checkpoint.save(film, identity);
@@ -390,7 +420,7 @@ int runJob(const Job& job) {
     if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
     if (failure.get()) throw *failure.get();
     if (facts.stop == StopReason::Interrupted)
-        logInfo("stopped by {}; the same command with --resume {} goes on from here", signalName(facts.signal), files.checkpoint);
+        logInfo("stopped by {}; the same command with --resume {} goes on from here", signalName(facts.signal), files.saved);
     return facts.exit_code;
 }
 

@@ -42,6 +42,7 @@ struct Job {
     std::string resume_file;                 ///< Empty: the checkpoint of this job.
     std::string checkpoint_file;             ///< Empty: beside the first output, and only when resuming or when stopped short.
     double checkpoint_interval_seconds = 600;
+    bool overwrite = false;                  ///< Also a film of more samples, or what is no film.
 
     std::vector<std::string> outputs;        ///< Instead of the scene's.
     std::optional<std::string> report_file;  ///< Unset: beside the first output. Empty: none.

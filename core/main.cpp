@@ -4,8 +4,10 @@
 #include "converge/engine.h"
 #include "converge/reference.h"
 #include "error.h"
+#include "interrupt.h"
 #include "job.h"
 #include "log.h"
+#include "standard_output.h"
 #include "verify/command.h"
 #include "yaml_reader.h"
 
@@ -17,6 +19,7 @@
 #include <functional>
 #include <memory>
 #include <new>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -48,7 +51,7 @@ Another exposure without another render:
 constexpr const char* kExitCodes = R"(
 Exit codes: 0 done, 1 internal error, 2 command line, 3 scene, 4 backend or device not available,
 5 device failed (what there was is saved), 6 output not written, 7 images differ or a case of verify fails,
-130 and 143 stopped by Ctrl-C or kill (image and checkpoint are saved).
+128 + n stopped by signal n, such as 130 by Ctrl-C and 143 by kill (image and checkpoint are saved).
 )";
 
 constexpr const char* kBackendGroup = "Backends instead of images";
@@ -161,10 +164,10 @@ public:
         try {
             app_.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back.
         } catch (const CLI::CallForHelp&) {
-            fmt::print("{}", (app_.get_subcommands().empty() ? &app_ : app_.get_subcommands().front())->help());
+            printOut("{}", (app_.get_subcommands().empty() ? &app_ : app_.get_subcommands().front())->help());
             return 0;
         } catch (const CLI::CallForVersion& version) {
-            fmt::print("{}\n", version.what());
+            printOut("{}\n", version.what());
             return 0;
         } catch (const CLI::ParseError& error) {
             refuse(error);
@@ -224,7 +227,7 @@ private:
 
     CLI::App* addRender() {
         CLI::App* render = addCommand("render", "render a scene; the word may be left out", [this] { return runJob(job_); });
-        render->add_option("SCENE", job_.scene.file, "scene file (YAML)")->required();
+        render->add_option("SCENE", job_.scene.file, "scene file (YAML), or - for standard input")->required();
 
         const char* group = "What is rendered";
         CLI::Option* spp = reader_.option(*render, "--spp", "N", "samples per pixel, instead of the scene's",
@@ -287,6 +290,7 @@ private:
                            job_.resume_file = text == "auto" ? "" : text;
                        })
             ->group(group);
+        render->add_flag("--overwrite", job_.overwrite, "replace a film even where it holds more samples than this run makes")->group(group);
         reader_.option(*render, "--report", "FILE", "what the run did, as JSON (first output with .report.json); or none",
                        [this](const std::string& text) { job_.report_file = text == "none" ? "" : text; })
             ->group(group);
@@ -370,6 +374,7 @@ private:
         reader_.option(*merge, "--scene", "SCENE", "the scene they are of: only for films that do not know how to develop them",
                        [this](const std::string& text) { merge_.scene.file = text; });
         addSceneChanges(*merge, merge_.scene, "The scene, changed as it was for rendering");
+        merge->add_flag("--overwrite", merge_.overwrite, "replace a film even where it holds more samples");
         merge->add_flag_callback("-q,--quiet", [this] { beQuiet(); }, "only warnings and errors");
     }
 
@@ -588,10 +593,14 @@ private:
 }  // namespace
 
 int main(int argc, char** argv) {
+    crt::openClosedStreams();
+    crt::ignoreWriteSignals();
     // One place turns everything that can be thrown into one line and an exit code.
     try {
         CommandLine command_line;
-        return command_line.run({argv, argv + argc});
+        const int code = command_line.run({argv, argv + argc});
+        if (const std::optional<crt::Error> lost = crt::finishStandardOutput()) throw *lost;
+        return code;
     } catch (const crt::Error& error) {
         const std::string text = error.what();
         // Errors in a scene come with places of their own, which editors find only at the start of a line.

@@ -1,6 +1,7 @@
 #include "mesh_io.h"
 
 #include "error.h"
+#include "input_file.h"
 #include "log.h"
 #include "material_files.h"
 #include "mesh_format.h"
@@ -281,7 +282,7 @@ private:
 
 LoadedMesh loadObj(const std::string& path, const ObjOptions& options) {
     std::optional<Stage> stage(std::in_place, "reading " + std::filesystem::path(path).filename().string());
-    const std::string text = readTextFile(path, "mesh", {path});
+    const std::string text = readTextFile(path, "mesh", kMostMeshBytes, {path});
     if (const std::string format = otherFormat(text); !format.empty())
         fail(fmt::format("this is {}; crt reads OBJ", format), path);
     ObjContents obj = readObj(text, path, *stage);

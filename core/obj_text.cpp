@@ -1,12 +1,11 @@
 #include "obj_text.h"
 
+#include "input_file.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 
 namespace crt {
@@ -36,17 +35,13 @@ std::string fromUtf16(std::string_view text) {
 
 }  // namespace
 
-std::string readTextFile(const std::string& path, const char* kind, const SourcePlace& named_at) {
-    const auto refuse = [&](const char* why) {
-        throw Error(ErrorKind::Scene, fmt::format("{} '{}' {}", kind, path, why), named_at);
-    };
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) refuse("is a directory");
-    std::ifstream in(path, std::ios::binary);
-    if (!in) refuse("cannot be opened");
-    std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-    if (in.bad()) refuse("cannot be read");
-    return text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF") ? fromUtf16(text) : text;
+std::string readTextFile(const std::string& path, const char* kind, std::uint64_t most_bytes, const SourcePlace& named_at) {
+    try {
+        std::string text = readInput(path, most_bytes);
+        return text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF") ? fromUtf16(text) : text;
+    } catch (const InputRefused& refused) {
+        throw Error(ErrorKind::Scene, fmt::format("{} '{}' {}", kind, path, refused.what()), named_at);
+    }
 }
 
 std::string_view nextField(std::string_view& line) {

@@ -134,6 +134,7 @@ struct Scene {
     std::vector<Output> outputs;
     std::map<std::string, Vec3d> whites;  ///< Named spectra that are lights, with luminance: XYZ with Y = 1.
     std::vector<std::string> files_read;  ///< Every file that went into the scene, the YAML first.
+    std::uint64_t input_bytes = 0;        ///< Of all of them; 0 for a scene made in memory.
     double parse_seconds = 0;
 };
 

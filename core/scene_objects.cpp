@@ -81,9 +81,17 @@ std::optional<std::vector<Vec3d>> readPoints(const SectionReader& mesh, std::str
 }  // namespace
 
 ObjectReader::ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene)
-    : out_(out), files_(files), spectra_(spectra), scene_(scene) {}
+    : out_(out), files_(files), spectra_(spectra), scene_(scene), limit_(scene.input_bytes) {}
 
 ObjectReader::~ObjectReader() = default;
+
+void ObjectReader::requireRoom(const YamlPlace& place) {
+    std::string why = limit_.refusal(placements_, "placements", kBytesPerPlacement);
+    if (why.empty()) why = limit_.refusal(triangles_, "triangles", kBytesPerTriangle);
+    if (why.empty()) return;
+    out_.error(place, why);
+    out_.throwIfFailed();
+}
 
 // ---- Materials -------------------------------------------------------------------------------------------------------
 
@@ -134,18 +142,17 @@ std::optional<std::int32_t> ObjectReader::findMaterial(const std::string& name, 
         if (found->second.index < 0) return std::nullopt;
         return found->second.index;
     }
-    std::vector<std::string> known = material_names_;
+    std::vector<std::string> known = out_.worthSuggesting(material_names_.size()) ? material_names_ : std::vector<std::string>();
     if (from_mtl_possible) known.push_back("from_mtl");
-    out_.error(place, fmt::format("there is no material '{}'", name), didYouMean(name, known));
+    out_.error(place, fmt::format("there is no material '{}'", name), out_.worthSuggesting(known.size()) ? didYouMean(name, known) : std::string());
     return std::nullopt;
 }
 
 void ObjectReader::finish() const {
-    for (const std::string& name : material_names_) {
-        const NamedMaterial& material = materials_.at(name);
-        const SourcePlace at = material.place.resolved();
-        if (!material.used) logWarning("{}:{}:{}: material '{}' is not used", at.file, at.line, at.column, name);
-    }
+    UnusedNames unused("material", "materials");
+    for (const std::string& name : material_names_)
+        if (const NamedMaterial& material = materials_.at(name); !material.used) unused.add(name, material.place);
+    unused.finish();
 }
 
 // ---- Placements ------------------------------------------------------------------------------------------------------
@@ -218,12 +225,15 @@ std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) 
     const YamlNode* list = object.list("transforms");
     if (list == nullptr) return {kIdentity4d};
     if (list->items.empty()) object.error("transforms", "an object with no placement is nowhere; leave 'transforms' out for one as it is");
+    placements_ += list->items.size();
+    requireRoom(object.place("transforms"));
     std::vector<Matrix4d> placements;
     placements.reserve(list->items.size());
     for (std::size_t i = 0; i < list->items.size(); ++i) {
         const YamlNode& item = *list->items[i];
-        const std::string subject = fmt::format("placement {} of {}", i, object.subject());
-        placements.push_back(readPlacement(item, item.place, subject).value_or(kIdentity4d));
+        const auto [known, fresh] = written_placements_.try_emplace(&item);
+        if (fresh) known->second = readPlacement(item, item.place, fmt::format("placement {} of {}", i, object.subject()));
+        placements.push_back(known->second.value_or(kIdentity4d));
     }
     return placements;
 }
@@ -269,6 +279,8 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
                                                     mesh.positions.size()));
         }
         if (polygon.size() != face.items.size()) continue;
+        triangles_ += polygon.size() - 2;
+        requireRoom(face.place);
 
         // A fan from the first corner. A triangle that turns against the whole lies outside the polygon.
         const Vec3d& apex = mesh.positions[polygon[0]];
@@ -329,7 +341,9 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     if (section.has("obj") && !section.has("mesh")) {
         mesh = readObj(section, readObjUse(section, material_name));
     } else if (const std::optional<SectionReader> written = section.section("mesh", fmt::format("the mesh of {}", section.subject()))) {
-        mesh = readMesh(*written);
+        const auto [known, fresh] = written_meshes_.try_emplace(section.find("mesh")->value.get());
+        if (fresh) known->second = readMesh(*written);
+        mesh = known->second;
         if (!section.has("material")) out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
         if (material_given && !named) section.error("material", "only an OBJ has materials of its own");
         refuseObjKeys(section);

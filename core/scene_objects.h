@@ -3,6 +3,7 @@
 
 #include "mesh_io.h"
 #include "scene.h"
+#include "scene_limits.h"
 #include "scene_spectra.h"
 
 #include <cstdint>
@@ -52,6 +53,8 @@ private:
     Overrides readOverrides(const SectionReader& object);
     std::optional<Matrix4d> readPlacement(const YamlNode& list, const YamlPlace& place, const std::string& subject);
     std::vector<Matrix4d> readPlacements(const SectionReader& object);
+    /// Stops when what was read so far is too large to be written out.
+    void requireRoom(const YamlPlace& place);
 
     struct NamedMaterial {
         std::int32_t index = -1;  ///< −1: known, but wrong.
@@ -65,6 +68,11 @@ private:
     Scene& scene_;
     std::map<std::string, NamedMaterial> materials_;
     std::vector<std::string> material_names_;  ///< In the order of the file.
+    /// By node: what an alias repeats is read once.
+    std::map<const YamlNode*, std::optional<std::uint32_t>> written_meshes_;
+    std::map<const YamlNode*, std::optional<Matrix4d>> written_placements_;
+    ExpansionLimit limit_;
+    std::uint64_t placements_ = 0, triangles_ = 0;  ///< Read so far.
     /// By file, whether its own materials are read, and what their colours are.
     using FileUse = std::tuple<std::string, bool, MtlColor>;
     std::map<FileUse, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.

@@ -1,5 +1,7 @@
 #include "scene_reader.h"
 
+#include "log.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -374,6 +376,18 @@ std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node,
         if (nearestWord(entry.key, words)) odd = &entry;
     out.error(odd->key_place, fmt::format("unknown key '{}' in {}", odd->key, subject), didYouMean(odd->key, words), note);
     return std::nullopt;
+}
+
+constexpr std::size_t kUnusedShown = 20;
+
+void UnusedNames::add(const std::string& name, const YamlPlace& place) {
+    if (++count_ > kUnusedShown) return;
+    const SourcePlace at = place.resolved();
+    logWarning("{}:{}:{}: {} '{}' is not used", at.file, at.line, at.column, one_, name);
+}
+
+void UnusedNames::finish() const {
+    if (count_ > kUnusedShown) logWarning("{} more {} are not used", count_ - kUnusedShown, many_);
 }
 
 std::optional<std::string> SceneFiles::locate(const std::string& name, const YamlPlace& place, Diagnostics& out) const {

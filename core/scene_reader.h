@@ -95,6 +95,18 @@ std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node,
 /// "expected …, found …" at a place.
 void expected(Diagnostics& out, const YamlPlace& place, std::string_view wanted, const std::string& what, const YamlNode& node);
 
+/// Warns about names that nothing uses: the first by name and place, the others by their number.
+class UnusedNames {
+public:
+    UnusedNames(std::string one, std::string many) : one_(std::move(one)), many_(std::move(many)) {}
+    void add(const std::string& name, const YamlPlace& place);
+    void finish() const;
+
+private:
+    std::string one_, many_;
+    std::size_t count_ = 0;
+};
+
 /// The files a scene names: where they are looked for, and which were read.
 class SceneFiles {
 public:

@@ -2,6 +2,7 @@
 
 #include "error.h"
 #include "scene.h"
+#include "scene_limits.h"
 
 #include <fmt/format.h>
 
@@ -16,6 +17,7 @@ using Shape = ValueShape;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr ValueRange kNotNegative{0, kInfinity, false, false};
+constexpr ValueRange kRadiance{0, kMostRadiance, false, false};
 constexpr ValueRange kPositive{0, kInfinity, true, false};
 
 /// A default read off core/scene.h, so that the manual cannot disagree with the code.
@@ -307,7 +309,7 @@ void addObjects(std::vector<SectionSchema>& all) {
                    {{.name = "matrix", .kind = Kind::Number, .shape = Shape::List, .count_min = 16, .count_max = 16, .required = true,
                      .doc = "Four rows of four, points as columns, last row 0 0 0 1; must be invertible."}}});
     all.push_back({"emission", "an emission", "",
-                   {{.name = "radiance", .kind = Kind::Spectrum, .range = kNotNegative, .unit = "W·m⁻²·sr⁻¹·nm⁻¹", .required = true,
+                   {{.name = "radiance", .kind = Kind::Spectrum, .range = kRadiance, .unit = "W·m⁻²·sr⁻¹·nm⁻¹", .required = true,
                      .doc = "Emitted equally in all directions. A lamp must not lie in the plane of another surface that it overlaps: rounding "
                             "decides which of them is seen, and crt warns."},
                     {.name = "two_sided", .kind = Kind::Boolean, .fallback = yaml(Emission{}.two_sided),
@@ -316,7 +318,7 @@ void addObjects(std::vector<SectionSchema>& all) {
 
 void addOutside(std::vector<SectionSchema>& all) {
     all.push_back({"environment", "environment", "",
-                   {{.name = "radiance", .kind = Kind::Spectrum, .range = kNotNegative, .unit = "W·m⁻²·sr⁻¹·nm⁻¹", .required = true,
+                   {{.name = "radiance", .kind = Kind::Spectrum, .range = kRadiance, .unit = "W·m⁻²·sr⁻¹·nm⁻¹", .required = true,
                      .doc = "The same from every direction."}}});
     all.push_back({"output", "an output", "",
                    {{.name = "file", .required = true, .doc = "Its name, as given to the file system: relative to the working directory."},

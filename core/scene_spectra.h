@@ -7,6 +7,8 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
+#include <unordered_map>
 #include <utility>
 
 namespace crt {
@@ -41,7 +43,10 @@ private:
     Diagnostics& out_;
     SceneFiles& files_;
     const YamlNode* named_;
+    std::unordered_map<std::string_view, const YamlEntry*> entry_of_;  ///< Of named_, which may hold a hundred thousand.
     std::map<std::pair<std::string, SpectrumUse>, std::optional<Spectrum>> resolved_;
+    std::map<double, Spectrum> constants_;
+    std::map<std::pair<Vec3d, bool>, Spectrum> colors_;  ///< Of linear sRGB, as reflectance or as emission.
     std::set<std::string> used_;
     std::set<std::string> open_;  ///< Names being resolved: meeting one again is a cycle.
 };

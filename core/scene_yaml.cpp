@@ -1,6 +1,8 @@
 #include "scene_yaml.h"
 
+#include "input_file.h"
 #include "log.h"
+#include "scene_limits.h"
 #include "scene_objects.h"
 #include "scene_reader.h"
 #include "scene_schema.h"
@@ -12,13 +14,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <deque>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
 #include <string_view>
 
@@ -330,6 +329,7 @@ Scene parse(const std::string& yaml, const std::string& name, const std::vector<
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = name;
+    scene.input_bytes = yaml.size();
     const YamlSource source(name, yaml);
     std::deque<YamlSource> override_sources;  // Places point to them: they must not move.
     Diagnostics out;
@@ -341,33 +341,34 @@ Scene parse(const std::string& yaml, const std::string& name, const std::vector<
         readScene(*root, out, files, scene);
     }
     out.throwIfFailed();
+    checkRadiance(scene);
     scene.files_read = files.read();
+    std::error_code unknown;
+    for (const std::string& file : scene.files_read)
+        if (file != name) scene.input_bytes += std::filesystem::file_size(file, unknown);
     scene.parse_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return scene;
 }
+
+constexpr std::string_view kStandardInput = "-";
+
+/// What messages and outputs are called after.
+std::string nameOf(const std::string& path) { return path == kStandardInput ? "stdin" : path; }
 
 [[noreturn]] void cannotRead(const std::string& path, std::string_view why) {
     throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", path, why), {path, 0, 0});
 }
 
-/// The whole scene file. A bound keeps a disk image or /dev/zero from filling the memory; meshes of that size belong in an OBJ.
+/// The whole text: of a file, or of standard input for "-".
 std::string readSceneText(const std::string& path) {
-    constexpr std::size_t kMaxBytes = std::size_t{256} << 20, kBlock = std::size_t{1} << 16;
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) cannotRead(path, "this is a directory, not a scene file");
-    errno = 0;
-    std::ifstream in(path, std::ios::binary);
-    if (!in) cannotRead(path, fmt::format("cannot be opened: {}", errno != 0 ? std::strerror(errno) : "unknown reason"));
-    std::string text;
-    while (in) {
-        const std::size_t size = text.size();
-        text.resize(size + kBlock);
-        in.read(text.data() + size, kBlock);
-        text.resize(size + static_cast<std::size_t>(in.gcount()));
-        if (text.size() > kMaxBytes) cannotRead(path, "more than 256 MiB; put large meshes into OBJ files");
+    try {
+        return path == kStandardInput ? readStandardInput(kMostSceneBytes) : readInput(path, kMostSceneBytes);
+    } catch (const InputRefused& refused) {
+        const std::string why = refused.what();
+        const bool large = why.starts_with("has "), pipe = why.starts_with("is a pipe");
+        cannotRead(nameOf(path), (path == kStandardInput ? "standard input " : why.starts_with("cannot") ? "" : "this ") + why +
+                                     (large ? "; put large meshes into OBJ files" : pipe ? "; for standard input write '-'" : ""));
     }
-    if (in.bad()) cannotRead(path, "cannot be read to its end");
-    return text;
 }
 
 }  // namespace
@@ -382,8 +383,8 @@ SceneOverride parseOverride(const std::string& text) {
 Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides) {
     const std::string text = readSceneText(path);
     SceneFiles files(std::filesystem::path(path).parent_path().string());
-    files.note(path);
-    return parse(text, path, overrides, std::move(files));
+    if (path != kStandardInput) files.note(path);
+    return parse(text, nameOf(path), overrides, std::move(files));
 }
 
 Scene parseScene(const std::string& yaml, const std::string& name, const std::string& directory, const std::vector<SceneOverride>& overrides) {

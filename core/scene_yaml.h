@@ -21,6 +21,7 @@ SceneOverride parseOverride(const std::string& text);
 /// Reads and checks a scene file. Throws crt::Error(Scene) whose message holds every error of the file at once, each as
 /// "file:line:column: error: …" with the line, a caret, and the nearest key. Relative file names in the scene are looked up beside the scene
 /// file, then in the mesh directory (CRT_MESH_PATH, or share/crt/meshes beside the installed program).
+/// "-" is standard input, which is beside the current directory.
 Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides = {});
 
 /// The same from text; `name` stands in messages, `directory` is where relative files are looked up.

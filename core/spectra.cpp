@@ -1,6 +1,7 @@
 #include "spectra.h"
 
 #include "error.h"
+#include "input_file.h"
 #include "spectra_data.h"
 
 #include <fmt/format.h>
@@ -8,9 +9,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 
 namespace crt {
@@ -201,12 +199,12 @@ Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vect
 }
 
 Spectrum readSpectrumFile(const std::string& path, Outside outside) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) fail("a spectrum file is expected, but this is a directory", {path});
-    std::ifstream in(path, std::ios::binary);
-    if (!in) fail("cannot open this spectrum file", {path});
-    const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-    if (in.bad()) fail("cannot read this spectrum file", {path});
+    std::string text;
+    try {
+        text = readInput(path, kMostSpectrumBytes);
+    } catch (const InputRefused& refused) {
+        fail(fmt::format("this spectrum file {}", refused.what()), {path});
+    }
 
     std::vector<double> wavelength, value;
     std::string_view rest = text;

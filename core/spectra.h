@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,10 +20,52 @@ inline constexpr int kSpectrumSize = kWavelengthMax_nm - kWavelengthMin_nm + 1; 
 using Vec3d = std::array<double, 3>;
 using Matrix3d = std::array<Vec3d, 3>;  ///< Rows.
 
+/// The samples of a spectrum. Copies share them until one of them is changed: scenes hold each spectrum several times, and some hold a hundred
+/// thousand. As with the containers of std, different objects may be used by different threads.
+class SpectrumValues {
+public:
+    using Array = std::array<double, kSpectrumSize>;
+
+    SpectrumValues() : shared_(zeros()) {}
+    SpectrumValues(const Array& values) : shared_(std::make_shared<Array>(values)) {}
+    // Moved, it would be empty; copied, it still is what it was.
+    SpectrumValues(const SpectrumValues&) = default;
+    SpectrumValues& operator=(const SpectrumValues&) = default;
+    ~SpectrumValues() = default;
+
+    static constexpr std::size_t size() { return kSpectrumSize; }
+    double operator[](std::size_t i) const { return (*shared_)[i]; }
+    double& operator[](std::size_t i) { return own()[i]; }
+    double front() const { return shared_->front(); }
+    double back() const { return shared_->back(); }
+    double& front() { return own().front(); }
+    double& back() { return own().back(); }
+    Array::const_iterator begin() const { return shared_->begin(); }
+    Array::const_iterator end() const { return shared_->end(); }
+    Array::iterator begin() { return own().begin(); }
+    Array::iterator end() { return own().end(); }
+    void fill(double value) { own().fill(value); }
+
+    bool operator==(const SpectrumValues& other) const { return shared_ == other.shared_ || *shared_ == *other.shared_; }
+    bool operator<(const SpectrumValues& other) const { return shared_ != other.shared_ && *shared_ < *other.shared_; }
+
+private:
+    static const std::shared_ptr<Array>& zeros() {
+        static const auto all = std::make_shared<Array>();
+        return all;
+    }
+    Array& own() {
+        if (shared_.use_count() != 1) shared_ = std::make_shared<Array>(*shared_);
+        return *shared_;
+    }
+
+    std::shared_ptr<Array> shared_;
+};
+
 /// A function of wavelength, sampled at 360, 361, … 830 nm and linear between. Everything a scene names as a spectrum
 /// is resolved to this at load.
 struct Spectrum {
-    std::array<double, kSpectrumSize> values{};
+    SpectrumValues values;
 
     double& operator[](std::size_t i) { return values[i]; }
     double operator[](std::size_t i) const { return values[i]; }

@@ -1,5 +1,7 @@
 #include "yaml_reader.h"
 
+#include "scene_limits.h"
+
 #include <fmt/format.h>
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/exceptions.h>
@@ -20,7 +22,6 @@ namespace crt {
 namespace {
 
 constexpr std::size_t kMaxDepth = 64;           // A scene needs 8; the bound keeps every later recursion safe.
-constexpr std::uint64_t kMaxNodes = 1u << 27;   // With aliases written out: stops "billion laughs" before anything walks them.
 constexpr std::size_t kMaxErrorsShown = 50;
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 
@@ -98,8 +99,8 @@ struct StopParsing {};
 
 class TreeBuilder final : public YAML::EventHandler {
 public:
-    TreeBuilder(const YamlSource& source, Diagnostics& out, int first_column)
-        : source_(source), out_(out), first_column_(first_column) {}
+    TreeBuilder(const YamlSource& source, std::size_t text_bytes, Diagnostics& out, int first_column)
+        : source_(source), out_(out), first_column_(first_column), limit_(text_bytes) {}
 
     YamlNodePtr root() const { return root_; }
 
@@ -171,7 +172,8 @@ private:
         std::unordered_map<std::string, int> line_of_key;
     };
 
-    YamlNodePtr make(YamlKind kind, const YamlPlace& place) const {
+    YamlNodePtr make(YamlKind kind, const YamlPlace& place) {
+        ++written_;
         auto node = std::make_shared<YamlNode>();
         node->kind = kind;
         node->place = place;
@@ -255,15 +257,20 @@ private:
     }
 
     void grow(YamlNode& parent, std::uint64_t added, const YamlPlace& place) {
+        // Stops "billion laughs" before anything walks them.
         parent.size += added;
-        if (parent.size <= kMaxNodes) return;
-        out_.error(place, fmt::format("aliases written out, the scene has more than {} values", kMaxNodes));
+        if (parent.size <= written_) return;
+        const std::string why = limit_.refusal(parent.size - written_, "values behind aliases", kBytesPerAliasedValue);
+        if (why.empty()) return;
+        out_.error(place, why);
         throw StopParsing{};
     }
 
     const YamlSource& source_;
     Diagnostics& out_;
     int first_column_;
+    ExpansionLimit limit_;
+    std::uint64_t written_ = 0;  ///< Values in the text itself.
     YamlNodePtr root_;
     std::vector<Frame> stack_;
     std::unordered_map<YAML::anchor_t, YamlNodePtr> anchors_;
@@ -453,7 +460,7 @@ YamlNodePtr readYaml(const YamlSource& source, std::string_view text, Diagnostic
     if (!checkText(source, text, out)) return nullptr;
     MemoryBuffer buffer(text);
     std::istream stream(&buffer);
-    TreeBuilder builder(source, out, first_column);
+    TreeBuilder builder(source, text.size(), out, first_column);
     try {
         YAML::Parser parser(stream);
         while (parser.HandleNextDocument(builder)) {

@@ -69,6 +69,9 @@ public:
     void error(const YamlPlace& place, std::string message, std::string suggestion = {}, std::string note = {});
     bool failed() const { return !errors_.empty(); }
     std::size_t count() const { return errors_.size() + not_kept_; }
+    /// Whether to look for the nearest of so many names: the first errors get a suggestion, however many names there are, but not a hundred thousand
+    /// errors over a hundred thousand names.
+    bool worthSuggesting(std::size_t names) const { return count() * names <= 1'000'000; }
     /// Throws crt::Error(Scene) with all errors in the order of the text, if there are any.
     void throwIfFailed() const;
 

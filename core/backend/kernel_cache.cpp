@@ -1,5 +1,7 @@
 #include "backend/kernel_cache.h"
 
+#include "backend/code_trust.h"
+
 // Inlined from the header alone: a plugin with this cache needs no further library.
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -121,11 +123,19 @@ std::string KernelCache::path(const Key& key) const {
     return path + kEntrySuffix;
 }
 
-std::optional<std::vector<unsigned char>> KernelCache::load(const Key& key) const {
+std::optional<std::vector<unsigned char>> KernelCache::load(const Key& key, std::string* refused) const {
     if (directory_.empty()) return std::nullopt;
-    const File file(::open(path(key).c_str(), O_RDONLY | O_CLOEXEC));
+    const std::string name = path(key);
+    // Not blocking: whoever may write to the directory could have put a pipe there.
+    const File file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW));
     struct stat status;
     if (!file.isOpen() || ::fstat(file.get(), &status) != 0) return std::nullopt;
+    const std::string why = S_ISREG(status.st_mode) ? trust::whyNot(status, name) : "'" + name + "' is not a regular file";
+    if (!why.empty()) {
+        if (refused != nullptr) *refused = why;
+        return std::nullopt;
+    }
+    if (static_cast<std::uint64_t>(status.st_size) > max_bytes_) return std::nullopt;
 
     // A damaged entry is not removed here: meanwhile another process may have put a good one in its place. store() replaces it.
     Header header;

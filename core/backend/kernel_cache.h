@@ -27,8 +27,9 @@ public:
     /// Key of a binary that depends on exactly these texts, in this order: kernel text, options, device, compiler, driver.
     static Key makeKey(const std::vector<std::string_view>& parts);
 
-    /// The binary stored under `key`, and marks it as used now. [any thread]
-    std::optional<std::vector<unsigned char>> load(const Key& key) const;
+    /// The binary stored under `key`, and marks it as used now. What it holds will be run: an entry that another user could have written is
+    /// not loaded, and `refused`, where given, says why. [any thread]
+    std::optional<std::vector<unsigned char>> load(const Key& key, std::string* refused = nullptr) const;
 
     /// Stores a binary, then removes what was used longest ago until all entries fit into max_bytes. Returns whether it is stored.
     /// [any thread]

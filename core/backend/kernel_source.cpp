@@ -1,14 +1,16 @@
 #include "backend/kernel_source.h"
 
+#include "backend/code_trust.h"
 #include "backend/crt_layout_hash.h"
 #include "error.h"
+#include "input_file.h"
 
 #include <fmt/format.h>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <mutex>
 #include <set>
@@ -28,9 +30,16 @@ std::optional<std::string> embeddedText(const std::string& name) {
 }
 
 std::optional<std::string> textIn(const std::string& directory, const std::string& name) {
-    std::ifstream file(directory + '/' + name, std::ios::binary);
-    if (!file) return std::nullopt;
-    return std::string(std::istreambuf_iterator<char>(file), {});
+    constexpr std::uint64_t kMostBytes = std::uint64_t{16} << 20;
+    const std::string path = directory + '/' + name;
+    if (::access(path.c_str(), F_OK) != 0) return std::nullopt;
+    if (const std::string why = trust::whyNotByName(path); !why.empty())
+        throw Error(ErrorKind::Backend, fmt::format("the kernels of CRT_KERNEL_DIR are refused: {}", why));
+    try {
+        return readInput(path, kMostBytes);
+    } catch (const InputRefused& refused) {
+        throw Error(ErrorKind::Backend, fmt::format("the kernel header '{}' {}", path, refused.what()));
+    }
 }
 
 /// The directive of a preprocessor line ("include", "if", …) and what follows it; empty when the line is none.

@@ -1,5 +1,6 @@
 #include "backend/loader.h"
 
+#include "backend/code_trust.h"
 #include "backend/crt_layout_hash.h"
 #include "backend/kernel_source.h"
 #include "error.h"
@@ -8,13 +9,18 @@
 #include "yaml_reader.h"
 
 #include <dlfcn.h>
+#include <elf.h>
+#include <link.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -144,6 +150,29 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
     }
 }
 
+/// Whether a library has all the bytes that its segments take. dlopen maps them unasked, and the first touch of one behind the end of the file is a SIGBUS.
+bool isCut(const std::string& file) {
+    std::ifstream in(file, std::ios::binary);
+    ElfW(Ehdr) header{};
+    std::error_code unknown;
+    const std::uintmax_t bytes = fs::file_size(file, unknown);
+    if (!in.read(reinterpret_cast<char*>(&header), sizeof header) || unknown || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0) return false;  // dlopen knows.
+    for (unsigned i = 0; i < header.e_phnum; ++i) {
+        ElfW(Phdr) segment{};
+        in.seekg(static_cast<std::streamoff>(header.e_phoff + std::uint64_t{i} * sizeof segment));
+        if (!in.read(reinterpret_cast<char*>(&segment), sizeof segment)) return true;
+        if (segment.p_type == PT_LOAD && (segment.p_offset > bytes || segment.p_filesz > bytes - segment.p_offset)) return true;
+    }
+    return false;
+}
+
+/// What could have been written by others is not run.
+void refuseUntrusted(const std::string& name, const std::string& path) {
+    std::error_code unreadable;
+    if (!fs::exists(path, unreadable)) return;  // A link to nowhere: dlopen says so.
+    if (const std::string why = trust::whyNotByName(path); !why.empty()) refuse(fmt::format("backend '{}' ({}) is refused: {}", name, path, why));
+}
+
 /// Existing and usable, made if need be; empty with a debug message otherwise.
 std::string cacheDirectory() {
     const auto variable = [](const char* name) -> std::string {
@@ -171,6 +200,12 @@ std::string cacheDirectory() {
     }
     if (::access(directory.c_str(), R_OK | W_OK | X_OK) != 0 || !fs::is_directory(directory, failed)) {
         logDebug("no kernel cache: {} is not a directory that can be written to", directory);
+        return {};
+    }
+    struct stat status {};
+    if (::stat(directory.c_str(), &status) != 0) return {};
+    if (const std::string why = trust::whyNot(status, directory); !why.empty()) {
+        logWarning("no kernel cache, so kernels are compiled anew: {}", why);
         return {};
     }
     return directory;
@@ -242,8 +277,12 @@ LoadedBackend loadBackend(const std::string& name) {
         refuse(fmt::format("there is no backend file {}", name));
     }
 
-    // dlopen searches the system's directories for a name without '/'.
-    const std::string file = fs::absolute(path).string();
+    refuseUntrusted(name, path);
+    // dlopen searches the system's directories for a name without '/'. Links are followed here: the way that was looked at is the one taken.
+    std::error_code unknown;
+    const fs::path real = fs::canonical(path, unknown);
+    const std::string file = unknown ? fs::absolute(path).string() : real.string();
+    if (isCut(file)) refuse(fmt::format("backend '{}' ({}) cannot be opened: the file is cut short", name, path));
     // NOW: a missing symbol is told here and not in the middle of a render. LOCAL: the libraries of one plugin are not those of another.
     void* library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
@@ -307,6 +346,7 @@ std::vector<BackendStatus> listBackends() {
         status.name = name;
         status.path = findPlugin(name).value_or("");
         try {
+            status.refused = !status.path.empty() && fs::exists(status.path) && !trust::whyNotByName(status.path).empty();
             const LoadedBackend backend = loadBackend(name);
             status.version = orUnknown(backend.table->version);
             status.build = orUnknown(backend.table->build);

@@ -25,7 +25,8 @@ double acceleratorReach(const LoadedBackend& backend);
 std::vector<std::string> backendDirectories();
 
 /// Opens exactly crt_backend_<name>.so, or `name` itself when it holds a '/'. Throws crt::Error(Backend) with one sentence: absent (where it
-/// was looked for), cannot be opened (dlerror()), not a crt backend, table too small, ABI or layout differs (both builds named).
+/// was looked for), cannot be opened (dlerror()), not a crt backend, table too small, ABI or layout differs (both builds named), or could have been written by others
+/// (code_trust.h), which is found before anything of it is run.
 LoadedBackend loadBackend(const std::string& name);
 
 /// Devices of a backend, best score first. Throws crt::Error(Backend) with the plugin's reason when there is none.
@@ -39,6 +40,7 @@ struct BackendStatus {
     std::string build;
     std::vector<CrtDevice> devices;
     std::string reason;  ///< Why it cannot run; empty when it can.
+    bool refused = false;  ///< It was not even opened: others could have written it (code_trust.h).
 };
 
 /// Every backend known (cuda, embree, opencl) or found in the directories, usable or not. Opens each.

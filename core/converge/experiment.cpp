@@ -5,13 +5,13 @@
 #include "converge/report_maps.h"
 #include "error.h"
 #include "film_record.h"
+#include "input_file.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 
 namespace crt::converge {
 namespace {
@@ -42,20 +42,22 @@ const char* samplerName(SamplerType type) {
 }
 
 Experiment readExperiment(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file)
-        throw Error(ErrorKind::Usage, fmt::format("'{}' does not say what experiment it holds (there is no "
-                                                  "experiment.json), so it cannot be resumed",
-                                                  fs::path(path).parent_path().string()));
+    std::string text;
     try {
-        const Json json = Json::parse(file);
+        text = readInput(path, kMostTableBytes);
+    } catch (const InputRefused& refused) {
+        throw Error(ErrorKind::Usage, fmt::format("'{}' does not say what experiment it holds (its experiment.json {}), so it cannot be resumed",
+                                                  fs::path(path).parent_path().string(), refused.what()));
+    }
+    try {
+        const Json json = Json::parse(text);
         if (json.at("format") != kFormat)
             throw Error(ErrorKind::Usage, fmt::format("'{}' is of another crt", path));
         Experiment experiment;
         for (const Json& entry : json.at("properties")) {
             Properties p{{entry.at("scene"), entry.at("backend"), entry.at("variant")}, {}};
-            for (const auto& [name, text] : entry.at("values").items())
-                p.values.emplace_back(name, text.get<std::string>());
+            for (const auto& [name, value] : entry.at("values").items())
+                p.values.emplace_back(name, value.get<std::string>());
             experiment.push_back(std::move(p));
         }
         return experiment;

@@ -2,6 +2,7 @@
 
 #include "converge/json_parts.h"
 #include "error.h"
+#include "input_file.h"
 
 #include <fmt/format.h>
 
@@ -234,6 +235,11 @@ std::vector<Row> readResults(const std::string& path) {
     std::vector<Row> rows;
     std::error_code ignored;
     if (!fs::exists(path, ignored)) return rows;
+    try {
+        requireInput(path);
+    } catch (const InputRefused& refused) {
+        throw Error(ErrorKind::Usage, fmt::format("'{}' {}", path, refused.what()), {path});
+    }
     std::ifstream file(path, std::ios::binary);
     std::map<std::tuple<Key, std::uint32_t, std::uint64_t>, std::size_t> place;
     int line_number = 0;

@@ -7,6 +7,7 @@
 #include "image_io.h"
 #include "interrupt.h"
 #include "log.h"
+#include "output_guard.h"
 #include "sampling.h"
 #include "stats/luminance_error.h"
 #include "stats/statistics.h"
@@ -232,6 +233,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
                                                   request.output));
     if (request.samples > 0 && request.samples < kFolds)
         throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
+    refuseOverInputs(scene.files_read, {request.output});
     checkWritable(request.output);
     const auto started = std::chrono::steady_clock::now();
     const std::string content = hashOfContent(scene), colour = colourText(scene), record = recordText(recordOf(scene));

@@ -2,6 +2,7 @@
 
 #include "atomic_file.h"
 #include "error.h"
+#include "input_file.h"
 
 #include <fmt/format.h>
 
@@ -32,8 +33,12 @@ void writeReplicate(const std::string& path, const StoredReplicate& replicate) {
 }
 
 std::optional<StoredReplicate> readReplicate(const std::string& path, std::size_t pixels) {
+    try {
+        requireInput(path);
+    } catch (const InputRefused&) {
+        return std::nullopt;
+    }
     std::ifstream file(path, std::ios::binary);
-    if (!file) return std::nullopt;
     Header header{};
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(path, error);

@@ -2,9 +2,11 @@
 
 #include "atomic_file.h"
 #include "error.h"
+#include "input_file.h"
 #include "interrupt.h"
 #include "log.h"
 #include "progress.h"
+#include "standard_output.h"
 #include "verify/report.h"
 #include "verify/run.h"
 
@@ -14,8 +16,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 
 namespace crt::verify {
@@ -42,9 +42,11 @@ void lookFirstIn(const std::string& directory) {
 }
 
 std::string readText(const std::string& file) {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) throw Error(ErrorKind::Usage, fmt::format("cannot open '{}'", file));
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    try {
+        return readInput(file, kMostTableBytes);
+    } catch (const InputRefused& refused) {
+        throw Error(ErrorKind::Usage, fmt::format("'{}' {}", file, refused.what()));
+    }
 }
 
 /// The line on a terminal that tells which case runs, and since when. Cases take from a millisecond to a minute: what is left cannot be told from what
@@ -87,12 +89,12 @@ int verify(const Arguments& arguments) {
     if (arguments.markdown) {
         std::vector<std::string> suites;
         for (const std::string& file : arguments.suites) suites.push_back(readText(file));
-        fmt::print("{}", registryMarkdown(suites));
+        printOut("{}", registryMarkdown(suites));
         return 0;
     }
     const std::vector<const Case*> cases = select(splitAtCommas(arguments.cases), arguments.level);
     if (arguments.list) {
-        fmt::print("{}", listText(cases));
+        printOut("{}", listText(cases));
         return 0;
     }
     if (!arguments.output.empty()) makeOutputFolder(arguments.output);
@@ -111,13 +113,13 @@ int verify(const Arguments& arguments) {
                 return;
             }
             line.clear();
-            if (!arguments.quiet || failed(result->verdict)) fmt::print("{}", caseText(*result, colored));
-            std::fflush(stdout);
+            if (!arguments.quiet || failed(result->verdict)) printOut("{}", caseText(*result, colored));
+            flushStandardOutput();
         });
-    fmt::print("{} on {}, level {}: {}\n", suite.backend, suite.device, name(suite.level), summaryText(suite));
+    printOut("{} on {}, level {}: {}\n", suite.backend, suite.device, name(suite.level), summaryText(suite));
     if (!arguments.output.empty()) {
         writeReports(arguments.output, suite);
-        fmt::print("{0}/verify.html and {0}/verify.json have every figure\n", arguments.output);
+        printOut("{0}/verify.html and {0}/verify.json have every figure\n", arguments.output);
     }
     if (suite.signal != 0) return signalExitCode(suite.signal);
     return suite.passed() ? 0 : kFailed;

@@ -165,7 +165,10 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ui
     lean_name_ = compiler->name() + " sm_" + std::to_string(device.arch);
     const std::string text = kernelText(host_.kernelSource("path.h"));
     const KernelCache::Key key = cacheKey(text, device.arch, features_, compiler->name(), driver().version);
-    if (const std::optional<std::vector<unsigned char>> cubin = KernelCache(host_.cacheDirectory()).load(key)) {
+    std::string refused;
+    const std::optional<std::vector<unsigned char>> cubin = KernelCache(host_.cacheDirectory()).load(key, &refused);
+    if (!refused.empty()) host_.log(CRT_LOG_WARNING, "cuda: a cached kernel is refused, and compiled again: " + refused);
+    if (cubin) {
         try {
             lean_ = Module(cubin->data(), features_, lean_name_);
             from_cache_ = true;

@@ -92,7 +92,10 @@ Program buildProgram(const plugin::Host& host, const Device& device, const Sessi
     Stopwatch cache_time;
     const KernelCache cache(host.cacheDirectory());
     const KernelCache::Key key = KernelCache::makeKey({"opencl", text, options, device.name, device.driver});
-    if (const std::optional<std::vector<unsigned char>> binary = cache.load(key)) {
+    std::string refused;
+    const std::optional<std::vector<unsigned char>> binary = cache.load(key, &refused);
+    if (!refused.empty()) host.log(CRT_LOG_WARNING, "opencl: a cached kernel is refused, and compiled again: " + refused);
+    if (binary) {
         built.program = fromBinary(session, *binary, options);
         built.from_cache = static_cast<bool>(built.program);
         if (!built.from_cache) host.log(CRT_LOG_DEBUG, "opencl: the driver refuses the cached kernel; compiling it again");

@@ -233,6 +233,28 @@ class LostGpu(CliTest):
         self.assert_one_error(run, "the film needs 3136.0 MB", "MB free")
 
 
+class Radiance(CliTest):
+    """At the ends of what scenes may ask for (core/scene_limits.h) nothing is rounded that is not rounded in the middle."""
+
+    def test_powers_of_two_round_nothing(self):
+        backend = test_cli.first_real_backend()
+        if backend is None:
+            self.skipTest("no backend can render light here")
+        glass = "materials:\n  glass: {type: dielectric, ior: 1.5}\n"
+        pane = ("  - name: pane\n    mesh: {positions: [[-1, 1, -1], [-1, 1, 1], [1, 1.2, 1], [1, 1.2, -1]], faces: [[0, 1, 2, 3]]}\n    material: glass\n")
+        lamp = "emission: {radiance: {blackbody: 4000, scale: 5}}"
+        self.assertIn(lamp, test_cli.SCENE)
+        images = {}
+        for exponent in (0, 83, -83):
+            light = f"emission: {{radiance: {2.0 ** exponent!r}}}"
+            self.write("scene.yaml", test_cli.SCENE.replace("materials:\n", glass).replace(lamp, light) + pane)
+            self.crt("scene.yaml", "-b", backend, "-o", "a.pfm", "--spp", "64", "--report", "none", CRT_BACKEND_PATH="")
+            images[exponent] = test_cli.read_pfm(self.path("a.pfm"))[2]
+        self.assertGreater(max(images[0]), 0)
+        for exponent in (83, -83):
+            self.assertEqual(images[exponent], tuple(value * 2.0 ** exponent for value in images[0]))
+
+
 class SignalStorm(CliTest):
     def test_a_burst_is_one_wish_to_stop(self):
         process = self.start("scene.yaml", "-b", "fake", "--spp", "64", "-o", "a.pfm", "--chunk", "1", fault="slow")
