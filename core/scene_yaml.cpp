@@ -346,6 +346,8 @@ Scene parse(const std::string& yaml, const std::string& name, const std::vector<
     std::error_code unknown;
     for (const std::string& file : scene.files_read)
         if (file != name) scene.input_bytes += std::filesystem::file_size(file, unknown);
+    // A scene of a program, which may still put meshes into it.
+    if (scene.files_read.empty()) scene.input_bytes = 0;
     scene.parse_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return scene;
 }
@@ -384,7 +386,9 @@ Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overr
     const std::string text = readSceneText(path);
     SceneFiles files(std::filesystem::path(path).parent_path().string());
     if (path != kStandardInput) files.note(path);
-    return parse(text, nameOf(path), overrides, std::move(files));
+    Scene scene = parse(text, nameOf(path), overrides, std::move(files));
+    if (scene.files_read.empty()) scene.input_bytes = text.size();
+    return scene;
 }
 
 Scene parseScene(const std::string& yaml, const std::string& name, const std::string& directory, const std::vector<SceneOverride>& overrides) {
