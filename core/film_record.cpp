@@ -19,6 +19,7 @@
 #include <memory>
 #include <new>
 #include <set>
+#include <type_traits>
 
 namespace crt {
 namespace {
@@ -67,15 +68,19 @@ public:
     }
     template <class Number>
     void add(Number number) {
+        static_assert(std::is_arithmetic_v<Number> || std::is_enum_v<Number>);
         XXH3_64bits_update(state_.get(), &number, sizeof number);
     }
     /// The size goes first, so that no item moves from one array to the next unseen.
     template <class Item>
     void add(const std::vector<Item>& items) {
+        static_assert(std::is_trivially_copyable_v<Item>);
         add(std::uint64_t{items.size()});
         if (!items.empty()) XXH3_64bits_update(state_.get(), items.data(), items.size() * sizeof(Item));
     }
-    void add(const Spectrum& spectrum) { XXH3_64bits_update(state_.get(), spectrum.values.data(), sizeof spectrum.values); }
+    void add(const Spectrum& spectrum) {
+        for (const double value : spectrum.values) add(value);
+    }
     std::string digits() const { return fmt::format("{:016x}", XXH3_64bits_digest(state_.get())); }
 
 private:

@@ -1,5 +1,6 @@
 #include "material_files.h"
 
+#include "input_file.h"
 #include "log.h"
 #include "obj_text.h"
 
@@ -163,7 +164,7 @@ private:
                        inQuotes(name), inQuotes(file));
         std::string text;
         try {
-            text = readTextFile(file, "material file", {obj_path_, line});
+            text = readTextFile(file, "material file", kMostMaterialBytes, {obj_path_, line});
         } catch (const Error& e) {
             logWarning("{}:{}: {}", obj_path_, line, e.what());
             miss(name);

@@ -3,6 +3,7 @@
 
 #include "error.h"
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,8 +11,9 @@
 namespace crt {
 
 /// The whole of a file, as UTF-8 where it is UTF-16. Throws crt::Error(Scene) at `named_at` for one that
-/// cannot be read; `kind` is what the message calls it.
-std::string readTextFile(const std::string& path, const char* kind, const SourcePlace& named_at);
+/// cannot be read or has more than `most_bytes`; `kind` is what the message calls it.
+std::string readTextFile(const std::string& path, const char* kind, std::uint64_t most_bytes,
+                         const SourcePlace& named_at);
 
 /// Takes the next field off the front of `line`; empty at its end, which a comment makes too.
 std::string_view nextField(std::string_view& line);

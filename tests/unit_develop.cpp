@@ -8,6 +8,7 @@
 #include "outputs.h"
 #include "scene_yaml.h"
 
+#include <fmt/format.h>
 #include <cmath>
 
 using namespace crt;
@@ -93,7 +94,7 @@ TEST_CASE("a text that is no record is refused, whatever of it is missing or wro
                             "apply_to_float"}) {
         INFO(key);
         std::string without = whole;
-        const std::size_t at = without.find("\"" + std::string(key) + "\"");
+        const std::size_t at = without.find(fmt::format("\"{}\"", key));
         REQUIRE(at != std::string::npos);
         without[at + 1] = '_';
         CHECK_THROWS_AS(readRecord(without), Error);

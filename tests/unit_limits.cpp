@@ -77,14 +77,14 @@ TEST_CASE("only regular files are read, and nobody waits for a pipe", "[limits][
         CAPTURE(file);
         CHECK_THROWS_WITH(readInput(file, kMostSceneBytes), Contains(what));
         CHECK_THROWS_WITH(loadScene(file), Contains(what));
-        CHECK_THROWS_WITH(loadObj(file, true), Contains(what));
+        CHECK_THROWS_WITH(loadObj(file), Contains(what));
         CHECK_THROWS_WITH(readSpectrumFile(file, Outside::Clamp), Contains(what));
         CHECK_THROWS_WITH(readImage(file), Contains(what));
         CHECK_THROWS_WITH(readCheckpoint(file), Contains(what));
     }
     CHECK_THROWS_WITH(loadScene(pipe), Contains("for standard input write '-'"));
     const std::string mesh = folder.write("mesh.obj", "mtllib pipe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
-    CHECK(secondsOf([&] { refusal([&] { loadObj(mesh, true); }); }) < 5);
+    CHECK(secondsOf([&] { refusal([&] { loadObj(mesh); }); }) < 5);
 }
 
 TEST_CASE("a file that is too large is refused by its size before it is read", "[limits][input]") {
@@ -92,7 +92,7 @@ TEST_CASE("a file that is too large is refused by its size before it is read", "
     const std::string file = folder.write("sparse", "");
     fs::resize_file(file, std::uintmax_t{1} << 42);
     CHECK_THROWS_WITH(readInput(file, kMostSceneBytes), Contains("has 4 TiB, and the most for a file of this kind is 256 MiB"));
-    CHECK_THROWS_WITH(loadObj(file, false), Contains("has 4 TiB"));
+    CHECK_THROWS_WITH(loadObj(file), Contains("has 4 TiB"));
     CHECK(readInput(folder.write("exact", "12345"), 5) == "12345");
     CHECK_THROWS_WITH(readInput(folder.write("more", "123456"), 5), Contains("has 6 bytes"));
     // A file whose size the system does not tell.

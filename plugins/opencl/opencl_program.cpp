@@ -106,11 +106,11 @@ Program buildProgram(const plugin::Host& host, const Device& device, const Sessi
         const Stopwatch compile_time;
         built.program = fromText(session, device, text, options);
         // PoCL generates the machine code only at the first launch, 0.7 s that no time of ours counts, and keeps it in a cache of its own.
-        const std::vector<unsigned char> binary = programBinary(built.program.get());
+        const std::vector<unsigned char> compiled = programBinary(built.program.get());
         built.compile_seconds = compile_time.seconds();
 
         const Stopwatch store_time;
-        if (!binary.empty()) cache.store(key, binary.data(), binary.size());
+        if (!compiled.empty()) cache.store(key, compiled.data(), compiled.size());
         built.cache_seconds += store_time.seconds();
     }
 
