@@ -51,7 +51,7 @@ bool sameBits(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 // 3 × 5 pixels: an odd number of ids, so that the padding is there.
-constexpr FilmShape kShape{3, 5, 8, kAovNormal | kAovDepth | kAovPrimitive};
+constexpr FilmShape kShape{3, 5, 8, kAovSquares | kAovNormal | kAovDepth | kAovPrimitive};
 
 }  // namespace
 
@@ -177,7 +177,7 @@ TEST_CASE("films of format 2, which were not packed, are read", "[checkpoint]") 
 
 TEST_CASE("films are packed without loss, in blocks, into less", "[checkpoint]") {
     // Two whole blocks and a short one, of everything that there is: noise, what is the same everywhere, what hardly differs.
-    Film film({kPackedPixels / 64, 130, 4, kAovPrimitive});
+    Film film({kPackedPixels / 64, 130, 4, kAovSquares | kAovPrimitive});
     std::mt19937_64 generator(1);
     for (std::size_t i = 0; i < film.sums.size(); ++i) {
         const std::uint64_t noise = generator();
@@ -349,12 +349,12 @@ TEST_CASE("the record of a merged film is that of the first samples, with every 
         identity.record->backend = backend;
         identity.record->date_utc = date;
         identity.record->complete = true;
-        writeCheckpoint(directory / name, randomFilm({1, 1, 4, 0}, range, 1), identity);
+        writeCheckpoint(directory / name, randomFilm({1, 1, 4, kAovSquares}, range, 1), identity);
         return directory / name;
     };
     const std::string a = write("a.crtfilm", {8, 16}, 1, "embree", "2026:01:01 00:00:00"), b = write("b.crtfilm", {0, 8}, 2, "cuda", "2025:01:01 00:00:00"),
                       c = write("c.crtfilm", {16, 20}, 3, "embree", "2024:01:01 00:00:00");
-    writeCheckpoint(directory / "old.crtfilm", randomFilm({1, 1, 4, 0}, {100, 101}, 1), kIdentity);
+    writeCheckpoint(directory / "old.crtfilm", randomFilm({1, 1, 4, kAovSquares}, {100, 101}, 1), kIdentity);
     std::string text;
     for (const std::vector<std::string>& order : {std::vector{a, b, c}, {c, b, a}, {b, directory / "old.crtfilm", c, a}, {directory / "old.crtfilm", c, a, b}}) {
         const std::optional<FilmRecord> record = mergeCheckpoints(order).second.record;
@@ -371,7 +371,7 @@ TEST_CASE("the record of a merged film is that of the first samples, with every 
     wrong.record.emplace();
     wrong.record->width = wrong.record->height = 2;
     wrong.record->window = {0, 0, 2, 1};
-    writeCheckpoint(directory / "wrong.crtfilm", Film({1, 1, 4, 0}), wrong);
+    writeCheckpoint(directory / "wrong.crtfilm", Film({1, 1, 4, kAovSquares}), wrong);
     CHECK_THROWS_WITH(readCheckpoint(directory / "wrong.crtfilm"), Contains("record of its scene that is of a film of another size"));
 }
 

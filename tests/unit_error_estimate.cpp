@@ -125,7 +125,7 @@ TEST_CASE("what replicates cannot tell is not told", "[error]") {
     }
     one_sided.counts = {10};
     CHECK_FALSE(LuminanceVariance(one_sided).fromReplicates());
-    CHECK(estimateError(one_sided)->knowledge == ErrorKnowledge::Bound);
+    CHECK_FALSE(estimateError(one_sided));
     const Film single = noisyFilm({1.0}, {0.1}, 64, random, 0);
     CHECK(estimateError(single)->knowledge == ErrorKnowledge::Bound);
     CHECK(estimateError(single, PixelSet::All, true)->knowledge == ErrorKnowledge::Known);
@@ -253,10 +253,7 @@ TEST_CASE("the relative error does not depend on the unit of radiance", "[error]
     for (const int exponent : {-400, -200, 200, 400}) {
         CAPTURE(exponent);
         Film scaled = film;
-        for (std::size_t i = 0; i < scaled.sums.size(); ++i) {
-            const bool is_of_squares = i / 2 % film.shape().channels == 3;
-            scaled.sums[i] = std::ldexp(scaled.sums[i], is_of_squares ? 2 * exponent : exponent);
-        }
+        for (double& sum : scaled.sums) sum = std::ldexp(sum, exponent);
         const std::optional<ErrorEstimate> error = estimateError(scaled);
         REQUIRE(error);
         CHECK(error->relative_rmse == expected->relative_rmse);

@@ -170,7 +170,7 @@ TEST_CASE("films of overlapping ranges or other shapes are refused and change no
 }
 
 TEST_CASE("a film refuses a channel count that its AOVs do not explain", "[film]") {
-    CHECK_NOTHROW(Film({3, 2, 11, kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive}));
+    CHECK_NOTHROW(Film({3, 2, 11, kAovSquares | kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive}));
     CHECK_THROWS_AS(Film({3, 2, 4, kAovSquares | kAovAlbedo}), Error);
     CHECK_THROWS_AS(Film({3, 2, 0, 0}), Error);
     const Film film({3, 2, 4, kAovSquares | kAovPrimitive});
@@ -345,7 +345,7 @@ TEST_CASE("an image says under which conditions its values came about, and how s
 }
 
 TEST_CASE("AOV planes carry their names, types and values", "[film]") {
-    const std::uint32_t in_film = kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive;
+    const std::uint32_t in_film = kAovSquares | kAovAlbedo | kAovNormal | kAovDepth | kAovPrimitive;
     Film film({1, 1, 11, in_film});
     const double means[11] = {0.4, 0.5, 0.6, 0.3, 1.0, 1.0, 1.0, 0.0, 0.6, -0.8, 42.5};
     for (int c = 0; c < 11; ++c) film.sums[2 * c] = 4 * means[c];

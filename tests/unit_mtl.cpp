@@ -249,7 +249,7 @@ TEST_CASE("colours are linear unless they are said to be sRGB", "[mesh_io][mtl]"
     CHECK_FALSE(loadMaterial("Ke 0 0 0\n").emission);
 }
 
-TEST_CASE("a colour of one number is grey; one that is no colour is left out and said", "[mesh_io][mtl]") {
+TEST_CASE("a colour of one number is grey, and one that is no colour is left out and said", "[mesh_io][mtl]") {
     const CapturedLog log;
     CHECK(loadMaterial("Kd 0.7\n").material.reflectance == constantSpectrum(.7));
     CHECK(log.warnings() == 0);

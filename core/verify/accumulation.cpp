@@ -62,7 +62,7 @@ void constantPixel(Context& context) {
 void noisyPixel(Context& context) {
     const double expected = squareFormFactor(0, 0.5);
     // Independent numbers; the spread of a path, wavelengths and all, is measured on the way.
-    const Film few = context.render(noisy("independent", "{resolution: [1, 1]}"), {.samples = 65536});
+    const Film few = context.render(noisy("independent", "{resolution: [1, 1]}"), {.samples = 65536, .squares = true});
     const double spread = std::sqrt(pathVariance(few, 0, 0)) / expected;
     for (const int bits : {20, 24, 27}) {
         if (bits > 20 && !context.atLeast(Level::Merge)) continue;

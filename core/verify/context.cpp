@@ -93,12 +93,13 @@ Film Context::render(const Scene& what, const Render& how) {
 }
 
 Film Context::renderRaw(const Scene& original, const Render& how) {
-    Scene with_seed;
+    Scene changed;
     const Scene* what = &original;
-    if (how.seed && *how.seed != original.sampler.seed) {
-        with_seed = original;
-        with_seed.sampler.seed = *how.seed;
-        what = &with_seed;
+    if (how.squares || (how.seed && *how.seed != original.sampler.seed)) {
+        changed = original;
+        if (how.seed) changed.sampler.seed = *how.seed;
+        if (how.squares) changed.sampler.replicates = 1;
+        what = &changed;
     }
     Integrator& integrator = integratorFor(how);
     const CompiledScene compiled = compileScene(*what, how.aovs, integrator.compileOptions());
@@ -288,8 +289,10 @@ double worstRatio(const Film& film, const Film& unit, double factor) {
 }
 
 double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y) {
+    const std::uint32_t squares = firstChannel(film.shape().aovs, kAovSquares);
+    if (squares == 0) throw Error(ErrorKind::Internal, "the variance of paths is asked of a film without squares");
     const double mean = film.mean(x, y, 1);
-    return film.mean(x, y, firstChannel(film.shape().aovs, kAovSquares)) - mean * mean;
+    return film.mean(x, y, squares) - mean * mean;
 }
 
 double pathVariance(const Film& film) {

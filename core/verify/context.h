@@ -25,6 +25,7 @@ struct Render {
     CrtKernelChoice kernel = CRT_KERNEL_LEAN;
     unsigned threads = 0;
     unsigned tile_size = 0;
+    bool squares = false;  ///< One sequence, whose film knows the variance of its paths (pathVariance).
 };
 
 inline Render samples(std::uint64_t count, std::uint32_t aovs = 0) { return {.samples = count, .aovs = aovs}; }

@@ -28,10 +28,10 @@ double worstFactor(const Film& film, const Film& unit, double factor) {
 void brightness(Context& context) {
     const Film unit = context.render(squareOverFloor(0, kDirect), {.samples = 64});
     const auto with = [&](const std::string& radiance) { return context.render(squareOverFloor(0, kDirect, 0.5, radiance), {.samples = 64}); };
-    for (const int m : {-100, -30, 10, 30, 100})
+    for (const int m : {-80, -30, 10, 30, 80})
         context.relative(fmt::format("radiance 2^{}: the worst of all sums", m),
                          worstFactor(with(fmt::format("{:.17g}", std::ldexp(1.0, m))), unit, std::ldexp(1.0, m)), 1, 0, {});
-    for (const int m : {-30, -10, 10, 30})
+    for (const int m : {-24, -10, 10, 24})
         context.relative(fmt::format("radiance 1e{}: the worst of all sums", m), worstFactor(with(fmt::format("1e{}", m)), unit, std::pow(10.0, m)), 1, 1e-6);
 }
 
@@ -63,8 +63,8 @@ void hopelesslyDim(Context& context) {
 }
 
 void secondMoment(Context& context) {
-    const Film unit = context.render(squareOverFloor(0, kDirect), {.samples = 64});
-    const Film bright = context.render(squareOverFloor(0, kDirect, 0.5, "1e20"), {.samples = 64});
+    const Film unit = context.render(squareOverFloor(0, kDirect), {.samples = 64, .squares = true});
+    const Film bright = context.render(squareOverFloor(0, kDirect, 0.5, "1e20"), {.samples = 64, .squares = true});
     context.relative("variance of a path at radiance 1e20, over 1e40 times that at 1", pathVariance(bright, 0, 0) / pathVariance(unit, 0, 0) / 1e40, 1, 1e-5,
                      {{std::numeric_limits<double>::infinity(), "the second moment, 1e40, is kept in single precision"}});
 }
@@ -213,7 +213,7 @@ void techniquesAgree(Context& context) {
         // Independent numbers, so that the pixel's own variance is right.
         const auto variance = [&](std::string text) {
             text += "sampler: {type: independent}\n";
-            return pathVariance(context.render(text, {.samples = 16384}));
+            return pathVariance(context.render(text, {.samples = 16384, .squares = true}));
         };
         // Veach's bound for two techniques of one sample each (1997, theorem 9.2): the better one's and μ²/2 more. It matters where chance alone has hardly
         // any noise; elsewhere 1.1.
@@ -260,7 +260,7 @@ void enormousPdf(Context& context) {
 
 std::vector<Case> lightCases() {
     return {
-        row("E01", "brightness", "A03 with a radiance of 2^±100 and 1e±30", "every sum scaled alike", "linearity of light", "exactly; 1e-6",
+        row("E01", "brightness", "A03 with a radiance of 2^±80 and 1e±24", "every sum scaled alike", "linearity of light", "exactly; 1e-6",
             Level::Commit, kDirectLight, brightness),
         row("E02", "bright-and-dim", "Under a lamp of 1e+10 beside one of 1e-10, a screen between them; two equal ones, one hidden",
             "the floor as under its lamp alone", "rectangle formula", "± 0.1 %; ± 0.3 %", Level::Merge, kDirectLight, brightAndDim),

@@ -154,7 +154,7 @@ void slits(Context& context) {
                                 .set("environment", "{radiance: 1}")
                                 .set("sampler", "{type: independent}")
                                 .yaml();
-    const Film sky_film = context.render(sky, {.samples = 65536});
+    const Film sky_film = context.render(sky, {.samples = 65536, .squares = true});
     const double second = sky_film.mean(0, 0, firstChannel(sky_film.shape().aovs, kAovSquares));
     struct Slit {
         double width;
@@ -168,7 +168,7 @@ void slits(Context& context) {
         // The plates end at 100, and so does the slit.
         const double p = polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{-h, 1, -100}, {h, 1, -100}, {h, 1, 100}, {-h, 1, 100}});
         context.estimate(fmt::format("slit of width {}", s.width), scene(s.width), meanRadiance, p, 0.02, s.effort);
-        const Film film = context.render(scene(s.width), {.samples = s.effort.samples, .seed = 99});
+        const Film film = context.render(scene(s.width), {.samples = s.effort.samples, .seed = 99, .squares = true});
         context.relative(fmt::format("slit of width {}: variance of a path", s.width), pathVariance(film), p * second - p * p, 0.1);
     }
 }
