@@ -612,7 +612,7 @@ class Developing(CliTest):
         self.crt("lit.yaml", "-b", "fake", "--samples", "0:24", "-o", "a.crtfilm")
         self.crt("lit.yaml", "-b", "fake", "--samples", "24:64", "-o", "b.crtfilm")
         self.crt("lit.yaml", "-b", "fake", "--spp", "64", "-o", "r.pfm", "-o", "r.png", "--resume", "a.crtfilm")
-        self.crt("lit.yaml", "-b", "fake", "--samples", "0:24", "-o", "a.crtfilm")
+        self.crt("lit.yaml", "-b", "fake", "--samples", "0:24", "-o", "a.crtfilm", "--overwrite")
         self.crt("develop", "b.crtfilm", "a.crtfilm", "-o", "d.pfm")
         self.assert_same_files(".pfm")
         self.crt("merge", "b.crtfilm", "a.crtfilm", "-o", "m.crtfilm", "-o", "d.pfm")

@@ -549,7 +549,8 @@ def fault_cases(samples):
         case("fault", asked, arguments, codes, words, options.pop("prepare", good), limits=limits, **options)
 
     limited("a limit of 1 kB on files (SIGXFSZ)", [*RENDER, "--set", "film.resolution=[64,64]"], 6, {resource.RLIMIT_FSIZE: 1024}, "File too large")
-    limited("a limit of 100 kB on files: the image fits, the film does not", [*RENDER, "--set", "film.resolution=[64,64]", "--checkpoint", "c.crtfilm", "--spp", "64"], 6,
+    limited("a limit of 60 kB on files: the image fits, the film does not",
+            [*RENDER, "--set", "film.resolution=[64,64]", "--set", "sampler.replicates=16", "--checkpoint", "c.crtfilm", "--spp", "64"], 6,
             {resource.RLIMIT_FSIZE: 60000}, "File too large", made=("a.pfm",))
     limited("a second of processor time (SIGXCPU)", [*RENDER, "--set", "film.resolution=[512,512]", "--spp", "1000000"], 152, {resource.RLIMIT_CPU: 1}, "SIGXCPU",
             made=("a.pfm", "a.crtfilm"))
