@@ -272,6 +272,7 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
                     case kAovAlbedo: append(multiply(albedo_color, triple(first))); break;
                     case kAovNormal: append(triple(first)); break;
                     case kAovDepth: add(film.mean(x, y, first)); break;
+                    case kAovSquares:
                     case kAovReplicates: break;
                     case kAovPrimitive: image.integers.push_back(film.primitives[pixel]); break;
                     case kAovVariance: add(error(x, y) * error(x, y)); break;

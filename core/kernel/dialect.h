@@ -16,6 +16,7 @@
 #pragma OPENCL FP_CONTRACT OFF
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define CRT_FN static inline
+#define CRT_HOT_FN CRT_FN
 #define CRT_GLOBAL __global
 #define CRT_CONSTANT __constant
 #define CRT_KERNEL_BEGIN
@@ -84,6 +85,7 @@ CRT_FN u32 mask8_bits(mask8 m) {
 #elif defined(__CUDACC__) || defined(__CUDACC_RTC__) /* ------------------------------- CUDA C++ */
 
 #define CRT_FN static __device__ inline
+#define CRT_HOT_FN CRT_FN
 #define CRT_GLOBAL
 #define CRT_CONSTANT static __device__ const
 #define CRT_KERNEL_BEGIN
@@ -167,6 +169,7 @@ CRT_FN vec4 crt_max4(vec4 a, vec4 b) {
 #include <immintrin.h>
 #endif
 #define CRT_FN static inline
+#define CRT_HOT_FN __attribute__((always_inline)) static inline /* called twice a vertex, where a call costs 1 % */
 #define CRT_GLOBAL
 #define CRT_CONSTANT static constexpr
 #define CRT_KERNEL_BEGIN namespace crt { namespace kernel {

@@ -187,7 +187,7 @@ CRT_FN f32 crt_sample_1d(CrtSampler *s, u32 dimension) { return crt_unit(crt_sam
 
 /* Two numbers, stratified together: padded pairs of the first two Sobol dimensions, index shuffled and values scrambled per (pixel,
    dimension) (Burley 2020, "Practical Hash-based Owen Scrambling"). */
-CRT_FN CrtRandom2 crt_sample_2d(CrtSampler *s, u32 dimension) {
+CRT_HOT_FN CrtRandom2 crt_sample_2d(CrtSampler *s, u32 dimension) {
     CrtRandom2 u;
     u.x = 0.0f;
     u.y = 0.0f;
