@@ -8,11 +8,11 @@
 // from the mean of independent renders of MOST samples with other seeds.
 #include "backend/integrator.h"
 #include "backend/loader.h"
-#include "error_estimate.h"
-#include "log.h"
-#include "sampling.h"
-#include "scene_yaml.h"
-#include "stats/statistics.h"
+#include "film/error_estimate.h"
+#include "base/log.h"
+#include "render/sampling.h"
+#include "scene/yaml/scene_yaml.h"
+#include "base/statistics.h"
 
 #include <fmt/format.h>
 

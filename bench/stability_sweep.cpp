@@ -3,9 +3,9 @@
 //     stability_sweep BACKEND SWEEP RAYS
 //
 // SWEEP: misses, offset-safety, offset-tightness, far, scale, fov, solid-angle. RAYS: of each point, roughly.
-#include "error.h"
-#include "log.h"
-#include "verify/probes.h"
+#include "base/error.h"
+#include "base/log.h"
+#include "judge/verify/probes.h"
 
 #include <fmt/format.h>
 

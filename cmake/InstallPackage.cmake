@@ -12,10 +12,9 @@ install(EXPORT crtTargets NAMESPACE crt:: DESTINATION ${CRT_INSTALL_CMAKE_DIR})
 
 install(FILES
   ${PROJECT_SOURCE_DIR}/core/backend/crt_backend.h
-  ${PROJECT_SOURCE_DIR}/core/backend/plugin_guard.h
-  ${PROJECT_SOURCE_DIR}/core/backend/kernel_cache.h
   ${PROJECT_BINARY_DIR}/generated/backend/crt_layout_hash.h
   DESTINATION include/crt/backend)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/backend/sdk/ DESTINATION include/crt/backend/sdk FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/kernel/ DESTINATION include/crt/kernel FILES_MATCHING PATTERN "*.h")
 
 configure_package_config_file(

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "catch.h"
-#include "log.h"
-#include "verify/temporary_folder.h"
+#include "base/log.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -4,9 +4,9 @@
 #include "backend/integrator.h"
 #include "backend/loader.h"
 #include "catch.h"
-#include "compile.h"
-#include "film.h"
-#include "scene_yaml.h"
+#include "compile/compile.h"
+#include "film/film.h"
+#include "scene/yaml/scene_yaml.h"
 
 #include <cstdint>
 #include <string>

@@ -1,8 +1,8 @@
 // What an image says of its own error, against a scene whose answer is known.
 #include "conformance.h"
 
-#include "error_estimate.h"
-#include "stats/statistics.h"
+#include "film/error_estimate.h"
+#include "base/statistics.h"
 
 #include <cmath>
 

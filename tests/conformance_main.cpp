@@ -4,8 +4,8 @@
 #define CATCH_CONFIG_RUNNER
 #include "conformance.h"
 
-#include "error.h"
-#include "log.h"
+#include "base/error.h"
+#include "base/log.h"
 
 #include <cstdio>
 #include <memory>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "catch.h"
-#include "compile.h"
+#include "compile/compile.h"
 #include "kernel/path.h"
 
 #include <cmath>

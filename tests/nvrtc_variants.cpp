@@ -9,10 +9,10 @@
 #include "cuda_program.h"
 
 #include "backend/loader.h"
-#include "compile.h"
-#include "error.h"
+#include "compile/compile.h"
+#include "base/error.h"
 #include "kernel/features.h"
-#include "scene_yaml.h"
+#include "scene/yaml/scene_yaml.h"
 
 #include <chrono>
 #include <cstdio>

@@ -2,7 +2,7 @@
 /// replicates, which state the variance of their mean as a film does.
 #pragma once
 
-#include "film.h"
+#include "film/film.h"
 
 #include <cmath>
 #include <cstdint>

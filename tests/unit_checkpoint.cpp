@@ -1,11 +1,11 @@
 // Checkpoint files: bit for bit there and back, and every kind of damage its own sentence.
 #include "catch.h"
-#include "checkpoint.h"
-#include "checkpoint_writer.h"
-#include "film_pack.h"
-#include "log.h"
-#include "scene_schema.h"
-#include "verify/temporary_folder.h"
+#include "film/checkpoint.h"
+#include "film/checkpoint_writer.h"
+#include "film/film_pack.h"
+#include "base/log.h"
+#include "scene/yaml/scene_schema.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <algorithm>
 #include <cstdio>

@@ -1,9 +1,9 @@
 // Comparing images: metrics worked out by hand, and everything that must not pass for equal.
 #include "catch.h"
-#include "compare_reference.h"
-#include "compare_text.h"
-#include "error.h"
-#include "image_metadata.h"
+#include "judge/compare/compare_reference.h"
+#include "judge/compare/compare_text.h"
+#include "base/error.h"
+#include "image/image_metadata.h"
 
 #include <nlohmann/json.hpp>
 

@@ -1,11 +1,11 @@
 // Noise and bias of images, and errors against a reference with noise, on images whose noise is known because it was made here.
 #include "catch.h"
-#include "compare_noise.h"
-#include "compare_reference.h"
-#include "compare_text.h"
-#include "error.h"
-#include "image_metadata.h"
-#include "image_noise.h"
+#include "judge/compare/compare_noise.h"
+#include "judge/compare/compare_reference.h"
+#include "judge/compare/compare_text.h"
+#include "base/error.h"
+#include "image/image_metadata.h"
+#include "judge/compare/image_noise.h"
 
 #include <nlohmann/json.hpp>
 

@@ -1,12 +1,12 @@
 // Scene → blob: which features a scene asks for, where the author's lengths and sides go, what lights, materials and tables come out, and what
 // is said to be left out.
-#include "near_scene.h"
-#include "near_surfaces.h"
+#include "compile/near_scene.h"
+#include "compile/near_surfaces.h"
 #include "kernel_test.h"
 
-#include "distributions.h"
-#include "error.h"
-#include "scene_identity.h"
+#include "compile/distributions.h"
+#include "base/error.h"
+#include "compile/scene_identity.h"
 
 #include <algorithm>
 #include <array>

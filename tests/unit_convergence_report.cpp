@@ -1,13 +1,14 @@
 // Files and report of `crt converge`, on a run that never was: 3 scenes, 2 backends, 2 variants, and everything that can be wrong with them.
 #include "catch.h"
-#include "converge/files.h"
-#include "converge/findings.h"
-#include "converge/quantity_text.h"
-#include "converge/report_html.h"
-#include "converge/svg_plot.h"
-#include "error.h"
+#include "base/unit_text.h"
+#include "judge/converge/files.h"
+#include "judge/converge/findings.h"
+#include "judge/converge/quantity_text.h"
+#include "judge/converge/report_html.h"
+#include "judge/converge/svg_plot.h"
+#include "base/error.h"
 #include "synthetic_run.h"
-#include "verify/temporary_folder.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

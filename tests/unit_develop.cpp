@@ -1,12 +1,14 @@
 // What a film knows of its scene (film_record.h), and what becomes of it in files.
 #include "catch.h"
-#include "compile.h"
-#include "film_record.h"
-#include "image_io.h"
-#include "image_metadata.h"
-#include "light_checks.h"
-#include "outputs.h"
-#include "scene_yaml.h"
+#include "film/checkpoint.h"
+#include "film/resolve.h"
+#include "compile/compile.h"
+#include "film/film_record.h"
+#include "image/image_io.h"
+#include "image/image_metadata.h"
+#include "render/light_checks.h"
+#include "render/outputs.h"
+#include "scene/yaml/scene_yaml.h"
 
 #include <fmt/format.h>
 #include <cmath>

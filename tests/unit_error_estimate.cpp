@@ -1,13 +1,14 @@
 // error_estimate.h: variances against the textbook, intervals against their promised coverage, and the replicates of the Sobol sampler, which must be
 // sequences of their own.
-#include "error_estimate.h"
+#include "film/error_estimate.h"
+#include "film/error_text.h"
 #include "kernel_test.h"
 
 #include "catch.h"
 #include "kernel/layout.h"
 #include "kernel/sampler.h"
-#include "progress.h"
-#include "sampling.h"
+#include "cli/progress.h"
+#include "render/sampling.h"
 
 #include <array>
 #include <cmath>

@@ -1,11 +1,11 @@
 // `crt compare` on pairs of images whose difference is known: alarms where there is none, and planted errors
 // that must be found.
 #include "catch.h"
-#include "compare_noise.h"
-#include "image_metadata.h"
-#include "stats/image_tests.h"
-#include "stats/pooled_tests.h"
-#include "stats/statistics.h"
+#include "judge/compare/compare_noise.h"
+#include "image/image_metadata.h"
+#include "judge/stats/image_tests.h"
+#include "judge/stats/pooled_tests.h"
+#include "base/statistics.h"
 #include "synthetic_noise.h"
 
 #include <algorithm>

@@ -1,11 +1,12 @@
 // Film: sums that do not show their order, ranges that never count twice, and what they resolve to.
 #include "catch.h"
-#include "error_estimate.h"
-#include "film.h"
-#include "image_io.h"
-#include "image_metadata.h"
-#include "stats/luminance_error.h"
-#include "stats/statistics.h"
+#include "film/resolve.h"
+#include "film/error_estimate.h"
+#include "film/film.h"
+#include "image/image_io.h"
+#include "image/image_metadata.h"
+#include "film/luminance_error.h"
+#include "base/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // Fits of convergence against renders whose variance, bias and cost are known: intervals must cover the truth as often as they say.
 #include "catch.h"
-#include "converge/fits.h"
+#include "judge/converge/fits.h"
 #include "synthetic_run.h"
 
 #include <functional>

@@ -1,10 +1,11 @@
 // What converge says where the truth is known by construction: noisy references, unequal pixels, few
 // replicates, colours beyond the gamut. bench/false_alarms.cpp asks the same of more situations, more often.
 #include "catch.h"
-#include "converge/error_model.h"
-#include "converge/fits.h"
-#include "converge/judgement.h"
-#include "converge/quantity_text.h"
+#include "film/error_text.h"
+#include "judge/converge/error_model.h"
+#include "judge/converge/fits.h"
+#include "judge/converge/judgement.h"
+#include "judge/converge/quantity_text.h"
 #include "synthetic_run.h"
 
 #include <map>

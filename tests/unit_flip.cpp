@@ -1,10 +1,10 @@
 // FLIP against the authors' own program: flip-evaluator 1.7 (PyPI), flip.evaluate(reference, test, …, applyMagma=False), linear inputs, whose map
 // was averaged in doubles. It computes in floats: where an error comes from nearly equal values, powers of 0.7 and 0.5 lift roundings of 1e-7 to some 1e-4 of one
 // pixel, and 1e-6 of a mean.
-#include "stats/flip.h"
+#include "judge/stats/flip.h"
 
 #include "catch.h"
-#include "error.h"
+#include "base/error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
 // Image files: bytes of the simple formats, everything an EXR has to keep, and what is refused.
 #include "catch.h"
-#include "error.h"
-#include "image_io.h"
-#include "log.h"
-#include "verify/temporary_folder.h"
+#include "base/error.h"
+#include "image/image_io.h"
+#include "base/log.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <cmath>
 #include <cstdlib>

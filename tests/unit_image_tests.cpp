@@ -1,8 +1,8 @@
 // The gate by simulation: what is equal passes, a bias in the mean, in one tile and in one pixel is found, fireflies are not judged.
-#include "stats/image_tests.h"
+#include "judge/stats/image_tests.h"
 
 #include "catch.h"
-#include "error.h"
+#include "base/error.h"
 
 #include <cmath>
 #include <limits>

@@ -2,7 +2,7 @@
 // as an error of the right kind.
 #include "backend/integrator.h"
 #include "catch.h"
-#include "error.h"
+#include "base/error.h"
 #include "fake_plugins/fake_pattern.h"
 #include "kernel/layout.h"
 

@@ -1,7 +1,7 @@
 // The kernel cache: it finds what was stored, and nothing that happens to its directory makes it fail or lie.
-#include "backend/kernel_cache.h"
+#include "backend/sdk/kernel_cache.h"
 #include "catch.h"
-#include "verify/temporary_folder.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

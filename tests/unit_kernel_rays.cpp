@@ -3,9 +3,9 @@
 // kernels of the Embree backend.
 #include "kernel_test.h"
 
-#include "bvh_build.h"
-#include "mesh_io.h"
-#include "verify/shapes.h"
+#include "compile/bvh_build.h"
+#include "scene/mesh/mesh_io.h"
+#include "judge/verify/shapes.h"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // Launch pacing: whatever the budget does, every sample of every pixel is launched exactly once.
-#include "backend/launch_pacer.h"
+#include "backend/sdk/launch_pacer.h"
 #include "catch.h"
 
 #include <cmath>

@@ -3,9 +3,9 @@
 #include "backend/kernel_source.h"
 #include "backend/loader.h"
 #include "catch.h"
-#include "error.h"
+#include "base/error.h"
 #include "kernel/bits_version.h"
-#include "verify/temporary_folder.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <unistd.h>
 

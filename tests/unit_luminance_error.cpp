@@ -1,6 +1,6 @@
 // The one definition of an image's error: luminance, relative to mean luminance.
 #include "catch.h"
-#include "stats/luminance_error.h"
+#include "film/luminance_error.h"
 
 #include <cmath>
 #include <random>

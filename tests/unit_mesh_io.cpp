@@ -1,9 +1,9 @@
 // OBJ: what is accepted, what it becomes, what is left out, and that every refusal names the line.
 #include "captured_log.h"
 #include "catch.h"
-#include "error.h"
-#include "mesh_io.h"
-#include "verify/temporary_folder.h"
+#include "base/error.h"
+#include "scene/mesh/mesh_io.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <cmath>
 #include <filesystem>

@@ -1,7 +1,7 @@
 // The generated meshes: exactly the promised triangles, closed, right side out, and the same bytes from every run.
 #include "catch.h"
-#include "mesh_io.h"
-#include "verify/temporary_folder.h"
+#include "scene/mesh/mesh_io.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,13 +19,8 @@ namespace {
 const std::string kMeshgen = std::string("'") + CRT_BUILD_DIR + "/bin/crt-meshgen' ";
 const std::string kMeshes = std::string(CRT_BUILD_DIR) + "/share/crt/meshes/";
 
-Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 Vec3d areaVector(const Mesh& m, const std::array<std::uint32_t, 3>& t) {
-    return cross(minus(m.positions[t[1]], m.positions[t[0]]), minus(m.positions[t[2]], m.positions[t[0]]));
+    return cross((m.positions[t[1]] - m.positions[t[0]]), (m.positions[t[2]] - m.positions[t[0]]));
 }
 
 /// Edges that are not met once from either side.
@@ -123,11 +118,11 @@ TEST_CASE("normals are written with unit length", "[meshgen]") {
 TEST_CASE("the sphere is one", "[meshgen]") {
     const Mesh m = loadObj(kMeshes + "sphere.obj").mesh;
     const Vec3d centre{0, .5, 0};
-    for (const Vec3d& p : m.positions) CHECK(std::sqrt(dot(minus(p, centre), minus(p, centre))) == Approx(.5).epsilon(1e-8));
+    for (const Vec3d& p : m.positions) CHECK(std::sqrt(dot((p - centre), (p - centre))) == Approx(.5).epsilon(1e-8));
     CHECK(agreement(m) == 1.0);
     for (std::size_t i = 0; i < m.triangles.size(); ++i)
         for (int k = 0; k < 3; ++k) {
-            const Vec3d out = minus(m.positions[m.triangles[i][k]], centre);
+            const Vec3d out = (m.positions[m.triangles[i][k]] - centre);
             REQUIRE(dot(out, m.normals[m.normal_index[i][k]]) == Approx(.5).epsilon(1e-8));
         }
 }

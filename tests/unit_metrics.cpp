@@ -1,9 +1,9 @@
 // Error metrics by hand and by their invariances, and CIEDE2000 against its published pairs.
-#include "stats/color_difference.h"
-#include "stats/metrics.h"
+#include "judge/stats/color_difference.h"
+#include "judge/stats/metrics.h"
 
 #include "catch.h"
-#include "error.h"
+#include "base/error.h"
 
 #include <cmath>
 #include <limits>

@@ -1,10 +1,10 @@
 // MTL: which files an OBJ's names lead to, what their materials become, and what is said about it.
 #include "captured_log.h"
 #include "catch.h"
-#include "error.h"
-#include "mesh_io.h"
-#include "scene_yaml.h"
-#include "verify/temporary_folder.h"
+#include "base/error.h"
+#include "scene/mesh/mesh_io.h"
+#include "scene/yaml/scene_yaml.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <filesystem>
 

@@ -1,8 +1,8 @@
 // stats/pooled_tests.h: the parts of compare's tests, each against what it promises.
 #include "catch.h"
-#include "stats/luminance_error.h"
-#include "stats/pooled_tests.h"
-#include "stats/statistics.h"
+#include "film/luminance_error.h"
+#include "judge/stats/pooled_tests.h"
+#include "base/statistics.h"
 
 #include <array>
 #include <cmath>

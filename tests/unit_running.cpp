@@ -1,13 +1,15 @@
 // What stands between the command line and the film: words to values, which samples are missing, the texts of progress, and a device that
 // fails in the middle.
-#include "arguments.h"
+#include "cli/arguments.h"
+#include "base/unit_text.h"
 #include "backend/loader.h"
 #include "catch.h"
-#include "interrupt.h"
-#include "outputs.h"
-#include "progress.h"
-#include "sampling.h"
-#include "scene_yaml.h"
+#include "cli/interrupt.h"
+#include "cli/terminal_watch.h"
+#include "render/outputs.h"
+#include "cli/progress.h"
+#include "render/sampling.h"
+#include "scene/yaml/scene_yaml.h"
 
 #include <csignal>
 #include <cstdlib>
@@ -171,8 +173,7 @@ namespace {
 struct FakeRun {
     CompiledScene compiled = compileScene(parseScene("crt: 1\nfilm: {resolution: [6, 4]}\nenvironment: {radiance: 1}\n", "test", "."), 0);
     Integrator integrator{loadBackend(std::string(CRT_FAKE_PLUGIN_DIR) + "/crt_backend_fake.so"), {}};
-    Progress progress{ProgressMode::None};
-    const InterruptGuard guard;
+    TerminalWatch watch{ProgressMode::None, TerminalWatch::Signals::Always};
 
     FakeRun() { integrator.setScene(compiled); }
     Film emptyFilm() const { return Film({compiled.width, compiled.height, compiled.channels, compiled.aovs}); }
@@ -184,13 +185,13 @@ TEST_CASE("a device that fails in the middle costs little") {
     unsetenv("CRT_FAKE_FAULT");
     FakeRun whole;
     Film reference = whole.emptyFilm();
-    CHECK(sampleFilm(whole.integrator, reference, {.ranges = {{0, 20}}, .target = 20}, whole.progress, [] {}).rendered == 20);
+    CHECK(sampleFilm(whole.integrator, reference, {.ranges = {{0, 20}}, .target = 20}, whole.watch, [] {}).rendered == 20);
 
     FakeRun failing;
     Film film = failing.emptyFilm();
     int checkpoints = 0;
     SamplingPlan plan{.ranges = {{0, 20}}, .target = 20, .chunk = 2, .checkpoint_interval_seconds = 1e-9};
-    const SamplingResult result = sampleFilm(failing.integrator, film, plan, failing.progress, [&] {
+    const SamplingResult result = sampleFilm(failing.integrator, film, plan, failing.watch, [&] {
         if (++checkpoints == 3) setenv("CRT_FAKE_FAULT", "device", 1);
     });
     unsetenv("CRT_FAKE_FAULT");
@@ -203,7 +204,7 @@ TEST_CASE("a device that fails in the middle costs little") {
     // Going on from there gives what the undisturbed run gives.
     FakeRun second;
     plan = {.ranges = missingSamples({0, 20}, film.samples), .target = 20};
-    CHECK(sampleFilm(second.integrator, film, plan, second.progress, [] {}).stop == StopReason::Samples);
+    CHECK(sampleFilm(second.integrator, film, plan, second.watch, [] {}).stop == StopReason::Samples);
     CHECK(film.samples.text() == reference.samples.text());
     for (std::uint32_t y = 0; y < 4; ++y)
         for (std::uint32_t x = 0; x < 6; ++x) CHECK(film.sum(x, y, 1) == reference.sum(x, y, 1));
@@ -213,8 +214,9 @@ TEST_CASE("a signal stops between chunks") {
     FakeRun run;
     Film film = run.emptyFilm();
     const SamplingPlan plan{.ranges = {{0, 20}}, .target = 20, .chunk = 3, .checkpoint_interval_seconds = 1e-9};
-    const SamplingResult result = sampleFilm(run.integrator, film, plan, run.progress, [] { std::raise(SIGINT); });
+    const SamplingResult result = sampleFilm(run.integrator, film, plan, run.watch, [] { std::raise(SIGINT); });
     CHECK(result.stop == StopReason::Interrupted);
-    CHECK(result.signal == SIGINT);
+    CHECK(result.request.cause == "SIGINT");
+    CHECK(result.request.exit_code == 130);
     CHECK(film.samples.text() == "0-3");
 }

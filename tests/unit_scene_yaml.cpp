@@ -1,12 +1,13 @@
 // Scene YAML: what good scenes become, and for every kind of mistake that the message names place, reason and remedy.
-#include "aov.h"
+#include "scene/aov.h"
+#include "film/resolve.h"
 #include "captured_log.h"
 #include "catch.h"
-#include "film.h"
-#include "log.h"
-#include "scene_schema.h"
-#include "scene_yaml.h"
-#include "verify/temporary_folder.h"
+#include "film/film.h"
+#include "base/log.h"
+#include "scene/yaml/scene_schema.h"
+#include "scene/yaml/scene_yaml.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <nlohmann/json.hpp>
 

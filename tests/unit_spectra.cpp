@@ -1,9 +1,9 @@
 // Spectra and colour: the measured tables by checksum and by smoothness, published reference values, and the RGB fit.
 #include "catch.h"
-#include "error.h"
-#include "spectra.h"
-#include "spectra_data.h"
-#include "verify/temporary_folder.h"
+#include "base/error.h"
+#include "spectra/spectra.h"
+#include "spectra/spectra_data.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <algorithm>
 #include <cmath>

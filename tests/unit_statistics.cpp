@@ -1,9 +1,9 @@
 // The statistics library: values of tables and of SciPy 1.17 (NumPy 2.4), and coverage and power by simulation. A simulation's band is four standard
 // deviations of its binomial count; seeds are fixed, so it passes always or never.
-#include "stats/statistics.h"
+#include "base/statistics.h"
 
 #include "catch.h"
-#include "error.h"
+#include "base/error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 #include "backend/integrator.h"
 
-#include "error.h"
+#include "base/error.h"
 #include "kernel/layout.h"
-#include "log.h"
+#include "base/log.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,8 +3,8 @@
 
 #include "backend/crt_backend.h"
 #include "backend/loader.h"
-#include "compile.h"
-#include "film.h"
+#include "compile/compile.h"
+#include "film/film.h"
 
 #include <cstdint>
 #include <functional>

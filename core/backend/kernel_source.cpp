@@ -1,9 +1,9 @@
 #include "backend/kernel_source.h"
 
-#include "backend/code_trust.h"
+#include "base/code_trust.h"
 #include "backend/crt_layout_hash.h"
-#include "error.h"
-#include "input_file.h"
+#include "base/error.h"
+#include "base/input_file.h"
 
 #include <fmt/format.h>
 

@@ -1,12 +1,13 @@
 #include "backend/loader.h"
 
-#include "backend/code_trust.h"
+#include "base/code_trust.h"
 #include "backend/crt_layout_hash.h"
 #include "backend/kernel_source.h"
-#include "error.h"
+#include "base/error.h"
 #include "kernel/bits_version.h"
-#include "log.h"
-#include "yaml_reader.h"
+#include "base/log.h"
+#include "base/modules.h"
+#include "base/words.h"
 
 #include <dlfcn.h>
 #include <elf.h>
@@ -63,7 +64,7 @@ const char* orUnknown(const char* text) { return text != nullptr && *text != '\0
 /// Names that have a plugin file in any of the directories, sorted.
 std::set<std::string> installedBackends() {
     std::set<std::string> names;
-    for (const std::string& directory : backendDirectories()) {
+    for (const std::string& directory : pluginDirectories()) {
         std::error_code unreadable;  // an absent directory holds no plugins
         for (const fs::directory_entry& file : fs::directory_iterator(directory, unreadable)) {
             const std::string stem = file.path().stem().string();
@@ -75,7 +76,7 @@ std::set<std::string> installedBackends() {
 
 /// The first directory that has the plugin wins, as in $PATH.
 std::optional<std::string> findPlugin(const std::string& name) {
-    for (const std::string& directory : backendDirectories()) {
+    for (const std::string& directory : pluginDirectories()) {
         const fs::path path = fs::path(directory) / (kFilePrefix + name + kFileSuffix);
         std::error_code unreadable;
         // A link to nowhere exists too: dlopen then says what is wrong with it.
@@ -86,7 +87,7 @@ std::optional<std::string> findPlugin(const std::string& name) {
 
 [[noreturn]] void refuseAbsent(const std::string& name) {
     std::string searched;
-    for (const std::string& directory : backendDirectories()) searched += (searched.empty() ? "" : ", ") + directory;
+    for (const std::string& directory : pluginDirectories()) searched += (searched.empty() ? "" : ", ") + directory;
 
     std::set<std::string> candidates = installedBackends();
     const bool known = std::find(std::begin(kKnownBackends), std::end(kKnownBackends), name) != std::end(kKnownBackends);
@@ -245,21 +246,6 @@ static_assert(static_cast<int>(LogLevel::Debug) == CRT_LOG_DEBUG && static_cast<
               static_cast<int>(LogLevel::Warning) == CRT_LOG_WARNING && static_cast<int>(LogLevel::Error) == CRT_LOG_ERROR);
 
 }  // namespace
-
-std::vector<std::string> backendDirectories() {
-    std::vector<std::string> directories;
-    if (const char* value = std::getenv("CRT_BACKEND_PATH")) {
-        for (std::string_view rest = value; !rest.empty();) {
-            const std::size_t length = std::min(rest.find(':'), rest.size());
-            if (length > 0) directories.emplace_back(rest.substr(0, length));
-            rest.remove_prefix(std::min(length + 1, rest.size()));
-        }
-    }
-    std::error_code unreadable;
-    const fs::path program = fs::read_symlink("/proc/self/exe", unreadable);
-    if (!unreadable) directories.push_back((program.parent_path().parent_path() / "lib" / "crt").string());
-    return directories;
-}
 
 double acceleratorReach(const LoadedBackend& backend) {
     const CrtBackend& table = *backend.table;

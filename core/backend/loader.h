@@ -21,9 +21,6 @@ struct LoadedBackend {
 /// CrtBackend::accelerator_reach of a backend that brings an acceleration structure of its own, else 0.
 double acceleratorReach(const LoadedBackend& backend);
 
-/// Directories searched, in order: each of CRT_BACKEND_PATH (colon-separated), then lib/crt beside the program's bin/.
-std::vector<std::string> backendDirectories();
-
 /// Opens exactly crt_backend_<name>.so, or `name` itself when it holds a '/'. Throws crt::Error(Backend) with one sentence: absent (where it
 /// was looked for), cannot be opened (dlerror()), not a crt backend, table too small, ABI or layout differs (both builds named), or could have been written by others
 /// (code_trust.h), which is found before anything of it is run.

@@ -1,7 +1,7 @@
-#include "atomic_file.h"
+#include "base/atomic_file.h"
 
-#include "error.h"
-#include "yaml_reader.h"
+#include "base/error.h"
+#include "base/words.h"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
-#include "input_file.h"
+#include "base/input_file.h"
 
-#include "host.h"
+#include "base/host.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "log.h"
+#include "base/log.h"
 
 #include <spdlog/logger.h>
 #include <spdlog/sinks/ansicolor_sink.h>

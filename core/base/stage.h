@@ -2,14 +2,14 @@
 /// device. Whoever works says so with a Stage; whoever owns the terminal shows it with a StageProgress.
 #pragma once
 
-#include "progress.h"
-
 #include <atomic>
 #include <chrono>
-#include <memory>
+#include <optional>
 #include <string>
 
 namespace crt {
+
+struct StageState;
 
 /// One piece of work, for as long as it lives. Cheap: nothing is drawn here. [any thread]
 class Stage {
@@ -27,7 +27,7 @@ public:
     void setAmount(double amount) noexcept { amount_.store(amount, std::memory_order_relaxed); }
 
 private:
-    friend class StageProgress;
+    friend std::optional<StageState> innermostStage();
     using Clock = std::chrono::steady_clock;
 
     const std::string what_;
@@ -35,18 +35,13 @@ private:
     const Clock::time_point start_ = Clock::now();
 };
 
-/// Shows the innermost stage while it lives: on a terminal the line that rendering has too, in a log a line
-/// for each stage that takes long and one every ten seconds. Work that is done at once is not mentioned.
-class StageProgress {
-public:
-    explicit StageProgress(ProgressMode mode);
-    ~StageProgress();
-    StageProgress(const StageProgress&) = delete;
-    StageProgress& operator=(const StageProgress&) = delete;
-
-private:
-    struct Shown;
-    std::unique_ptr<Shown> shown_;
+/// What the innermost living stage is, and how far.
+struct StageState {
+    std::string what;
+    double amount = 0, done = 0;  ///< As of Stage.
+    std::chrono::steady_clock::time_point start;
 };
+/// Nothing when no stage lives. [any thread]
+std::optional<StageState> innermostStage();
 
 }  // namespace crt

@@ -1,4 +1,4 @@
-#include "standard_output.h"
+#include "base/standard_output.h"
 
 #include <cerrno>
 #include <cstdio>

@@ -1,6 +1,6 @@
-#include "stats/statistics.h"
+#include "base/statistics.h"
 
-#include "error.h"
+#include "base/error.h"
 
 #include <boost/math/distributions/beta.hpp>
 #include <boost/math/distributions/chi_squared.hpp>

@@ -1,11 +1,12 @@
 /// Arithmetic of vectors in double precision, for everything that happens before the kernel.
 #pragma once
 
-#include "spectra.h"
-
+#include <array>
 #include <cmath>
 
 namespace crt {
+
+using Vec3d = std::array<double, 3>;
 
 inline Vec3d operator+(const Vec3d& a, const Vec3d& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 inline Vec3d operator-(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }

@@ -1,7 +1,8 @@
-#include "arguments.h"
+#include "cli/arguments.h"
 
-#include "checkpoint.h"
-#include "yaml_reader.h"
+#include "film/checkpoint.h"
+#include "base/error.h"
+#include "base/words.h"
 
 #include <fmt/format.h>
 
@@ -17,16 +18,6 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& option, const char* expected, const std::string& text) {
     throw Error(ErrorKind::Usage, fmt::format("{} takes {}, not '{}'", option, expected, text));
-}
-
-std::vector<std::string> split(const std::string& text, char separator) {
-    std::vector<std::string> parts;
-    for (std::size_t begin = 0;;) {
-        const std::size_t end = text.find(separator, begin);
-        parts.push_back(text.substr(begin, end - begin));
-        if (end == std::string::npos) return parts;
-        begin = end + 1;
-    }
 }
 
 bool endsWith(const std::string& text, std::string_view end) {
@@ -96,22 +87,15 @@ double parseDuration(const std::string& text, const std::string& option) {
 }
 
 SampleRange parseSampleRange(const std::string& text, const std::string& option) {
-    const std::vector<std::string> parts = split(text, ':');
+    const std::vector<std::string> parts = splitAt(text, ':');
     const auto first = parseUnsigned(parts.front()), end = parseUnsigned(parts.back());
     if (parts.size() != 2 || !first.value || !end.value || *first.value >= *end.value)
         refuse(option, "the first sample and one past the last, such as 0:512", text);
     return {*first.value, *end.value};
 }
 
-std::vector<std::string> parseList(const std::string& text, const std::string& option) {
-    std::vector<std::string> words = split(text, ',');
-    for (const std::string& word : words)
-        if (word.empty()) refuse(option, "names with commas between them, such as cuda,embree", text);
-    return words;
-}
-
 std::array<int, 4> parseRectangle(const std::string& text, const std::string& option) {
-    const std::vector<std::string> parts = split(text, ',');
+    const std::vector<std::string> parts = splitAt(text, ',');
     std::array<int, 4> rectangle{};
     if (parts.size() != rectangle.size()) refuse(option, "four pixel numbers x0,y0,x1,y1", text);
     for (std::size_t i = 0; i < rectangle.size(); ++i) {

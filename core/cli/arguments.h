@@ -1,7 +1,7 @@
 /// Words of the command line → values, with messages that say what was expected.
 #pragma once
 
-#include "film.h"
+#include "film/film.h"
 
 #include <array>
 #include <cstdint>
@@ -24,9 +24,6 @@ double parseDuration(const std::string& text, const std::string& option);
 
 /// "0:512": first sample, and one past the last.
 SampleRange parseSampleRange(const std::string& text, const std::string& option);
-
-/// "cuda,embree": words between commas, none of them empty.
-std::vector<std::string> parseList(const std::string& text, const std::string& option);
 
 /// "x0,y0,x1,y1".
 std::array<int, 4> parseRectangle(const std::string& text, const std::string& option);

@@ -1,9 +1,10 @@
 /// The subcommands of crt beside render (job.h): one function each, from checked arguments to an exit code. What they print goes to stdout.
 #pragma once
 
-#include "compare.h"
-#include "compare_backends.h"
-#include "job.h"
+#include "cli/progress.h"
+#include "judge/compare/compare.h"
+#include "judge/compare/compare_backends.h"
+#include "render/job.h"
 
 #include <array>
 #include <optional>
@@ -26,6 +27,7 @@ struct CompareArguments {
     std::string map_file;         ///< Of z; empty: none.
     SceneRequest scene;           ///< How to change the scene; its name is in `first`.
     BackendComparisonOptions backends;
+    ProgressMode progress = ProgressMode::Auto;
 };
 int compare(const CompareArguments& arguments);
 

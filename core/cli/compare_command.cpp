@@ -1,11 +1,12 @@
-#include "atomic_file.h"
-#include "commands.h"
-#include "compare_backends.h"
-#include "compare_text.h"
-#include "error.h"
-#include "image_io.h"
-#include "output_guard.h"
-#include "standard_output.h"
+#include "cli/terminal_watch.h"
+#include "base/atomic_file.h"
+#include "cli/commands.h"
+#include "judge/compare/compare_backends.h"
+#include "judge/compare/compare_text.h"
+#include "base/error.h"
+#include "image/image_io.h"
+#include "render/output_guard.h"
+#include "base/standard_output.h"
 
 #include <fmt/format.h>
 
@@ -106,7 +107,8 @@ int compareBackends(const CompareArguments& arguments) {
     request.file = arguments.first;
     const Scene scene = loadScene(request);
     refuseOverInputs(scene.files_read, outputs(arguments));
-    const BackendComparison comparison = compareBackends(scene, arguments.backends);
+    TerminalWatch watch(arguments.progress, TerminalWatch::Signals::Never);
+    const BackendComparison comparison = compareBackends(scene, arguments.backends, watch);
     print(arguments, backendComparisonText(comparison), backendComparisonJson(comparison));
     return comparison.passes() ? 0 : kDifferent;
 }

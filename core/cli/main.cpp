@@ -1,15 +1,16 @@
 /// The command line: arguments → what one of job.h and commands.h takes → exit code. `--help` and `--version` open no backend and no library.
-#include "arguments.h"
-#include "commands.h"
-#include "converge/engine.h"
-#include "converge/reference.h"
-#include "error.h"
-#include "interrupt.h"
-#include "job.h"
-#include "log.h"
-#include "standard_output.h"
-#include "verify/command.h"
-#include "yaml_reader.h"
+#include "cli/arguments.h"
+#include "cli/commands.h"
+#include "judge/converge/engine.h"
+#include "judge/converge/reference.h"
+#include "base/error.h"
+#include "cli/interrupt.h"
+#include "cli/terminal_watch.h"
+#include "render/job.h"
+#include "base/log.h"
+#include "base/standard_output.h"
+#include "cli/verify_command.h"
+#include "base/words.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -226,7 +227,10 @@ private:
     }
 
     CLI::App* addRender() {
-        CLI::App* render = addCommand("render", "render a scene; the word may be left out", [this] { return runJob(job_); });
+        CLI::App* render = addCommand("render", "render a scene; the word may be left out", [this] {
+            TerminalWatch watch(progress_);
+            return runJob(job_, watch);
+        });
         render->add_option("SCENE", job_.scene.file, "scene file (YAML), or - for standard input")->required();
 
         const char* group = "What is rendered";
@@ -358,7 +362,7 @@ private:
             ->group(group)
             ->needs(backends);
         addSceneChanges(compare, compare_.scene, group);
-        compare.add_flag_callback("-q,--quiet", [this] { compare_.backends.progress = ProgressMode::None; }, "no progress")->group(group);
+        compare.add_flag_callback("-q,--quiet", [this] { compare_.progress = ProgressMode::None; }, "no progress")->group(group);
     }
 
     void addMerge() {
@@ -419,7 +423,8 @@ private:
                 converge_.scenes.push_back(std::move(scene));
             }
             converge_.command = job_.command;
-            return converge::converge(converge_);
+            TerminalWatch watch(progress_, TerminalWatch::Signals::Always);
+            return converge::converge(converge_, watch);
         });
         command->footer("\nRenders every scene with every backend and variant, again and again with other seeds, looks at 1, 2, 4 ... samples, and writes one\n"
                         "page: error against seconds with its interval, efficiency, bias, whether the images' own error estimates hold, where the time goes.\n"
@@ -468,12 +473,15 @@ private:
             ->group(group);
         command->add_flag("--resume", converge_.resume, "go on with the run in that folder, of the same experiment")
             ->group(group);
-        command->add_flag_callback("-q,--quiet", [this] { converge_.progress = ProgressMode::None; }, "no progress")->group(group);
+        command->add_flag_callback("-q,--quiet", [this] { progress_ = ProgressMode::None; }, "no progress")->group(group);
     }
 
     void addReference() {
         CLI::App* command = addCommand("reference", "render an independent reference for 'crt converge' and 'crt compare'",
-                                       [this] { return converge::makeReference(reference_); });
+                                       [this] {
+                                           TerminalWatch watch(progress_, TerminalWatch::Signals::Always);
+                                           return converge::makeReference(reference_, watch);
+                                       });
         command->footer("\nAnother seed, independent samples, no roulette, and light sampling switched: as little as possible in common with what it will judge.\n"
                         "The file holds the mean and eight independent eighths of it, from which its own error follows.\n"
                         "\nExamples:\n"
@@ -494,7 +502,7 @@ private:
             ->envname("CRT_BACKEND")
             ->group(group);
         addSceneChanges(*command, reference_.scene, group);
-        command->add_flag_callback("-q,--quiet", [this] { reference_.progress = ProgressMode::None; }, "no progress")->group(group);
+        command->add_flag_callback("-q,--quiet", [this] { progress_ = ProgressMode::None; }, "no progress")->group(group);
     }
 
     void addVerify() {
@@ -555,7 +563,7 @@ private:
 
     void beQuiet() {
         setLogLevel(LogLevel::Warning);
-        job_.progress = ProgressMode::None;
+        progress_ = ProgressMode::None;
     }
 
     static unsigned smallCount(const std::string& text, const char* option, std::uint64_t least) {
@@ -578,6 +586,7 @@ private:
     Reader reader_;
     std::function<int()> action_;
     Job job_;
+    ProgressMode progress_ = ProgressMode::Auto;
     SceneRequest info_;
     CompareArguments compare_;
     MergeArguments merge_;

@@ -1,6 +1,8 @@
-#include "progress.h"
+#include "cli/progress.h"
+#include "film/error_text.h"
 
-#include "log.h"
+#include "base/log.h"
+#include "base/unit_text.h"
 
 #include <fmt/format.h>
 #include <sys/ioctl.h>
@@ -48,86 +50,6 @@ std::string stillNeeded(const ProgressState& state) {
 }
 
 }  // namespace
-
-double ProgressState::pathsPerSecond() const {
-    return elapsed_seconds > 0 ? (samples - start_samples) * static_cast<double>(pixels) / elapsed_seconds : 0;
-}
-
-double ProgressState::fraction() const {
-    double part = 0;
-    if (target > 0) part = samples / static_cast<double>(target);
-    if (time_limit_seconds > 0) part = std::max(part, elapsed_seconds / time_limit_seconds);
-    return std::clamp(part, 0.0, 1.0);
-}
-
-double ProgressState::secondsLeft() const {
-    double left = -1;
-    const double here = samples - start_samples;
-    if (target > 0 && here > 0) left = std::max(0.0, (static_cast<double>(target) - samples) * elapsed_seconds / here);
-    if (time_limit_seconds > 0) {
-        const double until_limit = std::max(0.0, time_limit_seconds - elapsed_seconds);
-        left = left < 0 ? until_limit : std::min(left, until_limit);
-    }
-    return left;
-}
-
-std::string clockText(double seconds) {
-    const auto s = static_cast<std::uint64_t>(std::llround(std::clamp(seconds, 0.0, 1e9)));
-    if (s >= 3600) return fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
-    return fmt::format("{}:{:02}", s / 60, s % 60);
-}
-
-std::string durationText(double seconds) {
-    if (seconds < 0.00995) return fmt::format("{:.2f} ms", seconds * 1e3);
-    if (seconds < 0.9995) return fmt::format("{:.0f} ms", seconds * 1e3);
-    if (seconds < 99.95) return fmt::format("{:.1f} s", seconds);
-    const auto s = static_cast<std::uint64_t>(std::llround(seconds));
-    if (s < 3600) return fmt::format("{} min {} s", s / 60, s % 60);
-    return fmt::format("{} h {} min", s / 3600, s / 60 % 60);
-}
-
-std::string rateText(double per_second, const char* unit) {
-    // Three significant digits whatever the prefix, so that the field keeps its width.
-    struct Prefix {
-        double scale;
-        const char* letter;
-    };
-    for (const Prefix prefix : {Prefix{1e9, "G"}, Prefix{1e6, "M"}, Prefix{1e3, "k"}}) {
-        const double value = per_second / prefix.scale;
-        if (value >= 1) return fmt::format("{:.{}f} {}{}", value, value < 9.995 ? 2 : value < 99.95 ? 1 : 0, prefix.letter, unit);
-    }
-    return fmt::format("{:.0f} {}", per_second, unit);
-}
-
-std::string percentText(double fraction) {
-    const double percent = fraction * 100;
-    return fmt::format("{:.{}f} %", percent, percent < 0.0995 ? 3 : percent < 0.995 ? 2 : percent < 99.5 ? 1 : 0);
-}
-
-std::string errorText(const ErrorEstimate& error) {
-    if (error.knowledge == ErrorKnowledge::NotYet) return "error not yet known";
-    if (error.knowledge == ErrorKnowledge::Bound) return "error below " + percentText(error.relative_rmse);
-    const double lower = error.relative_rmse_95.lower * 100, upper = error.relative_rmse_95.upper * 100;
-    const int digits = std::clamp(-static_cast<int>(std::floor(std::log10(std::max(upper - lower, 1e-6)))), 1, 6);
-    return fmt::format("error {:.{}f} % ({:.{}f}-{:.{}f})", error.relative_rmse * 100, digits, lower, digits, upper, digits);
-}
-
-std::string sampleCountText(const stats::Interval& samples) {
-    // Two significant digits: more would claim what the interval does not know.
-    const auto rounded = [](double value) {
-        const double unit = std::pow(10.0, std::max(0.0, std::floor(std::log10(std::max(value, 1.0))) - 1));
-        return std::ceil(value / unit) * unit;
-    };
-    return fmt::format("{:.0f}-{:.0f}", rounded(samples.lower), rounded(samples.upper));
-}
-
-std::string bytesText(double bytes) {
-    for (const auto& [scale, unit] : {std::pair{1e9, "GB"}, {1e6, "MB"}, {1e3, "kB"}}) {
-        const double value = bytes / scale;
-        if (value >= 1) return fmt::format("{:.{}f} {}", value, value < 9.95 ? 1 : 0, unit);
-    }
-    return fmt::format("{:.0f} B", bytes);
-}
 
 std::string progressText(const ProgressState& state) {
     if (!state.label.empty() && state.target == 0) return fmt::format("{}  {}", state.label, clockText(state.elapsed_seconds));

@@ -1,7 +1,7 @@
-#include "bvh_build.h"
+#include "compile/bvh_build.h"
 
 #include "kernel/bvh.h"
-#include "stage.h"
+#include "base/stage.h"
 
 #include <algorithm>
 #include <cmath>

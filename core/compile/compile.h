@@ -1,7 +1,7 @@
 /// Scene → CompiledScene: one flat, pointer-free blob (kernel/layout.h) and the feature mask that says what it needs.
 #pragma once
 
-#include "scene.h"
+#include "scene/scene.h"
 
 #include <cstddef>
 #include <cstdint>

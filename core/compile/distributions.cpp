@@ -1,4 +1,4 @@
-#include "distributions.h"
+#include "compile/distributions.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 /// Tabulated distributions that the kernels sample: wavelengths, pixel filters, the choice of an emitter.
 #pragma once
 
-#include "scene.h"
+#include "scene/scene.h"
 
 #include <cstdint>
 #include <vector>

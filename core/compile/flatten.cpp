@@ -1,10 +1,10 @@
-#include "flatten.h"
+#include "compile/flatten.h"
 
-#include "error.h"
-#include "log.h"
-#include "stage.h"
-#include "scene_limits.h"
-#include "vec3d.h"
+#include "base/error.h"
+#include "base/log.h"
+#include "base/stage.h"
+#include "scene/scene_limits.h"
+#include "base/vec3d.h"
 
 #include <fmt/format.h>
 

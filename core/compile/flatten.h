@@ -1,7 +1,7 @@
 /// Objects and transforms → one list of triangles, and lengths that single precision can hold (docs/architecture.md, "Lengths").
 #pragma once
 
-#include "scene.h"
+#include "scene/scene.h"
 
 #include <array>
 #include <cstdint>

@@ -1,10 +1,10 @@
-#include "near_scene.h"
+#include "compile/near_scene.h"
 
-#include "blob_writer.h"
-#include "bvh_build.h"
+#include "compile/blob_writer.h"
+#include "compile/bvh_build.h"
 #include "kernel/surface.h"
-#include "log.h"
-#include "near_surfaces.h"
+#include "base/log.h"
+#include "compile/near_surfaces.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,7 +1,7 @@
 /// For scenes that were compiled without a BVH: what near_surfaces.h asks about, with a BVH over that alone.
 #pragma once
 
-#include "compile.h"
+#include "compile/compile.h"
 
 namespace crt {
 

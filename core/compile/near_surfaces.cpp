@@ -1,8 +1,8 @@
-#include "near_surfaces.h"
+#include "compile/near_surfaces.h"
 
 #include "kernel/path.h"
 
-#include "vec3d.h"
+#include "base/vec3d.h"
 
 #include <algorithm>
 #include <array>

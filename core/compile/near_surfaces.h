@@ -1,7 +1,7 @@
 /// Warns of geometry that single precision cannot tell apart: surfaces nearer to each other than a ray's start is known.
 #pragma once
 
-#include "compile.h"
+#include "compile/compile.h"
 
 #include <cstdint>
 #include <optional>

@@ -1,4 +1,4 @@
-#include "scene_identity.h"
+#include "compile/scene_identity.h"
 
 #include "kernel/bits_version.h"
 

@@ -1,9 +1,9 @@
-#include "checkpoint.h"
+#include "film/checkpoint.h"
 
-#include "atomic_file.h"
-#include "film_pack.h"
-#include "input_file.h"
-#include "log.h"
+#include "base/atomic_file.h"
+#include "film/film_pack.h"
+#include "base/input_file.h"
+#include "base/log.h"
 
 #include <fmt/format.h>
 

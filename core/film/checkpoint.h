@@ -1,4 +1,4 @@
-/// What surrounds the checkpoint files of film.h (writeCheckpoint, readCheckpoint): refusing films of another scene, and merging.
+/// Files that hold a film: a checkpoint of a render, a part of one, or what a render is resumed from.
 ///
 /// A .crtfilm file, little-endian:
 ///
@@ -25,7 +25,7 @@
 /// record; its films hold squares (kernel/channels.h) without a bit that says so.
 #pragma once
 
-#include "film.h"
+#include "film/film.h"
 
 #include <cstdint>
 #include <string>
@@ -33,6 +33,20 @@
 #include <vector>
 
 namespace crt {
+
+/// Identity of what was rendered; a checkpoint of another scene, seed, film or version of the bits is
+/// refused.
+struct FilmIdentity {
+    std::string scene_hash;   ///< 32 hex digits: CompiledScene::hash.
+    std::string version;      ///< Of crt.
+    std::uint32_t bits_version = CRT_BITS_VERSION;  ///< kernel/bits_version.h of the crt that rendered it.
+    std::optional<FilmRecord> record{};             ///< Films of format 2 (checkpoint.h) have none.
+};
+
+/// Checkpoint = partial = resume file. Written to a temporary name, synced and renamed.
+void writeCheckpoint(const std::string& path, const Film& film, const FilmIdentity& identity);
+/// Throws crt::Error(Usage) on a damaged or truncated file (checksum), naming it.
+std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path);
 
 inline constexpr std::uint32_t kCheckpointVersion = 3;
 /// The last version whose films are not packed, and have no record.

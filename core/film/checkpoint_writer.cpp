@@ -1,6 +1,7 @@
-#include "checkpoint_writer.h"
+#include "film/checkpoint_writer.h"
+#include "film/checkpoint.h"
 
-#include "log.h"
+#include "base/log.h"
 
 #include <chrono>
 #include <exception>

@@ -1,8 +1,9 @@
 /// Checkpoints while a render goes on: the film is copied, and another thread packs and writes the copy.
 #pragma once
 
-#include "error.h"
-#include "film.h"
+#include "base/error.h"
+#include "film/checkpoint.h"
+#include "film/film.h"
 
 #include <functional>
 #include <future>

@@ -1,4 +1,4 @@
-#include "error_estimate.h"
+#include "film/error_estimate.h"
 
 #include <algorithm>
 #include <cmath>

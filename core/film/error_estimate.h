@@ -3,8 +3,8 @@
 /// it is about luminance Y. None of it sees a bias that all samples share.
 #pragma once
 
-#include "film.h"
-#include "stats/statistics.h"
+#include "film/film.h"
+#include "base/statistics.h"
 
 #include <array>
 #include <cstdint>

@@ -4,10 +4,10 @@
 /// any split over threads, tiles, chunks, machines or resumes resolves to the same float image.
 #pragma once
 
-#include "compile.h"
-#include "development.h"
-#include "error.h"
-#include "film_record.h"
+#include "compile/compile.h"
+#include "image/development.h"
+#include "base/error.h"
+#include "film/film_record.h"
 #include "kernel/bits_version.h"
 
 #include <array>
@@ -78,43 +78,5 @@ private:
 
 /// The pixels [x0, x1) × [y0, y1) of a film, as a film. Throws crt::Error(Internal) beyond its edge.
 Film cropped(const Film& film, const std::array<int, 4>& window);
-
-/// An image plane set: named float channels, row-major, top row first. What image_io writes and compare reads.
-struct Image {
-    std::uint32_t width = 0, height = 0;
-    std::vector<std::string> channels;      ///< "R","G","B","Albedo.R",…,"sampleCount","id.primitive"
-    std::vector<float> pixels;              ///< [height][width][channels]
-    std::vector<std::uint32_t> integers;    ///< [height][width][integer_channels]
-    std::vector<std::string> integer_channels;
-    std::vector<std::pair<std::string, std::string>> metadata;  ///< crt/backend, crt/seed, …
-    std::optional<std::array<double, 8>> chromaticities;
-    /// Where the pixels lie in the whole picture, in pixels from its upper left corner (EXR: data window), and how
-    /// large that is (EXR: display window); 0 × 0: they are all of it.
-    std::int32_t left = 0, top = 0;
-    std::uint32_t whole_width = 0, whole_height = 0;
-    /// For EXR: matrices for points as rows (film_record.h), and the chromaticity x, y of the light to be seen as
-    /// white where that was not applied.
-    std::optional<RowMatrix4d> world_to_camera, world_to_ndc;
-    std::optional<std::array<double, 2>> adopted_neutral;
-};
-
-/// XYZ sums → colour image, developed as said; AOVs as asked. StdError and Variance are of the luminance that the
-/// image has. The metadata is what the film and the development know. Throws crt::Error(Usage) for an AOV that
-/// the film lacks.
-Image resolveImage(const Film& film, const Development& development, std::uint32_t aovs);
-
-/// Identity of what was rendered; a checkpoint of another scene, seed, film or version of the bits is
-/// refused.
-struct FilmIdentity {
-    std::string scene_hash;   ///< 32 hex digits: CompiledScene::hash.
-    std::string version;      ///< Of crt.
-    std::uint32_t bits_version = CRT_BITS_VERSION;  ///< kernel/bits_version.h of the crt that rendered it.
-    std::optional<FilmRecord> record{};             ///< Films of format 2 (checkpoint.h) have none.
-};
-
-/// Checkpoint = partial = resume file. Written to a temporary name, synced and renamed.
-void writeCheckpoint(const std::string& path, const Film& film, const FilmIdentity& identity);
-/// Throws crt::Error(Usage) on a damaged or truncated file (checksum), naming it.
-std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path);
 
 }  // namespace crt

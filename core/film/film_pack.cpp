@@ -1,6 +1,6 @@
-#include "film_pack.h"
+#include "film/film_pack.h"
 
-#include "error.h"
+#include "base/error.h"
 
 #include <fmt/format.h>
 #include <zstd.h>

@@ -10,7 +10,7 @@
 ///     zstd frame of it
 #pragma once
 
-#include "film.h"
+#include "film/film.h"
 
 #include <cstddef>
 #include <cstdint>

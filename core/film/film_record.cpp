@@ -1,10 +1,10 @@
-#include "film_record.h"
+#include "film/film_record.h"
 
-#include "aov.h"
-#include "error.h"
-#include "scene.h"
-#include "vec3d.h"
-#include "yaml_reader.h"
+#include "scene/aov.h"
+#include "base/error.h"
+#include "scene/scene.h"
+#include "base/vec3d.h"
+#include "base/words.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -2,7 +2,8 @@
 /// say in words why a film and a scene do not fit. Kept in .crtfilm files as JSON (checkpoint.h).
 #pragma once
 
-#include "development.h"
+#include "image/development.h"
+#include "image/image.h"
 
 #include <array>
 #include <cstdint>
@@ -21,9 +22,6 @@ struct SceneTrait {
     std::string digest;  ///< Of what the text leaves out; empty: nothing.
     bool operator==(const SceneTrait&) const = default;
 };
-
-/// Row-major, for points as rows: p' = p · M, as OpenEXR has it.
-using RowMatrix4d = std::array<double, 16>;
 
 struct FilmRecord {
     std::string title;

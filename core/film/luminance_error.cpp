@@ -1,6 +1,6 @@
-#include "stats/luminance_error.h"
+#include "film/luminance_error.h"
 
-#include "error.h"
+#include "base/error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 /// for an image that is the same.
 #pragma once
 
-#include "spectra.h"
+#include "spectra/spectra.h"
 
 #include <array>
 #include <cstddef>

@@ -1,7 +1,7 @@
-#include "development.h"
+#include "image/development.h"
 
-#include "error.h"
-#include "scene.h"
+#include "base/error.h"
+#include "scene/scene.h"
 
 namespace crt {
 

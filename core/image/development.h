@@ -2,7 +2,7 @@
 /// after the render (`crt develop`).
 #pragma once
 
-#include "spectra.h"
+#include "spectra/spectra.h"
 
 #include <optional>
 

@@ -1,4 +1,4 @@
-#include "image_headers.h"
+#include "image/image_headers.h"
 
 #include <fmt/format.h>
 

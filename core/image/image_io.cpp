@@ -1,12 +1,12 @@
-#include "image_io.h"
+#include "image/image_io.h"
 
-#include "backend/code_trust.h"
-#include "backend/loader.h"
-#include "error.h"
-#include "image_metadata.h"
-#include "image_module.h"
-#include "input_file.h"
-#include "log.h"
+#include "base/code_trust.h"
+#include "base/modules.h"
+#include "base/error.h"
+#include "image/image_metadata.h"
+#include "image/image_module.h"
+#include "base/input_file.h"
+#include "base/log.h"
 
 #include <fmt/format.h>
 
@@ -201,7 +201,7 @@ const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {
     };
     static const Opened opened = [] {
         Opened o;
-        const std::vector<std::string> directories = backendDirectories();
+        const std::vector<std::string> directories = pluginDirectories();
         for (const std::string& directory : directories) {
             const std::string file = directory + "/" CRT_IMAGE_MODULE_FILE;
             std::error_code ignored;

@@ -8,10 +8,10 @@
 /// Files are written under a temporary name and renamed. checkWritable() (atomic_file.h) says beforehand whether that can work.
 #pragma once
 
-#include "atomic_file.h"
-#include "film.h"
-#include "scene.h"
-#include "spectra.h"
+#include "base/atomic_file.h"
+#include "image/image.h"
+#include "scene/scene.h"
+#include "spectra/spectra.h"
 
 #include <cstdint>
 #include <optional>

@@ -1,7 +1,7 @@
 // The image codec module: EXR and PNG through OpenImageIO, behind image_module.h. Built as a library of its own; nothing else in crt
 // includes OpenImageIO.
-#include "image_headers.h"
-#include "image_module.h"
+#include "image/image_headers.h"
+#include "image/image_module.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>

@@ -1,8 +1,8 @@
-#include "image_metadata.h"
+#include "image/image_metadata.h"
 
-#include "error.h"
-#include "image_io.h"
-#include "yaml_reader.h"
+#include "base/error.h"
+#include "image/image_io.h"
+#include "base/words.h"
 
 #include <fmt/format.h>
 

@@ -2,7 +2,8 @@
 /// compares share.
 #pragma once
 
-#include "film.h"
+#include "image/image.h"
+#include "image/development.h"
 
 #include <array>
 #include <optional>

@@ -1,18 +1,20 @@
-#include "job.h"
+#include "render/job.h"
 
-#include "atomic_file.h"
+#include "base/atomic_file.h"
 #include "backend/loader.h"
-#include "checkpoint.h"
-#include "checkpoint_writer.h"
-#include "compile.h"
-#include "interrupt.h"
-#include "light_checks.h"
-#include "log.h"
-#include "output_guard.h"
-#include "outputs.h"
-#include "report.h"
-#include "sampling.h"
-#include "stage.h"
+#include "film/checkpoint.h"
+#include "film/checkpoint_writer.h"
+#include "compile/compile.h"
+#include "render/light_checks.h"
+#include "base/log.h"
+#include "render/output_guard.h"
+#include "render/outputs.h"
+#include "render/report.h"
+#include "render/sampling.h"
+#include "base/stage.h"
+#include "base/unit_text.h"
+#include "film/error_text.h"
+#include "film/resolve.h"
 
 #include <fmt/format.h>
 
@@ -181,15 +183,9 @@ CompileOptions compileOptionsFor(const std::optional<LoadedBackend>& backend) {
     return backend ? compileOptionsFor(*backend) : CompileOptions{.accelerator_reach = kNobodyTraces};
 }
 
-/// What waits for the first sample, and what begins with it.
-struct Start {
-    std::optional<StageProgress> stages;      ///< Shown until then.
-    std::optional<InterruptGuard> interrupt;  ///< From then on there is something to lose: a signal no longer just ends the process.
-};
-
 /// CompiledScene → Film, by a backend. Returns what failed while sampling, if anything did; the film holds what there is.
 std::optional<Error> renderSamples(const Job& job, const LoadedBackend& backend, const CompiledScene& compiled, const SamplingPlan& plan,
-                                   Film& film, Start& start, const std::function<void()>& save_checkpoint, RunFacts& facts) {
+                                   Film& film, Watch& watch, const std::function<void()>& save_checkpoint, RunFacts& facts) {
     std::optional<Stage> stage(std::in_place, "opening the device");
     const Stopwatch opening;
     const std::vector<CrtDevice> devices = probeDevices(backend);  // Says better than a failing create() why there is none.
@@ -208,21 +204,19 @@ std::optional<Error> renderSamples(const Job& job, const LoadedBackend& backend,
     });
     facts.prepare_seconds = preparing.seconds();
     stage.reset();
-    start.stages.reset();
     askForReport(integrator, facts);
     facts.driver = driverOf(devices, arrayText(facts.backend.device));
     logInfo("{} on {}", backend.name, arrayText(facts.backend.device));
 
-    start.interrupt.emplace();
     SamplingResult result;
     {
-        Progress progress(job.progress);
-        result = sampleFilm(integrator, film, plan, progress, save_checkpoint);
+        const WatchedRendering rendering(watch);
+        result = sampleFilm(integrator, film, plan, watch, save_checkpoint);
     }
     // A device that failed is not asked again; what it said before the first sample stands.
     if (result.stop != StopReason::Failed) askForReport(integrator, facts);
     facts.stop = result.stop;
-    facts.signal = result.signal;
+    facts.request = result.request;
     facts.rendered_samples = result.rendered;
     facts.chunks = result.chunks;
     facts.sampling_seconds = result.seconds;
@@ -352,13 +346,10 @@ Scene loadScene(const SceneRequest& request) {
     return scene;
 }
 
-int runJob(const Job& job) {
+int runJob(const Job& job, Watch& watch) {
     const Stopwatch total;
     RunFacts facts;
     facts.command = job.command;
-
-    Start start;
-    start.stages.emplace(job.progress);
 
     // What is to be seen, and where it is to be written.
     Scene scene = loadScene(job.scene);
@@ -389,9 +380,8 @@ int runJob(const Job& job) {
     plan.checkpoint_possible = [&] { return checkpoint.idle(); };
 
     // Samples, from a backend into the film. None is opened when none is missing.
-    FirstFailure failure(backend ? renderSamples(job, *backend, compiled, plan, film, start, saveCheckpoint, facts) : std::nullopt);
-    start.stages.reset();
-    if (!start.interrupt) start.interrupt.emplace();
+    FirstFailure failure(backend ? renderSamples(job, *backend, compiled, plan, film, watch, saveCheckpoint, facts) : std::nullopt);
+    if (!backend) watch.renderingEnds();
     checkpoint.finish();
     facts.samples = film.samples;
     facts.invalid_samples = film.invalidSamples();
@@ -411,7 +401,7 @@ int runJob(const Job& job) {
     facts.total_seconds = total.seconds();
     facts.failure = failure.get() ? failure.get()->what() : "";
     facts.exit_code = failure.get()                             ? failure.get()->exitCode()
-                      : facts.stop == StopReason::Interrupted ? signalExitCode(facts.signal)
+                      : facts.stop == StopReason::Interrupted ? facts.request.exit_code
                                                               : 0;
     if (!files.report.empty()) failure.attempt([&] { writeReport(files.report, reportJson(scene, compiled, facts)); });
 
@@ -420,7 +410,7 @@ int runJob(const Job& job) {
     if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
     if (failure.get()) throw *failure.get();
     if (facts.stop == StopReason::Interrupted)
-        logInfo("stopped by {}; the same command with --resume {} goes on from here", signalName(facts.signal), files.saved);
+        logInfo("stopped by {}; the same command with --resume {} goes on from here", facts.request.cause, files.saved);
     return facts.exit_code;
 }
 

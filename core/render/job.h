@@ -2,9 +2,9 @@
 #pragma once
 
 #include "backend/integrator.h"
-#include "film.h"
-#include "progress.h"
-#include "scene_yaml.h"
+#include "film/film.h"
+#include "render/watch.h"
+#include "scene/yaml/scene_yaml.h"
 
 #include <array>
 #include <cstdint>
@@ -46,12 +46,11 @@ struct Job {
 
     std::vector<std::string> outputs;        ///< Instead of the scene's.
     std::optional<std::string> report_file;  ///< Unset: beside the first output. Empty: none.
-    ProgressMode progress = ProgressMode::Auto;
     std::string command;                     ///< As typed, for the report.
 };
 
-/// Runs the job and returns the exit code: 0, or 128 + signal when a signal ended the sampling early. Throws crt::Error for everything that
+/// Runs the job and returns the exit code: 0, or that of the StopRequest that ended the sampling early. Throws crt::Error for everything that
 /// goes wrong; when the device fails while rendering, after what there was has been saved.
-int runJob(const Job& job);
+int runJob(const Job& job, Watch& watch);
 
 }  // namespace crt

@@ -1,7 +1,7 @@
-#include "light_checks.h"
+#include "render/light_checks.h"
 
-#include "log.h"
-#include "vec3d.h"
+#include "base/log.h"
+#include "base/vec3d.h"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
 /// Warnings about light that gets nowhere.
 #pragma once
 
-#include "film.h"
-#include "scene.h"
+#include "film/film.h"
+#include "scene/scene.h"
 
 #include <string>
 #include <vector>

@@ -1,7 +1,7 @@
-#include "output_guard.h"
+#include "render/output_guard.h"
 
-#include "checkpoint.h"
-#include "error.h"
+#include "film/checkpoint.h"
+#include "base/error.h"
 
 #include <fmt/format.h>
 

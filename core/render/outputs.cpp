@@ -1,8 +1,9 @@
-#include "outputs.h"
+#include "render/outputs.h"
+#include "film/resolve.h"
 
-#include "checkpoint.h"
-#include "image_io.h"
-#include "image_metadata.h"
+#include "film/checkpoint.h"
+#include "image/image_io.h"
+#include "image/image_metadata.h"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,9 @@
 /// Which files a run writes, and writing them: shared by rendering, merging and developing.
 #pragma once
 
-#include "film.h"
-#include "scene.h"
+#include "film/film.h"
+#include "film/checkpoint.h"
+#include "scene/scene.h"
 
 #include <cstdint>
 #include <string>

@@ -1,8 +1,7 @@
-#include "report.h"
+#include "render/report.h"
 
 #include "backend/loader.h"
-#include "host.h"
-#include "interrupt.h"
+#include "base/host.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -165,7 +164,7 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
     for (const std::string& file : facts.outputs) outputs.push_back(file);
     report["outputs"] = std::move(outputs);
     report["stop"] = {{"reason", stopName(facts.stop)},
-                      {"signal", facts.signal != 0 ? Json(signalName(facts.signal)) : Json(nullptr)},
+                      {"signal", facts.stop == StopReason::Interrupted ? Json(facts.request.cause) : Json(nullptr)},
                       {"failure", facts.failure.empty() ? Json(nullptr) : Json(facts.failure)},
                       {"exit_code", facts.exit_code}};
     // File names and command lines are bytes, not necessarily UTF-8; a report with a replacement character beats none.

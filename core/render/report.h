@@ -2,25 +2,17 @@
 #pragma once
 
 #include "backend/crt_backend.h"
-#include "compile.h"
-#include "error_estimate.h"
-#include "film.h"
-#include "scene.h"
+#include "compile/compile.h"
+#include "film/error_estimate.h"
+#include "film/film.h"
+#include "render/sampling.h"
+#include "scene/scene.h"
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
 namespace crt {
-
-/// Why sampling ended.
-enum class StopReason {
-    Samples,      ///< Every sample asked for is there.
-    Time,         ///< --time is up.
-    Target,       ///< The target error is reached.
-    Interrupted,  ///< A signal.
-    Failed,       ///< The backend failed; the images hold what was rendered before.
-};
 
 /// Everything the report says that is not in Scene or CompiledScene. Times in seconds on the wall clock.
 struct RunFacts {
@@ -47,7 +39,7 @@ struct RunFacts {
     double target_error = 0;            ///< 0: none.
 
     StopReason stop = StopReason::Samples;
-    int signal = 0;       ///< With StopReason::Interrupted.
+    StopRequest request;  ///< With StopReason::Interrupted.
     std::string failure;  ///< The sentence, when something failed.
     int exit_code = 0;
     int warnings = 0;

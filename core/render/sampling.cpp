@@ -1,7 +1,6 @@
-#include "sampling.h"
+#include "render/sampling.h"
 
-#include "interrupt.h"
-#include "log.h"
+#include "base/log.h"
 
 #include <algorithm>
 #include <bit>
@@ -131,7 +130,7 @@ std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& 
     return missing;
 }
 
-SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan& plan, Progress& progress,
+SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint) {
     const Clock::time_point start = Clock::now();
     Clock::time_point checkpoint_at = start;
@@ -157,7 +156,10 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
 
     // Why to stop before the samples are there; nothing while there is no reason.
     const auto reasonToStop = [&]() -> std::optional<StopReason> {
-        if (InterruptGuard::signalReceived() != 0) return StopReason::Interrupted;
+        if (const std::optional<StopRequest> request = watch.stopRequested()) {
+            result.request = *request;
+            return StopReason::Interrupted;
+        }
         if (plan.time_limit_seconds > 0 && secondsSince(start) >= plan.time_limit_seconds) return StopReason::Time;
         if (targetReached()) return StopReason::Target;
         return std::nullopt;
@@ -166,11 +168,11 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
     const auto renderChunk = [&](std::uint64_t first, std::uint64_t count) {
         const Clock::time_point chunk_start = Clock::now();
         // Called from the plugin's threads: works on its own copy of the state.
-        const auto show = [&progress, start, count, before = state](double done) {
+        const auto show = [&watch, start, count, before = state](double done) {
             ProgressState now = before;
             now.samples += std::clamp(done, 0.0, 1.0) * static_cast<double>(count);
             now.elapsed_seconds = secondsSince(start);
-            progress.update(now);
+            watch.progress(now);
             return false;  // A chunk is always finished: cancelling would spoil the film on the device.
         };
         show(0);
@@ -213,7 +215,6 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
         result.failure = error;
         result.rendered = film.samples.count() - resumed;  // What was rendered but not read is lost.
     }
-    if (result.stop == StopReason::Interrupted) result.signal = InterruptGuard::signalReceived();
     result.seconds = secondsSince(start);
     return result;
 }

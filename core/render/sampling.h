@@ -3,11 +3,10 @@
 #pragma once
 
 #include "backend/integrator.h"
-#include "error.h"
-#include "error_estimate.h"
-#include "film.h"
-#include "progress.h"
-#include "report.h"
+#include "base/error.h"
+#include "film/error_estimate.h"
+#include "film/film.h"
+#include "render/watch.h"
 
 #include <cstdint>
 #include <functional>
@@ -22,6 +21,15 @@ inline constexpr std::uint64_t kEndlessSamples = std::uint64_t{1} << 53;
 /// The part of `wanted` that `there` lacks, in order.
 std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& there);
 
+/// Why sampling ended.
+enum class StopReason {
+    Samples,      ///< Every sample asked for is there.
+    Time,         ///< --time is up.
+    Target,       ///< The target error is reached.
+    Interrupted,  ///< The Watch asked for it.
+    Failed,       ///< The backend failed; the images hold what was rendered before.
+};
+
 struct SamplingPlan {
     std::vector<SampleRange> ranges;     ///< To render, in order.
     std::uint64_t target = 0;            ///< Samples per pixel in the film when all ranges are there; 0: endless.
@@ -35,7 +43,7 @@ struct SamplingPlan {
 
 struct SamplingResult {
     StopReason stop = StopReason::Samples;
-    int signal = 0;                 ///< With StopReason::Interrupted.
+    StopRequest request;            ///< With StopReason::Interrupted.
     std::optional<Error> failure;   ///< With StopReason::Failed.
     std::uint64_t rendered = 0;     ///< Samples per pixel added to the film.
     std::uint64_t chunks = 0;
@@ -52,9 +60,9 @@ std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels);
 bool reachesTarget(const Film& film, double target, bool independent_samples = false);
 
 /// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at most a small part of the run
-/// behind: a backend that failed cannot be asked for its film any more. The caller holds the InterruptGuard.
+/// behind: a backend that failed cannot be asked for its film any more. 
 /// `checkpoint` may save the film, which is up to date when it is called.
-SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan& plan, Progress& progress,
+SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint);
 
 }  // namespace crt

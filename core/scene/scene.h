@@ -2,9 +2,9 @@
 /// units and in double. Plain data without behaviour; scene_yaml.cpp fills it, compile.cpp flattens it.
 #pragma once
 
-#include "aov.h"
-#include "error.h"
-#include "spectra.h"
+#include "scene/aov.h"
+#include "base/error.h"
+#include "spectra/spectra.h"
 
 #include <array>
 #include <cstdint>

@@ -1,8 +1,8 @@
-#include "scene_limits.h"
+#include "scene/scene_limits.h"
 
-#include "error.h"
-#include "log.h"
-#include "progress.h"
+#include "base/error.h"
+#include "base/log.h"
+#include "base/unit_text.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 /// What a scene may ask for, where the file itself is fine: radiance that single precision carries, and memory in proportion to the files.
 #pragma once
 
-#include "scene.h"
+#include "scene/scene.h"
 
 #include <cstdint>
 #include <string>

@@ -2,8 +2,8 @@
 /// Computer Graphics Forum 38(2), 2019: a reflectance is the sigmoid of a quadratic in wavelength, which is smooth and
 /// cannot leave (0,1). The paper tabulates the three coefficients over the RGB cube; a scene has a handful of colours, so
 /// here they are solved for when the scene is read, to the last digit and without a table to ship.
-#include "error.h"
-#include "spectra.h"
+#include "base/error.h"
+#include "spectra/spectra.h"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
-#include "spectra.h"
+#include "spectra/spectra.h"
 
-#include "error.h"
-#include "input_file.h"
-#include "spectra_data.h"
+#include "base/error.h"
+#include "base/input_file.h"
+#include "spectra/spectra_data.h"
 
 #include <fmt/format.h>
 

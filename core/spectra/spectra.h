@@ -2,6 +2,8 @@
 /// matrices between XYZ and output colour spaces. The measured numbers live in spectra_data.cpp with their sources.
 #pragma once
 
+#include "base/vec3d.h"
+
 #include <array>
 #include <cstddef>
 #include <memory>
@@ -17,7 +19,6 @@ inline constexpr int kWavelengthMin_nm = 360;
 inline constexpr int kWavelengthMax_nm = 830;
 inline constexpr int kSpectrumSize = kWavelengthMax_nm - kWavelengthMin_nm + 1;  ///< 471 values, one a nanometre.
 
-using Vec3d = std::array<double, 3>;
 using Matrix3d = std::array<Vec3d, 3>;  ///< Rows.
 
 /// The samples of a spectrum. Copies share them until one of them is changed: scenes hold each spectrum several times, and some hold a hundred

@@ -1,5 +1,5 @@
 /// The measured numbers, as published. Nothing is computed here; spectra.cpp interpolates and normalises.
-#include "spectra_data.h"
+#include "spectra/spectra_data.h"
 
 namespace crt::data {
 

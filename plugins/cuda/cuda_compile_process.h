@@ -9,7 +9,7 @@
 
 #include "cuda_nvrtc.h"
 
-#include "backend/kernel_cache.h"
+#include "backend/sdk/kernel_cache.h"
 
 #include <sys/types.h>
 

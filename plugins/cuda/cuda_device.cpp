@@ -1,6 +1,6 @@
 #include "cuda_device.h"
 
-#include "backend/plugin_guard.h"
+#include "backend/sdk/plugin_guard.h"
 
 #include <dlfcn.h>
 

@@ -6,8 +6,8 @@
 #include "cuda_device.h"
 #include "cuda_nvrtc.h"
 
-#include "backend/kernel_cache.h"
-#include "backend/plugin_guard.h"
+#include "backend/sdk/kernel_cache.h"
+#include "backend/sdk/plugin_guard.h"
 
 #include <cstdint>
 #include <memory>

@@ -1,7 +1,7 @@
 // The CUDA backend: its ABI table and its list of devices.
 #include "cuda_integrator.h"
 
-#include "backend/plugin_guard.h"
+#include "backend/sdk/plugin_guard.h"
 #include "kernel/features.h"
 
 namespace {

@@ -5,7 +5,7 @@
 #include "embree_scene.h"
 
 #include "backend/crt_backend.h"
-#include "backend/plugin_guard.h"
+#include "backend/sdk/plugin_guard.h"
 
 #include <cstdint>
 #include <memory>

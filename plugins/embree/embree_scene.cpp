@@ -1,6 +1,6 @@
 #include "embree_scene.h"
 
-#include "backend/plugin_guard.h"
+#include "backend/sdk/plugin_guard.h"
 
 #if defined(CRT_EMBREE_MAJOR) && CRT_EMBREE_MAJOR >= 4
 #include <embree4/rtcore.h>

@@ -1,6 +1,6 @@
 #include "opencl_device.h"
 
-#include "backend/plugin_guard.h"
+#include "backend/sdk/plugin_guard.h"
 
 #include <algorithm>
 #include <cctype>

@@ -5,8 +5,8 @@
 #include "opencl_program.h"
 
 #include "backend/crt_backend.h"
-#include "backend/launch_pacer.h"
-#include "backend/plugin_guard.h"
+#include "backend/sdk/launch_pacer.h"
+#include "backend/sdk/plugin_guard.h"
 
 #include <cstdint>
 

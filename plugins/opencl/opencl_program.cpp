@@ -2,7 +2,7 @@
 
 #include "opencl_kernel_text.h"
 
-#include "backend/kernel_cache.h"
+#include "backend/sdk/kernel_cache.h"
 
 #include <chrono>
 #include <cstdio>

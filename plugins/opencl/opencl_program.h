@@ -3,7 +3,7 @@
 
 #include "opencl_device.h"
 
-#include "backend/plugin_guard.h"
+#include "backend/sdk/plugin_guard.h"
 
 #include <cstdint>
 #include <string>

@@ -1,7 +1,7 @@
 // The OpenCL backend: its ABI table and its list of devices.
 #include "opencl_integrator.h"
 
-#include "backend/plugin_guard.h"
+#include "backend/sdk/plugin_guard.h"
 #include "kernel/features.h"
 
 namespace {

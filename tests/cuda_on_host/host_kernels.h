@@ -1,7 +1,7 @@
 /// Launches of the CUDA kernels, run as loops over grid, block and thread. The kernels promise that no thread waits for another; so any order will do.
 #pragma once
 
-#include "backend/launch_pacer.h"
+#include "backend/sdk/launch_pacer.h"
 
 #include <cstdint>
 

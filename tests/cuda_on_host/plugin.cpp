@@ -1,8 +1,8 @@
 // A backend for tests: the CUDA kernels on the host's processor, so that the conformance suite sees the very entry points that a GPU runs.
 #include "host_kernels.h"
 
-#include "backend/launch_pacer.h"
-#include "backend/plugin_guard.h"
+#include "backend/sdk/launch_pacer.h"
+#include "backend/sdk/plugin_guard.h"
 #include "kernel/features.h"
 #include "kernel/layout.h"
 

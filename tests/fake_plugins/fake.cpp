@@ -11,7 +11,7 @@
 // CRT_FAKE_SCENE_SECONDS: so long takes set_scene, which says how far it is.
 // CRT_FAKE_FIRST_START_MS: so long takes the first integrator of a process, as a driver does that is not
 // loaded yet.
-#include "backend/plugin_guard.h"
+#include "backend/sdk/plugin_guard.h"
 
 #include "fake_pattern.h"
 #include "kernel/features.h"

@@ -1,6 +1,6 @@
 // The example backend with a mistake in its physics: the light of lamps is not weighted by the cosine at which it arrives on a diffuse surface.
 // `crt verify` must fail it, and say so.
-#include "backend/plugin_guard.h"
+#include "backend/sdk/plugin_guard.h"
 #include "kernel/light.h"
 
 namespace crt::kernel {

@@ -2,9 +2,9 @@
 // as it is; 1 puts in the checksum that belongs to it; anything else the size of the file as well.
 #include "fuzz_target.h"
 
-#include "checkpoint.h"
-#include "error_estimate.h"
-#include "scene.h"
+#include "film/checkpoint.h"
+#include "film/error_estimate.h"
+#include "scene/scene.h"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>

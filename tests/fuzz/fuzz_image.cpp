@@ -1,7 +1,7 @@
 // Image files: PFM and PPM by crt, EXR (pixels and metadata) and PNG by the codec module, as `crt compare` and `crt info` read them.
 #include "fuzz_target.h"
 
-#include "image_io.h"
+#include "image/image_io.h"
 
 /// Opens the codec module before the first run, or libFuzzer would not count what it covers.
 extern "C" int LLVMFuzzerInitialize(int*, char***) {

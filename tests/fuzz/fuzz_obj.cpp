@@ -1,7 +1,7 @@
 // OBJ and MTL → Mesh. The input is an OBJ file; what follows a line "%%mtl" is the material file "a.mtl".
 #include "fuzz_target.h"
 
-#include "mesh_io.h"
+#include "scene/mesh/mesh_io.h"
 
 #include <algorithm>
 #include <cmath>

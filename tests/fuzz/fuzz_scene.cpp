@@ -1,8 +1,8 @@
 // Scene YAML → Scene → CompiledScene. The text is a whole scene file; beside it lie a mesh and a spectrum that it may name.
 #include "fuzz_target.h"
 
-#include "compile.h"
-#include "scene_yaml.h"
+#include "compile/compile.h"
+#include "scene/yaml/scene_yaml.h"
 
 namespace {
 

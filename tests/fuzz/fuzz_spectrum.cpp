@@ -1,7 +1,7 @@
 // Spectrum files (.spd, .csv) → Spectrum, in all three ways of treating what lies outside the data.
 #include "fuzz_target.h"
 
-#include "spectra.h"
+#include "spectra/spectra.h"
 
 #include <cmath>
 

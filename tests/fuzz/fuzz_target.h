@@ -1,9 +1,9 @@
 /// What the fuzz targets share: files in memory, and the rule of what may come back from hostile input.
 #pragma once
 
-#include "error.h"
-#include "log.h"
-#include "verify/temporary_folder.h"
+#include "base/error.h"
+#include "base/log.h"
+#include "judge/verify/temporary_folder.h"
 
 #include <cstddef>
 #include <cstdint>

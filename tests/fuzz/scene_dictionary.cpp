@@ -1,6 +1,6 @@
 // Prints every word that the schema knows (keys, choices, defaults) as a libFuzzer dictionary.
-#include "scene_schema.h"
-#include "spectra.h"
+#include "scene/yaml/scene_schema.h"
+#include "spectra/spectra.h"
 
 #include <cstdio>
 #include <set>

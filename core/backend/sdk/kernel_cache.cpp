@@ -1,6 +1,6 @@
-#include "backend/kernel_cache.h"
+#include "backend/sdk/kernel_cache.h"
 
-#include "backend/code_trust.h"
+#include "base/code_trust.h"
 
 // Inlined from the header alone: a plugin with this cache needs no further library.
 #define XXH_INLINE_ALL

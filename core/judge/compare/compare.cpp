@@ -1,11 +1,11 @@
-#include "compare.h"
+#include "judge/compare/compare.h"
 
-#include "error.h"
-#include "image_io.h"
-#include "image_metadata.h"
-#include "image_noise.h"
-#include "stats/luminance_error.h"
-#include "stats/metrics.h"
+#include "base/error.h"
+#include "image/image_io.h"
+#include "image/image_metadata.h"
+#include "judge/compare/image_noise.h"
+#include "film/luminance_error.h"
+#include "judge/stats/metrics.h"
 
 #include <fmt/format.h>
 

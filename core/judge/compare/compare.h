@@ -1,8 +1,8 @@
 /// Image against image: are they the same bits, and if not, where and by how much.
 #pragma once
 
-#include "compare_looks.h"
-#include "film.h"
+#include "judge/compare/compare_looks.h"
+#include "film/film.h"
 
 #include <array>
 #include <cstdint>

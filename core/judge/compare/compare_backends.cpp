@@ -1,10 +1,12 @@
-#include "compare_backends.h"
+#include "judge/compare/compare_backends.h"
+#include "film/resolve.h"
 
+#include "base/unit_text.h"
 #include "backend/integrator.h"
 #include "backend/loader.h"
-#include "compile.h"
-#include "error.h"
-#include "film.h"
+#include "compile/compile.h"
+#include "base/error.h"
+#include "film/film.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -24,7 +26,7 @@ const std::vector<std::string> kColorNames{"X", "Y", "Z"};
 /// One bar over all renders.
 class SharedProgress {
 public:
-    SharedProgress(ProgressMode mode, std::uint64_t samples, std::uint64_t pixels) : progress_(mode) {
+    SharedProgress(Watch& watch, std::uint64_t samples, std::uint64_t pixels) : watch_(watch), rendering_(watch) {
         state_.target = samples;
         state_.pixels = pixels;
     }
@@ -33,7 +35,7 @@ public:
         ProgressState now = state_;
         now.samples = static_cast<double>(finished_) + std::clamp(done, 0.0, 1.0) * static_cast<double>(samples);
         now.elapsed_seconds = seconds();
-        progress_.update(now);
+        watch_.progress(now);
     }
     void finish(std::uint64_t samples) {
         finished_ += samples;
@@ -42,7 +44,8 @@ public:
     double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
 private:
-    Progress progress_;
+    Watch& watch_;
+    WatchedRendering rendering_;
     ProgressState state_;
     std::uint64_t finished_ = 0;
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -146,7 +149,7 @@ bool BackendComparison::passes() const {
     return std::all_of(backends.begin(), backends.end(), [](const BackendAgainst& b) { return b.verdict == Verdict::Pass; });
 }
 
-BackendComparison compareBackends(const Scene& scene, const BackendComparisonOptions& options) {
+BackendComparison compareBackends(const Scene& scene, const BackendComparisonOptions& options, Watch& watch) {
     if (options.backends.size() < 2) throw Error(ErrorKind::Usage, "--backends needs two names or more, such as cuda,embree");
     if (options.replicates < 2) throw Error(ErrorKind::Usage, "--replicates needs two or more: one says nothing about its own error");
     BackendComparison result;
@@ -165,7 +168,7 @@ BackendComparison compareBackends(const Scene& scene, const BackendComparisonOpt
         result.samples = std::bit_ceil((all + options.replicates - 1) / options.replicates);
     }
     const std::uint64_t renders = options.backends.size() * (1 + std::uint64_t{options.replicates});
-    SharedProgress progress(options.progress, renders * result.samples, std::uint64_t{result.width} * result.height);
+    SharedProgress progress(watch, renders * result.samples, std::uint64_t{result.width} * result.height);
 
     // All are opened first: nobody should learn after a minute that one is missing.
     std::vector<Contestant> contestants;

@@ -2,10 +2,10 @@
 /// which also judge backends that never promised the same bits.
 #pragma once
 
-#include "compare.h"
-#include "progress.h"
-#include "scene.h"
-#include "stats/image_tests.h"
+#include "judge/compare/compare.h"
+#include "render/watch.h"
+#include "scene/scene.h"
+#include "judge/stats/image_tests.h"
 
 #include <cstdint>
 #include <string>
@@ -18,7 +18,6 @@ struct BackendComparisonOptions {
     std::uint64_t samples = 0;          ///< Per pixel and replicate; 0: so many that all replicates together have the scene's, a power of two.
     std::uint32_t replicates = 16;      ///< Of each backend, every one with a seed of its own.
     stats::GateOptions gate;
-    ProgressMode progress = ProgressMode::Auto;
 };
 
 /// One backend against the last.
@@ -45,7 +44,7 @@ struct BackendComparison {
 };
 
 /// Renders in this process. Throws crt::Error(Usage) for fewer than two backends or replicates, Backend when one cannot run, Device when one fails.
-BackendComparison compareBackends(const Scene& scene, const BackendComparisonOptions& options);
+BackendComparison compareBackends(const Scene& scene, const BackendComparisonOptions& options, Watch& watch);
 
 /// A few lines without a final newline.
 std::string backendComparisonText(const BackendComparison& comparison);

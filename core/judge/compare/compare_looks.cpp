@@ -1,9 +1,9 @@
-#include "compare_looks.h"
+#include "judge/compare/compare_looks.h"
 
-#include "error.h"
-#include "image_io.h"
-#include "stats/color_difference.h"
-#include "stats/flip.h"
+#include "base/error.h"
+#include "image/image_io.h"
+#include "judge/stats/color_difference.h"
+#include "judge/stats/flip.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 /// How different two images look: FLIP and CIEDE2000 of what a screen shows of them.
 #pragma once
 
-#include "film.h"
+#include "film/film.h"
 
 #include <array>
 #include <optional>

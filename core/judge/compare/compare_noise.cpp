@@ -1,10 +1,10 @@
-#include "compare_noise.h"
+#include "judge/compare/compare_noise.h"
 
-#include "error.h"
-#include "image_io.h"
-#include "image_noise.h"
-#include "stats/pooled_tests.h"
-#include "yaml_reader.h"
+#include "base/error.h"
+#include "image/image_io.h"
+#include "judge/compare/image_noise.h"
+#include "judge/stats/pooled_tests.h"
+#include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
 

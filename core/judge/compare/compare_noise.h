@@ -1,8 +1,8 @@
 /// Is the difference of two images more than their noise?
 #pragma once
 
-#include "film.h"
-#include "stats/image_tests.h"
+#include "film/film.h"
+#include "judge/stats/image_tests.h"
 
 #include <string>
 #include <vector>

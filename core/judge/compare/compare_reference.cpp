@@ -1,11 +1,11 @@
-#include "compare_reference.h"
+#include "judge/compare/compare_reference.h"
 
-#include "compare_looks.h"
-#include "error.h"
-#include "image_metadata.h"
-#include "image_noise.h"
-#include "stats/luminance_error.h"
-#include "stats/statistics.h"
+#include "judge/compare/compare_looks.h"
+#include "base/error.h"
+#include "image/image_metadata.h"
+#include "judge/compare/image_noise.h"
+#include "film/luminance_error.h"
+#include "base/statistics.h"
 
 #include <fmt/format.h>
 

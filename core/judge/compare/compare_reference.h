@@ -1,8 +1,8 @@
 /// How far two images are from a reference, which has noise of its own.
 #pragma once
 
-#include "film.h"
-#include "stats/metrics.h"
+#include "film/film.h"
+#include "judge/stats/metrics.h"
 
 #include <array>
 #include <optional>

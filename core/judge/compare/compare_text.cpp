@@ -1,6 +1,6 @@
-#include "compare_text.h"
+#include "judge/compare/compare_text.h"
 
-#include "stats/statistics.h"
+#include "base/statistics.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

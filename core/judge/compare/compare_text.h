@@ -1,9 +1,9 @@
 /// What `crt compare` found, for people and for programs.
 #pragma once
 
-#include "compare.h"
-#include "compare_noise.h"
-#include "compare_reference.h"
+#include "judge/compare/compare.h"
+#include "judge/compare/compare_noise.h"
+#include "judge/compare/compare_reference.h"
 
 #include <string>
 

@@ -1,9 +1,9 @@
-#include "image_noise.h"
+#include "judge/compare/image_noise.h"
 
-#include "image_io.h"
-#include "image_metadata.h"
-#include "stats/luminance_error.h"
-#include "stats/statistics.h"
+#include "image/image_io.h"
+#include "image/image_metadata.h"
+#include "film/luminance_error.h"
+#include "base/statistics.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 /// What an image says of its own noise, by the channels that it carries beside its colour.
 #pragma once
 
-#include "film.h"
+#include "film/film.h"
 
 #include <array>
 #include <optional>

@@ -1,14 +1,15 @@
-#include "converge/contestant.h"
+#include "judge/converge/contestant.h"
+#include "film/resolve.h"
 
 #include "backend/loader.h"
-#include "compile.h"
-#include "converge/fits.h"
-#include "error_estimate.h"
-#include "report.h"
-#include "stats/color_difference.h"
-#include "stats/flip.h"
-#include "stats/luminance_error.h"
-#include "stats/metrics.h"
+#include "compile/compile.h"
+#include "judge/converge/fits.h"
+#include "film/error_estimate.h"
+#include "render/report.h"
+#include "judge/stats/color_difference.h"
+#include "judge/stats/flip.h"
+#include "film/luminance_error.h"
+#include "judge/stats/metrics.h"
 
 #include <fmt/format.h>
 

@@ -2,10 +2,10 @@
 #pragma once
 
 #include "backend/integrator.h"
-#include "converge/measurement.h"
-#include "converge/reference.h"
-#include "converge/replicate_file.h"
-#include "scene.h"
+#include "judge/converge/measurement.h"
+#include "judge/converge/reference.h"
+#include "judge/converge/replicate_file.h"
+#include "scene/scene.h"
 
 #include <cstdint>
 #include <functional>

@@ -1,20 +1,21 @@
-#include "converge/engine.h"
+#include "judge/converge/engine.h"
+#include "film/error_text.h"
 
-#include "atomic_file.h"
+#include "base/unit_text.h"
+#include "base/atomic_file.h"
 #include "backend/loader.h"
-#include "converge/contestant.h"
-#include "converge/experiment.h"
-#include "converge/files.h"
-#include "converge/findings.h"
-#include "converge/fits.h"
-#include "converge/quantity_text.h"
-#include "converge/report_html.h"
-#include "converge/report_maps.h"
-#include "converge/variants.h"
-#include "host.h"
-#include "interrupt.h"
-#include "log.h"
-#include "yaml_reader.h"
+#include "judge/converge/contestant.h"
+#include "judge/converge/experiment.h"
+#include "judge/converge/files.h"
+#include "judge/converge/findings.h"
+#include "judge/converge/fits.h"
+#include "judge/converge/quantity_text.h"
+#include "judge/converge/report_html.h"
+#include "judge/converge/report_maps.h"
+#include "judge/converge/variants.h"
+#include "base/host.h"
+#include "base/log.h"
+#include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
 
@@ -42,17 +43,16 @@ constexpr double kWarmUpShare = 0.4;
 /// One run from start to report.
 class Engine {
 public:
-    explicit Engine(const ConvergeRequest& request) : request_(request), start_(Clock::now()) {}
+    Engine(const ConvergeRequest& request, Watch& watch) : request_(request), watch_(watch), start_(Clock::now()) {}
 
     int run() {
-        const InterruptGuard interrupt;
         refuseAmbiguity();
         openFolder();
         describeEnvironment();
         loadReferences();
         claimFolder();
         makeReferences();
-        if (stopped()) return 128 + InterruptGuard::signalReceived();
+        if (const auto request = watch_.stopRequested()) return request->exit_code;
         openContestants();
         render();
         return report();
@@ -61,7 +61,7 @@ public:
 private:
     double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
     std::string path(const std::string& name) const { return (fs::path(request_.output) / name).string(); }
-    static bool stopped() { return InterruptGuard::signalReceived() != 0; }
+    bool stopped() const { return watch_.stopRequested().has_value(); }
 
     /// Rows are told apart by scene, backend and variant: each of these once.
     void refuseAmbiguity() {
@@ -169,13 +169,12 @@ private:
             request.output = path("reference-" + slug(names_[s]) + ".exr");
             request.seconds = kReferenceShare * request_.seconds / static_cast<double>(missing);
             request.same_estimator = true;
-            request.progress = request_.progress;
             if (holds_rows_ && !fs::exists(request.output))
                 throw Error(ErrorKind::Usage, fmt::format("'{}' is missing, against which the rows of this "
                                                           "run were measured: it cannot be resumed",
                                                           request.output));
             if (!holds_rows_) {
-                const std::optional<MadeReference> made = renderReference(scenes_[s], request);
+                const std::optional<MadeReference> made = renderReference(scenes_[s], request, watch_);
                 if (!made) return;
                 logInfo(
                     "{}: no reference was given; {} of the {} of --time made one: {} samples per pixel on "
@@ -263,8 +262,8 @@ private:
     }
 
     void render() {
-        Progress progress(request_.progress);
-        const auto stop = [] { return stopped(); };
+        const WatchedRendering rendering(watch_);
+        const auto stop = [this] { return stopped(); };
         // A report takes a little, and so does reading films; the rest is shared by replicates and configurations alike.
         const double for_report = 1 + 0.01 * request_.seconds;
         const double share = std::max(0.0, request_.seconds - elapsed() - for_report) / static_cast<double>(request_.replicates * contestants_.size());
@@ -279,7 +278,7 @@ private:
             if (replicate >= request_.replicates && elapsed() + round + for_report > request_.seconds) break;
             for (const auto& contestant : contestants_) {
                 if (contestant->looks().begin() != contestant->looks().end() && contestant->looks().begin()->second.count(replicate) > 0) continue;
-                if (!renderOne(*contestant, replicate, share, progress, stop)) {
+                if (!renderOne(*contestant, replicate, share, stop)) {
                     run_.notes.push_back(fmt::format("interrupted after {} rounds of replicates; --resume goes on", replicate));
                     return;
                 }
@@ -288,7 +287,7 @@ private:
         }
     }
 
-    bool renderOne(Contestant& contestant, std::uint32_t replicate, double share, Progress& progress, const std::function<bool()>& stop) {
+    bool renderOne(Contestant& contestant, std::uint32_t replicate, double share, const std::function<bool()>& stop) {
         const std::uint64_t most = replicate == 0 ? request_.max_samples : contestant.samplesReached();
         const auto found = [&](const Row& row) {
             run_.rows.push_back(row);
@@ -297,7 +296,7 @@ private:
             state.label = fmt::format("replicate {}  {} {} {}", replicate + 1, row.key.scene, row.key.backend, row.key.variant);
             state.elapsed_seconds = elapsed();
             state.time_limit_seconds = request_.seconds;
-            progress.update(state);
+            watch_.progress(state);
         };
         const bool done = contestant.replicate(replicate, most, share, found, stop);
         if (done) writeReplicate(replicateFile(contestant.key(), replicate), contestant.stored(replicate));
@@ -369,7 +368,7 @@ private:
         const bool failed = printVerdicts(analysis);
         logInfo("{} rounds of replicates in {}; wrote {}", rounds_, durationText(elapsed()),
                 path("report.html"));
-        if (stopped()) return 128 + InterruptGuard::signalReceived();
+        if (const auto request = watch_.stopRequested()) return request->exit_code;
         return failed ? 7 : 0;
     }
 
@@ -399,6 +398,7 @@ private:
         std::string omitted;
     };
     const ConvergeRequest& request_;
+    Watch& watch_;
     Clock::time_point start_;
     Run run_;
     std::vector<std::string> names_;  ///< Of the scenes, in keys.
@@ -415,6 +415,6 @@ private:
 
 }  // namespace
 
-int converge(const ConvergeRequest& request) { return Engine(request).run(); }
+int converge(const ConvergeRequest& request, Watch& watch) { return Engine(request, watch).run(); }
 
 }  // namespace crt::converge

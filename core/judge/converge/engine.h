@@ -2,10 +2,10 @@
 /// a machine that slows down slows all of them. This file renders; fits.h says what it means, report_html.h shows it.
 #pragma once
 
-#include "converge/reference.h"
-#include "converge/variants.h"
-#include "job.h"
-#include "progress.h"
+#include "judge/converge/reference.h"
+#include "judge/converge/variants.h"
+#include "render/job.h"
+#include "render/watch.h"
 
 #include <cstdint>
 #include <string>
@@ -25,12 +25,11 @@ struct ConvergeRequest {
     IntegratorOptions integrator;
     std::string output = "converge";       ///< Folder.
     bool resume = false;
-    ProgressMode progress = ProgressMode::Auto;
     std::string command;
 };
 
-/// Renders, fits, writes the report; the exit code: 0, 7 when a configuration's verdict is FAIL, 128 + signal when interrupted (what there is is
+/// Renders, fits, writes the report; the exit code: 0, 7 when a configuration's verdict is FAIL, that of the StopRequest when interrupted (what there is is
 /// reported). Throws crt::Error.
-int converge(const ConvergeRequest& request);
+int converge(const ConvergeRequest& request, Watch& watch);
 
 }  // namespace crt::converge

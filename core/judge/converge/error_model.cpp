@@ -1,6 +1,6 @@
-#include "converge/error_model.h"
+#include "judge/converge/error_model.h"
 
-#include "stats/luminance_error.h"
+#include "film/luminance_error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
-#include "converge/experiment.h"
+#include "judge/converge/experiment.h"
 
-#include "atomic_file.h"
-#include "converge/reference.h"
-#include "converge/report_maps.h"
-#include "error.h"
-#include "film_record.h"
-#include "input_file.h"
+#include "base/atomic_file.h"
+#include "judge/converge/reference.h"
+#include "judge/converge/report_maps.h"
+#include "base/error.h"
+#include "film/film_record.h"
+#include "base/input_file.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -2,10 +2,10 @@
 /// begins, so that --resume can refuse to mix rows of two.
 #pragma once
 
-#include "converge/measurement.h"
-#include "host.h"
-#include "job.h"
-#include "scene.h"
+#include "judge/converge/measurement.h"
+#include "base/host.h"
+#include "render/job.h"
+#include "scene/scene.h"
 
 #include <string>
 #include <utility>

@@ -1,8 +1,8 @@
-#include "converge/files.h"
+#include "judge/converge/files.h"
 
-#include "converge/json_parts.h"
-#include "error.h"
-#include "input_file.h"
+#include "judge/converge/json_parts.h"
+#include "base/error.h"
+#include "base/input_file.h"
 
 #include <fmt/format.h>
 

@@ -2,8 +2,8 @@
 /// what was run to get them (manifest.json). Units are in the names of keys and columns; what is unknown is null or an empty field.
 #pragma once
 
-#include "converge/fits.h"
-#include "converge/measurement.h"
+#include "judge/converge/fits.h"
+#include "judge/converge/measurement.h"
 
 #include <string>
 #include <vector>

@@ -1,6 +1,8 @@
-#include "converge/findings.h"
+#include "judge/converge/findings.h"
+#include "film/error_text.h"
 
-#include "converge/quantity_text.h"
+#include "base/unit_text.h"
+#include "judge/converge/quantity_text.h"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
 /// What a run has shown, in sentences: who is first and by how much, whether a bias was seen, whether images judge themselves rightly, what is missing.
 #pragma once
 
-#include "converge/fits.h"
-#include "converge/measurement.h"
+#include "judge/converge/fits.h"
+#include "judge/converge/measurement.h"
 
 #include <string>
 #include <vector>

@@ -1,9 +1,9 @@
-#include "converge/fits.h"
+#include "judge/converge/fits.h"
 
-#include "converge/error_model.h"
-#include "converge/jackknife.h"
-#include "converge/judgement.h"
-#include "converge/points.h"
+#include "judge/converge/error_model.h"
+#include "judge/converge/jackknife.h"
+#include "judge/converge/judgement.h"
+#include "judge/converge/points.h"
 
 #include <algorithm>
 #include <cmath>

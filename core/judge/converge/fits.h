@@ -17,9 +17,9 @@
 /// independent; for normal errors intervals come out too short by √((R − 2)/(R − 1)), and are widened by that.
 #pragma once
 
-#include "converge/measurement.h"
-#include "stats/image_tests.h"
-#include "stats/statistics.h"
+#include "judge/converge/measurement.h"
+#include "judge/stats/image_tests.h"
+#include "base/statistics.h"
 
 #include <array>
 #include <cstdint>

@@ -1,6 +1,6 @@
-#include "converge/jackknife.h"
+#include "judge/converge/jackknife.h"
 
-#include "stats/statistics.h"
+#include "base/statistics.h"
 
 #include <algorithm>
 #include <cmath>

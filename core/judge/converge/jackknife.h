@@ -6,7 +6,7 @@
 /// Student's degrees of freedom are those of Satterthwaite 1946.
 #pragma once
 
-#include "converge/measurement.h"
+#include "judge/converge/measurement.h"
 
 #include <cstddef>
 #include <functional>

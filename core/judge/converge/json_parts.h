@@ -1,7 +1,7 @@
 /// What the JSON files of `crt converge` have in common.
 #pragma once
 
-#include "converge/measurement.h"
+#include "judge/converge/measurement.h"
 
 #include <nlohmann/json.hpp>
 

@@ -1,6 +1,6 @@
-#include "converge/judgement.h"
+#include "judge/converge/judgement.h"
 
-#include "stats/luminance_error.h"
+#include "film/luminance_error.h"
 
 #include <fmt/format.h>
 

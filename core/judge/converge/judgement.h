@@ -1,8 +1,8 @@
 /// PASS, FAIL or INCONCLUSIVE: what a configuration's rows and images say about its being right.
 #pragma once
 
-#include "converge/error_model.h"
-#include "converge/fits.h"
+#include "judge/converge/error_model.h"
+#include "judge/converge/fits.h"
 
 #include <optional>
 

@@ -8,7 +8,7 @@
 /// an empty optional, never 0: a CPU backend has no device time, a scene without a reference has no error against one.
 #pragma once
 
-#include "film.h"
+#include "film/film.h"
 
 #include <array>
 #include <cmath>

@@ -1,7 +1,7 @@
-#include "converge/points.h"
+#include "judge/converge/points.h"
 
-#include "converge/jackknife.h"
-#include "converge/judgement.h"
+#include "judge/converge/jackknife.h"
+#include "judge/converge/judgement.h"
 
 #include <algorithm>
 #include <cmath>

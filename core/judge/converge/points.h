@@ -1,8 +1,8 @@
 /// One configuration at one number of samples per pixel.
 #pragma once
 
-#include "converge/error_model.h"
-#include "converge/fits.h"
+#include "judge/converge/error_model.h"
+#include "judge/converge/fits.h"
 
 #include <cstdint>
 

@@ -1,4 +1,6 @@
-#include "converge/quantity_text.h"
+#include "base/unit_text.h"
+#include "film/error_text.h"
+#include "judge/converge/quantity_text.h"
 
 #include <fmt/format.h>
 

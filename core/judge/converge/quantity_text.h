@@ -1,7 +1,7 @@
 /// Numbers for people: few digits, units always, and the interval beside the value. Plain UTF-8, not yet escaped for HTML.
 #pragma once
 
-#include "converge/measurement.h"
+#include "judge/converge/measurement.h"
 
 #include <cstdint>
 #include <string>

@@ -1,17 +1,19 @@
-#include "converge/reference.h"
+#include "judge/converge/reference.h"
+#include "film/error_text.h"
+#include "film/resolve.h"
 
-#include "atomic_file.h"
+#include "base/unit_text.h"
+#include "base/atomic_file.h"
 #include "backend/loader.h"
-#include "compile.h"
-#include "converge/files.h"
-#include "image_io.h"
-#include "interrupt.h"
-#include "log.h"
-#include "output_guard.h"
-#include "sampling.h"
-#include "stats/luminance_error.h"
-#include "stats/statistics.h"
-#include "yaml_reader.h"
+#include "compile/compile.h"
+#include "judge/converge/files.h"
+#include "image/image_io.h"
+#include "base/log.h"
+#include "render/output_guard.h"
+#include "render/sampling.h"
+#include "film/luminance_error.h"
+#include "base/statistics.h"
+#include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
 
@@ -140,10 +142,9 @@ std::string colourText(const Scene& scene) {
     return fmt::format("exposure {} EV, {}, {}", development.exposure_ev, space(development.color_space), white);
 }
 
-int makeReference(const ReferenceRequest& request) {
-    const InterruptGuard interrupt;
-    const std::optional<MadeReference> made = renderReference(loadScene(request.scene), request);
-    if (!made) return 128 + InterruptGuard::signalReceived();
+int makeReference(const ReferenceRequest& request, Watch& watch) {
+    const std::optional<MadeReference> made = renderReference(loadScene(request.scene), request, watch);
+    if (!made) return watch.stopRequested()->exit_code;
     logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, made->samples, kFolds,
             made->estimator, durationText(made->seconds));
     if (made->error) logInfo("its own {}", errorText(*made->error));
@@ -163,11 +164,11 @@ struct RenderedFolds {
 };
 
 /// Each eighth has samples of its own. The first also finds out how many fit into the time. Nothing when a
-/// signal came.
+/// the Watch asked to stop.
 std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene& compiled,
-                                         Integrator& integrator, const ReferenceRequest& request) {
+                                         Integrator& integrator, const ReferenceRequest& request, Watch& watch) {
     const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
-    Progress progress(request.progress);
+    const WatchedRendering rendering(watch);
     ProgressState state;
     state.pixels = std::uint64_t{shape.width} * shape.height;
     const auto started = std::chrono::steady_clock::now();
@@ -179,7 +180,7 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene
         const std::uint64_t first = std::uint64_t{fold} << 44;
         std::uint64_t done = 0;
         for (std::uint64_t chunk = 1; per_fold == 0 || done < per_fold;) {
-            if (InterruptGuard::signalReceived() != 0) return std::nullopt;
+            if (watch.stopRequested()) return std::nullopt;
             const double before = elapsed();
             if (per_fold > 0) chunk = std::min(chunk, per_fold - done);
             integrator.render({.first_sample = first + done, .sample_count = chunk});
@@ -189,7 +190,7 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene
             state.samples = static_cast<double>(fold * per_fold + done);
             state.target = per_fold * kFolds;
             if (request.samples == 0) state.time_limit_seconds = request.seconds;
-            progress.update(state);
+            watch.progress(state);
             if (per_fold == 0 && elapsed() > 0.04 * request.seconds)
                 per_fold = std::max(done, affordable(request.seconds / kFolds, took / static_cast<double>(chunk)));
             if (took < 0.25) chunk *= 2;
@@ -223,7 +224,7 @@ Image referenceImage(const RenderedFolds& folds, const Scene& scene) {
 
 }  // namespace
 
-std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request) {
+std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request, Watch& watch) {
     if (scene.integrator.type != IntegratorType::Path)
         throw Error(ErrorKind::Usage,
                     "a view has no noise and needs no reference: integrator.type must be path");
@@ -241,7 +242,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     const LoadedBackend backend = openBackend(request.backend);
     Integrator integrator(backend, request.integrator);
     const std::optional<RenderedFolds> folds =
-        renderFolds(scene, compileScene(scene, 0, integrator.compileOptions()), integrator, request);
+        renderFolds(scene, compileScene(scene, 0, integrator.compileOptions()), integrator, request, watch);
     if (!folds) return std::nullopt;
     Image file = referenceImage(*folds, scene);
     file.metadata.emplace_back("Software", "crt " CRT_VERSION);

@@ -5,12 +5,12 @@
 #pragma once
 
 #include "backend/integrator.h"
-#include "converge/measurement.h"
-#include "error_estimate.h"
-#include "job.h"
-#include "progress.h"
-#include "scene.h"
-#include "stats/image_tests.h"
+#include "judge/converge/measurement.h"
+#include "film/error_estimate.h"
+#include "render/job.h"
+#include "render/watch.h"
+#include "scene/scene.h"
+#include "judge/stats/image_tests.h"
 
 #include <cstdint>
 #include <optional>
@@ -30,21 +30,20 @@ struct ReferenceRequest {
     std::uint64_t samples = 0;      ///< Per pixel in all; 0: as many as `seconds` allow.
     double seconds = 60;
     bool same_estimator = false;    ///< Keep integrator.nee as the scene has it: less noise, less independence.
-    ProgressMode progress = ProgressMode::Auto;
 };
 
 /// Renders it and returns the exit code. Throws crt::Error.
-int makeReference(const ReferenceRequest& request);
+int makeReference(const ReferenceRequest& request, Watch& watch);
 
 /// The same for a scene that is read already; `request.scene` does not matter. What it took and how noisy it
-/// is, or nothing when a signal stopped it.
+/// is, or nothing when the Watch stopped it.
 struct MadeReference {
     std::uint64_t samples = 0;  ///< Per pixel.
     std::string estimator;
     double seconds = 0;
     std::optional<ErrorEstimate> error;
 };
-std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request);
+std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request, Watch& watch);
 
 /// The scene as a reference renders it: independent samples, another seed, light sampling switched, no roulette.
 Scene referenceScene(Scene scene, bool same_estimator);

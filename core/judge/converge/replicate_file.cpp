@@ -1,8 +1,8 @@
-#include "converge/replicate_file.h"
+#include "judge/converge/replicate_file.h"
 
-#include "atomic_file.h"
-#include "error.h"
-#include "input_file.h"
+#include "base/atomic_file.h"
+#include "base/error.h"
+#include "base/input_file.h"
 
 #include <fmt/format.h>
 

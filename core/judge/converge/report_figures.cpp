@@ -1,8 +1,10 @@
-#include "converge/report_figures.h"
+#include "judge/converge/report_figures.h"
+#include "film/error_text.h"
 
-#include "converge/findings.h"
-#include "converge/quantity_text.h"
-#include "converge/report_maps.h"
+#include "base/unit_text.h"
+#include "judge/converge/findings.h"
+#include "judge/converge/quantity_text.h"
+#include "judge/converge/report_maps.h"
 
 #include <fmt/format.h>
 

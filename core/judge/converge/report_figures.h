@@ -1,9 +1,9 @@
 /// The figures of a scene: which curve goes where, and the sentence that says how to read it.
 #pragma once
 
-#include "converge/fits.h"
-#include "converge/measurement.h"
-#include "converge/svg_plot.h"
+#include "judge/converge/fits.h"
+#include "judge/converge/measurement.h"
+#include "judge/converge/svg_plot.h"
 
 #include <string>
 #include <vector>

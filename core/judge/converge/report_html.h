@@ -1,8 +1,8 @@
 /// One self-contained page: findings, tables, figures, maps, environment. No script, no request to anywhere; reads on a phone, in the dark, and printed.
 #pragma once
 
-#include "converge/fits.h"
-#include "converge/measurement.h"
+#include "judge/converge/fits.h"
+#include "judge/converge/measurement.h"
 
 #include <string>
 #include <vector>

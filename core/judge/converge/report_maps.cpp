@@ -1,8 +1,9 @@
-#include "converge/report_maps.h"
+#include "judge/converge/report_maps.h"
 
-#include "converge/quantity_text.h"
-#include "error.h"
-#include "image_io.h"
+#include "base/unit_text.h"
+#include "judge/converge/quantity_text.h"
+#include "base/error.h"
+#include "image/image_io.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 /// Maps of a configuration as PNG: the image, its error, what it believes its error to be, their ratio, and FLIP.
 #pragma once
 
-#include "converge/measurement.h"
+#include "judge/converge/measurement.h"
 
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "converge/report_style.h"
+#include "judge/converge/report_style.h"
 
 namespace crt::converge {
 

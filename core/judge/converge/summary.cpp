@@ -1,7 +1,7 @@
 // summary.json: fits, verdicts, references, stages and environment.
-#include "atomic_file.h"
-#include "converge/files.h"
-#include "converge/json_parts.h"
+#include "base/atomic_file.h"
+#include "judge/converge/files.h"
+#include "judge/converge/json_parts.h"
 
 #include <cmath>
 

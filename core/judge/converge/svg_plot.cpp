@@ -1,4 +1,4 @@
-#include "converge/svg_plot.h"
+#include "judge/converge/svg_plot.h"
 
 #include <fmt/format.h>
 

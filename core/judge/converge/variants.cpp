@@ -1,8 +1,8 @@
-#include "converge/variants.h"
+#include "judge/converge/variants.h"
 
-#include "arguments.h"
-#include "error.h"
-#include "yaml_reader.h"
+#include "base/words.h"
+#include "base/error.h"
+#include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
 /// What `--vary` makes of a scene, and how large it is rendered.
 #pragma once
 
-#include "job.h"
-#include "scene.h"
+#include "render/job.h"
+#include "scene/scene.h"
 
 #include <string>
 #include <vector>

@@ -1,6 +1,6 @@
-#include "stats/color_difference.h"
+#include "judge/stats/color_difference.h"
 
-#include "error.h"
+#include "base/error.h"
 
 #include <algorithm>
 #include <cmath>

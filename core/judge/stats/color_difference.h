@@ -1,7 +1,7 @@
 /// Colours as they look: CIE L*a*b* and the difference CIEDE2000.
 #pragma once
 
-#include "stats/rgb_view.h"
+#include "judge/stats/rgb_view.h"
 
 #include <array>
 #include <cstdint>

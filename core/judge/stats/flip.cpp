@@ -1,6 +1,6 @@
-#include "stats/flip.h"
+#include "judge/stats/flip.h"
 
-#include "stats/color_difference.h"
+#include "judge/stats/color_difference.h"
 
 #include <algorithm>
 #include <array>

@@ -5,7 +5,7 @@
 /// medians) this agrees with it (unit_flip.cpp).
 #pragma once
 
-#include "stats/rgb_view.h"
+#include "judge/stats/rgb_view.h"
 
 #include <vector>
 

@@ -1,7 +1,7 @@
-#include "stats/image_tests.h"
+#include "judge/stats/image_tests.h"
 
-#include "error.h"
-#include "stats/pooled_tests.h"
+#include "base/error.h"
+#include "judge/stats/pooled_tests.h"
 
 #include <fmt/format.h>
 

@@ -2,7 +2,7 @@
 /// knows when too few samples carry the answer for any of it to be trusted.
 #pragma once
 
-#include "stats/statistics.h"
+#include "base/statistics.h"
 
 #include <cstdint>
 #include <span>

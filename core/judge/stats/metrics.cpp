@@ -1,6 +1,6 @@
-#include "stats/metrics.h"
+#include "judge/stats/metrics.h"
 
-#include "error.h"
+#include "base/error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "stats/pooled_tests.h"
+#include "judge/stats/pooled_tests.h"
 
 #include <algorithm>
 #include <cmath>

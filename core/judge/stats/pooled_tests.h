@@ -3,7 +3,7 @@
 /// taken as normal where that would raise alarms: fireflies are common.
 #pragma once
 
-#include "stats/image_tests.h"
+#include "judge/stats/image_tests.h"
 
 #include <cstddef>
 #include <cstdint>

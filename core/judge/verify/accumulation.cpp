@@ -1,7 +1,7 @@
 // Group I: sums of many samples, random numbers, samplers.
-#include "verify/context.h"
-#include "verify/references.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
 
 #include "kernel/features.h"
 #include "kernel/sampler.h"

@@ -1,8 +1,8 @@
 // Group L: floating point environment and backends. A backend is asked for the bits of crt's own portable build of the kernel, which is stricter than any
 // tolerance.
-#include "verify/context.h"
-#include "verify/shapes.h"
-#include "verify/variants.h"
+#include "judge/verify/context.h"
+#include "judge/verify/shapes.h"
+#include "judge/verify/variants.h"
 
 #include "kernel/features.h"
 

@@ -1,7 +1,7 @@
-#include "verify/case.h"
+#include "judge/verify/case.h"
 
-#include "error.h"
-#include "yaml_reader.h"
+#include "base/error.h"
+#include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
 

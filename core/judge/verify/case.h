@@ -5,7 +5,7 @@
 /// (`crt verify --list`) and the reports are made from the row.
 #pragma once
 
-#include "stats/statistics.h"
+#include "base/statistics.h"
 
 #include <cstdint>
 #include <optional>

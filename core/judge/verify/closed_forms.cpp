@@ -1,10 +1,10 @@
 // Group A: scenes whose radiance is known in closed form, or by deterministic quadrature.
-#include "verify/context.h"
-#include "verify/references.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
 
 #include "kernel/features.h"
-#include "vec3d.h"
+#include "base/vec3d.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 // Group A, the part about smooth interfaces: Fresnel, Snell, the scaling of radiance by n², dispersion.
-#include "verify/context.h"
-#include "verify/references.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
 
 #include "kernel/features.h"
 

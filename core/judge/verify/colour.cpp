@@ -1,9 +1,10 @@
 // Group H: spectra and colour.
-#include "verify/context.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "film/resolve.h"
+#include "judge/verify/scenes.h"
 
-#include "compile.h"
-#include "image_io.h"
+#include "compile/compile.h"
+#include "image/image_io.h"
 #include "kernel/features.h"
 
 #include <fmt/format.h>

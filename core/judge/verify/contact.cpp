@@ -1,12 +1,12 @@
 // Group O: emitters that touch the surfaces they light, or nearly do. There the two techniques of direct
 // light, points on the emitter and scattered rays, must still be about one point, with one density, in every
 // order of the vertices.
-#include "verify/context.h"
-#include "verify/references.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
 
 #include "kernel/features.h"
-#include "vec3d.h"
+#include "base/vec3d.h"
 
 #include <fmt/format.h>
 

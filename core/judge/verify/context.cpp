@@ -1,8 +1,8 @@
-#include "verify/context.h"
+#include "judge/verify/context.h"
 
-#include "compile.h"
-#include "error.h"
-#include "verify/physics.h"
+#include "compile/compile.h"
+#include "base/error.h"
+#include "judge/verify/physics.h"
 
 #include <fmt/format.h>
 

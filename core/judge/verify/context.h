@@ -3,9 +3,9 @@
 
 #include "backend/integrator.h"
 #include "backend/loader.h"
-#include "film.h"
-#include "scene_yaml.h"
-#include "verify/case.h"
+#include "film/film.h"
+#include "scene/yaml/scene_yaml.h"
+#include "judge/verify/case.h"
 
 #include <cstdint>
 #include <functional>

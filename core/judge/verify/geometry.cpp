@@ -1,11 +1,11 @@
 // Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a ray that leaks, or meets what it should not,
 // shows.
-#include "verify/probes.h"
-#include "verify/references.h"
+#include "judge/verify/probes.h"
+#include "judge/verify/references.h"
 
 #include "kernel/features.h"
 #include "kernel/layout.h"
-#include "log.h"
+#include "base/log.h"
 
 #include <fmt/format.h>
 

@@ -1,10 +1,11 @@
 // Group J: film and camera.
-#include "verify/context.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "film/resolve.h"
+#include "judge/verify/scenes.h"
 
-#include "compile.h"
+#include "compile/compile.h"
 #include "kernel/features.h"
-#include "log.h"
+#include "base/log.h"
 
 #include <fmt/format.h>
 

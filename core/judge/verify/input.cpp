@@ -1,9 +1,9 @@
 // Group K: input hygiene and size. What is wrong is refused by name before anything is rendered, or borne and the same image. One of each kind: every
 // refusal has a test of its own (tests/unit_scene_yaml.cpp, tests/unit_mesh_io.cpp), and every reader a fuzz target (tests/fuzz).
-#include "verify/context.h"
-#include "verify/temporary_folder.h"
+#include "judge/verify/context.h"
+#include "judge/verify/temporary_folder.h"
 
-#include "error.h"
+#include "base/error.h"
 
 #include <fmt/format.h>
 

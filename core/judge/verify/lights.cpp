@@ -1,9 +1,9 @@
 // Group E: lights that are bright, dim, tiny, near, edge-on, many, or nothing.
-#include "verify/context.h"
-#include "verify/references.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
 
-#include "distributions.h"
+#include "compile/distributions.h"
 #include "kernel/features.h"
 
 #include <fmt/format.h>

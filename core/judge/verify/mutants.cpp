@@ -1,11 +1,11 @@
 // Group N: questions that were written because a planted fault (tests/mutations) would otherwise have gone unnoticed. Small scenes, each sharp against one
 // mistake.
-#include "verify/context.h"
-#include "verify/references.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
 
 #include "kernel/features.h"
-#include "spectra.h"
+#include "spectra/spectra.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "verify/physics.h"
+#include "judge/verify/physics.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 /// What wrong figures say about the physics that is wrong.
 #pragma once
 
-#include "verify/context.h"
+#include "judge/verify/context.h"
 
 #include <string>
 #include <vector>

@@ -1,6 +1,6 @@
-#include "verify/probes.h"
+#include "judge/verify/probes.h"
 
-#include "compile.h"
+#include "compile/compile.h"
 #include "kernel/path.h"
 
 #include <fmt/format.h>

@@ -2,8 +2,8 @@
 /// the same everywhere; so geometry can be built onto them, and every pixel of the film counts for one ray.
 #pragma once
 
-#include "verify/context.h"
-#include "verify/shapes.h"
+#include "judge/verify/context.h"
+#include "judge/verify/shapes.h"
 
 #include <cstdint>
 

@@ -1,5 +1,5 @@
 // Group D: rays and traversal. Rays are those of cameras, known beforehand (probes.h); what they must meet is known by topology or by arithmetic in double.
-#include "verify/probes.h"
+#include "judge/verify/probes.h"
 
 #include "kernel/features.h"
 #include "kernel/layout.h"

@@ -1,6 +1,6 @@
-#include "verify/references.h"
+#include "judge/verify/references.h"
 
-#include "vec3d.h"
+#include "base/vec3d.h"
 
 #include <boost/math/quadrature/gauss.hpp>
 

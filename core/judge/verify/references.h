@@ -1,7 +1,7 @@
 /// What the cases expect, worked out in double from closed forms and deterministic quadrature.
 #pragma once
 
-#include "spectra.h"
+#include "spectra/spectra.h"
 
 #include <functional>
 #include <vector>

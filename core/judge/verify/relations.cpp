@@ -1,8 +1,8 @@
 // Group M: relations between images. Those that hold exactly, M01 to M19, ask for the same bits and cost little; they need no reference.
-#include "verify/context.h"
-#include "verify/shapes.h"
-#include "verify/temporary_folder.h"
-#include "verify/variants.h"
+#include "judge/verify/context.h"
+#include "judge/verify/shapes.h"
+#include "judge/verify/temporary_folder.h"
+#include "judge/verify/variants.h"
 
 #include "kernel/features.h"
 #include "kernel/layout.h"

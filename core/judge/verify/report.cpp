@@ -1,6 +1,6 @@
-#include "verify/report.h"
+#include "judge/verify/report.h"
 
-#include "progress.h"
+#include "base/unit_text.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -64,7 +64,7 @@ std::string suiteJson(const SuiteResult& suite) {
     json["seconds"] = suite.seconds;
     json["passed"] = suite.passed();
     json["asked"] = suite.asked;
-    json["interrupted"] = suite.signal != 0;
+    json["interrupted"] = suite.request.has_value();
     Json cases = Json::array();
     for (const CaseResult& c : suite.cases) {
         Json outcomes = Json::array();

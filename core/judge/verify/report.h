@@ -1,7 +1,7 @@
 /// What a run of the suite is written as.
 #pragma once
 
-#include "verify/run.h"
+#include "judge/verify/run.h"
 
 #include <string>
 #include <vector>

@@ -1,6 +1,6 @@
 // verify.html: the table of cases with what each asked and measured. One file, no script, readable on a telephone and at night.
-#include "progress.h"
-#include "verify/report.h"
+#include "base/unit_text.h"
+#include "judge/verify/report.h"
 
 #include <fmt/format.h>
 

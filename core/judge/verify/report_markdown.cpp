@@ -1,5 +1,5 @@
 // docs/stability.md: the registry as a manual page, so that it cannot tell anything else than what is tested.
-#include "verify/report.h"
+#include "judge/verify/report.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

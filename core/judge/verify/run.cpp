@@ -1,7 +1,6 @@
-#include "verify/run.h"
+#include "judge/verify/run.h"
 
-#include "compile.h"
-#include "interrupt.h"
+#include "compile/compile.h"
 
 #include <fmt/format.h>
 
@@ -56,7 +55,7 @@ bool SuiteResult::passed() const {
 }
 
 SuiteResult runCases(const LoadedBackend& backend, const IntegratorOptions& options, Level level, const std::vector<const Case*>& cases,
-                     const Watcher& watch) {
+                     const CaseShown& show, Watch& watch) {
     const Clock::time_point start = Clock::now();
     SuiteResult suite;
     suite.backend = backend.name;
@@ -68,13 +67,11 @@ SuiteResult runCases(const LoadedBackend& backend, const IntegratorOptions& opti
     suite.device = devices.front().name;
     Context context(backend, options, level);
     for (std::size_t i = 0; i < cases.size(); ++i) {
-        if (InterruptGuard::signalReceived() != 0) {
-            suite.signal = InterruptGuard::signalReceived();
-            break;
-        }
-        watch(*cases[i], i, nullptr);
+        suite.request = watch.stopRequested();
+        if (suite.request) break;
+        show(*cases[i], i, nullptr);
         suite.cases.push_back(runCase(*cases[i], context));
-        watch(*cases[i], i, &suite.cases.back());
+        show(*cases[i], i, &suite.cases.back());
     }
     suite.seconds = secondsSince(start);
     return suite;

@@ -1,9 +1,11 @@
 /// Runs cases one after another and keeps what came of them.
 #pragma once
 
-#include "verify/context.h"
+#include "judge/verify/context.h"
+#include "render/watch.h"
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +22,7 @@ struct SuiteResult {
     std::string backend, version, build, device;
     Level level = Level::Commit;
     std::vector<CaseResult> cases;
-    int signal = 0;          ///< That ended the run early; the cases after it are missing.
+    std::optional<StopRequest> request;  ///< That ended the run early; the cases after it are missing.
     std::size_t asked = 0;   ///< Cases that were to run.
     double seconds = 0;
 
@@ -29,10 +31,10 @@ struct SuiteResult {
 };
 
 /// Called before each case with null, after it with its result.
-using Watcher = std::function<void(const Case& next, std::size_t index, const CaseResult* result)>;
+using CaseShown = std::function<void(const Case& next, std::size_t index, const CaseResult* result)>;
 
-/// Runs the cases. A case whose backend throws fails; the others go on. The caller holds the InterruptGuard.
+/// Runs the cases. A case whose backend throws fails; the others go on.
 SuiteResult runCases(const LoadedBackend& backend, const IntegratorOptions& options, Level level, const std::vector<const Case*>& cases,
-                     const Watcher& watch);
+                     const CaseShown& show, Watch& watch);
 
 }  // namespace crt::verify

@@ -1,12 +1,12 @@
 // Group B: scale and position. Lengths are normalised in double before anything is float (core/flatten.cpp), so where a scene lies and how large it is must
 // not show; what remains is the ratio of sizes within a scene.
-#include "verify/probes.h"
-#include "verify/references.h"
-#include "verify/scenes.h"
+#include "judge/verify/probes.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
 
-#include "compile.h"
+#include "compile/compile.h"
 #include "kernel/features.h"
-#include "log.h"
+#include "base/log.h"
 
 #include <fmt/format.h>
 

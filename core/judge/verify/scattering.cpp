@@ -1,8 +1,8 @@
 // Group G: surfaces at the ends of their parameters. crt has Lambert's law, mirrors, smooth conductors and smooth dielectrics; what is said of rough
 // surfaces does not apply to it.
-#include "verify/context.h"
-#include "verify/references.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
 
 #include "kernel/bsdf.h"
 #include "kernel/features.h"

@@ -1,4 +1,4 @@
-#include "verify/scenes.h"
+#include "judge/verify/scenes.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "verify/shapes.h"
+#include "judge/verify/shapes.h"
 
 #include <algorithm>
 #include <array>

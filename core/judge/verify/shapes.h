@@ -1,8 +1,8 @@
 /// Geometry and scenes for the verification cases, made in memory: what they are must not depend on a file or on a reader.
 #pragma once
 
-#include "scene.h"
-#include "vec3d.h"
+#include "scene/scene.h"
+#include "base/vec3d.h"
 
 #include <cstdint>
 #include <random>

@@ -1,9 +1,9 @@
 // Group F: stiff transport. The condition number of L = E / (1 − ρ) is ρ / (1 − ρ): what a rounding or a bias does grows with it.
-#include "verify/context.h"
-#include "verify/references.h"
-#include "verify/scenes.h"
+#include "judge/verify/context.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
 
-#include "error_estimate.h"
+#include "film/error_estimate.h"
 #include "kernel/features.h"
 
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 /// An empty folder for the files of a case or a test, gone with the object.
 #pragma once
 
-#include "error.h"
+#include "base/error.h"
 
 #include <fmt/format.h>
 

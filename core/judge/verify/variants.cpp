@@ -1,7 +1,7 @@
-#include "verify/variants.h"
+#include "judge/verify/variants.h"
 
 #include "kernel/path.h"
-#include "verify/shapes.h"
+#include "judge/verify/shapes.h"
 
 #include <utility>
 

@@ -1,8 +1,8 @@
 /// Scenes that between them need everything the kernel has, for relations that hold of every scene; and the kernel as this program holds it.
 #pragma once
 
-#include "compile.h"
-#include "verify/context.h"
+#include "compile/compile.h"
+#include "judge/verify/context.h"
 
 #include <string>
 #include <vector>

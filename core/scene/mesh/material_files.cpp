@@ -1,8 +1,8 @@
-#include "material_files.h"
+#include "scene/mesh/material_files.h"
 
-#include "input_file.h"
-#include "log.h"
-#include "obj_text.h"
+#include "base/input_file.h"
+#include "base/log.h"
+#include "scene/mesh/obj_text.h"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
 /// The MTL files that an OBJ names, as exporters of other systems spell them.
 #pragma once
 
-#include "mtl_file.h"
-#include "obj_reader.h"
+#include "scene/mesh/mtl_file.h"
+#include "scene/mesh/obj_reader.h"
 
 #include <map>
 #include <string>

@@ -1,6 +1,6 @@
-#include "mesh_format.h"
+#include "scene/mesh/mesh_format.h"
 
-#include "obj_text.h"
+#include "scene/mesh/obj_text.h"
 
 #include <algorithm>
 #include <array>

@@ -1,15 +1,15 @@
-#include "mesh_io.h"
+#include "scene/mesh/mesh_io.h"
 
-#include "error.h"
-#include "input_file.h"
-#include "log.h"
-#include "material_files.h"
-#include "mesh_format.h"
-#include "obj_reader.h"
-#include "obj_text.h"
-#include "stage.h"
-#include "triangulate.h"
-#include "vec3d.h"
+#include "base/error.h"
+#include "base/input_file.h"
+#include "base/log.h"
+#include "scene/mesh/material_files.h"
+#include "scene/mesh/mesh_format.h"
+#include "scene/mesh/obj_reader.h"
+#include "scene/mesh/obj_text.h"
+#include "base/stage.h"
+#include "scene/mesh/triangulate.h"
+#include "base/vec3d.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

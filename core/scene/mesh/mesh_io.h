@@ -1,8 +1,8 @@
 /// OBJ files, with the materials of their MTL → Mesh.
 #pragma once
 
-#include "mtl_material.h"
-#include "scene.h"
+#include "scene/mesh/mtl_material.h"
+#include "scene/scene.h"
 
 #include <cstdint>
 #include <optional>

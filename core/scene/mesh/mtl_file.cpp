@@ -1,7 +1,7 @@
-#include "mtl_file.h"
+#include "scene/mesh/mtl_file.h"
 
-#include "log.h"
-#include "obj_text.h"
+#include "base/log.h"
+#include "scene/mesh/obj_text.h"
 
 #include <algorithm>
 #include <cctype>

@@ -1,7 +1,7 @@
-#include "mtl_material.h"
+#include "scene/mesh/mtl_material.h"
 
-#include "error.h"
-#include "obj_text.h"
+#include "base/error.h"
+#include "scene/mesh/obj_text.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,8 +1,8 @@
 /// Materials of an MTL file → ours, and what was lost on the way.
 #pragma once
 
-#include "mtl_file.h"
-#include "scene.h"
+#include "scene/mesh/mtl_file.h"
+#include "scene/scene.h"
 
 #include <map>
 #include <optional>

@@ -1,7 +1,7 @@
-#include "obj_reader.h"
+#include "scene/mesh/obj_reader.h"
 
-#include "error.h"
-#include "obj_text.h"
+#include "base/error.h"
+#include "scene/mesh/obj_text.h"
 
 #include <fmt/format.h>
 

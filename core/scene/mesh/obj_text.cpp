@@ -1,6 +1,6 @@
-#include "obj_text.h"
+#include "scene/mesh/obj_text.h"
 
-#include "input_file.h"
+#include "base/input_file.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 /// Lines, fields and numbers of OBJ and MTL files, which share their syntax.
 #pragma once
 
-#include "error.h"
+#include "base/error.h"
 
 #include <cstdint>
 #include <optional>

@@ -1,6 +1,6 @@
-#include "triangulate.h"
+#include "scene/mesh/triangulate.h"
 
-#include "vec3d.h"
+#include "base/vec3d.h"
 
 #include <algorithm>
 #include <cmath>

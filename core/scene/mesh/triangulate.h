@@ -1,7 +1,7 @@
 /// Polygons → triangles.
 #pragma once
 
-#include "spectra.h"
+#include "spectra/spectra.h"
 
 #include <array>
 #include <cstddef>

@@ -1,7 +1,7 @@
 /// The schema told to people (docs/scene.md) and to editors (JSON Schema). Nothing here knows a key: it all comes from the table.
-#include "mtl_file.h"
-#include "scene_schema.h"
-#include "scene_yaml.h"
+#include "scene/mesh/mtl_file.h"
+#include "scene/yaml/scene_schema.h"
+#include "scene/yaml/scene_yaml.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

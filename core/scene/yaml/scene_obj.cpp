@@ -1,9 +1,9 @@
 /// The part of ObjectReader that reads objects with `obj`: which of their materials are the file's, and
 /// which the scene's.
-#include "scene_objects.h"
+#include "scene/yaml/scene_objects.h"
 
-#include "log.h"
-#include "obj_text.h"
+#include "base/log.h"
+#include "scene/mesh/obj_text.h"
 
 #include <fmt/format.h>
 

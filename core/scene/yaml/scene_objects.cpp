@@ -1,7 +1,7 @@
-#include "scene_objects.h"
+#include "scene/yaml/scene_objects.h"
 
-#include "log.h"
-#include "vec3d.h"
+#include "base/log.h"
+#include "base/vec3d.h"
 
 #include <fmt/format.h>
 

@@ -1,10 +1,10 @@
 /// Materials and objects of a scene: meshes read and checked, names looked up, placements multiplied out.
 #pragma once
 
-#include "mesh_io.h"
-#include "scene.h"
-#include "scene_limits.h"
-#include "scene_spectra.h"
+#include "scene/mesh/mesh_io.h"
+#include "scene/scene.h"
+#include "scene/scene_limits.h"
+#include "scene/yaml/scene_spectra.h"
 
 #include <cstdint>
 #include <map>

@@ -1,6 +1,7 @@
-#include "scene_reader.h"
+#include "scene/yaml/scene_reader.h"
+#include "base/modules.h"
 
-#include "log.h"
+#include "base/log.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -71,24 +72,6 @@ bool readMembers(Diagnostics& out, const YamlNode& node, const YamlPlace& place,
 }
 
 std::string quotedName(std::string_view key) { return fmt::format("'{}'", key); }
-
-/// Directories for files that are not beside the scene: CRT_MESH_PATH (separated by ':'), else what is installed with the program.
-std::vector<fs::path> meshDirectories() {
-    std::vector<fs::path> directories;
-    if (const char* path = std::getenv("CRT_MESH_PATH")) {
-        std::string_view rest = path;
-        while (!rest.empty()) {
-            const std::size_t colon = std::min(rest.find(':'), rest.size());
-            if (colon > 0) directories.emplace_back(rest.substr(0, colon));
-            rest.remove_prefix(std::min(colon + 1, rest.size()));
-        }
-        return directories;
-    }
-    std::error_code ignored;
-    const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-    if (!program.empty()) directories.push_back((program.parent_path() / "../share/crt/meshes").lexically_normal());
-    return directories;
-}
 
 /// Files of a directory for the did-you-mean; a huge directory is not worth the time.
 void addFileNames(const fs::path& directory, std::vector<std::string>& names) {
@@ -397,7 +380,7 @@ std::optional<std::string> SceneFiles::locate(const std::string& name, const Yam
         directories.push_back(wanted.root_path());
     } else {
         directories.emplace_back(directory_.empty() ? "." : directory_);
-        for (fs::path& d : meshDirectories()) directories.push_back(std::move(d));
+        for (std::string& d : meshDirectories()) directories.emplace_back(std::move(d));
     }
     std::error_code ec;
     for (const fs::path& directory : directories) {

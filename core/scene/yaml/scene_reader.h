@@ -2,10 +2,10 @@
 /// Whatever is wrong goes to Diagnostics and the value keeps its default, so reading always goes on.
 #pragma once
 
-#include "error.h"
-#include "scene_schema.h"
-#include "spectra.h"
-#include "yaml_reader.h"
+#include "base/error.h"
+#include "scene/yaml/scene_schema.h"
+#include "spectra/spectra.h"
+#include "scene/yaml/yaml_reader.h"
 
 #include <cstdint>
 #include <optional>

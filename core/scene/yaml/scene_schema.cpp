@@ -1,8 +1,8 @@
-#include "scene_schema.h"
+#include "scene/yaml/scene_schema.h"
 
-#include "error.h"
-#include "scene.h"
-#include "scene_limits.h"
+#include "base/error.h"
+#include "scene/scene.h"
+#include "scene/scene_limits.h"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
-#include "scene_spectra.h"
+#include "scene/yaml/scene_spectra.h"
 
-#include "log.h"
+#include "base/log.h"
 
 #include <fmt/format.h>
 

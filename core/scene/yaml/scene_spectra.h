@@ -1,7 +1,7 @@
 /// The forms a spectrum can take in a scene, resolved to the 1 nm grid.
 #pragma once
 
-#include "scene_reader.h"
+#include "scene/yaml/scene_reader.h"
 
 #include <map>
 #include <optional>

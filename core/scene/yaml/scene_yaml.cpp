@@ -1,13 +1,13 @@
-#include "scene_yaml.h"
+#include "scene/yaml/scene_yaml.h"
 
-#include "input_file.h"
-#include "log.h"
-#include "scene_limits.h"
-#include "scene_objects.h"
-#include "scene_reader.h"
-#include "scene_schema.h"
-#include "scene_spectra.h"
-#include "yaml_reader.h"
+#include "base/input_file.h"
+#include "base/log.h"
+#include "scene/scene_limits.h"
+#include "scene/yaml/scene_objects.h"
+#include "scene/yaml/scene_reader.h"
+#include "scene/yaml/scene_schema.h"
+#include "scene/yaml/scene_spectra.h"
+#include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

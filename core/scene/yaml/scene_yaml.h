@@ -2,7 +2,7 @@
 /// Schema all come from it.
 #pragma once
 
-#include "scene.h"
+#include "scene/scene.h"
 
 #include <string>
 #include <vector>

@@ -5,7 +5,9 @@
 /// lets an alias close a cycle. So only its events are used here; text becomes numbers in scalar functions below and nowhere else.
 #pragma once
 
-#include "error.h"
+#include "base/words.h"
+
+#include "base/error.h"
 
 #include <cstdint>
 #include <memory>
@@ -90,26 +92,5 @@ YamlNodePtr readYaml(const YamlSource& source, std::string_view text, Diagnostic
 
 /// "a number", "a list": what a node is, for "expected …, found …".
 std::string describeNode(const YamlNode& node);
-
-/// What became of a text that should be a number: the number, or why not.
-template <class T>
-struct Parsed {
-    std::optional<T> value;
-    std::string problem;  ///< Follows "expected a number, found '012': ".
-};
-
-/// Decimal numbers by std::from_chars: no octal or hexadecimal, no NaN, no infinity, no overflow.
-Parsed<double> parseNumber(const std::string& text);
-/// The same for whole numbers; 1e3 and 3.0 count as whole.
-Parsed<std::int64_t> parseInteger(const std::string& text);
-Parsed<std::uint64_t> parseUnsigned(const std::string& text);
-/// Does this plain scalar look like a number (and so cannot be a name)?
-bool looksLikeNumber(std::string_view text);
-
-/// The candidate nearest to `word` by Damerau–Levenshtein distance, if it is within 2 or a third of the length (1 for words
-/// of up to three letters).
-std::optional<std::string> nearestWord(std::string_view word, const std::vector<std::string>& candidates);
-/// "did you mean 'x'?" or nothing.
-std::string didYouMean(std::string_view word, const std::vector<std::string>& candidates);
 
 }  // namespace crt

@@ -1,7 +1,7 @@
 /// `crt verify`: chooses backend and cases, runs them, shows them, and writes what came of them.
 #pragma once
 
-#include "verify/case.h"
+#include "judge/verify/case.h"
 
 #include "backend/integrator.h"
 

@@ -1,4 +1,4 @@
-#include "backend/code_trust.h"
+#include "base/code_trust.h"
 
 #include <fcntl.h>
 #include <grp.h>

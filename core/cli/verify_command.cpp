@@ -1,14 +1,14 @@
-#include "verify/command.h"
+#include "cli/verify_command.h"
 
-#include "atomic_file.h"
-#include "error.h"
-#include "input_file.h"
-#include "interrupt.h"
-#include "log.h"
-#include "progress.h"
-#include "standard_output.h"
-#include "verify/report.h"
-#include "verify/run.h"
+#include "base/atomic_file.h"
+#include "base/error.h"
+#include "base/input_file.h"
+#include "cli/terminal_watch.h"
+#include "base/log.h"
+#include "base/unit_text.h"
+#include "base/standard_output.h"
+#include "judge/verify/report.h"
+#include "judge/verify/run.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -103,7 +103,7 @@ int verify(const Arguments& arguments) {
     // Cases warn about scenes that are odd on purpose.
     setLogLevel(LogLevel::Error);
 
-    const InterruptGuard guard;
+    TerminalWatch watch(ProgressMode::None, TerminalWatch::Signals::Always);
     Line line(cases.size(), arguments.quiet);
     const bool colored = isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
     const SuiteResult suite =
@@ -115,13 +115,13 @@ int verify(const Arguments& arguments) {
             line.clear();
             if (!arguments.quiet || failed(result->verdict)) printOut("{}", caseText(*result, colored));
             flushStandardOutput();
-        });
+        }, watch);
     printOut("{} on {}, level {}: {}\n", suite.backend, suite.device, name(suite.level), summaryText(suite));
     if (!arguments.output.empty()) {
         writeReports(arguments.output, suite);
         printOut("{0}/verify.html and {0}/verify.json have every figure\n", arguments.output);
     }
-    if (suite.signal != 0) return signalExitCode(suite.signal);
+    if (suite.request) return suite.request->exit_code;
     return suite.passed() ? 0 : kFailed;
 }
 

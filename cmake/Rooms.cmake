@@ -1,0 +1,56 @@
+# The rooms of core/: one folder, one target, and the arrows between them.
+#
+#   crt_room(<folder> [SOURCES <file>…] [USES <folder>…] [LIBRARIES <target>…] [HEADERS <file of core/>…])
+#
+# makes the static library crt_<folder> (a '/' becomes '_') of core/<folder>, or an interface library where it has
+# headers alone. HEADERS are further ones that it shows. Its headers are included as "<folder>/<name>.h". Each room has an include root of its own,
+# build/rooms/<target>, which holds links to its headers and to nothing else: a file sees the headers of the rooms
+# that its own room USES, and of those that these use. So an include against the arrows does not compile.
+# tests/rooms/check_rooms.py draws the arrows, and fails when there is a cycle.
+
+set_property(GLOBAL PROPERTY CRT_ROOMS "")
+
+# build/rooms/<target>/<folder>/<name>.h → core/<folder>/<name>.h, for every header of the room.
+function(_crt_link_headers target folder)
+  set(root ${PROJECT_BINARY_DIR}/rooms/${target})
+  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/core ${PROJECT_SOURCE_DIR}/core/${folder}/*.h)
+  list(APPEND headers ${ARGN})
+  foreach(header IN LISTS headers)
+    if(NOT EXISTS ${root}/${header})
+      get_filename_component(directory ${root}/${header} DIRECTORY)
+      file(MAKE_DIRECTORY ${directory})
+      file(CREATE_LINK ${PROJECT_SOURCE_DIR}/core/${header} ${root}/${header} SYMBOLIC)
+    endif()
+  endforeach()
+  file(GLOB_RECURSE there RELATIVE ${root} ${root}/*.h)
+  list(REMOVE_ITEM there ${headers})
+  foreach(gone IN LISTS there)
+    file(REMOVE ${root}/${gone})
+  endforeach()
+endfunction()
+
+function(crt_room folder)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;USES;LIBRARIES;HEADERS")
+  string(REPLACE "/" "_" name ${folder})
+  set(target crt_${name})
+  _crt_link_headers(${target} ${folder} ${arg_HEADERS})
+  set(used "")
+  foreach(room IN LISTS arg_USES)
+    string(REPLACE "/" "_" room ${room})
+    if(NOT TARGET crt_${room})
+      message(FATAL_ERROR "${folder} uses ${room}, which is no room, or one that comes later")
+    endif()
+    list(APPEND used crt_${room})
+  endforeach()
+  if(arg_SOURCES)
+    list(TRANSFORM arg_SOURCES PREPEND ${PROJECT_SOURCE_DIR}/core/${folder}/)
+    add_library(${target} STATIC ${arg_SOURCES})
+    target_include_directories(${target} PUBLIC ${PROJECT_BINARY_DIR}/rooms/${target})
+    target_link_libraries(${target} PUBLIC ${used} ${arg_LIBRARIES} PRIVATE crt_flags)
+  else()
+    add_library(${target} INTERFACE)
+    target_include_directories(${target} INTERFACE ${PROJECT_BINARY_DIR}/rooms/${target})
+    target_link_libraries(${target} INTERFACE ${used} ${arg_LIBRARIES})
+  endif()
+  set_property(GLOBAL APPEND PROPERTY CRT_ROOMS ${target})
+endfunction()

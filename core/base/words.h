@@ -1,0 +1,39 @@
+/// Words and numbers as people type them: text → number, and the word that was probably meant.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace crt {
+
+/// What became of a text that should be a number: the number, or why not.
+template <class T>
+struct Parsed {
+    std::optional<T> value;
+    std::string problem;  ///< Follows "expected a number, found '012': ".
+};
+
+/// Decimal numbers by std::from_chars: no octal or hexadecimal, no NaN, no infinity, no overflow.
+Parsed<double> parseNumber(const std::string& text);
+/// The same for whole numbers; 1e3 and 3.0 count as whole.
+Parsed<std::int64_t> parseInteger(const std::string& text);
+Parsed<std::uint64_t> parseUnsigned(const std::string& text);
+/// Does this plain scalar look like a number (and so cannot be a name)?
+bool looksLikeNumber(std::string_view text);
+
+/// The parts between separators; one part where there is none.
+std::vector<std::string> splitAt(const std::string& text, char separator);
+
+/// "cuda,embree": words between commas, none of them empty. `option` stands in the message of the crt::Error(Usage).
+std::vector<std::string> parseList(const std::string& text, const std::string& option);
+
+/// The candidate nearest to `word` by Damerau–Levenshtein distance, if it is within 2 or a third of the length (1 for words
+/// of up to three letters).
+std::optional<std::string> nearestWord(std::string_view word, const std::vector<std::string>& candidates);
+/// "did you mean 'x'?" or nothing.
+std::string didYouMean(std::string_view word, const std::vector<std::string>& candidates);
+
+}  // namespace crt

@@ -1,0 +1,121 @@
+#include "film/resolve.h"
+
+#include "base/error.h"
+#include "film/error_estimate.h"
+#include "film/luminance_error.h"
+#include "image/image_metadata.h"
+#include "scene/aov.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+namespace crt {
+namespace {
+
+const char* spaceName(ColorSpace space) {
+    switch (space) {
+        case ColorSpace::LinearSrgb: return "lin_rec709_scene";
+        case ColorSpace::AcesCg: return "lin_ap1_scene";
+        case ColorSpace::Xyz: break;
+    }
+    return "lin_ciexyzd65_scene";
+}
+
+}  // namespace
+
+Image resolveImage(const Film& film, const Development& development, std::uint32_t aovs) {
+    const FilmShape& shape = film.shape();
+    for (const AovRow& row : kAovRows)
+        if ((aovs & kAovsOfFirstHits & ~shape.aovs & row.aov) != 0)
+            throw Error(ErrorKind::Usage,
+                        fmt::format("an output asks for the {} plane, but the film was rendered without it",
+                                    row.name));
+
+    const ColorSpace space = development.color_space;
+    const double exposure = std::exp2(development.exposure_ev);
+    const Matrix3d to_rgb = xyzToRgb(space);
+    Matrix3d color = to_rgb;
+    // To D65 in every space: it is the white of sRGB, xyzToRgb takes it to ACEScg's own, and an XYZ image then still becomes the sRGB one by
+    // the standard matrix.
+    if (development.white) color = multiply(color, bradfordAdaptation(*development.white, d65WhiteXyz()));
+    for (Vec3d& row : color)
+        for (double& entry : row) entry *= exposure;
+    // The film has the noise of Y alone, and a white balance mixes X, Y and Z: what becomes of that noise is
+    // known where it changes brightness and not colour. Then the relative error of luminance stays what it
+    // was.
+    const stats::Rgb luminance_weights = stats::luminanceWeights(space);
+    const auto luminanceGain = [&](const Vec3d& xyz) {
+        if (!development.white || !(xyz[1] > 0)) return exposure;
+        return std::abs(stats::luminance(multiply(color, xyz), luminance_weights)) / xyz[1];
+    };
+    // Albedo is a reflectance: the film has it as XYZ under equal-energy light, and a perfect white must come out as (1,1,1) in the RGB spaces
+    // whatever the exposure and white balance.
+    const Matrix3d albedo_color = multiply(to_rgb, bradfordAdaptation({1, 1, 1}, d65WhiteXyz()));
+
+    Image image;
+    image.width = shape.width;
+    image.height = shape.height;
+    image.channels = {"R", "G", "B"};
+    for (const AovRow& row : kAovRows) {
+        if ((aovs & row.aov) == 0) continue;
+        std::vector<std::string>& names = row.integer ? image.integer_channels : image.channels;
+        for (std::string& name : exrNames(row)) names.push_back(std::move(name));
+    }
+
+    const LuminanceVariance variance(film);
+    const std::size_t pixels = std::size_t{shape.width} * shape.height;
+    image.pixels.reserve(pixels * image.channels.size());
+    image.integers.reserve(pixels * image.integer_channels.size());
+    const auto append = [&image](const Vec3d& v) {
+        for (const double component : v) image.pixels.push_back(static_cast<float>(component));
+    };
+    for (std::uint32_t y = 0; y < shape.height; ++y)
+        for (std::uint32_t x = 0; x < shape.width; ++x) {
+            const auto triple = [&](std::uint32_t c) {
+                return Vec3d{film.mean(x, y, c), film.mean(x, y, c + 1), film.mean(x, y, c + 2)};
+            };
+            const auto add = [&](double value) { image.pixels.push_back(static_cast<float>(value)); };
+            const std::size_t pixel = std::size_t{y} * shape.width + x;
+            append(multiply(color, triple(0)));
+            const auto error = [&](std::uint32_t i, std::uint32_t j) {
+                return std::sqrt(variance(i, j)) * luminanceGain(triple(0));
+            };
+            // In the order of the names above.
+            for (const AovRow& row : kAovRows) {
+                if ((aovs & row.aov) == 0) continue;
+                const std::uint32_t first = firstChannel(shape.aovs, row.aov);
+                switch (row.aov) {
+                    case kAovAlbedo: append(multiply(albedo_color, triple(first))); break;
+                    case kAovNormal: append(triple(first)); break;
+                    case kAovDepth: add(film.mean(x, y, first)); break;
+                    case kAovSquares:
+                    case kAovReplicates: break;
+                    case kAovPrimitive: image.integers.push_back(film.primitives[pixel]); break;
+                    case kAovVariance: add(error(x, y) * error(x, y)); break;
+                    case kAovSamples:
+                        image.integers.push_back(static_cast<std::uint32_t>(std::min<std::uint64_t>(
+                            film.counts[pixel], std::numeric_limits<std::uint32_t>::max())));
+                        break;
+                    case kAovError: add(error(x, y)); break;
+                }
+            }
+        }
+
+    image.chromaticities = chromaticities(space);
+    // Who rendered it, where and when is for the caller to add.
+    image.metadata = {{kColorInteropIdKey, spaceName(space)},
+                      {"crt/spp", std::to_string(film.samples.count())},
+                      {"crt/sampleRanges", film.samples.text()},
+                      {kExposureKey, fmt::format("{}", development.exposure_ev)},
+                      {kWhiteBalanceKey, whiteBalanceText(development)},
+                      {"crt/invalidSamples", std::to_string(film.invalidSamples())}};
+    if ((aovs & (kAovVariance | kAovError)) && variance.degreesOfFreedom() >= 1)
+        image.metadata.emplace_back(kErrorDofKey, fmt::format("{:.6g}", variance.degreesOfFreedom()));
+    return image;
+}
+
+}  // namespace crt
