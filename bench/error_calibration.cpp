@@ -1,18 +1,21 @@
-// Does the error that an image states of itself hold? One JSON object a line; bench/run calibration makes a page of them.
+// Does the error that an image states of itself hold? One JSON object a line; bench/run calibration makes a
+// page of them.
 //
-//     error_calibration stated BACKEND SCENE SIDE SAMPLER SEEDS    the stated error against the real one, at many numbers of samples
-//     error_calibration price  BACKEND SCENE SIDE SAMPLER SEEDS    the error of an image with replicates, and of one sequence
-//     error_calibration stop   BACKEND SCENE SIDE SAMPLER SEEDS TARGET MOST    what --target-error stops at
+//     error_calibration stated BACKEND SCENE SIDE SAMPLER SEEDS    the stated error against the real one, at
+//     many numbers of samples error_calibration price  BACKEND SCENE SIDE SAMPLER SEEDS    the error of an
+//     image with replicates, and of one sequence error_calibration stop   BACKEND SCENE SIDE SAMPLER SEEDS
+//     TARGET MOST    what --target-error stops at
 //
-// SCENE is a file, rendered at SIDE x SIDE pixels. SAMPLER: sobol or independent. The real error is the spread between seeds; for `stop`, the distance
-// from the mean of independent renders of MOST samples with other seeds.
+// SCENE is a file, rendered at SIDE x SIDE pixels. SAMPLER: sobol or independent. The real error is the
+// spread between seeds; for `stop`, the distance from the mean of independent renders of MOST samples with
+// other seeds.
 #include "backend/integrator.h"
 #include "backend/loader.h"
-#include "film/error_estimate.h"
 #include "base/log.h"
+#include "base/statistics.h"
+#include "film/error_estimate.h"
 #include "render/sampling.h"
 #include "scene/yaml/scene_yaml.h"
-#include "base/statistics.h"
 
 #include <fmt/format.h>
 
@@ -37,7 +40,9 @@ struct Setup {
     int side;
 
     Scene scene(std::uint64_t seed, bool replicates = true) const {
-        std::vector<SceneOverride> settings{{"film.resolution", fmt::format("[{0},{0}]", side)}, {"sampler.type", sampler}, {"sampler.seed", fmt::format("{}", seed)}};
+        std::vector<SceneOverride> settings{{"film.resolution", fmt::format("[{0},{0}]", side)},
+                                            {"sampler.type", sampler},
+                                            {"sampler.seed", fmt::format("{}", seed)}};
         if (!replicates) settings.push_back({"sampler.replicates", "1"});
         return loadScene(file, settings);
     }
@@ -47,7 +52,10 @@ struct Setup {
 /// Samples of one scene with one seed, range after range, on a device that is opened once.
 class Progressive {
 public:
-    Progressive(const Setup& setup, const Scene& scene) : integrator_(*setup.integrator), compiled_(compileScene(scene, 0)) { restart(); }
+    Progressive(const Setup& setup, const Scene& scene)
+        : integrator_(*setup.integrator), compiled_(compileScene(scene, 0)) {
+        restart();
+    }
 
     void render(SampleRange range) {
         integrator_.render({.first_sample = range.first, .sample_count = range.second - range.first});
@@ -99,7 +107,8 @@ public:
     /// Root mean square error over the pixels, relative to the mean: the pixels' variances between seeds.
     double relativeRmse() const {
         double variance = 0;
-        for (std::size_t i = 0; i < sum_.size(); ++i) variance += (squares_[i] - sum_[i] * sum_[i] / count_) / (count_ - 1);
+        for (std::size_t i = 0; i < sum_.size(); ++i)
+            variance += (squares_[i] - sum_[i] * sum_[i] / count_) / (count_ - 1);
         return std::sqrt(variance / static_cast<double>(sum_.size())) / mean();
     }
     /// Standard error of relativeRmse, relative to it: from the spread of the seeds' own squared errors.
@@ -108,7 +117,8 @@ public:
         double squares = 0;
         for (const std::vector<double>& y : images_) {
             double own = 0;
-            for (std::size_t i = 0; i < y.size(); ++i) own += (y[i] - sum_[i] / count_) * (y[i] - sum_[i] / count_);
+            for (std::size_t i = 0; i < y.size(); ++i)
+                own += (y[i] - sum_[i] / count_) * (y[i] - sum_[i] / count_);
             own = own * count_ / (count_ - 1) / static_cast<double>(y.size()) / (mean() * mean());
             squares += (own / (all * all) - 1) * (own / (all * all) - 1);
         }
@@ -171,16 +181,23 @@ void stated(const Setup& setup, std::uint64_t seeds) {
             ratio += e.relative_rmse / truth;
             // Against the mean of the other seeds, whose own error is 1/(seeds - 1) of this one's square.
             std::vector<double> others = all.sum();
-            for (std::size_t k = 0; k < others.size(); ++k) others[k] = (others[k] - all.all()[i][k]) / (all.count() - 1);
-            within += relativeDistance(all.all()[i], others) / std::sqrt(1 + 1 / (all.count() - 1)) <= e.half_width_95;
+            for (std::size_t k = 0; k < others.size(); ++k)
+                others[k] = (others[k] - all.all()[i][k]) / (all.count() - 1);
+            within += relativeDistance(all.all()[i], others) / std::sqrt(1 + 1 / (all.count() - 1)) <=
+                      e.half_width_95;
         }
         std::string rows;
         for (const ErrorEstimate& e : estimates[name])
-            rows += fmt::format("{}[{:.6g}, {:.5g}, {:.4g}, {:.6g}]", rows.empty() ? "" : ", ", e.relative_rmse / truth, e.degrees_of_freedom, e.relative_rmse_95.lower / truth, e.relative_rmse_95.upper / truth);
+            rows += fmt::format("{}[{:.6g}, {:.5g}, {:.4g}, {:.6g}]", rows.empty() ? "" : ", ",
+                                e.relative_rmse / truth, e.degrees_of_freedom,
+                                e.relative_rmse_95.lower / truth, e.relative_rmse_95.upper / truth);
         fmt::print("{{\"rows\": [{}], ", rows);
-        fmt::print("\"samples\": \"{}\", \"seeds\": {}, \"true\": {}, \"true_error\": {}, \"known\": {}, \"covered\": {}, \"within_half_width\": {}, \"ratio\": {}, "
-                   "\"ratio_of_all\": {}, \"degrees_of_freedom\": {}}}\n",
-                   name, seeds, truth, all.relativeError(), known, covered, within, known > 0 ? ratio / known : 0, std::sqrt(squares) / truth, dof);
+        fmt::print(
+            "\"samples\": \"{}\", \"seeds\": {}, \"true\": {}, \"true_error\": {}, \"known\": {}, "
+            "\"covered\": {}, \"within_half_width\": {}, \"ratio\": {}, "
+            "\"ratio_of_all\": {}, \"degrees_of_freedom\": {}}}\n",
+            name, seeds, truth, all.relativeError(), known, covered, within, known > 0 ? ratio / known : 0,
+            std::sqrt(squares) / truth, dof);
         std::fflush(stdout);
     }
 }
@@ -198,8 +215,11 @@ void price(const Setup& setup, std::uint64_t seeds) {
             }
         }
     for (const auto& [samples, images] : with)
-        fmt::print("{{\"samples\": {}, \"seeds\": {}, \"replicates\": {}, \"replicates_error\": {}, \"one_sequence\": {}, \"one_sequence_error\": {}}}\n", samples, seeds,
-                   images.relativeRmse(), images.relativeError(), without[samples].relativeRmse(), without[samples].relativeError());
+        fmt::print(
+            "{{\"samples\": {}, \"seeds\": {}, \"replicates\": {}, \"replicates_error\": {}, "
+            "\"one_sequence\": {}, \"one_sequence_error\": {}}}\n",
+            samples, seeds, images.relativeRmse(), images.relativeError(), without[samples].relativeRmse(),
+            without[samples].relativeError());
 }
 
 void stop(const Setup& setup, std::uint64_t seeds, double target, std::uint64_t most) {
@@ -207,7 +227,8 @@ void stop(const Setup& setup, std::uint64_t seeds, double target, std::uint64_t 
     Setup independent = setup;
     independent.sampler = "independent";
     for (int i = 0; i < kReferenceRenders; ++i) {
-        Progressive reference(independent, independent.scene(kReferenceSeed + static_cast<std::uint64_t>(i)));
+        Progressive reference(independent,
+                              independent.scene(kReferenceSeed + static_cast<std::uint64_t>(i)));
         reference.render({0, 16 * most / kReferenceRenders});
         const std::vector<double> y = luminanceOf(reference.film());
         truth.resize(y.size());
@@ -225,7 +246,8 @@ void stop(const Setup& setup, std::uint64_t seeds, double target, std::uint64_t 
             film = progressive.film();
             reached = reachesTarget(film, target, setup.independent());
         }
-        fmt::print("{{\"seed\": {}, \"samples\": {}, \"reached\": {}, \"actual\": {}}}\n", seed, there, reached, relativeDistance(luminanceOf(film), truth));
+        fmt::print("{{\"seed\": {}, \"samples\": {}, \"reached\": {}, \"actual\": {}}}\n", seed, there,
+                   reached, relativeDistance(luminanceOf(film), truth));
         std::fflush(stdout);
     }
 }
@@ -236,7 +258,9 @@ int main(int argc, char** argv) {
     const std::string mode = argc > 1 ? argv[1] : "";
     const bool is_stop = mode == "stop";
     if (argc != (is_stop ? 9 : 7) || (mode != "stated" && mode != "price" && !is_stop)) {
-        std::fprintf(stderr, "error_calibration stated|price BACKEND SCENE SIDE SAMPLER SEEDS\nerror_calibration stop BACKEND SCENE SIDE SAMPLER SEEDS TARGET MOST\n");
+        std::fprintf(stderr,
+                     "error_calibration stated|price BACKEND SCENE SIDE SAMPLER SEEDS\nerror_calibration "
+                     "stop BACKEND SCENE SIDE SAMPLER SEEDS TARGET MOST\n");
         return 2;
     }
     setLogLevel(LogLevel::Error);

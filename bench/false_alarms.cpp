@@ -3,9 +3,9 @@
 // them.
 //
 //     false_alarms REPEATS
+#include "base/error.h"
 #include "judge/converge/findings.h"
 #include "judge/converge/fits.h"
-#include "base/error.h"
 #include "synthetic_run.h"
 
 #include <fmt/format.h>

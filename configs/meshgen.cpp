@@ -1,10 +1,12 @@
-/// crt-meshgen OUTDIR: writes the meshes that the scenes in this folder use: sphere.obj, figure.obj, dragon.obj, prism.obj.
+/// crt-meshgen OUTDIR: writes the meshes that the scenes in this folder use: sphere.obj, figure.obj,
+/// dragon.obj, prism.obj.
 ///
-/// They are made rather than shipped: the source says what they are, nothing is downloaded, and every run writes the same
-/// bytes. Sphere and prism are written down directly. Figure and dragon are modelled as signed distance fields (round
-/// bones, joined by a smooth minimum), polygonised by marching tetrahedra, which always gives a closed surface, and
-/// simplified by quadric error to an exact number of triangles. So triangles are small where the shape is fine and large
-/// where it is flat, as in a scan, which is what a BVH has to be good at.
+/// They are made rather than shipped: the source says what they are, nothing is downloaded, and every run
+/// writes the same bytes. Sphere and prism are written down directly. Figure and dragon are modelled as
+/// signed distance fields (round bones, joined by a smooth minimum), polygonised by marching tetrahedra,
+/// which always gives a closed surface, and simplified by quadric error to an exact number of triangles. So
+/// triangles are small where the shape is fine and large where it is flat, as in a scan, which is what a BVH
+/// has to be good at.
 ///
 /// Every object stands on y = 0, is centred in x and z, has height 1, and faces −z.
 #include <algorithm>
@@ -27,7 +29,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// --- vectors ---------------------------------------------------------------------------------------------------------
+// --- vectors
+// ---------------------------------------------------------------------------------------------------------
 
 struct Vec {
     double x = 0, y = 0, z = 0;
@@ -43,7 +46,8 @@ Vec mix(Vec a, Vec b, double t) { return (1.0 - t) * a + t * b; }
 Vec mirrorX(Vec a) { return {-a.x, a.y, a.z}; }
 Vec mirrorZ(Vec a) { return {a.x, a.y, -a.z}; }
 
-// --- meshes ----------------------------------------------------------------------------------------------------------
+// --- meshes
+// ----------------------------------------------------------------------------------------------------------
 
 struct Mesh {
     std::vector<Vec> positions;
@@ -52,7 +56,9 @@ struct Mesh {
 };
 
 /// Normal of a triangle, twice its area long.
-Vec areaVector(const std::array<Vec, 3>& corner) { return cross(corner[1] - corner[0], corner[2] - corner[0]); }
+Vec areaVector(const std::array<Vec, 3>& corner) {
+    return cross(corner[1] - corner[0], corner[2] - corner[0]);
+}
 Vec areaVector(const Mesh& mesh, const std::array<std::uint32_t, 3>& t) {
     return areaVector({mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]});
 }
@@ -83,19 +89,23 @@ void writeObj(const Mesh& mesh, const std::filesystem::path& path, const char* t
     if (file == nullptr) throw std::runtime_error("cannot write " + path.string());
     std::fprintf(file, "# %s, %zu triangles. Written by crt-meshgen.\n", title, mesh.triangles.size());
     // Adding zero turns −0 into 0: which of the two a sum gives is nobody's business.
-    for (const Vec& p : mesh.positions) std::fprintf(file, "v %.9g %.9g %.9g\n", p.x + 0.0, p.y + 0.0, p.z + 0.0);
-    for (const Vec& n : mesh.normals) std::fprintf(file, "vn %.9g %.9g %.9g\n", n.x + 0.0, n.y + 0.0, n.z + 0.0);
+    for (const Vec& p : mesh.positions)
+        std::fprintf(file, "v %.9g %.9g %.9g\n", p.x + 0.0, p.y + 0.0, p.z + 0.0);
+    for (const Vec& n : mesh.normals)
+        std::fprintf(file, "vn %.9g %.9g %.9g\n", n.x + 0.0, n.y + 0.0, n.z + 0.0);
     for (const auto& t : mesh.triangles) {
         if (mesh.normals.empty())
             std::fprintf(file, "f %u %u %u\n", t[0] + 1, t[1] + 1, t[2] + 1);
         else
-            std::fprintf(file, "f %u//%u %u//%u %u//%u\n", t[0] + 1, t[0] + 1, t[1] + 1, t[1] + 1, t[2] + 1, t[2] + 1);
+            std::fprintf(file, "f %u//%u %u//%u %u//%u\n", t[0] + 1, t[0] + 1, t[1] + 1, t[1] + 1, t[2] + 1,
+                         t[2] + 1);
     }
     const bool failed = std::ferror(file) != 0;
     if (std::fclose(file) != 0 || failed) throw std::runtime_error("cannot write " + path.string());
 }
 
-// --- distance fields -------------------------------------------------------------------------------------------------
+// --- distance fields
+// -------------------------------------------------------------------------------------------------
 
 /// Minimum with a fillet of about width k where the two are equal.
 double smoothMin(double a, double b, double k) {
@@ -141,8 +151,10 @@ double membrane(Vec p, Vec a, Vec b, Vec c, double r) {
         const Vec d = std::clamp(dot(e, q) / dot(e, e), 0.0, 1.0) * e - q;
         return dot(d, d);
     };
-    const bool beside = dot(cross(ba, n), pa) < 0.0 || dot(cross(cb, n), pb) < 0.0 || dot(cross(ac, n), pc) < 0.0;
-    const double d2 = beside ? std::min({toEdge(ba, pa), toEdge(cb, pb), toEdge(ac, pc)}) : dot(n, pa) * dot(n, pa) / dot(n, n);
+    const bool beside =
+        dot(cross(ba, n), pa) < 0.0 || dot(cross(cb, n), pb) < 0.0 || dot(cross(ac, n), pc) < 0.0;
+    const double d2 = beside ? std::min({toEdge(ba, pa), toEdge(cb, pb), toEdge(ac, pc)})
+                             : dot(n, pa) * dot(n, pa) / dot(n, n);
     return std::sqrt(d2) - r;
 }
 
@@ -165,7 +177,8 @@ public:
         std::vector<std::uint32_t> near;
         for (std::size_t i = 0; i < parts_.size(); ++i) {
             const double reach = parts_[i].blend + 3.0 * radius;
-            if (distance[i] < (parts_[i].carved ? reach : nearest + reach)) near.push_back(static_cast<std::uint32_t>(i));
+            if (distance[i] < (parts_[i].carved ? reach : nearest + reach))
+                near.push_back(static_cast<std::uint32_t>(i));
         }
         return near;
     }
@@ -175,7 +188,8 @@ public:
         double d = 1e30;
         for (const std::uint32_t i : near) {
             const Part& part = parts_[i];
-            d = part.carved ? -smoothMin(-d, part.distance(p), part.blend) : smoothMin(d, part.distance(p), part.blend);
+            d = part.carved ? -smoothMin(-d, part.distance(p), part.blend)
+                            : smoothMin(d, part.distance(p), part.blend);
         }
         return std::max(d, -p.y);
     }
@@ -189,22 +203,29 @@ private:
     std::vector<Part> parts_;
 };
 
-// --- polygonisation --------------------------------------------------------------------------------------------------
+// --- polygonisation
+// --------------------------------------------------------------------------------------------------
 
-/// The surface where `field` is zero inside the box, by marching tetrahedra on a grid of `step`. Each cube is cut into six
-/// tetrahedra around one diagonal; neighbours agree on the cut of their common face, so the surface is closed.
+/// The surface where `field` is zero inside the box, by marching tetrahedra on a grid of `step`. Each cube
+/// is cut into six tetrahedra around one diagonal; neighbours agree on the cut of their common face, so the
+/// surface is closed.
 Mesh polygonise(const Field& field, Vec low, Vec high, double step) {
     constexpr int kBlock = 8;
     const auto blocks = [&](double extent) { return static_cast<int>(std::ceil(extent / (step * kBlock))); };
     const int bx = blocks(high.x - low.x), by = blocks(high.y - low.y), bz = blocks(high.z - low.z);
     const int nx = bx * kBlock, ny = by * kBlock, nz = bz * kBlock;  // Grid points.
-    const auto pointAt = [&](int i, int j, int k) { return Vec{low.x + i * step, low.y + j * step, low.z + k * step}; };
-    const auto gridIndex = [&](int i, int j, int k) { return (static_cast<std::size_t>(k) * ny + j) * nx + i; };
+    const auto pointAt = [&](int i, int j, int k) {
+        return Vec{low.x + i * step, low.y + j * step, low.z + k * step};
+    };
+    const auto gridIndex = [&](int i, int j, int k) {
+        return (static_cast<std::size_t>(k) * ny + j) * nx + i;
+    };
     const auto blockIndex = [&](int i, int j, int k) {
         return (static_cast<std::size_t>(k / kBlock) * by + j / kBlock) * bx + i / kBlock;
     };
 
-    // The field is a distance, near enough: a block whose centre is farther from the surface than its corners holds none.
+    // The field is a distance, near enough: a block whose centre is farther from the surface than its
+    // corners holds none.
     std::vector<float> value(static_cast<std::size_t>(nx) * ny * nz);
     std::vector<std::vector<std::uint32_t>> near(static_cast<std::size_t>(bx) * by * bz);
     const double radius = 0.5 * std::sqrt(3.0) * kBlock * step;
@@ -219,7 +240,8 @@ Mesh polygonise(const Field& field, Vec low, Vec high, double step) {
                 for (int k = k0; k < k0 + kBlock; ++k)
                     for (int j = j0; j < j0 + kBlock; ++j)
                         for (int i = i0; i < i0 + kBlock; ++i)
-                            value[gridIndex(i, j, k)] = static_cast<float>(empty ? at_centre : field(pointAt(i, j, k), parts));
+                            value[gridIndex(i, j, k)] =
+                                static_cast<float>(empty ? at_centre : field(pointAt(i, j, k), parts));
             }
 
     Mesh mesh;
@@ -228,32 +250,38 @@ Mesh polygonise(const Field& field, Vec low, Vec high, double step) {
         if (gridIndex(a[0], a[1], a[2]) > gridIndex(b[0], b[1], b[2])) std::swap(a, b);
         const int direction = (b[0] - a[0]) + 2 * (b[1] - a[1]) + 4 * (b[2] - a[2]);
         const std::uint64_t key = gridIndex(a[0], a[1], a[2]) * 8 + static_cast<unsigned>(direction);
-        const auto [found, is_new] = vertex_on_edge.try_emplace(key, static_cast<std::uint32_t>(mesh.positions.size()));
+        const auto [found, is_new] =
+            vertex_on_edge.try_emplace(key, static_cast<std::uint32_t>(mesh.positions.size()));
         if (is_new) {
             const std::vector<std::uint32_t>& parts = near[blockIndex(a[0], a[1], a[2])];
             const Vec pa = pointAt(a[0], a[1], a[2]), pb = pointAt(b[0], b[1], b[2]);
             double ta = 0.0, tb = 1.0;
             double fa = value[gridIndex(a[0], a[1], a[2])], fb = value[gridIndex(b[0], b[1], b[2])];
             double t = fa / (fa - fb);
-            for (int i = 0; i < 3; ++i) {  // False position; three steps put the vertex on the surface to 1e-4 of the grid.
+            for (int i = 0; i < 3;
+                 ++i) {  // False position; three steps put the vertex on the surface to 1e-4 of the grid.
                 const double f = field(mix(pa, pb, t), parts);
                 if ((f < 0.0) == (fa < 0.0)) ta = t, fa = f;
                 else tb = t, fb = f;
                 if (fa == fb) break;
                 t = ta + (tb - ta) * fa / (fa - fb);
             }
-            // Not onto the grid point itself, where the vertices of many edges would meet in triangles of no area.
+            // Not onto the grid point itself, where the vertices of many edges would meet in triangles of no
+            // area.
             mesh.positions.push_back(mix(pa, pb, std::clamp(t, 0.02, 0.98)));
         }
         return found->second;
     };
 
     // Corners of the six tetrahedra, as bits x, y, z: the paths from corner 0 to corner 7 along three axes.
-    constexpr int kTetrahedra[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7}, {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
+    constexpr int kTetrahedra[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7},
+                                       {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
     for (int k = 0; k + 1 < nz; ++k)
         for (int j = 0; j + 1 < ny; ++j)
             for (int i = 0; i + 1 < nx; ++i) {
-                const auto corner = [&](int c) { return std::array<int, 3>{i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)}; };
+                const auto corner = [&](int c) {
+                    return std::array<int, 3>{i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)};
+                };
                 unsigned inside = 0;
                 for (int c = 0; c < 8; ++c) {
                     const auto [x, y, z] = corner(c);
@@ -261,7 +289,8 @@ Mesh polygonise(const Field& field, Vec low, Vec high, double step) {
                 }
                 if (inside == 0 || inside == 255) continue;
                 for (const auto& tetrahedron : kTetrahedra) {
-                    // Corners in the order inside first; an odd permutation turns the tetrahedron inside out.
+                    // Corners in the order inside first; an odd permutation turns the tetrahedron inside
+                    // out.
                     std::array<int, 4> c{tetrahedron[0], tetrahedron[1], tetrahedron[2], tetrahedron[3]};
                     int count = 0;
                     bool flipped = false;
@@ -273,7 +302,9 @@ Mesh polygonise(const Field& field, Vec low, Vec high, double step) {
                             }
                             ++count;
                         }
-                    const auto between = [&](int a, int b) { return vertexBetween(corner(c[a]), corner(c[b])); };
+                    const auto between = [&](int a, int b) {
+                        return vertexBetween(corner(c[a]), corner(c[b]));
+                    };
                     const auto triangle = [&](std::uint32_t p, std::uint32_t q, std::uint32_t r) {
                         if (flipped) std::swap(q, r);
                         mesh.triangles.push_back({p, q, r});
@@ -283,7 +314,8 @@ Mesh polygonise(const Field& field, Vec low, Vec high, double step) {
                     } else if (count == 3) {
                         triangle(between(0, 3), between(1, 3), between(2, 3));
                     } else if (count == 2) {
-                        const std::uint32_t p = between(0, 2), q = between(0, 3), r = between(1, 3), s = between(1, 2);
+                        const std::uint32_t p = between(0, 2), q = between(0, 3), r = between(1, 3),
+                                            s = between(1, 2);
                         triangle(p, q, r);
                         triangle(p, r, s);
                     }
@@ -304,12 +336,14 @@ Mesh withoutCrumbs(Mesh mesh) {
         for (const std::uint32_t v : {t[1], t[2]}) parent[root(v)] = root(t[0]);
     std::vector<std::uint32_t> faces(mesh.positions.size(), 0);
     for (const auto& t : mesh.triangles) ++faces[root(t[0])];
-    const auto largest = static_cast<std::uint32_t>(std::max_element(faces.begin(), faces.end()) - faces.begin());
+    const auto largest =
+        static_cast<std::uint32_t>(std::max_element(faces.begin(), faces.end()) - faces.begin());
     std::erase_if(mesh.triangles, [&](const auto& t) { return root(t[0]) != largest; });
     return mesh;
 }
 
-// --- simplification --------------------------------------------------------------------------------------------------
+// --- simplification
+// --------------------------------------------------------------------------------------------------
 
 /// Sum of squared distances to a set of planes (Garland and Heckbert 1997).
 struct Quadric {
@@ -342,13 +376,14 @@ struct Quadric {
         const double size = xx + yy + zz;
         if (!(det > 1e-9 * size * size * size)) return false;
         const double d = xx * zz - xz * xz, e = xy * xz - xx * yz, f = xx * yy - xy * xy;
-        p = {-(a * xw + b * yw + c * zw) / det, -(b * xw + d * yw + e * zw) / det, -(c * xw + e * yw + f * zw) / det};
+        p = {-(a * xw + b * yw + c * zw) / det, -(b * xw + d * yw + e * zw) / det,
+             -(c * xw + e * yw + f * zw) / det};
         return true;
     }
 };
 
-/// Collapses edges, cheapest first, until `target` triangles are left. The mesh must be closed and stays so; an edge is
-/// passed over if collapsing it would pinch the surface, turn a face over, or leave a sliver.
+/// Collapses edges, cheapest first, until `target` triangles are left. The mesh must be closed and stays so;
+/// an edge is passed over if collapsing it would pinch the surface, turn a face over, or leave a sliver.
 class Simplifier {
 public:
     explicit Simplifier(Mesh mesh) : mesh_(std::move(mesh)) {
@@ -377,7 +412,8 @@ public:
         while (count > target) {
             if (heap_.empty()) {
                 // An edge passed over may be collapsible now that its surroundings have changed.
-                if (count == count_at_refill) throw std::runtime_error("a mesh cannot be simplified as far as asked for");
+                if (count == count_at_refill)
+                    throw std::runtime_error("a mesh cannot be simplified as far as asked for");
                 count_at_refill = count;
                 for (std::uint32_t v = 0; v < faces_of_.size(); ++v)
                     for (const std::uint32_t w : neighbours(v))
@@ -434,12 +470,14 @@ private:
         return longest2 > 0.0 ? length(areaVector(corner)) / longest2 : 0.0;
     }
 
-    /// Whether the faces of `v`, but for those with `other`, keep their side and a reasonable shape when v moves.
+    /// Whether the faces of `v`, but for those with `other`, keep their side and a reasonable shape when v
+    /// moves.
     bool facesSurvive(std::uint32_t v, std::uint32_t other, Vec to) const {
         for (const std::uint32_t f : faces_of_[v]) {
             const auto& t = mesh_.triangles[f];
             if (t[0] == other || t[1] == other || t[2] == other) continue;
-            const std::array<Vec, 3> before{mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]};
+            const std::array<Vec, 3> before{mesh_.positions[t[0]], mesh_.positions[t[1]],
+                                            mesh_.positions[t[2]]};
             std::array<Vec, 3> after = before;
             for (int i = 0; i < 3; ++i)
                 if (t[i] == v) after[i] = to;
@@ -454,10 +492,12 @@ private:
 
     bool collapse(const Edge& edge) {
         const std::uint32_t a = edge.a, b = edge.b;
-        // On a closed surface the two ends of an edge share exactly two neighbours; with more, the collapse pinches it.
+        // On a closed surface the two ends of an edge share exactly two neighbours; with more, the collapse
+        // pinches it.
         const std::vector<std::uint32_t> around_a = neighbours(a), around_b = neighbours(b);
         std::vector<std::uint32_t> shared;
-        std::set_intersection(around_a.begin(), around_a.end(), around_b.begin(), around_b.end(), std::back_inserter(shared));
+        std::set_intersection(around_a.begin(), around_a.end(), around_b.begin(), around_b.end(),
+                              std::back_inserter(shared));
         if (shared.size() != 2) return false;
         for (const std::uint32_t v : shared)
             if (faces_of_[v].size() <= 3) return false;
@@ -511,12 +551,14 @@ private:
     Mesh mesh_;
     std::vector<std::vector<std::uint32_t>> faces_of_;
     std::vector<Quadric> quadric_;
-    std::vector<std::uint32_t> version_;  ///< Counts the changes of a vertex; edges in the heap from before are stale.
+    std::vector<std::uint32_t>
+        version_;  ///< Counts the changes of a vertex; edges in the heap from before are stale.
     std::vector<bool> alive_;
     std::priority_queue<Edge> heap_;
 };
 
-// --- sphere and prism ------------------------------------------------------------------------------------------------
+// --- sphere and prism
+// ------------------------------------------------------------------------------------------------
 
 Mesh sphere() {
     constexpr std::uint32_t kSegments = 32, kRings = 16;
@@ -533,7 +575,9 @@ Mesh sphere() {
         }
     add({0, -1, 0});
 
-    const auto at = [&](std::uint32_t ring, std::uint32_t segment) { return 1 + (ring - 1) * kSegments + segment % kSegments; };
+    const auto at = [&](std::uint32_t ring, std::uint32_t segment) {
+        return 1 + (ring - 1) * kSegments + segment % kSegments;
+    };
     const std::uint32_t south = 1 + (kRings - 1) * kSegments;
     for (std::uint32_t s = 0; s < kSegments; ++s) mesh.triangles.push_back({0, at(1, s + 1), at(1, s)});
     for (std::uint32_t ring = 1; ring + 1 < kRings; ++ring)
@@ -541,12 +585,13 @@ Mesh sphere() {
             mesh.triangles.push_back({at(ring, s), at(ring, s + 1), at(ring + 1, s + 1)});
             mesh.triangles.push_back({at(ring, s), at(ring + 1, s + 1), at(ring + 1, s)});
         }
-    for (std::uint32_t s = 0; s < kSegments; ++s) mesh.triangles.push_back({south, at(kRings - 1, s), at(kRings - 1, s + 1)});
+    for (std::uint32_t s = 0; s < kSegments; ++s)
+        mesh.triangles.push_back({south, at(kRings - 1, s), at(kRings - 1, s + 1)});
     return mesh;
 }
 
-/// A dispersing prism: equilateral section of height 1 in the xy plane, apex up, two units long in z. Its faces are flat,
-/// so it has no normals of its own.
+/// A dispersing prism: equilateral section of height 1 in the xy plane, apex up, two units long in z. Its
+/// faces are flat, so it has no normals of its own.
 Mesh prism() {
     const double half = 1.0 / std::sqrt(3.0);
     Mesh mesh;
@@ -555,13 +600,16 @@ Mesh prism() {
         mesh.positions.push_back({half, 0, z});
         mesh.positions.push_back({0, 1, z});
     }
-    mesh.triangles = {{0, 2, 1}, {3, 4, 5}, {0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}, {2, 0, 3}, {2, 3, 5}};
+    mesh.triangles = {{0, 2, 1}, {3, 4, 5}, {0, 1, 4}, {0, 4, 3},
+                      {1, 2, 5}, {1, 5, 4}, {2, 0, 3}, {2, 3, 5}};
     return mesh;
 }
 
-// --- figure ----------------------------------------------------------------------------------------------------------
+// --- figure
+// ----------------------------------------------------------------------------------------------------------
 
-/// An ape sitting on a block of stone and thinking, chin on hand, after the bronze that Hugo Rheinhold made in 1892.
+/// An ape sitting on a block of stone and thinking, chin on hand, after the bronze that Hugo Rheinhold made
+/// in 1892.
 Mesh figure() {
     Field field;
     const auto bone = [&](Vec a, Vec b, double ra, double rb, double blend) {
@@ -600,7 +648,9 @@ Mesh figure() {
         const Vec nostril = s({0.013, 0.897, -0.292});
         field.carve(0.01, [nostril](Vec p) { return ellipsoid(p, nostril, {0.008, 0.007, 0.012}); });
     }
-    field.carve(0.008, [](Vec p) { return roundCone(p, {-0.055, 0.847, -0.288}, {0.055, 0.847, -0.288}, 0.006, 0.006); });
+    field.carve(0.008, [](Vec p) {
+        return roundCone(p, {-0.055, 0.847, -0.288}, {0.055, 0.847, -0.288}, 0.006, 0.006);
+    });
 
     // Legs: thighs out, knees high, feet flat with a thumb-like great toe.
     for (const double side : {-1.0, 1.0}) {
@@ -614,7 +664,8 @@ Mesh figure() {
         bone(ankle + Vec{0, -0.02, 0}, s({0.185, 0.068, -0.30}), 0.044, 0.038, 0.03);
         for (int toe = 0; toe < 4; ++toe) {
             const double x = 0.162 + 0.024 * toe;
-            bone(s({x, 0.068, -0.29}), s({x + 0.004 * toe, 0.058, -0.365 + 0.008 * toe}), 0.016, 0.014, 0.012);
+            bone(s({x, 0.068, -0.29}), s({x + 0.004 * toe, 0.058, -0.365 + 0.008 * toe}), 0.016, 0.014,
+                 0.012);
         }
         bone(s({0.15, 0.068, -0.25}), s({0.108, 0.060, -0.315}), 0.020, 0.016, 0.015);
     }
@@ -645,22 +696,26 @@ Mesh figure() {
     }
     bone({0.195, 0.43, -0.325}, {0.160, 0.375, -0.318}, 0.018, 0.014, 0.015);
 
-    Mesh mesh = Simplifier(withoutCrumbs(polygonise(field, {-0.45, -0.03, -0.56}, {0.47, 1.14, 0.45}, 0.010))).reduce(4746);
-    // A closed surface has an even number of triangles. The 4,745th is the last one: the lowest face of the slab, on which
-    // everything stands, is left open by the one triangle nobody can see.
-    const auto lowest = std::min_element(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& a, const auto& b) {
-        const auto height = [&](const auto& t) {
-            return mesh.positions[t[0]].y + mesh.positions[t[1]].y + mesh.positions[t[2]].y;
-        };
-        return height(a) < height(b);
-    });
+    Mesh mesh =
+        Simplifier(withoutCrumbs(polygonise(field, {-0.45, -0.03, -0.56}, {0.47, 1.14, 0.45}, 0.010)))
+            .reduce(4746);
+    // A closed surface has an even number of triangles. The 4,745th is the last one: the lowest face of the
+    // slab, on which everything stands, is left open by the one triangle nobody can see.
+    const auto lowest =
+        std::min_element(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& a, const auto& b) {
+            const auto height = [&](const auto& t) {
+                return mesh.positions[t[0]].y + mesh.positions[t[1]].y + mesh.positions[t[2]].y;
+            };
+            return height(a) < height(b);
+        });
     mesh.triangles.erase(lowest);
     normalise(mesh);
     addNormals(mesh);
     return mesh;
 }
 
-// --- dragon ----------------------------------------------------------------------------------------------------------
+// --- dragon
+// ----------------------------------------------------------------------------------------------------------
 
 /// A curve through points with a radius at each: Catmull and Rom's spline, cut into short straight pieces.
 struct Spine {
@@ -677,7 +732,8 @@ struct Spine {
         };
         for (std::size_t i = 0; i + 1 < through.size(); ++i)
             for (int s = 0; s < pieces; ++s)
-                knots.push_back(blend(get(i, -1), get(i, 0), get(i, 1), get(i, 2), static_cast<double>(s) / pieces));
+                knots.push_back(
+                    blend(get(i, -1), get(i, 0), get(i, 1), get(i, 2), static_cast<double>(s) / pieces));
         knots.push_back(through.back());
     }
 
@@ -699,16 +755,16 @@ private:
     }
 };
 
-/// Height of the scales, 0 to 1, at a place on the skin: `around` counts scales round the body, `along` rows towards the
-/// tail. Rows are shifted by half a scale, and each scale rises towards its free end.
+/// Height of the scales, 0 to 1, at a place on the skin: `around` counts scales round the body, `along` rows
+/// towards the tail. Rows are shifted by half a scale, and each scale rises towards its free end.
 double scaleHeight(double around, double along) {
     const double a = around + 0.5 * along, b = around - 0.5 * along;
     const double x = a - std::floor(a) - 0.5, y = b - std::floor(b) - 0.5;
     return (1 - 4 * x * x) * (1 - 4 * y * y) * (0.7 + 0.6 * (x - y));
 }
 
-/// A winged dragon, half coiled, head turned to the viewer. Long and thin in every direction, and as fine in its scales as
-/// it is coarse on its wings.
+/// A winged dragon, half coiled, head turned to the viewer. Long and thin in every direction, and as fine in
+/// its scales as it is coarse on its wings.
 Mesh dragon() {
     Field field;
     const auto bone = [&](Vec a, Vec b, double ra, double rb, double blend) {
@@ -719,15 +775,27 @@ Mesh dragon() {
     };
 
     // Body from the nape to the tip of the tail.
-    const Spine spine({{{-0.640, 0.800, -0.170}, 0.066}, {{-0.590, 0.735, -0.100}, 0.070}, {{-0.525, 0.600, -0.020}, 0.082},
-                       {{-0.400, 0.465, 0.040}, 0.112},  {{-0.205, 0.415, 0.060}, 0.158},  {{0.020, 0.405, 0.040}, 0.160},
-                       {{0.240, 0.395, -0.010}, 0.145},  {{0.430, 0.345, -0.070}, 0.112},  {{0.610, 0.240, -0.080}, 0.086},
-                       {{0.780, 0.135, -0.010}, 0.068},  {{0.870, 0.082, 0.150}, 0.055},   {{0.800, 0.062, 0.310}, 0.046},
-                       {{0.620, 0.056, 0.390}, 0.038},   {{0.420, 0.050, 0.370}, 0.031},   {{0.270, 0.046, 0.290}, 0.024},
-                       {{0.170, 0.050, 0.330}, 0.017},   {{0.120, 0.075, 0.410}, 0.010}},
+    const Spine spine({{{-0.640, 0.800, -0.170}, 0.066},
+                       {{-0.590, 0.735, -0.100}, 0.070},
+                       {{-0.525, 0.600, -0.020}, 0.082},
+                       {{-0.400, 0.465, 0.040}, 0.112},
+                       {{-0.205, 0.415, 0.060}, 0.158},
+                       {{0.020, 0.405, 0.040}, 0.160},
+                       {{0.240, 0.395, -0.010}, 0.145},
+                       {{0.430, 0.345, -0.070}, 0.112},
+                       {{0.610, 0.240, -0.080}, 0.086},
+                       {{0.780, 0.135, -0.010}, 0.068},
+                       {{0.870, 0.082, 0.150}, 0.055},
+                       {{0.800, 0.062, 0.310}, 0.046},
+                       {{0.620, 0.056, 0.390}, 0.038},
+                       {{0.420, 0.050, 0.370}, 0.031},
+                       {{0.270, 0.046, 0.290}, 0.024},
+                       {{0.170, 0.050, 0.330}, 0.017},
+                       {{0.120, 0.075, 0.410}, 0.010}},
                       5);
     constexpr int kScalesAround = 22;
-    double rows = 0.0;  // Scales keep their shape as the body thins, so rows are counted in units of its girth.
+    double rows =
+        0.0;  // Scales keep their shape as the body thins, so rows are counted in units of its girth.
     for (std::size_t i = 0; i + 1 < spine.knots.size(); ++i) {
         const Spine::Knot a = spine.knots[i], b = spine.knots[i + 1];
         const double rows_a = rows;
@@ -757,8 +825,10 @@ Mesh dragon() {
         const Vec up = spine.up(i), back = spine.tangent(i);
         const double size = 0.35 * k.radius + 0.018;
         const Vec root = k.at + (0.92 * k.radius) * up;
-        bone(root - (0.5 * size) * back, root + size * up + (0.9 * size) * back, 0.30 * size, 0.06 * size + 0.002, 0.012);
-        bone(root + (0.4 * size) * back, root + size * up + (0.9 * size) * back, 0.26 * size, 0.06 * size + 0.002, 0.008);
+        bone(root - (0.5 * size) * back, root + size * up + (0.9 * size) * back, 0.30 * size,
+             0.06 * size + 0.002, 0.012);
+        bone(root + (0.4 * size) * back, root + size * up + (0.9 * size) * back, 0.26 * size,
+             0.06 * size + 0.002, 0.008);
     }
     // The tail ends in a blade.
     const Vec tip = spine.knots.back().at;
@@ -769,15 +839,18 @@ Mesh dragon() {
     // Head, in its own frame: `f` forward along the snout, `u` up, `s` to its left.
     const Vec head{-0.665, 0.845, -0.200};
     const Vec f = unit({-0.62, -0.22, -0.75}), s = unit(cross({0, 1, 0}, f)), u = cross(f, s);
-    const auto place = [=](double forward, double up, double side) { return head + forward * f + up * u + side * s; };
+    const auto place = [=](double forward, double up, double side) {
+        return head + forward * f + up * u + side * s;
+    };
     bone(place(-0.03, -0.005, 0), place(0.06, 0.0, 0), 0.074, 0.062, 0.05);
     bone(place(0.05, 0.006, 0), place(0.205, -0.004, 0), 0.050, 0.034, 0.03);         // Upper jaw.
     bone(place(0.01, -0.050, 0), place(0.180, -0.098, 0), 0.042, 0.022, 0.02);        // Lower jaw, open.
     ball(place(0.214, 0.006, 0), {0.030, 0.024, 0.032}, 0.025);
     bone(place(0.09, -0.048, 0), place(0.170, -0.060, 0), 0.012, 0.006, 0.01);        // Tongue.
     for (const double side : {-1.0, 1.0}) {
-        bone(place(0.02, 0.052, side * 0.036), place(0.105, 0.040, side * 0.030), 0.018, 0.010, 0.015);      // Brow.
-        ball(place(0.070, 0.027, side * 0.051), {0.017, 0.017, 0.017}, 0.004);                               // Eye.
+        bone(place(0.02, 0.052, side * 0.036), place(0.105, 0.040, side * 0.030), 0.018, 0.010,
+             0.015);                                                            // Brow.
+        ball(place(0.070, 0.027, side * 0.051), {0.017, 0.017, 0.017}, 0.004);  // Eye.
         const Vec nostril = place(0.234, 0.022, side * 0.016);
         field.carve(0.006, [nostril](Vec p) { return length(p - nostril) - 0.009; });
         // Horns in three pieces that turn back and up, and two smaller ones below.
@@ -791,10 +864,11 @@ Mesh dragon() {
         for (int tooth = 0; tooth < 6; ++tooth) {
             const double forward = 0.085 + 0.024 * tooth, out = side * (0.036 - 0.0024 * tooth);
             const double fang = tooth == 4 ? 1.8 : 1.0;
-            bone(place(forward, -0.018, out), place(forward + 0.003, -0.030 - 0.022 * fang, out), 0.0100, 0.0035, 0.004);
+            bone(place(forward, -0.018, out), place(forward + 0.003, -0.030 - 0.022 * fang, out), 0.0100,
+                 0.0035, 0.004);
             const double jaw = -0.052 - 0.29 * (forward - 0.085);
-            bone(place(forward - 0.015, jaw - 0.008, 0.75 * out), place(forward - 0.013, jaw + 0.026, 0.75 * out), 0.0095, 0.0035,
-                 0.004);
+            bone(place(forward - 0.015, jaw - 0.008, 0.75 * out),
+                 place(forward - 0.013, jaw + 0.026, 0.75 * out), 0.0095, 0.0035, 0.004);
         }
     }
 
@@ -804,7 +878,8 @@ Mesh dragon() {
         bone(hip, knee, 1.15 * r, 0.72 * r, 0.04);
         bone(knee, ankle, 0.70 * r, 0.45 * r, 0.02);
         bone(ankle, foot, 0.46 * r, 0.42 * r, 0.015);
-        const Vec forward = unit(Vec{foot.x - ankle.x, 0, foot.z - ankle.z}), across = cross({0, 1, 0}, forward);
+        const Vec forward = unit(Vec{foot.x - ankle.x, 0, foot.z - ankle.z}),
+                  across = cross({0, 1, 0}, forward);
         for (int toe = -1; toe <= 2; ++toe) {
             const bool spur = toe == 2;
             const Vec direction = spur ? (-1.0) * forward : unit(forward + (0.55 * toe) * across);
@@ -813,20 +888,26 @@ Mesh dragon() {
             const Vec end{knuckle.x + 0.55 * r * direction.x, 0.018, knuckle.z + 0.55 * r * direction.z};
             bone(start, knuckle, 0.30 * r, 0.26 * r, 0.012);
             bone(knuckle, end, 0.26 * r, 0.20 * r, 0.008);
-            bone(end, {end.x + 0.5 * r * direction.x, 0.004, end.z + 0.5 * r * direction.z}, 0.16 * r, 0.02 * r, 0.006);
+            bone(end, {end.x + 0.5 * r * direction.x, 0.004, end.z + 0.5 * r * direction.z}, 0.16 * r,
+                 0.02 * r, 0.006);
         }
     };
-    leg({-0.270, 0.370, -0.080}, {-0.235, 0.235, -0.235}, {-0.255, 0.075, -0.200}, {-0.320, 0.030, -0.255}, 0.072);
-    leg({-0.250, 0.370, 0.190}, {-0.170, 0.230, 0.300}, {-0.235, 0.075, 0.275}, {-0.305, 0.030, 0.295}, 0.072);
-    leg({0.235, 0.360, -0.130}, {0.130, 0.270, -0.290}, {0.295, 0.105, -0.270}, {0.245, 0.030, -0.335}, 0.090);
+    leg({-0.270, 0.370, -0.080}, {-0.235, 0.235, -0.235}, {-0.255, 0.075, -0.200}, {-0.320, 0.030, -0.255},
+        0.072);
+    leg({-0.250, 0.370, 0.190}, {-0.170, 0.230, 0.300}, {-0.235, 0.075, 0.275}, {-0.305, 0.030, 0.295},
+        0.072);
+    leg({0.235, 0.360, -0.130}, {0.130, 0.270, -0.290}, {0.295, 0.105, -0.270}, {0.245, 0.030, -0.335},
+        0.090);
     leg({0.260, 0.360, 0.110}, {0.150, 0.255, 0.240}, {0.305, 0.105, 0.215}, {0.245, 0.030, 0.235}, 0.090);
 
     // Wings, raised: arm, wrist with a claw, four fingers, and skin between them that hangs in arcs.
     for (const double side : {-1.0, 1.0}) {
         const auto w = [side](Vec p) { return (side < 0.0 ? p : mirrorZ(p)) + Vec{0, 0, 0.05}; };
-        const Vec shoulder = w({-0.200, 0.525, -0.085}), elbow = w({-0.060, 0.755, -0.185}), wrist = w({-0.235, 0.985, -0.300});
-        const std::array<Vec, 5> tip_of{w({-0.120, 1.120, -0.560}), w({0.190, 1.090, -0.600}), w({0.420, 0.915, -0.520}),
-                                        w({0.500, 0.680, -0.370}), w({0.330, 0.505, -0.115})};
+        const Vec shoulder = w({-0.200, 0.525, -0.085}), elbow = w({-0.060, 0.755, -0.185}),
+                  wrist = w({-0.235, 0.985, -0.300});
+        const std::array<Vec, 5> tip_of{w({-0.120, 1.120, -0.560}), w({0.190, 1.090, -0.600}),
+                                        w({0.420, 0.915, -0.520}), w({0.500, 0.680, -0.370}),
+                                        w({0.330, 0.505, -0.115})};
         bone(shoulder, elbow, 0.052, 0.030, 0.03);
         bone(elbow, wrist, 0.032, 0.022, 0.012);
         bone(wrist, wrist + Vec{-0.055, 0.055, 0.0}, 0.014, 0.003, 0.01);
@@ -840,7 +921,8 @@ Mesh dragon() {
             field.add(0.008, [=](Vec p) { return membrane(p, a, b, c, kSkin); });
         };
         for (std::size_t i = 0; i + 1 < tip_of.size(); ++i) {
-            // The last tip is where the skin meets the flank; before it the skin hangs from the arm instead of a finger.
+            // The last tip is where the skin meets the flank; before it the skin hangs from the arm instead
+            // of a finger.
             const Vec pa = mix(wrist, tip_of[i], 0.5) + Vec{0, 0.030, 0};
             const Vec pb = i == 3 ? elbow : mix(wrist, tip_of[i + 1], 0.5) + Vec{0, 0.030, 0};
             const Vec rim = mix(mix(tip_of[i], tip_of[i + 1], 0.5), i == 3 ? elbow : wrist, 0.22);
@@ -853,7 +935,9 @@ Mesh dragon() {
         skin(elbow, w({0.060, 0.480, -0.090}), shoulder);
     }
 
-    Mesh mesh = Simplifier(withoutCrumbs(polygonise(field, {-1.00, -0.03, -0.72}, {1.00, 1.20, 0.80}, 0.0066))).reduce(100000);
+    Mesh mesh =
+        Simplifier(withoutCrumbs(polygonise(field, {-1.00, -0.03, -0.72}, {1.00, 1.20, 0.80}, 0.0066)))
+            .reduce(100000);
     normalise(mesh);
     addNormals(mesh);
     return mesh;
@@ -866,7 +950,8 @@ int main(int argc, char** argv) {
     const bool asks_for_help = argument == "--help" || argument == "-h";
     if (argument.empty() || argument[0] == '-') {
         std::fprintf(asks_for_help ? stdout : stderr,
-                     "usage: crt-meshgen OUTDIR\nWrites sphere.obj, figure.obj, dragon.obj and prism.obj into the folder OUTDIR, which is made if need be.\n");
+                     "usage: crt-meshgen OUTDIR\nWrites sphere.obj, figure.obj, dragon.obj and prism.obj "
+                     "into the folder OUTDIR, which is made if need be.\n");
         return asks_for_help ? 0 : 2;
     }
     try {

@@ -1,4 +1,5 @@
-// The main of tests compiled for AVX2. Compiled without it: on a CPU that lacks it nothing else of the program may run, static initialisers included.
+// The main of tests compiled for AVX2. Compiled without it: on a CPU that lacks it nothing else of the
+// program may run, static initialisers included.
 #define CATCH_CONFIG_RUNNER
 #include "catch.h"
 

@@ -1,8 +1,8 @@
 // What the log says, for tests that check it.
 #pragma once
 
-#include "catch.h"
 #include "base/log.h"
+#include "catch.h"
 #include "judge/verify/temporary_folder.h"
 
 #include <fcntl.h>

@@ -1,4 +1,5 @@
-/// Catch2, version 2 (Debian 12, Ubuntu 22.04) or 3 (later ones): what the tests use of it, under the same names.
+/// Catch2, version 2 (Debian 12, Ubuntu 22.04) or 3 (later ones): what the tests use of it, under the same
+/// names.
 #pragma once
 
 #include <string>

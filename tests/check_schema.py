@@ -3,7 +3,8 @@
 
     check_schema.py CRT_PROGRAM CONFIG_DIR
 
-The schema is for editors; this keeps it from refusing what the program accepts. A few broken scenes make sure that it
+The schema is for editors; this keeps it from refusing what the program accepts. A few broken scenes make
+sure that it
 refuses anything at all. Needs python3-jsonschema and python3-yaml.
 """
 
@@ -18,14 +19,19 @@ import yaml
 
 
 class SceneLoader(yaml.SafeLoader):
-    """YAML as crt reads it: the only booleans are true and false, and 1e3 is a number (PyYAML follows YAML 1.1)."""
+    """YAML as crt reads it: the only booleans are true and false, and 1e3 is a number (PyYAML follows YAML
+    1.1)."""
 
     yaml_implicit_resolvers = {}
 
 
 SceneLoader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"^(true|false)$"), list("tf"))
-SceneLoader.add_implicit_resolver("tag:yaml.org,2002:null", re.compile(r"^(~|null|Null|NULL|)$"), ["~", "n", "N", ""])
-SceneLoader.add_implicit_resolver("tag:yaml.org,2002:int", re.compile(r"^[-+]?(0|[1-9][0-9]*)$"), list("-+0123456789"))
+SceneLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:null", re.compile(r"^(~|null|Null|NULL|)$"), ["~", "n", "N", ""]
+)
+SceneLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:int", re.compile(r"^[-+]?(0|[1-9][0-9]*)$"), list("-+0123456789")
+)
 SceneLoader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$"),
@@ -68,7 +74,9 @@ def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
     program, folder = sys.argv[1], pathlib.Path(sys.argv[2])
-    schema = json.loads(subprocess.run([program, "schema"], check=True, capture_output=True, text=True).stdout)
+    schema = json.loads(
+        subprocess.run([program, "schema"], check=True, capture_output=True, text=True).stdout
+    )
     jsonschema.Draft7Validator.check_schema(schema)
     validator = jsonschema.Draft7Validator(schema)
 

@@ -16,7 +16,8 @@ namespace conformance {
 
 /// The backend named by --backend.
 const crt::LoadedBackend& backend();
-/// The backend that others are compared with, bit by bit: --against, by default the portable C++ build of the kernel (`example`).
+/// The backend that others are compared with, bit by bit: --against, by default the portable C++ build of
+/// the kernel (`example`).
 const crt::LoadedBackend& reference();
 
 /// A scene from YAML; meshes only inline.

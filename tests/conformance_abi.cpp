@@ -1,4 +1,5 @@
-// The border itself: what a host may do wrong, and what it may count on. Runs on the C table, not on its C++ face.
+// The border itself: what a host may do wrong, and what it may count on. Runs on the C table, not on its C++
+// face.
 #include "conformance.h"
 
 #include "backend/crt_layout_hash.h"
@@ -14,9 +15,11 @@ using namespace conformance;
 namespace {
 
 const char* kScene =
-    "crt: 1\ncamera: {position: [0, 0, -3], target: [0, 0, 0], fov: 60}\nfilm: {resolution: [16, 12]}\nenvironment: {radiance: 1}\n"
+    "crt: 1\ncamera: {position: [0, 0, -3], target: [0, 0, 0], fov: 60}\nfilm: {resolution: [16, "
+    "12]}\nenvironment: {radiance: 1}\n"
     "materials: {white: {type: diffuse, reflectance: 0.5}}\n"
-    "objects: [{name: t, mesh: {positions: [[-1,-1,0],[1,-1,0],[0,1,0]], faces: [[0,1,2]]}, material: white}]\n";
+    "objects: [{name: t, mesh: {positions: [[-1,-1,0],[1,-1,0],[0,1,0]], faces: [[0,1,2]]}, material: "
+    "white}]\n";
 
 /// An integrator through the C table alone, with a host that counts calls and can cancel.
 struct Raw {
@@ -59,7 +62,8 @@ struct Raw {
         blob.size_bytes = compiled.size_bytes;
         return integrator.set_scene(integrator.state, &blob);
     }
-    CrtStatus render(std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::uint32_t y1, std::uint64_t first, std::uint64_t count) {
+    CrtStatus render(std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::uint32_t y1,
+                     std::uint64_t first, std::uint64_t count) {
         CrtRenderRange range{};
         range.struct_size = sizeof(range);
         range.x0 = x0;
@@ -78,7 +82,8 @@ struct Target {
     std::vector<std::uint64_t> counts;
     CrtFilmView view{};
 
-    explicit Target(const crt::CompiledScene& compiled) : sums(16 * 12 * compiled.channels * 2), counts(16 * 12) {
+    explicit Target(const crt::CompiledScene& compiled)
+        : sums(16 * 12 * compiled.channels * 2), counts(16 * 12) {
         view.struct_size = sizeof(view);
         view.width = 16;
         view.height = 12;
@@ -168,7 +173,8 @@ TEST_CASE("set_scene clears the film, render adds, the report counts", "[abi]") 
     for (int round = 0; round < 2; ++round) {
         REQUIRE(raw.setScene(compiled) == CRT_OK);
         REQUIRE(raw.integrator.read_film(raw.integrator.state, &target.view) == CRT_OK);
-        CHECK(std::all_of(target.counts.begin(), target.counts.end(), [](std::uint64_t n) { return n == 0; }));
+        CHECK(
+            std::all_of(target.counts.begin(), target.counts.end(), [](std::uint64_t n) { return n == 0; }));
         REQUIRE(raw.render(0, 0, 16, 12, 0, 3) == CRT_OK);
         REQUIRE(raw.render(2, 1, 16, 12, 3, 2) == CRT_OK);
         REQUIRE(raw.render(0, 0, 16, 12, 9, 0) == CRT_OK);  // nothing is a legal amount

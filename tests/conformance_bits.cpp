@@ -24,7 +24,8 @@ using namespace conformance;
 namespace {
 
 /// A small box with something of everything; `extra` adds or replaces top-level parts.
-std::string richScene(const std::string& integrator, const std::string& sampler, const std::string& camera_extra, const std::string& filter) {
+std::string richScene(const std::string& integrator, const std::string& sampler,
+                      const std::string& camera_extra, const std::string& filter) {
     return fmt::format(R"(crt: 1
 camera: {{position: [0.5, 0.5, -1.4], target: [0.5, 0.5, 0.5], fov: 40{}}}
 film: {{resolution: [48, 40], filter: {}}}
@@ -41,19 +42,25 @@ materials:
   glass: {{type: dielectric, ior: 1.5}}
   flint: {{type: dielectric, ior: {{glass: SF10}}}}
 objects:
-  - {{name: floor, mesh: {{positions: [[0,0,0],[0,0,1],[1,0,1],[1,0,0]], faces: [[0,1,2,3]]}}, material: white}}
+  - {{name: floor, mesh: {{positions: [[0,0,0],[0,0,1],[1,0,1],[1,0,0]], faces: [[0,1,2,3]]}},
+      material: white}}
   - {{name: back, mesh: {{positions: [[0,0,1],[0,1,1],[1,1,1],[1,0,1]], faces: [[0,1,2,3]]}}, material: red}}
-  - {{name: left, mesh: {{positions: [[0,0,0],[0,1,0],[0,1,1],[0,0,1]], faces: [[0,1,2,3]]}}, material: gold}}
-  - {{name: right, mesh: {{positions: [[1,0,0],[1,0,1],[1,1,1],[1,1,0]], faces: [[0,1,2,3]]}}, material: mirror}}
-  - {{name: lamp, mesh: {{positions: [[0.3,0.99,0.3],[0.7,0.99,0.3],[0.7,0.99,0.7],[0.3,0.99,0.7]], faces: [[0,1,2,3]]}}, material: white,
+  - {{name: left, mesh: {{positions: [[0,0,0],[0,1,0],[0,1,1],[0,0,1]], faces: [[0,1,2,3]]}},
+      material: gold}}
+  - {{name: right, mesh: {{positions: [[1,0,0],[1,0,1],[1,1,1],[1,1,0]], faces: [[0,1,2,3]]}},
+      material: mirror}}
+  - {{name: lamp, mesh: {{positions: [[0.3,0.99,0.3],[0.7,0.99,0.3],[0.7,0.99,0.7],[0.3,0.99,0.7]],
+      faces: [[0,1,2,3]]}}, material: white,
      emission: {{radiance: {{blackbody: 3000, scale: 5}}}}}}
-  - {{name: strip, mesh: {{positions: [[0.02,0.1,0.2],[0.02,0.1,0.8],[0.02,0.12,0.8]], faces: [[0,1,2]]}}, material: white, emission: {{radiance: 8, two_sided: true}}}}
+  - {{name: strip, mesh: {{positions: [[0.02,0.1,0.2],[0.02,0.1,0.8],[0.02,0.12,0.8]],
+      faces: [[0,1,2]]}}, material: white, emission: {{radiance: 8, two_sided: true}}}}
   - name: gems
     material: flint
     mesh: {{positions: [[0,0,0],[1,0,0],[1,1,0],[0,1,0],[0,0,1],[1,0,1],[1,1,1],[0,1,1]],
       normals: [[-1,-1,-1],[1,-1,-1],[1,1,-1],[-1,1,-1],[-1,-1,1],[1,-1,1],[1,1,1],[-1,1,1]],
       faces: [[0,3,2,1],[4,5,6,7],[0,1,5,4],[2,3,7,6],[0,4,7,3],[1,2,6,5]]}}
-    transforms: [[{{scale: 0.25}}, {{rotate: {{axis: [0, 1, 0], angle_deg: 30}}}}, {{translate: [0.2, 0.05, 0.3]}}],
+    transforms: [[{{scale: 0.25}}, {{rotate: {{axis: [0, 1, 0], angle_deg: 30}}}},
+        {{translate: [0.2, 0.05, 0.3]}}],
       [{{scale: [-0.2, 0.3, 0.2]}}, {{translate: [0.9, 0.1, 0.5]}}]]
   - name: glass
     material: glass
@@ -73,8 +80,10 @@ struct Case {
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
     {"{max_depth: 12}", "{type: sobol}", "", "box"},
-    {"{max_depth: 12, accelerator: bvh}", "{type: independent, seed: 7}", ", aperture_radius: 0.05, focus_distance: 1.9", "gaussian"},
-    {"{max_depth: 5, accelerator: aabb, nee: false}", "{type: xorshift, seed: 18446744073709551615}", "", "blackman-harris"},
+    {"{max_depth: 12, accelerator: bvh}", "{type: independent, seed: 7}",
+     ", aperture_radius: 0.05, focus_distance: 1.9", "gaussian"},
+    {"{max_depth: 5, accelerator: aabb, nee: false}", "{type: xorshift, seed: 18446744073709551615}", "",
+     "blackman-harris"},
     {"{type: normals, accelerator: bvh}", "{type: sobol}", "", "box"},
     {"{type: aabb}", "{type: sobol}", "", "box"},
 };
@@ -109,7 +118,9 @@ struct Named {
     bool plain = false;
 };
 
-crt::Scene sceneOf(const Case& c) { return sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter)); }
+crt::Scene sceneOf(const Case& c) {
+    return sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter));
+}
 
 std::vector<Named> allScenes() {
     const char* const names[] = {"sobol", "tree, independent, lens, gaussian",
@@ -197,9 +208,10 @@ TEST_CASE("a change of bits needs a new version of them", "[bits]") {
 
     for (const StoredHash& line : storedHashes())
         if (line.version == CRT_BITS_VERSION) stored[line.name] = line.hash;
-    INFO("bits version " << CRT_BITS_VERSION
-                         << ": raise CRT_BITS_VERSION and store the new hash (core/kernel/bits_version.h says when): "
-                            "CRT_UPDATE_BITS=tests/bits_hashes.txt crt_conformance --backend embree 'a change of bits*'");
+    INFO("bits version "
+         << CRT_BITS_VERSION
+         << ": raise CRT_BITS_VERSION and store the new hash (core/kernel/bits_version.h says when): "
+            "CRT_UPDATE_BITS=tests/bits_hashes.txt crt_conformance --backend embree 'a change of bits*'");
     for (const auto& [name, hash] : rendered) {
         INFO(name);
         CHECK(hash == stored[name]);
@@ -289,7 +301,8 @@ TEST_CASE("what a backend brings shows in no bit", "[bits]") {
     CHECK(differingPixels(expected, filmOf(far, brings)) == 0);
     // Embree's plugin finds these hits without nodes too, slowly.
     if (backend().name == "embree")
-        CHECK(differingPixels(expected, filmOf(far, {.accelerator_reach = std::numeric_limits<double>::infinity()})) == 0);
+        CHECK(differingPixels(expected, filmOf(far, {.accelerator_reach =
+                                                         std::numeric_limits<double>::infinity()})) == 0);
 }
 
 TEST_CASE("sample ranges add up, in any order", "[bits]") {
@@ -318,7 +331,8 @@ TEST_CASE("crops tile the whole image", "[bits]") {
     Run run;
     run.samples = 4;
     const crt::Film whole = render(backend(), sceneOf(c), run);
-    for (const auto& [x0, y0, x1, y1] : {std::array{0, 0, 20, 40}, std::array{20, 0, 48, 13}, std::array{20, 13, 48, 40}}) {
+    for (const auto& [x0, y0, x1, y1] :
+         {std::array{0, 0, 20, 40}, std::array{20, 0, 48, 13}, std::array{20, 13, 48, 40}}) {
         const crt::Scene scene = sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter),
                                            {{"film.crop", fmt::format("[{}, {}, {}, {}]", x0, y0, x1, y1)}});
         const crt::Film crop = render(backend(), scene, run);
@@ -326,8 +340,10 @@ TEST_CASE("crops tile the whole image", "[bits]") {
         for (int y = y0; y < y1; ++y)
             for (int x = x0; x < x1; ++x)
                 for (std::uint32_t channel = 0; channel < 3; ++channel)
-                    differing += whole.mean(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), channel) !=
-                                 crop.mean(static_cast<std::uint32_t>(x - x0), static_cast<std::uint32_t>(y - y0), channel);
+                    differing +=
+                        whole.mean(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), channel) !=
+                        crop.mean(static_cast<std::uint32_t>(x - x0), static_cast<std::uint32_t>(y - y0),
+                                  channel);
         CHECK(differing == 0);
     }
 }
@@ -340,8 +356,10 @@ film: {{resolution: [24, 24]}}
 integrator: {{max_depth: 6}}
 materials: {{white: {{type: diffuse, reflectance: 0.7}}}}
 objects:
-  - {{name: floor, mesh: {{positions: [[{4},{4},{4}],[{4},{4},{3}],[{3},{4},{3}],[{3},{4},{4}]], faces: [[0,1,2,3]]}}, material: white}}
-  - {{name: lamp, mesh: {{positions: [[{4},{3},{4}],[{3},{3},{4}],[{3},{3},{3}],[{4},{3},{3}]], faces: [[0,1,2,3]]}}, material: white, emission: {{radiance: 1}}}}
+  - {{name: floor, mesh: {{positions: [[{4},{4},{4}],[{4},{4},{3}],[{3},{4},{3}],[{3},{4},{4}]],
+      faces: [[0,1,2,3]]}}, material: white}}
+  - {{name: lamp, mesh: {{positions: [[{4},{3},{4}],[{3},{3},{4}],[{3},{3},{3}],[{4},{3},{3}]],
+      faces: [[0,1,2,3]]}}, material: white, emission: {{radiance: 1}}}}
 )",
                            scale, shift, shift - 3 * scale, shift + scale, shift - scale);
     };
@@ -356,8 +374,10 @@ objects:
 
 TEST_CASE("an empty scene renders its background", "[bits]") {
     Run run;
-    const crt::Film film =
-        render(backend(), sceneFrom("crt: 1\ncamera: {position: [0, 0, 0], target: [0, 0, 1], fov: 40}\nfilm: {resolution: [8, 8]}\nenvironment: {radiance: 1}\n"), run);
+    const crt::Film film = render(backend(),
+                                  sceneFrom("crt: 1\ncamera: {position: [0, 0, 0], target: [0, 0, 1], fov: "
+                                            "40}\nfilm: {resolution: [8, 8]}\nenvironment: {radiance: 1}\n"),
+                                  run);
     CHECK(imageMean(film) == Approx(1).margin(0.05));
     CHECK(film.invalidSamples() == 0);
 }

@@ -1,8 +1,8 @@
 // What an image says of its own error, against a scene whose answer is known.
 #include "conformance.h"
 
-#include "film/error_estimate.h"
 #include "base/statistics.h"
+#include "film/error_estimate.h"
 
 #include <cmath>
 
@@ -17,13 +17,18 @@ film: {resolution: [1, 1]}
 integrator: {type: path, max_depth: 1}
 materials: {floor: {type: diffuse, reflectance: 1}, lamp: {type: diffuse, reflectance: 0}}
 objects:
-  - {name: floor, mesh: {positions: [[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]], faces: [[0,1,2,3]]}, material: floor}
-  - {name: lamp, mesh: {positions: [[-0.5,1,-0.5],[0.5,1,-0.5],[0.5,1,0.5],[-0.5,1,0.5]], faces: [[0,1,2,3]]}, material: lamp, emission: {radiance: 1}}
+  - {name: floor, mesh: {positions: [[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]], faces: [[0,1,2,3]]},
+      material: floor}
+  - {name: lamp, mesh: {positions: [[-0.5,1,-0.5],[0.5,1,-0.5],[0.5,1,0.5],[-0.5,1,0.5]],
+      faces: [[0,1,2,3]]}, material: lamp, emission: {radiance: 1}}
 )";
 
 }  // namespace
 
-TEST_CASE("the error that an image states of itself is its error: 60 seeds of the square light, Sobol and independent", "[error]") {
+TEST_CASE(
+    "the error that an image states of itself is its error: 60 seeds of the square light, Sobol and "
+    "independent",
+    "[error]") {
     constexpr double kTruth = 0.2394564705;
     constexpr int kSeeds = 60;
     const char* sampler = GENERATE("sobol", "independent");
@@ -33,16 +38,19 @@ TEST_CASE("the error that an image states of itself is its error: 60 seeds of th
     int covered = 0;
     double claimed = 0, squares = 0;
     for (int seed = 1; seed <= kSeeds; ++seed) {
-        const crt::Scene scene = sceneFrom(kSquareOverFloor, {{"sampler.type", sampler}, {"sampler.seed", std::to_string(seed)}});
+        const crt::Scene scene =
+            sceneFrom(kSquareOverFloor, {{"sampler.type", sampler}, {"sampler.seed", std::to_string(seed)}});
         const std::optional<crt::ErrorEstimate> error = crt::estimateError(render(backend(), scene, run));
         REQUIRE(error);
         covered += error->meanInterval(0.95).contains(kTruth);
         claimed += error->mean_standard_error * error->mean_standard_error / kSeeds;
         squares += (error->mean_luminance - kTruth) * (error->mean_luminance - kTruth) / kSeeds;
     }
-    INFO(sampler << ": " << covered << " of " << kSeeds << " intervals hold the truth, predicted : actual error " << std::sqrt(claimed / squares));
+    INFO(sampler << ": " << covered << " of " << kSeeds
+                 << " intervals hold the truth, predicted : actual error " << std::sqrt(claimed / squares));
     CHECK(covered >= 49);  // Of 60 with probability 0.95 each, 48 or fewer turn up in one of 27,000 runs.
-    // The mean square of 60 errors over that of what 60 images with 15 degrees of freedom each claim, 99.99 % band.
+    // The mean square of 60 errors over that of what 60 images with 15 degrees of freedom each claim, 99.99
+    // % band.
     CHECK(squares / claimed > crt::stats::fisherQuantile(0.00005, kSeeds, 15.0 * kSeeds));
     CHECK(squares / claimed < crt::stats::fisherQuantile(0.99995, kSeeds, 15.0 * kSeeds));
 }

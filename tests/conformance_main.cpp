@@ -58,7 +58,8 @@ std::uint64_t differingPixels(const crt::Film& a, const crt::Film& b, bool all) 
     for (std::uint32_t y = 0; y < a.shape().height; ++y)
         for (std::uint32_t x = 0; x < a.shape().width; ++x) {
             const std::size_t pixel = static_cast<std::size_t>(y) * a.shape().width + x;
-            bool same = a.counts[pixel] == b.counts[pixel] && (a.primitives.empty() || a.primitives[pixel] == b.primitives[pixel]);
+            bool same = a.counts[pixel] == b.counts[pixel] &&
+                        (a.primitives.empty() || a.primitives[pixel] == b.primitives[pixel]);
             for (std::uint32_t c = 0; c < channels; ++c)
                 same = same && static_cast<float>(a.mean(x, y, c)) == static_cast<float>(b.mean(x, y, c));
             differing += same ? 0 : 1;
@@ -89,7 +90,8 @@ int main(int argc, char** argv) {
     try {
         crt::probeDevices(conformance::backend());
     } catch (const crt::Error& error) {
-        std::printf("SKIPPED: backend '%s' cannot run here: %s\n", conformance::backend_name.c_str(), error.what());
+        std::printf("SKIPPED: backend '%s' cannot run here: %s\n", conformance::backend_name.c_str(),
+                    error.what());
         return conformance::kSkipped;
     }
     return session.run();

@@ -1,4 +1,5 @@
-/// What the kernel's unit tests share: the kernel as plain C++, scenes made in memory, seeded numbers, and chi-squared.
+/// What the kernel's unit tests share: the kernel as plain C++, scenes made in memory, seeded numbers, and
+/// chi-squared.
 #pragma once
 
 #include "catch.h"
@@ -15,12 +16,15 @@ namespace kernel_test {
 
 using namespace crt::kernel;
 
-/// Seeded by the test, so that a failure comes back. Not std::uniform_real_distribution, whose numbers depend on the library.
+/// Seeded by the test, so that a failure comes back. Not std::uniform_real_distribution, whose numbers
+/// depend on the library.
 class Random {
 public:
     explicit Random(std::uint64_t seed) : engine_(seed) {}
     std::uint64_t bits() { return engine_(); }
-    std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>(((engine_() >> 32) * n) >> 32); }
+    std::uint32_t below(std::uint32_t n) {
+        return static_cast<std::uint32_t>(((engine_() >> 32) * n) >> 32);
+    }
     double uniform() { return (static_cast<double>(engine_() >> 11) + 0.5) * 0x1p-53; }
     double uniform(double lower, double upper) { return lower + (upper - lower) * uniform(); }
     CrtRandom2 pair() {
@@ -31,7 +35,8 @@ public:
     }
     /// Uniform on the unit sphere.
     crt::Vec3d direction() {
-        const double z = uniform(-1, 1), phi = uniform(0, 2 * 3.14159265358979323846), r = std::sqrt(1 - z * z);
+        const double z = uniform(-1, 1), phi = uniform(0, 2 * 3.14159265358979323846),
+                     r = std::sqrt(1 - z * z);
         return {r * std::cos(phi), r * std::sin(phi), z};
     }
 
@@ -39,12 +44,20 @@ private:
     std::mt19937_64 engine_;
 };
 
-inline vec3 toFloat(const crt::Vec3d& v) { return make_vec3(static_cast<f32>(v[0]), static_cast<f32>(v[1]), static_cast<f32>(v[2])); }
+inline vec3 toFloat(const crt::Vec3d& v) {
+    return make_vec3(static_cast<f32>(v[0]), static_cast<f32>(v[1]), static_cast<f32>(v[2]));
+}
 inline crt::Vec3d toDouble(vec3 v) { return {v.x, v.y, v.z}; }
-inline crt::Vec3d minus(const crt::Vec3d& a, const crt::Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline crt::Vec3d plus(const crt::Vec3d& a, const crt::Vec3d& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+inline crt::Vec3d minus(const crt::Vec3d& a, const crt::Vec3d& b) {
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+inline crt::Vec3d plus(const crt::Vec3d& a, const crt::Vec3d& b) {
+    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
 inline crt::Vec3d times(const crt::Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-inline double dot(const crt::Vec3d& a, const crt::Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+inline double dot(const crt::Vec3d& a, const crt::Vec3d& b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 inline double length(const crt::Vec3d& a) { return std::sqrt(dot(a, a)); }
 inline crt::Vec3d unit(const crt::Vec3d& a) { return times(a, 1 / length(a)); }
 inline crt::Vec3d cross(const crt::Vec3d& a, const crt::Vec3d& b) {
@@ -94,9 +107,10 @@ inline crt::Scene sceneOf(crt::Mesh mesh, crt::Accelerator accelerator = crt::Ac
     return scene;
 }
 
-/// Standard normal deviate of a chi-squared statistic (Wilson and Hilferty): |z| < 4.4 but for one time in 100,000. Both tails: counts that
-/// fit too well are no random counts either.
-inline double chiSquaredDeviate(const std::vector<std::uint64_t>& observed, const std::vector<double>& expected) {
+/// Standard normal deviate of a chi-squared statistic (Wilson and Hilferty): |z| < 4.4 but for one time in
+/// 100,000. Both tails: counts that fit too well are no random counts either.
+inline double chiSquaredDeviate(const std::vector<std::uint64_t>& observed,
+                                const std::vector<double>& expected) {
     double sum = 0, chi2 = 0, total = 0;
     for (const double e : expected) sum += e;
     for (const std::uint64_t n : observed) total += static_cast<double>(n);
@@ -123,7 +137,8 @@ struct Mean {
     double mean() const { return sum / static_cast<double>(n); }
     double standardError() const {
         const double m = mean();
-        return std::sqrt(std::max(0.0, squares / static_cast<double>(n) - m * m) / static_cast<double>(n - 1));
+        return std::sqrt(std::max(0.0, squares / static_cast<double>(n) - m * m) /
+                         static_cast<double>(n - 1));
     }
     double deviate(double expected) const { return (mean() - expected) / standardError(); }
 };

@@ -1,16 +1,16 @@
-// Compiles every kernel variant that matters for one GPU with NVRTC, through the code of the CUDA backend, and checks that none spills
-// registers. Needs no GPU. Prints registers and compile time of each variant.
+// Compiles every kernel variant that matters for one GPU with NVRTC, through the code of the CUDA backend,
+// and checks that none spills registers. Needs no GPU. Prints registers and compile time of each variant.
 //
 //     nvrtc_variants [--arch 90] [SCENE.yaml …]
 //
-// The masks: everything, each sampler and accelerator, each kind of material, and those of the scenes given. Exit code 77, which ctest shows as
-// skipped, where NVRTC is missing.
+// The masks: everything, each sampler and accelerator, each kind of material, and those of the scenes given.
+// Exit code 77, which ctest shows as skipped, where NVRTC is missing.
 #include "cuda_nvrtc.h"
 #include "cuda_program.h"
 
 #include "backend/loader.h"
-#include "compile/compile.h"
 #include "base/error.h"
+#include "compile/compile.h"
 #include "kernel/features.h"
 #include "scene/yaml/scene_yaml.h"
 
@@ -46,9 +46,11 @@ std::map<std::uint32_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_CONDUCTOR, "a mesh of metal"},
         {mesh | CRT_FEATURE_DIELECTRIC, "a mesh of glass"},
         {mesh | glass, "a mesh of dispersive glass"},
-        {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER, "a mesh, environment, lens and filter"},
+        {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
+         "a mesh, environment, lens and filter"},
         {mesh | CRT_FEATURE_AOV, "a mesh with AOVs"},
-        {mesh | glass | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
+        {mesh | glass | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_ENVIRONMENT |
+             CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "all materials, BVH"},
         {CRT_FEATURE_SOBOL | CRT_FEATURE_BVH | CRT_FEATURE_VIEW, "a view of normals"},
     };
@@ -84,23 +86,26 @@ int run(int argc, char** argv) {
         return kSkipped;
     }
 
-    std::printf("%s, sm_%d, %zu variants\n%9s %6s %6s %8s %8s  %s\n", nvrtc.name().c_str(), arch, masks.size(), "registers", "stack", "spill",
-                "CUBIN kB", "ms", "variant");
+    std::printf("%s, sm_%d, %zu variants\n%9s %6s %6s %8s %8s  %s\n", nvrtc.name().c_str(), arch,
+                masks.size(), "registers", "stack", "spill", "CUBIN kB", "ms", "variant");
     int failures = 0;
     for (const auto& [mask, name] : masks) {
         const auto start = std::chrono::steady_clock::now();
         const crt::cuda::Cubin cubin = crt::cuda::compileLean(nvrtc, text, arch, mask);
-        const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        const double ms =
+            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         const crt::cuda::ResourceUse use = crt::cuda::resourceUse(cubin.log, "crt_render");
         std::printf("%9u %6u %6u %8.1f %8.0f  0x%05x %s\n", use.registers, use.stack_bytes, use.spill_bytes,
                     static_cast<double>(cubin.bytes.size()) / 1e3, ms, mask, name.c_str());
         std::fflush(stdout);
         // An entry that is not in the log would pass for one that does not spill.
-        if (use.registers == 0) std::printf("FAILED: the assembler's log says nothing of crt_render:\n%s\n", cubin.log.c_str());
+        if (use.registers == 0)
+            std::printf("FAILED: the assembler's log says nothing of crt_render:\n%s\n", cubin.log.c_str());
         if (use.spill_bytes != 0) std::printf("FAILED: %u bytes are spilled\n", use.spill_bytes);
         // The only array that a thread may keep in memory is the BVH's traversal stack.
         const bool stack_expected = (mask & CRT_FEATURE_BVH) != 0;
-        if (!stack_expected && use.stack_bytes != 0) std::printf("FAILED: local memory without a traversal stack\n");
+        if (!stack_expected && use.stack_bytes != 0)
+            std::printf("FAILED: local memory without a traversal stack\n");
         failures += use.registers == 0 || use.spill_bytes != 0 || (!stack_expected && use.stack_bytes != 0);
     }
     std::printf("%d of %zu variants failed\n", failures, masks.size());

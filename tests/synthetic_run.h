@@ -3,8 +3,8 @@
 /// reference that is exact, or has noisy folds as `crt reference` makes them.
 #pragma once
 
-#include "judge/converge/measurement.h"
 #include "film/luminance_error.h"
+#include "judge/converge/measurement.h"
 
 #include <array>
 #include <cmath>

@@ -1,11 +1,11 @@
 // Checkpoint files: bit for bit there and back, and every kind of damage its own sentence.
+#include "base/log.h"
 #include "catch.h"
 #include "film/checkpoint.h"
 #include "film/checkpoint_writer.h"
 #include "film/film_pack.h"
-#include "base/log.h"
-#include "scene/yaml/scene_schema.h"
 #include "judge/verify/temporary_folder.h"
+#include "scene/yaml/scene_schema.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -44,7 +44,9 @@ std::string slurp(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
 }
-void spit(const std::string& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
+void spit(const std::string& path, const std::string& bytes) {
+    std::ofstream(path, std::ios::binary) << bytes;
+}
 
 bool sameBits(const std::vector<double>& a, const std::vector<double>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
@@ -90,11 +92,14 @@ TEST_CASE("films without samples or ids are checkpoints too", "[checkpoint]") {
     CHECK(identity.version.empty());
 }
 
-// Found by fuzzing: with no pixels a row any number of rows fits the file's size, and whatever walked them ran for a minute.
+// Found by fuzzing: with no pixels a row any number of rows fits the file's size, and whatever walked them
+// ran for a minute.
 TEST_CASE("a checkpoint of a film with an impossible side is refused", "[checkpoint]") {
     const TemporaryFolder directory;
     const std::string path = directory / "part.crtfilm";
-    for (const FilmShape shape : {FilmShape{0, 0x81000000u, 4, kAovSquares}, FilmShape{0x81000000u, 0, 4, kAovSquares}, FilmShape{0, 0, 4, kAovSquares}, FilmShape{65536, 1, 4, kAovSquares}}) {
+    for (const FilmShape shape :
+         {FilmShape{0, 0x81000000u, 4, kAovSquares}, FilmShape{0x81000000u, 0, 4, kAovSquares},
+          FilmShape{0, 0, 4, kAovSquares}, FilmShape{65536, 1, 4, kAovSquares}}) {
         writeCheckpoint(path, Film(shape), kIdentity);
         CHECK_THROWS_WITH(readCheckpoint(path), Contains(path) && Contains("1 to 65535 a side"));
     }
@@ -176,12 +181,14 @@ TEST_CASE("films of format 2, which were not packed, are read", "[checkpoint]") 
 }
 
 TEST_CASE("films are packed without loss, in blocks, into less", "[checkpoint]") {
-    // Two whole blocks and a short one, of everything that there is: noise, what is the same everywhere, what hardly differs.
+    // Two whole blocks and a short one, of everything that there is: noise, what is the same everywhere,
+    // what hardly differs.
     Film film({kPackedPixels / 64, 130, 4, kAovSquares | kAovPrimitive});
     std::mt19937_64 generator(1);
     for (std::size_t i = 0; i < film.sums.size(); ++i) {
         const std::uint64_t noise = generator();
-        if (i % 8 == 0) std::memcpy(&film.sums[i], &noise, sizeof noise);  // every bit pattern, NaN among them
+        if (i % 8 == 0)
+            std::memcpy(&film.sums[i], &noise, sizeof noise);  // every bit pattern, NaN among them
         if (i % 8 == 2) film.sums[i] = 1 + static_cast<double>(noise % 1024) / 1024;
         if (i % 8 == 4) film.sums[i] = -0.0;
     }
@@ -332,15 +339,19 @@ TEST_CASE("what is wrong with a checkpoint is said", "[checkpoint]") {
         readCheckpoint(with(8, 9)),
         Contains("format 9") && Contains("reads formats 2 and " + std::to_string(kCheckpointVersion)));
     CHECK_THROWS_WITH(readCheckpoint(with(0, 'x')), Contains("not a crt film"));
-    CHECK_THROWS_WITH(readCheckpoint(with(35, 0x7f)), Contains("damaged: its header"));  // Two thousand million pixels wide.
-    CHECK_THROWS_WITH(readCheckpoint(with(whole.size() / 2, static_cast<char>(~whole[whole.size() / 2]))), Contains("checksum"));
-    CHECK_THROWS_WITH(readCheckpoint(directory / "absent.crtfilm"), Contains("absent.crtfilm") && Contains("No such file"));
+    CHECK_THROWS_WITH(readCheckpoint(with(35, 0x7f)),
+                      Contains("damaged: its header"));  // Two thousand million pixels wide.
+    CHECK_THROWS_WITH(readCheckpoint(with(whole.size() / 2, static_cast<char>(~whole[whole.size() / 2]))),
+                      Contains("checksum"));
+    CHECK_THROWS_WITH(readCheckpoint(directory / "absent.crtfilm"),
+                      Contains("absent.crtfilm") && Contains("No such file"));
     CHECK_THROWS_AS(readCheckpoint(directory.path()), Error);
 }
 
 TEST_CASE("the record of a merged film is that of the first samples, with every run in it", "[checkpoint]") {
     const TemporaryFolder directory;
-    const auto write = [&](const char* name, SampleRange range, double exposure_ev, const char* backend, const char* date) {
+    const auto write = [&](const char* name, SampleRange range, double exposure_ev, const char* backend,
+                           const char* date) {
         FilmIdentity identity = kIdentity;
         identity.record.emplace();
         identity.record->width = identity.record->height = 1;
@@ -352,11 +363,15 @@ TEST_CASE("the record of a merged film is that of the first samples, with every 
         writeCheckpoint(directory / name, randomFilm({1, 1, 4, kAovSquares}, range, 1), identity);
         return directory / name;
     };
-    const std::string a = write("a.crtfilm", {8, 16}, 1, "embree", "2026:01:01 00:00:00"), b = write("b.crtfilm", {0, 8}, 2, "cuda", "2025:01:01 00:00:00"),
+    const std::string a = write("a.crtfilm", {8, 16}, 1, "embree", "2026:01:01 00:00:00"),
+                      b = write("b.crtfilm", {0, 8}, 2, "cuda", "2025:01:01 00:00:00"),
                       c = write("c.crtfilm", {16, 20}, 3, "embree", "2024:01:01 00:00:00");
     writeCheckpoint(directory / "old.crtfilm", randomFilm({1, 1, 4, kAovSquares}, {100, 101}, 1), kIdentity);
     std::string text;
-    for (const std::vector<std::string>& order : {std::vector{a, b, c}, {c, b, a}, {b, directory / "old.crtfilm", c, a}, {directory / "old.crtfilm", c, a, b}}) {
+    for (const std::vector<std::string>& order : {std::vector{a, b, c},
+                                                  {c, b, a},
+                                                  {b, directory / "old.crtfilm", c, a},
+                                                  {directory / "old.crtfilm", c, a, b}}) {
         const std::optional<FilmRecord> record = mergeCheckpoints(order).second.record;
         REQUIRE(record);
         CHECK(record->development.exposure_ev == 2);
@@ -372,7 +387,8 @@ TEST_CASE("the record of a merged film is that of the first samples, with every 
     wrong.record->width = wrong.record->height = 2;
     wrong.record->window = {0, 0, 2, 1};
     writeCheckpoint(directory / "wrong.crtfilm", Film({1, 1, 4, kAovSquares}), wrong);
-    CHECK_THROWS_WITH(readCheckpoint(directory / "wrong.crtfilm"), Contains("record of its scene that is of a film of another size"));
+    CHECK_THROWS_WITH(readCheckpoint(directory / "wrong.crtfilm"),
+                      Contains("record of its scene that is of a film of another size"));
 }
 
 TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpoint]") {
@@ -386,7 +402,8 @@ TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpo
     CHECK(warningCount() == warnings + 1);
     setLogLevel(LogLevel::Info);
     const TemporaryFolder directory;
-    CHECK_THROWS_AS(writeCheckpoint(directory / "x.crtfilm", Film({1, 1, 4, kAovSquares}), {"no hash", "0.1.0"}), Error);
+    CHECK_THROWS_AS(
+        writeCheckpoint(directory / "x.crtfilm", Film({1, 1, 4, kAovSquares}), {"no hash", "0.1.0"}), Error);
 }
 
 TEST_CASE("films of other bits are neither gone on with nor merged", "[checkpoint]") {
@@ -474,5 +491,6 @@ TEST_CASE("merging partial films gives one film whatever the order", "[checkpoin
     CHECK_THROWS_WITH(mergeCheckpoints({a, b, a}), Contains("a.crtfilm") && Contains("0-64"));
     CHECK_THROWS_WITH(mergeCheckpoints({}), Contains("nothing to merge"));
     writeCheckpoint(c, randomFilm(kShape, {256, 300}, 9), {"ffffffffffffffffffffffffffffffff", "0.1.0"});
-    CHECK_THROWS_WITH(mergeCheckpoints({a, c}), Contains("a.crtfilm") && Contains("c.crtfilm") && Contains("ffffffffffffffffffffffffffffffff"));
+    CHECK_THROWS_WITH(mergeCheckpoints({a, c}), Contains("a.crtfilm") && Contains("c.crtfilm") &&
+                                                    Contains("ffffffffffffffffffffffffffffffff"));
 }

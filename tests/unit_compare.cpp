@@ -1,9 +1,9 @@
 // Comparing images: metrics worked out by hand, and everything that must not pass for equal.
+#include "base/error.h"
 #include "catch.h"
+#include "image/image_metadata.h"
 #include "judge/compare/compare_reference.h"
 #include "judge/compare/compare_text.h"
-#include "base/error.h"
-#include "image/image_metadata.h"
 
 #include <nlohmann/json.hpp>
 
@@ -105,14 +105,16 @@ TEST_CASE("a tolerance allows that much RMSE relative to the mean", "[compare]")
     const double relative = 0.12 / std::sqrt(6.0) / 2;
     CHECK(compareImages(a, b, {relative * 1.001, false}).same);
     CHECK_FALSE(compareImages(a, b, {relative * 0.999, false}).same);
-    CHECK_THAT(compareText(compareImages(a, b, {0.1, false})), Contains("same within the tolerance") && Contains("0.1 allowed"));
+    CHECK_THAT(compareText(compareImages(a, b, {0.1, false})),
+               Contains("same within the tolerance") && Contains("0.1 allowed"));
     // Anything is infinitely far from black.
     CHECK_FALSE(compareImages(a, twoPixels(std::vector<float>(6, 0.0f)), {1e6, false}).same);
 }
 
 TEST_CASE("a NaN or an infinity voids the metrics and never passes a tolerance", "[compare]") {
     const Image b = twoPixels(kReference);
-    for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    for (const float bad :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
         Image a = b;
         a.pixels[4] = bad;
         for (const double tolerance : {0.0, 1e9}) {
@@ -121,7 +123,8 @@ TEST_CASE("a NaN or an infinity voids the metrics and never passes a tolerance",
             CHECK_FALSE(r.metrics_valid);
             CHECK(r.not_finite == std::array<std::uint64_t, 2>{1, 0});
             CHECK(r.differing_pixels == 1);
-            CHECK_THAT(compareText(r), Contains("not finite") && Contains("1 values in the first image, 0 in the second"));
+            CHECK_THAT(compareText(r),
+                       Contains("not finite") && Contains("1 values in the first image, 0 in the second"));
         }
         // Bit for bit it equals itself, but that is said and no metric is given.
         const CompareResult self = compareImages(a, a);

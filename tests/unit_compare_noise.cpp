@@ -1,10 +1,11 @@
-// Noise and bias of images, and errors against a reference with noise, on images whose noise is known because it was made here.
+// Noise and bias of images, and errors against a reference with noise, on images whose noise is known
+// because it was made here.
+#include "base/error.h"
 #include "catch.h"
+#include "image/image_metadata.h"
 #include "judge/compare/compare_noise.h"
 #include "judge/compare/compare_reference.h"
 #include "judge/compare/compare_text.h"
-#include "base/error.h"
-#include "image/image_metadata.h"
 #include "judge/compare/image_noise.h"
 
 #include <nlohmann/json.hpp>
@@ -46,7 +47,8 @@ Image withStandardError(std::uint64_t seed, double factor = 1, double stated = k
     Random random(seed);
     Image image = blank({"R", "G", "B", "StdError.R", "StdError.G", "StdError.B"}, std::to_string(seed));
     for (std::uint32_t p = 0; p < kWidth * kHeight; ++p) {
-        for (int c = 0; c < 3; ++c) image.pixels.push_back(static_cast<float>(factor * (c + 1) + kNoise * random.normal()));
+        for (int c = 0; c < 3; ++c)
+            image.pixels.push_back(static_cast<float>(factor * (c + 1) + kNoise * random.normal()));
         for (int c = 0; c < 3; ++c) image.pixels.push_back(static_cast<float>(stated));
     }
     return image;
@@ -62,7 +64,8 @@ Image withFolds(std::uint64_t seed, double standard_error) {
     for (std::uint32_t p = 0; p < kWidth * kHeight; ++p) {
         std::vector<float> folds;
         for (std::size_t i = 0; i < 3 * kFolds; ++i)
-            folds.push_back(static_cast<float>(static_cast<double>(i % 3 + 1) + standard_error * std::sqrt(8.0) * random.normal()));
+            folds.push_back(static_cast<float>(static_cast<double>(i % 3 + 1) +
+                                               standard_error * std::sqrt(8.0) * random.normal()));
         for (std::size_t c = 0; c < 3; ++c) {
             double sum = 0;
             for (std::size_t k = 0; k < kFolds; ++k) sum += folds[3 * k + c];
@@ -93,15 +96,18 @@ TEST_CASE("an image's noise is read from what it carries", "[compare-noise]") {
     const auto folds = noisyImage(withFolds(2, kNoise), NoiseOf::Color);
     REQUIRE(folds);
     CHECK(folds->dof == 7);
-    CHECK(stats::summarize(folds->variances).mean == Approx(kNoise * kNoise).epsilon(0.05));  // 2880 χ² of 7: their mean is good to 1 %.
+    CHECK(stats::summarize(folds->variances).mean ==
+          Approx(kNoise * kNoise).epsilon(0.05));  // 2880 χ² of 7: their mean is good to 1 %.
     const auto luminance = noisyImage(withFolds(2, kNoise), NoiseOf::Luminance);
     REQUIRE(luminance);
     const auto w = luminanceWeights(withFolds(2, kNoise));
-    CHECK(stats::summarize(luminance->variances).mean == Approx(kNoise * kNoise * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2])).epsilon(0.08));
+    CHECK(stats::summarize(luminance->variances).mean ==
+          Approx(kNoise * kNoise * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2])).epsilon(0.08));
     CHECK(stats::summarize(luminance->values).mean == Approx(w[0] + 2 * w[1] + 3 * w[2]).epsilon(0.01));
 
     Image variance = blank({"R", "G", "B", "Variance.Y"}, "3");
-    for (std::uint32_t p = 0; p < kWidth * kHeight; ++p) variance.pixels.insert(variance.pixels.end(), {1, 1, 1, 0.25f});
+    for (std::uint32_t p = 0; p < kWidth * kHeight; ++p)
+        variance.pixels.insert(variance.pixels.end(), {1, 1, 1, 0.25f});
     CHECK(noisyImage(variance, NoiseOf::Luminance)->variances[7] == 0.25);
     CHECK_FALSE(noisyImage(variance, NoiseOf::Color));
     variance.pixels[3] = std::numeric_limits<float>::infinity();  // What one sample knows of itself.
@@ -159,7 +165,8 @@ TEST_CASE("a bias is found: in the mean, in a tile, in a pixel", "[compare-noise
 
     Image tile = withStandardError(3);
     for (std::uint32_t y = 8; y < 16; ++y)
-        for (std::uint32_t x = 16; x < 24; ++x) tile.pixels[(y * kWidth + x) * 6 + 1] += 0.4f;  // Two standard errors of a pixel.
+        for (std::uint32_t x = 16; x < 24; ++x)
+            tile.pixels[(y * kWidth + x) * 6 + 1] += 0.4f;  // Two standard errors of a pixel.
     const NoiseComparison in_tile = compareNoise(tile, b);
     CHECK(in_tile.tiles.rejected == 1);
     CHECK(in_tile.tiles.worst == (1 * 5 + 2) * 3 + 1);
@@ -177,10 +184,12 @@ TEST_CASE("a bias is found: in the mean, in a tile, in a pixel", "[compare-noise
 }
 
 TEST_CASE("standard errors that are stated too small are seen in z", "[compare-noise]") {
-    CHECK(compareNoise(withStandardError(1, 1, kNoise / 2), withStandardError(2, 1, kNoise / 2)).rms_z == Approx(2).margin(0.1));
+    CHECK(compareNoise(withStandardError(1, 1, kNoise / 2), withStandardError(2, 1, kNoise / 2)).rms_z ==
+          Approx(2).margin(0.1));
 }
 
-TEST_CASE("images of one seed, and without noise, are not judged, and one that knows its noise is enough", "[compare-noise]") {
+TEST_CASE("images of one seed, and without noise, are not judged, and one that knows its noise is enough",
+          "[compare-noise]") {
     CHECK_THAT(compareNoise(withStandardError(1), withStandardError(1)).unknown, Contains("seed 1"));
     Image plain = blank({"R", "G", "B"}, "9");
     plain.pixels.assign(std::size_t{3} * kWidth * kHeight, 2.0f);
@@ -280,7 +289,9 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     CHECK(figures["bias"][0]["beyond_noise"] == false);
 }
 
-TEST_CASE("errors against a reference: its variance is subtracted, and its choice moves them as far as is said", "[compare-noise]") {
+TEST_CASE(
+    "errors against a reference: its variance is subtracted, and its choice moves them as far as is said",
+    "[compare-noise]") {
     const Image a = withStandardError(1), b = withStandardError(2, 1.1);
     constexpr double reference_noise = 0.1;
     const ReferenceComparison r = compareWithReference(a, b, withFolds(3, reference_noise), false);
@@ -304,7 +315,8 @@ TEST_CASE("errors against a reference: its variance is subtracted, and its choic
     // The spread, against that of references made anew.
     std::vector<double> means;
     for (std::uint64_t seed = 10; seed < 60; ++seed)
-        means.push_back(compareWithReference(a, a, withFolds(seed, reference_noise), true).errors[0].metrics.mean_ratio);
+        means.push_back(
+            compareWithReference(a, a, withFolds(seed, reference_noise), true).errors[0].metrics.mean_ratio);
     const double actual = std::sqrt(stats::summarize(means).variance);
     REQUIRE(of_a.mean_ratio.spread);
     CHECK(*of_a.mean_ratio.spread > actual / 2);
@@ -312,9 +324,11 @@ TEST_CASE("errors against a reference: its variance is subtracted, and its choic
     CHECK(of_a.flip.spread);
 }
 
-TEST_CASE("a reference that may hold the image's samples, or is noisier than the error, is said", "[compare-noise]") {
+TEST_CASE("a reference that may hold the image's samples, or is noisier than the error, is said",
+          "[compare-noise]") {
     const Image a = withStandardError(3);
-    const ReferenceComparison same_seed = compareWithReference(a, withStandardError(4), withFolds(3, 0.1), true);
+    const ReferenceComparison same_seed =
+        compareWithReference(a, withStandardError(4), withFolds(3, 0.1), true);
     REQUIRE(same_seed.errors[0].warnings.size() == 1);
     CHECK_THAT(same_seed.errors[0].warnings[0], Contains("same samples"));
     CHECK(same_seed.errors[1].warnings.empty());
@@ -358,7 +372,8 @@ TEST_CASE("text and JSON of a comparison say what was found and what is not know
     const nlohmann::json json = nlohmann::json::parse(comparisonJson({&result, &noise, &errors}));
     CHECK(json["noise"]["bias"].size() == 3);
     CHECK(json["reference"]["a"]["rmse_spread"].is_number());
-    CHECK(json["reference"]["a"]["relative_rmse_less_reference_variance"].get<double>() == Approx(*errors.errors[0].corrected_relative_rmse));
+    CHECK(json["reference"]["a"]["relative_rmse_less_reference_variance"].get<double>() ==
+          Approx(*errors.errors[0].corrected_relative_rmse));
     CHECK(json["metrics"]["flip_kind"] == "HDR");
     CHECK(json["metrics"]["flip"].get<double>() > 0);
 }

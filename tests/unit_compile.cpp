@@ -1,11 +1,11 @@
-// Scene → blob: which features a scene asks for, where the author's lengths and sides go, what lights, materials and tables come out, and what
-// is said to be left out.
+// Scene → blob: which features a scene asks for, where the author's lengths and sides go, what lights,
+// materials and tables come out, and what is said to be left out.
 #include "compile/near_scene.h"
 #include "compile/near_surfaces.h"
 #include "kernel_test.h"
 
-#include "compile/distributions.h"
 #include "base/error.h"
+#include "compile/distributions.h"
 #include "compile/scene_identity.h"
 
 #include <algorithm>
@@ -56,7 +56,9 @@ CompiledScene changed(const std::function<void(Scene&)>& change) {
 std::uint32_t featuresOf(const std::function<void(Scene&)>& change) { return changed(change).features; }
 const CrtScene& headerOf(const CompiledScene& c) { return *reinterpret_cast<const CrtScene*>(c.data()); }
 
-bool sameBytes(const CompiledScene& a, const CompiledScene& b) { return a.size_bytes == b.size_bytes && std::memcmp(a.data(), b.data(), a.size_bytes) == 0; }
+bool sameBytes(const CompiledScene& a, const CompiledScene& b) {
+    return a.size_bytes == b.size_bytes && std::memcmp(a.data(), b.data(), a.size_bytes) == 0;
+}
 
 template <class T>
 std::vector<T> listOf(const CompiledScene& c, CrtSpan span) {
@@ -88,21 +90,22 @@ void makeGlass(Scene& s) {
 
 TEST_CASE("the mask names kinds, never values", "[compile]") {
     const std::uint32_t base = compiled(litFloor()).features;
-    CHECK(base == (CRT_FEATURE_SOBOL | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE |
-                   CRT_FEATURE_REPLICATES));
+    CHECK(base == (CRT_FEATURE_SOBOL | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_DIFFUSE |
+                   CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_REPLICATES));
     Random random(41);
     for (int i = 0; i < 50; ++i) {
-        CHECK(featuresOf([&](Scene& s) {
-                  s.camera.position = {random.uniform(-9, 9), random.uniform(0.1, 9), random.uniform(-9, -1)};
-                  s.camera.tan_half_width = random.uniform(0.01, 2);
-                  s.film.width = 1 + static_cast<int>(random.below(500));
-                  s.materials[0].reflectance = crt::constantSpectrum(random.uniform());
-                  s.emissions[0].radiance = crt::constantSpectrum(random.uniform(0.1, 100));
-                  s.sampler.seed = random.bits();
-                  s.integrator.max_depth = 1 + static_cast<int>(random.below(100));
-                  s.integrator.roulette = random.bits() & 1;
-                  for (crt::Vec3d& p : s.meshes[1].positions) p[0] += random.uniform(-1, 1);
-              }) == base);
+        CHECK(
+            featuresOf([&](Scene& s) {
+                s.camera.position = {random.uniform(-9, 9), random.uniform(0.1, 9), random.uniform(-9, -1)};
+                s.camera.tan_half_width = random.uniform(0.01, 2);
+                s.film.width = 1 + static_cast<int>(random.below(500));
+                s.materials[0].reflectance = crt::constantSpectrum(random.uniform());
+                s.emissions[0].radiance = crt::constantSpectrum(random.uniform(0.1, 100));
+                s.sampler.seed = random.bits();
+                s.integrator.max_depth = 1 + static_cast<int>(random.below(100));
+                s.integrator.roulette = random.bits() & 1;
+                for (crt::Vec3d& p : s.meshes[1].positions) p[0] += random.uniform(-1, 1);
+            }) == base);
     }
     // A material that no surface has is no need.
     CHECK(featuresOf([](Scene& s) {
@@ -114,23 +117,29 @@ TEST_CASE("the mask names kinds, never values", "[compile]") {
 
 TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compile]") {
     const std::uint32_t base = compiled(litFloor()).features;
-    const auto differs = [&](std::uint32_t added, std::uint32_t removed, const std::function<void(Scene&)>& change) {
+    const auto differs = [&](std::uint32_t added, std::uint32_t removed,
+                             const std::function<void(Scene&)>& change) {
         const std::uint32_t mask = featuresOf(change);
-        INFO("expected +" << crt::featureNames(added) << " -" << crt::featureNames(removed) << ", got " << crt::featureNames(mask));
+        INFO("expected +" << crt::featureNames(added) << " -" << crt::featureNames(removed) << ", got "
+                          << crt::featureNames(mask));
         CHECK(mask == ((base | added) & ~removed));
         return mask;
     };
     std::uint32_t seen = base;
     constexpr std::uint32_t sobol = CRT_FEATURE_SOBOL;
-    seen |= differs(CRT_FEATURE_INDEPENDENT, sobol, [](Scene& s) { s.sampler.type = crt::SamplerType::Independent; });
-    seen |= differs(CRT_FEATURE_XORSHIFT, sobol, [](Scene& s) { s.sampler.type = crt::SamplerType::XorShift; });
+    seen |= differs(CRT_FEATURE_INDEPENDENT, sobol,
+                    [](Scene& s) { s.sampler.type = crt::SamplerType::Independent; });
+    seen |=
+        differs(CRT_FEATURE_XORSHIFT, sobol, [](Scene& s) { s.sampler.type = crt::SamplerType::XorShift; });
     differs(0, CRT_FEATURE_REPLICATES, [](Scene& s) { s.sampler.replicates = 1; });
     differs(CRT_FEATURE_INDEPENDENT, CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES, [](Scene& s) {
         s.sampler.type = crt::SamplerType::Independent;
         s.sampler.replicates = 1;
     });
-    seen |= differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Bvh; });
-    seen |= differs(CRT_FEATURE_AABB, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Aabb; });
+    seen |= differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE,
+                    [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Bvh; });
+    seen |= differs(CRT_FEATURE_AABB, CRT_FEATURE_BRUTE_FORCE,
+                    [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Aabb; });
     const auto other = [](crt::MaterialType type) {
         return [type](Scene& s) {
             s.materials.resize(2);
@@ -151,12 +160,16 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         s.objects.emplace_back();
         s.objects.back().mesh = 2;
     });
-    seen |= differs(CRT_FEATURE_ENVIRONMENT, 0, [](Scene& s) { s.environment = crt::Environment{crt::constantSpectrum(1)}; });
+    seen |= differs(CRT_FEATURE_ENVIRONMENT, 0,
+                    [](Scene& s) { s.environment = crt::Environment{crt::constantSpectrum(1)}; });
     seen |= differs(CRT_FEATURE_LENS, 0, [](Scene& s) { s.camera.aperture_radius = 0.1; });
     seen |= differs(CRT_FEATURE_FILTER, 0, [](Scene& s) { s.film.filter = crt::PixelFilter::Gaussian; });
-    constexpr std::uint32_t light = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_REPLICATES;
-    seen |= differs(CRT_FEATURE_VIEW, light, [](Scene& s) { s.integrator.type = crt::IntegratorType::Normals; });
-    seen |= differs(CRT_FEATURE_VIEW, light | CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.integrator.type = crt::IntegratorType::Aabb; });
+    constexpr std::uint32_t light =
+        CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_REPLICATES;
+    seen |=
+        differs(CRT_FEATURE_VIEW, light, [](Scene& s) { s.integrator.type = crt::IntegratorType::Normals; });
+    seen |= differs(CRT_FEATURE_VIEW, light | CRT_FEATURE_BRUTE_FORCE,
+                    [](Scene& s) { s.integrator.type = crt::IntegratorType::Aabb; });
     seen |= compiled(litFloor(), crt::kAovDepth).features;
     CHECK(compiled(litFloor(), crt::kAovDepth).features == (base | CRT_FEATURE_AOV));
     // The film keeps these itself; the kernel need not know.
@@ -166,7 +179,8 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     differs(0, CRT_FEATURE_NEE, [](Scene& s) { s.integrator.nee = false; });
     differs(CRT_FEATURE_DIELECTRIC, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, makeGlass);
     differs(0, CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE, [](Scene& s) { s.objects[1].emission = -1; });
-    differs(0, CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE, [](Scene& s) { s.emissions[0].radiance = crt::constantSpectrum(0); });
+    differs(0, CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE,
+            [](Scene& s) { s.emissions[0].radiance = crt::constantSpectrum(0); });
     // Nothing is scattered at depth 0.
     differs(0, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, [](Scene& s) { s.integrator.max_depth = 0; });
     differs(CRT_FEATURE_ENVIRONMENT, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, [](Scene& s) {
@@ -176,7 +190,8 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         s.environment = crt::Environment{crt::constantSpectrum(1)};
     });
     // More triangles than brute force is good for.
-    differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE, [](Scene& s) { s.objects[0].transforms.resize(40, crt::kIdentity4d); });
+    differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE,
+            [](Scene& s) { s.objects[0].transforms.resize(40, crt::kIdentity4d); });
 }
 
 TEST_CASE("the list of features is the mask, bit by bit", "[compile]") {
@@ -197,13 +212,15 @@ TEST_CASE("the list of features is the mask, bit by bit", "[compile]") {
 }
 
 TEST_CASE("a mirroring transform keeps the outside outside, for faces and shading normals", "[compile]") {
-    for (const Vec3d& scale : {Vec3d{1, 1, 1}, Vec3d{-1, 1, 1}, Vec3d{2, -3, 1}, Vec3d{-1, -2, 0.5}, Vec3d{-1, -2, -0.3}}) {
+    for (const Vec3d& scale :
+         {Vec3d{1, 1, 1}, Vec3d{-1, 1, 1}, Vec3d{2, -3, 1}, Vec3d{-1, -2, 0.5}, Vec3d{-1, -2, -0.3}}) {
         Scene scene = litFloor();
         scene.meshes[0] = smoothTetrahedron();
         scene.objects.resize(1);
         scene.objects[0].emission = 0;
         // Scale, then shear, then move.
-        scene.objects[0].transforms = {{scale[0], 0.3 * scale[1], 0, 4, 0, scale[1], -0.2 * scale[2], 5, 0, 0, scale[2], 6, 0, 0, 0, 1}};
+        scene.objects[0].transforms = {{scale[0], 0.3 * scale[1], 0, 4, 0, scale[1], -0.2 * scale[2], 5, 0,
+                                        0, scale[2], 6, 0, 0, 0, 1}};
         const CompiledScene c = compiled(scene);
         const CrtContext ctx = contextOf(c);
         const auto triangles = listOf<CrtTriangle>(c, ctx.scene->triangles);
@@ -213,12 +230,14 @@ TEST_CASE("a mirroring transform keeps the outside outside, for faces and shadin
         REQUIRE(triangles.size() == 4);
         Vec3d middle{};  // inside
         for (const CrtTriangle& t : triangles)
-            for (u32 v = 0; v < 3; ++v) middle = plus(middle, times(toDouble(crt_triangle_vertex(&t, v)), 1.0 / 12));
+            for (u32 v = 0; v < 3; ++v)
+                middle = plus(middle, times(toDouble(crt_triangle_vertex(&t, v)), 1.0 / 12));
         for (std::size_t slot = 0; slot < 4; ++slot) {
             INFO("scale " << scale[0] << " " << scale[1] << " " << scale[2]);
             const CrtTriangle& t = triangles[slot];
             const auto corner = [&](u32 v) { return toDouble(crt_triangle_vertex(&t, v)); };
-            const Vec3d n = cross(minus(corner(1), corner(0)), minus(corner(2), corner(0))), ng{faces[slot].normal[0], faces[slot].normal[1], faces[slot].normal[2]};
+            const Vec3d n = cross(minus(corner(1), corner(0)), minus(corner(2), corner(0))),
+                        ng{faces[slot].normal[0], faces[slot].normal[1], faces[slot].normal[2]};
             CHECK(dot(n, minus(corner(0), middle)) > 0);
             CHECK(length(minus(unit(n), ng)) < 1e-6);
             CHECK(length(ng) == Approx(1).margin(2e-7));
@@ -246,7 +265,8 @@ TEST_CASE("shading normals stay perpendicular to their surface under any transfo
         mesh.normals = {n, times(n, 3), times(n, 1e-3)};  // any length
         scene.objects.resize(1);
         for (double& m : scene.objects[0].transforms[0]) m = random.uniform(-1, 1);
-        scene.objects[0].transforms[0][12] = scene.objects[0].transforms[0][13] = scene.objects[0].transforms[0][14] = 0;
+        scene.objects[0].transforms[0][12] = scene.objects[0].transforms[0][13] =
+            scene.objects[0].transforms[0][14] = 0;
         scene.objects[0].transforms[0][15] = 1;
         const CompiledScene c = compiled(scene);
         const auto face = listOf<CrtFace>(c, headerOf(c).faces)[0];
@@ -273,7 +293,9 @@ TEST_CASE("lengths are moved and scaled exactly", "[compile]") {
     for (const CrtTriangle& t : listOf<CrtTriangle>(here, headerOf(here).triangles))
         for (u32 v = 0; v < 3; ++v) {
             const Vec3d p = plus(times(toDouble(crt_triangle_vertex(&t, v)), 8), here.centre);
-            const Vec3d original = t.id < 2 ? litFloor().meshes[0].positions[t.id == 0 ? v : (v == 0 ? 0 : v + 1)] : litFloor().meshes[1].positions[t.id == 2 ? v : (v == 0 ? 0 : v + 1)];
+            const Vec3d original =
+                t.id < 2 ? litFloor().meshes[0].positions[t.id == 0 ? v : (v == 0 ? 0 : v + 1)]
+                         : litFloor().meshes[1].positions[t.id == 2 ? v : (v == 0 ? 0 : v + 1)];
             CHECK(p == original);
         }
     // Moved by what doubles represent, nothing in the blob changes; scaled by 2^k, only the way back.
@@ -282,7 +304,8 @@ TEST_CASE("lengths are moved and scaled exactly", "[compile]") {
         const CompiledScene scaled = placed(std::ldexp(1.0, k), {0, 0, 0});
         CHECK(scaled.scale_exponent == -3 - k);
         CHECK(headerOf(scaled).depth_scale == std::ldexp(8.0f, k));
-        const auto a = listOf<CrtTriangle>(here, headerOf(here).triangles), b = listOf<CrtTriangle>(scaled, headerOf(scaled).triangles);
+        const auto a = listOf<CrtTriangle>(here, headerOf(here).triangles),
+                   b = listOf<CrtTriangle>(scaled, headerOf(scaled).triangles);
         CHECK(std::memcmp(a.data(), b.data(), a.size() * sizeof(CrtTriangle)) == 0);
         CHECK(std::memcmp(&headerOf(here).camera, &headerOf(scaled).camera, sizeof(CrtCamera)) == 0);
     }
@@ -290,7 +313,8 @@ TEST_CASE("lengths are moved and scaled exactly", "[compile]") {
     Random random(43);
     for (int i = 0; i < 50; ++i) {
         const double scale = std::pow(10.0, random.uniform(-30, 30));
-        const CompiledScene c = placed(scale, times(random.direction(), scale * std::pow(10.0, random.uniform(-3, 6))));
+        const CompiledScene c =
+            placed(scale, times(random.direction(), scale * std::pow(10.0, random.uniform(-3, 6))));
         f32 largest = 0;
         for (const CrtTriangle& t : listOf<CrtTriangle>(c, headerOf(c).triangles))
             for (const f32 x : t.p) largest = std::max(largest, std::abs(x));
@@ -366,10 +390,12 @@ TEST_CASE("four wavelengths of one path nearly integrate a smooth spectrum by th
     const std::vector<float> nodes = crt::wavelengthTable(CRT_WAVELENGTH_TABLE);
     const auto& cie = crt::cieObserver();
     const auto at = [](const crt::Spectrum& s, double nm) {
-        const auto i = std::min(static_cast<std::size_t>(nm - 360), static_cast<std::size_t>(crt::kSpectrumSize - 2));
+        const auto i =
+            std::min(static_cast<std::size_t>(nm - 360), static_cast<std::size_t>(crt::kSpectrumSize - 2));
         return s[i] + (nm - 360 - static_cast<double>(i)) * (s[i + 1] - s[i]);
     };
-    // Relative standard deviation, over the comb's position, of X, Y or Z of light whose spectrum rises in a straight line from `blue` to `red`.
+    // Relative standard deviation, over the comb's position, of X, Y or Z of light whose spectrum rises in a
+    // straight line from `blue` to `red`.
     const auto deviation = [&](const crt::Spectrum& observer, double blue, double red) {
         double sum = 0, squares = 0;
         const std::size_t combs = CRT_WAVELENGTH_TABLE / 4;
@@ -416,11 +442,15 @@ TEST_CASE("wavelength and filter tables are monotone, complete, and distributed 
         return sum;
     };
     const double all = cumulative(830);
-    for (std::size_t i = 0; i <= CRT_WAVELENGTH_TABLE; i += 16) CHECK(cumulative(wavelengths[i]) / all == Approx(static_cast<double>(i) / CRT_WAVELENGTH_TABLE).margin(2e-4));
+    for (std::size_t i = 0; i <= CRT_WAVELENGTH_TABLE; i += 16)
+        CHECK(cumulative(wavelengths[i]) / all ==
+              Approx(static_cast<double>(i) / CRT_WAVELENGTH_TABLE).margin(2e-4));
 
-    // Density is constant in a cell: where x̄ falls to half within 10 nm a wide one would be a spike in the integrand.
+    // Density is constant in a cell: where x̄ falls to half within 10 nm a wide one would be a spike in the
+    // integrand.
     for (std::size_t i = 1; i < wavelengths.size(); ++i)
-        if (wavelengths[i] < 780 && wavelengths[i] - wavelengths[i - 1] > 12) FAIL("a cell of " << wavelengths[i] - wavelengths[i - 1] << " nm at " << wavelengths[i]);
+        if (wavelengths[i] < 780 && wavelengths[i] - wavelengths[i - 1] > 12)
+            FAIL("a cell of " << wavelengths[i] - wavelengths[i - 1] << " nm at " << wavelengths[i]);
 
     crt::FilmSettings film;
     CHECK(crt::filterTable(film, CRT_FILTER_TABLE).empty());  // the pixel itself
@@ -441,8 +471,10 @@ TEST_CASE("wavelength and filter tables are monotone, complete, and distributed 
         // Each cell holds the same part of the filter: midpoint sums of its definition up to the nodes.
         const auto value = [&](double x) {
             const double t = 3.14159265358979323846 * (x / 1.5 + 1);
-            return filter == crt::PixelFilter::Gaussian ? std::exp(-2 * x * x) - std::exp(-2 * 2.25)
-                                                        : 0.35875 - 0.48829 * std::cos(t) + 0.14128 * std::cos(2 * t) - 0.01168 * std::cos(3 * t);
+            return filter == crt::PixelFilter::Gaussian
+                       ? std::exp(-2 * x * x) - std::exp(-2 * 2.25)
+                       : 0.35875 - 0.48829 * std::cos(t) + 0.14128 * std::cos(2 * t) -
+                             0.01168 * std::cos(3 * t);
         };
         constexpr int kSteps = 2000;
         const auto mass = [&](double lower, double upper) {
@@ -451,7 +483,9 @@ TEST_CASE("wavelength and filter tables are monotone, complete, and distributed 
             return sum * (upper - lower) / kSteps;
         };
         const double all_of_it = mass(-1.5, 1.5);
-        for (std::size_t i = 16; i < CRT_FILTER_TABLE; i += 16) CHECK(mass(-1.5, table[i]) / all_of_it == Approx(static_cast<double>(i) / CRT_FILTER_TABLE).margin(2e-6));
+        for (std::size_t i = 16; i < CRT_FILTER_TABLE; i += 16)
+            CHECK(mass(-1.5, table[i]) / all_of_it ==
+                  Approx(static_cast<double>(i) / CRT_FILTER_TABLE).margin(2e-6));
     }
 }
 
@@ -459,7 +493,8 @@ TEST_CASE("materials: the face's own, the object's, or grey, and equal spectra o
     Scene scene = litFloor();
     scene.objects[1].emission = -1;
     scene.materials.resize(4);
-    for (std::size_t i = 1; i < 4; ++i) scene.materials[i].reflectance = crt::constantSpectrum(0.1 * static_cast<double>(i));
+    for (std::size_t i = 1; i < 4; ++i)
+        scene.materials[i].reflectance = crt::constantSpectrum(0.1 * static_cast<double>(i));
     scene.materials[3].reflectance = crt::constantSpectrum(0.5);  // as material 0
     scene.meshes[0].material = {1, -1};
     scene.objects[0].material = 3;
@@ -484,7 +519,9 @@ TEST_CASE("materials: the face's own, the object's, or grey, and equal spectra o
     const CompiledScene kinds = changed([](Scene& s) {
         s.materials.resize(5);
         s.materials[1] = {"mirror", crt::MaterialType::Mirror, crt::constantSpectrum(0.9), {}, {}, {}};
-        s.materials[2] = {"metal", crt::MaterialType::Conductor, {}, crt::constantSpectrum(0.2), crt::constantSpectrum(3), {}};
+        s.materials[2] = {
+            "metal", crt::MaterialType::Conductor, {}, crt::constantSpectrum(0.2), crt::constantSpectrum(3),
+            {}};
         s.materials[3] = {"glass", crt::MaterialType::Dielectric, {}, crt::constantSpectrum(1.5), {}, {}};
         s.materials[4] = {"flint", crt::MaterialType::Dielectric, {}, dispersiveIndex(), {}, {}};
         s.meshes[0].material = {1, 2};
@@ -522,15 +559,18 @@ TEST_CASE("emitters: one a triangle, or one a parallelogram, with its area and s
     REQUIRE(emitters.size() == 2);
     CHECK(emitters[0].flags == 0);
     CHECK(emitters[0].choice_probability + emitters[1].choice_probability == Approx(1));
-    CHECK(emitters[0].choice_probability / emitters[1].choice_probability == Approx(emitters[0].area / emitters[1].area));
+    CHECK(emitters[0].choice_probability / emitters[1].choice_probability ==
+          Approx(emitters[0].area / emitters[1].area));
     emitters = of([](Scene& s) {
         s.emissions.push_back({crt::constantSpectrum(6), true});
         s.meshes[1].emission = {0, 1};
     });
     REQUIRE(emitters.size() == 2);
     CHECK(emitters[1].flags == CRT_EMITTER_TWO_SIDED);
-    CHECK(emitters[1].choice_probability / emitters[0].choice_probability == Approx(6));  // three times as bright, on both sides
-    CHECK(of([](Scene& s) { s.meshes[1].positions[3] = s.meshes[1].positions[2]; }).size() == 1);  // the half without area gives no light
+    CHECK(emitters[1].choice_probability / emitters[0].choice_probability ==
+          Approx(6));  // three times as bright, on both sides
+    CHECK(of([](Scene& s) { s.meshes[1].positions[3] = s.meshes[1].positions[2]; }).size() ==
+          1);  // the half without area gives no light
     CHECK(of([](Scene& s) { s.emissions[0].radiance = crt::constantSpectrum(0); }).empty());
     // A lamp of which the eye sees next to nothing is chosen more often than its luminance says.
     emitters = of([](Scene& s) {
@@ -547,8 +587,11 @@ TEST_CASE("walls with the whole scene before them are not asked whether they occ
         Scene scene = litFloor();
         crt::Mesh& mesh = scene.meshes[0];
         mesh.positions.clear();
-        for (int i = 0; i < 8; ++i) mesh.positions.push_back({static_cast<double>(i & 1), static_cast<double>(i >> 1 & 1), static_cast<double>(i >> 2)});
-        mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4}, {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+        for (int i = 0; i < 8; ++i)
+            mesh.positions.push_back(
+                {static_cast<double>(i & 1), static_cast<double>(i >> 1 & 1), static_cast<double>(i >> 2)});
+        mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                          {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
         if (with_screen) {
             mesh.positions.insert(mesh.positions.end(), {{0.2, 0.2, 0.5}, {0.8, 0.2, 0.5}, {0.5, 0.8, 0.5}});
             mesh.triangles.push_back({8, 9, 10});
@@ -572,11 +615,15 @@ TEST_CASE("walls with the whole scene before them are not asked whether they occ
 
 TEST_CASE("what is left out is listed with a reason, and what is needed is not", "[compile]") {
     const auto listed = [](const CompiledScene& c, const std::string& what) {
-        return std::any_of(c.left_out.begin(), c.left_out.end(), [&](const auto& entry) { return entry.first == what && entry.second.size() > 5; });
+        return std::any_of(c.left_out.begin(), c.left_out.end(), [&](const auto& entry) {
+            return entry.first == what && entry.second.size() > 5;
+        });
     };
     const CompiledScene plain = compiled(litFloor());
-    for (const char* what : {"BVH", "mirror and conductor", "dielectric", "hero wavelength selection", "shading normals", "environment", "thin lens",
-                             "pixel filter table", "AOV buffers", "normals and bounding-box views", "independent sampler", "xorshift sampler"}) {
+    for (const char* what :
+         {"BVH", "mirror and conductor", "dielectric", "hero wavelength selection", "shading normals",
+          "environment", "thin lens", "pixel filter table", "AOV buffers", "normals and bounding-box views",
+          "independent sampler", "xorshift sampler"}) {
         INFO(what);
         CHECK(listed(plain, what));
     }
@@ -592,7 +639,8 @@ TEST_CASE("what is left out is listed with a reason, and what is needed is not",
     rich.film.filter = crt::PixelFilter::BlackmanHarris;
     rich.environment = crt::Environment{crt::constantSpectrum(1)};
     const CompiledScene full = compiled(rich, crt::kAovAlbedo);
-    for (const char* what : {"BVH", "dielectric", "hero wavelength selection", "environment", "thin lens", "pixel filter table", "AOV buffers"}) {
+    for (const char* what : {"BVH", "dielectric", "hero wavelength selection", "environment", "thin lens",
+                             "pixel filter table", "AOV buffers"}) {
         INFO(what);
         CHECK_FALSE(listed(full, what));
     }
@@ -808,7 +856,8 @@ TEST_CASE("a better tree and a smaller kernel leave the hash alone", "[compile]"
 }
 
 TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]") {
-    for (const crt::Accelerator accelerator : {crt::Accelerator::None, crt::Accelerator::Bvh, crt::Accelerator::Aabb}) {
+    for (const crt::Accelerator accelerator :
+         {crt::Accelerator::None, crt::Accelerator::Bvh, crt::Accelerator::Aabb}) {
         const CompiledScene c = changed([&](Scene& s) {
             s.integrator.accelerator = accelerator;
             s.film.filter = crt::PixelFilter::Gaussian;
@@ -821,11 +870,20 @@ TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]")
         const CrtScene& h = headerOf(c);
         CHECK(h.magic == CRT_SCENE_MAGIC);
         CHECK(h.features == c.features);
-        const std::pair<CrtSpan, std::size_t> arrays[] = {
-            {h.triangles, sizeof(CrtTriangle)}, {h.faces, sizeof(CrtFace)}, {h.triangles8, sizeof(CrtTriangle8)}, {h.occluders8, sizeof(CrtTriangle8)},
-            {h.primitives, sizeof(CrtPrimitive)}, {h.normals, sizeof(CrtNormals)}, {h.nodes, sizeof(CrtNode4)}, {h.objects, sizeof(CrtObject)},
-            {h.materials, sizeof(CrtMaterial)}, {h.emitters, sizeof(CrtEmitter)}, {h.spectra, CRT_SPECTRUM_STRIDE * sizeof(f32)}, {h.observer, sizeof(f32)},
-            {h.wavelengths, sizeof(f32)}, {h.filter, sizeof(f32)}};
+        const std::pair<CrtSpan, std::size_t> arrays[] = {{h.triangles, sizeof(CrtTriangle)},
+                                                          {h.faces, sizeof(CrtFace)},
+                                                          {h.triangles8, sizeof(CrtTriangle8)},
+                                                          {h.occluders8, sizeof(CrtTriangle8)},
+                                                          {h.primitives, sizeof(CrtPrimitive)},
+                                                          {h.normals, sizeof(CrtNormals)},
+                                                          {h.nodes, sizeof(CrtNode4)},
+                                                          {h.objects, sizeof(CrtObject)},
+                                                          {h.materials, sizeof(CrtMaterial)},
+                                                          {h.emitters, sizeof(CrtEmitter)},
+                                                          {h.spectra, CRT_SPECTRUM_STRIDE * sizeof(f32)},
+                                                          {h.observer, sizeof(f32)},
+                                                          {h.wavelengths, sizeof(f32)},
+                                                          {h.filter, sizeof(f32)}};
         for (const auto& [span, size] : arrays) {
             if (span.count == 0) continue;
             CHECK(span.offset % 4 == 0);
@@ -842,7 +900,8 @@ TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]")
     }
 }
 
-TEST_CASE("a lamp in the plane of another surface that it overlaps is found, and nothing else", "[compile]") {
+TEST_CASE("a lamp in the plane of another surface that it overlaps is found, and nothing else",
+          "[compile]") {
     const auto quad = [](double x0, double x1, double y, double z0, double z1) {
         crt::Mesh mesh;
         mesh.positions = {{x0, y, z0}, {x1, y, z0}, {x1, y, z1}, {x0, y, z1}};
@@ -876,7 +935,8 @@ TEST_CASE("a lamp in the plane of another surface that it overlaps is found, and
         CHECK(found(quad(-9, 9, 2, -9, 9), tree));
         CHECK(found(quad(0.5, -0.5, 2, -0.5, 0.5), tree));
         CHECK(found(quad(-0.5, 0.5, 2 - 1e-6, -0.5, 0.5), tree));  // below what rays can tell
-        // What is as far off as is advised, beside the ceiling, at its edge, or stands on the floor is right.
+        // What is as far off as is advised, beside the ceiling, at its edge, or stands on the floor is
+        // right.
         CHECK_FALSE(found(quad(-0.5, 0.5, 2 - 2 * inside->least_gap, -0.5, 0.5), tree));
         CHECK_FALSE(found(quad(3, 4, 2, -0.5, 0.5), tree));
         CHECK_FALSE(found(quad(2, 3, 2, -0.5, 0.5), tree));
@@ -895,11 +955,14 @@ Scene twoSheets(std::size_t side, double gap) {
     crt::Mesh& sheet = scene.meshes[0];
     sheet = {};
     const auto add = [&](double height) {
-        const auto first = static_cast<std::uint32_t>(sheet.positions.size()), row = static_cast<std::uint32_t>(side + 1);
+        const auto first = static_cast<std::uint32_t>(sheet.positions.size()),
+                   row = static_cast<std::uint32_t>(side + 1);
         for (std::size_t y = 0; y <= side; ++y)
             for (std::size_t x = 0; x <= side; ++x) {
-                const double u = static_cast<double>(x) / static_cast<double>(side), v = static_cast<double>(y) / static_cast<double>(side);
-                sheet.positions.push_back({10 * u - 5, height + 0.3 * std::sin(9 * u) * std::cos(7 * v), 10 * v - 5});
+                const double u = static_cast<double>(x) / static_cast<double>(side),
+                             v = static_cast<double>(y) / static_cast<double>(side);
+                sheet.positions.push_back(
+                    {10 * u - 5, height + 0.3 * std::sin(9 * u) * std::cos(7 * v), 10 * v - 5});
             }
         for (std::uint32_t y = 0; y < side; ++y)
             for (std::uint32_t x = 0; x < side; ++x) {
@@ -917,9 +980,11 @@ constexpr double kEverywhere = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-TEST_CASE("a backend that brings its own acceleration structure gets no BVH, and the same scene otherwise", "[compile]") {
+TEST_CASE("a backend that brings its own acceleration structure gets no BVH, and the same scene otherwise",
+          "[compile]") {
     const Scene scene = twoSheets(20, 1);
-    const CompiledScene with = compiled(scene), without = crt::compileScene(scene, 0, {.accelerator_reach = 4});
+    const CompiledScene with = compiled(scene),
+                        without = crt::compileScene(scene, 0, {.accelerator_reach = 4});
     CHECK_FALSE(with.without_nodes);
     CHECK(with.nodes > 0);
     CHECK(without.without_nodes);
@@ -931,7 +996,8 @@ TEST_CASE("a backend that brings its own acceleration structure gets no BVH, and
     CHECK(without.hash == with.hash);
     CHECK(without.size_bytes < with.size_bytes);
     const auto left_out = [](const CompiledScene& c) {
-        return std::any_of(c.left_out.begin(), c.left_out.end(), [](const auto& what) { return what.first == "BVH"; });
+        return std::any_of(c.left_out.begin(), c.left_out.end(),
+                           [](const auto& what) { return what.first == "BVH"; });
     };
     CHECK(left_out(without));
     CHECK_FALSE(left_out(with));
@@ -940,8 +1006,8 @@ TEST_CASE("a backend that brings its own acceleration structure gets no BVH, and
     REQUIRE(triangles.size() == 1602);
     for (std::uint32_t slot = 0; slot < triangles.size(); ++slot) REQUIRE(triangles[slot].id == slot);
 
-    // The camera stands at z = -5 in a scene that is 10 wide: 0.625 of the compiled scene. From beyond the reach, and with a
-    // lens that goes there, rays need the nodes.
+    // The camera stands at z = -5 in a scene that is 10 wide: 0.625 of the compiled scene. From beyond the
+    // reach, and with a lens that goes there, rays need the nodes.
     const auto nodesAt = [&](double z, double aperture) {
         Scene moved = scene;
         moved.camera.position[2] = z;
@@ -959,10 +1025,12 @@ TEST_CASE("surfaces too near and lamps in a plane are found without a BVH as wit
     // Of 40,000 triangles an even choice is looked at.
     for (const double gap : {3e-7, 1e-6, 1.1e-6, 1.0}) {
         const Scene scene = twoSheets(100, gap);
-        const CompiledScene with = compiled(scene), without = crt::compileScene(scene, 0, {.accelerator_reach = kEverywhere});
+        const CompiledScene with = compiled(scene),
+                            without = crt::compileScene(scene, 0, {.accelerator_reach = kEverywhere});
         REQUIRE(without.without_nodes);
         const CompiledScene reduced = crt::nearScene(without);
-        const crt::NearSurfaces expected = crt::findNearSurfaces(with), found = crt::findNearSurfaces(reduced);
+        const crt::NearSurfaces expected = crt::findNearSurfaces(with),
+                                found = crt::findNearSurfaces(reduced);
         INFO("gap " << gap << ", near " << expected.near << " of " << expected.asked);
         CHECK(expected.asked == 10000);
         CHECK(found.asked == expected.asked);
@@ -978,13 +1046,15 @@ TEST_CASE("surfaces too near and lamps in a plane are found without a BVH as wit
     CHECK(headerOf(crt::nearScene(large)).triangle_count < large.triangles / 2);
 
     Scene lamp = twoSheets(100, 1);
-    lamp.meshes[1].positions = {{-1, 3, -1}, {1, 3, -1}, {1, 3, 1}, {-1, 3, 1}, {-2, 3, -2}, {2, 3, -2}, {2, 3, 2}};
+    lamp.meshes[1].positions = {{-1, 3, -1}, {1, 3, -1}, {1, 3, 1}, {-1, 3, 1},
+                                {-2, 3, -2}, {2, 3, -2}, {2, 3, 2}};
     lamp.meshes.push_back(lamp.meshes[1]);
     lamp.meshes.back().triangles = {{4, 5, 6}};
     lamp.objects.push_back(lamp.objects[0]);
     lamp.objects.back().mesh = 2;
     const auto with = crt::findCoplanarLight(compiled(lamp));
-    const auto without = crt::findCoplanarLight(crt::nearScene(crt::compileScene(lamp, 0, {.accelerator_reach = kEverywhere})));
+    const auto without = crt::findCoplanarLight(
+        crt::nearScene(crt::compileScene(lamp, 0, {.accelerator_reach = kEverywhere})));
     REQUIRE(with);
     REQUIRE(without);
     CHECK(without->surface == with->surface);

@@ -1,14 +1,15 @@
-// Files and report of `crt converge`, on a run that never was: 3 scenes, 2 backends, 2 variants, and everything that can be wrong with them.
-#include "catch.h"
+// Files and report of `crt converge`, on a run that never was: 3 scenes, 2 backends, 2 variants, and
+// everything that can be wrong with them.
+#include "base/error.h"
 #include "base/unit_text.h"
+#include "catch.h"
 #include "judge/converge/files.h"
 #include "judge/converge/findings.h"
 #include "judge/converge/quantity_text.h"
 #include "judge/converge/report_html.h"
 #include "judge/converge/svg_plot.h"
-#include "base/error.h"
-#include "synthetic_run.h"
 #include "judge/verify/temporary_folder.h"
+#include "synthetic_run.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -33,7 +34,9 @@ std::string readText(const std::string& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-void writeText(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+void writeText(const std::string& path, const std::string& text) {
+    std::ofstream(path, std::ios::binary) << text;
+}
 
 /// A box lit from above, and noise on it.
 Maps syntheticMaps(double deviation, std::uint64_t seed) {
@@ -50,8 +53,13 @@ Maps syntheticMaps(double deviation, std::uint64_t seed) {
             const float u = static_cast<float>(x) / size, v = static_cast<float>(y) / size;
             const bool left = u < 0.18f, right = u > 0.82f, lamp = v < 0.05f && u > 0.4f && u < 0.6f;
             const float light = lamp ? 1.0f : 0.55f / (1 + 3 * (u - 0.5f) * (u - 0.5f) + 2 * v * v);
-            const float sd = static_cast<float>(deviation) * (0.3f + light + (left || right ? 0.5f : 0.0f)), z = normal(engine);
-            const float colour[3] = {right ? 0.15f : 0.75f, left ? 0.1f : right ? 0.5f : 0.73f, left || right ? 0.1f : 0.7f};
+            const float sd = static_cast<float>(deviation) * (0.3f + light + (left || right ? 0.5f : 0.0f)),
+                        z = normal(engine);
+            const float colour[3] = {right ? 0.15f : 0.75f,
+                                     left    ? 0.1f
+                                     : right ? 0.5f
+                                             : 0.73f,
+                                     left || right ? 0.1f : 0.7f};
             for (const float c : colour) maps.image.pixels.push_back(c * light + sd * z * 0.5f);
             maps.error.values.push_back(std::abs(sd * z));
             maps.standard_error.values.push_back(sd);
@@ -64,9 +72,24 @@ Maps syntheticMaps(double deviation, std::uint64_t seed) {
 Run syntheticStudy() {
     Run run;
     converge::Environment& e = run.environment;
-    e = {"0.1.0", "f8994df0c1d2e3f4a5b6", true, "g++ 12.2.0", "-O3 -ffp-contract=off", "Example CPU @ 2.10GHz", "Debian GNU/Linux 12, Linux 6.1 x86_64", 8, "0.31 0.40 0.38",
-         "7.92 5.10 2.33", "/home/me/crt", {"crt converge configs/cornell_box.yaml configs/furnace.yaml configs/dragon.yaml --backends embree,opencl,cuda "
-         "--vary sampler=sobol,independent --time 120 -o out/converge"}, "2026-11-20T13:00:00Z", "2026-11-20T13:02:03Z", 120, 118.6};
+    e = {"0.1.0",
+         "f8994df0c1d2e3f4a5b6",
+         true,
+         "g++ 12.2.0",
+         "-O3 -ffp-contract=off",
+         "Example CPU @ 2.10GHz",
+         "Debian GNU/Linux 12, Linux 6.1 x86_64",
+         8,
+         "0.31 0.40 0.38",
+         "7.92 5.10 2.33",
+         "/home/me/crt",
+         {"crt converge configs/cornell_box.yaml configs/furnace.yaml configs/dragon.yaml --backends "
+          "embree,opencl,cuda "
+          "--vary sampler=sobol,independent --time 120 -o out/converge"},
+         "2026-11-20T13:00:00Z",
+         "2026-11-20T13:02:03Z",
+         120,
+         118.6};
     run.notes = {"'cuda' was asked for, and there is no GPU here: its configurations were left out."};
 
     ReferenceInfo cornell;
@@ -101,9 +124,13 @@ Run syntheticStudy() {
                 c.scene_file = "configs/" + scene + ".yaml";
                 c.scene_hash = "0123456789abcdef0123456789abcdef";
                 c.width = c.height = 512;
-                c.kept = {{"diffuse", "a material needs it"}, {"next-event estimation", "there is an emitter"}};
-                c.left_out = {{"glass", "no material is a dielectric"}, {"environment", "the scene has none; rays that leave are black"}};
-                if (scene == "furnace") c.left_out.push_back({"bounding volume hierarchy", "12 triangles are tested one by one"});
+                c.kept = {{"diffuse", "a material needs it"},
+                          {"next-event estimation", "there is an emitter"}};
+                c.left_out = {{"glass", "no material is a dielectric"},
+                              {"environment", "the scene has none; rays that leave are black"}};
+                if (scene == "furnace")
+                    c.left_out.push_back(
+                        {"bounding volume hierarchy", "12 triangles are tested one by one"});
                 const bool embree = backend == "embree", sobol = variant == "sampler=sobol";
                 SyntheticRender what;
                 what.pixels = 256;
@@ -117,7 +144,9 @@ Run syntheticStudy() {
                 if (scene == "furnace" && backend == "opencl" && sobol) what.bias = 0.006;
                 what.mean_bias = scene == "cornell_box" && !embree && !sobol ? 0.03 : 0;
                 for (Row& row : syntheticRows(c.key, what, seed += 1000)) run.rows.push_back(std::move(row));
-                c.stages = {0.002, 0.011, embree ? 0.004 : 0.72, 0.003, 0.02, what.seconds_per_sample * (1 << (what.looks - 1)), std::nullopt, 0.19};
+                c.stages = {0.002,        0.011, embree ? 0.004 : 0.72,
+                            0.003,        0.02,  what.seconds_per_sample * (1 << (what.looks - 1)),
+                            std::nullopt, 0.19};
                 if (scene == "dragon") c.stages.render_device = 0.9 * c.stages.render_wall;
                 c.maps = syntheticMaps(std::sqrt(what.variance / 1024), seed);
                 if (!what.has_reference) c.maps.error = c.maps.z = c.maps.flip = {};
@@ -125,7 +154,8 @@ Run syntheticStudy() {
                 run.configurations.push_back(std::move(c));
             }
     for (Row& row : run.rows)
-        if (row.key.scene == "furnace" && row.key.backend == "embree" && row.key.variant == "sampler=independent" && row.replicate == 3 && row.samples >= 512)
+        if (row.key.scene == "furnace" && row.key.backend == "embree" &&
+            row.key.variant == "sampler=independent" && row.replicate == 3 && row.samples >= 512)
             row.invalid_samples = row.samples / 512;
     Configuration cuda;
     cuda.key = {"cornell_box", "cuda", "sampler=sobol"};
@@ -134,7 +164,8 @@ Run syntheticStudy() {
     return run;
 }
 
-/// Balanced tags, quoted attributes, no bare '<' or '&': what XML asks for, so that any reader takes the page or figure alike. Empty when all is well.
+/// Balanced tags, quoted attributes, no bare '<' or '&': what XML asks for, so that any reader takes the
+/// page or figure alike. Empty when all is well.
 std::string whyNotWellFormed(const std::string& text) {
     std::vector<std::string> open;
     for (std::size_t at = 0; at < text.size(); ++at) {
@@ -162,7 +193,8 @@ std::string whyNotWellFormed(const std::string& text) {
         if (end == text.size()) return "a tag does not end" + here();
         const bool empty = text[end - 1] == '/';
         if (closing) {
-            if (open.empty() || open.back() != name) return "</" + name + "> closes " + (open.empty() ? "nothing" : open.back()) + here();
+            if (open.empty() || open.back() != name)
+                return "</" + name + "> closes " + (open.empty() ? "nothing" : open.back()) + here();
             open.pop_back();
         } else if (!empty) {
             open.push_back(name);
@@ -174,7 +206,8 @@ std::string whyNotWellFormed(const std::string& text) {
 
 bool sameRow(const Row& a, const Row& b) {
     const auto same = [](const std::optional<Estimate>& x, const std::optional<Estimate>& y) {
-        return x.has_value() == y.has_value() && (!x || (x->value == y->value && x->low == y->low && x->high == y->high));
+        return x.has_value() == y.has_value() &&
+               (!x || (x->value == y->value && x->low == y->low && x->high == y->high));
     };
     return a.key == b.key && a.seed == b.seed && a.replicate == b.replicate && a.samples == b.samples &&
            a.render_wall_seconds == b.render_wall_seconds &&
@@ -200,7 +233,8 @@ std::vector<Row> fewRows() {
     SyntheticRender what;
     what.replicates = 3;
     what.looks = 2;
-    std::vector<Row> rows = syntheticRows({"scene, with \"quotes\"", "embree", "sampler=sobol nee=true"}, what, 1);
+    std::vector<Row> rows =
+        syntheticRows({"scene, with \"quotes\"", "embree", "sampler=sobol nee=true"}, what, 1);
     rows[0].render_device_seconds = 0.1 + 0.2;
     rows[0].cpu_clock_mhz = 2100;
     rows[0].error->delta_e2000_mean = 1.5;
@@ -293,7 +327,8 @@ TEST_CASE("the manifest has size and hash of every file", "[converge]") {
     writeText(folder / "a.txt", "a");
     writeManifest(folder / "manifest.json", syntheticStudy(), {"empty.txt", "a.txt"});
     const nlohmann::json manifest = nlohmann::json::parse(readText(folder / "manifest.json"));
-    CHECK(manifest["files"][0]["xxh3_128"] == "99aa06d3014798d86001c324468d497f");  // XXH3's published value of nothing.
+    CHECK(manifest["files"][0]["xxh3_128"] ==
+          "99aa06d3014798d86001c324468d497f");  // XXH3's published value of nothing.
     CHECK(manifest["files"][1]["bytes"] == 1);
     CHECK(manifest["files"][1]["xxh3_128"] != manifest["files"][0]["xxh3_128"]);
     CHECK(manifest["scenes"].size() == 3);
@@ -341,7 +376,8 @@ TEST_CASE("the report is one well-formed page without requests, and leaves nothi
     const std::string html = readText(folder + "/report.html");
 
     CHECK(whyNotWellFormed(html) == "");
-    for (const char* request : {"http:", "https:", "//", "<script", "<link", "@import", "url(", "src=\"/", "<iframe", "<object"}) {
+    for (const char* request :
+         {"http:", "https:", "//", "<script", "<link", "@import", "url(", "src=\"/", "<iframe", "<object"}) {
         INFO(request);
         // Base64 may hold "//".
         std::string without_data;
@@ -354,7 +390,9 @@ TEST_CASE("the report is one well-formed page without requests, and leaves nothi
     }
     for (const Configuration& configuration : run.configurations) {
         INFO(configuration.key.scene << ' ' << labelOf(configuration.key));
-        const std::size_t section = html.find("<section id=\"scene-" + (configuration.key.scene == "cornell_box" ? "cornell-box" : configuration.key.scene));
+        const std::size_t section =
+            html.find("<section id=\"scene-" +
+                      (configuration.key.scene == "cornell_box" ? "cornell-box" : configuration.key.scene));
         REQUIRE(section != std::string::npos);
         const std::string own = html.substr(section, html.find("</section>", section) - section);
         CHECK_THAT(own, Contains("</span>" + labelOf(configuration.key) + "</th>"));
@@ -364,7 +402,8 @@ TEST_CASE("the report is one well-formed page without requests, and leaves nothi
     for (const Row& row : run.rows) {
         if (!row.isVoid()) continue;
         ++void_rows;
-        CHECK_THAT(html, Contains("replicate\"><span>" + std::to_string(row.replicate) + "</span></td><td class=\"num\" data-label=\"samples per pixel\"><span>" +
+        CHECK_THAT(html, Contains("replicate\"><span>" + std::to_string(row.replicate) +
+                                  "</span></td><td class=\"num\" data-label=\"samples per pixel\"><span>" +
                                   countText(row.samples)));
     }
     CHECK(void_rows == 3);
@@ -397,9 +436,11 @@ TEST_CASE("findings say who is first, what is wrong and what is missing", "[conv
         for (const Finding& finding : findingsOfScene(run, analysis, scene)) text += finding.text + '\n';
         return text;
     };
-    const std::string cornell = textOf("cornell_box"), furnace = textOf("furnace"), dragon = textOf("dragon");
+    const std::string cornell = textOf("cornell_box"), furnace = textOf("furnace"),
+                      dragon = textOf("dragon");
     CHECK_THAT(cornell, Contains("embree, sampler=sobol reaches 1 % relative RMSE first"));
-    CHECK_THAT(cornell, Contains("opencl, sampler=independent FAILS: The image mean is off by more than 1 %"));
+    CHECK_THAT(cornell,
+               Contains("opencl, sampler=independent FAILS: The image mean is off by more than 1 %"));
     CHECK_THAT(cornell, Contains("opencl, sampler=sobol understates its own error"));
     CHECK_THAT(cornell, Contains("cuda, sampler=sobol was left out: no CUDA driver"));
     CHECK_THAT(furnace, Contains("embree, sampler=independent FAILS: 3 rows are void"));
@@ -501,14 +542,17 @@ TEST_CASE("few replicates, few looks and no reference make a report with what th
                 INFO(file);
                 const std::string text = readText(folder / file);
                 CHECK(whyNotWellFormed(text) == "");
-                for (const char* wrong : {"\"nan", "\"-nan", "\"inf", "\"-inf", " nan", " inf ", ">nan", ">inf"}) CHECK_THAT(text, !Contains(wrong));
+                for (const char* wrong :
+                     {"\"nan", "\"-nan", "\"inf", "\"-inf", " nan", " inf ", ">nan", ">inf"})
+                    CHECK_THAT(text, !Contains(wrong));
             }
             writeSummary(folder / "summary.json", run, analysis);
             CHECK(nlohmann::json::parse(readText(folder / "summary.json"))["fits"].size() == 1);
         }
 }
 
-TEST_CASE("the report bounds an error floor, but not by 0 where errors fall faster than a floor lets them", "[converge]") {
+TEST_CASE("the report bounds an error floor, but not by 0 where errors fall faster than a floor lets them",
+          "[converge]") {
     for (const double rate : {1.0, 1.8}) {
         SyntheticRender what;
         what.rate = rate;
@@ -518,7 +562,8 @@ TEST_CASE("the report bounds an error floor, but not by 0 where errors fall fast
         const TemporaryFolder folder;
         writeReport(folder.path(), run, analyze(run));
         const std::string html = readText(folder / "report.html");
-        CHECK_THAT(html, Contains(rate == 1.0 ? "none seen<span class=\"ci\">below " : "none seen<span class=\"ci\">falls faster than 1/√N"));
+        CHECK_THAT(html, Contains(rate == 1.0 ? "none seen<span class=\"ci\">below "
+                                              : "none seen<span class=\"ci\">falls faster than 1/√N"));
         CHECK_THAT(html, !Contains("below 0 %"));
     }
 }

@@ -1,5 +1,5 @@
-// The host's side of the CUDA backend, which needs neither GPU nor driver: where NVRTC is looked for, the options and the cache key, and what is
-// read from the assembler's log.
+// The host's side of the CUDA backend, which needs neither GPU nor driver: where NVRTC is looked for, the
+// options and the cache key, and what is read from the assembler's log.
 #ifdef CRT_HAVE_CUDA_PROGRAM  // nothing to test in a build without CUDA
 
 #include "catch.h"
@@ -14,8 +14,10 @@ using namespace crt::cuda;
 
 TEST_CASE("NVRTC is looked for by name, in CUDA_HOME, then in the usual place", "[cuda]") {
     const std::vector<std::string> plain = nvrtcCandidates(nullptr);
-    CHECK(plain == std::vector<std::string>{"libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so", "/usr/local/cuda/lib64/libnvrtc.so.13",
-                                            "/usr/local/cuda/lib64/libnvrtc.so.12", "/usr/local/cuda/lib64/libnvrtc.so"});
+    CHECK(plain == std::vector<std::string>{"libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so",
+                                            "/usr/local/cuda/lib64/libnvrtc.so.13",
+                                            "/usr/local/cuda/lib64/libnvrtc.so.12",
+                                            "/usr/local/cuda/lib64/libnvrtc.so"});
     CHECK(nvrtcCandidates("") == plain);
     CHECK(nvrtcCandidates("/usr/local/cuda") == plain);
     const std::vector<std::string> named = nvrtcCandidates("/opt/cuda");
@@ -25,15 +27,18 @@ TEST_CASE("NVRTC is looked for by name, in CUDA_HOME, then in the usual place", 
 }
 
 TEST_CASE("a machine without NVRTC gets one sentence", "[cuda]") {
-    CHECK_THROWS_WITH(Nvrtc::open({"/nowhere/libnvrtc.so.13", "/nowhere/libnvrtc.so"}),
-                      Catch::Matchers::StartsWith("NVRTC is not installed (") && Contains("/nowhere/libnvrtc.so.13"));
+    CHECK_THROWS_WITH(
+        Nvrtc::open({"/nowhere/libnvrtc.so.13", "/nowhere/libnvrtc.so"}),
+        Catch::Matchers::StartsWith("NVRTC is not installed (") && Contains("/nowhere/libnvrtc.so.13"));
     // A library that is there, but is none.
     CHECK_THROWS_WITH(Nvrtc::open({"libm.so.6"}), Contains("libm.so.6"));
 }
 
 TEST_CASE("no option relaxes arithmetic", "[cuda]") {
     const std::vector<std::string> options = nvrtcOptions(90, 0x1851, 4);
-    const auto has = [&](const char* option) { return std::find(options.begin(), options.end(), option) != options.end(); };
+    const auto has = [&](const char* option) {
+        return std::find(options.begin(), options.end(), option) != options.end();
+    };
     CHECK(has("--gpu-architecture=sm_90"));
     CHECK(has("--fmad=false"));
     CHECK(has("--prec-div=true"));
@@ -98,8 +103,9 @@ TEST_CASE("what NVRTC refuses is quoted", "[cuda]") {
     const Nvrtc& nvrtc = found.front();
     CHECK(nvrtc.major() >= 12);
     CHECK_FALSE(nvrtc.supports(1));
-    CHECK_THROWS_WITH(nvrtc.compile("extern \"C\" __global__ void f() { g(); }", "wrong.cu", {"--gpu-architecture=sm_90"}),
-                      Contains("wrong.cu(1)") && Contains("\"g\" is undefined"));
+    CHECK_THROWS_WITH(
+        nvrtc.compile("extern \"C\" __global__ void f() { g(); }", "wrong.cu", {"--gpu-architecture=sm_90"}),
+        Contains("wrong.cu(1)") && Contains("\"g\" is undefined"));
     const Cubin cubin = nvrtc.compile("extern \"C\" __global__ void f(float *x) { *x = 1.0f; }", "right.cu",
                                       {"--gpu-architecture=sm_90", "--ptxas-options=-v"});
     REQUIRE(cubin.bytes.size() > 4);

@@ -1,9 +1,9 @@
 // What a film knows of its scene (film_record.h), and what becomes of it in files.
 #include "catch.h"
-#include "film/checkpoint.h"
-#include "film/resolve.h"
 #include "compile/compile.h"
+#include "film/checkpoint.h"
 #include "film/film_record.h"
+#include "film/resolve.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
 #include "render/light_checks.h"
@@ -91,9 +91,10 @@ TEST_CASE("a record comes back from its text with every bit", "[develop]") {
 
 TEST_CASE("a text that is no record is refused, whatever of it is missing or wrong", "[develop]") {
     const std::string whole = recordText(recordOf(parsed()));
-    for (const char* key : {"title", "seed", "independent_samples", "resolution", "window", "aovs", "development", "lights_xyz",
-                            "world_to_camera", "world_to_ndc", "traits", "backend", "device", "date_utc", "exposure_ev", "color_space",
-                            "apply_to_float"}) {
+    for (const char* key :
+         {"title", "seed", "independent_samples", "resolution", "window", "aovs", "development",
+          "lights_xyz", "world_to_camera", "world_to_ndc", "traits", "backend", "device", "date_utc",
+          "exposure_ev", "color_space", "apply_to_float"}) {
         INFO(key);
         std::string without = whole;
         const std::size_t at = without.find(fmt::format("\"{}\"", key));
@@ -114,13 +115,18 @@ TEST_CASE("a text that is no record is refused, whatever of it is missing or wro
     CHECK_THROWS_AS(readRecord(std::string(100000, '[')), Error);
 }
 
-TEST_CASE("files of floats hold the radiance of the scene, display formats what exposure and white balance make of it",
-          "[develop]") {
+TEST_CASE(
+    "files of floats hold the radiance of the scene, display formats what exposure and white balance make "
+    "of it",
+    "[develop]") {
     const Scene scene = parsed();
     const Vec3d color{0.4, 0.5, 0.2};
     const Film film = oneColor(32, 32, color);
     FilmIdentity identity{.scene_hash = "h", .version = "v", .record = recordOf(scene)};
-    const auto image = [&](OutputFormat format) { return developedImage({.file = "a", .format = format, .aovs = kAovError, .place = {}}, film, identity); };
+    const auto image = [&](OutputFormat format) {
+        return developedImage({.file = "a", .format = format, .aovs = kAovError, .place = {}}, film,
+                              identity);
+    };
     const Image plain = resolveImage(film, {}, kAovError);
     const Image shown = resolveImage(film, developmentOf(scene), kAovError);
     REQUIRE(plain.pixels != shown.pixels);
@@ -141,7 +147,8 @@ TEST_CASE("files of floats hold the radiance of the scene, display formats what 
         CHECK(metadataValue(display, kDisplayExposureKey).empty());
     }
     identity.record->development.apply_to_float = true;
-    for (const OutputFormat format : {OutputFormat::Exr, OutputFormat::Pfm, OutputFormat::Png, OutputFormat::Ppm}) {
+    for (const OutputFormat format :
+         {OutputFormat::Exr, OutputFormat::Pfm, OutputFormat::Png, OutputFormat::Ppm}) {
         const Image all = image(format);
         CHECK(all.pixels == shown.pixels);
         CHECK(metadataValue(all, kExposureKey) == "0.1");
@@ -153,14 +160,16 @@ TEST_CASE("a part of a film is the film of that part", "[develop]") {
     const std::uint32_t aovs = kAovDepth | kAovPrimitive;
     Film film({5, 4, channelsFor(aovs), aovs});
     for (std::size_t i = 0; i < film.sums.size(); ++i) film.sums[i] = static_cast<double>(i);
-    for (std::size_t p = 0; p < 20; ++p) film.counts[p] = 100 + p, film.primitives[p] = static_cast<std::uint32_t>(p);
+    for (std::size_t p = 0; p < 20; ++p)
+        film.counts[p] = 100 + p, film.primitives[p] = static_cast<std::uint32_t>(p);
     film.samples.add({3, 9});
     const Film part = cropped(film, {1, 2, 4, 4});
     CHECK(part.shape() == FilmShape{3, 2, channelsFor(aovs), aovs});
     CHECK(part.samples.text() == "3-9");
     for (std::uint32_t y = 0; y < 2; ++y)
         for (std::uint32_t x = 0; x < 3; ++x) {
-            for (std::uint32_t c = 0; c < film.shape().channels; ++c) CHECK(part.sum(x, y, c) == film.sum(x + 1, y + 2, c));
+            for (std::uint32_t c = 0; c < film.shape().channels; ++c)
+                CHECK(part.sum(x, y, c) == film.sum(x + 1, y + 2, c));
             CHECK(part.counts[y * 3 + x] == film.counts[(y + 2) * 5 + x + 1]);
             CHECK(part.primitives[y * 3 + x] == film.primitives[(y + 2) * 5 + x + 1]);
         }
@@ -172,7 +181,8 @@ TEST_CASE("the matrices of the camera put points where its pixels see them", "[d
     const Scene scene = parsed();
     const FilmRecord record = recordOf(scene);
     const Camera& camera = scene.camera;
-    const Vec3d d{camera.target[0] - camera.position[0], camera.target[1] - camera.position[1], camera.target[2] - camera.position[2]};
+    const Vec3d d{camera.target[0] - camera.position[0], camera.target[1] - camera.position[1],
+                  camera.target[2] - camera.position[2]};
     const double distance = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     const auto near = [](const Vec3d& a, const Vec3d& b) {
         for (std::size_t k = 0; k < 3; ++k)
@@ -222,13 +232,15 @@ TEST_CASE("whatever makes a film another one is said in words", "[develop]") {
         {{"camera.fov", "41"}, "the camera is at"},
         {{"camera.position", "[1, 2, -4.0000001]"}, "not at (1, 2, -4.0000001)"},
         {{"camera.aperture_radius", "0.1"}, "lens of radius 0.1"},
-        {{"objects.0.mesh.positions.0.0", "-2.5"}, "the geometry is another (4 triangles in 2 objects in both)"},
+        {{"objects.0.mesh.positions.0.0", "-2.5"},
+         "the geometry is another (4 triangles in 2 objects in both)"},
         {{"objects.0.transform", "[{translate: [0, 0.5, 0]}]"}, "the geometry is another"},
         {{"objects.0.material", "glass"}, "the geometry is another"},
         {{"materials.floor.reflectance", "0.6"}, "the materials are others (2 materials in both)"},
         {{"spectra.glow.scale", "6"}, "the light is another"},
         {{"objects.1.emission.two_sided", "true"}, "the light is another"},
-        {{"environment", "{radiance: 1}"}, "the light is 1 kind of lamp, no environment, not 1 kind of lamp, an environment"},
+        {{"environment", "{radiance: 1}"},
+         "the light is 1 kind of lamp, no environment, not 1 kind of lamp, an environment"},
         {{"outputs.0.aovs", "[normal]"}, "the AOVs of first hits are depth, not normal"},
     };
     for (const auto& [change, words] : changes) {
@@ -241,7 +253,10 @@ TEST_CASE("whatever makes a film another one is said in words", "[develop]") {
         CHECK_THAT(all, Contains(words));
     }
     // What no sample depends on is no difference.
-    for (const SceneOverride& change : {SceneOverride{"film.exposure_ev", "2"}, {"film.color_space", "xyz"}, {"title", "other"}, {"sampler.samples", "7"}}) {
+    for (const SceneOverride& change : {SceneOverride{"film.exposure_ev", "2"},
+                                        {"film.color_space", "xyz"},
+                                        {"title", "other"},
+                                        {"sampler.samples", "7"}}) {
         const Scene other = parsed({change});
         CHECK(compileScene(other, requestedAovs(other)).hash == hash);
         CHECK(differingTraits(record, recordOf(other)).empty());
@@ -262,14 +277,20 @@ TEST_CASE("a lamp with nothing in front of it is named, and no other", "[develop
     CHECK(named({away, {"objects.0.transform", "[{translate: [0, 2, 0]}]"}}) == lamp);   // In its plane.
     CHECK(named({away, {"objects.0.transform", "[{translate: [0, 2.001, 0]}]"}}).empty());
     CHECK(named({away, {"objects.0.transform", "[{rotate: {axis: [1, 0, 0], angle_deg: 80}}]"}}) == lamp);
-    CHECK(named({away, {"objects.0.transform", "[{rotate: {axis: [1, 0, 0], angle_deg: 80}}, {scale: [1, 2, 1]}]"}}).empty());
+    CHECK(
+        named({away,
+               {"objects.0.transform", "[{rotate: {axis: [1, 0, 0], angle_deg: 80}}, {scale: [1, 2, 1]}]"}})
+            .empty());
     // A mirroring transform keeps the outside outside.
     CHECK(named({{"objects.1.transform", "[{scale: [-1, 1, 1]}]"}}).empty());
     CHECK(named({away, {"objects.1.transform", "[{scale: [-1, 1, 1]}]"}}) == lamp);
     CHECK(named({{"objects.1.transform", "[{scale: [1, -1, 1]}]"}}).empty());  // At −2, it lights upwards.
     // Tilted, at rounding's mercy: its own corners are not in front of it.
     for (int degrees = 1; degrees < 30; degrees += 3)
-        CHECK(named({away, {"objects.1.transform", "[{rotate: {axis: [1, 0, 0.3], angle_deg: " + std::to_string(degrees) + "}}, {translate: [0, 9, 0]}]"}}) == lamp);
+        CHECK(named({away,
+                     {"objects.1.transform",
+                      "[{rotate: {axis: [1, 0, 0.3], angle_deg: " + std::to_string(degrees) +
+                          "}}, {translate: [0, 9, 0]}]"}}) == lamp);
 }
 
 TEST_CASE("a film is black when no pixel has any of X, Y and Z", "[develop]") {

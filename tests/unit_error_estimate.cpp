@@ -1,13 +1,13 @@
-// error_estimate.h: variances against the textbook, intervals against their promised coverage, and the replicates of the Sobol sampler, which must be
-// sequences of their own.
+// error_estimate.h: variances against the textbook, intervals against their promised coverage, and the
+// replicates of the Sobol sampler, which must be sequences of their own.
 #include "film/error_estimate.h"
 #include "film/error_text.h"
 #include "kernel_test.h"
 
 #include "catch.h"
+#include "cli/progress.h"
 #include "kernel/layout.h"
 #include "kernel/sampler.h"
-#include "cli/progress.h"
 #include "render/sampling.h"
 
 #include <array>
@@ -39,18 +39,23 @@ void addSample(Film& film, std::size_t pixel, u64 sample, double y) {
     if (replicate + 1 < replicates) pairs[2 * (CRT_CHANNELS_BASE + replicate)] += y;
 }
 
-/// A film of one row whose pixel p has mean truth[p] and independent normal samples of standard deviation sigma[p].
-Film noisyFilm(const std::vector<double>& truth, const std::vector<double>& sigma, std::uint64_t samples, std::mt19937_64& random, u32 shift = 4) {
+/// A film of one row whose pixel p has mean truth[p] and independent normal samples of standard deviation
+/// sigma[p].
+Film noisyFilm(const std::vector<double>& truth, const std::vector<double>& sigma, std::uint64_t samples,
+               std::mt19937_64& random, u32 shift = 4) {
     Film film(shapeFor(static_cast<u32>(truth.size()), 1, shift));
     std::normal_distribution<double> normal;
     for (std::size_t p = 0; p < truth.size(); ++p)
-        for (std::uint64_t s = 0; s < samples; ++s) addSample(film, p, s, truth[p] + sigma[p] * normal(random));
+        for (std::uint64_t s = 0; s < samples; ++s)
+            addSample(film, p, s, truth[p] + sigma[p] * normal(random));
     film.counts.assign(truth.size(), samples);
     film.samples.add({0, samples});
     return film;
 }
 
-double mean(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size()); }
+double mean(const std::vector<double>& values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
 
 /// Root mean square deviation of the film's pixels from the truth, over the film's mean.
 double trueRelativeRmse(const Film& film, const std::vector<double>& truth) {
@@ -66,7 +71,8 @@ bool consistent(int hits, int trials, double probability) {
 
 }  // namespace
 
-TEST_CASE("the replicates' variance is that of their means, also of the last, which has no channel", "[error]") {
+TEST_CASE("the replicates' variance is that of their means, also of the last, which has no channel",
+          "[error]") {
     std::mt19937_64 random(1);
     const u32 shift = GENERATE(1u, 2u, 3u, 4u);
     const u32 replicates = 1u << shift;
@@ -79,7 +85,8 @@ TEST_CASE("the replicates' variance is that of their means, also of the last, wh
         sum += film.replicateSum(0, 0, r);
     }
     CHECK(sum == Approx(film.sum(0, 0, 1)).epsilon(1e-14));
-    CHECK(LuminanceVariance(film)(0, 0) == Approx(stats::summarize(means).variance / replicates).epsilon(1e-12));
+    CHECK(LuminanceVariance(film)(0, 0) ==
+          Approx(stats::summarize(means).variance / replicates).epsilon(1e-12));
     CHECK(LuminanceVariance(film).degreesOfFreedom() == replicates - 1);
 }
 
@@ -96,8 +103,9 @@ TEST_CASE("the last replicate is no rounding beside a bright sample in another",
 TEST_CASE("any number of samples is no bias, and neither is a merge of unequal ranges", "[error]") {
     std::mt19937_64 random(2);
     const u32 shift = GENERATE(1u, 4u);
-    const std::vector<SampleRange> ranges = GENERATE(std::vector<SampleRange>{{0, 33}}, std::vector<SampleRange>{{0, 65}}, std::vector<SampleRange>{{0, 200}},
-                                                     std::vector<SampleRange>{{0, 33}, {100, 131}, {1000, 1007}});
+    const std::vector<SampleRange> ranges = GENERATE(
+        std::vector<SampleRange>{{0, 33}}, std::vector<SampleRange>{{0, 65}},
+        std::vector<SampleRange>{{0, 200}}, std::vector<SampleRange>{{0, 33}, {100, 131}, {1000, 1007}});
     u64 samples = 0;
     for (const auto& [first, end] : ranges) samples += end - first;
     double sum = 0;
@@ -145,7 +153,8 @@ TEST_CASE("a pixel that lost samples has no error bar, and the others keep their
 
 TEST_CASE("the variance of a variance is measured without bias, for short tails and long ones", "[error]") {
     std::mt19937_64 random(11);
-    // Replicates' means of one sample each. Var of k2/R = (k4/R + 2 k2²/(R − 1))/R²: normal k2 = 1, k4 = 0; exponential k2 = 1, k4 = 6.
+    // Replicates' means of one sample each. Var of k2/R = (k4/R + 2 k2²/(R − 1))/R²: normal k2 = 1, k4 = 0;
+    // exponential k2 = 1, k4 = 6.
     const bool exponential = GENERATE(false, true);
     constexpr int kRepeats = 400000;
     double sum = 0;
@@ -171,18 +180,23 @@ struct Coverage {
     double ratio = 0;
 };
 
-/// Films of `width` × `height` pixels of mean 1 whose pixels' samples are independent draws of variance sigma².
-Coverage coverage(u32 width, u32 height, u32 shift, u64 samples, const Draw& draw, const std::vector<double>& sigma, int repeats) {
+/// Films of `width` × `height` pixels of mean 1 whose pixels' samples are independent draws of variance
+/// sigma².
+Coverage coverage(u32 width, u32 height, u32 shift, u64 samples, const Draw& draw,
+                  const std::vector<double>& sigma, int repeats) {
     std::mt19937_64 random(21);
     double expected = 0;
-    for (const double s : sigma) expected += s * s / static_cast<double>(samples) / static_cast<double>(sigma.size());
+    for (const double s : sigma)
+        expected += s * s / static_cast<double>(samples) / static_cast<double>(sigma.size());
     Coverage c;
     for (int i = 0; i < repeats; ++i) {
         Film film(shapeFor(width, height, shift));
         double squares = 0;
         for (std::size_t p = 0; p < sigma.size(); ++p) {
             for (u64 s = 0; s < samples; ++s) addSample(film, p, s, draw(random, p));
-            const double error = film.sum(static_cast<u32>(p % width), static_cast<u32>(p / width), 1) / static_cast<double>(samples) - 1;
+            const double error = film.sum(static_cast<u32>(p % width), static_cast<u32>(p / width), 1) /
+                                     static_cast<double>(samples) -
+                                 1;
             squares += error * error / static_cast<double>(sigma.size());
         }
         film.counts.assign(sigma.size(), samples);
@@ -202,10 +216,14 @@ Coverage coverage(u32 width, u32 height, u32 shift, u64 samples, const Draw& dra
 
 TEST_CASE("intervals of normal noise cover what they promise", "[error]") {
     std::normal_distribution<double> normal;
-    const auto [width, height, shift, repeats] = GENERATE(table<u32, u32, u32, int>({{1, 1, 4, 4000}, {6, 8, 4, 2000}, {32, 32, 1, 1000}}));
+    const auto [width, height, shift, repeats] =
+        GENERATE(table<u32, u32, u32, int>({{1, 1, 4, 4000}, {6, 8, 4, 2000}, {32, 32, 1, 1000}}));
     const std::vector<double> sigma(std::size_t{width} * height, 0.1);
-    const Coverage c = coverage(width, height, shift, 32, [&](std::mt19937_64& r, std::size_t) { return 1 + 0.1 * normal(r); }, sigma, repeats);
-    INFO(width << " x " << height << ": mean " << c.mean << ", rmse " << c.rmse << ", half-width " << c.half_width << " of " << repeats);
+    const Coverage c = coverage(
+        width, height, shift, 32, [&](std::mt19937_64& r, std::size_t) { return 1 + 0.1 * normal(r); },
+        sigma, repeats);
+    INFO(width << " x " << height << ": mean " << c.mean << ", rmse " << c.rmse << ", half-width "
+               << c.half_width << " of " << repeats);
     CHECK(c.known == repeats);
     CHECK(consistent(c.mean, repeats, 0.95));
     CHECK(c.rmse > 0.93 * repeats);
@@ -242,7 +260,8 @@ TEST_CASE("an image whose light few paths carry does not know its error yet", "[
     CHECK_FALSE(reachesTarget(film, 1e9));
 }
 
-// Found by fuzzing: the squares of variances left the range of doubles, and the degrees of freedom were no number.
+// Found by fuzzing: the squares of variances left the range of doubles, and the degrees of freedom were no
+// number.
 TEST_CASE("the relative error does not depend on the unit of radiance", "[error]") {
     std::mt19937_64 random(5);
     const u32 shift = GENERATE(1u, 4u);
@@ -284,7 +303,8 @@ TEST_CASE("a forecast is an interval, from 1/N at its lower end to 1/sqrt N at i
 }
 
 TEST_CASE("no forecast jumps by more than its interval while an image converges", "[error]") {
-    // Noise of independent samples, which is the slowest that is forecast: each forecast must meet all that come after it.
+    // Noise of independent samples, which is the slowest that is forecast: each forecast must meet all that
+    // come after it.
     std::mt19937_64 random(12);
     std::exponential_distribution<double> waiting;
     Film film(shapeFor(32, 32, 1));
@@ -318,19 +338,24 @@ TEST_CASE("target checks are at powers of two, after a million paths", "[error]"
     CHECK(nextTargetCheck(0, 1) == kMillion);
 }
 
-TEST_CASE("who stops when the target is reached has reached it, also where luck could stop early", "[error]") {
+TEST_CASE("who stops when the target is reached has reached it, also where luck could stop early",
+          "[error]") {
     // One pixel with sixteen replicates: looked at at every power of two, it must not stop at the luckiest.
     std::mt19937_64 random(7);
     constexpr double kTruth = 1.0, kTarget = 0.01;
     constexpr int kRepeats = 2000;
     int missed = 0, by_far = 0;
     for (int i = 0; i < kRepeats; ++i) {
-        const double sigma = 0.3 * std::pow(0.8 / 0.3, static_cast<double>(i) / kRepeats);  // 3,500 to 25,000 independent samples would do.
+        const double sigma =
+            0.3 * std::pow(0.8 / 0.3, static_cast<double>(i) /
+                                          kRepeats);  // 3,500 to 25,000 independent samples would do.
         Film film(shapeFor(1, 1, 4));
         std::normal_distribution<double> normal;
         for (std::uint64_t check = 64; film.samples.count() < check; check *= 2) {
-            const double each = static_cast<double>(check - film.samples.count()) / 16;  // Of a replicate, together; Y² is not looked at.
-            for (u64 r = 0; r < 16; ++r) addSample(film, 0, r, each * kTruth + std::sqrt(each) * sigma * normal(random));
+            const double each = static_cast<double>(check - film.samples.count()) /
+                                16;  // Of a replicate, together; Y² is not looked at.
+            for (u64 r = 0; r < 16; ++r)
+                addSample(film, 0, r, each * kTruth + std::sqrt(each) * sigma * normal(random));
             film.counts[0] = check;
             film.samples.add({film.samples.count(), check});
             if (reachesTarget(film, kTarget)) break;
@@ -339,7 +364,8 @@ TEST_CASE("who stops when the target is reached has reached it, also where luck 
         missed += error > kTarget;
         by_far += error > 2 * kTarget;
     }
-    INFO(missed << " of " << kRepeats << " images that stopped are worse than they say, " << by_far << " by far");
+    INFO(missed << " of " << kRepeats << " images that stopped are worse than they say, " << by_far
+                << " by far");
     CHECK(missed <= 0.06 * kRepeats);
     CHECK(by_far <= 8);
     CHECK(reachesTarget(noisyFilm({1.0}, {1e-6}, 64, random), kTarget));
@@ -352,7 +378,8 @@ TEST_CASE("odd pixels veto what even ones would have stopped at", "[error]") {
     std::normal_distribution<double> normal;
     for (u32 y = 0; y < 32; ++y)
         for (u32 x = 0; x < 32; ++x)
-            for (u64 s = 0; s < 64; ++s) addSample(film, y * 32 + x, s, 1 + ((x + y) % 2 == 0 ? 1e-3 : 0.3) * normal(random));
+            for (u64 s = 0; s < 64; ++s)
+                addSample(film, y * 32 + x, s, 1 + ((x + y) % 2 == 0 ? 1e-3 : 0.3) * normal(random));
     film.counts.assign(32 * 32, 64);
     film.samples.add({0, 64});
     const auto half_width = [&](PixelSet which) { return estimateError(film, which)->half_width_95; };
@@ -388,7 +415,8 @@ TEST_CASE("each replicate is a scrambled Sobol sequence, and no two are alike", 
     for (u32 r = 0; r < 1u << kShift; ++r) {
         std::vector<std::uint32_t> strata_x(kPoints), strata_y(kPoints), order;
         for (u64 i = 0; i < kPoints; ++i) {
-            kernel::CrtSampler s = kernel::crt_sampler_begin(CRT_SAMPLER_SOBOL, kShift, kernel::crt_seed(7, 0), 3, (i << kShift) + r);
+            kernel::CrtSampler s = kernel::crt_sampler_begin(CRT_SAMPLER_SOBOL, kShift,
+                                                             kernel::crt_seed(7, 0), 3, (i << kShift) + r);
             const kernel::CrtRandom2 u = kernel::crt_sample_2d(&s, kDimension);
             ++strata_x[static_cast<std::size_t>(u.x * kPoints)];
             ++strata_y[static_cast<std::size_t>(u.y * kPoints)];
@@ -401,18 +429,22 @@ TEST_CASE("each replicate is a scrambled Sobol sequence, and no two are alike", 
     }
 }
 
-TEST_CASE("replicates are independent: their means scatter as the variance of one says", "[error][sampler]") {
-    // Mean of a smooth function over 64 points of each replicate. If replicates were stratified against each other, the mean of all would scatter less
-    // than the spread between them claims; if they shared numbers, more.
+TEST_CASE("replicates are independent: their means scatter as the variance of one says",
+          "[error][sampler]") {
+    // Mean of a smooth function over 64 points of each replicate. If replicates were stratified against each
+    // other, the mean of all would scatter less than the spread between them claims; if they shared numbers,
+    // more.
     double claimed = 0, squares = 0;
     constexpr int kPixels = 600;
     constexpr u32 kShift = 4, kReplicates = 1u << kShift, kPoints = 64;
     for (u32 pixel = 0; pixel < kPixels; ++pixel) {
         std::array<double, kReplicates> means{};
         for (u64 s = 0; s < kPoints * kReplicates; ++s) {
-            kernel::CrtSampler sampler = kernel::crt_sampler_begin(CRT_SAMPLER_SOBOL, kShift, kernel::crt_seed(1, 0), pixel, s);
+            kernel::CrtSampler sampler =
+                kernel::crt_sampler_begin(CRT_SAMPLER_SOBOL, kShift, kernel::crt_seed(1, 0), pixel, s);
             const kernel::CrtRandom2 u = kernel::crt_sample_2d(&sampler, 4);
-            means[kernel::crt_replicate(s, kShift)] += static_cast<double>(u.x) * static_cast<double>(u.y) / kPoints;
+            means[kernel::crt_replicate(s, kShift)] +=
+                static_cast<double>(u.x) * static_cast<double>(u.y) / kPoints;
         }
         const stats::Summary summary = stats::summarize(means);
         claimed += summary.variance / kReplicates / kPixels;

@@ -1,11 +1,11 @@
 // `crt compare` on pairs of images whose difference is known: alarms where there is none, and planted errors
 // that must be found.
+#include "base/statistics.h"
 #include "catch.h"
-#include "judge/compare/compare_noise.h"
 #include "image/image_metadata.h"
+#include "judge/compare/compare_noise.h"
 #include "judge/stats/image_tests.h"
 #include "judge/stats/pooled_tests.h"
-#include "base/statistics.h"
 #include "synthetic_noise.h"
 
 #include <algorithm>
@@ -187,7 +187,8 @@ TEST_CASE("(a table) power of compare", "[.][false-alarm-table]") {
 TEST_CASE("backends that render the same do not fail, whatever the noise and however few the replicates",
           "[false-alarms]") {
     constexpr int kRepeats = 60;
-    for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies, Noise::Coverage})
+    for (const Noise noise :
+         {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies, Noise::Coverage})
         for (const bool equal : {true, false})
             for (const int renders : {2, 4, 16}) {
                 synthetic::Maker maker(3);
@@ -220,8 +221,10 @@ TEST_CASE("backends that render the same do not fail, whatever the noise and how
 }
 
 TEST_CASE("a pixel whose replicates agree exactly by chance is no alarm", "[false-alarms]") {
-    // Coins: eight replicates of one sample each agree in one pixel of 128, and B knows the pixel much better.
-    const Alarms alarms = countAlarms({Noise::Coverage, false, 8, noiseOf(Noise::Coverage), 64, 64}, 60, {}, 16);
+    // Coins: eight replicates of one sample each agree in one pixel of 128, and B knows the pixel much
+    // better.
+    const Alarms alarms =
+        countAlarms({Noise::Coverage, false, 8, noiseOf(Noise::Coverage), 64, 64}, 60, {}, 16);
     CHECK(alarms.pixels[0] < tooMany(60, 0.05));
     CHECK(alarms.pixels[1] < tooMany(60, 0.001));
 }

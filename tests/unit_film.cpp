@@ -1,12 +1,12 @@
 // Film: sums that do not show their order, ranges that never count twice, and what they resolve to.
+#include "base/statistics.h"
 #include "catch.h"
-#include "film/resolve.h"
 #include "film/error_estimate.h"
 #include "film/film.h"
+#include "film/luminance_error.h"
+#include "film/resolve.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
-#include "film/luminance_error.h"
-#include "base/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -83,8 +83,9 @@ TEST_CASE("sample ranges stay sorted, merged and disjoint", "[film]") {
 
 TEST_CASE("overlapping sample ranges are refused and change nothing", "[film]") {
     SampleRanges ranges({{10, 20}, {30, 40}});
-    for (const SampleRange& bad : {SampleRange{19, 21}, SampleRange{0, 11}, SampleRange{12, 13}, SampleRange{0, 100}, SampleRange{20, 31},
-                                  SampleRange{10, 20}, SampleRange{39, 45}}) {
+    for (const SampleRange& bad :
+         {SampleRange{19, 21}, SampleRange{0, 11}, SampleRange{12, 13}, SampleRange{0, 100},
+          SampleRange{20, 31}, SampleRange{10, 20}, SampleRange{39, 45}}) {
         INFO(bad.first << " " << bad.second);
         CHECK_THROWS_AS(ranges.add(bad), Error);
         CHECK(ranges.text() == "10-20;30-40");
@@ -179,7 +180,8 @@ TEST_CASE("a film refuses a channel count that its AOVs do not explain", "[film]
     CHECK(Film({3, 2, 4, kAovSquares}).primitives.empty());
 }
 
-TEST_CASE("primitive ids come from the film with the lower first sample, whoever is added to whom", "[film]") {
+TEST_CASE("primitive ids come from the film with the lower first sample, whoever is added to whom",
+          "[film]") {
     const FilmShape shape{1, 1, 4, kAovSquares | kAovPrimitive};
     Film early(shape), late(shape);
     early.primitives[0] = 11;
@@ -228,7 +230,8 @@ TEST_CASE("the variance of the mean is the textbook one", "[film]") {
     for (const float v : values) squares += (v - mean) * (v - mean);
     const double expected = static_cast<double>(squares / (n - 1) / n);
     CHECK(LuminanceVariance(film)(0, 0) == Approx(expected).epsilon(1e-9));
-    CHECK(estimateError(film)->relative_rmse == Approx(std::sqrt(expected) / static_cast<double>(mean)).epsilon(1e-9));
+    CHECK(estimateError(film)->relative_rmse ==
+          Approx(std::sqrt(expected) / static_cast<double>(mean)).epsilon(1e-9));
 }
 
 TEST_CASE("nothing is claimed about an error that is not known", "[film]") {
@@ -306,7 +309,8 @@ TEST_CASE(
             // The same by resolving every sample as an image of its own.
             std::vector<double> luminances;
             for (const double b : brightness) {
-                const Image one = resolveImage(filmOf({color[0] * b, color[1] * b, color[2] * b}), developmentOf(scene), 0);
+                const Image one = resolveImage(filmOf({color[0] * b, color[1] * b, color[2] * b}),
+                                               developmentOf(scene), 0);
                 luminances.push_back(
                     stats::luminance({one.pixels[0], one.pixels[1], one.pixels[2]}, weights));
             }
@@ -357,8 +361,8 @@ TEST_CASE("AOV planes carry their names, types and values", "[film]") {
     scene.film.exposure_ev = 1;
 
     const Image image = resolveImage(film, developmentOf(scene), in_film | kAovVariance | kAovSamples);
-    REQUIRE(image.channels == std::vector<std::string>{"R", "G", "B", "Albedo.R", "Albedo.G", "Albedo.B", "Ns.X", "Ns.Y", "Ns.Z", "Z",
-                                                       "Variance.Y"});
+    REQUIRE(image.channels == std::vector<std::string>{"R", "G", "B", "Albedo.R", "Albedo.G", "Albedo.B",
+                                                       "Ns.X", "Ns.Y", "Ns.Z", "Z", "Variance.Y"});
     REQUIRE(image.integer_channels == std::vector<std::string>{"id.primitive", "sampleCount"});
     // A perfect white has albedo 1 whatever the exposure; the rest is as it lies in the film.
     for (int c = 3; c < 6; ++c) CHECK(image.pixels[c] == Approx(1.0).margin(2e-7));

@@ -1,4 +1,5 @@
-// Fits of convergence against renders whose variance, bias and cost are known: intervals must cover the truth as often as they say.
+// Fits of convergence against renders whose variance, bias and cost are known: intervals must cover the
+// truth as often as they say.
 #include "catch.h"
 #include "judge/converge/fits.h"
 #include "synthetic_run.h"
@@ -12,7 +13,9 @@ using namespace crt::converge;
 
 namespace {
 
-bool covers(const Estimate& estimate, double truth) { return estimate.low <= truth && truth <= estimate.high; }
+bool covers(const Estimate& estimate, double truth) {
+    return estimate.low <= truth && truth <= estimate.high;
+}
 
 ConfigurationFit fitOf(const SyntheticRender& what, std::uint64_t seed, const FitOptions& options = {}) {
     return analyze(syntheticRun(what, seed), options).fits.at(0);
@@ -22,14 +25,17 @@ ConfigurationFit fitOf(const SyntheticRender& what, std::uint64_t seed, const Fi
 struct Coverage {
     int repeats = 0;
     std::map<std::string, int> covered;
-    void count(const std::string& name, const Estimate& estimate, double truth) { covered[name] += covers(estimate, truth) ? 1 : 0; }
+    void count(const std::string& name, const Estimate& estimate, double truth) {
+        covered[name] += covers(estimate, truth) ? 1 : 0;
+    }
     double of(const std::string& name) const { return static_cast<double>(covered.at(name)) / repeats; }
 };
 
 Coverage coverageOf(const SyntheticRender& what, int repeats) {
     Coverage coverage;
     coverage.repeats = repeats;
-    const double v = what.variance, c = what.seconds_per_sample, bias_squared = what.bias * what.bias + what.mean_bias * what.mean_bias;
+    const double v = what.variance, c = what.seconds_per_sample,
+                 bias_squared = what.bias * what.bias + what.mean_bias * what.mean_bias;
     for (int i = 0; i < repeats; ++i) {
         const ConfigurationFit fit = fitOf(what, 1000 + static_cast<std::uint64_t>(i) * 100);
         coverage.count("variance", fit.error.variance, v);
@@ -46,7 +52,9 @@ Coverage coverageOf(const SyntheticRender& what, int repeats) {
         if (middle.mean_bias) coverage.count("mean bias", *middle.mean_bias, what.mean_bias);
         if (middle.bias_squared) coverage.count("bias squared at 64", *middle.bias_squared, bias_squared);
         const Target& target = fit.targets.at(0);
-        if (target.samples) coverage.count("samples to target", *target.samples, v / (target.relative_rmse * target.relative_rmse - bias_squared));
+        if (target.samples)
+            coverage.count("samples to target", *target.samples,
+                           v / (target.relative_rmse * target.relative_rmse - bias_squared));
         coverage.count("slope", fit.slope_samples, -0.5);
         coverage.count("slope in time", fit.slope_seconds, -0.5);
     }
@@ -60,20 +68,23 @@ TEST_CASE("intervals of an unbiased render cover the truth in 95 of 100 repeats"
     SyntheticRender what;
     what.variance = 0.02;  // 1 % at 200 samples, within what is measured.
     const Coverage coverage = coverageOf(what, 600);
-    for (const char* name : {"variance", "intercept", "launch", "per sample", "efficiency", "rmse", "seconds", "efficiency at 64", "mean bias",
-                             "samples to target", "slope", "slope in time"}) {
+    for (const char* name :
+         {"variance", "intercept", "launch", "per sample", "efficiency", "rmse", "seconds",
+          "efficiency at 64", "mean bias", "samples to target", "slope", "slope in time"}) {
         INFO(name << ": " << coverage.of(name));
         CHECK(coverage.of(name) > 0.923);
         CHECK(coverage.of(name) < 0.977);
     }
-    // A product of two independent estimates of nothing: the jackknife is too careful there (Efron and Stein 1981), never too bold.
+    // A product of two independent estimates of nothing: the jackknife is too careful there (Efron and Stein
+    // 1981), never too bold.
     for (const char* name : {"bias squared", "bias squared at 64"}) {
         INFO(name << ": " << coverage.of(name));
         CHECK(coverage.of(name) > 0.95);
     }
 }
 
-TEST_CASE("intervals of very many replicates are those of fewer, narrower by the root of their number", "[fits]") {
+TEST_CASE("intervals of very many replicates are those of fewer, narrower by the root of their number",
+          "[fits]") {
     SyntheticRender what;
     what.looks = 4;
     what.pixels = 4;
@@ -83,11 +94,14 @@ TEST_CASE("intervals of very many replicates are those of fewer, narrower by the
         return variance.high / variance.low - 1;
     };
     double ratio = 0;
-    for (std::uint64_t seed = 0; seed < 4; ++seed) ratio += 0.25 * widthOfVariance(240, 10000 * seed) / widthOfVariance(960, 10000 * seed + 5000);
-    CHECK(ratio == Approx(2).epsilon(0.15));  // A spread estimated with 240 or more degrees of freedom errs by 4.6 % at most, of four by 3.3 %.
+    for (std::uint64_t seed = 0; seed < 4; ++seed)
+        ratio += 0.25 * widthOfVariance(240, 10000 * seed) / widthOfVariance(960, 10000 * seed + 5000);
+    CHECK(ratio == Approx(2).epsilon(0.15));  // A spread estimated with 240 or more degrees of freedom errs
+                                              // by 4.6 % at most, of four by 3.3 %.
 }
 
-// The closed forms that crt converge is held to have one pixel. Where its mean happens to be right, the jackknife alone is sure of a b² below 0: it covers 87 %.
+// The closed forms that crt converge is held to have one pixel. Where its mean happens to be right, the
+// jackknife alone is sure of a b² below 0: it covers 87 %.
 TEST_CASE("the interval of the bias of a single pixel holds 0 where there is none", "[fits]") {
     SyntheticRender what;
     what.variance = 0.02;
@@ -97,7 +111,8 @@ TEST_CASE("the interval of the bias of a single pixel holds 0 where there is non
         INFO(name << ": " << coverage.of(name));
         CHECK(coverage.of(name) > 0.95);
     }
-    what.mean_bias = 0.02;  // 18 standard errors of the mean at 1024 samples and 16 replicates; b² is seen from some nine on.
+    what.mean_bias = 0.02;  // 18 standard errors of the mean at 1024 samples and 16 replicates; b² is seen
+                            // from some nine on.
     CHECK(fitOf(what, 3).error.flattening);
 }
 
@@ -139,7 +154,8 @@ TEST_CASE("the slope of independent samples is -0.5", "[fits]") {
     }
 }
 
-TEST_CASE("Sobol's slope is recovered, its fit to 1/N flagged, and its bias floor still contains 0", "[fits]") {
+TEST_CASE("Sobol's slope is recovered, its fit to 1/N flagged, and its bias floor still contains 0",
+          "[fits]") {
     SyntheticRender what;
     what.rate = 1.4;
     what.pixels = 512;
@@ -150,7 +166,8 @@ TEST_CASE("Sobol's slope is recovered, its fit to 1/N flagged, and its bias floo
     CHECK_FALSE(fit.error.flattening);
 }
 
-TEST_CASE("flattening is flagged when error stops falling, with and without the variance between replicates", "[fits]") {
+TEST_CASE("flattening is flagged when error stops falling, with and without the variance between replicates",
+          "[fits]") {
     SyntheticRender what;
     what.bias = 0.05;
     Run run = syntheticRun(what, 6);
@@ -198,7 +215,8 @@ TEST_CASE("the noise of the reference is subtracted", "[fits]") {
     CHECK(fit.slope_samples.value == Approx(-0.5).margin(0.03));
 }
 
-TEST_CASE("calibration is the ratio of predicted to actual error, and counts intervals that hold", "[fits]") {
+TEST_CASE("calibration is the ratio of predicted to actual error, and counts intervals that hold",
+          "[fits]") {
     SyntheticRender what;
     what.prediction = 1;
     const Point good = fitOf(what, 9).points.at(5);

@@ -1,8 +1,8 @@
 // Image files: bytes of the simple formats, everything an EXR has to keep, and what is refused.
-#include "catch.h"
 #include "base/error.h"
-#include "image/image_io.h"
 #include "base/log.h"
+#include "catch.h"
+#include "image/image_io.h"
 #include "judge/verify/temporary_folder.h"
 
 #include <cmath>
@@ -24,7 +24,9 @@ std::string slurp(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
 }
-void spit(const std::string& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
+void spit(const std::string& path, const std::string& bytes) {
+    std::ofstream(path, std::ios::binary) << bytes;
+}
 
 std::string floatBytes(const std::vector<float>& values) {
     return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float)};
@@ -44,16 +46,25 @@ Image fullImage() {
     Image image;
     image.width = 2;
     image.height = 2;
-    image.channels = {"R", "G", "B", "Albedo.R", "Albedo.G", "Albedo.B", "Ns.X", "Ns.Y", "Ns.Z", "Z", "Variance.Y"};
-    for (std::size_t i = 0; i < 4 * image.channels.size(); ++i) image.pixels.push_back(0.1f * static_cast<float>(i) - 0.7f);
+    image.channels = {"R",    "G",    "B",    "Albedo.R", "Albedo.G",  "Albedo.B",
+                      "Ns.X", "Ns.Y", "Ns.Z", "Z",        "Variance.Y"};
+    for (std::size_t i = 0; i < 4 * image.channels.size(); ++i)
+        image.pixels.push_back(0.1f * static_cast<float>(i) - 0.7f);
     image.pixels[0] = 1e30f;  // Beyond half.
     image.pixels[1] = std::numeric_limits<float>::denorm_min();
     image.integer_channels = {"id.primitive", "sampleCount"};
     image.integers = {0xffffffffu, 16, 0, 4000000001u, 16777217, 1, 7, 1024};
-    image.metadata = {{"Software", "crt 0.1.0"},      {"crt/version", "0.1.0"},     {"crt/backend", "embree 0.1.0"},
-                      {"crt/device", "A CPU (8 threads)"}, {"crt/spp", "64"},       {"crt/seed", "18446744073709551615"},
-                      {"crt/sceneHash", "0123456789abcdef0123456789abcdef"},        {"crt/sampleRanges", "0-32;64-96"},
-                      {"DateTime", "2026:11:20 10:00:00"}, {"renderTimeSeconds", "12.5"}, {"samplesPerPixel", "64"},
+    image.metadata = {{"Software", "crt 0.1.0"},
+                      {"crt/version", "0.1.0"},
+                      {"crt/backend", "embree 0.1.0"},
+                      {"crt/device", "A CPU (8 threads)"},
+                      {"crt/spp", "64"},
+                      {"crt/seed", "18446744073709551615"},
+                      {"crt/sceneHash", "0123456789abcdef0123456789abcdef"},
+                      {"crt/sampleRanges", "0-32;64-96"},
+                      {"DateTime", "2026:11:20 10:00:00"},
+                      {"renderTimeSeconds", "12.5"},
+                      {"samplesPerPixel", "64"},
                       {"colorInteropID", "lin_ap1_scene"}};
     image.chromaticities = chromaticities(ColorSpace::AcesCg);
     return image;
@@ -104,7 +115,8 @@ TEST_CASE("a PFM is its header and little-endian floats, bottom row first", "[im
     CHECK(readImage(path).pixels == std::vector<float>{1, 2, 3, 4, 5, 6});
 
     // Infinities and NaN pass unchanged; the float format has a place for them.
-    writeImage(path, OutputFormat::Pfm, rgbImage(1, 1, {std::numeric_limits<float>::infinity(), -0.0f, std::nanf("")}));
+    writeImage(path, OutputFormat::Pfm,
+               rgbImage(1, 1, {std::numeric_limits<float>::infinity(), -0.0f, std::nanf("")}));
     CHECK(std::isinf(readImage(path).pixels[0]));
     CHECK(std::signbit(readImage(path).pixels[1]));
     CHECK(std::isnan(readImage(path).pixels[2]));
@@ -159,7 +171,8 @@ TEST_CASE("8-bit images of other colour spaces are converted to sRGB", "[image_i
     // srgb → XYZ by columns of the published matrix's inverse: solve with the forward one, by Cramer's rule.
     const Matrix3d m = xyzToRgb(ColorSpace::LinearSrgb);
     const auto determinant = [](const Matrix3d& a) {
-        return a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) - a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
+        return a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
+               a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
                a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
     };
     Vec3d xyz{};
@@ -170,13 +183,15 @@ TEST_CASE("8-bit images of other colour spaces are converted to sRGB", "[image_i
     }
     for (const ColorSpace space : {ColorSpace::Xyz, ColorSpace::AcesCg}) {
         const Vec3d v = multiply(xyzToRgb(space), xyz);
-        Image image = rgbImage(1, 1, {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])});
+        Image image =
+            rgbImage(1, 1, {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])});
         image.chromaticities = chromaticities(space);
         CHECK(encodeSrgb8(image).rgb == expected.rgb);
     }
     // The white of D65 is white.
     const Vec3d d65 = d65WhiteXyz();
-    Image white = rgbImage(1, 1, {static_cast<float>(d65[0]), static_cast<float>(d65[1]), static_cast<float>(d65[2])});
+    Image white =
+        rgbImage(1, 1, {static_cast<float>(d65[0]), static_cast<float>(d65[1]), static_cast<float>(d65[2])});
     white.chromaticities = chromaticities(ColorSpace::Xyz);
     const EncodedImage encoded = encodeSrgb8(white);
     CHECK(encoded.rgb == std::vector<std::uint8_t>{255, 255, 255});
@@ -202,15 +217,18 @@ TEST_CASE("an EXR keeps every plane, type, number and word", "[image_io]") {
         INFO(image.channels[c]);
         REQUIRE(found != back.channels.end());
         for (std::size_t p = 0; p < 4; ++p)
-            CHECK(back.pixels[p * back.channels.size() + static_cast<std::size_t>(found - back.channels.begin())] ==
+            CHECK(back.pixels[p * back.channels.size() +
+                              static_cast<std::size_t>(found - back.channels.begin())] ==
                   image.pixels[p * image.channels.size() + c]);
     }
     for (std::size_t c = 0; c < image.integer_channels.size(); ++c) {
-        const auto found = std::find(back.integer_channels.begin(), back.integer_channels.end(), image.integer_channels[c]);
+        const auto found =
+            std::find(back.integer_channels.begin(), back.integer_channels.end(), image.integer_channels[c]);
         INFO(image.integer_channels[c]);
         REQUIRE(found != back.integer_channels.end());
         for (std::size_t p = 0; p < 4; ++p)
-            CHECK(back.integers[p * 2 + static_cast<std::size_t>(found - back.integer_channels.begin())] == image.integers[p * 2 + c]);
+            CHECK(back.integers[p * 2 + static_cast<std::size_t>(found - back.integer_channels.begin())] ==
+                  image.integers[p * 2 + c]);
     }
     for (const auto& [name, value] : image.metadata) {
         INFO(name);
@@ -282,7 +300,8 @@ TEST_CASE("damaged images are refused with a sentence", "[image_io]") {
     refused("P6\n4 4\n70000\nxx", "65535");
     refused("P6", "width");
     refused("this is text, not an image", "");
-    CHECK_THROWS_WITH(readImage(directory / "absent.pfm"), Contains("absent.pfm") && Contains("No such file"));
+    CHECK_THROWS_WITH(readImage(directory / "absent.pfm"),
+                      Contains("absent.pfm") && Contains("No such file"));
     CHECK_THROWS_WITH(readImage(directory.path()), Contains("is a directory"));
 
     const std::string exr = directory / "image.exr";
@@ -292,7 +311,8 @@ TEST_CASE("damaged images are refused with a sentence", "[image_io]") {
     refused(whole.substr(0, 100), "");
 }
 
-// Found by fuzzing. A file of no known format went through all of OpenImageIO's readers; a header could ask for any amount of memory.
+// Found by fuzzing. A file of no known format went through all of OpenImageIO's readers; a header could ask
+// for any amount of memory.
 TEST_CASE("files of other formats and headers beyond the file's size are refused", "[image_io]") {
     const TemporaryFolder directory;
     const std::string path = directory / "image";
@@ -307,7 +327,8 @@ TEST_CASE("files of other formats and headers beyond the file's size are refused
     spit(path, std::string("\x76\x2f\x31\x01\x02\0\0\0note\0string\0\xff\xff\xff\x7fx", 25));
     CHECK_THROWS_WITH(readImage(path), Contains("attribute 'note' goes beyond the end"));
 
-    // One of a known type that is shorter than the type: OpenEXR would go on reading in the middle of the next.
+    // One of a known type that is shorter than the type: OpenEXR would go on reading in the middle of the
+    // next.
     spit(path, std::string("\x76\x2f\x31\x01\x02\0\0\0w\0box2i\0\x05\0\0\0.....", 25));
     CHECK_THROWS_WITH(readImage(path), Contains("'w' has 5 bytes and its type, box2i, takes 16"));
 
@@ -317,12 +338,15 @@ TEST_CASE("files of other formats and headers beyond the file's size are refused
 
     // A Radiance HDR header and eight bytes of one of its 65535 x 65535 pixels.
     spit(path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 65535 +X 65535\n12345678");
-    CHECK_THROWS_WITH(readImage(path), Contains("65535 x 65535") && Contains("more than a file of its size can hold"));
+    CHECK_THROWS_WITH(readImage(path),
+                      Contains("65535 x 65535") && Contains("more than a file of its size can hold"));
 
-    // One row that is so long that OpenImageIO, which reads rows by 64, would allocate 4 GiB; and one that is not.
+    // One row that is so long that OpenImageIO, which reads rows by 64, would allocate 4 GiB; and one that
+    // is not.
     Image row = rgbImage(6'000'000, 1, std::vector<float>(18'000'000, 0.5f));
     writeImage(path + ".exr", OutputFormat::Exr, row);
-    CHECK_THROWS_WITH(readImage(path + ".exr"), Contains("its rows of 6000000 pixels are longer than can be read"));
+    CHECK_THROWS_WITH(readImage(path + ".exr"),
+                      Contains("its rows of 6000000 pixels are longer than can be read"));
     row = rgbImage(65'535, 1, std::vector<float>(3 * 65'535, 0.5f));
     writeImage(path + ".exr", OutputFormat::Exr, row);
     CHECK(readImage(path + ".exr").width == 65'535);
@@ -330,7 +354,8 @@ TEST_CASE("files of other formats and headers beyond the file's size are refused
 
 TEST_CASE("an image that lacks what it must have is refused", "[image_io]") {
     const TemporaryFolder directory;
-    for (const OutputFormat format : {OutputFormat::Exr, OutputFormat::Png, OutputFormat::Ppm, OutputFormat::Pfm}) {
+    for (const OutputFormat format :
+         {OutputFormat::Exr, OutputFormat::Png, OutputFormat::Ppm, OutputFormat::Pfm}) {
         Image grey = rgbImage(1, 1, {1, 1, 1});
         grey.channels = {"X", "Y", "Z"};
         CHECK_THROWS_AS(writeImage(directory / "image", format, grey), Error);
@@ -347,8 +372,10 @@ TEST_CASE("a folder that a command fills is made, and none above it", "[image_io
         makeOutputFolder(directory / name);
         CHECK(fs::is_directory(directory / name));
     }
-    CHECK_THROWS_WITH(makeOutputFolder(directory / "one/two"), Contains("one/two") && Contains("no folder '" + (directory / "one") + "'"));
-    CHECK_THROWS_WITH(makeOutputFolder(directory / "one/two/"), Contains("no folder '" + (directory / "one") + "'"));
+    CHECK_THROWS_WITH(makeOutputFolder(directory / "one/two"),
+                      Contains("one/two") && Contains("no folder '" + (directory / "one") + "'"));
+    CHECK_THROWS_WITH(makeOutputFolder(directory / "one/two/"),
+                      Contains("no folder '" + (directory / "one") + "'"));
     CHECK_FALSE(fs::exists(directory / "one"));
     spit(directory / "file", "x");
     CHECK_THROWS_WITH(makeOutputFolder(directory / "file"), Contains("there is a file of this name"));
@@ -366,9 +393,12 @@ TEST_CASE("unwritable outputs are found before anything is rendered", "[image_io
     // No folder is made: it may be a typing error.
     fs::create_directory(directory / "out");
     CHECK_NOTHROW(checkWritable(directory / "out/image.exr"));
-    CHECK_THROWS_WITH(checkWritable(directory / "oit/image.exr"), Contains("no folder '" + (directory / "oit") + "'") && Contains("did you mean 'out'?"));
+    CHECK_THROWS_WITH(
+        checkWritable(directory / "oit/image.exr"),
+        Contains("no folder '" + (directory / "oit") + "'") && Contains("did you mean 'out'?"));
     CHECK_THROWS_WITH(checkWritable(directory / "one/two/image.exr"),
-                      Contains("no folder '" + (directory / "one") + "'") && Contains("mkdir -p '" + (directory / "one/two") + "'"));
+                      Contains("no folder '" + (directory / "one") + "'") &&
+                          Contains("mkdir -p '" + (directory / "one/two") + "'"));
     CHECK_FALSE(fs::exists(directory / "oit"));
     CHECK_FALSE(fs::exists(directory / "one"));
     CHECK(fs::is_empty(directory / "out"));
@@ -407,7 +437,9 @@ TEST_CASE("files get the permissions that the umask says", "[image_io]") {
     CHECK((status.st_mode & 0777) == 0640);
 }
 
-TEST_CASE("PFM and PPM load no image library", "[image_io]") { CHECK(runAlone(thisProgram(), "[image-io-alone]")); }
+TEST_CASE("PFM and PPM load no image library", "[image_io]") {
+    CHECK(runAlone(thisProgram(), "[image-io-alone]"));
+}
 
 TEST_CASE("(in a process of its own) PFM and PPM load no image library", "[.][image-io-alone]") {
     const TemporaryFolder directory;
@@ -422,7 +454,8 @@ TEST_CASE("(in a process of its own) PFM and PPM load no image library", "[.][im
 }
 
 TEST_CASE("without the image module EXR and PNG are refused and the rest works", "[image_io]") {
-    // The module is looked for beside the program, so a program elsewhere does not find it. A link, because the program is large.
+    // The module is looked for beside the program, so a program elsewhere does not find it. A link, because
+    // the program is large.
     const TemporaryFolder directory(fs::path(thisProgram()).parent_path());
     fs::create_directories(directory / "bin");
     const std::string program = directory / "bin/tests";
@@ -438,11 +471,13 @@ TEST_CASE("(in a process of its own) without the image module", "[.][image-io-no
             FAIL_CHECK("written");
         } catch (const Error& error) {
             CHECK(error.kind() == ErrorKind::Output);
-            CHECK_THAT(error.what(), Contains("crt_image_oiio.so") && Contains(".pfm and .ppm work without it"));
+            CHECK_THAT(error.what(),
+                       Contains("crt_image_oiio.so") && Contains(".pfm and .ppm work without it"));
         }
     }
     CHECK(directory.fileCount() == 0);
     CHECK_NOTHROW(writeImage(directory / "image.pfm", OutputFormat::Pfm, rgbImage(1, 1, {1, 1, 1})));
     spit(directory / "text", "not an image");
-    CHECK_THROWS_WITH(readImage(directory / "text"), Contains("cannot read") && Contains("crt_image_oiio.so"));
+    CHECK_THROWS_WITH(readImage(directory / "text"),
+                      Contains("cannot read") && Contains("crt_image_oiio.so"));
 }

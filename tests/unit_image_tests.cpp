@@ -1,8 +1,9 @@
-// The gate by simulation: what is equal passes, a bias in the mean, in one tile and in one pixel is found, fireflies are not judged.
+// The gate by simulation: what is equal passes, a bias in the mean, in one tile and in one pixel is found,
+// fireflies are not judged.
 #include "judge/stats/image_tests.h"
 
-#include "catch.h"
 #include "base/error.h"
+#include "catch.h"
 
 #include <cmath>
 #include <limits>
@@ -12,7 +13,8 @@ using namespace crt::stats;
 
 namespace {
 
-constexpr std::uint32_t kWidth = 20, kHeight = 12, kChannels = 3;  // Three by two tiles, those at the border smaller.
+constexpr std::uint32_t kWidth = 20, kHeight = 12,
+                        kChannels = 3;  // Three by two tiles, those at the border smaller.
 constexpr std::size_t kValues = std::size_t{kWidth} * kHeight * kChannels;
 
 class Random {
@@ -30,7 +32,8 @@ struct Bias {
     double factor = 1;
 };
 
-/// Sixteen images whose pixels have mean x + 1 and are as skewed as path tracing: sums of `paths` exponential values. Channels share their noise.
+/// Sixteen images whose pixels have mean x + 1 and are as skewed as path tracing: sums of `paths`
+/// exponential values. Channels share their noise.
 Replicates simulate(Random& random, int paths, const Bias& bias = {}) {
     Replicates replicates(kWidth, kHeight, kChannels);
     for (int r = 0; r < 16; ++r) {
@@ -40,7 +43,8 @@ Replicates simulate(Random& random, int paths, const Bias& bias = {}) {
                 double sum = 0;
                 for (int i = 0; i < paths; ++i) sum += random.exponential();
                 const bool inside = x >= bias.x0 && x < bias.x1 && y >= bias.y0 && y < bias.y1;
-                for (std::uint32_t c = 0; c < kChannels; ++c) image.push_back((x + 1) * sum / paths * (inside ? bias.factor : 1) * (c + 1));
+                for (std::uint32_t c = 0; c < kChannels; ++c)
+                    image.push_back((x + 1) * sum / paths * (inside ? bias.factor : 1) * (c + 1));
             }
         replicates.add(image);
     }
@@ -88,7 +92,8 @@ TEST_CASE("families of tests count how many they are", "[image-tests]") {
     CHECK(sidakFamily(p, 0.01).rejected == 1);
     CHECK(sidakFamily(p, 0.05).smallest_p == Approx(1 - std::pow(1 - 0.0005, 4)));
     CHECK(sidakFamily({}, 0.05).rejected == 0);
-    CHECK(std::isnan(holmFamily(std::vector<double>{0.5, std::numeric_limits<double>::quiet_NaN()}, 0.05).smallest_p));
+    CHECK(std::isnan(
+        holmFamily(std::vector<double>{0.5, std::numeric_limits<double>::quiet_NaN()}, 0.05).smallest_p));
 }
 
 TEST_CASE("what is equal passes, and raises false alarms no more often than allowed", "[image-tests]") {
@@ -105,9 +110,11 @@ TEST_CASE("what is equal passes, and raises false alarms no more often than allo
         tile_alarms += r.tiles.rejected > 0;
         pixel_alarms += r.pixels.rejected > 0;
     }
-    // alpha is 5 % a family, less for channels with common noise; four deviations of the binomial count above it.
+    // alpha is 5 % a family, less for channels with common noise; four deviations of the binomial count
+    // above it.
     const double most = repeats * 0.05 + 4 * std::sqrt(repeats * 0.05 * 0.95);
-    INFO(passes << " pass, " << fails << " fail, alarms of tiles " << tile_alarms << ", of pixels " << pixel_alarms);
+    INFO(passes << " pass, " << fails << " fail, alarms of tiles " << tile_alarms << ", of pixels "
+                << pixel_alarms);
     CHECK(tile_alarms < most);
     CHECK(pixel_alarms < most);
     CHECK(fails == Approx(tile_alarms + pixel_alarms).margin(5));
@@ -136,7 +143,8 @@ TEST_CASE("a bias of the mean, of one tile, of one pixel is found where it is", 
     CHECK(pixel.pixels.worst / kChannels == 9 * kWidth + 3);
 }
 
-TEST_CASE("too few samples are inconclusive, and so is what one value decides, and what is no number", "[image-tests]") {
+TEST_CASE("too few samples are inconclusive, and so is what one value decides, and what is no number",
+          "[image-tests]") {
     Random random(3);
     GateOptions strict;
     strict.delta = 1e-3;

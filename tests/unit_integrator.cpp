@@ -1,8 +1,8 @@
-// The C++ face of a backend, against the test double `fake`: what was rendered is what is read, and whatever goes wrong in a plugin arrives
-// as an error of the right kind.
+// The C++ face of a backend, against the test double `fake`: what was rendered is what is read, and whatever
+// goes wrong in a plugin arrives as an error of the right kind.
 #include "backend/integrator.h"
-#include "catch.h"
 #include "base/error.h"
+#include "catch.h"
 #include "fake_plugins/fake_pattern.h"
 #include "kernel/layout.h"
 
@@ -21,7 +21,9 @@ namespace {
 
 constexpr std::uint64_t kSeed = 0x1234567890ull;
 
-LoadedBackend openFake(const std::string& name) { return loadBackend(std::string(CRT_FAKE_PLUGIN_DIR "/crt_backend_") + name + ".so"); }
+LoadedBackend openFake(const std::string& name) {
+    return loadBackend(std::string(CRT_FAKE_PLUGIN_DIR "/crt_backend_") + name + ".so");
+}
 
 struct ScopedFault {
     explicit ScopedFault(const char* fault) { ::setenv("CRT_FAKE_FAULT", fault, 1); }
@@ -51,9 +53,12 @@ CompiledScene makeScene(std::uint32_t width, std::uint32_t height, std::uint32_t
     return scene;
 }
 
-Film filmOf(const CompiledScene& scene) { return Film(FilmShape{scene.width, scene.height, scene.channels, scene.aovs}); }
+Film filmOf(const CompiledScene& scene) {
+    return Film(FilmShape{scene.width, scene.height, scene.channels, scene.aovs});
+}
 
-double expected(std::uint32_t x, std::uint32_t y, std::uint32_t channel, std::uint64_t first, std::uint64_t count) {
+double expected(std::uint32_t x, std::uint32_t y, std::uint32_t channel, std::uint64_t first,
+                std::uint64_t count) {
     double sum = 0;  // exact: multiples of 2^-24
     for (std::uint64_t s = first; s < first + count; ++s) sum += fake::sampleValue(kSeed, x, y, s, channel);
     return sum;
@@ -86,7 +91,8 @@ TEST_CASE("what a backend renders arrives in the film", "[integrator]") {
         for (std::uint32_t x = 0; x < 7; ++x) {
             CHECK(film.counts[y * 7 + x] == 24);
             CHECK(film.primitives[y * 7 + x] == fake::primitiveAt(x, y));
-            for (std::uint32_t c : {0u, 1u, 2u, 3u}) CHECK(film.sum(x, y, c) == expected(x, y, c, 0, 16) + expected(x, y, c, 32, 8));
+            for (std::uint32_t c : {0u, 1u, 2u, 3u})
+                CHECK(film.sum(x, y, c) == expected(x, y, c, 0, 16) + expected(x, y, c, 32, 8));
         }
     }
     CHECK(film.invalidSamples() == 0);
@@ -111,7 +117,11 @@ TEST_CASE("any split of ranges and rectangles gives the same film", "[integrator
     Film split = filmOf(scene);
     // A film knows ranges that every pixel has.
     CHECK(kindOfFailure([&] { integrator.readFilm(split); }, "do not cover it yet") == ErrorKind::Internal);
-    CHECK(kindOfFailure([&] { integrator.render({{2, 1, 4, 3}, 4, 6}); }, "rendered twice") == ErrorKind::Usage);
+    CHECK(kindOfFailure(
+              [&] {
+                  integrator.render({{2, 1, 4, 3}, 4, 6});
+              },
+              "rendered twice") == ErrorKind::Usage);
     CHECK(kindOfFailure([&] { integrator.render({{0, 2, 3, 6}, 3, 2}); }, "overlap") == ErrorKind::Usage);
     integrator.render({{0, 2, 3, 6}, 4, 6});
     integrator.readFilm(split);
@@ -154,7 +164,8 @@ TEST_CASE("a cancelled render leaves nothing that could be read", "[integrator]"
     CHECK(std::is_sorted(seen.begin(), seen.end()));
 
     Film film = filmOf(scene);
-    CHECK(kindOfFailure([&] { integrator.readFilm(film); }, "part of a cancelled or failed range") == ErrorKind::Internal);
+    CHECK(kindOfFailure([&] { integrator.readFilm(film); }, "part of a cancelled or failed range") ==
+          ErrorKind::Internal);
     CHECK(kindOfFailure([&] { integrator.render({{}, 0, 4}); }, "without setScene") == ErrorKind::Internal);
     integrator.setScene(scene);
     CHECK(integrator.render({{}, 0, 4}));
@@ -169,7 +180,8 @@ TEST_CASE("a cancelled render leaves nothing that could be read", "[integrator]"
 TEST_CASE("an exception of the caller's own passes around the plugin", "[integrator]") {
     Integrator integrator(openFake("fake"), {});
     integrator.setScene(makeScene(4, 4));
-    CHECK_THROWS_AS(integrator.render({{}, 0, 1}, [](double) -> bool { throw std::out_of_range("mine"); }), std::out_of_range);
+    CHECK_THROWS_AS(integrator.render({{}, 0, 1}, [](double) -> bool { throw std::out_of_range("mine"); }),
+                    std::out_of_range);
 }
 
 TEST_CASE("what goes wrong in a backend arrives as an error of its kind", "[integrator]") {
@@ -179,22 +191,39 @@ TEST_CASE("what goes wrong in a backend arrives as an error of its kind", "[inte
     integrator.setScene(scene);
     {
         const ScopedFault fault("oom");
-        CHECK(kindOfFailure([&] { integrator.render({{}, 0, 1}); }, "backend 'fake': the device has no memory left") == ErrorKind::Device);
+        CHECK(kindOfFailure(
+                  [&] {
+                      integrator.render({{}, 0, 1});
+                  },
+                  "backend 'fake': the device has no memory left") == ErrorKind::Device);
     }
     integrator.setScene(scene);
     {
         const ScopedFault fault("device");
-        CHECK(kindOfFailure([&] { integrator.render({{}, 0, 1}); }, "backend 'fake': the device fell off the bus") == ErrorKind::Device);
+        CHECK(kindOfFailure(
+                  [&] {
+                      integrator.render({{}, 0, 1});
+                  },
+                  "backend 'fake': the device fell off the bus") == ErrorKind::Device);
     }
     integrator.setScene(scene);
-    CHECK(kindOfFailure([&] { integrator.render({{0, 0, 5, 4}, 0, 1}); }, "leaves the film of 4×4") == ErrorKind::Internal);
-    CHECK(kindOfFailure([&] { integrator.render({{}, ~std::uint64_t{0}, 2}); }, "exceed 64 bits") == ErrorKind::Usage);
+    CHECK(kindOfFailure(
+              [&] {
+                  integrator.render({{0, 0, 5, 4}, 0, 1});
+              },
+              "leaves the film of 4×4") == ErrorKind::Internal);
+    CHECK(kindOfFailure(
+              [&] {
+                  integrator.render({{}, ~std::uint64_t{0}, 2});
+              },
+              "exceed 64 bits") == ErrorKind::Usage);
     CHECK(integrator.render({{}, 0, 0}));
     CHECK(integrator.render({{}, 0, 1}));
 
     CompiledScene wrong = makeScene(4, 4);
     wrong.blob[0].bytes[0] ^= 1;
-    CHECK(kindOfFailure([&] { integrator.setScene(wrong); }, "does not begin with a scene") == ErrorKind::Internal);
+    CHECK(kindOfFailure([&] { integrator.setScene(wrong); }, "does not begin with a scene") ==
+          ErrorKind::Internal);
 }
 
 TEST_CASE("samples that are not a number are dropped and counted", "[integrator]") {
@@ -209,14 +238,16 @@ TEST_CASE("samples that are not a number are dropped and counted", "[integrator]
     CHECK(film.counts[0] == 12);
 }
 
-TEST_CASE("a film that no sound backend hands over is refused, and what was there before is kept", "[integrator]") {
+TEST_CASE("a film that no sound backend hands over is refused, and what was there before is kept",
+          "[integrator]") {
     const CompiledScene scene = makeScene(5, 3);
     Integrator integrator(openFake("fake"), {});
     integrator.setScene(scene);
     integrator.render({{}, 0, 14});
     Film film = filmOf(scene);
-    for (const auto& [fault, words] : {std::pair{"nan_film", "broke the contract: pixel 2,1 of its film is not a number"},
-                                       {"count_film", "pixel 0,0 of its film has 15 samples and 14 were asked for"}}) {
+    for (const auto& [fault, words] :
+         {std::pair{"nan_film", "broke the contract: pixel 2,1 of its film is not a number"},
+          {"count_film", "pixel 0,0 of its film has 15 samples and 14 were asked for"}}) {
         const ScopedFault scoped(fault);
         CHECK(kindOfFailure([&] { integrator.readFilm(film); }, words) == ErrorKind::Internal);
         CHECK(film.samples.count() == 0);
@@ -235,7 +266,9 @@ TEST_CASE("devices are chosen by number or by name", "[integrator]") {
     CHECK(device("") == "pattern");
     CHECK(device("1") == "second pattern");
     CHECK(device("SECOND") == "second pattern");
-    CHECK(kindOfFailure([&] { device("third"); }, "no device matches 'third'; there is 0 'pattern', 1 'second pattern'") == ErrorKind::Backend);
+    CHECK(kindOfFailure([&] { device("third"); },
+                        "no device matches 'third'; there is 0 'pattern', 1 'second pattern'") ==
+          ErrorKind::Backend);
 }
 
 TEST_CASE("a scene without a BVH is for backends that bring one", "[integrator]") {
@@ -243,7 +276,9 @@ TEST_CASE("a scene without a BVH is for backends that bring one", "[integrator]"
     without.without_nodes = true;
     Integrator fake(openFake("fake"), {});
     CHECK(fake.compileOptions().accelerator_reach == 0);
-    CHECK(kindOfFailure([&] { fake.setScene(without); }, "backend 'fake' needs the BVH that was left out of this scene") == ErrorKind::Internal);
+    CHECK(kindOfFailure([&] { fake.setScene(without); },
+                        "backend 'fake' needs the BVH that was left out of this scene") ==
+          ErrorKind::Internal);
     fake.setScene(makeScene(4, 3));
     Integrator brings(openFake("many_devices"), {});
     CHECK(brings.compileOptions().accelerator_reach == 2);
@@ -262,14 +297,22 @@ TEST_CASE("a backend tells how far set_scene is", "[integrator]") {
 }
 
 TEST_CASE("a plugin that throws at its host is named", "[integrator]") {
-    CHECK(kindOfFailure([] { Integrator(openFake("throws_in_create"), {}); },
-                        "broke the contract: an exception crossed the border from create (create fell over)") == ErrorKind::Internal);
+    CHECK(kindOfFailure(
+              [] { Integrator(openFake("throws_in_create"), {}); },
+              "broke the contract: an exception crossed the border from create (create fell over)") ==
+          ErrorKind::Internal);
     Integrator integrator(openFake("throws_in_render"), {});
     integrator.setScene(makeScene(4, 4));
-    CHECK(kindOfFailure([&] { integrator.render({{}, 0, 1}); },
-                        "backend 'throws_in_render' broke the contract: an exception crossed the border from render") == ErrorKind::Internal);
+    CHECK(
+        kindOfFailure(
+            [&] {
+                integrator.render({{}, 0, 1});
+            },
+            "backend 'throws_in_render' broke the contract: an exception crossed the border from render") ==
+        ErrorKind::Internal);
     // A plugin that fails without a word.
-    CHECK(kindOfFailure([&] { integrator.report(); }, "backend 'throws_in_render': internal error") == ErrorKind::Internal);
+    CHECK(kindOfFailure([&] { integrator.report(); }, "backend 'throws_in_render': internal error") ==
+          ErrorKind::Internal);
 }
 
 TEST_CASE("integrators move", "[integrator]") {

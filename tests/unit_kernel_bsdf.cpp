@@ -1,5 +1,6 @@
-// How surfaces scatter and lights are sampled, and which wavelengths a path carries: closed forms, complex arithmetic in long double, chi-squared
-// against the density that is claimed, and expectations that must come out whatever the density.
+// How surfaces scatter and lights are sampled, and which wavelengths a path carries: closed forms, complex
+// arithmetic in long double, chi-squared against the density that is claimed, and expectations that must
+// come out whatever the density.
 #include "kernel_test.h"
 
 #include <algorithm>
@@ -23,7 +24,9 @@ double fresnel(double cosine, std::complex<long double> index) {
 }
 
 double lane(vec4 v, u32 i) { return i == 0 ? V4X(v) : i == 1 ? V4Y(v) : i == 2 ? V4Z(v) : V4W(v); }
-vec4 heroOf(u32 i) { return make_vec4(i == 0 ? 1.0f : 0.0f, i == 1 ? 1.0f : 0.0f, i == 2 ? 1.0f : 0.0f, i == 3 ? 1.0f : 0.0f); }
+vec4 heroOf(u32 i) {
+    return make_vec4(i == 0 ? 1.0f : 0.0f, i == 1 ? 1.0f : 0.0f, i == 2 ? 1.0f : 0.0f, i == 3 ? 1.0f : 0.0f);
+}
 
 CrtRandom2 pairOf(double x, double y) {
     CrtRandom2 u;
@@ -34,11 +37,17 @@ CrtRandom2 pairOf(double x, double y) {
 
 /// Solid angle of a triangle seen from the origin (Van Oosterom and Strackee 1983), in long double.
 double solidAngle(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
-    const auto dotl = [](const Vec3d& p, const Vec3d& q) { return static_cast<long double>(p[0]) * q[0] + static_cast<long double>(p[1]) * q[1] + static_cast<long double>(p[2]) * q[2]; };
+    const auto dotl = [](const Vec3d& p, const Vec3d& q) {
+        return static_cast<long double>(p[0]) * q[0] + static_cast<long double>(p[1]) * q[1] +
+               static_cast<long double>(p[2]) * q[2];
+    };
     const long double la = std::sqrt(dotl(a, a)), lb = std::sqrt(dotl(b, b)), lc = std::sqrt(dotl(c, c));
-    const auto minor = [&](std::size_t i, std::size_t j) { return static_cast<long double>(b[i]) * c[j] - static_cast<long double>(b[j]) * c[i]; };
+    const auto minor = [&](std::size_t i, std::size_t j) {
+        return static_cast<long double>(b[i]) * c[j] - static_cast<long double>(b[j]) * c[i];
+    };
     const long double triple = std::abs(a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1));
-    return static_cast<double>(2 * std::atan2(triple, la * lb * lc + dotl(a, b) * lc + dotl(b, c) * la + dotl(c, a) * lb));
+    return static_cast<double>(
+        2 * std::atan2(triple, la * lb * lc + dotl(a, b) * lc + dotl(b, c) * la + dotl(c, a) * lb));
 }
 
 /// Lambert 1760: ∫ cos dω / π over a polygon above the horizon, for a receiver at the origin with normal n.
@@ -55,7 +64,10 @@ double formFactor(const std::vector<Vec3d>& polygon, const Vec3d& n) {
 }  // namespace
 
 TEST_CASE("Fresnel reflectance at known angles", "[kernel][bsdf]") {
-    const auto at = [](double degrees, f32 eta) { return static_cast<double>(crt_fresnel_dielectric(static_cast<f32>(std::cos(degrees * kPi / 180)), eta)); };
+    const auto at = [](double degrees, f32 eta) {
+        return static_cast<double>(
+            crt_fresnel_dielectric(static_cast<f32>(std::cos(degrees * kPi / 180)), eta));
+    };
     CHECK(at(0, 1.5f) == Approx(.04).margin(1e-7));
     CHECK(at(56.309932, 1.5f) == Approx(.073964497).margin(1e-7));  // Brewster: all of it polarised
     CHECK(at(60, 1.5f) == Approx(.089186713).margin(1e-7));
@@ -77,28 +89,36 @@ TEST_CASE("Fresnel reflectance at known angles", "[kernel][bsdf]") {
     CHECK(inside == Approx(.5963457597).margin(1e-5));
 }
 
-TEST_CASE("Fresnel reflectance of dielectrics and conductors is that of the field equations", "[kernel][bsdf]") {
+TEST_CASE("Fresnel reflectance of dielectrics and conductors is that of the field equations",
+          "[kernel][bsdf]") {
     double dielectric = 0, conductor = 0, reciprocal = 0;
     for (int i = 1; i <= 500; ++i) {
         const f32 c = static_cast<f32>(i) / 500;
-        for (const f32 eta : {0.1f, 0.5f, 1 / 1.5f, 0.9f, 1.001f, 1.1f, 1.33f, 1.5f, 1.9f, 2.4f, 10.0f, 1e4f}) {
+        for (const f32 eta :
+             {0.1f, 0.5f, 1 / 1.5f, 0.9f, 1.001f, 1.1f, 1.33f, 1.5f, 1.9f, 2.4f, 10.0f, 1e4f}) {
             const double sin2_t = (1 - static_cast<double>(c) * c) / (static_cast<double>(eta) * eta);
             // At the critical angle the slope is infinite: rounding of the cosine decides.
             if (std::abs(1 - sin2_t) < 1e-4) continue;
             const f32 f = crt_fresnel_dielectric(c, eta);
             dielectric = std::max(dielectric, std::abs(f - (sin2_t > 1 ? 1 : fresnel(c, eta))));
             // The same from the other side, where the cosine there still tells angles apart.
-            if (c > 0.1f && sin2_t < 0.99 && sin2_t > 0.01) reciprocal = std::max<double>(reciprocal, std::abs(f - crt_fresnel_dielectric(static_cast<f32>(std::sqrt(1 - sin2_t)), 1 / eta)));
+            if (c > 0.1f && sin2_t < 0.99 && sin2_t > 0.01)
+                reciprocal = std::max<double>(
+                    reciprocal,
+                    std::abs(f - crt_fresnel_dielectric(static_cast<f32>(std::sqrt(1 - sin2_t)), 1 / eta)));
         }
         for (const double n : {0.05, 0.2, 0.9, 1.5, 3.0, 8.0})
             for (const double k : {0.0, 0.5, 2.0, 7.5}) {
                 // One lane at a time, so that no lane can be taken for another.
                 const u32 at = static_cast<u32>(i) % 4;
                 const vec4 hero = heroOf(at);
-                const vec4 result = crt_fresnel_conductor(c, splat4(1.3f) + hero * static_cast<f32>(n - 1.3f), splat4(2.0f) + hero * static_cast<f32>(k - 2.0f));
+                const vec4 result =
+                    crt_fresnel_conductor(c, splat4(1.3f) + hero * static_cast<f32>(n - 1.3f),
+                                          splat4(2.0f) + hero * static_cast<f32>(k - 2.0f));
                 const f32 nf = 1.3f + static_cast<f32>(n - 1.3f), kf = 2.0f + static_cast<f32>(k - 2.0f);
                 conductor = std::max(conductor, std::abs(lane(result, at) - fresnel(c, {nf, kf})));
-                conductor = std::max(conductor, std::abs(lane(result, (at + 1) % 4) - fresnel(c, {1.3f, 2.0f})));
+                conductor =
+                    std::max(conductor, std::abs(lane(result, (at + 1) % 4) - fresnel(c, {1.3f, 2.0f})));
             }
     }
     CHECK(dielectric < 3e-6);
@@ -114,18 +134,22 @@ TEST_CASE("an index of exactly 1 is no surface, however grazing", "[kernel][bsdf
     for (int i = 0; i < 100000; ++i) {
         const vec3 n = toFloat(random.direction());
         const CrtFrame frame = crt_frame(n);
-        const f32 c = static_cast<f32>(std::pow(10.0, random.uniform(-5, 0))), phi = static_cast<f32>(random.uniform(-3, 3));
+        const f32 c = static_cast<f32>(std::pow(10.0, random.uniform(-5, 0))),
+                  phi = static_cast<f32>(random.uniform(-3, 3));
         const f32 s = std::sqrt(1 - c * c);
         const vec3 wo = normalize3(crt_to_world(frame, make_vec3(s * std::cos(phi), s * std::sin(phi), c)));
         if (!(dot3(wo, n) > 0)) continue;
         wrong += crt_fresnel_dielectric(c, 1) != 0;
-        const CrtScatter scatter = crt_sample_dielectric(splat4(1), wo, n, n, heroOf(0), 0, 0, crt_unit(static_cast<u32>(random.bits())));
-        wrong += !scatter.valid || scatter.wi.x != -wo.x || scatter.wi.y != -wo.y || scatter.wi.z != -wo.z || V4X(scatter.weight) != 1;
+        const CrtScatter scatter = crt_sample_dielectric(splat4(1), wo, n, n, heroOf(0), 0, 0,
+                                                         crt_unit(static_cast<u32>(random.bits())));
+        wrong += !scatter.valid || scatter.wi.x != -wo.x || scatter.wi.y != -wo.y || scatter.wi.z != -wo.z ||
+                 V4X(scatter.weight) != 1;
     }
     CHECK(wrong == 0);
 }
 
-TEST_CASE("a dielectric refracts by Snell's law, reflects by the mirror's, and loses nothing", "[kernel][bsdf]") {
+TEST_CASE("a dielectric refracts by Snell's law, reflects by the mirror's, and loses nothing",
+          "[kernel][bsdf]") {
     Random random(32);
     double snell = 0, mirror = 0, not_unit = 0, unbalanced = 0;
     for (const f32 eta : {1.0f / 2.4f, 1 / 1.5f, 1.0001f, 1.33f, 1.5f, 2.4f, 20.0f})
@@ -135,12 +159,14 @@ TEST_CASE("a dielectric refracts by Snell's law, reflects by the mirror's, and l
             Vec3d wod = random.direction();
             if (dot(wod, nd) < 0) wod = times(wod, -1);
             const vec3 wo = unitFloat(wod);
-            const double cos_i = dot(toDouble(wo), toDouble(n)), sin2_t = (1 - cos_i * cos_i) / (static_cast<double>(eta) * eta);
+            const double cos_i = dot(toDouble(wo), toDouble(n)),
+                         sin2_t = (1 - cos_i * cos_i) / (static_cast<double>(eta) * eta);
             if (cos_i < 0.01 || std::abs(1 - sin2_t) < 1e-3) continue;
             double sum = 0, reflected = 0;
             constexpr int kSteps = 20000;
             for (int k = 0; k < kSteps; ++k) {
-                const CrtScatter s = crt_sample_dielectric(splat4(eta), wo, n, n, heroOf(1), 0, 0, static_cast<f32>((k + 0.5) / kSteps));
+                const CrtScatter s = crt_sample_dielectric(splat4(eta), wo, n, n, heroOf(1), 0, 0,
+                                                           static_cast<f32>((k + 0.5) / kSteps));
                 if (!s.valid) continue;
                 sum += lane(s.weight, 2) * s.eta_square / kSteps;
                 if (s.eta_square == 1.0f) reflected += lane(s.weight, 2) / kSteps;
@@ -152,7 +178,8 @@ TEST_CASE("a dielectric refracts by Snell's law, reflects by the mirror's, and l
                     CHECK(s.eta_square == 1.0f);
                 } else {
                     // η times the tangential part is that of the incident direction, turned round.
-                    const Vec3d tangent = plus(times(minus(wi, times(m, dot(wi, m))), eta), minus(toDouble(wo), times(m, cos_i)));
+                    const Vec3d tangent = plus(times(minus(wi, times(m, dot(wi, m))), eta),
+                                               minus(toDouble(wo), times(m, cos_i)));
                     snell = std::max(snell, length(tangent) / std::max(1.0, static_cast<double>(eta)));
                     CHECK(s.eta_square == eta * eta);
                 }
@@ -168,7 +195,8 @@ TEST_CASE("a dielectric refracts by Snell's law, reflects by the mirror's, and l
     CHECK(unbalanced < 1e-5);
 }
 
-TEST_CASE("dispersion: on average over heroes, every wavelength is refracted with its own share", "[kernel][bsdf]") {
+TEST_CASE("dispersion: on average over heroes, every wavelength is refracted with its own share",
+          "[kernel][bsdf]") {
     const vec4 eta = make_vec4(1.45f, 1.5f, 1.6f, 1.8f);
     const vec3 n = make_vec3(0, 0, 1);
     constexpr int kSteps = 100000;
@@ -179,11 +207,13 @@ TEST_CASE("dispersion: on average over heroes, every wavelength is refracted wit
             std::array<double, 4> reflected{}, refracted{};
             for (u32 hero = 0; hero < 4; ++hero)
                 for (int k = 0; k < kSteps; ++k) {
-                    const CrtScatter s = crt_sample_dielectric(index, wo, n, n, heroOf(hero), 1, 0, static_cast<f32>((k + 0.5) / kSteps));
+                    const CrtScatter s = crt_sample_dielectric(index, wo, n, n, heroOf(hero), 1, 0,
+                                                               static_cast<f32>((k + 0.5) / kSteps));
                     if (!s.valid) continue;
                     CHECK_FALSE((s.hero_only != 0) == (s.wi.z > 0));
                     for (u32 i = 0; i < 4; ++i) {
-                        if (s.hero_only)  // as the path does it: the others are given up, the hero counts four times
+                        if (s.hero_only)  // as the path does it: the others are given up, the hero counts
+                                          // four times
                             refracted[i] += lane(s.weight * heroOf(hero) * 4.0f, i) / (4.0 * kSteps);
                         else
                             reflected[i] += lane(s.weight, i) / (4.0 * kSteps);
@@ -191,7 +221,8 @@ TEST_CASE("dispersion: on average over heroes, every wavelength is refracted wit
                     if (s.hero_only) CHECK(std::abs(s.wi.x * lane(index, hero) + wo.x) < 1e-6);
                 }
             for (u32 i = 0; i < 4; ++i) {
-                const double relative = lane(index, i), sin2_t = (1 - static_cast<double>(wo.z) * wo.z) / (relative * relative);
+                const double relative = lane(index, i),
+                             sin2_t = (1 - static_cast<double>(wo.z) * wo.z) / (relative * relative);
                 const double f = sin2_t > 1 ? 1 : fresnel(wo.z, relative);
                 INFO(degrees << "°, " << (inside ? "inside" : "outside") << ", lane " << i);
                 CHECK(reflected[i] == Approx(f).margin(3e-5));
@@ -219,17 +250,23 @@ TEST_CASE("a mirror reflects, and not through the surface", "[kernel][bsdf]") {
 TEST_CASE("diffuse directions follow cos/π, and weigh what the density leaves", "[kernel][bsdf]") {
     Random random(33);
     for (int k = 0; k < 4; ++k) {
-        const vec3 ns = k == 0 ? make_vec3(0, 0, 1) : k == 1 ? make_vec3(0, 0, -1) : toFloat(random.direction());
-        const Vec3d z = toDouble(ns), x = unit(cross(z, std::abs(z[0]) < 0.5 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0})), y = cross(z, x);
+        const vec3 ns = k == 0   ? make_vec3(0, 0, 1)
+                        : k == 1 ? make_vec3(0, 0, -1)
+                                 : toFloat(random.direction());
+        const Vec3d z = toDouble(ns),
+                    x = unit(cross(z, std::abs(z[0]) < 0.5 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0})),
+                    y = cross(z, x);
         // cos² and azimuth are uniform under cos/π.
         std::vector<std::uint64_t> bins(20 * 40);
         double not_unit = 0, pdf_error = 0;
         for (int i = 0; i < 400000; ++i) {
-            const CrtScatter s = crt_sample_diffuse(make_vec4(0.1f, 0.2f, 0.3f, 0.4f), ns, ns, random.pair());
+            const CrtScatter s =
+                crt_sample_diffuse(make_vec4(0.1f, 0.2f, 0.3f, 0.4f), ns, ns, random.pair());
             if (!s.valid) FAIL("a direction below the surface");
             const Vec3d w = toDouble(s.wi);
             const double cosine = dot(w, z), turn = (std::atan2(dot(w, y), dot(w, x)) + kPi) / (2 * kPi);
-            ++bins[std::min<std::size_t>(19, static_cast<std::size_t>(cosine * cosine * 20)) * 40 + std::min<std::size_t>(39, static_cast<std::size_t>(turn * 40))];
+            ++bins[std::min<std::size_t>(19, static_cast<std::size_t>(cosine * cosine * 20)) * 40 +
+                   std::min<std::size_t>(39, static_cast<std::size_t>(turn * 40))];
             not_unit = std::max(not_unit, std::abs(length(w) - 1));
             pdf_error = std::max(pdf_error, std::abs(s.pdf - cosine / kPi));
             // f·cos/pdf with f = reflectance/π.
@@ -256,7 +293,8 @@ TEST_CASE("the power heuristic shares out 1, for any densities", "[kernel][bsdf]
     Random random(34);
     double worst = 0;
     for (int i = 0; i < 100000; ++i) {
-        const f32 a = static_cast<f32>(std::pow(10.0, random.uniform(-37, 38))), b = static_cast<f32>(std::pow(10.0, random.uniform(-37, 38)));
+        const f32 a = static_cast<f32>(std::pow(10.0, random.uniform(-37, 38))),
+                  b = static_cast<f32>(std::pow(10.0, random.uniform(-37, 38)));
         const f32 wa = crt_power_heuristic(b / a), wb = crt_power_heuristic(a / b);
         worst = std::max<double>(worst, std::abs(wa + wb - 1));
         if (!(wa >= 0 && wa <= 1)) FAIL("a weight of " << wa << " for " << a << " against " << b);
@@ -271,7 +309,8 @@ TEST_CASE("the power heuristic shares out 1, for any densities", "[kernel][bsdf]
     CHECK(crt_power_heuristic(1 / CRT_INFINITY) == 1);
 }
 
-// --------------------------------------------------------------------------------------------------------------------------- lights
+// ----------------------------------------------------------------------------------------------------------
+// lights
 
 namespace {
 
@@ -279,7 +318,9 @@ namespace {
 f32 tripleOf(const vec3& a, const vec3& b, const vec3& c) {
     return static_cast<f32>(std::abs(dot(toDouble(a), cross(toDouble(b), toDouble(c)))));
 }
-f32 solidAngleOf(const vec3& a, const vec3& b, const vec3& c) { return crt_solid_angle(tripleOf(a, b, c), a, b, c); }
+f32 solidAngleOf(const vec3& a, const vec3& b, const vec3& c) {
+    return crt_solid_angle(tripleOf(a, b, c), a, b, c);
+}
 
 }  // namespace
 
@@ -289,20 +330,28 @@ TEST_CASE("solid angles of triangles, down to 1e-8 sr", "[kernel][light]") {
     const double t = 1 / std::sqrt(3.0), g = (1 + std::sqrt(5.0)) / 2;
     CHECK(solidAngleOf(toFloat({t, t, t}), toFloat({t, -t, -t}), toFloat({-t, t, -t})) == Approx(kPi));
     CHECK(solidAngleOf(toFloat({t, t, t}), toFloat({-t, t, t}), toFloat({-t, -t, t})) == Approx(kPi / 3));
-    CHECK(solidAngleOf(unitFloat({0, 1, g}), unitFloat({0, -1, g}), unitFloat({g, 0, 1})) == Approx(kPi / 5));
+    CHECK(solidAngleOf(unitFloat({0, 1, g}), unitFloat({0, -1, g}), unitFloat({g, 0, 1})) ==
+          Approx(kPi / 5));
     // Nearly a half space, and none at all.
-    CHECK(solidAngleOf(unitFloat({1, 0, 1e-3}), unitFloat({-0.5, 0.9, 1e-3}), unitFloat({-0.5, -0.9, 1e-3})) == Approx(2 * kPi).margin(2e-2));
+    CHECK(solidAngleOf(unitFloat({1, 0, 1e-3}), unitFloat({-0.5, 0.9, 1e-3}),
+                       unitFloat({-0.5, -0.9, 1e-3})) == Approx(2 * kPi).margin(2e-2));
     CHECK(solidAngleOf(make_vec3(0, 0, 1), make_vec3(0, 0, 1), make_vec3(1, 0, 0)) == 0);
 
-    // Of the same rounded directions, in long double. What is left is the rounding of the triple product, 1e-7 of the triangle's width.
+    // Of the same rounded directions, in long double. What is left is the rounding of the triple product,
+    // 1e-7 of the triangle's width.
     Random random(35);
     for (const double width : {1.0, 1e-1, 1e-2, 1e-3, 1e-4}) {
         double worst = 0;
         for (int i = 0; i < 20000; ++i) {
             const Vec3d d = random.direction(), x = unit(cross(d, random.direction())), y = cross(d, x);
-            const auto corner = [&](double u, double v) { return unitFloat(plus(d, plus(times(x, u * width), times(y, v * width)))); };
-            const vec3 a = corner(0.9, 0.1 * random.uniform()), b = corner(-0.5, 0.8), c = corner(-0.5 * random.uniform(), -0.9);
-            worst = std::max(worst, std::abs(solidAngleOf(a, b, c) / solidAngle(toDouble(a), toDouble(b), toDouble(c)) - 1));
+            const auto corner = [&](double u, double v) {
+                return unitFloat(plus(d, plus(times(x, u * width), times(y, v * width))));
+            };
+            const vec3 a = corner(0.9, 0.1 * random.uniform()), b = corner(-0.5, 0.8),
+                       c = corner(-0.5 * random.uniform(), -0.9);
+            worst = std::max(
+                worst,
+                std::abs(solidAngleOf(a, b, c) / solidAngle(toDouble(a), toDouble(b), toDouble(c)) - 1));
         }
         INFO("width " << width);
         CHECK(worst < 4e-7 / width);
@@ -325,7 +374,8 @@ TEST_CASE("directions are uniform in a spherical triangle", "[kernel][light]") {
         // The flat triangle, cut into 8 × 8 strips of smaller ones; each has its own solid angle.
         constexpr int kCut = 8;
         const auto point = [&](int i, int j) {
-            return plus(a, plus(times(minus(b, a), static_cast<double>(i) / kCut), times(minus(c, a), static_cast<double>(j) / kCut)));
+            return plus(a, plus(times(minus(b, a), static_cast<double>(i) / kCut),
+                                times(minus(c, a), static_cast<double>(j) / kCut)));
         };
         std::vector<double> expected;
         std::vector<std::uint64_t> observed;
@@ -334,23 +384,30 @@ TEST_CASE("directions are uniform in a spherical triangle", "[kernel][light]") {
             for (int j = 0; i + j < kCut; ++j)
                 for (int upper = 0; upper < 2; ++upper) {
                     if (upper && i + j + 1 >= kCut) continue;
-                    index[static_cast<std::size_t>(2 * (i * kCut + j) + upper)] = static_cast<int>(expected.size());
-                    expected.push_back(upper ? solidAngle(point(i + 1, j + 1), point(i, j + 1), point(i + 1, j)) : solidAngle(point(i, j), point(i + 1, j), point(i, j + 1)));
+                    index[static_cast<std::size_t>(2 * (i * kCut + j) + upper)] =
+                        static_cast<int>(expected.size());
+                    expected.push_back(
+                        upper ? solidAngle(point(i + 1, j + 1), point(i, j + 1), point(i + 1, j))
+                              : solidAngle(point(i, j), point(i + 1, j), point(i, j + 1)));
                 }
         observed.resize(expected.size());
         const Vec3d n = cross(minus(b, a), minus(c, a));
         std::uint64_t outside = 0;
         for (int i = 0; i < 300000; ++i) {
-            const Vec3d d = toDouble(crt_sample_spherical_triangle(toFloat(a), toFloat(b), toFloat(c), triple, omega, random.pair()));
+            const Vec3d d = toDouble(crt_sample_spherical_triangle(toFloat(a), toFloat(b), toFloat(c),
+                                                                   triple, omega, random.pair()));
             const Vec3d p = minus(times(d, dot(n, a) / dot(n, d)), a);
-            const double u = dot(cross(p, minus(c, a)), n) / dot(n, n), v = dot(cross(minus(b, a), p), n) / dot(n, n);
+            const double u = dot(cross(p, minus(c, a)), n) / dot(n, n),
+                         v = dot(cross(minus(b, a), p), n) / dot(n, n);
             if (u < -1e-3 || v < -1e-3 || u + v > 1.001) {
                 ++outside;
                 continue;
             }
-            const int column = std::clamp(static_cast<int>(u * kCut), 0, kCut - 1), row = std::clamp(static_cast<int>(v * kCut), 0, kCut - 1 - column);
+            const int column = std::clamp(static_cast<int>(u * kCut), 0, kCut - 1),
+                      row = std::clamp(static_cast<int>(v * kCut), 0, kCut - 1 - column);
             const bool upper = u * kCut - column + v * kCut - row > 1 && column + row + 1 < kCut;
-            ++observed[static_cast<std::size_t>(index[static_cast<std::size_t>(2 * (column * kCut + row) + upper)])];
+            ++observed[static_cast<std::size_t>(
+                index[static_cast<std::size_t>(2 * (column * kCut + row) + upper)])];
         }
         double sum = 0;
         for (const double e : expected) sum += e;
@@ -410,9 +467,11 @@ const std::vector<Vec3d> kQuad{{-0.5, -0.5, 1}, {-0.4, 0.5, 1}, {0.6, 0.7, 1}, {
 
 }  // namespace
 
-TEST_CASE("light sampling integrates: solid angles and form factors in closed form, near and far", "[kernel][light]") {
+TEST_CASE("light sampling integrates: solid angles and form factors in closed form, near and far",
+          "[kernel][light]") {
     // By solid angle under it and close by, by area far off; edge-on in between.
-    const Vec3d places[] = {{0, 0, 0.9}, {0.1, -0.1, 0.5}, {0, 0, 0}, {2, 1, 0}, {0.2, 0.1, -6}, {1.1, 0.2, 0.95}, {0.95, 0, 0.997}, {6, 1, 0.8}, {60, 30, -50}};
+    const Vec3d places[] = {{0, 0, 0.9},      {0.1, -0.1, 0.5}, {0, 0, 0},   {2, 1, 0},    {0.2, 0.1, -6},
+                            {1.1, 0.2, 0.95}, {0.95, 0, 0.997}, {6, 1, 0.8}, {60, 30, -50}};
     for (const auto& corners : {kTriangle, kQuad}) {
         const LitScene scene({{corners, 1, false}});
         REQUIRE(scene.compiled.emitters == 1);  // the halves of a parallelogram are one light
@@ -443,7 +502,8 @@ TEST_CASE("light sampling integrates: solid angles and form factors in closed fo
             }
             INFO("seen from " << where[0] << " " << where[1] << " " << where[2] << ", Ω = " << omega);
             // Solid angle sampling has no variance here; then rounding alone is left.
-            CHECK(std::abs(solid_angle.mean() - omega) < 4.4 * solid_angle.standardError() + 1e-5 * omega + 1e-7);
+            CHECK(std::abs(solid_angle.mean() - omega) <
+                  4.4 * solid_angle.standardError() + 1e-5 * omega + 1e-7);
             const double f = formFactor(seen, up);
             CHECK(std::abs(form_factor.mean() - f) < 4.4 * form_factor.standardError() + 1e-5 * f + 1e-8);
             CHECK(inconsistent < 1e-3);
@@ -460,15 +520,20 @@ TEST_CASE("a light's density integrates to 1 over the light", "[kernel][light]")
             const Vec3d p = toDouble(toFloat(scene.place(where)));
             double integral = 0;
             for (std::size_t half = 0; half + 2 < corners.size(); ++half) {
-                const Vec3d o = scene.place(corners[0]), a = minus(scene.place(corners[half + 1]), o), b = minus(scene.place(corners[half + 2]), o);
+                const Vec3d o = scene.place(corners[0]), a = minus(scene.place(corners[half + 1]), o),
+                            b = minus(scene.place(corners[half + 2]), o);
                 const double area = length(cross(a, b)) / 2;
                 constexpr int kCut = 300;
                 for (int i = 0; i < kCut; ++i)
                     for (int j = 0; j < 2 * (kCut - i) - 1; ++j) {
-                        const double third = j % 2 ? 2.0 / 3 : 1.0 / 3;  // centroids of small triangles, upright and inverted
-                        const Vec3d d = minus(plus(o, plus(times(a, (i + third) / kCut), times(b, (j / 2 + third) / kCut))), p);
+                        const double third =
+                            j % 2 ? 2.0 / 3 : 1.0 / 3;  // centroids of small triangles, upright and inverted
+                        const Vec3d d = minus(
+                            plus(o, plus(times(a, (i + third) / kCut), times(b, (j / 2 + third) / kCut))),
+                            p);
                         const Vec3d wi = unit(d);
-                        const f32 pdf = crt_light_seen(&scene.ctx, 0, toFloat(p), static_cast<f32>(length(d))).pdf;
+                        const f32 pdf =
+                            crt_light_seen(&scene.ctx, 0, toFloat(p), static_cast<f32>(length(d))).pdf;
                         integral += pdf * std::abs(wi[2]) / dot(d, d) * area / (kCut * kCut);
                     }
             }
@@ -479,8 +544,11 @@ TEST_CASE("a light's density integrates to 1 over the light", "[kernel][light]")
 
 TEST_CASE("lights are chosen by power, counted by choice, and seen from their front", "[kernel][light]") {
     // Four lamps, strong and weak; the last shines both ways.
-    const auto at = [](double x, double z) { return std::vector<Vec3d>{{x, 0, z}, {x, 0.2, z}, {x + 0.2, 0, z}}; };
-    const LitScene scene({{at(0, 1), 1, false}, {at(1, 1), 100, false}, {at(2, 1), 1e-3, false}, {at(3, 1), 5, true}});
+    const auto at = [](double x, double z) {
+        return std::vector<Vec3d>{{x, 0, z}, {x, 0.2, z}, {x + 0.2, 0, z}};
+    };
+    const LitScene scene(
+        {{at(0, 1), 1, false}, {at(1, 1), 100, false}, {at(2, 1), 1e-3, false}, {at(3, 1), 5, true}});
     REQUIRE(scene.compiled.emitters == 4);
     double total = 0;
     for (u32 i = 0; i < 4; ++i) total += static_cast<double>(scene.emitter(i).choice_probability);
@@ -496,7 +564,10 @@ TEST_CASE("lights are chosen by power, counted by choice, and seen from their fr
     double expected_below = 0, expected_above = 0;
     for (const auto& [x, shines_up] : {std::pair{0.0, false}, {1.0, false}, {2.0, false}, {3.0, true}}) {
         const std::vector<Vec3d> c = at(x, 1);
-        const auto angle = [&](const Vec3d& p) { return solidAngle(minus(scene.place(c[0]), p), minus(scene.place(c[1]), p), minus(scene.place(c[2]), p)); };
+        const auto angle = [&](const Vec3d& p) {
+            return solidAngle(minus(scene.place(c[0]), p), minus(scene.place(c[1]), p),
+                              minus(scene.place(c[2]), p));
+        };
         expected_below += angle(below);
         if (shines_up) expected_above += angle(above);
     }
@@ -519,7 +590,8 @@ TEST_CASE("lights are chosen by power, counted by choice, and seen from their fr
     }
 }
 
-// ---------------------------------------------------------------------------------------------------------------------- wavelengths
+// ----------------------------------------------------------------------------------------------------------
+// wavelengths
 
 TEST_CASE("four wavelengths integrate any spectrum, together or the hero alone", "[kernel][spectrum]") {
     crt::Scene scene;
@@ -527,7 +599,8 @@ TEST_CASE("four wavelengths integrate any spectrum, together or the hero alone",
     crt::Spectrum ramp, line;
     for (std::size_t i = 0; i < ramp.values.size(); ++i) ramp[i] = 0.1 + 0.002 * static_cast<double>(i);
     line[589 - 360] = 50;  // one nanometre wide at the foot: a triangle
-    const crt::Spectrum spectra[] = {crt::constantSpectrum(1), *crt::illuminantSpectrum("D65"), *crt::illuminantSpectrum("F11"), ramp, line};
+    const crt::Spectrum spectra[] = {crt::constantSpectrum(1), *crt::illuminantSpectrum("D65"),
+                                     *crt::illuminantSpectrum("F11"), ramp, line};
     for (const crt::Spectrum& spectrum : spectra) {
         scene.environment = crt::Environment{spectrum};
         const crt::CompiledScene compiled = crt::compileScene(scene, 0);
@@ -538,7 +611,8 @@ TEST_CASE("four wavelengths integrate any spectrum, together or the hero alone",
         for (u32 i = 0; i < kSteps; ++i) {
             const CrtWavelengths w = crt_sample_wavelengths(&ctx, static_cast<f32>((i + 0.5) / kSteps));
             const vec4 radiance = crt_spectrum(&ctx, ctx.scene->environment, w.position);
-            const vec4 xyz = crt_to_xyz(&ctx, w, radiance), hero = crt_to_xyz(&ctx, w, radiance * heroOf(i % 4) * 4.0f);
+            const vec4 xyz = crt_to_xyz(&ctx, w, radiance),
+                       hero = crt_to_xyz(&ctx, w, radiance * heroOf(i % 4) * 4.0f);
             for (u32 k = 0; k < 3; ++k) {
                 all[k] += lane(xyz, k) / kSteps;
                 alone[k] += lane(hero, k) / kSteps;
@@ -551,13 +625,15 @@ TEST_CASE("four wavelengths integrate any spectrum, together or the hero alone",
             }
         }
         double trapezoid = 0;
-        for (std::size_t i = 0; i + 1 < spectrum.values.size(); ++i) trapezoid += (spectrum[i] + spectrum[i + 1]) / 2;
+        for (std::size_t i = 0; i + 1 < spectrum.values.size(); ++i)
+            trapezoid += (spectrum[i] + spectrum[i + 1]) / 2;
         const Vec3d expected = crt::spectrumToXyz(spectrum);
         CHECK(nanometres == Approx(470).epsilon(1e-5));
         CHECK(area == Approx(trapezoid).epsilon(2e-3));
         CHECK(lowest >= 0);
         CHECK(highest <= 470);
-        // The host sums products at whole nanometres; the kernel interpolates both factors between them, which differs where both bend.
+        // The host sums products at whole nanometres; the kernel interpolates both factors between them,
+        // which differs where both bend.
         for (std::size_t k = 0; k < 3; ++k) {
             CHECK(all[k] == Approx(expected[k]).epsilon(2e-3).margin(1e-5));
             CHECK(alone[k] == Approx(all[k]).epsilon(2e-3).margin(1e-5));
@@ -585,9 +661,12 @@ TEST_CASE("the density of a wavelength is what its weight says", "[kernel][spect
         f32 inverse = 0;
         const f32 position = crt_wavelength(&ctx, static_cast<f32>((i + 0.5) * 0x1p-20), &inverse);
         if (!(position >= before) || !(inverse > 0)) FAIL("not monotone at " << i);
-        if (i > 0 && position > before) expected[std::min<std::size_t>(93, static_cast<std::size_t>(position / 5))] += (position - before) / inverse;
+        if (i > 0 && position > before)
+            expected[std::min<std::size_t>(93, static_cast<std::size_t>(position / 5))] +=
+                (position - before) / inverse;
         before = position;
-        ++observed[std::min<std::size_t>(93, static_cast<std::size_t>(crt_wavelength(&ctx, random.pair().x, &inverse) / 5))];
+        ++observed[std::min<std::size_t>(
+            93, static_cast<std::size_t>(crt_wavelength(&ctx, random.pair().x, &inverse) / 5))];
     }
     CHECK(std::abs(chiSquaredDeviate(observed, expected)) < 4.4);
     // The ends: no table is left.
@@ -612,8 +691,11 @@ TEST_CASE("spectra and observer are exact at whole nanometres and linear between
     for (u32 nm = 0; nm <= 470; ++nm) {
         const f32 at = static_cast<f32>(nm);
         CHECK(lane(crt_spectrum(&ctx, ctx.scene->environment, make_vec4(0, 0, at, 0)), 2) == s[nm]);
-        CHECK(lane(crt_observer(&ctx, at), 1) == static_cast<f32>(crt::cieObserver()[1][nm] / crt::cieYIntegral()));
-        if (nm < 470) CHECK(lane(crt_spectrum(&ctx, ctx.scene->environment, splat4(at + 0.25f)), 0) == Approx(0.75 * s[nm] + 0.25 * s[nm + 1]).margin(1e-5));
+        CHECK(lane(crt_observer(&ctx, at), 1) ==
+              static_cast<f32>(crt::cieObserver()[1][nm] / crt::cieYIntegral()));
+        if (nm < 470)
+            CHECK(lane(crt_spectrum(&ctx, ctx.scene->environment, splat4(at + 0.25f)), 0) ==
+                  Approx(0.75 * s[nm] + 0.25 * s[nm + 1]).margin(1e-5));
     }
 }
 
@@ -621,7 +703,8 @@ TEST_CASE("colours of views are the film's sRGB", "[kernel][spectrum]") {
     // The kernel's matrix to XYZ against the host's from XYZ, which resolves the image.
     const crt::Matrix3d to_rgb = crt::xyzToRgb(crt::ColorSpace::LinearSrgb);
     for (int axis = 0; axis < 3; ++axis) {
-        const vec4 xyz = crt_srgb_to_xyz(axis == 0 ? 1.0f : 0.0f, axis == 1 ? 1.0f : 0.0f, axis == 2 ? 1.0f : 0.0f);
+        const vec4 xyz =
+            crt_srgb_to_xyz(axis == 0 ? 1.0f : 0.0f, axis == 1 ? 1.0f : 0.0f, axis == 2 ? 1.0f : 0.0f);
         const crt::Vec3d rgb = crt::multiply(to_rgb, crt::Vec3d{V4X(xyz), V4Y(xyz), V4Z(xyz)});
         for (int k = 0; k < 3; ++k) CHECK(rgb[k] == Approx(k == axis ? 1.0 : 0.0).margin(2e-6));
     }

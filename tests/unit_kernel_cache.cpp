@@ -1,4 +1,5 @@
-// The kernel cache: it finds what was stored, and nothing that happens to its directory makes it fail or lie.
+// The kernel cache: it finds what was stored, and nothing that happens to its directory makes it fail or
+// lie.
 #include "backend/sdk/kernel_cache.h"
 #include "catch.h"
 #include "judge/verify/temporary_folder.h"
@@ -25,7 +26,9 @@ using Bytes = std::vector<unsigned char>;
 struct Fixture {
     TemporaryFolder directory;
 
-    KernelCache cache(std::uint64_t max_bytes = KernelCache::kDefaultMaxBytes) const { return KernelCache(directory.path().c_str(), max_bytes); }
+    KernelCache cache(std::uint64_t max_bytes = KernelCache::kDefaultMaxBytes) const {
+        return KernelCache(directory.path().c_str(), max_bytes);
+    }
     std::size_t files() const { return directory.fileCount(); }
 };
 
@@ -62,7 +65,8 @@ TEST_CASE("a stored kernel is found again", "[cache]") {
     CHECK(cache.load(keyOf("a")) == kernel);
     CHECK_FALSE(cache.load(keyOf("b")));
     CHECK(fixture.files() == 1);
-    CHECK((fs::status(cache.path(keyOf("a"))).permissions() & fs::perms::all) == (fs::perms::owner_read | fs::perms::owner_write));
+    CHECK((fs::status(cache.path(keyOf("a"))).permissions() & fs::perms::all) ==
+          (fs::perms::owner_read | fs::perms::owner_write));
 
     // Another process, later.
     CHECK(fixture.cache().load(keyOf("a")) == kernel);
@@ -156,7 +160,8 @@ TEST_CASE("only its own files are counted and removed", "[cache]") {
     std::ofstream(fixture.directory / "notes.txt") << std::string(10'000, 'n');
     std::ofstream(fixture.directory / "young.crttmp") << "being written";
     std::ofstream(fixture.directory / "old.crttmp") << "left behind";
-    fs::last_write_time(fixture.directory / "old.crttmp", fs::file_time_type::clock::now() - std::chrono::hours(2));
+    fs::last_write_time(fixture.directory / "old.crttmp",
+                        fs::file_time_type::clock::now() - std::chrono::hours(2));
 
     const Bytes kernel = bytes(1500, 9);
     REQUIRE(cache.store(keyOf("a"), kernel.data(), kernel.size()));
@@ -192,5 +197,6 @@ TEST_CASE("many writers and readers share a directory", "[cache]") {
     CHECK(torn == 0);
     CHECK(hits > 0);
     CHECK(fixture.files() <= kernels);
-    for (const fs::directory_entry& file : fs::directory_iterator(fixture.directory.path())) CHECK(file.path().extension() == ".crtkernel");
+    for (const fs::directory_entry& file : fs::directory_iterator(fixture.directory.path()))
+        CHECK(file.path().extension() == ".crtkernel");
 }

@@ -1,4 +1,5 @@
-// kernel/math.h against long double and exact integers: what its comments promise in ulps, signs that must be exact, sums that lose nothing.
+// kernel/math.h against long double and exact integers: what its comments promise in ulps, signs that must
+// be exact, sums that lose nothing.
 #include "kernel_test.h"
 
 #include <algorithm>
@@ -15,7 +16,8 @@ double ulps(f32 computed, long double exact) {
     if (exact == 0) return computed == 0 ? 0 : HUGE_VAL;
     int exponent = 0;
     std::frexp(std::abs(exact), &exponent);
-    return static_cast<double>(std::abs(static_cast<long double>(computed) - exact) / std::ldexp(1.0L, std::max(exponent, -125) - 24));
+    return static_cast<double>(std::abs(static_cast<long double>(computed) - exact) /
+                               std::ldexp(1.0L, std::max(exponent, -125) - 24));
 }
 
 /// Calls f for every `stride`-th float in [lower, upper], and for upper.
@@ -26,7 +28,9 @@ void forFloats(f32 lower, f32 upper, u32 stride, F f) {
 }
 
 f32 randomFloat(Random& random, int lowest_exponent, int highest_exponent) {
-    const int exponent = lowest_exponent + static_cast<int>(random.below(static_cast<u32>(highest_exponent - lowest_exponent + 1)));
+    const int exponent =
+        lowest_exponent +
+        static_cast<int>(random.below(static_cast<u32>(highest_exponent - lowest_exponent + 1)));
     const f32 x = std::ldexp(1.0f + static_cast<f32>(random.bits() >> 41) * 0x1p-23f, exponent);
     return random.bits() & 1 ? -x : x;
 }
@@ -38,7 +42,8 @@ TEST_CASE("sine and cosine of up to a quarter turn's half: below 1 ulp", "[kerne
     forFloats(0x1p-20f, static_cast<f32>(kPi / 4), 61, [&](f32 x) {
         sine = std::max(sine, ulps(crt_sin_quarter(x), std::sin(static_cast<long double>(x))));
         cosine = std::max(cosine, ulps(crt_cos_quarter(x), std::cos(static_cast<long double>(x))));
-        if (crt_sin_quarter(-x) != -crt_sin_quarter(x) || crt_cos_quarter(-x) != crt_cos_quarter(x)) FAIL("not odd, not even at " << x);
+        if (crt_sin_quarter(-x) != -crt_sin_quarter(x) || crt_cos_quarter(-x) != crt_cos_quarter(x))
+            FAIL("not odd, not even at " << x);
     });
     CHECK(sine < 0.74);
     CHECK(cosine < 0.88);
@@ -54,7 +59,8 @@ TEST_CASE("sine and cosine of ten turns either way: 7.8e-8", "[kernel][math]") {
     const auto check = [&](f32 x) {
         f32 cosine = 0;
         const f32 sine = crt_sincos(x, &cosine);
-        worst = std::max({worst, std::abs(sine - std::sin(static_cast<double>(x))), std::abs(cosine - std::cos(static_cast<double>(x)))});
+        worst = std::max({worst, std::abs(sine - std::sin(static_cast<double>(x))),
+                          std::abs(cosine - std::cos(static_cast<double>(x)))});
     };
     forFloats(0x1p-20f, 63.999996f, 61, [&](f32 x) {
         check(x);
@@ -71,7 +77,9 @@ TEST_CASE("sine and cosine of ten turns either way: 7.8e-8", "[kernel][math]") {
 
 TEST_CASE("arc tangent of up to 1, and of two numbers: the ulps that are promised", "[kernel][math]") {
     double worst = 0;
-    forFloats(0x1p-20f, 1.0f, 61, [&](f32 x) { worst = std::max(worst, ulps(crt_atan_unit(x), std::atan(static_cast<long double>(x)))); });
+    forFloats(0x1p-20f, 1.0f, 61, [&](f32 x) {
+        worst = std::max(worst, ulps(crt_atan_unit(x), std::atan(static_cast<long double>(x))));
+    });
     CHECK(worst < 2.81);
     CHECK(ulps(crt_atan_unit(0x1.ba7036p-2f), std::atan(0x1.ba7036p-2L)) == Approx(2.8043).margin(1e-4));
 
@@ -81,7 +89,8 @@ TEST_CASE("arc tangent of up to 1, and of two numbers: the ulps that are promise
         const int e = static_cast<int>(random.below(61)) - 30;
         const f32 y = randomFloat(random, e, e);
         const f32 x = i & 1 ? randomFloat(random, e - 2, e + 2) : randomFloat(random, -30, 30);
-        worst = std::max(worst, ulps(crt_atan2(y, x), std::atan2(static_cast<long double>(y), static_cast<long double>(x))));
+        worst = std::max(worst, ulps(crt_atan2(y, x),
+                                     std::atan2(static_cast<long double>(y), static_cast<long double>(x))));
     }
     CHECK(worst < 3.5);
     CHECK(crt_atan2(0.0f, 0.0f) == 0.0f);
@@ -107,7 +116,8 @@ TEST_CASE("a difference of products has the exact sign, and an error of at most 
             for (u32 n = random.below(4); n > 0; --n) d = crt_next_down(d);
             if (i % 3 == 2) std::swap(c, d);
         }
-        const long double exact = static_cast<long double>(static_cast<double>(a) * b) - static_cast<long double>(static_cast<double>(c) * d);
+        const long double exact = static_cast<long double>(static_cast<double>(a) * b) -
+                                  static_cast<long double>(static_cast<double>(c) * d);
         const f32 computed = crt_difference_of_products(a, b, c, d);
         const int sign = (exact > 0) - (exact < 0);
         wrong_signs += ((computed > 0) - (computed < 0)) != sign;
@@ -137,7 +147,8 @@ TEST_CASE("the cross product of float vectors is right in every component", "[ke
 
 TEST_CASE("the next float up and down", "[kernel][math]") {
     Random random(4);
-    std::vector<f32> numbers{0.0f, -0.0f, FLT_TRUE_MIN, -FLT_TRUE_MIN, FLT_MIN, -FLT_MIN, 1.0f, -1.0f, FLT_MAX, -FLT_MAX};
+    std::vector<f32> numbers{0.0f,     -0.0f, FLT_TRUE_MIN, -FLT_TRUE_MIN, FLT_MIN,
+                             -FLT_MIN, 1.0f,  -1.0f,        FLT_MAX,       -FLT_MAX};
     for (int i = 0; i < 100000; ++i) {
         const f32 x = crt_from_bits(static_cast<u32>(random.bits()));
         if (crt_is_finite(x)) numbers.push_back(x);
@@ -161,7 +172,8 @@ TEST_CASE("finite means finite", "[kernel][math]") {
 
 TEST_CASE("frames are orthonormal, right-handed, and carry z to the normal", "[kernel][math]") {
     Random random(5);
-    std::vector<crt::Vec3d> normals{{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {1, 0, -0.0}};
+    std::vector<crt::Vec3d> normals{{0, 0, 1}, {0, 0, -1}, {1, 0, 0},   {-1, 0, 0},
+                                    {0, 1, 0}, {0, -1, 0}, {1, 0, -0.0}};
     for (int i = 0; i < 300000; ++i) normals.push_back(random.direction());
     // Around −z, where older constructions lost their digits.
     for (int i = 0; i < 100000; ++i) {
@@ -172,9 +184,11 @@ TEST_CASE("frames are orthonormal, right-handed, and carry z to the normal", "[k
     for (const crt::Vec3d& normal : normals) {
         const vec3 n = toFloat(normal);
         const CrtFrame f = crt_frame(n);
-        const crt::Vec3d s = toDouble(f.s), t = toDouble(f.t), m = toDouble(n), handed = minus(cross(s, t), m);
-        worst = std::max({worst, std::abs(dot(s, s) - 1), std::abs(dot(t, t) - 1), std::abs(dot(s, t)), std::abs(dot(s, m)), std::abs(dot(t, m)),
-                          length(handed), length(minus(toDouble(crt_to_world(f, make_vec3(0, 0, 1))), m))});
+        const crt::Vec3d s = toDouble(f.s), t = toDouble(f.t), m = toDouble(n),
+                         handed = minus(cross(s, t), m);
+        worst = std::max({worst, std::abs(dot(s, s) - 1), std::abs(dot(t, t) - 1), std::abs(dot(s, t)),
+                          std::abs(dot(s, m)), std::abs(dot(t, m)), length(handed),
+                          length(minus(toDouble(crt_to_world(f, make_vec3(0, 0, 1))), m))});
     }
     CHECK(worst < 4e-7);
 }
@@ -190,7 +204,8 @@ TEST_CASE("the concentric map stays in the disk, is uniform, and keeps strata to
     const f32 last = crt_unit(0xffffffffu), first = crt_unit(0);
     for (u32 i = 0; i < 1u << 16; ++i) {
         const f32 v = crt_unit(i << 16 | i);
-        for (const CrtRandom2 p : {at(first, v), at(last, v), at(v, first), at(v, last), at(v, v), at(v, 1.0f - v)})
+        for (const CrtRandom2 p :
+             {at(first, v), at(last, v), at(v, first), at(v, last), at(v, v), at(v, 1.0f - v)})
             farthest = std::max(farthest, static_cast<double>(p.x) * p.x + static_cast<double>(p.y) * p.y);
     }
     CHECK(farthest <= 1.0);
@@ -205,7 +220,8 @@ TEST_CASE("the concentric map stays in the disk, is uniform, and keeps strata to
         const CrtRandom2 p = crt_concentric_disk(u);
         const double r2 = static_cast<double>(p.x) * p.x + static_cast<double>(p.y) * p.y;
         const double turn = (std::atan2(p.y, p.x) + kPi) / (2 * kPi);
-        ++bins[std::min<std::size_t>(15, static_cast<std::size_t>(r2 * 16)) * 64 + std::min<std::size_t>(63, static_cast<std::size_t>(turn * 64))];
+        ++bins[std::min<std::size_t>(15, static_cast<std::size_t>(r2 * 16)) * 64 +
+               std::min<std::size_t>(63, static_cast<std::size_t>(turn * 64))];
         // Points 1e-4 apart in the square are at most a few 1e-4 apart in the disk.
         const CrtRandom2 q = at(std::min(u.x + 1e-4f, last), u.y);
         largest_jump = std::max<double>(largest_jump, std::hypot(q.x - p.x, q.y - p.y));
@@ -245,7 +261,8 @@ TEST_CASE("long sums are exact, in any order", "[kernel][math]") {
         magnitude += v;
     }
     const CrtSum s = sum();
-    const __int128 error = static_cast<__int128>(s.hi * 0x1p60) + static_cast<__int128>(s.lo * 0x1p60) - exact;
+    const __int128 error =
+        static_cast<__int128>(s.hi * 0x1p60) + static_cast<__int128>(s.lo * 0x1p60) - exact;
     CHECK(std::abs(static_cast<double>(error)) * 0x1p-60 <= 1000 * 0x1p-106 * magnitude);
     // What a plain sum loses.
     const CrtSum tiny = crt_sum_add(crt_sum_add(crt_sum_add(CrtSum{0, 0}, 1e16), 1.0), -1e16);

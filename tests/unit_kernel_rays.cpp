@@ -1,11 +1,11 @@
-// Rays against triangles, alone, eight at a time, through boxes and trees: nothing leaks through an edge, nothing is culled that would be hit,
-// and a ray that leaves a surface meets neither it nor the world behind the wall. An executable of its own, compiled for AVX2 like the
-// kernels of the Embree backend.
+// Rays against triangles, alone, eight at a time, through boxes and trees: nothing leaks through an edge,
+// nothing is culled that would be hit, and a ray that leaves a surface meets neither it nor the world behind
+// the wall. An executable of its own, compiled for AVX2 like the kernels of the Embree backend.
 #include "kernel_test.h"
 
 #include "compile/bvh_build.h"
-#include "scene/mesh/mesh_io.h"
 #include "judge/verify/shapes.h"
+#include "scene/mesh/mesh_io.h"
 
 #include <algorithm>
 #include <array>
@@ -31,7 +31,8 @@ Mesh soup(Random& random, std::uint32_t count) {
     for (std::uint32_t i = 0; i < count; ++i) {
         const Vec3d p{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
         const double size = std::pow(10.0, random.uniform(-3, 0));
-        const Vec3d a = times(random.direction(), size), b = times(random.direction(), size * std::pow(10.0, random.uniform(-3, 0)));
+        const Vec3d a = times(random.direction(), size),
+                    b = times(random.direction(), size * std::pow(10.0, random.uniform(-3, 0)));
         // Some lie in planes of constant x, y or z: their boxes are flat.
         const auto flatten = [&](Vec3d v) {
             if (i % 4 < 3) v[i % 4] = 0;
@@ -51,7 +52,8 @@ CrtRay rayOf(vec3 o, vec3 d, f32 reach = CRT_INFINITY) {
 }
 
 bool sameBits(const CrtHit& a, const CrtHit& b) {
-    return a.id == b.id && crt_bits(a.t) == crt_bits(b.t) && crt_bits(a.b1) == crt_bits(b.b1) && crt_bits(a.b2) == crt_bits(b.b2);
+    return a.id == b.id && crt_bits(a.t) == crt_bits(b.t) && crt_bits(a.b1) == crt_bits(b.b1) &&
+           crt_bits(a.b2) == crt_bits(b.b2);
 }
 
 /// The portable loop: every slot in turn, one at a time.
@@ -59,7 +61,8 @@ CrtHit oneByOne(const CrtContext& ctx, CrtRay ray) {
     const auto* triangles = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles);
     const CrtShear shear = crt_shear(ray);
     CrtHit best = crt_no_hit(ray.reach);
-    for (u32 slot = 0; slot < ctx.scene->triangle_count; ++slot) crt_test_closest(triangles, slot, shear, &best);
+    for (u32 slot = 0; slot < ctx.scene->triangle_count; ++slot)
+        crt_test_closest(triangles, slot, shear, &best);
     return best;
 }
 
@@ -67,8 +70,12 @@ CrtHit oneByOne(const CrtContext& ctx, CrtRay ray) {
 struct ThreeWays {
     crt::CompiledScene brute, bvh, boxes;
     explicit ThreeWays(const Mesh& mesh)
-        : brute(compiled(mesh, Accelerator::None)), bvh(compiled(mesh, Accelerator::Bvh)), boxes(compiled(mesh, Accelerator::Aabb)) {}
-    static crt::CompiledScene compiled(const Mesh& mesh, Accelerator accelerator) { return crt::compileScene(sceneOf(mesh, accelerator), 0); }
+        : brute(compiled(mesh, Accelerator::None)),
+          bvh(compiled(mesh, Accelerator::Bvh)),
+          boxes(compiled(mesh, Accelerator::Aabb)) {}
+    static crt::CompiledScene compiled(const Mesh& mesh, Accelerator accelerator) {
+        return crt::compileScene(sceneOf(mesh, accelerator), 0);
+    }
 };
 
 vec3 vertexOf(const CrtTriangle& t, u32 i) { return make_vec3(t.p[i], t.p[3 + i], t.p[6 + i]); }
@@ -76,7 +83,8 @@ vec3 vertexOf(const CrtTriangle& t, u32 i) { return make_vec3(t.p[i], t.p[3 + i]
 /// A point of the triangle: a vertex, a point of an edge, or any, in float.
 vec3 aimAt(const CrtTriangle& t, int how, Random& random) {
     const u32 i = random.below(3);
-    const Vec3d a = toDouble(vertexOf(t, i)), b = toDouble(vertexOf(t, (i + 1) % 3)), c = toDouble(vertexOf(t, (i + 2) % 3));
+    const Vec3d a = toDouble(vertexOf(t, i)), b = toDouble(vertexOf(t, (i + 1) % 3)),
+                c = toDouble(vertexOf(t, (i + 2) % 3));
     if (how == 0) return toFloat(a);
     if (how == 1) return toFloat(plus(a, times(minus(b, a), random.uniform())));
     const double u = std::sqrt(random.uniform()), v = random.uniform();
@@ -84,8 +92,8 @@ vec3 aimAt(const CrtTriangle& t, int how, Random& random) {
 }
 const char* const kHow[] = {"vertices", "edges", "faces"};
 
-/// Rays of every awkward kind into a scene within ±1. `like_a_path`: only those of which the paths of an integrator have some, of unit length
-/// and from nowhere on a triangle.
+/// Rays of every awkward kind into a scene within ±1. `like_a_path`: only those of which the paths of an
+/// integrator have some, of unit length and from nowhere on a triangle.
 CrtRay awkwardRay(const CrtContext& ctx, Random& random, bool like_a_path) {
     const auto* triangles = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles);
     const CrtTriangle& target = triangles[random.below(ctx.scene->triangle_count)];
@@ -96,10 +104,11 @@ CrtRay awkwardRay(const CrtContext& ctx, Random& random, bool like_a_path) {
         case 1: o = plus(o, times(random.direction(), 50)); break;
         case 6: o = toDouble(aimAt(target, 2, random)); break;          // along the triangle's own plane
         case 7: o = toDouble(aimAt(triangles[random.below(ctx.scene->triangle_count)], 0, random)); break;
-        case 2:                                                         // along an axis, in the plane of the target, with either zero
+        case 2:  // along an axis, in the plane of the target, with either zero
         case 3: {
             const u32 axis = random.below(3);
-            Vec3d d{random.bits() & 1 ? 0.0 : -0.0, random.bits() & 1 ? 0.0 : -0.0, random.bits() & 1 ? 0.0 : -0.0};
+            Vec3d d{random.bits() & 1 ? 0.0 : -0.0, random.bits() & 1 ? 0.0 : -0.0,
+                    random.bits() & 1 ? 0.0 : -0.0};
             d[axis] = random.bits() & 1 ? 1 : -1;
             o = minus(toDouble(aim), times(d, random.uniform(0, 2)));
             return rayOf(toFloat(o), toFloat(d));
@@ -117,9 +126,11 @@ CrtRay awkwardRay(const CrtContext& ctx, Random& random, bool like_a_path) {
     return rayOf(toFloat(o), like_a_path || random.bits() & 1 ? unitFloat(d) : toFloat(d));
 }
 
-/// How often tracing through the tree, the objects' boxes and eight triangles at a time differs from one triangle after another.
+/// How often tracing through the tree, the objects' boxes and eight triangles at a time differs from one
+/// triangle after another.
 std::uint64_t disagreements(const ThreeWays& scene, Random& random, int rays, std::uint64_t* hits) {
-    const CrtContext brute = contextOf(scene.brute), bvh = contextOf(scene.bvh), boxes = contextOf(scene.boxes);
+    const CrtContext brute = contextOf(scene.brute), bvh = contextOf(scene.bvh),
+                     boxes = contextOf(scene.boxes);
     std::uint64_t wrong = 0;
     for (int i = 0; i < rays; ++i) {
         const bool like_a_path = i % 2 == 0;
@@ -131,7 +142,8 @@ std::uint64_t disagreements(const ThreeWays& scene, Random& random, int rays, st
         wrong += !sameBits(expected, crt_bvh_closest(&bvh, ray));
         wrong += !sameBits(expected, crt_aabb_closest(&boxes, ray));
         // Any hit up to somewhere before or behind the nearest.
-        ray.reach = expected.slot == CRT_NONE ? CRT_INFINITY : expected.t * static_cast<f32>(random.uniform(0.5, 1.5));
+        ray.reach = expected.slot == CRT_NONE ? CRT_INFINITY
+                                              : expected.t * static_cast<f32>(random.uniform(0.5, 1.5));
         const int any = expected.slot != CRT_NONE && expected.t < ray.reach;
         wrong += crt_bvh_any(&bvh, ray) != any;
         wrong += crt_aabb_any(&boxes, ray) != any;
@@ -139,9 +151,11 @@ std::uint64_t disagreements(const ThreeWays& scene, Random& random, int rays, st
     return wrong;
 }
 
-/// Shadow rays, from above one triangle to just before another: how often one triangle after another and the four ways disagree.
+/// Shadow rays, from above one triangle to just before another: how often one triangle after another and the
+/// four ways disagree.
 std::uint64_t shadowDisagreements(const ThreeWays& scene, Random& random, int rays, std::uint64_t* hits) {
-    const CrtContext brute = contextOf(scene.brute), bvh = contextOf(scene.bvh), boxes = contextOf(scene.boxes);
+    const CrtContext brute = contextOf(scene.brute), bvh = contextOf(scene.bvh),
+                     boxes = contextOf(scene.boxes);
     const auto* triangles = CRT_ARRAY(CrtTriangle, brute.blob, brute.scene->triangles);
     std::uint64_t wrong = 0;
     for (int i = 0; i < rays; ++i) {
@@ -173,16 +187,20 @@ TEST_CASE("nothing leaks: rays at vertices, edges and faces from inside closed s
         const char* what;
         Vec3d centre;
         double radius;
-        bool company;  // a far triangle keeps the sphere away from the scene's centre, where floats are coarse
+        bool company;  // a far triangle keeps the sphere away from the scene's centre, where floats are
+                       // coarse
     };
-    for (const Place& place : {Place{"at the origin", {0, 0, 0}, 1, false}, Place{"far away", kFarPlace, 100, false},
-                               Place{"far from the scene's centre", kFarPlace, 100, true}}) {
+    for (const Place& place :
+         {Place{"at the origin", {0, 0, 0}, 1, false}, Place{"far away", kFarPlace, 100, false},
+          Place{"far from the scene's centre", kFarPlace, 100, true}}) {
         for (const bool tree : {false, true}) {
             Mesh mesh = icosphere(tree ? 5 : 2, place.radius, place.centre);
             const auto closed = static_cast<u32>(mesh.triangles.size());
             if (place.company)
-                addTriangle(mesh, times(place.centre, -1), plus(times(place.centre, -1), {1, 0, 0}), plus(times(place.centre, -1), {0, 1, 0}));
-            const crt::CompiledScene compiled = crt::compileScene(sceneOf(mesh, tree ? Accelerator::Bvh : Accelerator::None), 0);
+                addTriangle(mesh, times(place.centre, -1), plus(times(place.centre, -1), {1, 0, 0}),
+                            plus(times(place.centre, -1), {0, 1, 0}));
+            const crt::CompiledScene compiled =
+                crt::compileScene(sceneOf(mesh, tree ? Accelerator::Bvh : Accelerator::None), 0);
             const CrtContext ctx = contextOf(compiled);
             const auto* triangles = arrayOf<CrtTriangle>(compiled, ctx.scene->triangles);
             const double scale = std::ldexp(1.0, compiled.scale_exponent);
@@ -192,14 +210,17 @@ TEST_CASE("nothing leaks: rays at vertices, edges and faces from inside closed s
                 std::uint64_t misses = 0;
                 for (int i = 0; i < 350000; ++i) {
                     // Every third from one point, as a camera's.
-                    const Vec3d from = plus(centre, times(random.direction(), i % 3 == 0 ? 0 : 0.5 * place.radius * scale * random.uniform()));
+                    const Vec3d from =
+                        plus(centre, times(random.direction(),
+                                           i % 3 == 0 ? 0 : 0.5 * place.radius * scale * random.uniform()));
                     u32 slot = 0;
                     do slot = random.below(compiled.triangles ? static_cast<u32>(compiled.triangles) : 1u);
                     while (triangles[slot].id >= closed);
                     const vec3 o = toFloat(from);
                     const Vec3d d = minus(toDouble(aimAt(triangles[slot], how, random)), toDouble(o));
                     const CrtRay ray = rayOf(o, i & 1 ? unitFloat(d) : toFloat(d));
-                    const CrtHit hit = tree ? crt_bvh_closest(&ctx, ray) : crt_brute_force_closest(&ctx, ray);
+                    const CrtHit hit =
+                        tree ? crt_bvh_closest(&ctx, ray) : crt_brute_force_closest(&ctx, ray);
                     misses += hit.slot == CRT_NONE || hit.id >= closed;
                 }
                 INFO(place.what << ", " << (tree ? "BVH" : "brute force") << ", rays at " << kHow[how]);
@@ -298,8 +319,10 @@ TEST_CASE("and on the meshes that crt makes", "[kernel][rays]") {
     Random random(22);
     std::uint64_t hits = 0;
     for (const char* name : {"sphere", "prism", "figure", "dragon"}) {
-        const crt::LoadedMesh file = crt::loadObj(std::string(CRT_BUILD_DIR) + "/share/crt/meshes/" + name + ".obj");
-        const int rays = static_cast<int>(std::min<std::size_t>(10000, 20000000 / file.mesh.triangles.size()));
+        const crt::LoadedMesh file =
+            crt::loadObj(std::string(CRT_BUILD_DIR) + "/share/crt/meshes/" + name + ".obj");
+        const int rays =
+            static_cast<int>(std::min<std::size_t>(10000, 20000000 / file.mesh.triangles.size()));
         INFO(name);
         CHECK(disagreements(ThreeWays(file.mesh), random, rays, &hits) == 0);
     }
@@ -308,7 +331,8 @@ TEST_CASE("and on the meshes that crt makes", "[kernel][rays]") {
 
 TEST_CASE("a box that is touched is entered: exact fractions decide", "[kernel][rays]") {
     Random random(23);
-    std::uint64_t culled = 0, touched_count = 0, node_differs = 0, entered_untouched = 0, untouched_count = 0;
+    std::uint64_t culled = 0, touched_count = 0, node_differs = 0, entered_untouched = 0,
+                  untouched_count = 0;
     const auto zero = [&] { return random.bits() & 1 ? 0.0f : -0.0f; };
     for (int i = 0; i < 2000000; ++i) {
         // Eighths between −1 and 1 and small whole directions: numbers whose fractions compare exactly.
@@ -316,8 +340,11 @@ TEST_CASE("a box that is touched is entered: exact fractions decide", "[kernel][
         f32 box_lower[3], box_upper[3], ray_d[3];
         for (int k = 0; k < 3; ++k) {
             lower[k] = static_cast<int>(random.below(17)) - 8;
-            upper[k] = random.below(3) == 0 ? lower[k] : lower[k] + static_cast<int>(random.below(static_cast<u32>(9 - lower[k])));
-            o[k] = random.below(3) == 0 ? (random.bits() & 1 ? lower[k] : upper[k]) : static_cast<int>(random.below(33)) - 16;
+            upper[k] = random.below(3) == 0
+                           ? lower[k]
+                           : lower[k] + static_cast<int>(random.below(static_cast<u32>(9 - lower[k])));
+            o[k] = random.below(3) == 0 ? (random.bits() & 1 ? lower[k] : upper[k])
+                                        : static_cast<int>(random.below(33)) - 16;
             d[k] = random.below(2) ? 0 : static_cast<int>(random.below(7)) - 3;
             box_lower[k] = static_cast<f32>(lower[k]) / 8;
             box_upper[k] = static_cast<f32>(upper[k]) / 8;
@@ -333,13 +360,15 @@ TEST_CASE("a box that is touched is entered: exact fractions decide", "[kernel][
                 continue;
             }
             const long sign = d[k] > 0 ? 1 : -1, denominator = sign * d[k];
-            const long near = sign * ((d[k] > 0 ? lower[k] : upper[k]) - o[k]), far = sign * ((d[k] > 0 ? upper[k] : lower[k]) - o[k]);
+            const long near = sign * ((d[k] > 0 ? lower[k] : upper[k]) - o[k]),
+                       far = sign * ((d[k] > 0 ? upper[k] : lower[k]) - o[k]);
             if (near * enter_d > enter_n * denominator) enter_n = near, enter_d = denominator;
             if (far * leave_d < leave_n * denominator) leave_n = far, leave_d = denominator;
         }
         touched &= enter_n * leave_d <= leave_n * enter_d;
-        const CrtRay ray = rayOf(make_vec3(static_cast<f32>(o[0]) / 8, static_cast<f32>(o[1]) / 8, static_cast<f32>(o[2]) / 8),
-                                 make_vec3(ray_d[0], ray_d[1], ray_d[2]));
+        const CrtRay ray = rayOf(
+            make_vec3(static_cast<f32>(o[0]) / 8, static_cast<f32>(o[1]) / 8, static_cast<f32>(o[2]) / 8),
+            make_vec3(ray_d[0], ray_d[1], ray_d[2]));
         const CrtSlab slab = crt_slab(ray);
         const f32 t = crt_box(box_lower, box_upper, ray, slab, CRT_INFINITY);
         CrtNode4 node{};
@@ -349,7 +378,8 @@ TEST_CASE("a box that is touched is entered: exact fractions decide", "[kernel][
                 node.bounds[2 * k + 1][c] = c == 2 ? box_upper[k] : -CRT_INFINITY;
             }
         const vec4 four = crt_node_distances(&node, ray, slab, CRT_INFINITY);
-        node_differs += crt_bits(V4Z(four)) != crt_bits(t) || V4X(four) < CRT_INFINITY || V4Y(four) < CRT_INFINITY || V4W(four) < CRT_INFINITY;
+        node_differs += crt_bits(V4Z(four)) != crt_bits(t) || V4X(four) < CRT_INFINITY ||
+                        V4Y(four) < CRT_INFINITY || V4W(four) < CRT_INFINITY;
         touched_count += touched;
         untouched_count += !touched;
         culled += touched && !(t < CRT_INFINITY);
@@ -365,30 +395,36 @@ TEST_CASE("a box that is touched is entered: exact fractions decide", "[kernel][
 
 TEST_CASE("rays that are none hit nothing, and end", "[kernel][rays]") {
     const ThreeWays scene(icosphere(4, 1, {0, 0, 0}));
-    const CrtContext brute = contextOf(scene.brute), bvh = contextOf(scene.bvh), boxes = contextOf(scene.boxes);
+    const CrtContext brute = contextOf(scene.brute), bvh = contextOf(scene.bvh),
+                     boxes = contextOf(scene.boxes);
     const f32 nan = std::nanf(""), inf = CRT_INFINITY;
     std::vector<CrtRay> rays;
     for (const f32 bad : {nan, inf, -inf})
         for (u32 mask = 1; mask < 64; ++mask) {
             const auto at = [&](u32 bit, f32 good) { return mask >> bit & 1 ? bad : good; };
-            rays.push_back(rayOf(make_vec3(at(0, 0.1f), at(1, 0.2f), at(2, 0.3f)), make_vec3(at(3, 0.5f), at(4, 0.0f), at(5, -0.7f))));
+            rays.push_back(rayOf(make_vec3(at(0, 0.1f), at(1, 0.2f), at(2, 0.3f)),
+                                 make_vec3(at(3, 0.5f), at(4, 0.0f), at(5, -0.7f))));
         }
-    for (const f32 zero : {0.0f, -0.0f}) rays.push_back(rayOf(make_vec3(0.1f, 0.2f, 0.3f), make_vec3(zero, zero, zero)));
+    for (const f32 zero : {0.0f, -0.0f})
+        rays.push_back(rayOf(make_vec3(0.1f, 0.2f, 0.3f), make_vec3(zero, zero, zero)));
     rays.push_back(rayOf(make_vec3(0.1f, 0.2f, 0.3f), make_vec3(FLT_TRUE_MIN, 0, 0)));
     // Real directions, but no way to go.
-    for (const f32 reach : {0.0f, -1.0f, -inf}) rays.push_back(rayOf(make_vec3(0, 0, 0), make_vec3(0, 0, 1), reach));
+    for (const f32 reach : {0.0f, -1.0f, -inf})
+        rays.push_back(rayOf(make_vec3(0, 0, 0), make_vec3(0, 0, 1), reach));
     std::uint64_t hits = 0;
     for (const CrtRay& ray : rays) {
         hits += crt_brute_force_closest(&brute, ray).slot != CRT_NONE;
         hits += crt_bvh_closest(&bvh, ray).slot != CRT_NONE;
         hits += crt_aabb_closest(&boxes, ray).slot != CRT_NONE;
-        hits += static_cast<std::uint64_t>(crt_brute_force_any(&brute, ray) + crt_bvh_any(&bvh, ray) + crt_aabb_any(&boxes, ray));
+        hits += static_cast<std::uint64_t>(crt_brute_force_any(&brute, ray) + crt_bvh_any(&bvh, ray) +
+                                           crt_aabb_any(&boxes, ray));
     }
     CHECK(hits == 0);
     // Directions of extreme but honest lengths do hit.
     for (const f32 length : {1e-18f, 1e-30f, 1e18f, 1e30f}) {
         INFO(length);
-        CHECK(crt_bvh_closest(&bvh, rayOf(make_vec3(0.1f, 0.2f, 0.3f), make_vec3(0.3f * length, 0, length))).slot != CRT_NONE);
+        CHECK(crt_bvh_closest(&bvh, rayOf(make_vec3(0.1f, 0.2f, 0.3f), make_vec3(0.3f * length, 0, length)))
+                  .slot != CRT_NONE);
     }
 }
 
@@ -396,16 +432,22 @@ TEST_CASE("triangles without area are never hit", "[kernel][rays]") {
     Random random(24);
     Mesh mesh;
     for (int i = 0; i < 2000; ++i) {
-        const Vec3d a = times(random.direction(), random.uniform()), b = times(random.direction(), random.uniform());
+        const Vec3d a = times(random.direction(), random.uniform()),
+                    b = times(random.direction(), random.uniform());
         switch (i % 4) {
             case 0: addTriangle(mesh, a, a, a); break;
             case 1: addTriangle(mesh, a, b, b); break;
             case 2: addTriangle(mesh, a, b, a); break;
             // Three points of one line, exactly.
             default: {
-                const Vec3d step{std::ldexp(std::round(a[0] * 64), -12), std::ldexp(std::round(a[1] * 64), -12), std::ldexp(std::round(a[2] * 64), -12)};
-                const Vec3d start{std::ldexp(std::round(b[0] * 512), -10), std::ldexp(std::round(b[1] * 512), -10), std::ldexp(std::round(b[2] * 512), -10)};
-                addTriangle(mesh, start, plus(start, times(step, 1 + random.below(5))), plus(start, times(step, -3)));
+                const Vec3d step{std::ldexp(std::round(a[0] * 64), -12),
+                                 std::ldexp(std::round(a[1] * 64), -12),
+                                 std::ldexp(std::round(a[2] * 64), -12)};
+                const Vec3d start{std::ldexp(std::round(b[0] * 512), -10),
+                                  std::ldexp(std::round(b[1] * 512), -10),
+                                  std::ldexp(std::round(b[2] * 512), -10)};
+                addTriangle(mesh, start, plus(start, times(step, 1 + random.below(5))),
+                            plus(start, times(step, -3)));
             }
         }
     }
@@ -418,10 +460,13 @@ TEST_CASE("triangles without area are never hit", "[kernel][rays]") {
             // At the places where they would be.
             const auto& t = mesh.triangles[random.below(2000)];
             const Vec3d p = mesh.positions[t[0]], q = mesh.positions[t[random.below(2) + 1]];
-            const Vec3d target = times(minus(plus(p, times(minus(q, p), random.uniform())), compiled.centre), scale);
+            const Vec3d target =
+                times(minus(plus(p, times(minus(q, p), random.uniform())), compiled.centre), scale);
             const vec3 o = toFloat(times(random.direction(), 1.5));
             const CrtRay ray = rayOf(o, unitFloat(minus(toDouble(toFloat(target)), toDouble(o))));
-            hits += (accelerator == Accelerator::Bvh ? crt_bvh_closest(&ctx, ray) : crt_brute_force_closest(&ctx, ray)).slot != CRT_NONE;
+            hits += (accelerator == Accelerator::Bvh ? crt_bvh_closest(&ctx, ray)
+                                                     : crt_brute_force_closest(&ctx, ray))
+                        .slot != CRT_NONE;
         }
         CHECK(hits == 0);
     }
@@ -433,7 +478,8 @@ TEST_CASE("of triangles equally near, the first in the author's order is hit", "
     const Mesh distinct = soup(random, kDistinct);
     std::vector<std::uint32_t> order(kDistinct * kCopies);
     std::iota(order.begin(), order.end(), 0u);
-    for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(static_cast<u32>(i))]);
+    for (std::size_t i = order.size(); i > 1; --i)
+        std::swap(order[i - 1], order[random.below(static_cast<u32>(i))]);
     Mesh mesh = distinct;
     mesh.triangles.clear();
     std::vector<u32> first(kDistinct, CRT_NONE);
@@ -448,19 +494,23 @@ TEST_CASE("of triangles equally near, the first in the author's order is hit", "
         const CrtRay ray = awkwardRay(ctx, random, true);
         const CrtHit one = oneByOne(ctx, ray);
         if (one.slot == CRT_NONE) continue;
-        // Where two different triangles tie, the one whose first copy comes first wins; those rays go to the general comparison.
+        // Where two different triangles tie, the one whose first copy comes first wins; those rays go to the
+        // general comparison.
         ++hits;
-        const CrtContext bvh = contextOf(all.bvh), brute = contextOf(all.brute), boxes = contextOf(all.boxes);
+        const CrtContext bvh = contextOf(all.bvh), brute = contextOf(all.brute),
+                         boxes = contextOf(all.boxes);
         const CrtHit hit = oneByOne(brute, ray);
         wrong += hit.t != one.t || first[order[hit.id] % kDistinct] != hit.id;
-        wrong += !sameBits(hit, crt_bvh_closest(&bvh, ray)) || !sameBits(hit, crt_brute_force_closest(&brute, ray)) ||
+        wrong += !sameBits(hit, crt_bvh_closest(&bvh, ray)) ||
+                 !sameBits(hit, crt_brute_force_closest(&brute, ray)) ||
                  !sameBits(hit, crt_aabb_closest(&boxes, ray));
     }
     CHECK(wrong == 0);
     CHECK(hits > 5000);
 }
 
-TEST_CASE("a tree holds every triangle once, inside all boxes above it, within the kernel's stack", "[kernel][rays]") {
+TEST_CASE("a tree holds every triangle once, inside all boxes above it, within the kernel's stack",
+          "[kernel][rays]") {
     Random random(27);
     const auto check = [](const std::vector<crt::TriangleBounds>& triangles) {
         const crt::Bvh bvh = crt::buildBvh(triangles, 0.0f);
@@ -493,7 +543,9 @@ TEST_CASE("a tree holds every triangle once, inside all boxes above it, within t
                 for (u32 i = 0; i < count; ++i) {
                     const u32 id = bvh.order[first + i];
                     ++seen[id];
-                    for (u32 k = 0; k < 3; ++k) outside += triangles[id].lower[k] < box.lower[k] || triangles[id].upper[k] > box.upper[k];
+                    for (u32 k = 0; k < 3; ++k)
+                        outside +=
+                            triangles[id].lower[k] < box.lower[k] || triangles[id].upper[k] > box.upper[k];
                 }
             }
         }
@@ -511,11 +563,14 @@ TEST_CASE("a tree holds every triangle once, inside all boxes above it, within t
         INFO(count);
         check(triangles);
     }
-    // All the same; all on a line; nested, each half as large, to the end of the floats; one cluster inside another, to the end of the halvings.
+    // All the same; all on a line; nested, each half as large, to the end of the floats; one cluster inside
+    // another, to the end of the halvings.
     check(std::vector<crt::TriangleBounds>(100000, {{0, 0, 0}, {1, 1, 1}}));
     std::vector<crt::TriangleBounds> nested, line, clusters;
-    for (int i = 0; i < 120; ++i) nested.push_back({{0, 0, 0}, {std::ldexp(1.0f, -i), std::ldexp(1.0f, -i), std::ldexp(1.0f, -i)}});
-    for (int i = 0; i < 5000; ++i) line.push_back({{static_cast<f32>(i), 0, 0}, {static_cast<f32>(i), 0, 0}});
+    for (int i = 0; i < 120; ++i)
+        nested.push_back({{0, 0, 0}, {std::ldexp(1.0f, -i), std::ldexp(1.0f, -i), std::ldexp(1.0f, -i)}});
+    for (int i = 0; i < 5000; ++i)
+        line.push_back({{static_cast<f32>(i), 0, 0}, {static_cast<f32>(i), 0, 0}});
     for (int i = 0; i < 2000; ++i) {
         const f32 x = std::ldexp(1.0f, -i % 140);
         clusters.push_back({{x, 0, 0}, {x, 0, 0}});
@@ -525,7 +580,8 @@ TEST_CASE("a tree holds every triangle once, inside all boxes above it, within t
     check(clusters);
 }
 
-// ---------------------------------------------------------------------------------------------------------------- leaving a surface
+// ----------------------------------------------------------------------------------------------------------
+// leaving a surface
 
 namespace {
 
@@ -544,12 +600,13 @@ crt::Matrix4d placed(const Vec3d& scale, const Vec3d& axis, double angle, const 
     return m;
 }
 
-/// A closed box whose six faces are quads of their own, facing inwards, the ceiling alight; and, where asked for, a triangle far away that makes
-/// the scene's floats coarse around the box.
+/// A closed box whose six faces are quads of their own, facing inwards, the ceiling alight; and, where asked
+/// for, a triangle far away that makes the scene's floats coarse around the box.
 crt::Scene room(const Vec3d& scale, const Vec3d& axis, double angle, double far) {
-    const Vec3d corners[6][4] = {{{0, 0, 0}, {0, 0, 1}, {1, 0, 1}, {1, 0, 0}}, {{0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {0, 1, 1}},
-                                 {{0, 0, 0}, {0, 1, 0}, {0, 1, 1}, {0, 0, 1}}, {{1, 0, 0}, {1, 0, 1}, {1, 1, 1}, {1, 1, 0}},
-                                 {{0, 0, 1}, {0, 1, 1}, {1, 1, 1}, {1, 0, 1}}, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}};
+    const Vec3d corners[6][4] = {
+        {{0, 0, 0}, {0, 0, 1}, {1, 0, 1}, {1, 0, 0}}, {{0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {0, 1, 1}},
+        {{0, 0, 0}, {0, 1, 0}, {0, 1, 1}, {0, 0, 1}}, {{1, 0, 0}, {1, 0, 1}, {1, 1, 1}, {1, 1, 0}},
+        {{0, 0, 1}, {0, 1, 1}, {1, 1, 1}, {1, 0, 1}}, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}};
     crt::Scene scene;
     scene.camera.position = {0.5, 0.5, 0.2};
     scene.camera.target = {0.5, 0.5, 1};
@@ -568,7 +625,8 @@ crt::Scene room(const Vec3d& scale, const Vec3d& axis, double angle, double far)
     }
     if (far > 0) {
         Mesh mesh;
-        addTriangle(mesh, {far, 0.3 * far, -0.6 * far}, {far + 1, 0.3 * far, -0.6 * far}, {far, 0.3 * far + 1, -0.6 * far});
+        addTriangle(mesh, {far, 0.3 * far, -0.6 * far}, {far + 1, 0.3 * far, -0.6 * far},
+                    {far, 0.3 * far + 1, -0.6 * far});
         scene.meshes.push_back(mesh);
         scene.objects.emplace_back();
         scene.objects.back().mesh = 6;
@@ -580,7 +638,8 @@ struct Walk {
     std::uint64_t vertices = 0, escapes = 0, self_hits = 0, self_shadows = 0, dark = 0, lit = 0;
 };
 
-/// Diffuse bounces from wall to wall, and at each a shadow ray to the ceiling, from `share` of the clearance.
+/// Diffuse bounces from wall to wall, and at each a shadow ray to the ceiling, from `share` of the
+/// clearance.
 Walk walkIn(const crt::CompiledScene& compiled, std::uint64_t vertices, Random& random, f32 share = 1) {
     const CrtContext ctx = contextOf(compiled);
     const auto* triangles = arrayOf<CrtTriangle>(compiled, ctx.scene->triangles);
@@ -594,7 +653,8 @@ Walk walkIn(const crt::CompiledScene& compiled, std::uint64_t vertices, Random& 
             hit.id = triangles[hit.slot].id;
             const f32 tiny = static_cast<f32>(std::pow(10.0, random.uniform(-12, 0)));
             const u32 corner = random.below(3);
-            const f32 other = random.bits() & 1 ? tiny * 0.3f : static_cast<f32>(random.uniform(0, 1 - tiny));
+            const f32 other =
+                random.bits() & 1 ? tiny * 0.3f : static_cast<f32>(random.uniform(0, 1 - tiny));
             const f32 b[3] = {tiny, other, std::max(0.0f, 1 - tiny - other)};
             hit.b1 = b[corner];
             hit.b2 = b[(corner + 1) % 3];
@@ -603,7 +663,8 @@ Walk walkIn(const crt::CompiledScene& compiled, std::uint64_t vertices, Random& 
         const CrtSurface surface = crt_surface(&ctx, hit);
         const f32 clearance = surface.clearance * share;
         const vec3 ng = dot3(wo, surface.ng) > 0 ? surface.ng : -surface.ng;
-        CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, crt_seed(1, static_cast<u32>(random.bits())), 2, 3);
+        CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0,
+                                               crt_seed(1, static_cast<u32>(random.bits())), 2, 3);
         const CrtLightSample light = crt_sample_light(&ctx, &sampler, 0, surface.p);
         if (light.pdf > 0 && dot3(light.wi, ng) > 0) {
             const vec3 o = crt_offset_origin(surface.p, clearance, ng, light.wi);
@@ -619,7 +680,8 @@ Walk walkIn(const crt::CompiledScene& compiled, std::uint64_t vertices, Random& 
             continue;
         }
         const u32 left = hit.id;
-        hit = crt_brute_force_closest(&ctx, rayOf(crt_offset_origin(surface.p, clearance, surface.ng, scatter.wi), scatter.wi));
+        hit = crt_brute_force_closest(
+            &ctx, rayOf(crt_offset_origin(surface.p, clearance, surface.ng, scatter.wi), scatter.wi));
         walk.self_hits += hit.id == left;
         if (hit.slot == CRT_NONE || hit.id >= 12) {
             ++walk.escapes;
@@ -634,9 +696,10 @@ struct Room {
     Vec3d scale;
     double far;
 };
-const Room kRooms[] = {{{1, 1, 1}, 0},      {{1, 1, 1}, 1e3},     {{1, 1, 1}, 1e5},         {{100, 1, 1}, 0},
-                       {{100, 1, 1}, 1e4},  {{100, 1, 1}, 1e5},   {{10000, 1, 1}, 0},       {{10000, 1, 1}, 1e5},
-                       {{1e-3, 1, 1}, 0},   {{1, 1e-3, 1}, 100},  {{3e7, 2e7, 1e7}, 0},     {{0.7e-5, 1e-5, 2e-5}, 0}};
+const Room kRooms[] = {{{1, 1, 1}, 0},      {{1, 1, 1}, 1e3},     {{1, 1, 1}, 1e5},
+                       {{100, 1, 1}, 0},    {{100, 1, 1}, 1e4},   {{100, 1, 1}, 1e5},
+                       {{10000, 1, 1}, 0},  {{10000, 1, 1}, 1e5}, {{1e-3, 1, 1}, 0},
+                       {{1, 1e-3, 1}, 100}, {{3e7, 2e7, 1e7}, 0}, {{0.7e-5, 1e-5, 2e-5}, 0}};
 
 }  // namespace
 
@@ -646,9 +709,12 @@ TEST_CASE("no path leaves a closed room, and none meets the wall that it leaves"
     for (const Room& r : kRooms)
         for (int turn = 0; turn < 3; ++turn) {
             const crt::CompiledScene compiled =
-                crt::compileScene(room(r.scale, turn == 2 ? Vec3d{1, 2, 3} : Vec3d{0, 1, 0}, turn == 0 ? 0 : 33 * 3.14159265358979 / 180, r.far), 0);
+                crt::compileScene(room(r.scale, turn == 2 ? Vec3d{1, 2, 3} : Vec3d{0, 1, 0},
+                                       turn == 0 ? 0 : 33 * 3.14159265358979 / 180, r.far),
+                                  0);
             const Walk walk = walkIn(compiled, 60000, random);
-            INFO("room " << r.scale[0] << "×" << r.scale[1] << "×" << r.scale[2] << ", triangle at " << r.far << ", turn " << turn);
+            INFO("room " << r.scale[0] << "×" << r.scale[1] << "×" << r.scale[2] << ", triangle at " << r.far
+                         << ", turn " << turn);
             CHECK(walk.escapes == 0);
             CHECK(walk.self_hits == 0);
             CHECK(walk.self_shadows == 0);
@@ -658,7 +724,8 @@ TEST_CASE("no path leaves a closed room, and none meets the wall that it leaves"
         }
     CHECK(all.vertices > 2000000);
     CHECK(all.lit > 500000);
-    // A point of the ceiling's rim may round to just behind the wall that it meets there, and is then not seen from near that wall.
+    // A point of the ceiling's rim may round to just behind the wall that it meets there, and is then not
+    // seen from near that wall.
     CHECK(static_cast<double>(all.dark) < 2e-4 * static_cast<double>(all.lit));
 }
 
@@ -666,7 +733,8 @@ TEST_CASE("a ray starts on the side that it goes to, reflected or refracted", "[
     Random random(31);
     std::uint64_t wrong = 0;
     for (int i = 0; i < 2000; ++i) {
-        const crt::CompiledScene compiled = crt::compileScene(sceneOf(soup(random, 2), Accelerator::None), 0);
+        const crt::CompiledScene compiled =
+            crt::compileScene(sceneOf(soup(random, 2), Accelerator::None), 0);
         const CrtContext ctx = contextOf(compiled);
         for (int k = 0; k < 50; ++k) {
             CrtHit hit = crt_no_hit(CRT_INFINITY);
@@ -677,7 +745,8 @@ TEST_CASE("a ray starts on the side that it goes to, reflected or refracted", "[
             const vec3 w = toFloat(random.direction());
             const Vec3d o = toDouble(crt_offset_origin(surface.p, surface.clearance, surface.ng, w));
             const CrtTriangle& t = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles)[hit.slot];
-            const Vec3d a = toDouble(vertexOf(t, 0)), n = cross(minus(toDouble(vertexOf(t, 1)), a), minus(toDouble(vertexOf(t, 2)), a));
+            const Vec3d a = toDouble(vertexOf(t, 0)),
+                        n = cross(minus(toDouble(vertexOf(t, 1)), a), minus(toDouble(vertexOf(t, 2)), a));
             wrong += (dot(minus(o, a), n) > 0) != (dot(toDouble(w), n) > 0);
         }
     }
@@ -685,7 +754,8 @@ TEST_CASE("a ray starts on the side that it goes to, reflected or refracted", "[
 }
 
 TEST_CASE("parallel layers at 1e-5 of their size are seen", "[kernel][rays]") {
-    // An offset that is safe because it is large steps over the neighbour. From anywhere on the lower layer but its rim, the upper one is met.
+    // An offset that is safe because it is large steps over the neighbour. From anywhere on the lower layer
+    // but its rim, the upper one is met.
     Random random(29);
     std::uint64_t skipped = 0;
     constexpr double kGap = 1e-5;
@@ -717,7 +787,9 @@ TEST_CASE("a third of the clearance that rays are given would do", "[kernel][ray
     for (const Room& r : kRooms)
         for (int turn = 0; turn < 3; ++turn) {
             const crt::CompiledScene compiled =
-                crt::compileScene(room(r.scale, turn == 2 ? Vec3d{1, 2, 3} : Vec3d{0, 1, 0}, turn == 0 ? 0 : 33 * 3.14159265358979 / 180, r.far), 0);
+                crt::compileScene(room(r.scale, turn == 2 ? Vec3d{1, 2, 3} : Vec3d{0, 1, 0},
+                                       turn == 0 ? 0 : 33 * 3.14159265358979 / 180, r.far),
+                                  0);
             const Walk walk = walkIn(compiled, 60000, random, 1.0f / 3);
             failures += walk.escapes + walk.self_hits;
         }

@@ -1,5 +1,6 @@
-// kernel/sampler.h: Philox against its authors' known answers, Sobol against its definition, and of all three samplers what an integrator
-// counts on: uniform, never 0 or 1, and no dimension, pixel, sample or seed that knows of another.
+// kernel/sampler.h: Philox against its authors' known answers, Sobol against its definition, and of all
+// three samplers what an integrator counts on: uniform, never 0 or 1, and no dimension, pixel, sample or
+// seed that knows of another.
 #include "kernel_test.h"
 
 #include <algorithm>
@@ -15,7 +16,8 @@ constexpr u32 kKinds[] = {CRT_SAMPLER_SOBOL, CRT_SAMPLER_INDEPENDENT, CRT_SAMPLE
 const char* const kNames[] = {"sobol", "independent", "xorshift"};
 
 CrtSampler begin(u32 kind, std::uint64_t seed, u32 pixel, u64 sample) {
-    return crt_sampler_begin(kind, 0, crt_seed(static_cast<u32>(seed), static_cast<u32>(seed >> 32)), pixel, sample);
+    return crt_sampler_begin(kind, 0, crt_seed(static_cast<u32>(seed), static_cast<u32>(seed >> 32)), pixel,
+                             sample);
 }
 
 CrtRandom2 draw2(u32 kind, std::uint64_t seed, u32 pixel, u64 sample, u32 dimension) {
@@ -44,15 +46,19 @@ double correlation(const std::vector<double>& a, const std::vector<double>& b) {
     return ab / std::sqrt(aa * bb) * std::sqrt(n);
 }
 
-/// 2^m points of the square from sample index `first`, a multiple of 2^m: does every elementary interval hold exactly one?
+/// 2^m points of the square from sample index `first`, a multiple of 2^m: does every elementary interval
+/// hold exactly one?
 bool isNet(u32 m, std::uint64_t seed, u32 pixel, u64 first, u32 dimension) {
     std::vector<CrtRandom2> points;
-    for (u64 i = 0; i < (u64{1} << m); ++i) points.push_back(draw2(CRT_SAMPLER_SOBOL, seed, pixel, first + i, dimension));
+    for (u64 i = 0; i < (u64{1} << m); ++i)
+        points.push_back(draw2(CRT_SAMPLER_SOBOL, seed, pixel, first + i, dimension));
     for (u32 a = 0; a <= m; ++a) {
         std::vector<bool> taken(points.size());
         for (const CrtRandom2& p : points) {
-            const auto column = static_cast<std::size_t>(std::ldexp(static_cast<double>(p.x), static_cast<int>(a)));
-            const auto row = static_cast<std::size_t>(std::ldexp(static_cast<double>(p.y), static_cast<int>(m - a)));
+            const auto column =
+                static_cast<std::size_t>(std::ldexp(static_cast<double>(p.x), static_cast<int>(a)));
+            const auto row =
+                static_cast<std::size_t>(std::ldexp(static_cast<double>(p.y), static_cast<int>(m - a)));
             const std::size_t cell = column << (m - a) | row;
             if (taken[cell]) return false;
             taken[cell] = true;
@@ -69,11 +75,16 @@ TEST_CASE("Philox 4x32-10 gives its authors' known answers", "[kernel][sampler]"
         u32 counter[4], key[2], answer[4];
     } known[] = {
         {{0, 0, 0, 0}, {0, 0}, {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}},
-        {{0xffffffff, 0xffffffff, 0xffffffff, 0xffffffff}, {0xffffffff, 0xffffffff}, {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}},
-        {{0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344}, {0xa4093822, 0x299f31d0}, {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}},
+        {{0xffffffff, 0xffffffff, 0xffffffff, 0xffffffff},
+         {0xffffffff, 0xffffffff},
+         {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}},
+        {{0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344},
+         {0xa4093822, 0x299f31d0},
+         {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}},
     };
     for (const auto& k : known) {
-        const CrtPhilox r = crt_philox(k.counter[0], k.counter[1], k.counter[2], k.counter[3], k.key[0], k.key[1]);
+        const CrtPhilox r =
+            crt_philox(k.counter[0], k.counter[1], k.counter[2], k.counter[3], k.key[0], k.key[1]);
         CHECK(r.x0 == k.answer[0]);
         CHECK(r.x1 == k.answer[1]);
         CHECK(r.x2 == k.answer[2]);
@@ -81,10 +92,12 @@ TEST_CASE("Philox 4x32-10 gives its authors' known answers", "[kernel][sampler]"
     }
 }
 
-TEST_CASE("the independent sampler is Philox of (pixel, sample, dimension) under the seed", "[kernel][sampler]") {
+TEST_CASE("the independent sampler is Philox of (pixel, sample, dimension) under the seed",
+          "[kernel][sampler]") {
     const u32 pixel = 123456, seed_low = 7, seed_high = 9;
     const u64 sample = 0x500000003;
-    CrtSampler s = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, crt_seed(seed_low, seed_high), pixel, sample);
+    CrtSampler s =
+        crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, crt_seed(seed_low, seed_high), pixel, sample);
     // In any order, and again: nothing is used up.
     for (const u32 dimension : {0u, 1u, 6u, 7u, 6u, 0u, 4000000000u, 1u}) {
         const CrtPhilox r = crt_philox(pixel, 3, 5, dimension / 2, seed_low, seed_high);
@@ -127,7 +140,8 @@ TEST_CASE("Owen scrambling flips each bit by the bits above it alone", "[kernel]
     }
 }
 
-TEST_CASE("Sobol points fill every elementary interval, in every dimension, pixel, seed and aligned range", "[kernel][sampler]") {
+TEST_CASE("Sobol points fill every elementary interval, in every dimension, pixel, seed and aligned range",
+          "[kernel][sampler]") {
     Random random(13);
     std::uint64_t nets = 0;
     for (int i = 0; i < 150; ++i) {
@@ -147,7 +161,8 @@ TEST_CASE("Sobol points fill every elementary interval, in every dimension, pixe
 }
 
 TEST_CASE("Sobol integrates a smooth function far better than chance", "[kernel][sampler]") {
-    // x²·sin(πy) over the square is 2/(3π). Of 1024 points, independent ones err by .34/32 (rms), Owen's nets by some 100 times less.
+    // x²·sin(πy) over the square is 2/(3π). Of 1024 points, independent ones err by .34/32 (rms), Owen's
+    // nets by some 100 times less.
     Mean squared;
     for (u32 pixel = 0; pixel < 200; ++pixel) {
         double sum = 0;
@@ -189,8 +204,10 @@ TEST_CASE("each number is uniform over pixels, samples, seeds and dimensions", "
         {"pixels", [](u32 kind, u32 i) { return draw2(kind, 0, i, 0, 0); }},
         {"rows", [](u32 kind, u32 i) { return draw2(kind, 0, i * 1024, 5, 1); }},
         {"seeds", [](u32 kind, u32 i) { return draw2(kind, i, 0, 0, 0); }},
-        {"high halves of seeds", [](u32 kind, u32 i) { return draw2(kind, static_cast<std::uint64_t>(i) << 32, 9, 1, 0); }},
-        {"high halves of samples", [](u32 kind, u32 i) { return draw2(kind, 0, 3, static_cast<u64>(i) << 32, 0); }},
+        {"high halves of seeds",
+         [](u32 kind, u32 i) { return draw2(kind, static_cast<std::uint64_t>(i) << 32, 9, 1, 0); }},
+        {"high halves of samples",
+         [](u32 kind, u32 i) { return draw2(kind, 0, 3, static_cast<u64>(i) << 32, 0); }},
     };
     for (const u32 kind : kKinds)
         for (const auto& [what, draw] : walks) {
@@ -246,7 +263,8 @@ TEST_CASE("dimensions know nothing of each other", "[kernel][sampler]") {
         }
         double worst = 0;
         for (std::size_t a = 0; a < series.size(); ++a)
-            for (std::size_t b = 0; b < a; ++b) worst = std::max(worst, std::abs(correlation(series[a], series[b])));
+            for (std::size_t b = 0; b < a; ++b)
+                worst = std::max(worst, std::abs(correlation(series[a], series[b])));
         INFO(kNames[kind]);
         CHECK(worst < 4.8);  // of 780 pairs
     }
@@ -258,9 +276,14 @@ TEST_CASE("neighbouring pixels, samples and seeds know nothing of each other", "
         {"pixels", [](u32 kind, u32 i, u32 step) { return draw1(kind, 0, i * 2 + step, 0, 0); }},
         {"rows of 512", [](u32 kind, u32 i, u32 step) { return draw1(kind, 0, i + 512 * step, 3, 0); }},
         {"seeds", [](u32 kind, u32 i, u32 step) { return draw1(kind, i * 2 + step, 5, 0, 0); }},
-        {"seeds, seen by one pixel after another", [](u32 kind, u32 i, u32 step) { return draw1(kind, step, i, 0, 0); }},
-        {"seeds in the high half", [](u32 kind, u32 i, u32 step) { return draw1(kind, static_cast<std::uint64_t>(step) << 32, i, 0, 0); }},
-        {"2^32 samples apart", [](u32 kind, u32 i, u32 step) { return draw1(kind, 0, 8, i + (static_cast<u64>(step) << 32), 0); }},
+        {"seeds, seen by one pixel after another",
+         [](u32 kind, u32 i, u32 step) { return draw1(kind, step, i, 0, 0); }},
+        {"seeds in the high half",
+         [](u32 kind, u32 i, u32 step) {
+             return draw1(kind, static_cast<std::uint64_t>(step) << 32, i, 0, 0);
+         }},
+        {"2^32 samples apart",
+         [](u32 kind, u32 i, u32 step) { return draw1(kind, 0, 8, i + (static_cast<u64>(step) << 32), 0); }},
     };
     for (const u32 kind : kKinds)
         for (const auto& [what, draw] : neighbours) {
@@ -302,7 +325,8 @@ TEST_CASE("whatever names a number changes it", "[kernel][sampler]") {
 }
 
 TEST_CASE("xorshift is well seeded and never stuck", "[kernel][sampler]") {
-    // Its hash reaches 0, the one state that xorshift never leaves, where the low half of the index meets this value.
+    // Its hash reaches 0, the one state that xorshift never leaves, where the low half of the index meets
+    // this value.
     const u32 key = crt_pixel_key(crt_seed(6, 7), 5, 0);
     const u32 low = key ^ unhash(0u - crt_hash(key + 0x85ebca6bu));
     CHECK(crt_hash(crt_hash(low ^ key) + crt_hash(key + 0x85ebca6bu)) == 0);

@@ -90,7 +90,8 @@ TEST_CASE("no two of 13,000 seeds give the same random numbers to a film of 2^21
     for (int i = 0; i < 1000; ++i) {
         const std::uint64_t seed = i < 500 ? random.bits() : seeds[random.below(13000)];
         const u32 pixel = static_cast<u32>(random.bits());
-        const CrtSampler s = crt_sampler_begin(CRT_SAMPLER_SOBOL, 0, crt_seed(static_cast<u32>(seed), static_cast<u32>(seed >> 32)), pixel, 5);
+        const CrtSampler s = crt_sampler_begin(
+            CRT_SAMPLER_SOBOL, 0, crt_seed(static_cast<u32>(seed), static_cast<u32>(seed >> 32)), pixel, 5);
         CHECK(s.pixel_key == keyOf(wordsOf(seed), pixel));
         CHECK(pixelOf(wordsOf(seed), s.pixel_key) == pixel);
     }
@@ -141,8 +142,10 @@ TEST_CASE("xorshift's streams of two seeds meet by chance alone", "[kernel][samp
     const auto states = [](std::uint64_t seed) {
         std::vector<u32> found(1u << 20);
         for (u32 pixel = 0; pixel < found.size(); ++pixel)
-            found[pixel] = crt_sampler_begin(CRT_SAMPLER_XORSHIFT, 0, crt_seed(static_cast<u32>(seed), static_cast<u32>(seed >> 32)), pixel, 3)
-                               .b0;
+            found[pixel] =
+                crt_sampler_begin(CRT_SAMPLER_XORSHIFT, 0,
+                                  crt_seed(static_cast<u32>(seed), static_cast<u32>(seed >> 32)), pixel, 3)
+                    .b0;
         std::sort(found.begin(), found.end());
         return found;
     };

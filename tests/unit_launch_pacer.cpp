@@ -11,7 +11,8 @@ using crt::LaunchPacer;
 
 namespace {
 
-CrtRenderRange range(std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::uint32_t y1, std::uint64_t first, std::uint64_t count) {
+CrtRenderRange range(std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::uint32_t y1,
+                     std::uint64_t first, std::uint64_t count) {
     CrtRenderRange r{};
     r.struct_size = sizeof r;
     r.x0 = x0;
@@ -27,7 +28,9 @@ CrtRenderRange range(std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::
 
 TEST_CASE("launches cover a range exactly once, with any tile, at any speed", "[launch_pacer]") {
     std::mt19937 random(1);
-    const auto below = [&](std::uint32_t n) { return std::uniform_int_distribution<std::uint32_t>(0, n - 1)(random); };
+    const auto below = [&](std::uint32_t n) {
+        return std::uniform_int_distribution<std::uint32_t>(0, n - 1)(random);
+    };
     for (int trial = 0; trial < 300; ++trial) {
         const std::uint32_t width = 1 + below(40), height = 1 + below(40), x0 = below(5), y0 = below(5);
         const std::uint64_t first = below(100), samples = 1 + below(70);
@@ -46,7 +49,8 @@ TEST_CASE("launches cover a range exactly once, with any tile, at any speed", "[
                 for (std::uint32_t y = launch.y0; y < launch.y1; ++y)
                     for (std::uint32_t x = launch.x0; x < launch.x1; ++x)
                         for (std::uint64_t s = 0; s < launch.sample_count; ++s)
-                            ++seen.at(std::size_t{y - y0} * width + (x - x0)).at(launch.first_sample - first + s);
+                            ++seen.at(std::size_t{y - y0} * width + (x - x0))
+                                  .at(launch.first_sample - first + s);
                 pacer.finished(launch, 1e-6 * (1 + below(100000)));
                 REQUIRE(pacer.done() > done);
                 done = pacer.done();
@@ -109,7 +113,8 @@ TEST_CASE("a device whose clock says nothing does not make launches grow", "[lau
 TEST_CASE("an empty range has no launches and is done", "[launch_pacer]") {
     LaunchPacer pacer(0.02, 1000);
     Launch launch;
-    for (const CrtRenderRange& empty : {range(0, 0, 10, 10, 5, 0), range(3, 3, 3, 9, 0, 4), range(0, 7, 9, 7, 0, 4)}) {
+    for (const CrtRenderRange& empty :
+         {range(0, 0, 10, 10, 5, 0), range(3, 3, 3, 9, 0, 4), range(0, 7, 9, 7, 0, 4)}) {
         pacer.begin(empty, 0);
         CHECK_FALSE(pacer.next(launch));
         CHECK(pacer.done() == 1);

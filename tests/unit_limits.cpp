@@ -1,22 +1,22 @@
-// What comes from outside has bounds: files that never end, files that others could have written, outputs that would destroy something, geometry and light
-// that arithmetic cannot carry.
+// What comes from outside has bounds: files that never end, files that others could have written, outputs
+// that would destroy something, geometry and light that arithmetic cannot carry.
+#include "backend/loader.h"
+#include "backend/sdk/kernel_cache.h"
 #include "base/atomic_file.h"
 #include "base/code_trust.h"
-#include "backend/sdk/kernel_cache.h"
-#include "backend/loader.h"
-#include "catch.h"
-#include "film/checkpoint.h"
-#include "compile/compile.h"
 #include "base/error.h"
-#include "image/image_io.h"
 #include "base/input_file.h"
-#include "scene/mesh/mesh_io.h"
-#include "compile/near_surfaces.h"
-#include "render/output_guard.h"
-#include "scene/yaml/scene_yaml.h"
-#include "scene/mesh/triangulate.h"
 #include "base/vec3d.h"
+#include "catch.h"
+#include "compile/compile.h"
+#include "compile/near_surfaces.h"
+#include "film/checkpoint.h"
+#include "image/image_io.h"
 #include "judge/verify/temporary_folder.h"
+#include "render/output_guard.h"
+#include "scene/mesh/mesh_io.h"
+#include "scene/mesh/triangulate.h"
+#include "scene/yaml/scene_yaml.h"
 
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -53,7 +53,9 @@ std::string refusal(const Work& work) {
     return {};
 }
 
-std::string kernelEntry(const plugin::KernelCache& cache, const std::string& name) { return cache.path(plugin::KernelCache::makeKey({name})); }
+std::string kernelEntry(const plugin::KernelCache& cache, const std::string& name) {
+    return cache.path(plugin::KernelCache::makeKey({name}));
+}
 
 Film filmOf(std::uint64_t samples) {
     Film film({2, 1, channelsFor(0, 1), 0});
@@ -66,13 +68,15 @@ const FilmIdentity kIdentity{"0123456789abcdef0123456789abcdef", "1.0"};
 
 }  // namespace
 
-// ---- Input files -----------------------------------------------------------------------------------------------------
+// ---- Input files
+// -----------------------------------------------------------------------------------------------------
 
 TEST_CASE("only regular files are read, and nobody waits for a pipe", "[limits][input]") {
     const TemporaryFolder folder;
     const std::string pipe = folder / "pipe";
     REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
-    for (const auto& [file, what] : {std::pair{pipe, "is a pipe, not a regular file"}, {std::string("/dev/zero"), "is a character device, not a regular file"},
+    for (const auto& [file, what] : {std::pair{pipe, "is a pipe, not a regular file"},
+                                     {std::string("/dev/zero"), "is a character device, not a regular file"},
                                      {folder.path(), "is a directory"}}) {
         CAPTURE(file);
         CHECK_THROWS_WITH(readInput(file, kMostSceneBytes), Contains(what));
@@ -83,7 +87,8 @@ TEST_CASE("only regular files are read, and nobody waits for a pipe", "[limits][
         CHECK_THROWS_WITH(readCheckpoint(file), Contains(what));
     }
     CHECK_THROWS_WITH(loadScene(pipe), Contains("for standard input write '-'"));
-    const std::string mesh = folder.write("mesh.obj", "mtllib pipe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+    const std::string mesh =
+        folder.write("mesh.obj", "mtllib pipe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
     CHECK(secondsOf([&] { refusal([&] { loadObj(mesh); }); }) < 5);
 }
 
@@ -91,7 +96,8 @@ TEST_CASE("a file that is too large is refused by its size before it is read", "
     const TemporaryFolder folder;
     const std::string file = folder.write("sparse", "");
     fs::resize_file(file, std::uintmax_t{1} << 42);
-    CHECK_THROWS_WITH(readInput(file, kMostSceneBytes), Contains("has 4 TiB, and the most for a file of this kind is 256 MiB"));
+    CHECK_THROWS_WITH(readInput(file, kMostSceneBytes),
+                      Contains("has 4 TiB, and the most for a file of this kind is 256 MiB"));
     CHECK_THROWS_WITH(loadObj(file), Contains("has 4 TiB"));
     CHECK(readInput(folder.write("exact", "12345"), 5) == "12345");
     CHECK_THROWS_WITH(readInput(folder.write("more", "123456"), 5), Contains("has 6 bytes"));
@@ -100,14 +106,17 @@ TEST_CASE("a file that is too large is refused by its size before it is read", "
     CHECK_THROWS_WITH(readInput("/proc/self/status", 100), Contains("more than 100 bytes"));
 }
 
-// ---- Outputs ---------------------------------------------------------------------------------------------------------
+// ---- Outputs
+// ---------------------------------------------------------------------------------------------------------
 
 TEST_CASE("no output replaces an input or another output", "[limits][output]") {
     const TemporaryFolder folder;
-    const std::string scene = folder.write("scene.yaml", "crt: 1\n"), mesh = folder.write("mesh.obj", "v 0 0 0\n");
+    const std::string scene = folder.write("scene.yaml", "crt: 1\n"),
+                      mesh = folder.write("mesh.obj", "v 0 0 0\n");
     fs::create_hard_link(mesh, folder / "hard.obj");
     fs::create_symlink("mesh.obj", folder / "soft.obj");
-    const auto refused = [&](const std::vector<std::string>& outputs, const std::vector<std::string>& films = {}) {
+    const auto refused = [&](const std::vector<std::string>& outputs,
+                             const std::vector<std::string>& films = {}) {
         return refusal([&] { refuseOverInputs({scene, mesh}, outputs, films); });
     };
     CHECK(refused({folder / "a.exr", folder / "a.png"}, {folder / "a.crtfilm"}).empty());
@@ -127,8 +136,11 @@ TEST_CASE("a film of more samples stays", "[limits][output]") {
     FilmGuard guard;
     guard.look(film, true, false);
     guard.requireRoom(16);
-    CHECK_THROWS_WITH(guard.requireRoom(15), Contains("holds 16 samples per pixel and would be replaced by 15") && Contains("--resume") && Contains("--overwrite"));
-    CHECK_THROWS_WITH(guard.look(other, true, false), Contains("a film would replace") && Contains("--overwrite"));
+    CHECK_THROWS_WITH(guard.requireRoom(15),
+                      Contains("holds 16 samples per pixel and would be replaced by 15") &&
+                          Contains("--resume") && Contains("--overwrite"));
+    CHECK_THROWS_WITH(guard.look(other, true, false),
+                      Contains("a film would replace") && Contains("--overwrite"));
     guard.look(other, true, true);
     CHECK(guard.placeFor(other, 1) == other);
 
@@ -159,7 +171,8 @@ TEST_CASE("an output link that leads to nothing yet stays a link", "[limits][out
     CHECK_THROWS_WITH(AtomicFile(folder / "loop"), Contains("leads to itself"));
 }
 
-// ---- Code ------------------------------------------------------------------------------------------------------------
+// ---- Code
+// ----------------------------------------------------------------------------------------------------------
 
 TEST_CASE("a kernel that others could have written is not loaded", "[limits][trust]") {
     const TemporaryFolder folder;
@@ -173,7 +186,8 @@ TEST_CASE("a kernel that others could have written is not loaded", "[limits][tru
 
     REQUIRE(::chmod(entry.c_str(), 0666) == 0);
     CHECK_FALSE(cache.load(key, &refused));
-    CHECK_THAT(refused, Contains("everyone can write to '" + entry + "' (mode 0666)") && Contains("chmod go-w"));
+    CHECK_THAT(refused,
+               Contains("everyone can write to '" + entry + "' (mode 0666)") && Contains("chmod go-w"));
     REQUIRE(::chmod(entry.c_str(), 0600) == 0);
     CHECK(cache.load(key));
     if (::geteuid() == 0) {  // Only root gives files away.
@@ -209,9 +223,12 @@ TEST_CASE("a plugin that others could have written is not opened", "[limits][tru
         REQUIRE(::chmod(path.c_str(), before.st_mode) == 0);
         return sentence;
     };
-    CHECK_THAT(refusedWith(plugin, 0777), Contains("is refused: everyone can write to '" + plugin + "' (mode 0777)"));
-    CHECK_THAT(refusedWith(plugins, 0777), Contains("is refused: everyone can write to '" + plugins.string() + "'"));
-    CHECK_THAT(refusedWith(folder.path(), 0777), Contains("is refused: everyone can write to '" + folder.path() + "'"));  // further up
+    CHECK_THAT(refusedWith(plugin, 0777),
+               Contains("is refused: everyone can write to '" + plugin + "' (mode 0777)"));
+    CHECK_THAT(refusedWith(plugins, 0777),
+               Contains("is refused: everyone can write to '" + plugins.string() + "'"));
+    CHECK_THAT(refusedWith(folder.path(), 0777),
+               Contains("is refused: everyone can write to '" + folder.path() + "'"));  // further up
     CHECK(refusedWith(plugins, 01777).empty());  // sticky, as /tmp: nobody can replace what is another's
     if (::geteuid() == 0) {
         REQUIRE(::chown(plugin.c_str(), 65534, 65534) == 0);
@@ -225,7 +242,8 @@ TEST_CASE("a plugin that others could have written is not opened", "[limits][tru
     CHECK_THAT(refusal([&] { loadBackend(folder / "link.so"); }), !Contains("refused"));
 }
 
-// ---- Geometry and light ----------------------------------------------------------------------------------------------
+// ---- Geometry and light
+// ----------------------------------------------------------------------------------------------
 
 TEST_CASE("forty thousand triangles on one spot are compiled in a second", "[limits][near_surfaces]") {
     Scene scene;
@@ -249,7 +267,8 @@ TEST_CASE("forty thousand triangles on one spot are compiled in a second", "[lim
     }
 }
 
-TEST_CASE("a disc of forty thousand lamps that share a corner is looked at in a second", "[limits][near_surfaces]") {
+TEST_CASE("a disc of forty thousand lamps that share a corner is looked at in a second",
+          "[limits][near_surfaces]") {
     Scene scene;
     scene.camera.position = {0, 0, -3};
     scene.materials.resize(1);
@@ -258,8 +277,10 @@ TEST_CASE("a disc of forty thousand lamps that share a corner is looked at in a 
     mesh.positions = {{0, 0, 0}};
     constexpr std::uint32_t kCorners = 40000;
     for (std::uint32_t i = 0; i < kCorners; ++i)
-        mesh.positions.push_back({std::cos(i * 2 * std::numbers::pi / kCorners), std::sin(i * 2 * std::numbers::pi / kCorners), 0});
-    for (std::uint32_t i = 0; i < kCorners; ++i) mesh.triangles.push_back({0, 1 + i, 1 + (i + 1) % kCorners});
+        mesh.positions.push_back({std::cos(i * 2 * std::numbers::pi / kCorners),
+                                  std::sin(i * 2 * std::numbers::pi / kCorners), 0});
+    for (std::uint32_t i = 0; i < kCorners; ++i)
+        mesh.triangles.push_back({0, 1 + i, 1 + (i + 1) % kCorners});
     scene.meshes = {mesh};
     Object object;
     object.material = 0;
@@ -278,9 +299,12 @@ TEST_CASE("a polygon of forty thousand corners becomes triangles in a second", "
             const double t = static_cast<double>(i) / kCorners, angle = 2 * std::numbers::pi * t;
             const double radius = i % 2 == 0 ? 1.0 : 0.3;
             if (shape == "star") polygon.push_back({radius * std::cos(angle), radius * std::sin(angle), 0});
-            if (shape == "comb") polygon.push_back(i + 2 < kCorners ? Vec3d{t, i % 2 == 0 ? 1.0 : 1e-3, 0} : Vec3d{i + 2 == kCorners ? 1.0 : 0.0, -1, 0});
+            if (shape == "comb")
+                polygon.push_back(i + 2 < kCorners ? Vec3d{t, i % 2 == 0 ? 1.0 : 1e-3, 0}
+                                                   : Vec3d{i + 2 == kCorners ? 1.0 : 0.0, -1, 0});
             // Out along one arm, and back beside it.
-            if (shape == "spiral") polygon.push_back(t < 0.5 ? spiral(1 + 2 * t) : spiral(1 + 2 * (1 - t)) * 0.98);
+            if (shape == "spiral")
+                polygon.push_back(t < 0.5 ? spiral(1 + 2 * t) : spiral(1 + 2 * (1 - t)) * 0.98);
         }
         Triangulator triangulator;
         double area = 0, turned = 0, whole = 0;
@@ -291,7 +315,8 @@ TEST_CASE("a polygon of forty thousand corners becomes triangles in a second", "
                 turned += twice / 2;
             }
         });
-        for (std::size_t i = 0; i < kCorners; ++i) whole += cross(polygon[i], polygon[(i + 1) % kCorners])[2] / 2;
+        for (std::size_t i = 0; i < kCorners; ++i)
+            whole += cross(polygon[i], polygon[(i + 1) % kCorners])[2] / 2;
         CHECK(seconds < 2);
         CHECK(triangulator.crossingPolygons() == 0);
         CHECK(triangulator.split(polygon).size() == kCorners - 2);
@@ -304,7 +329,8 @@ TEST_CASE("light beyond what floats carry is refused with its place", "[limits][
     const auto lit = [](const std::string& radiance, const std::string& environment = "") {
         return refusal([&] {
             parseScene("crt: 1\nmaterials: {m: {type: diffuse, reflectance: 0.5}}\n" + environment +
-                           "objects:\n  - {name: lamp, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}, material: m, emission: {radiance: " +
+                           "objects:\n  - {name: lamp, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: "
+                           "[[0,1,2]]}, material: m, emission: {radiance: " +
                            radiance + "}}\n",
                        "scene.yaml", ".");
         });
@@ -314,13 +340,17 @@ TEST_CASE("light beyond what floats carry is refused with its place", "[limits][
     CHECK(lit("0").empty());
     CHECK_THAT(lit("1e38"), Contains("scene.yaml:4:") && Contains("it must be 0 to 1e+25"));
     CHECK_THAT(lit("1e308"), Contains("it must be 0 to 1e+25"));
-    CHECK_THAT(lit("{blackbody: 5000, scale: 1e30}"), Contains("reaches") && Contains("it must be 0 to 1e+25"));
-    CHECK_THAT(lit("1e-50"), Contains("scene.yaml:4:5: error: 'lamp' is the brightest light, of radiance 1e-50, and single precision carries light from 1e-25"));
+    CHECK_THAT(lit("{blackbody: 5000, scale: 1e30}"),
+               Contains("reaches") && Contains("it must be 0 to 1e+25"));
+    CHECK_THAT(lit("1e-50"), Contains("scene.yaml:4:5: error: 'lamp' is the brightest light, of radiance "
+                                      "1e-50, and single precision carries light from 1e-25"));
     CHECK(lit("1e-50", "environment: {radiance: 1}\n").empty());
 
     const TemporaryFolder folder;
     folder.write("lamp.mtl", "newmtl lamp\nKe 1e30 1e30 1e30\n");
     folder.write("lamp.obj", "mtllib lamp.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl lamp\nf 1 2 3\n");
-    CHECK_THAT(refusal([&] { parseScene("crt: 1\nobjects:\n  - {obj: lamp.obj}\n", "scene.yaml", folder.path()); }),
-               Contains("scene.yaml:3:5: error: the radiance of a material (Ke)") && Contains("single precision carries light up to 1e+25"));
+    CHECK_THAT(
+        refusal([&] { parseScene("crt: 1\nobjects:\n  - {obj: lamp.obj}\n", "scene.yaml", folder.path()); }),
+        Contains("scene.yaml:3:5: error: the radiance of a material (Ke)") &&
+            Contains("single precision carries light up to 1e+25"));
 }

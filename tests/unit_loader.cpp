@@ -1,11 +1,12 @@
-// The border from the host's side: every way in which a plugin can be wrong has its own sentence, and none of them brings crt down.
+// The border from the host's side: every way in which a plugin can be wrong has its own sentence, and none
+// of them brings crt down.
 #include "backend/crt_layout_hash.h"
 #include "backend/kernel_source.h"
 #include "backend/loader.h"
-#include "catch.h"
 #include "base/error.h"
-#include "kernel/bits_version.h"
+#include "catch.h"
 #include "judge/verify/temporary_folder.h"
+#include "kernel/bits_version.h"
 
 #include <unistd.h>
 
@@ -56,9 +57,12 @@ std::string refusal(const std::string& name) {
 }  // namespace
 
 TEST_CASE("a plugin that is not there", "[loader]") {
-    CHECK_THAT(refusal("exampel"), Contains("backend 'exampel' is unknown: no crt_backend_exampel.so in " CRT_FAKE_PLUGIN_DIR ", ") &&
-                                       Contains("did you mean 'example'?"));
-    CHECK_THAT(refusal("/nowhere/crt_backend_x.so"), Contains("there is no backend file /nowhere/crt_backend_x.so"));
+    CHECK_THAT(
+        refusal("exampel"),
+        Contains("backend 'exampel' is unknown: no crt_backend_exampel.so in " CRT_FAKE_PLUGIN_DIR ", ") &&
+            Contains("did you mean 'example'?"));
+    CHECK_THAT(refusal("/nowhere/crt_backend_x.so"),
+               Contains("there is no backend file /nowhere/crt_backend_x.so"));
     CHECK_THAT(refusal(""), Contains("the backend has no name"));
 
     // A name that crt knows is not a spelling mistake. Those that were built beside this program are found
@@ -75,7 +79,9 @@ TEST_CASE("a plugin that is not there", "[loader]") {
 }
 
 TEST_CASE("a plugin that cannot be opened", "[loader]") {
-    CHECK_THAT(refusal("missing_library"), Contains("cannot be opened") && Contains("libcrt_absent.so.1: cannot open shared object file"));
+    CHECK_THAT(
+        refusal("missing_library"),
+        Contains("cannot be opened") && Contains("libcrt_absent.so.1: cannot open shared object file"));
 
     const TemporaryFolder directory;
     directory.write("crt_backend_text.so", "this is not a library\n");
@@ -103,9 +109,11 @@ TEST_CASE("a plugin built for another scene layout names both builds", "[loader]
         std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(hash));
         return std::string(text);
     };
-    CHECK_THAT(refusal("wrong_layout"), Contains("was built for another scene layout, " + hex(~CRT_LAYOUT_HASH) + " (an old compiler)") &&
-                                            Contains(hex(CRT_LAYOUT_HASH) + " (crt " CRT_HEADERS_VERSION ", ") &&
-                                            Contains("rebuild the plugin"));
+    CHECK_THAT(
+        refusal("wrong_layout"),
+        Contains("was built for another scene layout, " + hex(~CRT_LAYOUT_HASH) + " (an old compiler)") &&
+            Contains(hex(CRT_LAYOUT_HASH) + " (crt " CRT_HEADERS_VERSION ", ") &&
+            Contains("rebuild the plugin"));
 }
 
 TEST_CASE("a plugin that renders other bits is refused by both versions and both builds", "[loader]") {
@@ -123,7 +131,8 @@ TEST_CASE("a plugin that renders other bits is refused by both versions and both
 
 TEST_CASE("what a backend brings is read from tables that have it, and must reach the scene", "[loader]") {
     const ScopedVariable path("CRT_BACKEND_PATH", CRT_FAKE_PLUGIN_DIR);
-    CHECK_THAT(refusal("short_reach"), Contains("it brings an acceleration structure that reaches 0.5, and scenes reach 1"));
+    CHECK_THAT(refusal("short_reach"),
+               Contains("it brings an acceleration structure that reaches 0.5, and scenes reach 1"));
     CHECK(acceleratorReach(loadBackend("many_devices")) == 2);
     CHECK(acceleratorReach(loadBackend("version_1_1")) == 0);  // its table ends before
     CHECK(acceleratorReach(loadBackend("fake")) == 0);
@@ -135,9 +144,11 @@ TEST_CASE("no device is an answer with a reason", "[loader]") {
 
 TEST_CASE("an exception that crosses the border is named and survived", "[loader]") {
     CHECK(refusal("throws_in_entry") ==
-          "backend 'throws_in_entry' broke the contract: an exception crossed the border from crt_backend_v1 (the entry fell over)");
+          "backend 'throws_in_entry' broke the contract: an exception crossed the border from "
+          "crt_backend_v1 (the entry fell over)");
     CHECK(refusal("throws_in_probe") ==
-          "backend 'throws_in_probe' broke the contract: an exception crossed the border from probe (probe fell over)");
+          "backend 'throws_in_probe' broke the contract: an exception crossed the border from probe (probe "
+          "fell over)");
 }
 
 TEST_CASE("a good plugin loads by name and by path", "[loader]") {
@@ -247,7 +258,8 @@ TEST_CASE("expanding includes", "[loader]") {
         {"once.h", "#ifndef ONCE_H\n#define ONCE_H\nint once;\n#endif\n"},
         {"both.h", "#ifndef BOTH_H\n#include \"once.h\"\n  #  include\t\"once.h\" // again\n#endif\n"},
         {"circle.h", "#ifndef C_H\n#include \"circle.h\"\nint circle;\n#endif"},
-        {"maybe.h", "#ifndef M_H\n#ifdef FAST\n#include \"once.h\"\n#else\n#include \"once.h\"\n#endif\n#endif\n"},
+        {"maybe.h",
+         "#ifndef M_H\n#ifdef FAST\n#include \"once.h\"\n#else\n#include \"once.h\"\n#endif\n#endif\n"},
         {"angle.h", "#include <cstdint>\n/*\n * #include \"once.h\" is how to use it\n */\n"},
         {"broken.h", "#include \"absent.h\"\n"},
     };
@@ -265,8 +277,10 @@ TEST_CASE("expanding includes", "[loader]") {
     CHECK(count(expandIncludes("circle.h", text_of), "int circle;") == 1);
     // Only the compiler knows which of the two is compiled.
     CHECK(count(expandIncludes("maybe.h", text_of), "int once;") == 2);
-    CHECK_THAT(expandIncludes("angle.h", text_of), Contains("#include <cstdint>\n") && Contains(" * #include \"once.h\" is how"));
-    CHECK_THROWS_WITH(expandIncludes("broken.h", text_of), Contains("kernel header broken.h includes absent.h, which does not exist"));
+    CHECK_THAT(expandIncludes("angle.h", text_of),
+               Contains("#include <cstdint>\n") && Contains(" * #include \"once.h\" is how"));
+    CHECK_THROWS_WITH(expandIncludes("broken.h", text_of),
+                      Contains("kernel header broken.h includes absent.h, which does not exist"));
 }
 
 TEST_CASE("CRT_KERNEL_DIR replaces the embedded sources", "[loader]") {
@@ -281,12 +295,14 @@ TEST_CASE("CRT_KERNEL_DIR replaces the embedded sources", "[loader]") {
     // All or nothing: what is not there is not taken from the program.
     CHECK(kernelSource("bsdf.h") == nullptr);
 
-    // A layout of another build would misread the scene. Another directory, because texts once handed out stay.
+    // A layout of another build would misread the scene. Another directory, because texts once handed out
+    // stay.
     const TemporaryFolder other;
     fs::copy(directory.path(), other.path(), fs::copy_options::recursive);
     other.write("layout.h", "struct Changed;\n");
     const ScopedVariable changed("CRT_KERNEL_DIR", other.path());
-    CHECK_THROWS_WITH(kernelSource("path.h"), Contains("holds another layout.h than this crt was built with"));
+    CHECK_THROWS_WITH(kernelSource("path.h"),
+                      Contains("holds another layout.h than this crt was built with"));
     const CrtHost host = makeHost(false);
     CHECK(host.kernel_source(host.user, "path.h") == nullptr);
 }

@@ -1,4 +1,5 @@
-// The one main of the unit tests; in a file of its own because compiling Catch's runner takes longer than any test.
+// The one main of the unit tests; in a file of its own because compiling Catch's runner takes longer than
+// any test.
 #define CATCH_CONFIG_RUNNER
 #include "catch.h"
 

@@ -1,9 +1,9 @@
 // OBJ: what is accepted, what it becomes, what is left out, and that every refusal names the line.
+#include "base/error.h"
 #include "captured_log.h"
 #include "catch.h"
-#include "base/error.h"
-#include "scene/mesh/mesh_io.h"
 #include "judge/verify/temporary_folder.h"
+#include "scene/mesh/mesh_io.h"
 
 #include <cmath>
 #include <filesystem>
@@ -39,7 +39,8 @@ double area(const Mesh& mesh) {
     for (const auto& t : mesh.triangles) {
         const Vec3d &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
         const Vec3d u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-        sum += std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+        sum +=
+            std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
     }
     return sum;
 }
@@ -62,17 +63,18 @@ TEST_CASE("a triangle", "[mesh_io]") {
 TEST_CASE("the same mesh in every spelling", "[mesh_io]") {
     const Mesh expected = loadText(kTriangle + "f 1 2 3\n").mesh;
     for (const char* text : {
-             "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n",                       // Windows
-             "v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r",                               // before that
-             "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3",                                 // no newline at the end
-             "\xEF\xBB\xBFv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",                   // byte-order mark
-             "# c\n\n  v  0\t0 0 \nv 1 0 0 1.0\nv +0 1e0 0 .5 .5 .5\nf  1 2  3 \n",  // blanks, weights, colours
-             "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",                 // texture coordinates
-             "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n",                            // counted from the end
-             "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n",                               // faces first
-             "v 0 0 0\nv 1 0 \\\n0\nv 0 1 0\nf 1 \\\r\n 2 3\n",                    // joined lines
+             "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n",                         // Windows
+             "v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r",                                 // before that
+             "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3",                                   // no newline at the end
+             "\xEF\xBB\xBFv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",                     // byte-order mark
+             "# c\n\n  v  0\t0 0 \nv 1 0 0 1.0\nv +0 1e0 0 .5 .5 .5\nf  1 2  3 \n",  // blanks, weights,
+                                                                                     // colours
+             "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",                   // texture coordinates
+             "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n",                              // counted from the end
+             "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n",                                 // faces first
+             "v 0 0 0\nv 1 0 \\\n0\nv 0 1 0\nf 1 \\\r\n 2 3\n",                      // joined lines
              "o thing\ng a b\ns off\nv 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\np 1\nf 1 2 3 # done\n",
-             "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3\n",               // one corner without normal: flat
+             "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3\n",  // one corner without normal: flat
          }) {
         CAPTURE(text);
         const Mesh mesh = loadText(text).mesh;
@@ -196,7 +198,8 @@ TEST_CASE("polygons become triangles of the same area and side", "[mesh_io]") {
         std::string face = "f";
         for (std::size_t i = 0; i < outline.size(); ++i) {
             // In a plane that is none of the coordinate planes.
-            text += fmt::format("v {} {} {}\n", outline[i][0], outline[i][1], 0.5 * outline[i][0] + 0.25 * outline[i][1]);
+            text += fmt::format("v {} {} {}\n", outline[i][0], outline[i][1],
+                                0.5 * outline[i][0] + 0.25 * outline[i][1]);
             face += fmt::format(" {}", i + 1);
         }
         return loadText(text + face + "\n").mesh;
@@ -211,7 +214,8 @@ TEST_CASE("polygons become triangles of the same area and side", "[mesh_io]") {
     CHECK(arrow.triangles.size() == 2);
     CHECK(area(arrow) == Approx(.5 * tilt));
 
-    const Mesh comb = split({{0, 0}, {5, 0}, {5, 3}, {4, 3}, {4, 1}, {3, 1}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}});
+    const Mesh comb = split(
+        {{0, 0}, {5, 0}, {5, 3}, {4, 3}, {4, 1}, {3, 1}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}});
     CHECK(comb.triangles.size() == 10);
     CHECK(area(comb) == Approx((15 - 4) * tilt));
 
@@ -231,12 +235,15 @@ TEST_CASE("polygons become triangles of the same area and side", "[mesh_io]") {
 
 TEST_CASE("triangles without area are dropped and counted", "[mesh_io]") {
     const CapturedLog log;
-    const LoadedMesh m = loadText(kTriangle + "v 0.1 0.1 0.1\nv 0.2 0.2 0.2\nv 0.3 0.3 0.3\nf 1 2 2\nf 4 5 6\nf 1 2 3\n");
+    const LoadedMesh m =
+        loadText(kTriangle + "v 0.1 0.1 0.1\nv 0.2 0.2 0.2\nv 0.3 0.3 0.3\nf 1 2 2\nf 4 5 6\nf 1 2 3\n");
     CHECK(m.mesh.triangles.size() == 1);
     CHECK(m.degenerate_faces == 2);
     CHECK(log.warnings() == 1);
     // Small and far off is not the same as degenerate.
-    CHECK(loadText("v 1e6 1e6 0\nv 1000000.001 1e6 0\nv 1e6 1000000.001 0\nf 1 2 3\n").mesh.triangles.size() == 1);
+    CHECK(
+        loadText("v 1e6 1e6 0\nv 1000000.001 1e6 0\nv 1e6 1000000.001 0\nf 1 2 3\n").mesh.triangles.size() ==
+        1);
     CHECK(loadText("v 0 0 0\nv 1e-200 0 0\nv 0 1e-200 0\nf 1 2 3\n").mesh.triangles.size() == 1);
     CHECK(loadText("v 0 0 0\nv 1e200 0 0\nv 0 1e200 0\nf 1 2 3\n").mesh.triangles.size() == 1);
 }

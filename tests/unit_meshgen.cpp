@@ -1,7 +1,8 @@
-// The generated meshes: exactly the promised triangles, closed, right side out, and the same bytes from every run.
+// The generated meshes: exactly the promised triangles, closed, right side out, and the same bytes from
+// every run.
 #include "catch.h"
-#include "scene/mesh/mesh_io.h"
 #include "judge/verify/temporary_folder.h"
+#include "scene/mesh/mesh_io.h"
 
 #include <algorithm>
 #include <cmath>
@@ -38,7 +39,8 @@ int openEdges(const Mesh& m) {
 
 double volume(const Mesh& m) {
     double sum = 0;
-    for (const auto& t : m.triangles) sum += dot(m.positions[t[0]], cross(m.positions[t[1]], m.positions[t[2]])) / 6;
+    for (const auto& t : m.triangles)
+        sum += dot(m.positions[t[0]], cross(m.positions[t[1]], m.positions[t[2]])) / 6;
     return sum;
 }
 
@@ -118,7 +120,8 @@ TEST_CASE("normals are written with unit length", "[meshgen]") {
 TEST_CASE("the sphere is one", "[meshgen]") {
     const Mesh m = loadObj(kMeshes + "sphere.obj").mesh;
     const Vec3d centre{0, .5, 0};
-    for (const Vec3d& p : m.positions) CHECK(std::sqrt(dot((p - centre), (p - centre))) == Approx(.5).epsilon(1e-8));
+    for (const Vec3d& p : m.positions)
+        CHECK(std::sqrt(dot((p - centre), (p - centre))) == Approx(.5).epsilon(1e-8));
     CHECK(agreement(m) == 1.0);
     for (std::size_t i = 0; i < m.triangles.size(); ++i)
         for (int k = 0; k < 3; ++k) {

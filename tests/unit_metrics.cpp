@@ -2,8 +2,8 @@
 #include "judge/stats/color_difference.h"
 #include "judge/stats/metrics.h"
 
-#include "catch.h"
 #include "base/error.h"
+#include "catch.h"
 
 #include <cmath>
 #include <limits>
@@ -13,7 +13,8 @@ using namespace crt::stats;
 
 namespace {
 
-const std::vector<float> kReference{1, 2, 3, 0, 4, 2}, kTest{1, 2, 3, 0.5f, 4, 1};  // Means 2 and 11.5/6: ε is 0.02.
+const std::vector<float> kReference{1, 2, 3, 0, 4, 2},
+    kTest{1, 2, 3, 0.5f, 4, 1};  // Means 2 and 11.5/6: ε is 0.02.
 
 std::vector<float> scaled(std::vector<float> values, float factor) {
     for (float& v : values) v *= factor;
@@ -37,7 +38,8 @@ TEST_CASE("error metrics are those of their formulas", "[metrics]") {
 
 TEST_CASE("the 99th percentile leaves out one value of a hundred", "[metrics]") {
     std::vector<float> test(200, 0.0f), reference(200, 1.0f);
-    for (std::size_t i = 0; i < 200; ++i) test[i] = 1 + static_cast<float>((i * 77) % 200 + 1);  // Errors 1 … 200, shuffled.
+    for (std::size_t i = 0; i < 200; ++i)
+        test[i] = 1 + static_cast<float>((i * 77) % 200 + 1);  // Errors 1 … 200, shuffled.
     const ErrorMetrics m = errorMetrics(test, reference);
     CHECK(m.p99_absolute == 198.0);
     CHECK(m.max_absolute == 200.0);
@@ -45,7 +47,8 @@ TEST_CASE("the 99th percentile leaves out one value of a hundred", "[metrics]") 
 }
 
 TEST_CASE("relative metrics do not know the exposure, absolute ones are proportional to it", "[metrics]") {
-    const ErrorMetrics m = errorMetrics(kTest, kReference), dark = errorMetrics(scaled(kTest, 0x1p-30f), scaled(kReference, 0x1p-30f));
+    const ErrorMetrics m = errorMetrics(kTest, kReference),
+                       dark = errorMetrics(scaled(kTest, 0x1p-30f), scaled(kReference, 0x1p-30f));
     CHECK(dark.relmse == Approx(m.relmse).epsilon(1e-14));
     CHECK(dark.relative_rmse == Approx(m.relative_rmse).epsilon(1e-14));
     CHECK(dark.smape == Approx(m.smape).epsilon(1e-14));
@@ -55,7 +58,8 @@ TEST_CASE("relative metrics do not know the exposure, absolute ones are proporti
 }
 
 TEST_CASE("one NaN or infinity voids every metric and is counted by kind and side", "[metrics]") {
-    constexpr float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN(),
+                    infinity = std::numeric_limits<float>::infinity();
     std::vector<float> test = kTest, reference = kReference;
     test[1] = nan;
     test[2] = -infinity;
@@ -66,7 +70,8 @@ TEST_CASE("one NaN or infinity voids every metric and is counted by kind and sid
     CHECK(m.test.infinite == 1);
     CHECK(m.reference.nan == 0);
     CHECK(m.reference.infinite == 1);
-    for (const double number : {m.test_mean, m.mean_ratio, m.mse, m.rmse, m.relative_rmse, m.relmse, m.smape, m.mae, m.p99_absolute, m.max_absolute})
+    for (const double number : {m.test_mean, m.mean_ratio, m.mse, m.rmse, m.relative_rmse, m.relmse, m.smape,
+                                m.mae, m.p99_absolute, m.max_absolute})
         CHECK(std::isnan(number));
     CHECK_FALSE(errorMetrics({}, {}).valid());
     CHECK_THROWS_AS(errorMetrics(kTest, std::vector<float>{1}), crt::Error);

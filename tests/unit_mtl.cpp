@@ -1,10 +1,10 @@
 // MTL: which files an OBJ's names lead to, what their materials become, and what is said about it.
+#include "base/error.h"
 #include "captured_log.h"
 #include "catch.h"
-#include "base/error.h"
+#include "judge/verify/temporary_folder.h"
 #include "scene/mesh/mesh_io.h"
 #include "scene/yaml/scene_yaml.h"
-#include "judge/verify/temporary_folder.h"
 
 #include <filesystem>
 
@@ -249,7 +249,8 @@ TEST_CASE("colours are linear unless they are said to be sRGB", "[mesh_io][mtl]"
     CHECK_FALSE(loadMaterial("Ke 0 0 0\n").emission);
 }
 
-TEST_CASE("a colour of one number is grey, and one that is no colour is left out and said", "[mesh_io][mtl]") {
+TEST_CASE("a colour of one number is grey, and one that is no colour is left out and said",
+          "[mesh_io][mtl]") {
     const CapturedLog log;
     CHECK(loadMaterial("Kd 0.7\n").material.reflectance == constantSpectrum(.7));
     CHECK(log.warnings() == 0);

@@ -1,8 +1,8 @@
 // stats/pooled_tests.h: the parts of compare's tests, each against what it promises.
+#include "base/statistics.h"
 #include "catch.h"
 #include "film/luminance_error.h"
 #include "judge/stats/pooled_tests.h"
-#include "base/statistics.h"
 
 #include <array>
 #include <cmath>

@@ -1,13 +1,13 @@
-// What stands between the command line and the film: words to values, which samples are missing, the texts of progress, and a device that
-// fails in the middle.
-#include "cli/arguments.h"
-#include "base/unit_text.h"
+// What stands between the command line and the film: words to values, which samples are missing, the texts
+// of progress, and a device that fails in the middle.
 #include "backend/loader.h"
+#include "base/unit_text.h"
 #include "catch.h"
+#include "cli/arguments.h"
 #include "cli/interrupt.h"
+#include "cli/progress.h"
 #include "cli/terminal_watch.h"
 #include "render/outputs.h"
-#include "cli/progress.h"
 #include "render/sampling.h"
 #include "scene/yaml/scene_yaml.h"
 
@@ -26,15 +26,18 @@ TEST_CASE("durations") {
     CHECK(parseDuration("1h0m5s", "--time") == 3605);
     CHECK(parseDuration("250ms", "--time") == Approx(0.25));
     // "1h30" could mean minutes or seconds, "30m1h" is a slip.
-    for (const char* text : {"", "s", "-5s", "0", "1h30", "30m1h", "5 s", "1e3", "5days", "nan", "inf", "1h1h"})
+    for (const char* text :
+         {"", "s", "-5s", "0", "1h30", "30m1h", "5 s", "1e3", "5days", "nan", "inf", "1h1h"})
         CHECK_THROWS_AS(parseDuration(text, "--time"), Error);
 }
 
 TEST_CASE("sample ranges, rectangles and counts from text") {
     CHECK(parseSampleRange("0:512", "--samples") == SampleRange{0, 512});
-    for (const char* text : {"", ":", "5", "5:5", "6:5", "a:b", "0:1:2", "-1:4"}) CHECK_THROWS_AS(parseSampleRange(text, "--samples"), Error);
+    for (const char* text : {"", ":", "5", "5:5", "6:5", "a:b", "0:1:2", "-1:4"})
+        CHECK_THROWS_AS(parseSampleRange(text, "--samples"), Error);
     CHECK(parseRectangle("1,2,30,40", "--crop") == std::array<int, 4>{1, 2, 30, 40});
-    for (const char* text : {"", "1,2,3", "1,2,3,4,5", "1,2,3,x", "1,2,3,99999999999"}) CHECK_THROWS_AS(parseRectangle(text, "--crop"), Error);
+    for (const char* text : {"", "1,2,3", "1,2,3,4,5", "1,2,3,x", "1,2,3,99999999999"})
+        CHECK_THROWS_AS(parseRectangle(text, "--crop"), Error);
     CHECK(parseCount("1e3", "--spp", 1) == 1000);
     CHECK_THROWS_AS(parseCount("0", "--spp", 1), Error);
     CHECK_THROWS_AS(parseCount("1.5", "--spp", 1), Error);
@@ -44,11 +47,13 @@ TEST_CASE("abbreviated command lines are written out") {
     using Words = std::vector<std::string>;
     const Words commands{"render", "compare", "info"};
     CHECK(writtenOut({"a.yaml"}, commands) == Words{"render", "a.yaml"});
-    CHECK(writtenOut({"--backend", "cuda", "a.yaml"}, commands) == Words{"render", "--backend", "cuda", "a.yaml"});
+    CHECK(writtenOut({"--backend", "cuda", "a.yaml"}, commands) ==
+          Words{"render", "--backend", "cuda", "a.yaml"});
     CHECK(writtenOut({"info", "a.yaml"}, commands) == Words{"info", "a.yaml"});
     CHECK(writtenOut({"--help"}, commands) == Words{"--help"});
     CHECK(writtenOut({"--resume", "a.yaml"}, commands) == Words{"render", "--resume=auto", "a.yaml"});
-    CHECK(writtenOut({"a.yaml", "--resume", "b.crtfilm"}, commands) == Words{"render", "a.yaml", "--resume=b.crtfilm"});
+    CHECK(writtenOut({"a.yaml", "--resume", "b.crtfilm"}, commands) ==
+          Words{"render", "a.yaml", "--resume=b.crtfilm"});
     CHECK_THROWS_WITH(writtenOut({"rendr", "a.yaml"}, commands), Contains("did you mean 'render'?"));
 }
 
@@ -100,8 +105,11 @@ TEST_CASE("progress: numbers and texts") {
     error.relative_rmse_95 = {0.0196, 0.0204};
     error.knowledge = ErrorKnowledge::Known;
     state.error = error;
-    // A fourth of the samples that 1 % takes at 1/sqrt N are there, one a second, and half of those that it takes at 1/N.
-    CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error 2.00 % (1.96-2.04)  1 % at 59-130 spp, in 0:29-1:35");
+    // A fourth of the samples that 1 % takes at 1/sqrt N are there, one a second, and half of those that it
+    // takes at 1/N.
+    CHECK(progressText(state) ==
+          " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error 2.00 % (1.96-2.04)  1 % at 59-130 spp, in "
+          "0:29-1:35");
     // A bound forecasts nothing.
     state.error->knowledge = ErrorKnowledge::Bound;
     CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error below 2.0 %");
@@ -124,7 +132,8 @@ TEST_CASE("progress: numbers and texts") {
         CHECK(progressText(state) == "  0 %  0/64 spp");
     }
     SECTION("the bar fits") {
-        for (int columns = 1; columns < 200; ++columns) CHECK(static_cast<int>(progressBar(state, columns).size()) < columns);
+        for (int columns = 1; columns < 200; ++columns)
+            CHECK(static_cast<int>(progressBar(state, columns).size()) < columns);
         CHECK(progressBar(state, 120).substr(0, 42) == "[========================>               ]");
     }
     CHECK(clockText(59.6) == "1:00");
@@ -148,7 +157,8 @@ TEST_CASE("progress of a stage: how far it is, or for how long it has gone on") 
     state.samples = 250;
     CHECK(progressText(state) == " 25 %  reading bunny.obj  3:09 left");
     CHECK(progressLine(state) == "25 %  reading bunny.obj  3:09 left");
-    for (int columns = 1; columns < 200; ++columns) CHECK(static_cast<int>(progressBar(state, columns).size()) < columns);
+    for (int columns = 1; columns < 200; ++columns)
+        CHECK(static_cast<int>(progressBar(state, columns).size()) < columns);
 }
 
 TEST_CASE("the first signal is remembered, and the handlers go with the guard") {
@@ -171,12 +181,15 @@ namespace {
 
 /// The fake backend with a small scene.
 struct FakeRun {
-    CompiledScene compiled = compileScene(parseScene("crt: 1\nfilm: {resolution: [6, 4]}\nenvironment: {radiance: 1}\n", "test", "."), 0);
+    CompiledScene compiled = compileScene(
+        parseScene("crt: 1\nfilm: {resolution: [6, 4]}\nenvironment: {radiance: 1}\n", "test", "."), 0);
     Integrator integrator{loadBackend(std::string(CRT_FAKE_PLUGIN_DIR) + "/crt_backend_fake.so"), {}};
     TerminalWatch watch{ProgressMode::None, TerminalWatch::Signals::Always};
 
     FakeRun() { integrator.setScene(compiled); }
-    Film emptyFilm() const { return Film({compiled.width, compiled.height, compiled.channels, compiled.aovs}); }
+    Film emptyFilm() const {
+        return Film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+    }
 };
 
 }  // namespace
@@ -185,7 +198,8 @@ TEST_CASE("a device that fails in the middle costs little") {
     unsetenv("CRT_FAKE_FAULT");
     FakeRun whole;
     Film reference = whole.emptyFilm();
-    CHECK(sampleFilm(whole.integrator, reference, {.ranges = {{0, 20}}, .target = 20}, whole.watch, [] {}).rendered == 20);
+    CHECK(sampleFilm(whole.integrator, reference, {.ranges = {{0, 20}}, .target = 20}, whole.watch, [] {
+          }).rendered == 20);
 
     FakeRun failing;
     Film film = failing.emptyFilm();
@@ -213,8 +227,10 @@ TEST_CASE("a device that fails in the middle costs little") {
 TEST_CASE("a signal stops between chunks") {
     FakeRun run;
     Film film = run.emptyFilm();
-    const SamplingPlan plan{.ranges = {{0, 20}}, .target = 20, .chunk = 3, .checkpoint_interval_seconds = 1e-9};
-    const SamplingResult result = sampleFilm(run.integrator, film, plan, run.watch, [] { std::raise(SIGINT); });
+    const SamplingPlan plan{
+        .ranges = {{0, 20}}, .target = 20, .chunk = 3, .checkpoint_interval_seconds = 1e-9};
+    const SamplingResult result =
+        sampleFilm(run.integrator, film, plan, run.watch, [] { std::raise(SIGINT); });
     CHECK(result.stop == StopReason::Interrupted);
     CHECK(result.request.cause == "SIGINT");
     CHECK(result.request.exit_code == 130);

@@ -1,13 +1,14 @@
-// Scene YAML: what good scenes become, and for every kind of mistake that the message names place, reason and remedy.
-#include "scene/aov.h"
-#include "film/resolve.h"
+// Scene YAML: what good scenes become, and for every kind of mistake that the message names place, reason
+// and remedy.
+#include "base/log.h"
 #include "captured_log.h"
 #include "catch.h"
 #include "film/film.h"
-#include "base/log.h"
+#include "film/resolve.h"
+#include "judge/verify/temporary_folder.h"
+#include "scene/aov.h"
 #include "scene/yaml/scene_schema.h"
 #include "scene/yaml/scene_yaml.h"
-#include "judge/verify/temporary_folder.h"
 
 #include <nlohmann/json.hpp>
 
@@ -29,13 +30,15 @@ struct Quiet {
     ~Quiet() { setLogLevel(LogLevel::Info); }
 };
 
-Scene parse(const std::string& body, const std::vector<SceneOverride>& overrides = {}, const std::string& directory = ".") {
+Scene parse(const std::string& body, const std::vector<SceneOverride>& overrides = {},
+            const std::string& directory = ".") {
     const Quiet quiet;
     return parseScene("crt: 1\n" + body, "scene.yaml", directory, overrides);
 }
 
 /// The error of a text that must not be a scene.
-Error refusal(const std::string& yaml, const std::vector<SceneOverride>& overrides = {}, const std::string& directory = ".") {
+Error refusal(const std::string& yaml, const std::vector<SceneOverride>& overrides = {},
+              const std::string& directory = ".") {
     const Quiet quiet;
     try {
         parseScene(yaml, "scene.yaml", directory, overrides);
@@ -48,7 +51,8 @@ Error refusal(const std::string& yaml, const std::vector<SceneOverride>& overrid
 }
 
 /// What is said about a scene whose second line onwards is `body`.
-std::string refused(const std::string& body, const std::vector<SceneOverride>& overrides = {}, const std::string& directory = ".") {
+std::string refused(const std::string& body, const std::vector<SceneOverride>& overrides = {},
+                    const std::string& directory = ".") {
     return refusal("crt: 1\n" + body, overrides, directory).what();
 }
 
@@ -77,13 +81,16 @@ std::size_t count(const std::string& text, const std::string& word) {
 const std::string kTriangle = "{positions: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces: [[0, 1, 2]]}";
 const std::string kGrey = "materials: {grey: {type: diffuse, reflectance: 0.5}}\n";
 
-std::string meshScene(const std::string& object) { return kGrey + "objects:\n  - {material: grey, " + object + "}\n"; }
+std::string meshScene(const std::string& object) {
+    return kGrey + "objects:\n  - {material: grey, " + object + "}\n";
+}
 
 }  // namespace
 
-// ---- Good scenes -----------------------------------------------------------------------------------------------------
+// ---- Good scenes
+// -----------------------------------------------------------------------------------------------------
 
-TEST_CASE("the smallest scene is legal and has the defaults of core/scene.h", "[scene_yaml]") {
+TEST_CASE("the smallest scene is legal and has the defaults of core/scene/scene.h", "[scene_yaml]") {
     const Scene scene = parse("");
     const Camera camera;
     CHECK(scene.objects.empty());
@@ -199,7 +206,8 @@ TEST_CASE("the choices of the schema are in the order of the enumerations", "[sc
             return parse("outputs: [{file: a.exr, aovs: [" + name + "]}]").outputs[0].aovs;
         });
 
-    const Scene outputs = parse("outputs: [{file: a.exr}, {file: a.PNG}, {file: a, format: ppm}, {file: -, format: pfm}]");
+    const Scene outputs =
+        parse("outputs: [{file: a.exr}, {file: a.PNG}, {file: a, format: ppm}, {file: -, format: pfm}]");
     CHECK(outputs.outputs[0].format == OutputFormat::Exr);
     CHECK(outputs.outputs[1].format == OutputFormat::Png);
     CHECK(outputs.outputs[2].format == OutputFormat::Ppm);
@@ -221,7 +229,8 @@ TEST_CASE("every AOV is written by its name in a scene, alone and together", "[s
         // Read from the scene, resolved from a film that has what the scene asks for: the channels that the
         // row names, and no others.
         const std::uint32_t in_film = output.aovs & kAovsOfFirstHits;
-        const Image image = resolveImage(Film({2, 1, channelsFor(in_film), in_film}), Development{}, output.aovs);
+        const Image image =
+            resolveImage(Film({2, 1, channelsFor(in_film), in_film}), Development{}, output.aovs);
         std::vector<std::string> channels = {"R", "G", "B"};
         const std::vector<std::string> own = exrNames(row);
         CHECK_FALSE(own.empty());
@@ -244,7 +253,8 @@ TEST_CASE("the field of view is across the shorter side, or comes from the senso
     CHECK(high.camera.tan_half_width == Approx(1));
     CHECK(high.camera.tan_half_height == Approx(3));
     CHECK(parse("film: {resolution: [200, 100]}").camera.tan_half_width == 2 * Camera{}.tan_half_width);
-    const Scene lens = parse("camera: {focal_length: 35, sensor: [25, 25], aperture_radius: 2, focus_distance: 7}");
+    const Scene lens =
+        parse("camera: {focal_length: 35, sensor: [25, 25], aperture_radius: 2, focus_distance: 7}");
     CHECK(lens.camera.tan_half_width == Approx(25.0 / 70));
     CHECK(lens.camera.aperture_radius == 2);
     CHECK(lens.camera.focus_distance == 7);
@@ -252,12 +262,16 @@ TEST_CASE("the field of view is across the shorter side, or comes from the senso
 
 TEST_CASE("film details", "[scene_yaml]") {
     CHECK(parse("film: {filter: gaussian}").film.filter_radius == 1.5);
-    const FilmSettings film = parse("film: {filter: {type: gaussian, radius: 2, sigma: 0.75}, crop: [1, 2, 3, 4], white_balance: A}").film;
+    const FilmSettings film =
+        parse(
+            "film: {filter: {type: gaussian, radius: 2, sigma: 0.75}, crop: [1, 2, 3, 4], white_balance: A}")
+            .film;
     CHECK(film.filter_radius == 2);
     CHECK(film.filter_sigma == 0.75);
     CHECK(film.crop == std::array<int, 4>{1, 2, 3, 4});
     CHECK(film.white_balance == illuminantSpectrum("A"));
-    CHECK(parse("film: {white_balance: {blackbody: 3200}}").film.white_balance == blackbodySpectrum(3200, true));
+    CHECK(parse("film: {white_balance: {blackbody: 3200}}").film.white_balance ==
+          blackbodySpectrum(3200, true));
 }
 
 TEST_CASE("numbers may be written as people write them", "[scene_yaml]") {
@@ -278,12 +292,16 @@ TEST_CASE("spectra in all their forms", "[scene_yaml]") {
     CHECK(emitted("{rgb: [1, 0.5, 0.25], space: linear}") == rgbEmission({1, 0.5, 0.25}));
     CHECK(emitted("{rgb: [1, 1, 1]}") == rgbEmission({1, 1, 1}));
     CHECK(emitted("{table: {nm: [300, 900], value: [1, 1]}}") == constantSpectrum(1));
-    CHECK(emitted("{table: {nm: [400, 700], value: [1, 3]}, outside: clamp}") == tableSpectrum({400, 700}, {1, 3}, Outside::Clamp));
-    CHECK(emitted("{table: {nm: [400, 700], value: [1, 3]}, outside: zero}") == tableSpectrum({400, 700}, {1, 3}, Outside::Zero));
+    CHECK(emitted("{table: {nm: [400, 700], value: [1, 3]}, outside: clamp}") ==
+          tableSpectrum({400, 700}, {1, 3}, Outside::Clamp));
+    CHECK(emitted("{table: {nm: [400, 700], value: [1, 3]}, outside: zero}") ==
+          tableSpectrum({400, 700}, {1, 3}, Outside::Zero));
     CHECK(emitted("lamp", "spectra: {lamp: {illuminant: A}}\n") == *illuminantSpectrum("A"));
     CHECK(emitted("again", "spectra: {lamp: 4, again: {ref: lamp, scale: 0.5}}\n") == constantSpectrum(2));
 
-    const auto material = [](const std::string& text) { return parse("materials: {m: " + text + "}").materials.at(0); };
+    const auto material = [](const std::string& text) {
+        return parse("materials: {m: " + text + "}").materials.at(0);
+    };
     CHECK(material("{type: dielectric, ior: {glass: N-BK7}}").eta == *glassIndex("N-BK7"));
     CHECK(material("{type: dielectric, ior: {cauchy: [1.5, 0.004]}}").eta == cauchyIndex({1.5, 0.004}));
     CHECK(material("{type: dielectric, ior: {sellmeier: {B: [1, 0.2, 1], C: [0.006, 0.02, 100]}}}").eta ==
@@ -294,8 +312,9 @@ TEST_CASE("spectra in all their forms", "[scene_yaml]") {
 }
 
 TEST_CASE("one name means a reflectance to a wall and a light to a lamp", "[scene_yaml]") {
-    const Scene scene = parse("spectra: {c: {rgb: [0.5, 0.25, 0.75], space: linear}}\n"
-                              "materials: {m: {type: diffuse, reflectance: c}}\nenvironment: {radiance: c}\n");
+    const Scene scene = parse(
+        "spectra: {c: {rgb: [0.5, 0.25, 0.75], space: linear}}\n"
+        "materials: {m: {type: diffuse, reflectance: c}}\nenvironment: {radiance: c}\n");
     CHECK(scene.materials[0].reflectance == rgbReflectance({0.5, 0.25, 0.75}));
     CHECK(scene.environment->radiance == rgbEmission({0.5, 0.25, 0.75}));
 }
@@ -304,12 +323,14 @@ TEST_CASE("spectrum files are found beside the scene", "[scene_yaml]") {
     const TemporaryFolder folder;
     folder.write("lamp.spd", "400 1\n700 3\n");
     folder.write("whole.csv", "nm,value\n360,1\n830,1\n");
-    const std::string path = folder.write("scene.yaml", "crt: 1\nenvironment: {radiance: {file: lamp.spd, outside: zero}}\n");
+    const std::string path =
+        folder.write("scene.yaml", "crt: 1\nenvironment: {radiance: {file: lamp.spd, outside: zero}}\n");
     const Scene scene = loadScene(path);
     CHECK(scene.environment->radiance == tableSpectrum({400, 700}, {1, 3}, Outside::Zero));
     CHECK(scene.files_read == std::vector<std::string>{path, folder.path() + "/lamp.spd"});
     CHECK(scene.file == path);
-    CHECK(parse("environment: {radiance: {file: whole.csv}}", {}, folder.path()).environment->radiance == constantSpectrum(1));
+    CHECK(parse("environment: {radiance: {file: whole.csv}}", {}, folder.path()).environment->radiance ==
+          constantSpectrum(1));
 
     CHECK_THAT(refused("environment: {radiance: {file: lamp.spd}}", {}, folder.path()),
                Contains("scene.yaml:2:32: error") && Contains("say 'outside: clamp' or 'outside: zero'"));
@@ -317,12 +338,14 @@ TEST_CASE("spectrum files are found beside the scene", "[scene_yaml]") {
     CHECK_THAT(refused("environment: {radiance: {file: broken.spd, outside: zero}}", {}, folder.path()),
                Contains("scene.yaml:2:32: error") && Contains("broken.spd:2"));
     CHECK_THAT(refused("environment: {radiance: {file: lmap.spd, outside: zero}}", {}, folder.path()),
-               Contains("scene.yaml:2:32: error: cannot find 'lmap.spd'; searched in " + folder.path()) && Contains("did you mean 'lamp.spd'?"));
+               Contains("scene.yaml:2:32: error: cannot find 'lmap.spd'; searched in " + folder.path()) &&
+                   Contains("did you mean 'lamp.spd'?"));
 }
 
 TEST_CASE("meshes in the scene", "[scene_yaml]") {
-    const Scene scene = parse(meshScene("mesh: {positions: [[0,0,0],[1,0,0],[1,1,0],[0,1,0]], faces: [[0,1,2,3]], "
-                                        "normals: [[0,0,1],[0,0,1],[0,0,1],[0,0,1]]}"));
+    const Scene scene =
+        parse(meshScene("mesh: {positions: [[0,0,0],[1,0,0],[1,1,0],[0,1,0]], faces: [[0,1,2,3]], "
+                        "normals: [[0,0,1],[0,0,1],[0,0,1],[0,0,1]]}"));
     REQUIRE(scene.meshes.size() == 1);
     CHECK(scene.meshes[0].triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}, {0, 2, 3}});
     CHECK(scene.meshes[0].normal_index == scene.meshes[0].triangles);
@@ -333,7 +356,8 @@ TEST_CASE("meshes in the scene", "[scene_yaml]") {
 
 TEST_CASE("triangles without area are left out with a warning", "[scene_yaml]") {
     const int before = warningCount();
-    const Scene scene = parse(meshScene("mesh: {positions: [[0,0,0],[1,0,0],[0,1,0],[2,0,0]], faces: [[0,1,2],[0,1,3]]}"));
+    const Scene scene =
+        parse(meshScene("mesh: {positions: [[0,0,0],[1,0,0],[0,1,0],[2,0,0]], faces: [[0,1,2],[0,1,3]]}"));
     CHECK(scene.meshes[0].triangles.size() == 1);
     CHECK(warningCount() == before + 1);
 }
@@ -341,16 +365,20 @@ TEST_CASE("triangles without area are left out with a warning", "[scene_yaml]") 
 TEST_CASE("placements multiply in the order they are written", "[scene_yaml]") {
     const auto point = [](const Matrix4d& m, const Vec3d& p) {
         Vec3d q{};
-        for (std::size_t r = 0; r < 3; ++r) q[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
+        for (std::size_t r = 0; r < 3; ++r)
+            q[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
         return q;
     };
-    const Scene one = parse(meshScene("mesh: " + kTriangle + ", transform: [{scale: 2}, {rotate: {axis: [0, 0, 3], angle_deg: 90}}, "
-                                                             "{translate: [10, 0, 0]}]"));
+    const Scene one =
+        parse(meshScene("mesh: " + kTriangle +
+                        ", transform: [{scale: 2}, {rotate: {axis: [0, 0, 3], angle_deg: 90}}, "
+                        "{translate: [10, 0, 0]}]"));
     // Quarter turns are exact.
     CHECK(point(one.objects[0].transforms.at(0), {1, 0, 0}) == Vec3d{10, 2, 0});
     CHECK(point(one.objects[0].transforms.at(0), {0, 1, 0}) == Vec3d{8, 0, 0});
-    const Scene two = parse(meshScene("mesh: " + kTriangle +
-                                      ", transforms: [[], [{scale: [1, 2, 3]}, {matrix: [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,0,1]}]]"));
+    const Scene two = parse(meshScene(
+        "mesh: " + kTriangle +
+        ", transforms: [[], [{scale: [1, 2, 3]}, {matrix: [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,0,1]}]]"));
     REQUIRE(two.objects[0].transforms.size() == 2);
     CHECK(two.objects[0].transforms[0] == kIdentity4d);
     CHECK(point(two.objects[0].transforms[1], {1, 1, 1}) == Vec3d{6, 8, 10});
@@ -360,7 +388,9 @@ TEST_CASE("placements multiply in the order they are written", "[scene_yaml]") {
 TEST_CASE("an OBJ named twice is loaded once", "[scene_yaml][mtl]") {
     const TemporaryFolder folder;
     folder.write("plain.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    const Scene scene = parse(kGrey + "objects: [{obj: plain.obj, material: grey}, {obj: ./plain.obj, material: grey}]", {}, folder.path());
+    const Scene scene =
+        parse(kGrey + "objects: [{obj: plain.obj, material: grey}, {obj: ./plain.obj, material: grey}]", {},
+              folder.path());
     CHECK(scene.meshes.size() == 1);
     CHECK(scene.objects[1].mesh == 0);
     CHECK(scene.files_read == std::vector<std::string>{folder.path() + "/plain.obj"});
@@ -377,14 +407,18 @@ TEST_CASE("an OBJ named twice is loaded once", "[scene_yaml][mtl]") {
 TEST_CASE("materials of an OBJ can be kept, replaced or ignored", "[scene_yaml][mtl]") {
     const TemporaryFolder folder;
     folder.write("two.mtl", "newmtl body\nKd 0.5 0.5 0.5\nnewmtl Lamp.001\nKd 0 0 0\nKe 2 2 2\n");
-    folder.write("two.obj", "mtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl body\nf 1 2 3\nusemtl Lamp.001\nf 3 2 1\n");
-    const Scene kept = parse("objects: [{obj: two.obj}, {obj: two.obj, material: from_mtl}]", {}, folder.path());
+    folder.write(
+        "two.obj",
+        "mtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl body\nf 1 2 3\nusemtl Lamp.001\nf 3 2 1\n");
+    const Scene kept =
+        parse("objects: [{obj: two.obj}, {obj: two.obj, material: from_mtl}]", {}, folder.path());
     REQUIRE(kept.meshes.size() == 1);
     CHECK(kept.meshes[0].material == std::vector<std::int32_t>{0, 1});
     CHECK(kept.meshes[0].emission == std::vector<std::int32_t>{-1, 0});
     CHECK(kept.materials.at(1).name == "two.obj:Lamp.001");
 
-    const Scene replaced = parse(kGrey + "objects: [{obj: two.obj, material_overrides: {Lamp.001: grey}}]", {}, folder.path());
+    const Scene replaced =
+        parse(kGrey + "objects: [{obj: two.obj, material_overrides: {Lamp.001: grey}}]", {}, folder.path());
     CHECK(replaced.materials.size() == 2);
     CHECK(replaced.meshes.at(0).material == std::vector<std::int32_t>{1, 0});
     CHECK(replaced.meshes[0].emission.empty());
@@ -395,8 +429,10 @@ TEST_CASE("materials of an OBJ can be kept, replaced or ignored", "[scene_yaml][
     CHECK(ignored.materials.size() == 1);
     CHECK(ignored.objects.at(0).material == 0);
 
-    CHECK_THAT(refused(kGrey + "objects: [{obj: two.obj, material_overrides: {Lmap.001: grey}}]", {}, folder.path()),
-               Contains("scene.yaml:3:47: error: no face of 'two.obj' has a material 'Lmap.001'") && Contains("did you mean 'Lamp.001'?"));
+    CHECK_THAT(refused(kGrey + "objects: [{obj: two.obj, material_overrides: {Lmap.001: grey}}]", {},
+                       folder.path()),
+               Contains("scene.yaml:3:47: error: no face of 'two.obj' has a material 'Lmap.001'") &&
+                   Contains("did you mean 'Lamp.001'?"));
     CHECK_THAT(refused(kGrey + "objects: [{obj: two.obj, material: grey, override: true, "
                                "material_overrides: {body: grey}}]",
                        {}, folder.path()),
@@ -479,44 +515,68 @@ TEST_CASE("unused names are warnings, not errors", "[scene_yaml]") {
     const int before = warningCount();
     parse("spectra: {a: 1}\nmaterials: {b: {type: diffuse, reflectance: 0}}");
     CHECK(warningCount() == before + 2);
-    CHECK_THAT(refused("spectra: {a: {rgb: [1, 2]}}"), Contains("scene.yaml:2:20: error: expected a list of 3 numbers for 'rgb', found a list of 2"));
+    CHECK_THAT(
+        refused("spectra: {a: {rgb: [1, 2]}}"),
+        Contains("scene.yaml:2:20: error: expected a list of 3 numbers for 'rgb', found a list of 2"));
 }
 
 TEST_CASE("aliases are welcome, a byte order mark and CRLF are borne", "[scene_yaml]") {
     const Quiet quiet;
-    const Scene scene = parseScene("\xef\xbb\xbf" "crt: 1\r\ncamera: {position: &p [1, 2, 3], target: [0, 0, 0], up: *p}\r\n"
-                                   "film: {resolution: [2, 2]}\r\n",
-                                   "scene.yaml", ".", {{"camera.up", "[0, 1, 0]"}});
+    const Scene scene = parseScene(
+        "\xef\xbb\xbf"
+        "crt: 1\r\ncamera: {position: &p [1, 2, 3], target: [0, 0, 0], up: *p}\r\n"
+        "film: {resolution: [2, 2]}\r\n",
+        "scene.yaml", ".", {{"camera.up", "[0, 1, 0]"}});
     CHECK(scene.camera.position == Vec3d{1, 2, 3});
     CHECK(scene.camera.up == Vec3d{0, 1, 0});
-    CHECK_THAT(refusal("\xef\xbb\xbf" "ctr: 1").what(), Contains("scene.yaml:1:1: error: unknown key 'ctr' in the scene"));
+    CHECK_THAT(refusal("\xef\xbb\xbf"
+                       "ctr: 1")
+                   .what(),
+               Contains("scene.yaml:1:1: error: unknown key 'ctr' in the scene"));
 }
 
-// ---- Bad files -------------------------------------------------------------------------------------------------------
+// ---- Bad files
+// -------------------------------------------------------------------------------------------------------
 
 TEST_CASE("files that are not there or not text", "[scene_yaml][refused]") {
     const TemporaryFolder folder;
-    CHECK_THROWS_WITH(loadScene(folder.path() + "/none.yaml"), Contains("none.yaml: error: cannot be opened: No such file"));
+    CHECK_THROWS_WITH(loadScene(folder.path() + "/none.yaml"),
+                      Contains("none.yaml: error: cannot be opened: No such file"));
     CHECK_THROWS_WITH(loadScene(folder.path()), Contains("this is a directory"));
-    CHECK_THROWS_WITH(loadScene(folder.write("empty.yaml", "")), Contains("empty.yaml: error: there is nothing in this file; a scene begins with 'crt: 1'"));
-    CHECK_THROWS_WITH(loadScene(folder.write("comment.yaml", "# nothing\n")), Contains("there is nothing in this file"));
-    CHECK_THROWS_WITH(loadScene(folder.write("zero.yaml", std::string("crt: 1\nx\0y", 10))), Contains("zero.yaml:2:2: error: byte 0x00 at offset 8 is not text"));
-    CHECK_THROWS_WITH(loadScene(folder.write("png.yaml", "\x89PNG\r\n\x1a\n")), Contains("png.yaml:1:1: error: byte 0x89 at offset 0"));
-    CHECK_THROWS_WITH(loadScene(folder.write("latin.yaml", "crt: 1\ntitle: caf\xe9\n")), Contains("latin.yaml:2:11: error: byte 0xe9") && Contains("title: caf\ufffd\n"));
+    CHECK_THROWS_WITH(
+        loadScene(folder.write("empty.yaml", "")),
+        Contains("empty.yaml: error: there is nothing in this file; a scene begins with 'crt: 1'"));
+    CHECK_THROWS_WITH(loadScene(folder.write("comment.yaml", "# nothing\n")),
+                      Contains("there is nothing in this file"));
+    CHECK_THROWS_WITH(loadScene(folder.write("zero.yaml", std::string("crt: 1\nx\0y", 10))),
+                      Contains("zero.yaml:2:2: error: byte 0x00 at offset 8 is not text"));
+    CHECK_THROWS_WITH(loadScene(folder.write("png.yaml", "\x89PNG\r\n\x1a\n")),
+                      Contains("png.yaml:1:1: error: byte 0x89 at offset 0"));
+    CHECK_THROWS_WITH(loadScene(folder.write("latin.yaml", "crt: 1\ntitle: caf\xe9\n")),
+                      Contains("latin.yaml:2:11: error: byte 0xe9") && Contains("title: caf\ufffd\n"));
 }
 
 TEST_CASE("texts that are not YAML, or not the YAML of a scene", "[scene_yaml][refused]") {
     CHECK_THAT(refused("film: {resolution: [1, 2}\n"), Contains("scene.yaml:2:25: error: not valid YAML"));
-    CHECK_THAT(refused("camera:\n\tfov: 3\n"), Contains("scene.yaml:3:5: error: not valid YAML") && Contains("indent with blanks"));
-    CHECK_THAT(refused("title: *nowhere\n"), Contains("scene.yaml:2:8: error: not valid YAML: the referenced anchor is not defined"));
-    CHECK_THAT(refusal("- 1\n- 2\n").what(), Contains("scene.yaml:1:1: error: expected a map for the scene, found a list of 2"));
+    CHECK_THAT(refused("camera:\n\tfov: 3\n"),
+               Contains("scene.yaml:3:5: error: not valid YAML") && Contains("indent with blanks"));
+    CHECK_THAT(refused("title: *nowhere\n"),
+               Contains("scene.yaml:2:8: error: not valid YAML: the referenced anchor is not defined"));
+    CHECK_THAT(refusal("- 1\n- 2\n").what(),
+               Contains("scene.yaml:1:1: error: expected a map for the scene, found a list of 2"));
     CHECK_THAT(refusal("~").what(), Contains("expected a map for the scene, found nothing"));
-    CHECK_THAT(refused("---\ncrt: 1\n"), Contains("scene.yaml:2:1: error: a second YAML document begins here"));
-    CHECK_THAT(refused("title: !!str x\n"), Contains("error: the YAML tag 'tag:yaml.org,2002:str' means nothing in a scene"));
-    CHECK_THAT(refused("? [1, 2]\n: 3\n"), Contains("scene.yaml:2:3: error: a list as a key is not possible here"));
-    CHECK_THAT(refused("title: " + std::string(3000, '[') + "\n"), Contains("nested more than 64 levels deep"));
-    CHECK_THAT(refused("objects: &a [{name: x, transforms: *a}]\n"), Contains("scene.yaml:2:36: error: this alias is inside the value it stands for"));
-    CHECK_THAT(refused("film: {<<: {resolution: [1, 1]}}\n"), Contains("scene.yaml:2:8: error: merge keys ('<<') are not part of a scene"));
+    CHECK_THAT(refused("---\ncrt: 1\n"),
+               Contains("scene.yaml:2:1: error: a second YAML document begins here"));
+    CHECK_THAT(refused("title: !!str x\n"),
+               Contains("error: the YAML tag 'tag:yaml.org,2002:str' means nothing in a scene"));
+    CHECK_THAT(refused("? [1, 2]\n: 3\n"),
+               Contains("scene.yaml:2:3: error: a list as a key is not possible here"));
+    CHECK_THAT(refused("title: " + std::string(3000, '[') + "\n"),
+               Contains("nested more than 64 levels deep"));
+    CHECK_THAT(refused("objects: &a [{name: x, transforms: *a}]\n"),
+               Contains("scene.yaml:2:36: error: this alias is inside the value it stands for"));
+    CHECK_THAT(refused("film: {<<: {resolution: [1, 1]}}\n"),
+               Contains("scene.yaml:2:8: error: merge keys ('<<') are not part of a scene"));
 
     std::string laughs = "spectra:\n  a: &a [x, x, x, x, x, x, x, x, x, x]\n";
     for (char c = 'b'; c <= 'k'; ++c) {
@@ -524,12 +584,15 @@ TEST_CASE("texts that are not YAML, or not the YAML of a scene", "[scene_yaml][r
         for (int i = 0; i < 10; ++i) laughs += std::string(i > 0 ? ", *" : "*") + static_cast<char>(c - 1);
         laughs += "]\n";
     }
-    CHECK_THAT(refused(laughs), Contains("values behind aliases, which take") && Contains("set CRT_SCENE_MEMORY="));
+    CHECK_THAT(refused(laughs),
+               Contains("values behind aliases, which take") && Contains("set CRT_SCENE_MEMORY="));
 }
 
 TEST_CASE("the version comes first", "[scene_yaml][refused]") {
-    CHECK_THAT(refusal("title: x\n").what(), Contains("scene.yaml:1:1: error: 'crt' is missing in the scene"));
-    CHECK_THAT(refusal("title: x\ncrt: 1\n").what(), Contains("scene.yaml:2:1: error: 'crt' must be the first key of a scene"));
+    CHECK_THAT(refusal("title: x\n").what(),
+               Contains("scene.yaml:1:1: error: 'crt' is missing in the scene"));
+    CHECK_THAT(refusal("title: x\ncrt: 1\n").what(),
+               Contains("scene.yaml:2:1: error: 'crt' must be the first key of a scene"));
     CHECK_THAT(refusal("crt: 2\n").what(), Contains("scene.yaml:1:6: error: 'crt' is 2; it must be 1"));
 }
 
@@ -540,24 +603,35 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
           "    3 |   white: {type: diffuse, reflectence: 0.5}\n"
           "      |                          ^~~~~~~~~~~ did you mean 'reflectance'?\n"
           "      = keys of a diffuse material: type, reflectance");
-    CHECK_THAT(refused("flim: {}\n"), Contains("scene.yaml:2:1: error: unknown key 'flim' in the scene") && Contains("did you mean 'film'?"));
-    CHECK_THAT(refused("nee: false\n"), Contains("unknown key 'nee' in the scene") && Contains("'nee' is a key of integrator"));
+    CHECK_THAT(refused("flim: {}\n"), Contains("scene.yaml:2:1: error: unknown key 'flim' in the scene") &&
+                                          Contains("did you mean 'film'?"));
+    CHECK_THAT(refused("nee: false\n"),
+               Contains("unknown key 'nee' in the scene") && Contains("'nee' is a key of integrator"));
     CHECK_THAT(refused("path: {nee: false}\n"), Contains("unknown key 'path' in the scene"));
-    CHECK_THAT(refused("title: a\ntitle: b\n"), Contains("scene.yaml:3:1: error: duplicate key 'title', already given in line 2"));
-    CHECK_THAT(refused("materials: {a: {type: difuse}}\n"), Contains("scene.yaml:2:23: error: expected one of diffuse, mirror, conductor, dielectric for 'type'") &&
-                                                               Contains("did you mean 'diffuse'?"));
-    CHECK_THAT(refused("materials: {a: {typ: diffuse}}\n"), Contains("scene.yaml:2:17: error: unknown key 'typ' in material 'a'") &&
-                                                              Contains("did you mean 'type'?"));
-    CHECK_THAT(refused("materials: {a: {reflectance: 1}}\n"), Contains("scene.yaml:2:16: error: 'type' is missing in material 'a'"));
-    CHECK_THAT(refused("materials: {a: {type: diffuse}}\n"), Contains("scene.yaml:2:16: error: 'reflectance' is missing in material 'a'"));
-    CHECK_THAT(refused("camera: {fov: 40, focal_length: 3}\n"), Contains("'fov' and 'focal_length' in camera exclude each other") &&
-                                                                  Contains("'focal_length' in camera needs 'sensor' too"));
+    CHECK_THAT(refused("title: a\ntitle: b\n"),
+               Contains("scene.yaml:3:1: error: duplicate key 'title', already given in line 2"));
+    CHECK_THAT(
+        refused("materials: {a: {type: difuse}}\n"),
+        Contains(
+            "scene.yaml:2:23: error: expected one of diffuse, mirror, conductor, dielectric for 'type'") &&
+            Contains("did you mean 'diffuse'?"));
+    CHECK_THAT(refused("materials: {a: {typ: diffuse}}\n"),
+               Contains("scene.yaml:2:17: error: unknown key 'typ' in material 'a'") &&
+                   Contains("did you mean 'type'?"));
+    CHECK_THAT(refused("materials: {a: {reflectance: 1}}\n"),
+               Contains("scene.yaml:2:16: error: 'type' is missing in material 'a'"));
+    CHECK_THAT(refused("materials: {a: {type: diffuse}}\n"),
+               Contains("scene.yaml:2:16: error: 'reflectance' is missing in material 'a'"));
+    CHECK_THAT(refused("camera: {fov: 40, focal_length: 3}\n"),
+               Contains("'fov' and 'focal_length' in camera exclude each other") &&
+                   Contains("'focal_length' in camera needs 'sensor' too"));
     CHECK_THAT(refused("objects: [{material: m}]\n"), Contains("object 0 needs obj or mesh"));
 }
 
 TEST_CASE("columns count characters, not bytes", "[scene_yaml][refused]") {
     const Error e = refusal("crt: 1\nmaterials: {grün: {refl: 1}}\n");
-    CHECK_THAT(e.what(), Contains("scene.yaml:2:19: error: 'type' is missing in material 'grün': one of diffuse, mirror, conductor, dielectric\n"
+    CHECK_THAT(e.what(), Contains("scene.yaml:2:19: error: 'type' is missing in material 'grün': one of "
+                                  "diffuse, mirror, conductor, dielectric\n"
                                   "    2 | materials: {grün: {refl: 1}}\n"
                                   "      |                   ^"));
     CHECK(e.place().file == "scene.yaml");
@@ -569,132 +643,212 @@ TEST_CASE("long lines are cut around the place", "[scene_yaml][refused]") {
     std::string table = "environment: {radiance: {table: {nm: [";
     for (int i = 0; i < 200; ++i) table += std::to_string(360 + i) + ", ";
     const std::string message = refused(table + "nan], value: [1]}}}\n");
-    CHECK_THAT(message, Contains("value 201 of 'nm', found 'nan': NaN and infinity have no place in a scene"));
+    CHECK_THAT(message,
+               Contains("value 201 of 'nm', found 'nan': NaN and infinity have no place in a scene"));
     CHECK_THAT(message, Contains(" | …") && Contains("^~~"));
     CHECK(message.size() < 500);
 }
 
 TEST_CASE("wrong types and impossible numbers", "[scene_yaml][refused]") {
     CHECK_THAT(refused("film: 3\n"), Contains("scene.yaml:2:7: error: expected a map for film, found '3'"));
-    CHECK_THAT(refused("film:\n"), Contains("scene.yaml:2:1: error: expected a map for film, found nothing"));
+    CHECK_THAT(refused("film:\n"),
+               Contains("scene.yaml:2:1: error: expected a map for film, found nothing"));
     CHECK_THAT(refused("objects: {a: 1}\n"), Contains("expected a list for 'objects', found a map"));
-    CHECK_THAT(refused("camera: {fov: wide}\n"), Contains("scene.yaml:2:15: error: expected a number for 'fov', found 'wide'"));
-    CHECK_THAT(refused("camera: {fov: '40'}\n"), Contains("found the text \"40\"") && Contains("leave the quotes out"));
+    CHECK_THAT(refused("camera: {fov: wide}\n"),
+               Contains("scene.yaml:2:15: error: expected a number for 'fov', found 'wide'"));
+    CHECK_THAT(refused("camera: {fov: '40'}\n"),
+               Contains("found the text \"40\"") && Contains("leave the quotes out"));
     CHECK_THAT(refused("camera: {fov: $fov}\n"), Contains("scenes have no variables; use --set"));
-    CHECK_THAT(refused("camera: {position: [0, 0]}\n"), Contains("expected a list of 3 numbers for 'position', found a list of 2"));
-    CHECK_THAT(refused("camera: {position: [0, .nan, -.inf]}\n"), Contains("scene.yaml:2:24: error: expected a number for value 2 of 'position', found '.nan'") &&
-                                                                    Contains("scene.yaml:2:30: error"));
+    CHECK_THAT(refused("camera: {position: [0, 0]}\n"),
+               Contains("expected a list of 3 numbers for 'position', found a list of 2"));
+    CHECK_THAT(
+        refused("camera: {position: [0, .nan, -.inf]}\n"),
+        Contains("scene.yaml:2:24: error: expected a number for value 2 of 'position', found '.nan'") &&
+            Contains("scene.yaml:2:30: error"));
     CHECK_THAT(refused("camera: {position: [0, 1e999, 0]}\n"), Contains("outside the range of a double"));
-    CHECK_THAT(refused("integrator: {max_depth: 012}\n"), Contains("scene.yaml:2:25: error: expected a whole number for 'max_depth', found '012': leading zeros") &&
-                                                              Contains("write 12"));
+    CHECK_THAT(
+        refused("integrator: {max_depth: 012}\n"),
+        Contains(
+            "scene.yaml:2:25: error: expected a whole number for 'max_depth', found '012': leading zeros") &&
+            Contains("write 12"));
     CHECK_THAT(refused("integrator: {max_depth: 0x10}\n"), Contains("write it in decimal"));
     CHECK_THAT(refused("integrator: {max_depth: 1.5}\n"), Contains("it is not whole"));
-    CHECK_THAT(refused("integrator: {max_depth: -1}\n"), Contains("'max_depth' is -1; it must be 0 to 1000000000"));
-    CHECK_THAT(refused("integrator: {max_depth: 1e10}\n"), Contains("'max_depth' is 1e10; it must be 0 to 1000000000"));
-    CHECK_THAT(refused("integrator: {nee: yes}\n"), Contains("expected true or false for 'nee', found 'yes'") && Contains("write true"));
+    CHECK_THAT(refused("integrator: {max_depth: -1}\n"),
+               Contains("'max_depth' is -1; it must be 0 to 1000000000"));
+    CHECK_THAT(refused("integrator: {max_depth: 1e10}\n"),
+               Contains("'max_depth' is 1e10; it must be 0 to 1000000000"));
+    CHECK_THAT(refused("integrator: {nee: yes}\n"),
+               Contains("expected true or false for 'nee', found 'yes'") && Contains("write true"));
     CHECK_THAT(refused("integrator: {nee: 0}\n"), Contains("write false"));
-    CHECK_THAT(refused("integrator: {type: pth}\n"), Contains("expected one of path, normals, aabb for 'type', found 'pth'") && Contains("did you mean 'path'?"));
+    CHECK_THAT(refused("integrator: {type: pth}\n"),
+               Contains("expected one of path, normals, aabb for 'type', found 'pth'") &&
+                   Contains("did you mean 'path'?"));
     CHECK_THAT(refused("sampler: {samples: 0}\n"), Contains("'samples' is 0; it must be 1 to"));
     CHECK_THAT(refused("sampler: {seed: -1}\n"), Contains("'seed' is -1; it must be 0 or more"));
     CHECK_THAT(refused("sampler: {seed: 18446744073709551616}\n"), Contains("it is too large"));
-    CHECK_THAT(refused("title: 2024\n"), Contains("expected text for 'title', found '2024'") && Contains("put it in quotes"));
-    CHECK_THAT(refused("film: {exposure_ev: 1000}\n"), Contains("'exposure_ev' is 1000; it must be -100 to 100"));
+    CHECK_THAT(refused("title: 2024\n"),
+               Contains("expected text for 'title', found '2024'") && Contains("put it in quotes"));
+    CHECK_THAT(refused("film: {exposure_ev: 1000}\n"),
+               Contains("'exposure_ev' is 1000; it must be -100 to 100"));
 }
 
 TEST_CASE("film sizes that cannot be", "[scene_yaml][refused]") {
-    CHECK_THAT(refused("film: {resolution: [0, 0]}\n"), Contains("scene.yaml:2:21: error: value 1 of 'resolution' is 0; it must be 1 to 65535") &&
-                                                          Contains("scene.yaml:2:24: error: value 2"));
-    CHECK_THAT(refused("film: {resolution: [100000, 100000]}\n"), Contains("value 1 of 'resolution' is 100000; it must be 1 to 65535"));
-    CHECK_THAT(refused("film: {resolution: [65535, 65535]}\n"), Contains("scene.yaml:2:20: error: 65535 x 65535 are 4294836225 pixels; a film has at most 2^31"));
-    CHECK_THAT(refused("film: {resolution: [4, 4], crop: [0, 0, 5, 4]}\n"), Contains("beyond the film of 4 x 4 pixels"));
+    CHECK_THAT(refused("film: {resolution: [0, 0]}\n"),
+               Contains("scene.yaml:2:21: error: value 1 of 'resolution' is 0; it must be 1 to 65535") &&
+                   Contains("scene.yaml:2:24: error: value 2"));
+    CHECK_THAT(refused("film: {resolution: [100000, 100000]}\n"),
+               Contains("value 1 of 'resolution' is 100000; it must be 1 to 65535"));
+    CHECK_THAT(
+        refused("film: {resolution: [65535, 65535]}\n"),
+        Contains("scene.yaml:2:20: error: 65535 x 65535 are 4294836225 pixels; a film has at most 2^31"));
+    CHECK_THAT(refused("film: {resolution: [4, 4], crop: [0, 0, 5, 4]}\n"),
+               Contains("beyond the film of 4 x 4 pixels"));
     CHECK_THAT(refused("film: {crop: [3, 0, 3, 4]}\n"), Contains("this window is empty"));
-    CHECK_THAT(refused("film: {filter: {type: box, sigma: 1}}\n"), Contains("only a gaussian filter has a sigma"));
+    CHECK_THAT(refused("film: {filter: {type: box, sigma: 1}}\n"),
+               Contains("only a gaussian filter has a sigma"));
     CHECK_THAT(refused("film: {filter: Gausian}\n"), Contains("did you mean 'gaussian'?"));
-    CHECK_THAT(refused("film: {white_balance: d65}\n"), Contains("there is no spectrum 'd65'") && Contains("did you mean 'D65'?"));
+    CHECK_THAT(refused("film: {white_balance: d65}\n"),
+               Contains("there is no spectrum 'd65'") && Contains("did you mean 'D65'?"));
     CHECK_THAT(refused("film: {white_balance: 0}\n"), Contains("no luminance"));
 }
 
 TEST_CASE("cameras that look nowhere", "[scene_yaml][refused]") {
-    CHECK_THAT(refused("camera: {position: [1, 2, 3], target: [1, 2, 3]}\n"), Contains("scene.yaml:2:39: error: position and target are the same point"));
+    CHECK_THAT(refused("camera: {position: [1, 2, 3], target: [1, 2, 3]}\n"),
+               Contains("scene.yaml:2:39: error: position and target are the same point"));
     CHECK_THAT(refused("camera: {up: [0, 0, 0]}\n"), Contains("scene.yaml:2:14: error: up has length 0"));
-    CHECK_THAT(refused("camera: {up: [0, 0, -5]}\n"), Contains("scene.yaml:2:14: error: up is parallel to the view"));
-    CHECK_THAT(refused("camera: {position: [0, 9, 0], target: [0, 0, 0]}\n"), Contains("up is parallel to the view") && Contains("set 'up'"));
+    CHECK_THAT(refused("camera: {up: [0, 0, -5]}\n"),
+               Contains("scene.yaml:2:14: error: up is parallel to the view"));
+    CHECK_THAT(refused("camera: {position: [0, 9, 0], target: [0, 0, 0]}\n"),
+               Contains("up is parallel to the view") && Contains("set 'up'"));
     CHECK(count(refused("camera: {positoin: [0, 0, 2], target: [0, 0, 0]}\n"), ": error: ") == 1);
-    CHECK_THAT(refused("camera: {fov: 0}\n"), Contains("scene.yaml:2:15: error: 'fov' is 0; it must be between 0 and 180, both excluded"));
+    CHECK_THAT(refused("camera: {fov: 0}\n"),
+               Contains("scene.yaml:2:15: error: 'fov' is 0; it must be between 0 and 180, both excluded"));
     CHECK_THAT(refused("camera: {fov: 180}\n"), Contains("'fov' is 180"));
-    CHECK_THAT(refused("camera: {focal_length: -1, sensor: [1, 0]}\n"), Contains("'focal_length' is -1; it must be above 0") &&
-                                                                          Contains("value 2 of 'sensor' is 0"));
-    CHECK_THAT(refused("camera: {aperture_radius: -1}\n"), Contains("'aperture_radius' is -1; it must be 0 or more"));
+    CHECK_THAT(refused("camera: {focal_length: -1, sensor: [1, 0]}\n"),
+               Contains("'focal_length' is -1; it must be above 0") && Contains("value 2 of 'sensor' is 0"));
+    CHECK_THAT(refused("camera: {aperture_radius: -1}\n"),
+               Contains("'aperture_radius' is -1; it must be 0 or more"));
 }
 
 TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
-    CHECK_THAT(refusedReflectance("1.5"), Contains("scene.yaml:3:35: error: 'reflectance' of material 'm' is 1.5; it must be 0 to 1"));
+    CHECK_THAT(refusedReflectance("1.5"),
+               Contains("scene.yaml:3:35: error: 'reflectance' of material 'm' is 1.5; it must be 0 to 1"));
     CHECK_THAT(refusedReflectance("{table: {nm: [400, 550, 700], value: [0.1, 1.25, 0.5]}, outside: clamp}"),
                Contains("'reflectance' of material 'm' reaches 1.25 at 550 nm; it must be 0 to 1"));
     CHECK_THAT(refusedReflectance("-0.1"), Contains("is -0.1; it must be 0 to 1"));
     CHECK_THAT(refusedReflectance(".nan"), Contains("NaN and infinity have no place in a scene"));
-    CHECK_THAT(refusedReflectance("{rgb: [1.2, 0, 0]}"), Contains("a component of this colour is 1.2; a reflectance must be 0 to 1"));
+    CHECK_THAT(refusedReflectance("{rgb: [1.2, 0, 0]}"),
+               Contains("a component of this colour is 1.2; a reflectance must be 0 to 1"));
     CHECK_THAT(refusedReflectance("{rgb: [0.2, 0, 0], spcae: srgb}"), Contains("did you mean 'space'?"));
-    CHECK_THAT(refusedReflectance("{table: {nm: [400, 700], value: [0, 1]}}"),
-               Contains("scene.yaml:3:43: error: the data go from 400 to 700 nm") && Contains("'outside: clamp'"));
-    CHECK_THAT(refusedReflectance("{table: {nm: [400, 700], value: [0, 1]}, outside: error}"), Contains("scene.yaml:3:85: error: the data go from 400 to 700 nm"));
+    CHECK_THAT(
+        refusedReflectance("{table: {nm: [400, 700], value: [0, 1]}}"),
+        Contains("scene.yaml:3:43: error: the data go from 400 to 700 nm") && Contains("'outside: clamp'"));
+    CHECK_THAT(refusedReflectance("{table: {nm: [400, 700], value: [0, 1]}, outside: error}"),
+               Contains("scene.yaml:3:85: error: the data go from 400 to 700 nm"));
     CHECK_THAT(refusedReflectance("{table: {nm: [400, 700, 600], value: [0, 1, 0]}, outside: zero}"),
                Contains("scene.yaml:3:59: error: wavelengths must increase, but 600 nm follows 700 nm"));
-    CHECK_THAT(refusedReflectance("{table: {nm: [400, 700], value: [0]}, outside: zero}"), Contains("the table has 2 wavelengths but 1 values"));
-    CHECK_THAT(refusedReflectance("{file: no.spd, outside: zero}"), Contains("scene.yaml:3:42: error: cannot find 'no.spd'; searched in ."));
-    CHECK_THAT(refusedReflectance("{ilum: D65}"), Contains("unknown key 'ilum' in 'reflectance' of material 'm'") && Contains("one of: table, file, rgb"));
+    CHECK_THAT(refusedReflectance("{table: {nm: [400, 700], value: [0]}, outside: zero}"),
+               Contains("the table has 2 wavelengths but 1 values"));
+    CHECK_THAT(refusedReflectance("{file: no.spd, outside: zero}"),
+               Contains("scene.yaml:3:42: error: cannot find 'no.spd'; searched in ."));
+    CHECK_THAT(refusedReflectance("{ilum: D65}"),
+               Contains("unknown key 'ilum' in 'reflectance' of material 'm'") &&
+                   Contains("one of: table, file, rgb"));
     CHECK_THAT(refusedReflectance("{iluminant: D65}"), Contains("did you mean 'illuminant'?"));
-    CHECK_THAT(refusedReflectance("{rgb: [0, 0, 0], glass: SF10}"), Contains("'rgb' and 'glass' in 'reflectance' of material 'm' exclude each other"));
-    CHECK_THAT(refusedReflectance("D65"), Contains("there is no spectrum 'D65'") && Contains("write {illuminant: D65}"));
+    CHECK_THAT(refusedReflectance("{rgb: [0, 0, 0], glass: SF10}"),
+               Contains("'rgb' and 'glass' in 'reflectance' of material 'm' exclude each other"));
+    CHECK_THAT(refusedReflectance("D65"),
+               Contains("there is no spectrum 'D65'") && Contains("write {illuminant: D65}"));
     CHECK_THAT(refusedReflectance("[1, 2]"), Contains("expected a number, the name of a spectrum or a map"));
-    CHECK_THAT(refused("environment: {radiance: -1}\n"), Contains("scene.yaml:2:25: error: 'radiance' of environment is -1; it must be 0 to 1e+25"));
-    CHECK_THAT(refused("environment: {radiance: {rgb: [5, 1, 1]}}\n"), Contains("an sRGB-encoded colour must be 0 to 1") && Contains("add 'space: linear'"));
-    CHECK_THAT(refused("environment: {radiance: {blackbody: 0}}\n"), Contains("'blackbody' is 0; it must be 100 to"));
-    CHECK_THAT(refused("spectra: {a: b, b: {ref: a}}\nenvironment: {radiance: a}\n"), Contains("spectrum 'a' is defined by itself"));
+    CHECK_THAT(refused("environment: {radiance: -1}\n"),
+               Contains("scene.yaml:2:25: error: 'radiance' of environment is -1; it must be 0 to 1e+25"));
+    CHECK_THAT(refused("environment: {radiance: {rgb: [5, 1, 1]}}\n"),
+               Contains("an sRGB-encoded colour must be 0 to 1") && Contains("add 'space: linear'"));
+    CHECK_THAT(refused("environment: {radiance: {blackbody: 0}}\n"),
+               Contains("'blackbody' is 0; it must be 100 to"));
+    CHECK_THAT(refused("spectra: {a: b, b: {ref: a}}\nenvironment: {radiance: a}\n"),
+               Contains("spectrum 'a' is defined by itself"));
     CHECK_THAT(refused("spectra: {0.5: 1}\n"), Contains("'0.5' cannot name a spectrum"));
-    CHECK_THAT(refused("spectra: {withe: 1, other: whte}\n"), Contains("there is no spectrum 'whte'") && Contains("did you mean 'withe'?"));
-    CHECK_THAT(refused("materials: {m: {type: dielectric, ior: {rgb: [1, 1, 1]}}}\n"), Contains("a refractive index is not a colour"));
-    CHECK_THAT(refused("materials: {m: {type: dielectric, ior: 0}}\n"), Contains("'ior' of material 'm' is 0; it must be 0.001 to 1000"));
-    CHECK_THAT(refused("materials: {m: {type: dielectric, ior: {sellmeier: {B: [-3, 0, 0], C: [0, 0, 0]}}}}\n"), Contains("Sellmeier"));
-    CHECK_THAT(refused("materials: {m: {type: conductor, metal: Ax}}\n"), Contains("scene.yaml:2:41: error: expected one of") && Contains("did you mean 'A"));
-    CHECK_THAT(refused("materials: {m: {type: conductor, metal: Au, eta: 1, k: 1}}\n"), Contains("'metal' and 'eta' in material 'm' exclude each other"));
+    CHECK_THAT(refused("spectra: {withe: 1, other: whte}\n"),
+               Contains("there is no spectrum 'whte'") && Contains("did you mean 'withe'?"));
+    CHECK_THAT(refused("materials: {m: {type: dielectric, ior: {rgb: [1, 1, 1]}}}\n"),
+               Contains("a refractive index is not a colour"));
+    CHECK_THAT(refused("materials: {m: {type: dielectric, ior: 0}}\n"),
+               Contains("'ior' of material 'm' is 0; it must be 0.001 to 1000"));
+    CHECK_THAT(
+        refused("materials: {m: {type: dielectric, ior: {sellmeier: {B: [-3, 0, 0], C: [0, 0, 0]}}}}\n"),
+        Contains("Sellmeier"));
+    CHECK_THAT(refused("materials: {m: {type: conductor, metal: Ax}}\n"),
+               Contains("scene.yaml:2:41: error: expected one of") && Contains("did you mean 'A"));
+    CHECK_THAT(refused("materials: {m: {type: conductor, metal: Au, eta: 1, k: 1}}\n"),
+               Contains("'metal' and 'eta' in material 'm' exclude each other"));
 }
 
 TEST_CASE("objects that cannot be", "[scene_yaml][refused]") {
-    CHECK_THAT(refused(kGrey + "objects: [{obj: none.obj, material: grey}]\n"), Contains("scene.yaml:3:17: error: cannot find 'none.obj'; searched in ."));
-    CHECK_THAT(refused(kGrey + "objects: [{obj: /none/none.obj, material: grey}]\n"), Contains("there is no file '/none/none.obj'"));
+    CHECK_THAT(refused(kGrey + "objects: [{obj: none.obj, material: grey}]\n"),
+               Contains("scene.yaml:3:17: error: cannot find 'none.obj'; searched in ."));
+    CHECK_THAT(refused(kGrey + "objects: [{obj: /none/none.obj, material: grey}]\n"),
+               Contains("there is no file '/none/none.obj'"));
     CHECK_THAT(refused(kGrey + "objects: [{obj: /tmp, material: grey}]\n"), Contains("is a directory"));
-    CHECK_THAT(refused(kGrey + "objects: [{mesh: " + kTriangle + ", material: gray}]\n"), Contains("there is no material 'gray'") && Contains("did you mean 'grey'?"));
-    CHECK_THAT(refused("objects: [{mesh: " + kTriangle + "}]\n"), Contains("scene.yaml:2:11: error: 'material' is missing in object 0"));
-    CHECK_THAT(refused("objects: [{mesh: " + kTriangle + ", material: from_mtl}]\n"), Contains("only an OBJ has materials of its own"));
-    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: [[0, 0, 1]]}")), Contains("face 0 names position 1, but there are only 1"));
-    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: [[0, 0, -1]]}")), Contains("an index of face 0 is -1; it must be 0 to"));
-    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: [[0, 0]]}")), Contains("expected a list of 3 or more indices for face 0, found a list of 2"));
-    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0]], faces: [[0, 0, 0]]}")), Contains("expected a list of 3 numbers for position 0"));
-    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: []}")), Contains("a mesh without faces cannot be seen"));
-    CHECK_THAT(refused(meshScene("mesh: {positions: [[0,0,0],[4,0,0],[1,1,0],[0,4,0]], faces: [[1,2,3,0]]}")), Contains("face 0 is not convex"));
-    CHECK_THAT(refused(meshScene("mesh: {positions: [[0,0,0],[4,0,0],[1,1,0]], faces: [[0,1,2]], normals: [[0,0,1]]}")), Contains("there are 1 normals for 3 positions"));
-    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{scale: 0}]")), Contains("a scale of 0 flattens"));
-    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{rotate: {axis: [0, 0, 0], angle_deg: 1}}]")), Contains("an axis of length 0"));
-    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{tarnslate: [0, 0, 0]}]")), Contains("did you mean 'translate'?"));
-    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{matrix: [1,0,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]}]")), Contains("cannot be inverted"));
-    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{matrix: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,2]}]")), Contains("the last row must be 0 0 0 1"));
-    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{scale: 1e200}, {scale: 1e200}]")), Contains("overflows"));
-    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transforms: []")), Contains("an object with no placement is nowhere"));
-    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", emission: {radiance: -2}")), Contains("'radiance' of the emission of object 0 is -2; it must be 0 to 1e+25"));
+    CHECK_THAT(refused(kGrey + "objects: [{mesh: " + kTriangle + ", material: gray}]\n"),
+               Contains("there is no material 'gray'") && Contains("did you mean 'grey'?"));
+    CHECK_THAT(refused("objects: [{mesh: " + kTriangle + "}]\n"),
+               Contains("scene.yaml:2:11: error: 'material' is missing in object 0"));
+    CHECK_THAT(refused("objects: [{mesh: " + kTriangle + ", material: from_mtl}]\n"),
+               Contains("only an OBJ has materials of its own"));
+    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: [[0, 0, 1]]}")),
+               Contains("face 0 names position 1, but there are only 1"));
+    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: [[0, 0, -1]]}")),
+               Contains("an index of face 0 is -1; it must be 0 to"));
+    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: [[0, 0]]}")),
+               Contains("expected a list of 3 or more indices for face 0, found a list of 2"));
+    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0]], faces: [[0, 0, 0]]}")),
+               Contains("expected a list of 3 numbers for position 0"));
+    CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: []}")),
+               Contains("a mesh without faces cannot be seen"));
+    CHECK_THAT(
+        refused(meshScene("mesh: {positions: [[0,0,0],[4,0,0],[1,1,0],[0,4,0]], faces: [[1,2,3,0]]}")),
+        Contains("face 0 is not convex"));
+    CHECK_THAT(refused(meshScene(
+                   "mesh: {positions: [[0,0,0],[4,0,0],[1,1,0]], faces: [[0,1,2]], normals: [[0,0,1]]}")),
+               Contains("there are 1 normals for 3 positions"));
+    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{scale: 0}]")),
+               Contains("a scale of 0 flattens"));
+    CHECK_THAT(refused(meshScene("mesh: " + kTriangle +
+                                 ", transform: [{rotate: {axis: [0, 0, 0], angle_deg: 1}}]")),
+               Contains("an axis of length 0"));
+    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{tarnslate: [0, 0, 0]}]")),
+               Contains("did you mean 'translate'?"));
+    CHECK_THAT(refused(meshScene("mesh: " + kTriangle +
+                                 ", transform: [{matrix: [1,0,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]}]")),
+               Contains("cannot be inverted"));
+    CHECK_THAT(refused(meshScene("mesh: " + kTriangle +
+                                 ", transform: [{matrix: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,2]}]")),
+               Contains("the last row must be 0 0 0 1"));
+    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{scale: 1e200}, {scale: 1e200}]")),
+               Contains("overflows"));
+    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transforms: []")),
+               Contains("an object with no placement is nowhere"));
+    CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", emission: {radiance: -2}")),
+               Contains("'radiance' of the emission of object 0 is -2; it must be 0 to 1e+25"));
     CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", emission: {radiance: .nan}")), Contains("NaN"));
 }
 
 TEST_CASE("outputs that cannot be", "[scene_yaml][refused]") {
-    CHECK_THAT(refused("outputs: [{file: a.jpg}]\n"), Contains("scene.yaml:2:18: error: 'a.jpg' does not end in one of .exr, .png, .ppm, .pfm; add 'format'"));
-    CHECK_THAT(refused("outputs: [{file: a.png, aovs: [depth]}]\n"), Contains("only exr files hold more than the image"));
+    CHECK_THAT(
+        refused("outputs: [{file: a.jpg}]\n"),
+        Contains(
+            "scene.yaml:2:18: error: 'a.jpg' does not end in one of .exr, .png, .ppm, .pfm; add 'format'"));
+    CHECK_THAT(refused("outputs: [{file: a.png, aovs: [depth]}]\n"),
+               Contains("only exr files hold more than the image"));
     CHECK_THAT(refused("outputs: [{file: a.exr, aovs: [dpeth]}]\n"), Contains("did you mean 'depth'?"));
     CHECK_THAT(refused("outputs: [{file: a.exr}, {file: a.exr}]\n"), Contains("'a.exr' is written twice"));
     CHECK_THAT(refused("outputs: [{format: exr}]\n"), Contains("'file' is missing in output 0"));
 }
 
 TEST_CASE("all errors of a file come at once, in its order", "[scene_yaml][refused]") {
-    const Error e = refusal("crt: 1\nsampler: {sed: 1}\nfilm: {resolution: [0, 1]}\ncamera: {fov: 0}\nouputs: []\n");
+    const Error e =
+        refusal("crt: 1\nsampler: {sed: 1}\nfilm: {resolution: [0, 1]}\ncamera: {fov: 0}\nouputs: []\n");
     const std::string text = e.what();
     CHECK(count(text, ": error: ") == 4);
     CHECK(text.find("sed") < text.find("resolution"));
@@ -708,7 +862,8 @@ TEST_CASE("all errors of a file come at once, in its order", "[scene_yaml][refus
     CHECK_THAT(refused(many), Contains("… and 950 more errors"));
 }
 
-// ---- Overrides -------------------------------------------------------------------------------------------------------
+// ---- Overrides
+// -------------------------------------------------------------------------------------------------------
 
 TEST_CASE("overrides change the scene before it is checked", "[scene_yaml][override]") {
     CHECK(parseOverride("film.resolution=[128,128]").path == "film.resolution");
@@ -716,9 +871,11 @@ TEST_CASE("overrides change the scene before it is checked", "[scene_yaml][overr
     CHECK_THROWS_AS(parseOverride("film"), Error);
     CHECK_THROWS_WITH(parseOverride("=3"), Contains("expected KEY.PATH=VALUE"));
 
-    const std::string body = "film: {resolution: [0, 0]}\nintegrator: {nee: true}\nenvironment: null\n"
-                             "materials: {red: {type: diffuse, reflectance: 1}, Blue.001: {type: diffuse, reflectance: 1}}\n"
-                             "objects: [{mesh: " + kTriangle + ", material: red}]\n";
+    const std::string body =
+        "film: {resolution: [0, 0]}\nintegrator: {nee: true}\nenvironment: null\n"
+        "materials: {red: {type: diffuse, reflectance: 1}, Blue.001: {type: diffuse, reflectance: 1}}\n"
+        "objects: [{mesh: " +
+        kTriangle + ", material: red}]\n";
     const Scene scene = parse(body, {{"film.resolution", "[12, 34]"},
                                      {"integrator.nee", "false"},
                                      {"sampler.samples", "7"},
@@ -736,7 +893,8 @@ TEST_CASE("overrides change the scene before it is checked", "[scene_yaml][overr
 }
 
 TEST_CASE("an override does not leak through an alias", "[scene_yaml][override]") {
-    const Scene scene = parse("materials: {a: &m {type: diffuse, reflectance: 1}, b: *m}\n", {{"materials.b.reflectance", "0.5"}});
+    const Scene scene = parse("materials: {a: &m {type: diffuse, reflectance: 1}, b: *m}\n",
+                              {{"materials.b.reflectance", "0.5"}});
     CHECK(scene.materials.at(0).reflectance == constantSpectrum(1));
     CHECK(scene.materials.at(1).reflectance == constantSpectrum(0.5));
 }
@@ -748,22 +906,35 @@ TEST_CASE("errors in overrides name the argument", "[scene_yaml][override][refus
           "--set film.resolutoin: error: unknown key 'resolutoin' in film\n"
           "      | film.resolutoin=[1,1]\n"
           "      |      ^~~~~~~~~~ did you mean 'resolution'?\n"
-          "      = keys of film: resolution, crop, filter, color_space, white_balance, exposure_ev, apply_to_float");
-    CHECK_THAT(refusedOverride(body, "flim.resolution=[1,1]"), Contains("--set flim.resolution: error: unknown key 'flim' in the scene") && Contains("did you mean 'film'?"));
-    CHECK_THAT(refusedOverride(body, "film.resolution=[0,1]"), Contains("--set film.resolution: error: value 1 of 'resolution' is 0") &&
-                                                               Contains("\n      | film.resolution=[0,1]\n      |                  ^"));
-    CHECK_THAT(refusedOverride(body, "film.resolution=[0,"), Contains("--set film.resolution: error: not valid YAML"));
-    CHECK_THAT(refusedOverride(body, "film.resolution="), Contains("--set film.resolution: error: there is no value after '='"));
-    CHECK_THAT(refusedOverride(body, "materials.rde.reflectance=1"), Contains("there is no 'rde' in 'materials'") && Contains("did you mean 'red'?"));
-    CHECK_THAT(refusedOverride(body, "objects.1.material=red"), Contains("'objects' is a list; expected an index from 0 to 0, found '1'"));
-    CHECK_THAT(refusedOverride(body, "objects.first.material=red"), Contains("expected an index from 0 to 0, found 'first'"));
-    CHECK_THAT(refusedOverride("", "outputs.0.file=a.exr"), Contains("--set outputs.0.file: error: expected a list for 'outputs', found a map"));
-    CHECK_THAT(refusedOverride("outputs: []\n", "outputs.0.file=a.exr"), Contains("'outputs' is an empty list"));
-    CHECK_THAT(refusedOverride(body, "film.filter.radius=2"), Contains("'film.filter' is 'box' here") && Contains("set 'film.filter' as a whole"));
+          "      = keys of film: resolution, crop, filter, color_space, white_balance, exposure_ev, "
+          "apply_to_float");
+    CHECK_THAT(refusedOverride(body, "flim.resolution=[1,1]"),
+               Contains("--set flim.resolution: error: unknown key 'flim' in the scene") &&
+                   Contains("did you mean 'film'?"));
+    CHECK_THAT(refusedOverride(body, "film.resolution=[0,1]"),
+               Contains("--set film.resolution: error: value 1 of 'resolution' is 0") &&
+                   Contains("\n      | film.resolution=[0,1]\n      |                  ^"));
+    CHECK_THAT(refusedOverride(body, "film.resolution=[0,"),
+               Contains("--set film.resolution: error: not valid YAML"));
+    CHECK_THAT(refusedOverride(body, "film.resolution="),
+               Contains("--set film.resolution: error: there is no value after '='"));
+    CHECK_THAT(refusedOverride(body, "materials.rde.reflectance=1"),
+               Contains("there is no 'rde' in 'materials'") && Contains("did you mean 'red'?"));
+    CHECK_THAT(refusedOverride(body, "objects.1.material=red"),
+               Contains("'objects' is a list; expected an index from 0 to 0, found '1'"));
+    CHECK_THAT(refusedOverride(body, "objects.first.material=red"),
+               Contains("expected an index from 0 to 0, found 'first'"));
+    CHECK_THAT(refusedOverride("", "outputs.0.file=a.exr"),
+               Contains("--set outputs.0.file: error: expected a list for 'outputs', found a map"));
+    CHECK_THAT(refusedOverride("outputs: []\n", "outputs.0.file=a.exr"),
+               Contains("'outputs' is an empty list"));
+    CHECK_THAT(refusedOverride(body, "film.filter.radius=2"),
+               Contains("'film.filter' is 'box' here") && Contains("set 'film.filter' as a whole"));
     CHECK(refusal("crt: 1\n", {{"camera.fov", "0"}}).place().file == "--set camera.fov");
 }
 
-// ---- Generated documents ---------------------------------------------------------------------------------------------
+// ---- Generated documents
+// ---------------------------------------------------------------------------------------------
 
 TEST_CASE("docs/scene.md is what the schema says", "[scene_yaml][docs]") {
     const std::string path = CRT_SOURCE_DIR "/docs/scene.md";
@@ -781,7 +952,8 @@ TEST_CASE("the example of the manual is a scene", "[scene_yaml][docs]") {
     const std::size_t begin = text.find("```yaml\n") + 8;
     const Quiet quiet;
     const int before = warningCount();
-    const Scene scene = parseScene(text.substr(begin, text.find("```", begin) - begin), "docs/scene.md", ".");
+    const Scene scene =
+        parseScene(text.substr(begin, text.find("```", begin) - begin), "docs/scene.md", ".");
     CHECK(scene.objects.size() == 2);
     CHECK(warningCount() == before);
 }

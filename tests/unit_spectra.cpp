@@ -1,9 +1,10 @@
-// Spectra and colour: the measured tables by checksum and by smoothness, published reference values, and the RGB fit.
-#include "catch.h"
+// Spectra and colour: the measured tables by checksum and by smoothness, published reference values, and the
+// RGB fit.
 #include "base/error.h"
+#include "catch.h"
+#include "judge/verify/temporary_folder.h"
 #include "spectra/spectra.h"
 #include "spectra/spectra_data.h"
-#include "judge/verify/temporary_folder.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +20,8 @@ namespace {
 
 double at(const Spectrum& s, int nm) { return s[static_cast<std::size_t>(nm - kWavelengthMin_nm)]; }
 
-/// A table's digits, folded into 64 bits (FNV-1a over the bytes of the doubles): a changed digit is a changed sum.
+/// A table's digits, folded into 64 bits (FNV-1a over the bytes of the doubles): a changed digit is a
+/// changed sum.
 std::uint64_t checksum(std::span<const double> table) {
     std::uint64_t hash = 0xcbf29ce484222325u;
     for (const double value : table) {
@@ -30,7 +32,8 @@ std::uint64_t checksum(std::span<const double> table) {
     return hash;
 }
 
-/// Largest distance between a value and the cubic through its four neighbours, relative to the table's maximum.
+/// Largest distance between a value and the cubic through its four neighbours, relative to the table's
+/// maximum.
 double roughness(std::span<const double> v) {
     double worst = 0, top = 0;
     for (const double x : v) top = std::max(top, x);
@@ -101,7 +104,8 @@ double tableIntegral(const std::vector<double>& nm, const std::vector<double>& v
 TEST_CASE("the measured tables are the published ones", "[spectra]") {
     // Sums anyone can redo from the publications, then the digits as a whole.
     double x = 0, y = 0, z = 0;
-    for (int i = 0; i < data::kObserverSize; ++i) x += data::kCieX[i], y += data::kCieY[i], z += data::kCieZ[i];
+    for (int i = 0; i < data::kObserverSize; ++i)
+        x += data::kCieX[i], y += data::kCieY[i], z += data::kCieZ[i];
     CHECK(x == Approx(106.8654695).epsilon(1e-9));
     CHECK(y == Approx(106.8569171).epsilon(1e-9));
     CHECK(z == Approx(106.8922513).epsilon(1e-9));
@@ -148,12 +152,14 @@ TEST_CASE("whites and single lines fall where colorimetry puts them", "[spectra]
         return std::pair{xyz[0] / sum, xyz[1] / sum};
     };
     const std::pair<const char*, std::pair<double, double>> whites[] = {
-        {"A", {.44757, .40745}}, {"D50", {.34567, .35850}}, {"D65", {.31272, .32903}},
-        {"F2", {.3721, .3751}},  {"F7", {.3129, .3292}},    {"F11", {.3805, .3769}}};  // CIE 15, 1931 observer
+        {"A", {.44757, .40745}},   {"D50", {.34567, .35850}},
+        {"D65", {.31272, .32903}}, {"F2", {.3721, .3751}},
+        {"F7", {.3129, .3292}},    {"F11", {.3805, .3769}}};  // CIE 15, 1931 observer
     for (const auto& [name, expected] : whites) {
         CAPTURE(name);
         const auto [x, y] = chromaticity(spectrumToXyz(*illuminantSpectrum(name)));
-        const double margin = name[0] == 'F' ? 3e-4 : 2e-5;  // Lamps with lines: the CIE sums them at 5 nm, crt at 1 nm.
+        const double margin =
+            name[0] == 'F' ? 3e-4 : 2e-5;  // Lamps with lines: the CIE sums them at 5 nm, crt at 1 nm.
         CHECK(x == Approx(expected.first).margin(margin));
         CHECK(y == Approx(expected.second).margin(margin));
     }
@@ -193,8 +199,9 @@ TEST_CASE("glass indices agree with the catalogue", "[spectra]") {
     const Spectrum grid = *glassIndex("N-BK7");
     CHECK(at(grid, 588) == Approx(index(.588)).epsilon(1e-14));
 
-    const std::tuple<const char*, double, double> catalogue[] = {{"N-BK7", 1.51680, 64.17}, {"SF10", 1.72825, 28.41},
-        {"SF11", 1.78472, 25.76}, {"N-SF10", 1.72828, 28.53}, {"N-SF11", 1.78472, 25.68}, {"fused_silica", 1.45846, 67.82}};
+    const std::tuple<const char*, double, double> catalogue[] = {
+        {"N-BK7", 1.51680, 64.17},  {"SF10", 1.72825, 28.41},   {"SF11", 1.78472, 25.76},
+        {"N-SF10", 1.72828, 28.53}, {"N-SF11", 1.78472, 25.68}, {"fused_silica", 1.45846, 67.82}};
     for (const auto& [name, nd, abbe] : catalogue) {
         CAPTURE(name);
         const Spectrum n = *glassIndex(name);
@@ -220,7 +227,8 @@ TEST_CASE("glass indices agree with the catalogue", "[spectra]") {
 }
 
 TEST_CASE("metals answer to symbol and name", "[spectra]") {
-    for (const auto& [symbol, name] : {std::pair{"Ag", "silver"}, {"Al", "aluminium"}, {"Au", "gold"}, {"Cu", "copper"}}) {
+    for (const auto& [symbol, name] :
+         {std::pair{"Ag", "silver"}, {"Al", "aluminium"}, {"Au", "gold"}, {"Cu", "copper"}}) {
         REQUIRE(metalIndex(symbol));
         CHECK(*metalIndex(symbol) == *metalIndex(name));
     }
@@ -281,7 +289,8 @@ TEST_CASE("tables are linear inside and explicit outside", "[spectra]") {
     CHECK(at(tableSpectrum({300, 900}, {1, 1}, Outside::Error), 360) == 1);
     CHECK(tableSpectrum({500}, {.25}, Outside::Clamp) == constantSpectrum(.25));
 
-    // Finer than the grid: half a nanometre of 1 between two of them keeps its integral and its mean; no value leaves the table's range.
+    // Finer than the grid: half a nanometre of 1 between two of them keeps its integral and its mean; no
+    // value leaves the table's range.
     const Spectrum between = tableSpectrum({500.25, 500.75}, {1, 1}, Outside::Zero);
     CHECK(at(between, 500) == Approx(0.25));
     CHECK(at(between, 501) == Approx(0.25));
@@ -290,7 +299,9 @@ TEST_CASE("tables are linear inside and explicit outside", "[spectra]") {
     CHECK(at(line, 588) + at(line, 589) == Approx(1));
     CHECK(at(line, 589) == Approx(0.3));
     CHECK(tableSpectrum({400, 410.5, 600}, {0.2, 0.2, 0.2}, Outside::Clamp).max() == Approx(0.2));
-    CHECK(tableSpectrum({400, 587.2, 587.21, 588.9, 588.91, 600}, {0, 0, 1, 1, 0, 0}, Outside::Clamp).max() <= 1);
+    CHECK(
+        tableSpectrum({400, 587.2, 587.21, 588.9, 588.91, 600}, {0, 0, 1, 1, 0, 0}, Outside::Clamp).max() <=
+        1);
 
     const double nan = std::numeric_limits<double>::quiet_NaN();
     CHECK_THROWS_AS(tableSpectrum({}, {}, Outside::Clamp), Error);
@@ -386,9 +397,10 @@ TEST_CASE("with zero outside, one wavelength alone is refused", "[spectra]") {
 
 TEST_CASE("spectrum files are read as people write them", "[spectra]") {
     const Spectrum expected = tableSpectrum({400, 500.5, 700}, {.1, .2, .3}, Outside::Clamp);
-    for (const char* text : {"400 0.1\n500.5 0.2\n700 0.3\n", "wavelength_nm,value\n400,0.1\n500.5,.2\n700,3e-1",
-                             "# measured\r\n400\t0.1\r\n\r\n500.5 \t 0.2 # middle\r\n700 +0.3\r\n",
-                             "\xEF\xBB\xBFnm;value\n400;0.1\n 500.5 ; 0.2\n700; 0.3"}) {
+    for (const char* text :
+         {"400 0.1\n500.5 0.2\n700 0.3\n", "wavelength_nm,value\n400,0.1\n500.5,.2\n700,3e-1",
+          "# measured\r\n400\t0.1\r\n\r\n500.5 \t 0.2 # middle\r\n700 +0.3\r\n",
+          "\xEF\xBB\xBFnm;value\n400;0.1\n 500.5 ; 0.2\n700; 0.3"}) {
         CAPTURE(text);
         const TemporaryFolder folder;
         CHECK(readSpectrumFile(folder.write("spectrum.spd", text), Outside::Clamp) == expected);
@@ -456,7 +468,8 @@ TEST_CASE("RGB emissions keep colour and strength", "[spectra][rgb]") {
 }
 
 TEST_CASE("the sRGB transfer function is its own inverse", "[spectra][rgb]") {
-    for (int i = 0; i <= 255; ++i) CHECK(linearToSrgb(srgbToLinear(i / 255.0)) == Approx(i / 255.0).margin(1e-7));
+    for (int i = 0; i <= 255; ++i)
+        CHECK(linearToSrgb(srgbToLinear(i / 255.0)) == Approx(i / 255.0).margin(1e-7));
     CHECK(srgbToLinear(1) == Approx(1).epsilon(1e-15));
     CHECK(srgbToLinear(.5) == Approx(.21404114).margin(1e-8));
 }
@@ -476,7 +489,8 @@ TEST_CASE("colour spaces have the published matrices and map white to white", "[
 
     // Adaptation takes one white to the other and back.
     const Vec3d d50{.96422, 1, .82521};
-    const Matrix3d there = bradfordAdaptation(d65WhiteXyz(), d50), back = bradfordAdaptation(d50, d65WhiteXyz());
+    const Matrix3d there = bradfordAdaptation(d65WhiteXyz(), d50),
+                   back = bradfordAdaptation(d50, d65WhiteXyz());
     const Vec3d mapped = multiply(there, d65WhiteXyz());
     const Matrix3d both = multiply(back, there);
     for (int i = 0; i < 3; ++i) {

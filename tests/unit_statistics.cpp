@@ -1,9 +1,10 @@
-// The statistics library: values of tables and of SciPy 1.17 (NumPy 2.4), and coverage and power by simulation. A simulation's band is four standard
-// deviations of its binomial count; seeds are fixed, so it passes always or never.
+// The statistics library: values of tables and of SciPy 1.17 (NumPy 2.4), and coverage and power by
+// simulation. A simulation's band is four standard deviations of its binomial count; seeds are fixed, so it
+// passes always or never.
 #include "base/statistics.h"
 
-#include "catch.h"
 #include "base/error.h"
+#include "catch.h"
 
 #include <algorithm>
 #include <cmath>
@@ -59,15 +60,18 @@ TEST_CASE("quantiles are those of the tables", "[statistics]") {
     CHECK_THROWS_AS(studentQuantile(0.5, 0), Error);
 }
 
-// A film of 16384 x 16384 has 4e9 degrees of freedom; found by fuzzing: Boost's series no longer end somewhere above 1e10.
+// A film of 16384 x 16384 has 4e9 degrees of freedom; found by fuzzing: Boost's series no longer end
+// somewhere above 1e10.
 TEST_CASE("quantiles of very many degrees of freedom", "[statistics]") {
-    CHECK(chiSquaredQuantile(0.975, 4e9) / 4e9 - 1 == Approx(4.3826600603e-05).epsilon(1e-9));  // SciPy 1.17, and so below
+    CHECK(chiSquaredQuantile(0.975, 4e9) / 4e9 - 1 ==
+          Approx(4.3826600603e-05).epsilon(1e-9));  // SciPy 1.17, and so below
     CHECK(chiSquaredQuantile(0.025, 4e9) / 4e9 - 1 == Approx(-4.3825653451e-05).epsilon(1e-9));
     CHECK(fisherQuantile(0.95, 4e9, 6e10) - 1 == Approx(3.79866228637e-05).epsilon(1e-9));
     CHECK(fisherQuantile(0.95, 2e9, 3e10) - 1 == Approx(5.3721405481e-05).epsilon(1e-9));
     for (const double dof : {0.9999e9, 1.0001e9, 1e12, 1e15, 1e19}) {
         CAPTURE(dof);
-        const double z = normalQuantile(0.975), expected = z * std::sqrt(2 / dof);  // normal, but for terms of 1/dof
+        const double z = normalQuantile(0.975),
+                     expected = z * std::sqrt(2 / dof);  // normal, but for terms of 1/dof
         CHECK(chiSquaredQuantile(0.975, dof) / dof - 1 == Approx(expected).epsilon(1e-4));
         CHECK(fisherQuantile(0.975, dof, dof) - 1 == Approx(expected * std::sqrt(2.0)).epsilon(1e-4));
         CHECK(fisherQuantile(0.95, 1, dof) == Approx(3.8414588).epsilon(1e-6));
@@ -88,8 +92,10 @@ TEST_CASE("a summary keeps a small spread about a large mean", "[statistics]") {
 }
 
 TEST_CASE("Welch's test is SciPy's ttest_ind without equal variances", "[statistics]") {
-    const std::vector<double> a{27.5, 21.0, 19.0, 23.6, 17.0, 17.9, 16.9, 20.1, 21.9, 22.6, 23.1, 19.6, 19.0, 21.7, 21.4};
-    const std::vector<double> b{27.1, 22.0, 20.8, 23.4, 23.4, 23.5, 25.8, 22.0, 24.8, 20.2, 21.9, 22.1, 22.9, 30.5, 24.4};
+    const std::vector<double> a{27.5, 21.0, 19.0, 23.6, 17.0, 17.9, 16.9, 20.1,
+                                21.9, 22.6, 23.1, 19.6, 19.0, 21.7, 21.4};
+    const std::vector<double> b{27.1, 22.0, 20.8, 23.4, 23.4, 23.5, 25.8, 22.0,
+                                24.8, 20.2, 21.9, 22.1, 22.9, 30.5, 24.4};
     const WelchResult r = welch(summarize(a), summarize(b), 0.95);
     CHECK(r.difference == Approx(-2.833333333333332).epsilon(1e-12));
     CHECK(r.t == Approx(-2.8529548701715215).epsilon(1e-12));
@@ -115,7 +121,8 @@ TEST_CASE("an interval of a mean covers it as often as it says", "[statistics]")
     for (const double confidence : {0.95, 0.5}) {
         Random random(11);
         int covered = 0;
-        for (int i = 0; i < repeats; ++i) covered += meanInterval(summarize(random.normals(5, 3, 2)), confidence).contains(3);
+        for (int i = 0; i < repeats; ++i)
+            covered += meanInterval(summarize(random.normals(5, 3, 2)), confidence).contains(3);
         checkRate(covered, repeats, confidence);
     }
 }
@@ -125,7 +132,8 @@ TEST_CASE("Welch's interval covers the difference, however unequal the variances
     Random random(12);
     int covered = 0, alarms = 0;
     for (int i = 0; i < repeats; ++i) {
-        const WelchResult r = welch(summarize(random.normals(8, 1, 1)), summarize(random.normals(16, 1, 5)), 0.95);
+        const WelchResult r =
+            welch(summarize(random.normals(8, 1, 1)), summarize(random.normals(16, 1, 5)), 0.95);
         covered += r.interval.contains(0);
         alarms += r.p < 0.05;
     }
@@ -143,14 +151,19 @@ TEST_CASE("equivalence decides by the whole interval", "[statistics]") {
     CHECK_THROWS_AS(equivalence({0, 0}, 0), Error);
 }
 
-TEST_CASE("equivalence passes what is just not equivalent no more often than it may, and what is equal nearly always", "[statistics]") {
+TEST_CASE(
+    "equivalence passes what is just not equivalent no more often than it may, and what is equal nearly "
+    "always",
+    "[statistics]") {
     constexpr int repeats = 4000;
     Random random(13);
     int false_passes = 0, false_fails = 0, passes = 0;
     for (int i = 0; i < repeats; ++i) {
         // Sixteen replicates; the standard error of the difference is a sixth of delta.
         const auto interval = [&](double difference) {
-            return welch(summarize(random.normals(16, difference, 0.47)), summarize(random.normals(16, 0, 0.47)), 0.95).interval;
+            return welch(summarize(random.normals(16, difference, 0.47)),
+                         summarize(random.normals(16, 0, 0.47)), 0.95)
+                .interval;
         };
         const Verdict at_delta = equivalence(interval(1), 1);
         false_passes += at_delta == Verdict::Pass;
@@ -164,13 +177,16 @@ TEST_CASE("equivalence passes what is just not equivalent no more often than it 
 
 TEST_CASE("Holm rejects stepwise", "[statistics]") {
     // Limits are 0.05/4, 0.05/3, 0.05/2, and 0.03 is beyond the third.
-    CHECK(holm(std::vector<double>{0.01, 0.04, 0.03, 0.005}, 0.05) == std::vector<bool>{true, false, false, true});
-    CHECK(holm(std::vector<double>{0.01, 0.02, 0.03, 0.04}, 0.05) == std::vector<bool>{true, false, false, false});
+    CHECK(holm(std::vector<double>{0.01, 0.04, 0.03, 0.005}, 0.05) ==
+          std::vector<bool>{true, false, false, true});
+    CHECK(holm(std::vector<double>{0.01, 0.02, 0.03, 0.04}, 0.05) ==
+          std::vector<bool>{true, false, false, false});
     CHECK(holm({}, 0.05).empty());
     CHECK_THROWS_AS(holm(std::vector<double>{kNan}, 0.05), Error);
 }
 
-TEST_CASE("Holm's family raises a false alarm no more often than alpha, and finds more than Bonferroni", "[statistics]") {
+TEST_CASE("Holm's family raises a false alarm no more often than alpha, and finds more than Bonferroni",
+          "[statistics]") {
     constexpr int repeats = 4000, tests = 20, wrong = 10;
     Random random(14);
     int all_true_alarms = 0, mixed_alarms = 0, found = 0, bonferroni = 0;
@@ -180,7 +196,8 @@ TEST_CASE("Holm's family raises a false alarm no more often than alpha, and find
         const std::vector<bool> fallen = holm(p, 0.05);
         all_true_alarms += std::find(fallen.begin(), fallen.end(), true) != fallen.end();
 
-        for (int j = 0; j < wrong; ++j) p[static_cast<std::size_t>(j)] = normalTwoSided(random.normal() + 3.5);
+        for (int j = 0; j < wrong; ++j)
+            p[static_cast<std::size_t>(j)] = normalTwoSided(random.normal() + 3.5);
         const std::vector<bool> mixed = holm(p, 0.05);
         mixed_alarms += std::find(mixed.begin() + wrong, mixed.end(), true) != mixed.end();
         for (std::size_t j = 0; j < wrong; ++j) {
@@ -188,7 +205,8 @@ TEST_CASE("Holm's family raises a false alarm no more often than alpha, and find
             bonferroni += p[j] <= 0.05 / tests;
         }
     }
-    checkRate(all_true_alarms, repeats, 1 - std::pow(1 - 0.05 / tests, tests));  // The smallest of 20 uniform values decides.
+    checkRate(all_true_alarms, repeats,
+              1 - std::pow(1 - 0.05 / tests, tests));  // The smallest of 20 uniform values decides.
     CHECK(mixed_alarms < 0.05 * repeats);
     CHECK(mixed_alarms > 0.025 * repeats);
     CHECK(found > bonferroni + 1000);
@@ -216,7 +234,8 @@ TEST_CASE("Clopper and Pearson's interval is SciPy's, and covers at least what i
     for (const double p : {0.02, 0.3, 0.77}) {
         double covered = 0, probability = std::pow(1 - p, trials);
         for (int k = 0; k <= trials; ++k) {
-            if (clopperPearson(static_cast<std::uint64_t>(k), trials, 0.95).contains(p)) covered += probability;
+            if (clopperPearson(static_cast<std::uint64_t>(k), trials, 0.95).contains(p))
+                covered += probability;
             probability *= static_cast<double>(trials - k) / (k + 1) * p / (1 - p);
         }
         INFO("p " << p);
@@ -226,7 +245,8 @@ TEST_CASE("Clopper and Pearson's interval is SciPy's, and covers at least what i
 }
 
 TEST_CASE("the Kolmogorov-Smirnov test of uniform p-values", "[statistics]") {
-    CHECK(kolmogorovSmirnovUniform(std::vector<double>{.02, .11, .17, .31, .38, .42, .55, .61, .86, .93}) == Approx(0.7994599807966072).margin(3e-3));
+    CHECK(kolmogorovSmirnovUniform(std::vector<double>{.02, .11, .17, .31, .38, .42, .55, .61, .86, .93}) ==
+          Approx(0.7994599807966072).margin(3e-3));
     std::vector<double> squares;
     for (int i = 1; i <= 30; ++i) squares.push_back(.001 * i * i);
     CHECK(kolmogorovSmirnovUniform(squares) == Approx(0.015474229862033506).margin(1e-3));
@@ -242,7 +262,9 @@ TEST_CASE("the Kolmogorov-Smirnov test of uniform p-values", "[statistics]") {
         const double uniform = kolmogorovSmirnovUniform(p);
         alarms += uniform < 0.05;
         halves += uniform < 0.5;
-        for (double& v : p) v = normalTwoSided(normalQuantile(v) * 1.7);  // Standard errors that are stated 1.7 times too small.
+        for (double& v : p)
+            v = normalTwoSided(normalQuantile(v) *
+                               1.7);  // Standard errors that are stated 1.7 times too small.
         found += kolmogorovSmirnovUniform(p) < 0.05;
     }
     checkRate(alarms, repeats, 0.05);
@@ -257,7 +279,8 @@ TEST_CASE("the bootstrap's interval covers the mean, skewed values too, and repe
         for (const std::size_t i : indices) sum += values[i];
         return sum / static_cast<double>(indices.size());
     };
-    // Exponential values are as skewed as squared errors are. The expected rates, below 95 %, are those of 10000 and 6000 repeats with other seeds.
+    // Exponential values are as skewed as squared errors are. The expected rates, below 95 %, are those of
+    // 10000 and 6000 repeats with other seeds.
     constexpr int repeats = 1000;
     for (const auto& [count, expected] : {std::pair<std::size_t, double>{16, 0.902}, {64, 0.9325}}) {
         Random random(16);
@@ -269,13 +292,15 @@ TEST_CASE("the bootstrap's interval covers the mean, skewed values too, and repe
         }
         checkRate(covered, repeats, expected);
     }
-    // SciPy's own, method BCa, 400000 resamples of the 16 quantiles of an exponential; without bias and acceleration it is [0.572, 1.457].
+    // SciPy's own, method BCa, 400000 resamples of the 16 quantiles of an exponential; without bias and
+    // acceleration it is [0.572, 1.457].
     values.clear();
     for (int i = 0; i < 16; ++i) values.push_back(-std::log((i + 0.5) / 16));
     const Interval known = bootstrap(16, mean, 40000, 0.95, 1);
     CHECK(known.lower == Approx(0.62286).margin(0.01));
     CHECK(known.upper == Approx(1.55422).margin(0.015));
-    const Interval a = bootstrap(values.size(), mean, 500, 0.95, 7), b = bootstrap(values.size(), mean, 500, 0.95, 7);
+    const Interval a = bootstrap(values.size(), mean, 500, 0.95, 7),
+                   b = bootstrap(values.size(), mean, 500, 0.95, 7);
     CHECK(a.lower == b.lower);
     CHECK(a.upper == b.upper);
     CHECK(bootstrap(values.size(), mean, 500, 0.95, 8).lower != a.lower);
@@ -299,12 +324,18 @@ TEST_CASE("a weighted line is NumPy's", "[statistics]") {
     CHECK(known.chi_squared == Approx(0.2548093841642215).epsilon(1e-10));
     CHECK(known.varianceAt(0) == known.intercept_variance);
     CHECK(known.at(2) == Approx(1.0020527859237522 + 2 * 2.015542521994134));
-    CHECK(std::isnan(weightedLine(std::vector<double>{1, 2}, std::vector<double>{1, 2}, std::vector<double>{1, 1}).slope_variance));
-    CHECK_THROWS_AS(weightedLine(std::vector<double>{1, 1}, std::vector<double>{1, 2}, std::vector<double>{1, 1}), Error);
+    CHECK(std::isnan(
+        weightedLine(std::vector<double>{1, 2}, std::vector<double>{1, 2}, std::vector<double>{1, 1})
+            .slope_variance));
+    CHECK_THROWS_AS(
+        weightedLine(std::vector<double>{1, 1}, std::vector<double>{1, 2}, std::vector<double>{1, 1}),
+        Error);
     CHECK_THROWS_AS(weightedLine(x, y, std::vector<double>{1, 1, 0, 1, 1}), Error);
 }
 
-TEST_CASE("a line's variances are those of repeats, at the intercept, along it, with known and unknown factor", "[statistics]") {
+TEST_CASE(
+    "a line's variances are those of repeats, at the intercept, along it, with known and unknown factor",
+    "[statistics]") {
     constexpr int repeats = 4000;
     const std::vector<double> x{1, 2, 4, 8, 16, 32}, deviation{2, 1, 1, 0.5, 0.5, 0.25};
     std::vector<double> w, y(x.size());
@@ -314,9 +345,11 @@ TEST_CASE("a line's variances are those of repeats, at the intercept, along it, 
     for (int i = 0; i < repeats; ++i) {
         for (std::size_t j = 0; j < x.size(); ++j) y[j] = 5 - 0.3 * x[j] + deviation[j] * random.normal();
         const LineFit fit = weightedLine(x, y, w, Weights::InverseVariances), scaled = weightedLine(x, y, w);
-        intercepts += std::abs(fit.intercept - 5) < normalQuantile(0.975) * std::sqrt(fit.intercept_variance);
+        intercepts +=
+            std::abs(fit.intercept - 5) < normalQuantile(0.975) * std::sqrt(fit.intercept_variance);
         at_ten += std::abs(fit.at(10) - 2) < normalQuantile(0.975) * std::sqrt(fit.varianceAt(10));
-        unknown_factor += std::abs(scaled.slope + 0.3) < studentQuantile(0.975, scaled.dof) * std::sqrt(scaled.slope_variance);
+        unknown_factor += std::abs(scaled.slope + 0.3) <
+                          studentQuantile(0.975, scaled.dof) * std::sqrt(scaled.slope_variance);
     }
     checkRate(intercepts, repeats, 0.95);
     checkRate(at_ten, repeats, 0.95);

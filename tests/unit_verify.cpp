@@ -1,13 +1,14 @@
-// The suite of `crt verify` itself: its registry, its verdicts, its diagnoses, and that its expectations are right.
+// The suite of `crt verify` itself: its registry, its verdicts, its diagnoses, and that its expectations are
+// right.
 #include "catch.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
 #include "judge/verify/case.h"
 #include "judge/verify/context.h"
 #include "judge/verify/physics.h"
 #include "judge/verify/references.h"
 #include "judge/verify/report.h"
 #include "judge/verify/variants.h"
+#include "kernel/features.h"
+#include "kernel/layout.h"
 
 #include <fmt/format.h>
 
@@ -54,8 +55,21 @@ TEST_CASE("every case of the suite says what is asked, what is expected and from
         CHECK(c.run != nullptr);
     }
     // Left out of no group: the list of the suite's plan, of relations the exact ones.
-    for (const auto& [group, count] : {std::pair{'A', 18}, {'B', 10}, {'C', 16}, {'D', 10}, {'E', 14}, {'F', 10}, {'G', 11}, {'H', 11}, {'I', 14}, {'J', 8},
-                                       {'K', 6}, {'L', 7}, {'M', 19}, {'N', 13}, {'O', 9}})
+    for (const auto& [group, count] : {std::pair{'A', 18},
+                                       {'B', 10},
+                                       {'C', 16},
+                                       {'D', 10},
+                                       {'E', 14},
+                                       {'F', 10},
+                                       {'G', 11},
+                                       {'H', 11},
+                                       {'I', 14},
+                                       {'J', 8},
+                                       {'K', 6},
+                                       {'L', 7},
+                                       {'M', 19},
+                                       {'N', 13},
+                                       {'O', 9}})
         for (int i = 1; i <= count; ++i) {
             const std::string id = fmt::format("{}{:02}", group, i);
             INFO(id);
@@ -74,7 +88,8 @@ TEST_CASE("docs/stability.md is what the registry says", "[verify][docs]") {
     std::ifstream in(CRT_SOURCE_DIR "/docs/stability.md");
     const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
     for (const Case& c : registry()) {
-        INFO("run crt verify --markdown, see the head of docs/stability.md; the row of " << c.id << " differs");
+        INFO("run crt verify --markdown, see the head of docs/stability.md; the row of " << c.id
+                                                                                         << " differs");
         CHECK(text.find(markdownRow(c)) != std::string::npos);
     }
 }
@@ -84,14 +99,16 @@ TEST_CASE("cases are chosen by id, name, group and level", "[verify]") {
     CHECK(select({"furnace", "A03"}, Level::Commit).size() == 2);
     CHECK(select({"H"}, Level::Merge).size() > select({"H"}, Level::Commit).size());
     CHECK(select({}, Level::Nightly).size() == registry().size());
-    CHECK_THROWS_WITH(select({"furnance"}, Level::Commit), Contains("no case is called 'furnance'") && Contains("furnace"));
+    CHECK_THROWS_WITH(select({"furnance"}, Level::Commit),
+                      Contains("no case is called 'furnance'") && Contains("furnace"));
 }
 
 TEST_CASE("a case is as good as its worst outcome", "[verify]") {
     CHECK(worst({}) == Verdict::Fail);
     CHECK(worst({outcome(Verdict::Pass), outcome(Verdict::Inconclusive)}) == Verdict::Inconclusive);
     CHECK(worst({outcome(Verdict::Fail), outcome(Verdict::Inconclusive)}) == Verdict::Fail);
-    CHECK(worst({outcome(Verdict::Pass), outcome(Verdict::Refused), outcome(Verdict::NotApplicable)}) == Verdict::Pass);
+    CHECK(worst({outcome(Verdict::Pass), outcome(Verdict::Refused), outcome(Verdict::NotApplicable)}) ==
+          Verdict::Pass);
     CHECK(worst({outcome(Verdict::Refused)}) == Verdict::Refused);
     CHECK(worst({outcome(Verdict::NotApplicable)}) == Verdict::NotApplicable);
     CHECK(failed(Verdict::Inconclusive));
@@ -108,7 +125,10 @@ TEST_CASE("a wrong figure is traced to the mistake that gives it", "[verify]") {
     CHECK_THAT(diagnose(std::nan(""), 1, 0, {}), Contains("not a finite number"));
 }
 
-TEST_CASE("the worst pixel is the one farthest from what is expected, and a pixel that is no number is worse than any", "[verify]") {
+TEST_CASE(
+    "the worst pixel is the one farthest from what is expected, and a pixel that is no number is worse than "
+    "any",
+    "[verify]") {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     const Film unit = rowOf({1, 1, 1});
     CHECK(worstRatio(rowOf({1.5, 0.25, 1}), unit) == 0.25);
@@ -124,7 +144,10 @@ TEST_CASE("the worst pixel is the one farthest from what is expected, and a pixe
 
 TEST_CASE("form factors agree by two formulas, and with published values", "[verify]") {
     for (const double x : {0.0, 0.3, 1.0, 2.0, 20.0})
-        CHECK(squareFormFactor(x, 0.5) == Approx(polygonFormFactor({x, 0, 0}, {0, 1, 0}, {{-.5, 1, -.5}, {.5, 1, -.5}, {.5, 1, .5}, {-.5, 1, .5}})).epsilon(1e-9));
+        CHECK(squareFormFactor(x, 0.5) ==
+              Approx(polygonFormFactor({x, 0, 0}, {0, 1, 0},
+                                       {{-.5, 1, -.5}, {.5, 1, -.5}, {.5, 1, .5}, {-.5, 1, .5}}))
+                  .epsilon(1e-9));
     CHECK(squareFormFactor(0, 0.5) == Approx(.2394564705).epsilon(1e-9));
     CHECK(squareFormFactor(20, 0.5) == Approx(1.982807681e-6).epsilon(1e-8));
     CHECK(squareFormFactor(0, 5e-5) == Approx(3.18309885123e-9).epsilon(1e-10));
@@ -142,7 +165,8 @@ TEST_CASE("form factors agree by two formulas, and with published values", "[ver
     }
     // The part of a wall below the horizon does not count: half of an upright square that straddles it.
     CHECK(polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{1, -1, -1}, {1, 1, -1}, {1, 1, 1}, {1, -1, 1}}) ==
-          Approx(polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{1, 0, -1}, {1, 1, -1}, {1, 1, 1}, {1, 0, 1}})).epsilon(1e-12));
+          Approx(polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{1, 0, -1}, {1, 1, -1}, {1, 1, 1}, {1, 0, 1}}))
+              .epsilon(1e-12));
     CHECK(fresnelDielectric(1, 1.5) == Approx(0.04).epsilon(1e-12));
     CHECK(fresnelDielectric(0.5, 1.5) == Approx(0.089186713).epsilon(1e-8));
     CHECK(fresnelDielectric(0.5, 1 / 1.5) == 1);

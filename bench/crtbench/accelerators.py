@@ -1,5 +1,7 @@
-"""Ways to find what a ray hits: a loop over all triangles, a box around every object, a BVH. And from how many triangles on the BVH is faster
-than the loop: kBruteForceTriangles in core/compile.cpp."""
+"""Ways to find what a ray hits: a loop over all triangles, a box around every object, a BVH. And from how
+many triangles on the BVH is faster
+than the loop: kBruteForceTriangles in core/compile/compile.cpp."""
+
 import math
 import random
 
@@ -14,15 +16,30 @@ COUNTS = [12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512]
 
 
 def room(triangles):
-    """A closed room of 10 triangles with a lamp of 2, open to the camera, and small quads in random places up to `triangles`. Always the same ones."""
+    """A closed room of 10 triangles with a lamp of 2, open to the camera, and small quads in random places
+    up to `triangles`. Always the same ones."""
     number = random.Random(1)
-    corners = [(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)]
+    corners = [
+        (-1, -1, -1),
+        (1, -1, -1),
+        (1, 1, -1),
+        (-1, 1, -1),
+        (-1, -1, 1),
+        (1, -1, 1),
+        (1, 1, 1),
+        (-1, 1, 1),
+    ]
     faces = [(4, 5, 6, 7), (0, 1, 5, 4), (3, 7, 6, 2), (0, 4, 7, 3), (1, 2, 6, 5)]
     quads = []
     for _ in range((triangles - 12) // 2):
         centre = [number.uniform(-0.8, 0.8) for _ in range(3)]
         a, b = ([number.gauss(0, 0.12) for _ in range(3)] for _ in range(2))
-        quads.append([[c + s * x + t * y for c, x, y in zip(centre, a, b)] for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+        quads.append(
+            [
+                [c + s * x + t * y for c, x, y in zip(centre, a, b)]
+                for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+            ]
+        )
 
     def points(values):
         return "[" + ", ".join("[" + ", ".join(f"{x:.6f}" for x in v) + "]" for v in values) + "]"
@@ -66,26 +83,66 @@ def measure(program, arguments):
 
     rows, data = [], {"scenes": {}, "crossover": {}}
     for scene in program.scenes(arguments.scenes or SCENES):
-        triangles = program.render(scene, usable[0], ["--spp", 1], settings=["film.resolution=[8,8]"]).value("scene", "triangles")
+        triangles = program.render(scene, usable[0], ["--spp", 1], settings=["film.resolution=[8,8]"]).value(
+            "scene", "triangles"
+        )
         entry = data["scenes"][scene] = {"triangles": triangles, "backends": {}}
         for backend in usable:
             cases = {}
             for kind in KINDS:
                 size, spp = size_and_samples(kind, triangles, arguments.tiny)
-                settings = [f"film.resolution=[{size},{size}]", "outputs.0.aovs=[]", f"integrator.accelerator={kind}"]
-                cases[kind] = lambda settings=settings, spp=spp: program.render(scene, backend, ["--spp", spp], settings=settings)
+                settings = [
+                    f"film.resolution=[{size},{size}]",
+                    "outputs.0.aovs=[]",
+                    f"integrator.accelerator={kind}",
+                ]
+                cases[kind] = lambda settings=settings, spp=spp: program.render(
+                    scene, backend, ["--spp", spp], settings=settings
+                )
             kept = program.interleaved(cases, runs)
-            speed = {kind: Spread(r.value("speed", "mpaths_per_second") for r in done) for kind, done in kept.items()}
-            rays = {kind: Spread(r.value("speed", "mrays_per_second") for r in done) for kind, done in kept.items()}
-            entry["backends"][backend] = {kind: {"mpaths_per_second": speed[kind].json(), "mrays_per_second": rays[kind].json(),
-                                                 "size_and_samples": size_and_samples(kind, triangles, arguments.tiny)} for kind in KINDS}
-            rows.append([scene, triangles, backend, *(f"{speed[k].text()}; {significant(rays[k].median)}" for k in KINDS),
-                         significant(speed["aabb"].median / speed["none"].median), significant(speed["bvh"].median / speed["none"].median)])
+            speed = {
+                kind: Spread(r.value("speed", "mpaths_per_second") for r in done)
+                for kind, done in kept.items()
+            }
+            rays = {
+                kind: Spread(r.value("speed", "mrays_per_second") for r in done)
+                for kind, done in kept.items()
+            }
+            entry["backends"][backend] = {
+                kind: {
+                    "mpaths_per_second": speed[kind].json(),
+                    "mrays_per_second": rays[kind].json(),
+                    "size_and_samples": size_and_samples(kind, triangles, arguments.tiny),
+                }
+                for kind in KINDS
+            }
+            rows.append(
+                [
+                    scene,
+                    triangles,
+                    backend,
+                    *(f"{speed[k].text()}; {significant(rays[k].median)}" for k in KINDS),
+                    significant(speed["aabb"].median / speed["none"].median),
+                    significant(speed["bvh"].median / speed["none"].median),
+                ]
+            )
             print(rows[-1], flush=True)
     results.heading("By scene")
-    results.paragraph(f"Mpaths/s, median of {runs} interleaved runs, in brackets the slowest and the fastest; then Mrays/s. 400 × 400 pixels and up to 8 samples, where the loop "
-                      "would take minutes fewer, of 64 × 64 or 32 × 32 pixels; depth and roulette as in the scene. Same image whatever is chosen.")
-    results.table(["scene", "triangles", "backend", *(f"`{k}`: {text}" for k, text in KINDS.items()), "boxes : loop", "BVH : loop"], rows)
+    results.paragraph(
+        f"Mpaths/s, median of {runs} interleaved runs, in brackets the slowest and the fastest; then Mrays/s. 400 × 400 pixels and up to 8 samples, where the loop "
+        "would take minutes fewer, of 64 × 64 or 32 × 32 pixels; depth and roulette as in the scene. Same image whatever is chosen."
+    )
+    results.table(
+        [
+            "scene",
+            "triangles",
+            "backend",
+            *(f"`{k}`: {text}" for k, text in KINDS.items()),
+            "boxes : loop",
+            "BVH : loop",
+        ],
+        rows,
+    )
 
     # Crossover.
     counts = COUNTS[:3] if arguments.tiny else COUNTS
@@ -96,26 +153,61 @@ def measure(program, arguments):
         row = [count]
         for backend in usable:
             size, spp = (16, 1) if arguments.tiny else (256, 16)
-            kept = program.interleaved({kind: lambda kind=kind: program.render(path, backend, ["--spp", spp], settings=[
-                f"film.resolution=[{size},{size}]", f"integrator.accelerator={kind}"]) for kind in ("none", "bvh")}, runs)
-            speed = {kind: Spread(r.value("speed", "mpaths_per_second") for r in done) for kind, done in kept.items()}
-            ratio = Spread(b / n for b, n in zip(*([r.value("speed", "mpaths_per_second") for r in kept[k]] for k in ("bvh", "none"))))
-            data["crossover"].setdefault(backend, {})[count] = {"none": speed["none"].json(), "bvh": speed["bvh"].json(), "bvh_over_loop": ratio.json()}
+            kept = program.interleaved(
+                {
+                    kind: lambda kind=kind: program.render(
+                        path,
+                        backend,
+                        ["--spp", spp],
+                        settings=[f"film.resolution=[{size},{size}]", f"integrator.accelerator={kind}"],
+                    )
+                    for kind in ("none", "bvh")
+                },
+                runs,
+            )
+            speed = {
+                kind: Spread(r.value("speed", "mpaths_per_second") for r in done)
+                for kind, done in kept.items()
+            }
+            ratio = Spread(
+                b / n
+                for b, n in zip(
+                    *([r.value("speed", "mpaths_per_second") for r in kept[k]] for k in ("bvh", "none"))
+                )
+            )
+            data["crossover"].setdefault(backend, {})[count] = {
+                "none": speed["none"].json(),
+                "bvh": speed["bvh"].json(),
+                "bvh_over_loop": ratio.json(),
+            }
             row += [speed["none"].text(), speed["bvh"].text(), significant(ratio.median)]
         rows.append(row)
         print(row, flush=True)
     results.heading("From how many triangles on the BVH wins")
-    results.paragraph(f"A closed room of 10 triangles with a lamp of 2, and small quads in random places. Mpaths/s, median of {runs} interleaved runs, in brackets the slowest and the "
-                      "fastest; 256 × 256 pixels, 16 samples, 5 scattering events, no roulette.")
-    results.table(["triangles", *(f"{b}, {text}" for b in usable for text in ("loop", "BVH", "BVH : loop"))], rows)
+    results.paragraph(
+        f"A closed room of 10 triangles with a lamp of 2, and small quads in random places. Mpaths/s, median of {runs} interleaved runs, in brackets the slowest and the "
+        "fastest; 256 × 256 pixels, 16 samples, 5 scattering events, no roulette."
+    )
+    results.table(
+        ["triangles", *(f"{b}, {text}" for b in usable for text in ("loop", "BVH", "BVH : loop"))], rows
+    )
     for backend in usable:
         found = crossover({c: v["bvh_over_loop"]["median"] for c, v in data["crossover"][backend].items()})
         data["crossover"][backend]["triangles"] = found
-        results.lines.append(f"- {backend}: " + (f"the BVH is faster from about {found:.0f} triangles on." if found else "no crossing in this range."))
+        results.lines.append(
+            f"- {backend}: "
+            + (
+                f"the BVH is faster from about {found:.0f} triangles on."
+                if found
+                else "no crossing in this range."
+            )
+        )
     results.lines.append("")
     results.not_measured(absent)
-    results.command("crt render configs/SCENE.yaml --backend BACKEND --spp N --set 'film.resolution=[400,400]' --set 'outputs.0.aovs=[]' "
-                    "--set integrator.accelerator=none|aabb|bvh -o unseen.pfm")
+    results.command(
+        "crt render configs/SCENE.yaml --backend BACKEND --spp N --set 'film.resolution=[400,400]' --set 'outputs.0.aovs=[]' "
+        "--set integrator.accelerator=none|aabb|bvh -o unseen.pfm"
+    )
     results.data = data
     results.write()
 

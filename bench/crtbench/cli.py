@@ -4,11 +4,29 @@ import os
 import pathlib
 import sys
 
-from . import accelerators, calibration, cpu_speed, false_alarms, figure2, leave_out, meshes, mtl_agreement, pictures, power, robustness, same_bits, stability, start
+from . import (
+    accelerators,
+    calibration,
+    cpu_speed,
+    false_alarms,
+    figure2,
+    leave_out,
+    meshes,
+    mtl_agreement,
+    pictures,
+    power,
+    robustness,
+    same_bits,
+    stability,
+    start,
+)
 from .command import add_options, exit_code, program_for
 
 COMMANDS = {
-    "same-bits": (same_bits, "every scene on every backend, thread count, tile size and split: do the bits agree?"),
+    "same-bits": (
+        same_bits,
+        "every scene on every backend, thread count, tile size and split: do the bits agree?",
+    ),
     "cpu-speed": (cpu_speed, "paths and rays per second on the processor"),
     "start": (start, "what it costs to begin: process, libraries, kernels"),
     "leave-out": (leave_out, "what leaving features out of the kernel saves, bit by bit"),
@@ -16,23 +34,42 @@ COMMANDS = {
     "figure2": (figure2, "render time against samples per pixel, at 1440² and 2880²"),
     "stability": (stability, "sweeps to where the arithmetic ends; --scenes names sweeps instead of scenes"),
     "robustness": (robustness, "what the watertight triangle test and the offsets cost, and what they buy"),
-    "calibration": (calibration, "does the error that an image states of itself hold? 100 seeds of five scenes, many numbers of samples"),
-    "false-alarms": (false_alarms, "statements of crt converge where the truth is known by construction: how often are they wrong?"),
+    "calibration": (
+        calibration,
+        "does the error that an image states of itself hold? 100 seeds of five scenes, many numbers of samples",
+    ),
+    "false-alarms": (
+        false_alarms,
+        "statements of crt converge where the truth is known by construction: how often are they wrong?",
+    ),
     "power": (power, "planted faults: how many seconds until a check finds each"),
     "meshes": (meshes, "OBJ files of other people, in folders: which render, which are refused and why"),
-    "mtl-agreement": (mtl_agreement, "the same OBJ and MTL in crt and in Mitsuba 3: is the luminance the same?"),
+    "mtl-agreement": (
+        mtl_agreement,
+        "the same OBJ and MTL in crt and in Mitsuba 3: is the luminance the same?",
+    ),
     "pictures": (pictures, "all scenes as PNG in out/pictures, to look at; measures nothing"),
 }
 
 
 def main():
-    parser = argparse.ArgumentParser(prog="bench/run", description="Measures crt and writes docs/results/NAME.md and NAME.json.")
+    parser = argparse.ArgumentParser(
+        prog="bench/run", description="Measures crt and writes docs/results/NAME.md and NAME.json."
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, (module, text) in COMMANDS.items():
-        command = commands.add_parser(name, help=text, description=module.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+        command = commands.add_parser(
+            name, help=text, description=module.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
         add_options(command, busy="a timed run is repeated")
         if name == "stability":
-            command.add_argument("--times", type=float, default=1, metavar="N", help="so many times the rays of each point (1); 5 makes 1e8 of offset-safety")
+            command.add_argument(
+                "--times",
+                type=float,
+                default=1,
+                metavar="N",
+                help="so many times the rays of each point (1); 5 makes 1e8 of offset-safety",
+            )
         if name in ("calibration", "figure2", "stability"):
             command.add_argument("--rows", help="measurements made on another machine, JSON Lines")
         if name == "meshes":
@@ -41,13 +78,22 @@ def main():
             command.add_argument("--note", help="a paragraph for the page, about what is in the folders")
             continue
         if name == "mtl-agreement":
-            command.add_argument("--python", help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in out/peers-venv")
-            command.add_argument("--samples", type=int, default=1024, help="per pixel, in both programs (1024)")
+            command.add_argument(
+                "--python",
+                help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in out/peers-venv",
+            )
+            command.add_argument(
+                "--samples", type=int, default=1024, help="per pixel, in both programs (1024)"
+            )
             continue
         command.add_argument("--scenes", nargs="*", help="only these scenes, by name without .yaml")
     arguments = parser.parse_args()
     try:
-        return exit_code(f"bench/run {arguments.command}", arguments, lambda: COMMANDS[arguments.command][0].measure(program_for(arguments), arguments))
+        return exit_code(
+            f"bench/run {arguments.command}",
+            arguments,
+            lambda: COMMANDS[arguments.command][0].measure(program_for(arguments), arguments),
+        )
     finally:
         sys.stdout.flush()
         os.sync()

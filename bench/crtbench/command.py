@@ -9,11 +9,32 @@ REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
 
 def add_options(parser, busy):
     """`busy`: what happens to runs during which others used the processor."""
-    parser.add_argument("--build", type=pathlib.Path, default=REPOSITORY / "build", help="build folder (build)")
-    parser.add_argument("--no-build", action="store_true", help="take the build as it is, instead of bringing it up to date first")
-    parser.add_argument("--results", type=pathlib.Path, default=REPOSITORY / "docs" / "results", help="where results go (docs/results)")
-    parser.add_argument("--tiny", action="store_true", help="small images, few samples and runs: does the tool work? The numbers mean nothing and go to out/tiny")
-    parser.add_argument("--busy", type=float, default=0.05, metavar="SHARE", help=f"{busy} when other processes took more than this share of the processor (0.05)")
+    parser.add_argument(
+        "--build", type=pathlib.Path, default=REPOSITORY / "build", help="build folder (build)"
+    )
+    parser.add_argument(
+        "--no-build",
+        action="store_true",
+        help="take the build as it is, instead of bringing it up to date first",
+    )
+    parser.add_argument(
+        "--results",
+        type=pathlib.Path,
+        default=REPOSITORY / "docs" / "results",
+        help="where results go (docs/results)",
+    )
+    parser.add_argument(
+        "--tiny",
+        action="store_true",
+        help="small images, few samples and runs: does the tool work? The numbers mean nothing and go to out/tiny",
+    )
+    parser.add_argument(
+        "--busy",
+        type=float,
+        default=0.05,
+        metavar="SHARE",
+        help=f"{busy} when other processes took more than this share of the processor (0.05)",
+    )
 
 
 def program_for(arguments):

@@ -1,7 +1,11 @@
-"""How often statements of `crt converge` are wrong where the truth is known by construction. The rows are not
-rendered: they are progressive means of normal samples, pixel by pixel, of known variance, bias and cost, against a
-reference that is exact or has eight noisy folds; they go through the same analysis and the same sentences as rows of
+"""How often statements of `crt converge` are wrong where the truth is known by construction. The rows are
+not
+rendered: they are progressive means of normal samples, pixel by pixel, of known variance, bias and cost,
+against a
+reference that is exact or has eight noisy folds; they go through the same analysis and the same sentences
+as rows of
 renders. Nothing is timed: it may run on a busy machine."""
+
 import json
 import math
 
@@ -25,7 +29,8 @@ def measure(program, arguments):
         "three standard errors of the counting is **bold**. Intervals of *b²* are wide on purpose: around 0 the "
         "jackknife is too careful, and what it misses is covered by Fisher's F. *FAIL of what is right*, *a floor where "
         "there is none* and *PASS of what is wrong* are claimed at 99.9 %. Intervals that have no bounds, because an "
-        "error hides in the reference's noise, are not asked.")
+        "error hides in the reference's noise, are not asked."
+    )
     for situation in dict.fromkeys(row["situation"] for row in rows):
         results.heading(situation[0].upper() + situation[1:])
         results.table(["statement", "asked", "wrong", "part", "stated"],
@@ -33,8 +38,10 @@ def measure(program, arguments):
     worse = [row for row in rows if excess(row)]
     results.heading("More often wrong than stated")
     if worse:
-        results.table(["situation", "statement", "part", "stated"],
-                      [[row["situation"], row["statement"], share(row), f"{row['stated']:.1%}"] for row in worse])
+        results.table(
+            ["situation", "statement", "part", "stated"],
+            [[row["situation"], row["statement"], share(row), f"{row['stated']:.1%}"] for row in worse],
+        )
     else:
         results.paragraph("None.")
     results.data = {"repeats": repeats, "rows": rows}

@@ -1,5 +1,9 @@
-"""Figure 2 of the paper that crt grew out of: render time against samples per pixel, 1 … 1024, of the Cornell box at 1440 × 1440, and at 2880 × 2880, for
-every backend. --rows takes measurements of the same kind made on another machine (JSON Lines with backend, resolution, spp, repeat, render)."""
+"""Figure 2 of the paper that crt grew out of: render time against samples per pixel, 1 … 1024, of the
+Cornell box at 1440 × 1440, and at 2880 × 2880, for
+every backend. --rows takes measurements of the same kind made on another machine (JSON Lines with backend,
+resolution, spp, repeat, render).
+"""
+
 import json
 import pathlib
 
@@ -9,23 +13,47 @@ from .results import Results
 
 SCENE = "cornell_box"
 COUNTS = [2**k for k in range(11)]
-COLOURS = {"embree": ("#0067a5", "#56b4e9"), "opencl": ("#00785a", "#2fc39b"), "cuda": ("#b34700", "#ff9455")}
+COLOURS = {
+    "embree": ("#0067a5", "#56b4e9"),
+    "opencl": ("#00785a", "#2fc39b"),
+    "cuda": ("#b34700", "#ff9455"),
+}
 
 
 def measure(program, arguments):
     resolutions = (72, 144) if arguments.tiny else (1440, 2880)
-    longest = 0.2 if arguments.tiny else 16.0   # Seconds that one render may take: a processor does not get to 1024.
+    longest = (
+        0.2 if arguments.tiny else 16.0
+    )  # Seconds that one render may take: a processor does not get to 1024.
     usable, absent = program.backends(["cuda", "embree", "opencl"])
     rows = []
     for resolution in resolutions:
         for spp in COUNTS:
-            cases = {b: (lambda b=b: program.render(SCENE, b, ["--spp", spp], settings=[f"film.resolution=[{resolution},{resolution}]", "outputs.0.aovs=[]"]))
-                     for b in usable if last_seconds(rows, b, resolution) * 2 < longest}
+            cases = {
+                b: (
+                    lambda b=b: program.render(
+                        SCENE,
+                        b,
+                        ["--spp", spp],
+                        settings=[f"film.resolution=[{resolution},{resolution}]", "outputs.0.aovs=[]"],
+                    )
+                )
+                for b in usable
+                if last_seconds(rows, b, resolution) * 2 < longest
+            }
             if not cases:
                 break
             for backend, done in program.interleaved(cases, 1 if spp > 4 else 2).items():
-                rows += [{"backend": backend, "resolution": resolution, "spp": spp, "repeat": i, "render": r.value("seconds", "render")}
-                         for i, r in enumerate(done)]
+                rows += [
+                    {
+                        "backend": backend,
+                        "resolution": resolution,
+                        "spp": spp,
+                        "repeat": i,
+                        "render": r.value("seconds", "render"),
+                    }
+                    for i, r in enumerate(done)
+                ]
             print(rows[-1], flush=True)
     if arguments.rows:
         rows += [json.loads(line) for line in pathlib.Path(arguments.rows).read_text().splitlines()]
@@ -35,7 +63,9 @@ def measure(program, arguments):
 
 
 def last_seconds(rows, backend, resolution):
-    return max((r["render"] for r in rows if r["backend"] == backend and r["resolution"] == resolution), default=0.0)
+    return max(
+        (r["render"] for r in rows if r["backend"] == backend and r["resolution"] == resolution), default=0.0
+    )
 
 
 def medians(rows):
@@ -43,7 +73,10 @@ def medians(rows):
     lines = {}
     for key in sorted({(r["backend"], r["resolution"]) for r in rows}):
         of_key = [r for r in rows if (r["backend"], r["resolution"]) == key]
-        lines[key] = [(spp, Spread(r["render"] for r in of_key if r["spp"] == spp).median) for spp in sorted({r["spp"] for r in of_key})]
+        lines[key] = [
+            (spp, Spread(r["render"] for r in of_key if r["spp"] == spp).median)
+            for spp in sorted({r["spp"] for r in of_key})
+        ]
     return lines
 
 
@@ -67,7 +100,9 @@ def slope(points):
 def write(program, arguments, rows, absent):
     results = Results(program, arguments, "figure2", "Time against samples: the paper's Figure 2")
     lines = medians(rows)
-    results.paragraph("Render seconds by the backend's report, median of repeats. A render that would take over 16 s on a processor was left out.")
+    results.paragraph(
+        "Render seconds by the backend's report, median of repeats. A render that would take over 16 s on a processor was left out."
+    )
     results.paragraph("![Seconds against samples per pixel](figure2.svg)")
     table, data = [], {}
     for (backend, resolution), points in lines.items():
@@ -75,23 +110,62 @@ def write(program, arguments, rows, absent):
             continue
         t0, c, deviation = line_fit(points)
         megapaths = resolution**2 / c * 1e-6
-        table.append([backend, f"{resolution}²", f"{points[0][0]} – {points[-1][0]}", significant(points[-1][1]), significant(1e3 * t0), significant(1e3 * c),
-                      significant(megapaths), significant(slope(points)), f"{deviation:.1%}"])
-        data[f"{backend} {resolution}"] = {"points": points, "t0": t0, "seconds_per_sample": c, "mpaths_per_second": megapaths,
-                                           "slope_upper_half": slope(points), "largest_deviation": deviation}
-    results.table(["backend", "resolution", "samples", "s at the last", "t₀, ms", "c, ms per sample", "Mpaths/s", "slope (upper half)",
-                   "farthest from t₀ + cN"], table)
+        table.append(
+            [
+                backend,
+                f"{resolution}²",
+                f"{points[0][0]} – {points[-1][0]}",
+                significant(points[-1][1]),
+                significant(1e3 * t0),
+                significant(1e3 * c),
+                significant(megapaths),
+                significant(slope(points)),
+                f"{deviation:.1%}",
+            ]
+        )
+        data[f"{backend} {resolution}"] = {
+            "points": points,
+            "t0": t0,
+            "seconds_per_sample": c,
+            "mpaths_per_second": megapaths,
+            "slope_upper_half": slope(points),
+            "largest_deviation": deviation,
+        }
+    results.table(
+        [
+            "backend",
+            "resolution",
+            "samples",
+            "s at the last",
+            "t₀, ms",
+            "c, ms per sample",
+            "Mpaths/s",
+            "slope (upper half)",
+            "farthest from t₀ + cN",
+        ],
+        table,
+    )
     doubling = []
     for backend in sorted({b for b, _ in lines}):
-        small, large = (data.get(f"{backend} {r}") for r in sorted({r for b, r in lines if b == backend})[:2]) if len({r for b, r in lines if b == backend}) > 1 else (None, None)
+        small, large = (
+            (data.get(f"{backend} {r}") for r in sorted({r for b, r in lines if b == backend})[:2])
+            if len({r for b, r in lines if b == backend}) > 1
+            else (None, None)
+        )
         if small and large:
             ratio = large["seconds_per_sample"] / small["seconds_per_sample"]
             data[f"{backend} doubling"] = ratio
-            doubling.append(f"- {backend}: twice the width and height costs {significant(ratio)} times as much a sample; 4 is linear in the number of pixels")
+            doubling.append(
+                f"- {backend}: twice the width and height costs {significant(ratio)} times as much a sample; 4 is linear in the number of pixels"
+            )
     results.heading("The doubling")
     results.lines += [*doubling, ""]
-    results.not_measured({name: reason for name, reason in absent.items() if not any(b == name for b, _ in lines)})
-    results.command(f"crt render configs/{SCENE}.yaml --backend BACKEND --spp N --set 'film.resolution=[1440,1440]' --set 'outputs.0.aovs=[]' -o unseen.pfm")
+    results.not_measured(
+        {name: reason for name, reason in absent.items() if not any(b == name for b, _ in lines)}
+    )
+    results.command(
+        f"crt render configs/{SCENE}.yaml --backend BACKEND --spp N --set 'film.resolution=[1440,1440]' --set 'outputs.0.aovs=[]' -o unseen.pfm"
+    )
     results.data = {"rows": rows, "fits": data}
     results.write()
     (arguments.results / "figure2.svg").write_text(draw(lines))
@@ -100,7 +174,13 @@ def write(program, arguments, rows, absent):
 def draw(lines):
     """Labels at the lines' ends."""
     seconds = [t for points in lines.values() for _, t in points]
-    chart = Chart((860, 520), (70, 190, 24, 56), (COUNTS[0], COUNTS[-1]), (min(seconds) * 0.7, max(seconds) * 1.4), COLOURS)
+    chart = Chart(
+        (860, 520),
+        (70, 190, 24, 56),
+        (COUNTS[0], COUNTS[-1]),
+        (min(seconds) * 0.7, max(seconds) * 1.4),
+        COLOURS,
+    )
     for n in COUNTS:
         chart.x_tick(n, n)
     for tick in ticks(*chart.y_range):

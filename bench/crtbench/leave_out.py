@@ -1,6 +1,9 @@
-"""What leaving out saves: the kernel that has just what the scene needs against the one that has everything, and against the same kernel
-with one feature more, for every feature. The one feature more comes through CRT_KERNEL_DIR: a copy of the kernel texts in which every kernel
+"""What leaving out saves: the kernel that has just what the scene needs against the one that has
+everything, and against the same kernel
+with one feature more, for every feature. The one feature more comes through CRT_KERNEL_DIR: a copy of the
+kernel texts in which every kernel
 has it."""
+
 from .nvrtc import variants
 from .program import Spread, feature_bits, significant
 from .results import Results
@@ -26,33 +29,64 @@ def measure(program, arguments):
     masks = {scene: scene_mask(program, scene) for scene in scenes}
 
     def render(scene, backend, kernel="lean", outputs=(), environment=None):
-        return program.render(scene, backend, ["--spp", spp[scene], "--kernel", kernel], outputs, settings, environment=environment)
+        return program.render(
+            scene,
+            backend,
+            ["--spp", spp[scene], "--kernel", kernel],
+            outputs,
+            settings,
+            environment=environment,
+        )
 
     # Lean against full.
     rows = []
     for scene in scenes:
         data["scenes"][scene] = {"backends": {}}
         for backend in usable:
-            images = {kernel: program.scratch / f"{scene}-{backend}-{kernel}.exr" for kernel in ("lean", "full")}
+            images = {
+                kernel: program.scratch / f"{scene}-{backend}-{kernel}.exr" for kernel in ("lean", "full")
+            }
             for kernel, image in images.items():
                 render(scene, backend, kernel, [image])
             different = program.compare(images["lean"], images["full"])["differing_pixels"]
-            kept = program.interleaved({kernel: lambda kernel=kernel: render(scene, backend, kernel) for kernel in images}, runs)
+            kept = program.interleaved(
+                {kernel: lambda kernel=kernel: render(scene, backend, kernel) for kernel in images}, runs
+            )
             seconds = {kernel: [r.value("seconds", "render") for r in done] for kernel, done in kept.items()}
-            memory = {kernel: Spread(r.value("memory", "host_peak_bytes") for r in done) for kernel, done in kept.items()}
+            memory = {
+                kernel: Spread(r.value("memory", "host_peak_bytes") for r in done)
+                for kernel, done in kept.items()
+            }
             ratio = gain(seconds["full"], seconds["lean"])
             data["scenes"][scene]["backends"][backend] = {
-                "differing_pixels": different, "render_seconds": {k: Spread(s).json() for k, s in seconds.items()}, "full_over_lean": ratio.json(),
+                "differing_pixels": different,
+                "render_seconds": {k: Spread(s).json() for k, s in seconds.items()},
+                "full_over_lean": ratio.json(),
                 "host_peak_bytes": {k: m.json() for k, m in memory.items()},
-                "lean_kernel": kept["lean"][0].value("backend", "kernel"), "lean_features": kept["lean"][0].value("backend", "kernel_features")}
-            rows.append([scene, backend, "yes" if different == 0 else f"**no**: {different} pixels", Spread(seconds["lean"]).text(),
-                         Spread(seconds["full"]).text(), ratio.text(), *(significant(memory[k].median / 1e6) for k in ("lean", "full"))])
+                "lean_kernel": kept["lean"][0].value("backend", "kernel"),
+                "lean_features": kept["lean"][0].value("backend", "kernel_features"),
+            }
+            rows.append(
+                [
+                    scene,
+                    backend,
+                    "yes" if different == 0 else f"**no**: {different} pixels",
+                    Spread(seconds["lean"]).text(),
+                    Spread(seconds["full"]).text(),
+                    ratio.text(),
+                    *(significant(memory[k].median / 1e6) for k in ("lean", "full")),
+                ]
+            )
             print(rows[-1], flush=True)
     results.heading("Lean and full kernel")
-    results.paragraph(f"{size} × {size} pixels; {', '.join(f'{s} {spp[s]}' for s in scenes)} samples per pixel. Render seconds without start, median of {runs} "
-                      "interleaved runs, in brackets the least and the most; the ratio is taken run by run. Memory is the process's peak. Embree's lean kernel is the "
-                      "smallest of those it has compiled ahead that covers the scene.")
-    results.table(["scene", "backend", "same bits", "s, lean", "s, full", "full : lean", "MB, lean", "MB, full"], rows)
+    results.paragraph(
+        f"{size} × {size} pixels; {', '.join(f'{s} {spp[s]}' for s in scenes)} samples per pixel. Render seconds without start, median of {runs} "
+        "interleaved runs, in brackets the least and the most; the ratio is taken run by run. Memory is the process's peak. Embree's lean kernel is the "
+        "smallest of those it has compiled ahead that covers the scene."
+    )
+    results.table(
+        ["scene", "backend", "same bits", "s, lean", "s, full", "full : lean", "MB, lean", "MB, full"], rows
+    )
 
     # Registers.
     results.heading("CUDA kernels: registers and sizes")
@@ -64,15 +98,29 @@ def measure(program, arguments):
         full = next(v for v in base if v["name"] == "everything")
         data["nvrtc"] = {"compiler": compiler, "full": full, "scenes": by_scene}
         results.paragraph(f"{compiler}, `crt_render`, without AOVs.")
-        results.table(["kernel", "mask", "registers", "stack, bytes", "spilled, bytes", "CUBIN, kB", "ms to compile"],
-                      [[title, f"`{v['mask']}`", v["registers"], v["stack"], v["spill"], significant(v["cubin_kb"]), significant(v["ms"])]
-                       for title, v in [*by_scene.items(), ("everything", full)]])
+        results.table(
+            ["kernel", "mask", "registers", "stack, bytes", "spilled, bytes", "CUBIN, kB", "ms to compile"],
+            [
+                [
+                    title,
+                    f"`{v['mask']}`",
+                    v["registers"],
+                    v["stack"],
+                    v["spill"],
+                    significant(v["cubin_kb"]),
+                    significant(v["ms"]),
+                ]
+                for title, v in [*by_scene.items(), ("everything", full)]
+            ],
+        )
 
     # Bit by bit.
     results.heading("Each feature alone")
-    results.paragraph("The scene's own kernel with one feature more that the scene does not use: what every feature would cost those who do not need it. OpenCL: render "
-                      f"seconds with the feature : without, median of {runs} interleaved runs, run by run, in brackets the least and the most. CUDA with "
-                      "NVRTC: registers, kB of the CUBIN and ms of one compilation more than without.")
+    results.paragraph(
+        "The scene's own kernel with one feature more that the scene does not use: what every feature would cost those who do not need it. OpenCL: render "
+        f"seconds with the feature : without, median of {runs} interleaved runs, run by run, in brackets the least and the most. CUDA with "
+        "NVRTC: registers, kB of the CUBIN and ms of one compilation more than without."
+    )
     bits = feature_bits(program.repository)
     rows, data["features"] = [], {}
     extra_variants = {}
@@ -87,13 +135,23 @@ def measure(program, arguments):
                 entry["scenes"][scene] = None  # The scene needs it.
                 continue
             if "opencl" in usable:
-                kept = program.interleaved({"lean": lambda: render(scene, "opencl"), "more": lambda: render(scene, "opencl", environment=environment)}, runs)
+                kept = program.interleaved(
+                    {
+                        "lean": lambda: render(scene, "opencl"),
+                        "more": lambda: render(scene, "opencl", environment=environment),
+                    },
+                    runs,
+                )
                 ratio = gain(*([r.value("seconds", "render") for r in kept[k]] for k in ("more", "lean")))
                 found = {"more_over_lean": ratio.json()}
             if base is not None:
                 lean, more = by_scene[scene], extra_variants[bit][by_scene[scene]["mask"]]
-                found |= {"registers_more": more["registers"] - lean["registers"], "cubin_kb_more": more["cubin_kb"] - lean["cubin_kb"],
-                          "compile_ms_more": more["ms"] - lean["ms"], "spill_more": more["spill"] - lean["spill"]}
+                found |= {
+                    "registers_more": more["registers"] - lean["registers"],
+                    "cubin_kb_more": more["cubin_kb"] - lean["cubin_kb"],
+                    "compile_ms_more": more["ms"] - lean["ms"],
+                    "spill_more": more["spill"] - lean["spill"],
+                }
             entry["scenes"][scene] = found
         data["features"][name] = entry
         rows.append([f"`{name}`: {what}", *(feature_cell(entry["scenes"][scene]) for scene in scenes)])
@@ -101,7 +159,11 @@ def measure(program, arguments):
     results.table(["feature", *scenes], rows)
     results.not_measured(absent)
     for scene in scenes:
-        results.command(f"crt render configs/{scene}.yaml --backend BACKEND --kernel lean|full --spp {spp[scene]} " + " ".join(f"--set '{c}'" for c in settings) + " -o unseen.pfm")
+        results.command(
+            f"crt render configs/{scene}.yaml --backend BACKEND --kernel lean|full --spp {spp[scene]} "
+            + " ".join(f"--set '{c}'" for c in settings)
+            + " -o unseen.pfm"
+        )
     results.data = data
     results.write()
 

@@ -1,4 +1,6 @@
-"""What is drawn and fitted on two logarithmic scales: power laws through points, and a chart as an SVG of its own, with colours for light and for dark."""
+"""What is drawn and fitted on two logarithmic scales: power laws through points, and a chart as an SVG of
+its own, with colours for light and for dark."""
+
 import math
 import statistics
 
@@ -7,11 +9,14 @@ INK_ON_DARK = ".ink{fill:#eee}.soft{fill:#b0b0b0}.grid{stroke:#343434}.frame{str
 
 
 class PowerLaw:
-    """y = e^offset · x^exponent through points (x, y), all positive and at least two: least squares in the logarithms."""
+    """y = e^offset · x^exponent through points (x, y), all positive and at least two: least squares in the
+    logarithms."""
 
     def __init__(self, points):
         xs, ys = zip(*points)
-        self.exponent, self.offset = statistics.linear_regression([math.log(x) for x in xs], [math.log(y) for y in ys])
+        self.exponent, self.offset = statistics.linear_regression(
+            [math.log(x) for x in xs], [math.log(y) for y in ys]
+        )
 
     def __call__(self, x):
         return math.exp(self.offset + self.exponent * math.log(x))
@@ -45,15 +50,21 @@ class Chart:
         self.shapes.append(shape)
 
     def x_tick(self, value, text):
-        self.draw(f'<line class="grid" x1="{self.x(value):.1f}" x2="{self.x(value):.1f}" y1="{self.top}" y2="{self.bottom}"/>'
-                  f'<text class="soft" x="{self.x(value):.1f}" y="{self.bottom + 18}" text-anchor="middle">{text}</text>')
+        self.draw(
+            f'<line class="grid" x1="{self.x(value):.1f}" x2="{self.x(value):.1f}" y1="{self.top}" y2="{self.bottom}"/>'
+            f'<text class="soft" x="{self.x(value):.1f}" y="{self.bottom + 18}" text-anchor="middle">{text}</text>'
+        )
 
     def y_tick(self, value, text):
-        self.draw(f'<line class="grid" x1="{self.left}" x2="{self.right}" y1="{self.y(value):.1f}" y2="{self.y(value):.1f}"/>'
-                  f'<text class="soft" x="{self.left - 8}" y="{self.y(value) + 4:.1f}" text-anchor="end">{text}</text>')
+        self.draw(
+            f'<line class="grid" x1="{self.left}" x2="{self.right}" y1="{self.y(value):.1f}" y2="{self.y(value):.1f}"/>'
+            f'<text class="soft" x="{self.left - 8}" y="{self.y(value) + 4:.1f}" text-anchor="end">{text}</text>'
+        )
 
     def x_title(self, text):
-        self.draw(f'<text class="soft" x="{(self.left + self.right) / 2}" y="{self.height - 15}" text-anchor="middle">{text}</text>')
+        self.draw(
+            f'<text class="soft" x="{(self.left + self.right) / 2}" y="{self.height - 15}" text-anchor="middle">{text}</text>'
+        )
 
     def curve(self, kind, points, width, radius, dashed):
         """Points, joined; `kind` is one of the colours."""
@@ -66,14 +77,19 @@ class Chart:
 
     def label(self, kind, x, y, text, size=13):
         """Text in the colour of its line, at a place in the picture's own units."""
-        self.draw(f'<text class="t{list(self.colours).index(kind)}" x="{x:.1f}" y="{y:.1f}" font-size="{size}">{text}</text>')
+        self.draw(
+            f'<text class="t{list(self.colours).index(kind)}" x="{x:.1f}" y="{y:.1f}" font-size="{size}">{text}</text>'
+        )
 
     def svg(self, title):
         style, dark = [INK], [INK_ON_DARK]
         for number, (light, night) in enumerate(self.colours.values()):
             style.append(f".l{number}{{stroke:{light};fill:none}}.t{number}{{fill:{light}}}")
             dark.append(f".l{number}{{stroke:{night}}}.t{number}{{fill:{night}}}")
-        head = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" font-family="system-ui, sans-serif" font-size="13" role="img">',
-                f"<title>{title}</title>", f"<style>{''.join(style)}@media (prefers-color-scheme: dark){{{''.join(dark)}}}</style>",
-                f'<rect class="ground" width="{self.width}" height="{self.height}"/>']
+        head = [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" font-family="system-ui, sans-serif" font-size="13" role="img">',
+            f"<title>{title}</title>",
+            f"<style>{''.join(style)}@media (prefers-color-scheme: dark){{{''.join(dark)}}}</style>",
+            f'<rect class="ground" width="{self.width}" height="{self.height}"/>',
+        ]
         return "\n".join([*head, *self.shapes, "</svg>"]) + "\n"

@@ -1,8 +1,12 @@
 """OBJ files of other people: which render, which are refused and why, and what crt made of their materials.
 
-    bench/run meshes FOLDER…    every *.obj below each folder, small, with a grey fallback material and a camera fitted to its bounds
+    bench/run meshes FOLDER…    every *.obj below each folder, small, with a grey fallback material and a
+    camera fitted to its bounds
 
-Times nothing. A file that has a face with an area must render, unless a face names a vertex that is not there: otherwise it ends with code 1."""
+Times nothing. A file that has a face with an area must render, unless a face names a vertex that is not
+there: otherwise it ends with code 1.
+"""
+
 import math
 import pathlib
 import re
@@ -43,7 +47,8 @@ def bounds(text):
 
 
 def fitted_scene(obj, text):
-    """A camera in front, above and to the right, so far away that the sphere around the bounds fits into its view."""
+    """A camera in front, above and to the right, so far away that the sphere around the bounds fits into
+    its view."""
     least, most = bounds(text)
     centre = [(a + b) / 2 for a, b in zip(least, most)]
     radius = max(math.dist(least, most) / 2, 1e-6)
@@ -57,7 +62,13 @@ def fitted_scene(obj, text):
     def quoted(value):
         return "'" + value.replace("'", "''") + "'"
 
-    return SCENE.format(title=quoted(obj.name), obj=quoted(str(obj)), position=numbers(position), target=numbers(centre), resolution=RESOLUTION)
+    return SCENE.format(
+        title=quoted(obj.name),
+        obj=quoted(str(obj)),
+        position=numbers(position),
+        target=numbers(centre),
+        resolution=RESOLUTION,
+    )
 
 
 def pixels(path):
@@ -72,7 +83,8 @@ def face_count(text):
 
 
 class File:
-    """What crt did with one OBJ: its exit code, its error, its warnings, and the share of pixels in which the mesh is seen."""
+    """What crt did with one OBJ: its exit code, its error, its warnings, and the share of pixels in which
+    the mesh is seen."""
 
     def __init__(self, program, backend, folder, path):
         self.name = str(path.relative_to(folder))
@@ -84,10 +96,21 @@ class File:
         done = self.crt(program, backend, scene, program.scratch / "mesh.pfm", "path")
         self.code = done.returncode
         said = done.stderr.replace(str(path.resolve()), path.name).replace(f"{path.resolve().parent}/", "")
-        self.warnings = [line.split(": ", 2)[2] for line in said.splitlines() if line.startswith("crt: warning: ")]
-        errors = re.findall(r"error: (.*)", said)   # The last is the one with a place; the first says that the scene cannot be rendered.
+        self.warnings = [
+            line.split(": ", 2)[2] for line in said.splitlines() if line.startswith("crt: warning: ")
+        ]
+        errors = re.findall(
+            r"error: (.*)", said
+        )  # The last is the one with a place; the first says that the scene cannot be rendered.
         self.error = errors[-1] if errors else said.strip()[-200:]
-        self.materials = next((m[1] for line in said.splitlines() if (m := re.search(r"\.obj: (\d+ materials?: .*)", line, re.IGNORECASE))), "")
+        self.materials = next(
+            (
+                m[1]
+                for line in said.splitlines()
+                if (m := re.search(r"\.obj: (\d+ materials?: .*)", line, re.IGNORECASE))
+            ),
+            "",
+        )
         if self.code == 0:
             self.finite = all(map(math.isfinite, pixels(program.scratch / "mesh.pfm")))
             normals = program.scratch / "normals.pfm"
@@ -97,10 +120,29 @@ class File:
 
     @staticmethod
     def crt(program, backend, scene, image, integrator):
-        command = [str(program.crt), "render", str(scene), "--backend", backend, "--spp", "4", "-o", str(image), "--set", f"integrator.type={integrator}"]
+        command = [
+            str(program.crt),
+            "render",
+            str(scene),
+            "--backend",
+            backend,
+            "--spp",
+            "4",
+            "-o",
+            str(image),
+            "--set",
+            f"integrator.type={integrator}",
+        ]
         try:
-            return subprocess.run(command, cwd=program.repository, env=program.environment, capture_output=True, text=True, errors="replace",
-                                  timeout=SECONDS_AT_MOST)
+            return subprocess.run(
+                command,
+                cwd=program.repository,
+                env=program.environment,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=SECONDS_AT_MOST,
+            )
         except subprocess.TimeoutExpired:
             return subprocess.CompletedProcess(command, 124, "", f"not done after {SECONDS_AT_MOST} s")
 
@@ -112,9 +154,11 @@ def cell(text):
 def measure(program, arguments):
     backend = program.backends(BACKENDS)[0][0]
     results = Results(program, arguments, "meshes", "OBJ files of other people")
-    results.paragraph(f"Every OBJ below each folder, {RESOLUTION} × {RESOLUTION} pixels, 4 samples, on `{backend}`, with `material: grey` for faces that have no "
-                      "material of their own, a camera fitted to the bounds and light from everywhere. A file renders when crt ends with code 0, all "
-                      "pixels are finite, and the mesh is seen in a second picture of its normals. Nothing of these files is part of crt.")
+    results.paragraph(
+        f"Every OBJ below each folder, {RESOLUTION} × {RESOLUTION} pixels, 4 samples, on `{backend}`, with `material: grey` for faces that have no "
+        "material of their own, a camera fitted to the bounds and light from everywhere. A file renders when crt ends with code 0, all "
+        "pixels are finite, and the mesh is seen in a second picture of its normals. Nothing of these files is part of crt."
+    )
     if arguments.note:
         results.paragraph(arguments.note)
     corpora = {}
@@ -124,29 +168,84 @@ def measure(program, arguments):
         for path in paths:
             corpora[folder.name].append(File(program, backend, folder, path))
             f = corpora[folder.name][-1]
-            print(f"{folder.name} {f.name}: {'renders' if f.code == 0 else f'code {f.code}: {f.error}'}", flush=True)
+            print(
+                f"{folder.name} {f.name}: {'renders' if f.code == 0 else f'code {f.code}: {f.error}'}",
+                flush=True,
+            )
 
     def renders(f):
         return f.code == 0 and f.finite and f.seen > 0
 
     everything = [f for files in corpora.values() for f in files]
-    results.table(["repository@commit", "files", "render", "refused: no face with an area", "refused: a face names no vertex", "anything else"],
-                  [[name, len(files), sum(map(renders, files)), *refusals(files, renders)] for name, files in corpora.items()] +
-                  [["together", len(everything), sum(map(renders, everything)), *refusals(everything, renders)]])
+    results.table(
+        [
+            "repository@commit",
+            "files",
+            "render",
+            "refused: no face with an area",
+            "refused: a face names no vertex",
+            "anything else",
+        ],
+        [
+            [name, len(files), sum(map(renders, files)), *refusals(files, renders)]
+            for name, files in corpora.items()
+        ]
+        + [["together", len(everything), sum(map(renders, everything)), *refusals(everything, renders)]],
+    )
 
     results.heading("Not rendered")
-    results.table(["file", "lines with faces", "code", "what crt says"],
-                  [[f"{name}/{f.name}", f.faces, f.code, cell(f.error if f.code else f"seen in {f.seen:.1%} of the pixels")]
-                   for name, files in corpora.items() for f in files if not renders(f)])
+    results.table(
+        ["file", "lines with faces", "code", "what crt says"],
+        [
+            [
+                f"{name}/{f.name}",
+                f.faces,
+                f.code,
+                cell(f.error if f.code else f"seen in {f.seen:.1%} of the pixels"),
+            ]
+            for name, files in corpora.items()
+            for f in files
+            if not renders(f)
+        ],
+    )
 
     results.heading("What was decided about materials")
-    results.table(["file", "what crt says"], [[f"{name}/{f.name}", cell(f.materials)] for name, files in corpora.items() for f in files if f.materials])
+    results.table(
+        ["file", "what crt says"],
+        [
+            [f"{name}/{f.name}", cell(f.materials)]
+            for name, files in corpora.items()
+            for f in files
+            if f.materials
+        ],
+    )
 
     results.heading("Other warnings of files that render")
-    other = [(f"{name}/{f.name}", w) for name, files in corpora.items() for f in files if renders(f) for w in f.warnings if f.materials not in w or not f.materials]
+    other = [
+        (f"{name}/{f.name}", w)
+        for name, files in corpora.items()
+        for f in files
+        if renders(f)
+        for w in f.warnings
+        if f.materials not in w or not f.materials
+    ]
     results.table(["file", "warning"], [[file, cell(w)] for file, w in other])
-    results.data = {name: [{"file": f.name, "code": f.code, "renders": renders(f), "faces": f.faces, "seen": f.seen, "error": f.error if f.code else "",
-                            "materials": f.materials, "warnings": f.warnings} for f in files] for name, files in corpora.items()}
+    results.data = {
+        name: [
+            {
+                "file": f.name,
+                "code": f.code,
+                "renders": renders(f),
+                "faces": f.faces,
+                "seen": f.seen,
+                "error": f.error if f.code else "",
+                "materials": f.materials,
+                "warnings": f.warnings,
+            }
+            for f in files
+        ]
+        for name, files in corpora.items()
+    }
     results.shown = {str(folder): folder.name for folder in arguments.folders}
     results.command(f"crt render SCENE.yaml --backend {backend} --spp 4 -o IMAGE.pfm")
     results.write()
@@ -154,12 +253,16 @@ def measure(program, arguments):
 
 
 def expected(f):
-    """A refusal that is right: the file has no face with an area, or one of them names a vertex that is not there."""
+    """A refusal that is right: the file has no face with an area, or one of them names a vertex that is not
+    there."""
     return f.code == 3 and (no_area(f) or names_no_vertex(f))
 
 
 def no_area(f):
-    return f.faces == 0 or re.search(r"no face of this mesh has an area|needs at least three corners", f.error) is not None
+    return (
+        f.faces == 0
+        or re.search(r"no face of this mesh has an area|needs at least three corners", f.error) is not None
+    )
 
 
 def names_no_vertex(f):

@@ -1,7 +1,10 @@
-"""McGuire's Cornell box with its own MTL, and with the MTLs that Maya and a Sponza in circulation have, in crt and in Mitsuba 3: is the luminance the same?
+"""McGuire's Cornell box with its own MTL, and with the MTLs that Maya and a Sponza in circulation have, in
+crt and in Mitsuba 3: is the luminance the same?
 
-Needs mitsuba and numpy (--python). Mitsuba renders a scene made from the same numbers by a reader of its own (mtl_worker.py), in RGB and in
+Needs mitsuba and numpy (--python). Mitsuba renders a scene made from the same numbers by a reader of its
+own (mtl_worker.py), in RGB and in
 wavelengths. Times nothing."""
+
 import json
 import math
 import pathlib
@@ -15,12 +18,23 @@ from .program import Failure
 from .results import Results
 
 FOLDER = "bench/scenes/mtl"
-FILES = {"cornell_original": "McGuire's own", "maya": "as Maya writes (`illum 4`, `Ni 1`, white `Tf`)", "sponza": "as a Sponza in circulation (`d 0`, `Ni 1`)"}
+FILES = {
+    "cornell_original": "McGuire's own",
+    "maya": "as Maya writes (`illum 4`, `Ni 1`, white `Tf`)",
+    "sponza": "as a Sponza in circulation (`d 0`, `Ni 1`)",
+}
 SIZE, BLOCK = 128, 16
 VIEW = {"position": [0, 1, 3.9], "target": [0, 1, 0], "fov": 40, "size": SIZE, "max_depth": 15}
 # Squares of pixels (x, y, width, height) that show one material, away from edges.
-PATCHES = {"left wall": (8, 40, 10, 40), "right wall": (108, 40, 10, 40), "back wall": (52, 30, 24, 14), "floor": (52, 114, 24, 8),
-           "ceiling": (20, 4, 24, 8), "tall box": (44, 60, 14, 30), "short box": (72, 88, 14, 20)}
+PATCHES = {
+    "left wall": (8, 40, 10, 40),
+    "right wall": (108, 40, 10, 40),
+    "back wall": (52, 30, 24, 14),
+    "floor": (52, 114, 24, 8),
+    "ceiling": (20, 4, 24, 8),
+    "tall box": (44, 60, 14, 30),
+    "short box": (72, 88, 14, 20),
+}
 
 
 def crt_luminance(program, backend, mtl, samples):
@@ -30,10 +44,14 @@ def crt_luminance(program, backend, mtl, samples):
     folder = program.scratch / mtl
     folder.mkdir(exist_ok=True)
     (folder / "scene.yaml").write_text(scene)
-    (folder / "cornell_original.obj").write_text(re.sub(r"^mtllib .*$", f"mtllib {mtl}.mtl", obj, flags=re.MULTILINE))
+    (folder / "cornell_original.obj").write_text(
+        re.sub(r"^mtllib .*$", f"mtllib {mtl}.mtl", obj, flags=re.MULTILINE)
+    )
     (folder / f"{mtl}.mtl").write_text((program.repository / FOLDER / f"{mtl}.mtl").read_text())
     image = folder / "image.pfm"
-    run = program.render(folder / "scene.yaml", backend, ["--spp", samples], [image], ["film.color_space=xyz"])
+    run = program.render(
+        folder / "scene.yaml", backend, ["--spp", samples], [image], ["film.color_space=xyz"]
+    )
     data = image.read_bytes()
     header = re.match(rb"PF\n(\d+) (\d+)\n-[0-9.]+\n", data)
     floats = struct.unpack(f"<{SIZE * SIZE * 3}f", data[header.end():])
@@ -44,14 +62,29 @@ def crt_luminance(program, backend, mtl, samples):
 def mitsuba_luminance(program, python, variant, mtl, samples, seed):
     image = program.scratch / f"{variant}.npy"
     folder = program.repository / FOLDER
-    done = subprocess.run([python, pathlib.Path(__file__).with_name("mtl_worker.py"), variant, folder / "cornell_original.obj", folder / f"{mtl}.mtl",
-                           str(samples), str(seed), image, json.dumps(VIEW)], capture_output=True, text=True)
+    done = subprocess.run(
+        [
+            python,
+            pathlib.Path(__file__).with_name("mtl_worker.py"),
+            variant,
+            folder / "cornell_original.obj",
+            folder / f"{mtl}.mtl",
+            str(samples),
+            str(seed),
+            image,
+            json.dumps(VIEW),
+        ],
+        capture_output=True,
+        text=True,
+    )
     if done.returncode != 0:
         raise Failure(f"Mitsuba fails: {done.stderr.strip()[-800:]}")
     data = image.read_bytes()
     header = 10 + struct.unpack("<H", data[8:10])[0]
     values = struct.unpack(f"<{SIZE * SIZE}f", data[header:])
-    return [list(values[y * SIZE:(y + 1) * SIZE]) for y in range(SIZE)], json.loads(done.stdout.splitlines()[-1])["mitsuba"]
+    return [list(values[y * SIZE : (y + 1) * SIZE]) for y in range(SIZE)], json.loads(
+        done.stdout.splitlines()[-1]
+    )["mitsuba"]
 
 
 class Mitsuba:
@@ -63,9 +96,13 @@ class Mitsuba:
         self.version = ""
 
     def luminance(self, variant, mtl):
-        read = json.dumps(materials(self.program.repository / FOLDER / f"{mtl}.mtl"), sort_keys=True).replace(', "Ke": [0.0, 0.0, 0.0]', "")
+        read = json.dumps(
+            materials(self.program.repository / FOLDER / f"{mtl}.mtl"), sort_keys=True
+        ).replace(', "Ke": [0.0, 0.0, 0.0]', "")
         if (variant, read) not in self.rendered:
-            self.rendered[variant, read], self.version = mitsuba_luminance(self.program, self.python, variant, mtl, self.samples, 1)
+            self.rendered[variant, read], self.version = mitsuba_luminance(
+                self.program, self.python, variant, mtl, self.samples, 1
+            )
         return self.rendered[variant, read]
 
 
@@ -85,9 +122,11 @@ def blocks(ours, theirs):
 
 def compared(ours, theirs):
     """({name of a patch: relative difference}, the same as text)"""
-    differences = {"whole image": mean(ours, 0, 0, SIZE, SIZE) / mean(theirs, 0, 0, SIZE, SIZE) - 1,
-                   **{name: mean(ours, *where) / mean(theirs, *where) - 1 for name, where in PATCHES.items()},
-                   "worst block": max(blocks(ours, theirs), key=abs)}
+    differences = {
+        "whole image": mean(ours, 0, 0, SIZE, SIZE) / mean(theirs, 0, 0, SIZE, SIZE) - 1,
+        **{name: mean(ours, *where) / mean(theirs, *where) - 1 for name, where in PATCHES.items()},
+        "worst block": max(blocks(ours, theirs), key=abs),
+    }
     return differences, [f"{d:+.2%}" for d in differences.values()]
 
 
@@ -106,18 +145,30 @@ def measure(program, arguments):
             rows[f"{mtl} {variant}"], cells = compared(ours, theirs)
             table.append([f"crt, {title}", f"Mitsuba in {in_what}", *cells])
             print(*table[-1], flush=True)
-    rows["mitsuba"], cells = compared(mitsuba.luminance("scalar_rgb", "cornell_original"), mitsuba.luminance("scalar_spectral", "cornell_original"))
+    rows["mitsuba"], cells = compared(
+        mitsuba.luminance("scalar_rgb", "cornell_original"),
+        mitsuba.luminance("scalar_spectral", "cornell_original"),
+    )
     table.append(["Mitsuba in RGB", "Mitsuba in wavelengths", *cells])
     version = mitsuba.version
-    results.paragraph(f"McGuire's Cornell box (public domain, Cardenas and McGuire 2011; `{FOLDER}`), {SIZE} × {SIZE} pixels, {samples} samples, in crt on `{backend}` and in Mitsuba "
-                      f"{version}, whose scene is made from the same OBJ and MTL by a reader of its own: every face diffuse with Kd, an area light with Ke, linear "
-                      "sRGB. Luminance (CIE Y) of one over that of the other, less one: of the whole image, of patches that show one material, and the largest of all "
-                      f"{(SIZE // BLOCK) ** 2} blocks of {BLOCK} × {BLOCK} pixels. Mitsuba in RGB multiplies three numbers at each reflection, where crt and Mitsuba in wavelengths multiply "
-                      "spectra that are made from them: the last line is how much that is.")
+    results.paragraph(
+        f"McGuire's Cornell box (public domain, Cardenas and McGuire 2011; `{FOLDER}`), {SIZE} × {SIZE} pixels, {samples} samples, in crt on `{backend}` and in Mitsuba "
+        f"{version}, whose scene is made from the same OBJ and MTL by a reader of its own: every face diffuse with Kd, an area light with Ke, linear "
+        "sRGB. Luminance (CIE Y) of one over that of the other, less one: of the whole image, of patches that show one material, and the largest of all "
+        f"{(SIZE // BLOCK) ** 2} blocks of {BLOCK} × {BLOCK} pixels. Mitsuba in RGB multiplies three numbers at each reflection, where crt and Mitsuba in wavelengths multiply "
+        "spectra that are made from them: the last line is how much that is."
+    )
     results.table(["this", "over that", "whole image", *PATCHES, "worst block"], table)
     reference = mitsuba.luminance("scalar_spectral", "cornell_original")
-    results.data = {"relative_difference": rows, "patches": {name: {"x_y_width_height": where, "mitsuba_luminance": mean(reference, *where)}
-                                                             for name, where in {"whole image": (0, 0, SIZE, SIZE), **PATCHES}.items()}}
+    results.data = {
+        "relative_difference": rows,
+        "patches": {
+            name: {"x_y_width_height": where, "mitsuba_luminance": mean(reference, *where)}
+            for name, where in {"whole image": (0, 0, SIZE, SIZE), **PATCHES}.items()
+        },
+    }
     results.shown = {arguments.python: "PYTHON"}
-    results.command(f"crt render {FOLDER}/cornell_original.yaml --backend {backend} --spp {samples} -o IMAGE.pfm")
+    results.command(
+        f"crt render {FOLDER}/cornell_original.yaml --backend {backend} --spp {samples} -o IMAGE.pfm"
+    )
     results.write()

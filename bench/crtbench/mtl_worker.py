@@ -1,9 +1,11 @@
-"""One OBJ with its MTL in Mitsuba 3, by a reading of both files that shares nothing with crt: every face diffuse with Kd, an area light where Ke is not
+"""One OBJ with its MTL in Mitsuba 3, by a reading of both files that shares nothing with crt: every face
+diffuse with Kd, an area light where Ke is not
 black, numbers taken as linear sRGB, nothing else read. Runs under a Python that has mitsuba and numpy.
 
     mtl_worker.py VARIANT OBJ MTL SAMPLES SEED IMAGE.npy '{"position": …, "target": …, "fov": …, "size": …, "max_depth": …}'
 
 The image is CIE Y."""
+
 import collections
 import json
 import pathlib
@@ -47,19 +49,42 @@ def main():
     scene = {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": view["max_depth"] + 1, "rr_depth": 1_000_000},
-        "sensor": {"type": "perspective", "fov": view["fov"], "near_clip": 0.01,
-                   "to_world": mi.ScalarTransform4f().look_at(origin=view["position"], target=view["target"], up=[0, 1, 0]),
-                   "film": {"type": "hdrfilm", "width": view["size"], "height": view["size"], "pixel_format": "xyz", "component_format": "float32",
-                            "rfilter": {"type": "box"}},
-                   "sampler": {"type": "independent", "sample_count": int(samples)}}}
+        "sensor": {
+            "type": "perspective",
+            "fov": view["fov"],
+            "near_clip": 0.01,
+            "to_world": mi.ScalarTransform4f().look_at(
+                origin=view["position"], target=view["target"], up=[0, 1, 0]
+            ),
+            "film": {
+                "type": "hdrfilm",
+                "width": view["size"],
+                "height": view["size"],
+                "pixel_format": "xyz",
+                "component_format": "float32",
+                "rfilter": {"type": "box"},
+            },
+            "sampler": {"type": "independent", "sample_count": int(samples)},
+        },
+    }
     found = materials(pathlib.Path(mtl))
     vertices, faces = faces_by_material(pathlib.Path(obj))
     with tempfile.TemporaryDirectory() as folder:
         for name, polygons in faces.items():
             part = pathlib.Path(folder) / f"{name}.obj"
-            part.write_text("".join(f"v {' '.join(v)}\n" for v in vertices) + "".join(f"f {' '.join(str(c + 1) for c in p)}\n" for p in polygons))
-            shape = {"type": "obj", "filename": str(part), "face_normals": True,
-                     "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": found[name]["Kd"]}}}}
+            part.write_text(
+                "".join(f"v {' '.join(v)}\n" for v in vertices)
+                + "".join(f"f {' '.join(str(c + 1) for c in p)}\n" for p in polygons)
+            )
+            shape = {
+                "type": "obj",
+                "filename": str(part),
+                "face_normals": True,
+                "bsdf": {
+                    "type": "twosided",
+                    "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": found[name]["Kd"]}},
+                },
+            }
             if any(found[name].get("Ke", [])):
                 shape["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": found[name]["Ke"]}}
             scene[name] = shape

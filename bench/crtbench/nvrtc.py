@@ -15,20 +15,35 @@ def find(program):
 
 
 def variants(program, scenes, environment=None):
-    """(compiler, [variant]) for the representative masks and those of the scenes; (why not, None) where NVRTC is missing."""
+    """(compiler, [variant]) for the representative masks and those of the scenes; (why not, None) where
+    NVRTC is missing."""
     tool = find(program)
     if tool is None:
         return "this build has no nvrtc_variants", None
-    # Code 1 says that a variant spills or keeps memory that it should not; its numbers are measurements all the same.
-    run = program.start([program.scene_file(s) for s in scenes], program=tool, codes=(0, 1, SKIPPED), environment=environment)
+    # Code 1 says that a variant spills or keeps memory that it should not; its numbers are measurements all
+    # the same.
+    run = program.start(
+        [program.scene_file(s) for s in scenes], program=tool, codes=(0, 1, SKIPPED), environment=environment
+    )
     return (run.output.strip(), None) if run.code == SKIPPED else parsed(run.output)
 
 
 def parsed(output):
     head = re.match(r"(.*), (sm_\d+), \d+ variants", output)
-    rows = re.findall(r"^\s*(\d+)\s+(\d+)\s+(\d+)\s+([\d.]+)\s+([\d.]+)\s+(0x[0-9a-f]+) (.*)$", output, re.MULTILINE)
+    rows = re.findall(
+        r"^\s*(\d+)\s+(\d+)\s+(\d+)\s+([\d.]+)\s+([\d.]+)\s+(0x[0-9a-f]+) (.*)$", output, re.MULTILINE
+    )
     if not head or not rows:
         raise Failure(f"nvrtc_variants prints something new:\n{output[:500]}")
-    return f"{head[1]}, {head[2]}", [{"mask": mask, "name": name, "registers": int(registers), "stack": int(stack), "spill": int(spill),
-                                      "cubin_kb": float(size), "ms": float(ms)}
-                                     for registers, stack, spill, size, ms, mask, name in rows]
+    return f"{head[1]}, {head[2]}", [
+        {
+            "mask": mask,
+            "name": name,
+            "registers": int(registers),
+            "stack": int(stack),
+            "spill": int(spill),
+            "cubin_kb": float(size),
+            "ms": float(ms),
+        }
+        for registers, stack, spill, size, ms, mask, name in rows
+    ]

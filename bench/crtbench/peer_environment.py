@@ -1,5 +1,7 @@
-"""What bench/peers needs beside crt: a Python with mitsuba, numpy and PyYAML, and an LLVM that Mitsuba's compiler accepts. Both are put into out/ when they are
+"""What bench/peers needs beside crt: a Python with mitsuba, numpy and PyYAML, and an LLVM that Mitsuba's
+compiler accepts. Both are put into out/ when they are
 missing; nothing of them is ever part of the product. The measurement then runs under that Python."""
+
 import argparse
 import os
 import pathlib
@@ -12,7 +14,9 @@ from .command import REPOSITORY, add_options, exit_code, program_for
 from .program import Failure
 
 PACKAGES = ["mitsuba==3.9.1", "numpy", "pyyaml"]
-OLDEST_LLVM = 17   # Older ones cannot select the instruction `fminimum` on x86, which Mitsuba's kernels contain.
+OLDEST_LLVM = (
+    17  # Older ones cannot select the instruction `fminimum` on x86, which Mitsuba's kernels contain.
+)
 LLVM_PACKAGE = "libllvm19"
 READY = "PEERS_PYTHON_IS_READY"  # Set for the process that runs under the right Python.
 
@@ -25,7 +29,9 @@ def python_with_mitsuba(wanted):
     """The Python that was asked for, this one, or that of out/peers-venv, made when it is missing."""
     if wanted:
         if not has_packages(wanted):
-            raise Failure(f"'{wanted}' cannot import mitsuba, numpy and yaml: {wanted} -m pip install {' '.join(PACKAGES)}")
+            raise Failure(
+                f"'{wanted}' cannot import mitsuba, numpy and yaml: {wanted} -m pip install {' '.join(PACKAGES)}"
+            )
         return wanted
     if has_packages(sys.executable):
         return sys.executable
@@ -34,14 +40,17 @@ def python_with_mitsuba(wanted):
     if not pathlib.Path(python).exists() or not has_packages(python):
         print(f"installing {', '.join(PACKAGES)} into {folder}", flush=True)
         venv.create(folder, with_pip=True)
-        done = subprocess.run([python, "-m", "pip", "install", "--quiet", *PACKAGES], capture_output=True, text=True)
+        done = subprocess.run(
+            [python, "-m", "pip", "install", "--quiet", *PACKAGES], capture_output=True, text=True
+        )
         if done.returncode != 0:
             raise Failure(f"pip cannot install {', '.join(PACKAGES)}: {done.stderr.strip()[-500:]}")
     return python
 
 
 def llvm_library():
-    """An LLVM new enough for Mitsuba's llvm variants: the system's, or the Debian package unpacked into out/peers-llvm."""
+    """An LLVM new enough for Mitsuba's llvm variants: the system's, or the Debian package unpacked into
+    out/peers-llvm."""
     given = os.environ.get("DRJIT_LIBLLVM_PATH")
     if given:
         return given
@@ -49,27 +58,60 @@ def llvm_library():
     folder = REPOSITORY / "out" / "peers-llvm"
 
     def newest():
-        files = [p for place in [*places, *folder.glob("usr/lib/*")] for p in pathlib.Path(place).glob("libLLVM*.so*")]
-        found = sorted((int(m[1]), str(p)) for p in files if (m := re.search(r"libLLVM(?:\.so\.|-)(\d+)", p.name)))
+        files = [
+            p
+            for place in [*places, *folder.glob("usr/lib/*")]
+            for p in pathlib.Path(place).glob("libLLVM*.so*")
+        ]
+        found = sorted(
+            (int(m[1]), str(p)) for p in files if (m := re.search(r"libLLVM(?:\.so\.|-)(\d+)", p.name))
+        )
         return next((p for version, p in reversed(found) if version >= OLDEST_LLVM), None)
 
     if newest() is None:
         print(f"unpacking {LLVM_PACKAGE} into {folder}", flush=True)
         folder.mkdir(parents=True, exist_ok=True)
-        done = subprocess.run(f"apt-get download {LLVM_PACKAGE} && dpkg -x {LLVM_PACKAGE}_*.deb .", shell=True, cwd=folder, capture_output=True, text=True)
+        done = subprocess.run(
+            f"apt-get download {LLVM_PACKAGE} && dpkg -x {LLVM_PACKAGE}_*.deb .",
+            shell=True,
+            cwd=folder,
+            capture_output=True,
+            text=True,
+        )
         if done.returncode != 0 or newest() is None:
-            raise Failure(f"Mitsuba's llvm variants need LLVM {OLDEST_LLVM} or newer; install {LLVM_PACKAGE} or name one in DRJIT_LIBLLVM_PATH")
+            raise Failure(
+                f"Mitsuba's llvm variants need LLVM {OLDEST_LLVM} or newer; install {LLVM_PACKAGE} or name one in DRJIT_LIBLLVM_PATH"
+            )
     return newest()
 
 
 def main():
-    parser = argparse.ArgumentParser(prog="bench/peers", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="bench/peers", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     add_options(parser, busy="a wall time is marked")
-    parser.add_argument("--python", help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in out/peers-venv")
-    parser.add_argument("--seconds", type=float, default=600, help="about how long all of it may take, without making environments (600)")
-    parser.add_argument("--replicates", type=int, default=8, help="renders with seeds of their own for each number of samples (8)")
-    parser.add_argument("--samplers", nargs="+", default=["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
-                        help="Mitsuba's samplers of which the best is taken (all five)")
+    parser.add_argument(
+        "--python",
+        help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in out/peers-venv",
+    )
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=600,
+        help="about how long all of it may take, without making environments (600)",
+    )
+    parser.add_argument(
+        "--replicates",
+        type=int,
+        default=8,
+        help="renders with seeds of their own for each number of samples (8)",
+    )
+    parser.add_argument(
+        "--samplers",
+        nargs="+",
+        default=["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
+        help="Mitsuba's samplers of which the best is taken (all five)",
+    )
     arguments = parser.parse_args()
     return exit_code("bench/peers", arguments, lambda: measure(arguments))
 
@@ -78,6 +120,8 @@ def measure(arguments):
     os.environ["DRJIT_LIBLLVM_PATH"] = llvm_library()
     if READY not in os.environ:
         python = python_with_mitsuba(arguments.python)
-        os.execve(python, [python, str(REPOSITORY / "bench" / "peers"), *sys.argv[1:]], {**os.environ, READY: "1"})
+        os.execve(
+            python, [python, str(REPOSITORY / "bench" / "peers"), *sys.argv[1:]], {**os.environ, READY: "1"}
+        )
     from . import peers  # Needs what only the right Python has.
     return peers.measure(program_for(arguments), arguments)

@@ -1,6 +1,10 @@
-"""The contestants of bench/peers. Each renders the Cornell box with so many samples and a seed, and says what it cost; images are XYZ, row 0 at the top.
+"""The contestants of bench/peers. Each renders the Cornell box with so many samples and a seed, and says
+what it cost; images are XYZ, row 0 at the top.
 
-What tells them apart: `renderer`, `engine` (a backend of crt or a variant of Mitsuba), `replicates` (of crt's sampler, otherwise 1) and `roulette`; `name` is for people."""
+What tells them apart: `renderer`, `engine` (a backend of crt or a variant of Mitsuba), `replicates` (of
+crt's sampler, otherwise 1) and `roulette`; `name` is for people.
+"""
+
 import json
 import os
 import subprocess
@@ -18,7 +22,8 @@ ROULETTE_FROM = 4  # Scattering events; in both programs the first after which a
 
 
 class Cost:
-    """One render. Wall seconds and seconds of all processors of the render alone and of the process; `others`: the share that other processes had."""
+    """One render. Wall seconds and seconds of all processors of the render alone and of the process;
+    `others`: the share that other processes had."""
 
     def __init__(self, image, spp, render, cpu, others, process=None, process_cpu=None):
         self.image, self.spp = image, spp
@@ -41,22 +46,51 @@ class Crt:
     renderer, unit = "crt", 1.0
 
     def __init__(self, program, backend, replicates, roulette, setup):
-        self.program, self.engine, self.replicates, self.roulette, self.setup = program, backend, replicates, roulette, setup
-        self.name = f"crt {backend}, {replicates} sequence{'s' if replicates > 1 else ''}" + (", roulette" if roulette else "")
+        self.program, self.engine, self.replicates, self.roulette, self.setup = (
+            program,
+            backend,
+            replicates,
+            roulette,
+            setup,
+        )
+        self.name = f"crt {backend}, {replicates} sequence{'s' if replicates > 1 else ''}" + (
+            ", roulette" if roulette else ""
+        )
         self.start_cpu = 0.0
 
     def settings(self):
         size = self.setup["size"]
-        return [f"film.resolution=[{size},{size}]", "film.color_space=xyz", f"integrator.max_depth={self.setup['max_depth']}",
-                f"integrator.roulette={'true' if self.roulette else 'false'}", f"integrator.roulette_depth={ROULETTE_FROM}",
-                f"sampler.replicates={self.replicates}", "outputs.0.aovs=[]"]
+        return [
+            f"film.resolution=[{size},{size}]",
+            "film.color_space=xyz",
+            f"integrator.max_depth={self.setup['max_depth']}",
+            f"integrator.roulette={'true' if self.roulette else 'false'}",
+            f"integrator.roulette_depth={ROULETTE_FROM}",
+            f"sampler.replicates={self.replicates}",
+            "outputs.0.aovs=[]",
+        ]
 
     def render(self, spp, seed, environment=None):
         file = self.program.scratch / "peer.pfm"
         before = crt.children_seconds()
-        run = self.program.render(SCENE, self.engine, ["--spp", spp, "--seed", seed], [file], self.settings(), environment=environment)
+        run = self.program.render(
+            SCENE,
+            self.engine,
+            ["--spp", spp, "--seed", seed],
+            [file],
+            self.settings(),
+            environment=environment,
+        )
         cpu = crt.children_seconds() - before
-        return Cost(read_pfm(file), spp, run.value("seconds", "render"), max(0.0, cpu - self.start_cpu), run.others, run.seconds, cpu)
+        return Cost(
+            read_pfm(file),
+            spp,
+            run.value("seconds", "render"),
+            max(0.0, cpu - self.start_cpu),
+            run.others,
+            run.seconds,
+            cpu,
+        )
 
     def learn_start(self, runs):
         """Processor seconds of a process that renders nothing: of 1 and 4 samples, carried back to none."""
@@ -64,27 +98,37 @@ class Crt:
         self.start_cpu = max(0.0, (4 * float(np.median(one)) - float(np.median(four))) / 3)
 
     def whole(self, spp, fresh):
-        """(wall, processor) seconds of a whole process less those of its render; `fresh`: with no kernel in any cache."""
+        """(wall, processor) seconds of a whole process less those of its render; `fresh`: with no kernel in
+        any cache."""
         folder = self.program.scratch / f"fresh-{time.monotonic_ns()}"
-        environment = {"CRT_CACHE_DIR": str(folder / "crt"), "POCL_CACHE_DIR": str(folder / "pocl")} if fresh else None
+        environment = (
+            {"CRT_CACHE_DIR": str(folder / "crt"), "POCL_CACHE_DIR": str(folder / "pocl")} if fresh else None
+        )
         if fresh:
             (folder / "pocl").mkdir(parents=True)
         done = self.render(spp, 8_000_000, environment)
         if not fresh:
             return done.process - done.render, self.start_cpu
-        # Compiling takes processor time that only a second, warm process can be told apart from: `cpu` is less the warm start.
+        # Compiling takes processor time that only a second, warm process can be told apart from: `cpu` is
+        # less the warm start.
         return done.process - done.render, max(0.0, done.process_cpu - self.render(spp, 8_000_001).cpu)
 
 
 class Worker:
-    """Mitsuba 3 in one variant, waiting for requests; processes of one variant are shared by all its contestants."""
+    """Mitsuba 3 in one variant, waiting for requests; processes of one variant are shared by all its
+    contestants."""
 
     def __init__(self, program, variant, setup):
         self.program, self.variant = program, variant
         self.scene_file = setup["mitsuba"]
         self.script = str(pathlib.Path(__file__).with_name("mitsuba_worker.py"))
-        self.process = subprocess.Popen([sys.executable, self.script, self.scene_file, variant], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                        stderr=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            [sys.executable, self.script, self.scene_file, variant],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
 
     def ask(self, request):
         try:
@@ -98,13 +142,22 @@ class Worker:
         raise Failure(f"Mitsuba ({self.variant}) has ended: {self.process.stderr.read().strip()[-800:]}")
 
     def once(self, request, home):
-        """A process of its own for one request: (answer, wall seconds, processor seconds). Mitsuba keeps compiled kernels below HOME."""
+        """A process of its own for one request: (answer, wall seconds, processor seconds). Mitsuba keeps
+        compiled kernels below HOME."""
         before, begin = crt.children_seconds(), time.perf_counter()
-        done = subprocess.run([sys.executable, self.script, self.scene_file, self.variant, json.dumps(request)], env={**os.environ, "HOME": str(home)},
-                              capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, self.script, self.scene_file, self.variant, json.dumps(request)],
+            env={**os.environ, "HOME": str(home)},
+            capture_output=True,
+            text=True,
+        )
         if done.returncode != 0:
             raise Failure(f"Mitsuba ({self.variant}) fails: {done.stderr.strip()[-800:]}")
-        return json.loads(done.stdout[done.stdout.index("{"):]), time.perf_counter() - begin, crt.children_seconds() - before
+        return (
+            json.loads(done.stdout[done.stdout.index("{") :]),
+            time.perf_counter() - begin,
+            crt.children_seconds() - before,
+        )
 
     def close(self):
         self.process.stdin.close()
@@ -121,7 +174,14 @@ class Mitsuba:
         self.name = f"Mitsuba {self.engine}, {sampler}" + (", roulette" if roulette else "")
 
     def request(self, spp, seed, image=None):
-        return {"do": "render", "sampler": self.sampler, "spp": spp, "seed": seed, "roulette": ROULETTE_FROM if self.roulette else 0, "image": image}
+        return {
+            "do": "render",
+            "sampler": self.sampler,
+            "spp": spp,
+            "seed": seed,
+            "roulette": ROULETTE_FROM if self.roulette else 0,
+            "image": image,
+        }
 
     def render(self, spp, seed):
         file = str(self.worker.program.scratch / "peer.npy")
@@ -131,7 +191,9 @@ class Mitsuba:
         others = max(0.0, crt.processor_seconds() - busy - done["busy_seconds"]) / (elapsed * os.cpu_count())
         if not done["finite"]:
             raise Failure(f"{self.name} made an image that is not finite")
-        return Cost(np.load(file).astype(np.float64), done["spp"], done["seconds"], done["cpu_seconds"], others)
+        return Cost(
+            np.load(file).astype(np.float64), done["spp"], done["seconds"], done["cpu_seconds"], others
+        )
 
     def whole(self, spp, fresh):
         home = self.worker.program.scratch / (f"home-{time.monotonic_ns()}" if fresh else "home")

@@ -1,4 +1,6 @@
-"""crt as the measurements see it: where it is, how it is started, what it reports, and how undisturbed it ran."""
+"""crt as the measurements see it: where it is, how it is started, what it reports, and how undisturbed it
+ran."""
+
 import json
 import os
 import pathlib
@@ -28,7 +30,8 @@ def children_seconds():
 
 
 class Run:
-    """One process that ran: how long, what it printed, what crt reported, and what share of the processor others took meanwhile."""
+    """One process that ran: how long, what it printed, what crt reported, and what share of the processor
+    others took meanwhile."""
 
     def __init__(self, code, seconds, output, others, report=None):
         self.code = code
@@ -67,11 +70,15 @@ class Program:
 
     def bring_up_to_date(self):
         if not (self.build / "CMakeCache.txt").exists():
-            raise Failure(f"there is no build in '{self.build}': cmake -B {self.build} && cmake --build {self.build}")
+            raise Failure(
+                f"there is no build in '{self.build}': cmake -B {self.build} && cmake --build {self.build}"
+            )
         home = self.cmake_cache().get("CMAKE_HOME_DIRECTORY", "")
         if pathlib.Path(home).resolve() != self.repository:
             raise Failure(f"'{self.build}' is a build of '{home}', not of '{self.repository}'")
-        done = subprocess.run(["cmake", "--build", str(self.build), "-j", str(os.cpu_count())], capture_output=True, text=True)
+        done = subprocess.run(
+            ["cmake", "--build", str(self.build), "-j", str(os.cpu_count())], capture_output=True, text=True
+        )
         if done.returncode != 0:
             raise Failure(f"the build fails:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
 
@@ -113,7 +120,9 @@ class Program:
             if line and not line.startswith(" "):
                 name, _, version = line.partition(" ")
                 current = statuses.setdefault(name, {"version": version, "devices": []})
-            elif current is not None and (match := re.match(r"  (file|built with|device|cannot run)\s+(.*)", line)):
+            elif current is not None and (
+                match := re.match(r"  (file|built with|device|cannot run)\s+(.*)", line)
+            ):
                 if match[1] == "device":
                     current["devices"].append(match[2])
                 elif match[1] == "cannot run":
@@ -129,16 +138,29 @@ class Program:
         done = subprocess.run(command, cwd=self.repository, env={**self.environment, **(environment or {})},
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace")
         seconds = time.perf_counter() - begin
-        others = max(0.0, (processor_seconds() - busy) - (children_seconds() - own)) / (seconds * os.cpu_count())
+        others = max(0.0, (processor_seconds() - busy) - (children_seconds() - own)) / (
+            seconds * os.cpu_count()
+        )
         if done.returncode not in codes:
-            raise Failure(f"{self.plain(' '.join(command))} ended with code {done.returncode}: {done.stderr.strip()[-1500:]}")
+            raise Failure(
+                f"{self.plain(' '.join(command))} ended with code {done.returncode}: {done.stderr.strip()[-1500:]}"
+            )
         return Run(done.returncode, seconds, done.stdout, others)
 
     def render(self, scene, backend, arguments=(), outputs=(), settings=(), codes=(0,), environment=None):
-        """Renders a scene of the repository (by name) or a file, and reads the report. Without outputs, a PFM that nobody looks at."""
+        """Renders a scene of the repository (by name) or a file, and reads the report. Without outputs, a
+        PFM that nobody looks at."""
         report = self.scratch / "report.json"
         report.unlink(missing_ok=True)
-        command = ["render", self.scene_file(scene) if "/" not in str(scene) else scene, "--backend", backend, "--quiet", "--report", report]
+        command = [
+            "render",
+            self.scene_file(scene) if "/" not in str(scene) else scene,
+            "--backend",
+            backend,
+            "--quiet",
+            "--report",
+            report,
+        ]
         for setting in settings:
             command += ["--set", setting]
         for output in outputs or [self.scratch / "unseen.pfm"]:
@@ -157,7 +179,8 @@ class Program:
 
     def interleaved(self, cases, runs, attempts=6):
         """{name: function → Run} → {name: [Run]}: first all once, untimed, to warm caches; then all in turn, `runs` times. A run during which
-        other processes used the processor is repeated; when that does not help, the measurement is given up."""
+        other processes used the processor is repeated; when that does not help, the measurement is given up.
+        """
         for case in cases.values():
             case()
         self.await_compilers()
@@ -171,14 +194,17 @@ class Program:
                         break
                     self.disturbed += 1
                     if attempt + 1 == attempts:
-                        raise Failure(f"other processes take {run.others:.0%} of the processor: no timing of '{name}' means anything now")
+                        raise Failure(
+                            f"other processes take {run.others:.0%} of the processor: no timing of '{name}' means anything now"
+                        )
                     time.sleep(2 * attempt)
                 kept[name].append(run)
         return kept
 
     @staticmethod
     def await_compilers():
-        """A render of the CUDA backend may end before its compiler: until that has put the kernel into the cache."""
+        """A render of the CUDA backend may end before its compiler: until that has put the kernel into the
+        cache."""
         def at_work():
             for process in pathlib.Path("/proc").glob("[0-9]*"):
                 try:
@@ -201,13 +227,18 @@ class Program:
         tree = self.scratch / patch.stem
         shutil.copytree(self.repository / "core" / "kernel", tree / "core" / "kernel")
         # Without fuzz: where the text around a change is another now, somebody has to look.
-        done = subprocess.run(["patch", "--strip=1", "--fuzz=0", "--silent", "-d", str(tree), "-i", str(patch)], capture_output=True, text=True)
+        done = subprocess.run(
+            ["patch", "--strip=1", "--fuzz=0", "--silent", "-d", str(tree), "-i", str(patch)],
+            capture_output=True,
+            text=True,
+        )
         if done.returncode != 0:
             raise Failure(f"{patch.name} does not fit the kernel any more: {done.stdout.strip()}")
         return tree / "core" / "kernel"
 
     def kernels_with(self, extra, masks):
-        """A copy of the kernel texts, for CRT_KERNEL_DIR, in which a kernel with one of the masks has the feature `extra` as well. Kernels with other
+        """A copy of the kernel texts, for CRT_KERNEL_DIR, in which a kernel with one of the masks has the
+        feature `extra` as well. Kernels with other
         masks, which nobody asked for, have nothing at all, so that they compile fast."""
         directory = self.scratch / f"kernel-{extra:05x}"
         if directory.exists():
@@ -215,9 +246,11 @@ class Program:
         shutil.copytree(self.repository / "core" / "kernel", directory)
         asked = " || ".join(f"(CRT_FEATURES) == {mask:#x}u" for mask in masks)
         # CRT_KERNEL_DIR wants features.h itself untouched.
-        more = (f'#include "features.h"\n#undef CRT_HAS\n#if {asked}\n'
-                f"#define CRT_HAS(name) ((((CRT_FEATURES) | {extra:#x}u) & (unsigned)CRT_FEATURE_##name) != 0u)\n"
-                "#else\n#define CRT_HAS(name) (0)\n#endif\n")
+        more = (
+            f'#include "features.h"\n#undef CRT_HAS\n#if {asked}\n'
+            f"#define CRT_HAS(name) ((((CRT_FEATURES) | {extra:#x}u) & (unsigned)CRT_FEATURE_##name) != 0u)\n"
+            "#else\n#define CRT_HAS(name) (0)\n#endif\n"
+        )
         changed = 0
         for header in directory.glob("*.h"):
             text = header.read_text()
@@ -225,7 +258,9 @@ class Program:
                 header.write_text(text.replace('#include "features.h"\n', more))
                 changed += 1
         if changed == 0:
-            raise Failure("no kernel header includes features.h: kernels_with() has to be taught the new way")
+            raise Failure(
+                "no kernel header includes features.h: kernels_with() has to be taught the new way"
+            )
         return directory
 
 

@@ -1,4 +1,6 @@
-"""What a measurement leaves behind: NAME.md for people, NAME.json for programs, both saying on what and with what it was measured."""
+"""What a measurement leaves behind: NAME.md for people, NAME.json for programs, both saying on what and
+with what it was measured."""
+
 import datetime
 import json
 import os
@@ -11,7 +13,8 @@ import sys
 
 
 class Results:
-    """Collects a page; nothing is written before write(), so that a measurement that breaks off leaves no half of a page."""
+    """Collects a page; nothing is written before write(), so that a measurement that breaks off leaves no
+    half of a page."""
 
     tool = "bench/run"
 
@@ -45,18 +48,34 @@ class Results:
 
     def write(self):
         facts = provenance(self.program)
-        facts["command"] = self.tool + " " + shlex.join(
-            self.shown.get(a) or self.program.plain(a) if not a.startswith(str(self.arguments.results)) else "RESULTS" for a in sys.argv[1:])
+        facts["command"] = (
+            self.tool
+            + " "
+            + shlex.join(
+                (
+                    self.shown.get(a) or self.program.plain(a)
+                    if not a.startswith(str(self.arguments.results))
+                    else "RESULTS"
+                )
+                for a in sys.argv[1:]
+            )
+        )
         facts["date"] = self.started.strftime("%Y-%m-%d %H:%M UTC")
         facts["load_at_start"] = self.load
         facts["timed_runs"] = self.program.timed
         facts["repeated_because_disturbed"] = self.program.disturbed
 
         self.heading("How it was measured")
-        rows = [("Command", f"`{facts['command']}`"),
-                ("Date", facts["date"]),
-                ("Commit", f"`{facts['commit']}`" + (", with uncommitted changes" if facts["dirty"] else ", nothing uncommitted")),
-                ("Compiler", f"{facts['compiler']}, {facts['build_type']}: `{facts['flags']}`")]
+        rows = [
+            ("Command", f"`{facts['command']}`"),
+            ("Date", facts["date"]),
+            (
+                "Commit",
+                f"`{facts['commit']}`"
+                + (", with uncommitted changes" if facts["dirty"] else ", nothing uncommitted"),
+            ),
+            ("Compiler", f"{facts['compiler']}, {facts['build_type']}: `{facts['flags']}`"),
+        ]
         if facts["embree_kernel_flags"]:
             rows.append(("Embree kernels", f"`{facts['embree_kernel_flags']}`"))
         rows += [("Processor", f"{processor()}, {facts['memory_gb']} GB"),
@@ -64,41 +83,71 @@ class Results:
                  ("System", facts["os"])]
         rows += [(f"Backend `{name}`", text) for name, text in facts["backends"].items()]
         if facts["timed_runs"]:
-            rows.append(("Disturbance", f"load {self.load:.1f} at the start; {facts['timed_runs']} timed runs, {facts['repeated_because_disturbed']} of "
-                         f"them repeated because other processes took over {self.program.busy_share:.0%} of the processor"))
+            rows.append(
+                (
+                    "Disturbance",
+                    f"load {self.load:.1f} at the start; {facts['timed_runs']} timed runs, {facts['repeated_because_disturbed']} of "
+                    f"them repeated because other processes took over {self.program.busy_share:.0%} of the processor",
+                )
+            )
         self.table(("", ""), rows)
         if self.commands:
-            self.lines += ["Runs like these, from the repository's folder:", "", "```sh", *self.commands, "```", ""]
+            self.lines += [
+                "Runs like these, from the repository's folder:",
+                "",
+                "```sh",
+                *self.commands,
+                "```",
+                "",
+            ]
 
         folder = self.arguments.results
         folder.mkdir(parents=True, exist_ok=True)
         page = folder / f"{self.name}.md"
         page.write_text("\n".join(self.lines).rstrip() + "\n")
-        (folder / f"{self.name}.json").write_text(json.dumps({"measured": facts, **self.data}, indent=1) + "\n")
+        (folder / f"{self.name}.json").write_text(
+            json.dumps({"measured": facts, **self.data}, indent=1) + "\n"
+        )
         print(f"wrote {page} and {self.name}.json")
 
 
 def provenance(program):
     def git(*arguments):
-        return subprocess.run(["git", "-C", str(program.repository), *arguments], capture_output=True, text=True).stdout
+        return subprocess.run(
+            ["git", "-C", str(program.repository), *arguments], capture_output=True, text=True
+        ).stdout
 
     cache = program.cmake_cache()
     build_type = cache.get("CMAKE_BUILD_TYPE", "")
-    version = subprocess.run([cache["CMAKE_CXX_COMPILER"], "--version"], capture_output=True, text=True).stdout.split("\n", 1)[0]
+    version = subprocess.run(
+        [cache["CMAKE_CXX_COMPILER"], "--version"], capture_output=True, text=True
+    ).stdout.split("\n", 1)[0]
     statuses = program.plugin_statuses()
     shown = ("cuda", "embree", "opencl", "cuda_on_host", "example")
     backends = {}
     for name in shown:
         if name in statuses:
             status = statuses[name]
-            backends[name] = program.plain(f"{status['version']}; " + ("; ".join(status["devices"]) or status.get("reason", "no device")))
-    gpus = [d for name in ("cuda", "opencl") for d in statuses.get(name, {"devices": []})["devices"] if re.search(r"NVIDIA|AMD Radeon|GPU", d)]
+            backends[name] = program.plain(
+                f"{status['version']}; "
+                + ("; ".join(status["devices"]) or status.get("reason", "no device"))
+            )
+    gpus = [
+        d
+        for name in ("cuda", "opencl")
+        for d in statuses.get(name, {"devices": []})["devices"]
+        if re.search(r"NVIDIA|AMD Radeon|GPU", d)
+    ]
     memory_kb = int(re.search(r"MemTotal:\s+(\d+)", pathlib.Path("/proc/meminfo").read_text())[1])
     # Results are what the measurements write; they do not change what is measured.
-    changed = [line for line in git("status", "--porcelain").splitlines() if not line[3:].startswith("docs/results/")]
+    changed = [
+        line
+        for line in git("status", "--porcelain").splitlines()
+        if not line[3:].startswith("docs/results/")
+    ]
     return {"commit": git("rev-parse", "HEAD").strip(), "dirty": bool(changed),
             "compiler": version, "build_type": build_type,
-            "flags": compile_flags(program, "core/compile.cpp"),
+            "flags": compile_flags(program, "core/compile/compile.cpp"),
             "embree_kernel_flags": compile_flags(program, "plugins/embree/kernels.cpp"),
             "cpu": processor_name(), "threads": os.cpu_count(), "memory_gb": round(memory_kb / 1e6, 1),
             "gpu": gpus[0] if gpus else None, "os": operating_system(), "backends": backends}

@@ -1,12 +1,20 @@
-"""What robustness costs, and what it buys: the watertight triangle test against Möller and Trumbore's, offsets by each triangle's error bound against one fixed
-epsilon. The alternatives are patches of the kernel's texts in bench/alternatives, which OpenCL compiles at run time (CRT_KERNEL_DIR)."""
+"""What robustness costs, and what it buys: the watertight triangle test against Möller and Trumbore's,
+offsets by each triangle's error bound against one fixed
+epsilon. The alternatives are patches of the kernel's texts in bench/alternatives, which OpenCL compiles at
+run time (CRT_KERNEL_DIR).
+"""
+
 import shutil
 
 from . import stability
 from .program import Failure, Spread
 from .results import Results
 
-ALTERNATIVES = {"moeller_trumbore": "Möller–Trumbore", "fixed_epsilon": "fixed epsilon, 1e-4 of the scene", "small_epsilon": "fixed epsilon, 1e-6 of the scene"}
+ALTERNATIVES = {
+    "moeller_trumbore": "Möller–Trumbore",
+    "fixed_epsilon": "fixed epsilon, 1e-4 of the scene",
+    "small_epsilon": "fixed epsilon, 1e-6 of the scene",
+}
 SCENES = {"cornell_figure": 16, "cornell_dragon": 8}
 
 
@@ -14,17 +22,27 @@ def measure(program, arguments):
     if "opencl" not in program.backends(["opencl"])[0]:
         raise Failure("the alternatives are compiled by the OpenCL backend, which has no device here")
     size, runs = (32, 2) if arguments.tiny else (250, 5)
-    environments = {"crt": {}} | {name: {"CRT_KERNEL_DIR": str(folder)} for name, folder in kernels(program).items()}
+    environments = {"crt": {}} | {
+        name: {"CRT_KERNEL_DIR": str(folder)} for name, folder in kernels(program).items()
+    }
     results = Results(program, arguments, "robustness", "What robustness costs, and what it buys")
     data = {"seconds": {}, "ratio": {}, "wrong": {}}
 
     results.heading("Time")
-    results.paragraph(f"OpenCL, {size} × {size} pixels, {', '.join(f'{s} {n}' for s, n in SCENES.items())} samples per pixel, the tree of both scenes the same. Render seconds, median of {runs} interleaved "
-                      "runs, in brackets the least and the most; ratios are taken run by run.")
+    results.paragraph(
+        f"OpenCL, {size} × {size} pixels, {', '.join(f'{s} {n}' for s, n in SCENES.items())} samples per pixel, the tree of both scenes the same. Render seconds, median of {runs} interleaved "
+        "runs, in brackets the least and the most; ratios are taken run by run."
+    )
     rows = []
     for scene, spp in SCENES.items():
         def render(environment, scene=scene, spp=spp):
-            return program.render(scene, "opencl", ["--spp", spp], settings=[f"film.resolution=[{size},{size}]", "outputs.0.aovs=[]"], environment=environment)
+            return program.render(
+                scene,
+                "opencl",
+                ["--spp", spp],
+                settings=[f"film.resolution=[{size},{size}]", "outputs.0.aovs=[]"],
+                environment=environment,
+            )
 
         kept = program.interleaved({name: lambda e=e: render(e) for name, e in environments.items()}, runs)
         seconds = {name: [r.value("seconds", "render") for r in done] for name, done in kept.items()}
@@ -36,16 +54,30 @@ def measure(program, arguments):
             cells += [Spread(seconds[name]).text(), ratio.text()]
         rows.append([scene, *cells])
         print(rows[-1], flush=True)
-    results.table(["scene", "s, crt", *(text for title in ALTERNATIVES.values() for text in (f"s, {title}", "crt : it"))], rows)
+    results.table(
+        [
+            "scene",
+            "s, crt",
+            *(text for title in ALTERNATIVES.values() for text in (f"s, {title}", "crt : it")),
+        ],
+        rows,
+    )
 
     results.heading("What each gets wrong")
-    results.paragraph("Rays of the sweeps of [stability-misses](stability-misses.md), [stability-offset-safety](stability-offset-safety.md) and [stability-offset-tightness]"
-                      "(stability-offset-tightness.md): how many slip through a closed mesh, meet the triangle that they leave, or step over a layer.")
+    results.paragraph(
+        "Rays of the sweeps of [stability-misses](stability-misses.md), [stability-offset-safety](stability-offset-safety.md) and [stability-offset-tightness]"
+        "(stability-offset-tightness.md): how many slip through a closed mesh, meet the triangle that they leave, or step over a layer."
+    )
     for sweep, rays in (("misses", 2e4), ("offset-safety", 4e4), ("offset-tightness", 4e3)):
-        points = {name: stability.run(program, "opencl", sweep, rays / (50 if arguments.tiny else 1), environment) for name, environment in environments.items()}
+        points = {
+            name: stability.run(program, "opencl", sweep, rays / (50 if arguments.tiny else 1), environment)
+            for name, environment in environments.items()
+        }
         data["wrong"][sweep] = points
         stability.TABLES[sweep](results, {ALTERNATIVES.get(name, name): p for name, p in points.items()})
-    results.command("CRT_KERNEL_DIR=SCRATCH/moeller_trumbore/core/kernel crt render configs/cornell_dragon.yaml --backend opencl --spp 8 -o unseen.pfm")
+    results.command(
+        "CRT_KERNEL_DIR=SCRATCH/moeller_trumbore/core/kernel crt render configs/cornell_dragon.yaml --backend opencl --spp 8 -o unseen.pfm"
+    )
     results.data = data
     results.write()
 
@@ -53,7 +85,10 @@ def measure(program, arguments):
 def kernels(program):
     """{name of an alternative: CRT_KERNEL_DIR}"""
     folder = program.repository / "bench" / "alternatives"
-    patched = {name: program.patched_kernel(folder / f"{name}.patch") for name in ("moeller_trumbore", "fixed_epsilon")}
+    patched = {
+        name: program.patched_kernel(folder / f"{name}.patch")
+        for name in ("moeller_trumbore", "fixed_epsilon")
+    }
     small = program.scratch / "small_epsilon"  # The same patch with another number.
     shutil.copytree(patched["fixed_epsilon"], small)
     surface, before, after = small / "surface.h", "CRT_FIXED_EPSILON 1e-4f", "CRT_FIXED_EPSILON 1e-6f"

@@ -1,9 +1,15 @@
-"""Renders every scene in many ways and compares the images bit by bit, all channels. The reference is the OpenCL backend with its defaults;
+"""Renders every scene in many ways and compares the images bit by bit, all channels. The reference is the
+OpenCL backend with its defaults;
 variations of Embree (threads, tiles, resumed, merged) are compared with Embree's own image.
 
-The images are half of it: the films, double sums of every pixel, are compared too. Where Embree's differ, both backends render every sample
-number alone and the samples that differ are counted. Between the fast backends all samples are compared; backends of one thread, and variations of
-one backend, which a quarter of the samples shows as well, have fewer. Times nothing, so it needs no quiet machine."""
+The images are half of it: the films, double sums of every pixel, are compared too. Where Embree's differ,
+both backends render every sample
+number alone and the samples that differ are counted. Between the fast backends all samples are compared;
+backends of one thread, and variations of
+one backend, which a quarter of the samples shows as well, have fewer. Times nothing, so it needs no quiet
+machine.
+"""
+
 import math
 import signal
 import struct
@@ -16,11 +22,14 @@ from .results import Results
 REFERENCE = "opencl"
 FAST = ("opencl", "embree", "cuda")
 SAMPLE_BOUND = 1e-6   # Share of samples in which Embree and OpenCL may differ.
-FILM_BOUND = 2.0**-100  # Of a sum: by which two orders of adding the same samples may differ (docs/decisions/0002-film-sums.md).
+FILM_BOUND = (
+    2.0**-100
+)  # Of a sum: by which two orders of adding the same samples may differ (docs/decisions/0002-film-sums.md).
 
 
 class FilmDifference:
-    """How two films differ. `pixels`: whose sums, count or primitive differ in any bit; `exact_pixels`: whose count or primitive differs; `relative`: the largest
+    """How two films differ. `pixels`: whose sums, count or primitive differ in any bit; `exact_pixels`:
+    whose count or primitive differs; `relative`: the largest
     difference of two sums, hi + lo, over the larger of them."""
 
     def __init__(self, pixels=0, exact_pixels=0, relative=0.0):
@@ -31,12 +40,17 @@ class FilmDifference:
         return self.exact_pixels > 0 or not self.relative <= FILM_BOUND
 
     def json(self):
-        return {"differing_film_pixels": self.pixels, "differing_counts_or_primitives": self.exact_pixels,
-                "largest_relative_film_difference": self.relative if math.isfinite(self.relative) else None, "film_beyond_promise": self.beyond_promise}
+        return {
+            "differing_film_pixels": self.pixels,
+            "differing_counts_or_primitives": self.exact_pixels,
+            "largest_relative_film_difference": self.relative if math.isfinite(self.relative) else None,
+            "film_beyond_promise": self.beyond_promise,
+        }
 
 
 class Film:
-    """A .crtfilm (core/checkpoint.h): what is compared is sums, counts and primitives of every pixel, not the header."""
+    """A .crtfilm (core/film/checkpoint.h): what is compared is sums, counts and primitives of every pixel,
+    not the header."""
 
     def __init__(self, path):
         data = path.read_bytes()
@@ -44,7 +58,8 @@ class Film:
         width, height, self.channels, aovs = struct.unpack_from("<4I", data, 32)
         self.pixels = width * height
         self.body = memoryview(data)[header_bytes:]
-        # Two doubles for each channel, a count of 64 bits, and the primitive's number where the scene asks for it.
+        # Two doubles for each channel, a count of 64 bits, and the primitive's number where the scene asks
+        # for it.
         self.strides = [self.channels * 16, 8] + ([4] if aovs & 8 else [])
         self.sums = self.body[:self.pixels * self.strides[0]].cast("d")
 
@@ -56,10 +71,23 @@ class Film:
         begin, planes = 0, []
         for stride in self.strides:
             starts = range(begin, begin + self.pixels * stride, stride)
-            planes.append({pixel for pixel, at in enumerate(starts) if self.body[at:at + stride] != other.body[at:at + stride]})
+            planes.append(
+                {
+                    pixel
+                    for pixel, at in enumerate(starts)
+                    if self.body[at : at + stride] != other.body[at : at + stride]
+                }
+            )
             begin += self.pixels * stride
         sums, exact = planes[0], set().union(*planes[1:])
-        relative = max((self.relative_difference(other, pixel * self.channels + c) for pixel in sums for c in range(self.channels)), default=0.0)
+        relative = max(
+            (
+                self.relative_difference(other, pixel * self.channels + c)
+                for pixel in sums
+                for c in range(self.channels)
+            ),
+            default=0.0,
+        )
         return FilmDifference(len(sums | exact), len(exact), relative)
 
     def relative_difference(self, other, index):
@@ -69,7 +97,8 @@ class Film:
             return 0.0
         if not all(map(math.isfinite, (high, low, other_high, other_low))):
             return math.inf
-        # fsum is exact until it rounds once: pairs of one sum that are split in another place differ by nothing.
+        # fsum is exact until it rounds once: pairs of one sum that are split in another place differ by
+        # nothing.
         difference = abs(math.fsum((high, low, -other_high, -other_low)))
         return difference / max(abs(high + low), abs(other_high + other_low)) if difference else 0.0
 
@@ -90,41 +119,76 @@ class Images:
         return command
 
     def render(self, name, backend, more=()):
-        self.program.start(self.arguments(backend, [self.folder / f"{name}.exr", self.folder / f"{name}.crtfilm"], ["--spp", self.spp, *more]))
+        self.program.start(
+            self.arguments(
+                backend,
+                [self.folder / f"{name}.exr", self.folder / f"{name}.crtfilm"],
+                ["--spp", self.spp, *more],
+            )
+        )
         return name
 
     def merged(self, name, first_backend, second_backend):
         half = self.spp // 2
         parts = [self.folder / f"{name}-{i}.crtfilm" for i in (0, 1)]
-        for part, backend, samples in zip(parts, (first_backend, second_backend), (f"0:{half}", f"{half}:{self.spp}")):
+        for part, backend, samples in zip(
+            parts, (first_backend, second_backend), (f"0:{half}", f"{half}:{self.spp}")
+        ):
             self.program.start(self.arguments(backend, [part], ["--samples", samples]))
         # Later part first: the order of merging must not show either.
-        self.program.start(["merge", "--quiet", "--scene", self.program.scene_file(self.scene), "-o", self.folder / f"{name}.exr",
-                            "-o", self.folder / f"{name}.crtfilm", *reversed(parts)] + self.merge_settings())
+        self.program.start(
+            [
+                "merge",
+                "--quiet",
+                "--scene",
+                self.program.scene_file(self.scene),
+                "-o",
+                self.folder / f"{name}.exr",
+                "-o",
+                self.folder / f"{name}.crtfilm",
+                *reversed(parts),
+            ]
+            + self.merge_settings()
+        )
         return name
 
     def merge_settings(self):
         return ["--set", f"film.resolution=[{self.size},{self.size}]"]
 
     def resumed(self, name, backend):
-        """Ctrl-C in the middle, then --resume. Returns the name and how many samples there were when it stopped."""
-        stopped, resumed = self.folder / "stopped.pfm", self.folder / f"{name}.exr"  # A PFM opens no codecs, which would take most of the time.
+        """Ctrl-C in the middle, then --resume. Returns the name and how many samples there were when it
+        stopped."""
+        stopped, resumed = (
+            self.folder / "stopped.pfm",
+            self.folder / f"{name}.exr",
+        )  # A PFM opens no codecs, which would take most of the time.
         checkpoint = self.folder / f"{name}.crtfilm"
         more = ["--spp", self.spp, "--chunk", 1, "--checkpoint", checkpoint]
-        shortest, whole = (self.program.start(self.arguments(backend, [stopped], ["--spp", spp, "--chunk", 1])).seconds
-                           for spp in (1, self.spp))
+        shortest, whole = (
+            self.program.start(self.arguments(backend, [stopped], ["--spp", spp, "--chunk", 1])).seconds
+            for spp in (1, self.spp)
+        )
         for share in (0.5, 0.3, 0.7, 0.4, 0.6, 0.2, 0.8, 0.1) * 3:  # On a busy machine a signal may miss.
             checkpoint.unlink(missing_ok=True)
-            process = subprocess.Popen([str(self.program.crt), *map(str, self.arguments(backend, [stopped], more))], cwd=self.program.repository,
-                                       env=self.program.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            process = subprocess.Popen(
+                [str(self.program.crt), *map(str, self.arguments(backend, [stopped], more))],
+                cwd=self.program.repository,
+                env=self.program.environment,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
             time.sleep(shortest + share * (whole - shortest))
             process.send_signal(signal.SIGINT)
             code = process.wait()
             if code != 130 or not checkpoint.exists():
                 continue
-            stopped_after = int(self.program.start(["info", checkpoint]).output.split("samples", 1)[1].split()[0])
+            stopped_after = int(
+                self.program.start(["info", checkpoint]).output.split("samples", 1)[1].split()[0]
+            )
             if 0 < stopped_after < self.spp:
-                self.program.start(self.arguments(backend, [resumed], ["--spp", self.spp, f"--resume={checkpoint}"]))
+                self.program.start(
+                    self.arguments(backend, [resumed], ["--spp", self.spp, f"--resume={checkpoint}"])
+                )
                 return name, stopped_after
         raise Failure(f"{self.scene} on {backend}: no signal met the middle of the render")
 
@@ -146,7 +210,8 @@ class Images:
 
 
 def beyond_promise(result):
-    """Two backends may differ in one sample of a million; where no sample differs, nothing else may: not the image, and not the film, but for the last words of
+    """Two backends may differ in one sample of a million; where no sample differs, nothing else may: not
+    the image, and not the film, but for the last words of
     sums whose samples were added up in another order."""
     if result.get("differing_samples", 0) > 0:
         return result["differing_samples"] > SAMPLE_BOUND * result["samples"]
@@ -155,8 +220,13 @@ def beyond_promise(result):
 
 
 def cell(result):
-    """Pixels of the image that differ; in brackets those of the film, if any, and its largest relative difference, rounded up to a power of two."""
-    image, film, relative = result["differing_pixels"], result["differing_film_pixels"], result["largest_relative_film_difference"]
+    """Pixels of the image that differ; in brackets those of the film, if any, and its largest relative
+    difference, rounded up to a power of two."""
+    image, film, relative = (
+        result["differing_pixels"],
+        result["differing_film_pixels"],
+        result["largest_relative_film_difference"],
+    )
     if film == 0:
         return f"{image}"
     return f"{image} ({film}; {power_of_two(relative)})"
@@ -205,13 +275,30 @@ def measure(program, arguments):
             variations |= {f"tiles of {n}": ["--tile", n] for n in (8, 37, 128)}
             variations |= {"5 samples at a time": ["--chunk", 5], "full kernel": ["--kernel", "full"]}
             for number, (what, more) in enumerate(variations.items()):
-                check(images, f"{backend}, {what}", images.render(f"{backend}-{number}", backend, more), backend)
-            check(images, f"{backend}, two halves merged", images.merged(f"{backend}-merged", backend, backend), backend, reordered=True)
+                check(
+                    images,
+                    f"{backend}, {what}",
+                    images.render(f"{backend}-{number}", backend, more),
+                    backend,
+                )
+            check(
+                images,
+                f"{backend}, two halves merged",
+                images.merged(f"{backend}-merged", backend, backend),
+                backend,
+                reordered=True,
+            )
             name, stopped_after = images.resumed(f"{backend}-resumed", backend)
             check(images, f"{backend}, stopped and resumed", name, backend, reordered=True)
             column[f"{backend}, stopped and resumed"]["stopped_after_samples"] = stopped_after
         if "example" in usable:
-            check(images, f"halves of {REFERENCE} and example merged", images.merged("mixed", REFERENCE, "example"), REFERENCE, reordered=True)
+            check(
+                images,
+                f"halves of {REFERENCE} and example merged",
+                images.merged("mixed", REFERENCE, "example"),
+                REFERENCE,
+                reordered=True,
+            )
 
         for label, result in column.items():
             if result["differing_pixels"] == 0 and result["differing_film_pixels"] == 0:
@@ -233,7 +320,8 @@ def measure(program, arguments):
         "the largest difference over the sum. The film holds each sum as a pair of doubles, which is rounded once, for the image: added up in another order, a sum may be "
         "split elsewhere ('same sums') or differ in its last words (docs/decisions/0002-film-sums.md), and no image shows either. There, in what was merged or resumed, more "
         f"than 2^{math.log2(FILM_BOUND):.0f} of the sum is a failure; in all other rows any bit of the film is, and everywhere a pixel's count of samples or its primitive. `a : b` compares two backends; the other "
-        "rows compare one backend with itself.")
+        "rows compare one backend with itself."
+    )
     rows = []
     for label, by_scene in table.items():
         rows.append([label, by_scene[scenes[0]]["spp"], *(cell(by_scene[scene]) for scene in scenes)])
@@ -242,18 +330,34 @@ def measure(program, arguments):
     if "embree" in usable:
         counted = {scene: column["embree : opencl"]["differing_samples"] for scene, column in data.items()}
         total = size * size * spp
-        results.paragraph(f"Samples in which Embree and OpenCL differ, of {total} in each scene: "
-                          + ", ".join(f"{scene} {n}" + (f" ({n / total:.1e})" if n else "") for scene, n in counted.items())
-                          + f". The bound that crt sets itself is {SAMPLE_BOUND:g}.")
-    stopped = "; ".join(f"{scene} " + ", ".join(f"{b} {column[f'{b}, stopped and resumed']['stopped_after_samples']}"
-                                                for b in FAST if f"{b}, stopped and resumed" in column)
-                        for scene, column in data.items())
-    results.paragraph(f"Stopped by SIGINT after so many of {fewer} samples per pixel, then resumed: {stopped}.")
-    results.paragraph("`example` is the kernel as portable C++, `cuda_on_host` the CUDA backend's entry points compiled for the host; both run "
-                      "on one thread.")
+        results.paragraph(
+            f"Samples in which Embree and OpenCL differ, of {total} in each scene: "
+            + ", ".join(
+                f"{scene} {n}" + (f" ({n / total:.1e})" if n else "") for scene, n in counted.items()
+            )
+            + f". The bound that crt sets itself is {SAMPLE_BOUND:g}."
+        )
+    stopped = "; ".join(
+        f"{scene} "
+        + ", ".join(
+            f"{b} {column[f'{b}, stopped and resumed']['stopped_after_samples']}"
+            for b in FAST
+            if f"{b}, stopped and resumed" in column
+        )
+        for scene, column in data.items()
+    )
+    results.paragraph(
+        f"Stopped by SIGINT after so many of {fewer} samples per pixel, then resumed: {stopped}."
+    )
+    results.paragraph(
+        "`example` is the kernel as portable C++, `cuda_on_host` the CUDA backend's entry points compiled for the host; both run "
+        "on one thread."
+    )
     for name, reason in absent.items():
         results.paragraph(f"Not compared: `{name}` ({reason}).")
-    results.command(f"crt render configs/SCENE.yaml --set 'film.resolution=[{size},{size}]' --spp {spp} --backend BACKEND -o a.exr -o a.crtfilm")
+    results.command(
+        f"crt render configs/SCENE.yaml --set 'film.resolution=[{size},{size}]' --spp {spp} --backend BACKEND -o a.exr -o a.crtfilm"
+    )
     results.command("crt compare --all-channels --json a.exr b.exr")
     results.data = {"size": size, "reference": REFERENCE, "absent": absent, "scenes": data}
     results.write()

@@ -1,6 +1,11 @@
-"""How far a backend's arithmetic carries: sweeps over sizes, gaps, places, fields of view and solid angles, each to where it ends. One page a
-sweep, stability-SWEEP.md, with every backend that runs here. Rays are counted, nothing is timed: it may run on a busy machine. --rows takes what
-stability_sweep printed on other machines, with "backend", and "machine" in words, added to each line, and the number of rays asked for as "asked"."""
+"""How far a backend's arithmetic carries: sweeps over sizes, gaps, places, fields of view and solid angles,
+each to where it ends. One page a
+sweep, stability-SWEEP.md, with every backend that runs here. Rays are counted, nothing is timed: it may run
+on a busy machine. --rows takes what
+stability_sweep printed on other machines, with "backend", and "machine" in words, added to each line, and
+the number of rays asked for as "asked".
+"""
+
 import json
 import pathlib
 
@@ -17,7 +22,15 @@ SWEEPS = {
     "solid-angle": "Solid angle of a light",
 }
 # Of each point of a sweep; `--times` multiplies them. Offset safety has 20 points.
-RAYS = {"misses": 2e5, "offset-safety": 1e6, "offset-tightness": 5e4, "far": 1e5, "scale": 1e5, "fov": 3e5, "solid-angle": 3e6}
+RAYS = {
+    "misses": 2e5,
+    "offset-safety": 1e6,
+    "offset-tightness": 5e4,
+    "far": 1e5,
+    "scale": 1e5,
+    "fov": 3e5,
+    "solid-angle": 3e6,
+}
 BACKENDS = ["cuda", "embree", "opencl"]
 
 
@@ -35,10 +48,16 @@ def measure(program, arguments):
     for sweep in sweeps:
         rays = RAYS[sweep] * arguments.times / (100 if arguments.tiny else 1)
         given = elsewhere.get(sweep, {})
-        points = {backend: given.get(backend) or run(program, backend, sweep, rays) for backend in BACKENDS if backend in given or backend in usable}
+        points = {
+            backend: given.get(backend) or run(program, backend, sweep, rays)
+            for backend in BACKENDS
+            if backend in given or backend in usable
+        }
         results = Results(program, arguments, f"stability-{sweep}", SWEEPS[sweep])
         TABLES[sweep](results, points)
-        results.not_measured({backend: reason for backend, reason in absent.items() if backend not in points})
+        results.not_measured(
+            {backend: reason for backend, reason in absent.items() if backend not in points}
+        )
         if given:
             results.paragraph(f"{amounts(points)} {origins(points)}")
         for backend, rows in points.items():
@@ -49,8 +68,14 @@ def measure(program, arguments):
 
 
 def run(program, backend, sweep, rays, environment=None):
-    paths = {"CRT_BACKEND_PATH": f"{program.build / 'lib' / 'crt'}:{program.environment['CRT_BACKEND_PATH']}"}
-    output = program.start([backend, sweep, rays], program=program.build / "bin" / "stability_sweep", environment={**paths, **(environment or {})}).output
+    paths = {
+        "CRT_BACKEND_PATH": f"{program.build / 'lib' / 'crt'}:{program.environment['CRT_BACKEND_PATH']}"
+    }
+    output = program.start(
+        [backend, sweep, rays],
+        program=program.build / "bin" / "stability_sweep",
+        environment={**paths, **(environment or {})},
+    ).output
     return [{**json.loads(line), "asked": rays, "machine": processor()} for line in output.splitlines()]
 
 
@@ -70,7 +95,9 @@ def alike(points, what):
 
 def amount(rows):
     """Of rays each point of a sweep has, or of samples each pixel; what the backend refused has none."""
-    unit, what = ("samples", "samples a pixel") if any("samples" in row for row in rows) else ("rays", "rays a point")
+    unit, what = (
+        ("samples", "samples a pixel") if any("samples" in row for row in rows) else ("rays", "rays a point")
+    )
     counts = [row[unit] for row in rows if unit in row] or [0]
     least, most = min(counts), max(counts)
     return f"{least:.3g} {what}" if least == most else f"{least:.3g} to {most:.3g} {what}"
@@ -78,22 +105,34 @@ def amount(rows):
 
 def amounts(points):
     groups = alike(points, amount)
-    return (next(iter(groups)) if len(groups) == 1 else "; ".join(f"{together(backends)} {text}" for text, backends in groups.items())) + "."
+    return (
+        next(iter(groups))
+        if len(groups) == 1
+        else "; ".join(f"{together(backends)} {text}" for text, backends in groups.items())
+    ) + "."
 
 
 def origins(points):
     parts = []
-    # This machine comes last, as "the one below": the page's table of what it was measured with describes it.
-    for machine, backends in sorted(alike(points, lambda rows: rows[0].get("machine", "another machine")).items(), key=lambda item: item[0] == processor()):
+    # This machine comes last, as "the one below": the page's table of what it was measured with describes
+    # it.
+    for machine, backends in sorted(
+        alike(points, lambda rows: rows[0].get("machine", "another machine")).items(),
+        key=lambda item: item[0] == processor(),
+    ):
         verb = "" if parts else " was measured" if len(backends) == 1 else " were measured"
-        parts.append(f"{together(backends)}{verb} on {'the one below' if machine == processor() else machine}")
+        parts.append(
+            f"{together(backends)}{verb} on {'the one below' if machine == processor() else machine}"
+        )
     return "; ".join(parts) + "."
 
 
 def count(point):
     """Failures of rays; with none, what rate 99.9 % confidence leaves (Clopper and Pearson)."""
     if point["failures"] == 0:
-        return f"0 of {point['rays']:.3g} (rate < {7.61 / point['rays']:.1g})" if point["rays"] else "no rays"
+        return (
+            f"0 of {point['rays']:.3g} (rate < {7.61 / point['rays']:.1g})" if point["rays"] else "no rays"
+        )
     return f"{point['failures']} of {point['rays']:.3g} ({point['failures'] / point['rays']:.2g})"
 
 
@@ -102,19 +141,28 @@ def by_point(results, points, keys, heads, cell):
     backends = list(points)
     rows = []
     for same in zip(*points.values()):
-        rows.append([*(f"{same[0][k]:g}" if isinstance(same[0][k], (int, float)) else same[0][k] for k in keys), *(cell(p) for p in same)])
+        rows.append(
+            [
+                *(f"{same[0][k]:g}" if isinstance(same[0][k], (int, float)) else same[0][k] for k in keys),
+                *(cell(p) for p in same),
+            ]
+        )
     results.table([*heads, *backends], rows)
 
 
 def misses(results, points):
-    results.paragraph("A crumpled sheet covers the whole film, a vertex or an edge on every pixel's first ray: by continuity no ray can pass it. Failures are rays that do. "
-                      "Faces are aimed at by further, random samples of the same pixels.")
+    results.paragraph(
+        "A crumpled sheet covers the whole film, a vertex or an edge on every pixel's first ray: by continuity no ray can pass it. Failures are rays that do. "
+        "Faces are aimed at by further, random samples of the same pixels."
+    )
     by_point(results, points, ("place", "aim"), ("place", "rays at"), count)
 
 
 def offset_safety(results, points):
-    results.paragraph("One triangle in a random place and pose, of random shape, in a scene that is 1 to 10⁶ times as large, so that its coordinates become coarse; rays scatter off it "
-                      "by the cosine. Failures meet the triangle that they have just left. Lengths in the author's units.")
+    results.paragraph(
+        "One triangle in a random place and pose, of random shape, in a scene that is 1 to 10⁶ times as large, so that its coordinates become coarse; rays scatter off it "
+        "by the cosine. Failures meet the triangle that they have just left. Lengths in the author's units."
+    )
     by_point(results, points, ("size", "extent"), ("triangle's size", "scene's half extent : size"), count)
     for backend, all_points in points.items():
         rays, failures = (sum(p[k] for p in all_points) for k in ("rays", "failures"))
@@ -122,8 +170,10 @@ def offset_safety(results, points):
 
 
 def offset_tightness(results, points):
-    results.paragraph("Two parallel squares of edge 1 and 2 in a random place and pose, `gap` apart, in a scene whose half extent is 1 (1.5 for the first rows) to 10⁴; rays pass through the first, "
-                      "whose index is 1. Failures do not meet the second. The last gap with hardly any failure is the limit that the manual gives.")
+    results.paragraph(
+        "Two parallel squares of edge 1 and 2 in a random place and pose, `gap` apart, in a scene whose half extent is 1 (1.5 for the first rows) to 10⁴; rays pass through the first, "
+        "whose index is 1. Failures do not meet the second. The last gap with hardly any failure is the limit that the manual gives."
+    )
     by_point(results, points, ("extent", "gap"), ("scene's half extent : size", "gap : size"), count)
 
 
@@ -135,8 +185,10 @@ def relation(point):
 
 
 def far(results, points):
-    results.paragraph("A lit room moved along (1, 0.7, −0.3) by many times its size: once with vertices that the sum in double holds exactly, once a third of it, which rounds. "
-                      "Against the same room at the origin, with the same random numbers: pixels that differ in any bit, and the relative difference of the mean.")
+    results.paragraph(
+        "A lit room moved along (1, 0.7, −0.3) by many times its size: once with vertices that the sum in double holds exactly, once a third of it, which rounds. "
+        "Against the same room at the origin, with the same random numbers: pixels that differ in any bit, and the relative difference of the mean."
+    )
     for same in points.values():
         for p in same:
             p["how"] = "exactly" if p["representable"] else "rounded"
@@ -144,7 +196,9 @@ def far(results, points):
 
 
 def scale(results, points):
-    results.paragraph("A lit room times 2^m and 10^m, against itself: pixels that differ in any bit, and the relative difference of the mean, with the same random numbers.")
+    results.paragraph(
+        "A lit room times 2^m and 10^m, against itself: pixels that differ in any bit, and the relative difference of the mean, with the same random numbers."
+    )
     for same in points.values():
         for p in same:
             p["factor"] = f"{p['base']}^{p['exponent']}"
@@ -152,15 +206,33 @@ def scale(results, points):
 
 
 def fov(results, points):
-    results.paragraph("Stripes two pixels wide exactly where the film's columns are, 128 × 128 pixels, the view along (1, 1, 1). Failures are rays that see the stripe of another column: what the rounding "
-                      "of directions to float costs, in rays.")
+    results.paragraph(
+        "Stripes two pixels wide exactly where the film's columns are, 128 × 128 pixels, the view along (1, 1, 1). Failures are rays that see the stripe of another column: what the rounding "
+        "of directions to float costs, in rays."
+    )
     by_point(results, points, ("degrees",), ("field of view, degrees",), count)
 
 
 def solid_angle(results, points):
-    results.paragraph("A square light at height 1 over a floor, from 2 rad across to nothing: the irradiance below its centre against the closed form (Howell, B-4). Relative error, and its standard error "
-                      "from 16 seeds.")
-    by_point(results, points, ("half_edge", "solid_angle"), ("half edge", "solid angle, sr"), lambda p: f"{p['error']:+.2g} ± {p['standard_error']:.1g}")
+    results.paragraph(
+        "A square light at height 1 over a floor, from 2 rad across to nothing: the irradiance below its centre against the closed form (Howell, B-4). Relative error, and its standard error "
+        "from 16 seeds."
+    )
+    by_point(
+        results,
+        points,
+        ("half_edge", "solid_angle"),
+        ("half edge", "solid angle, sr"),
+        lambda p: f"{p['error']:+.2g} ± {p['standard_error']:.1g}",
+    )
 
 
-TABLES = {"misses": misses, "offset-safety": offset_safety, "offset-tightness": offset_tightness, "far": far, "scale": scale, "fov": fov, "solid-angle": solid_angle}
+TABLES = {
+    "misses": misses,
+    "offset-safety": offset_safety,
+    "offset-tightness": offset_tightness,
+    "far": far,
+    "scale": scale,
+    "fov": fov,
+    "solid-angle": solid_angle,
+}

@@ -1,18 +1,19 @@
 /*
  * crt_backend.h: the border between crt and a backend plugin. C99; the only header that a plugin must have.
  *
- * A plugin is one shared library, crt_backend_<name>.so, that exports exactly one symbol, `crt_backend_v1`, returning a
- * table. The host gives the plugin a table too, so that the plugin links nothing of crt. Nothing crosses but the types
- * below: no C++ type, exception, bool, long or size_t; nothing allocated on one side is freed on the other.
+ * A plugin is one shared library, crt_backend_<name>.so, that exports exactly one symbol, `crt_backend_v1`,
+ * returning a table. The host gives the plugin a table too, so that the plugin links nothing of crt. Nothing
+ * crosses but the types below: no C++ type, exception, bool, long or size_t; nothing allocated on one side
+ * is freed on the other.
  *
- * Versioning. Every struct begins with its own size. A minor revision only appends members; a reader uses a member only
- * if the writer's struct_size covers it. A change of meaning or order is a new major version and a new symbol name.
- * The layout hash covers kernel/layout.h, channels.h and features.h: the scene blob is read as C structs, so
- * it must be equal. The bits version says that samples are the same: it must be equal too, or one image
- * would hold samples of two renderers.
+ * Versioning. Every struct begins with its own size. A minor revision only appends members; a reader uses a
+ * member only if the writer's struct_size covers it. A change of meaning or order is a new major version and
+ * a new symbol name. The layout hash covers kernel/layout.h, channels.h and features.h: the scene blob is
+ * read as C structs, so it must be equal. The bits version says that samples are the same: it must be equal
+ * too, or one image would hold samples of two renderers.
  *
- * Threads. Each function says who may call it: [owner thread] is the one thread at a time that uses an integrator,
- * [any thread] needs no care.
+ * Threads. Each function says who may call it: [owner thread] is the one thread at a time that uses an
+ * integrator, [any thread] needs no care.
  */
 #ifndef CRT_BACKEND_H
 #define CRT_BACKEND_H
@@ -40,7 +41,7 @@ extern "C" {
 typedef int32_t CrtStatus;
 enum {
     CRT_OK = 0,
-    CRT_CANCELLED = 1,        /* progress() asked to stop; the film holds part of the range and must be discarded */
+    CRT_CANCELLED = 1, /* progress() asked to stop; the film holds part of the range and must be discarded */
     CRT_INVALID_ARGUMENT = 2, /* the host broke this contract */
     CRT_NO_DEVICE = 3,        /* no usable device; last_error says why */
     CRT_OUT_OF_MEMORY = 4,    /* host or device memory */
@@ -59,13 +60,14 @@ typedef struct CrtHost {
     void *user; /* first argument of the functions below */
     /* One line, no newline. [any thread] */
     void (*log)(void *user, CrtLogLevel level, const char *message);
-    /* `done` in [0,1] of the running render call. Non-zero: stop soon and return CRT_CANCELLED. Since 1.2 set_scene may call
-       it too, to say how far it is; what it returns then may be ignored. [any thread] */
+    /* `done` in [0,1] of the running render call. Non-zero: stop soon and return CRT_CANCELLED. Since 1.2
+       set_scene may call it too, to say how far it is; what it returns then may be ignored. [any thread] */
     int32_t (*progress)(void *user, double done);
     /* Directory for compiled kernels, existing and writable, or null when caching is off. */
     const char *cache_directory;
-    /* Text of a kernel header ("path.h") with its includes expanded, or null when the name is unknown. Lives as long as the
-       host. This is the same text for every backend: it may be compiled as C++17, CUDA C++ or OpenCL C 1.2. [any thread] */
+    /* Text of a kernel header ("path.h") with its includes expanded, or null when the name is unknown. Lives
+       as long as the host. This is the same text for every backend: it may be compiled as C++17, CUDA C++ or
+       OpenCL C 1.2. [any thread] */
     const char *(*kernel_source)(void *user, const char *name);
 } CrtHost;
 
@@ -76,7 +78,7 @@ typedef struct CrtDevice {
     char name[128];
     char driver[128];
     uint64_t memory_bytes; /* 0 when unknown */
-    double score;          /* higher is preferred; a CPU is about its number of threads, a GPU a few thousand */
+    double score; /* higher is preferred; a CPU is about its number of threads, a GPU a few thousand */
 } CrtDevice;
 
 /* Which kernel the backend should run. */
@@ -84,8 +86,9 @@ typedef int32_t CrtKernelChoice;
 enum {
     CRT_KERNEL_LEAN = 0, /* the smallest that covers the scene's features (default) */
     CRT_KERNEL_FULL = 1, /* everything compiled in: the same bits, only slower; used to prove that */
-    CRT_KERNEL_LEAN_ONLY = 2 /* since 1.2: lean from the first sample on, even if it must be compiled first: for measurements. A
-                                backend that runs no other kernel meanwhile need not know it: whatever is not FULL is lean. */
+    CRT_KERNEL_LEAN_ONLY =
+        2 /* since 1.2: lean from the first sample on, even if it must be compiled first: for measurements. A
+             backend that runs no other kernel meanwhile need not know it: whatever is not FULL is lean. */
 };
 
 typedef struct CrtCreateInfo {
@@ -114,10 +117,11 @@ typedef struct CrtRenderRange {
 } CrtRenderRange;
 
 /*
- * The film, read back into the host's arrays. Row-major, top row first, width × height pixels of the whole crop window.
- * sums: [height][width][channels][2], each pair an unevaluated sum hi + lo of doubles (so that order does not show).
- * counts: [height][width], valid samples; an invalid (NaN or infinite) sample is dropped and not counted.
- * primitives: [height][width], primitive id at the first sample rendered, 0xffffffff for none; null unless the scene asks for it.
+ * The film, read back into the host's arrays. Row-major, top row first, width × height pixels of the whole
+ * crop window. sums: [height][width][channels][2], each pair an unevaluated sum hi + lo of doubles (so that
+ * order does not show). counts: [height][width], valid samples; an invalid (NaN or infinite) sample is
+ * dropped and not counted. primitives: [height][width], primitive id at the first sample rendered,
+ * 0xffffffff for none; null unless the scene asks for it.
  */
 typedef struct CrtFilmView {
     uint32_t struct_size;
@@ -132,7 +136,7 @@ typedef struct CrtBackendReport {
     uint32_t struct_size;
     uint32_t kernel_from_cache;  /* 1 when the kernel came from a disk cache */
     char device[128];
-    char kernel[128];            /* which kernel ran, in words, e.g. "nvrtc sm_90" or "precompiled: bvh, diffuse" */
+    char kernel[128]; /* which kernel ran, in words, e.g. "nvrtc sm_90" or "precompiled: bvh, diffuse" */
     uint64_t kernel_features;    /* mask compiled into it */
     double compile_seconds;
     double cache_seconds;        /* looking up, reading and writing the cache */
@@ -147,8 +151,8 @@ typedef struct CrtBackendReport {
 
 typedef struct CrtIntegratorState CrtIntegratorState; /* the plugin's own */
 
-/* The verbs of one integrator. All [owner thread]; render blocks. Every call may be refused with a status, and then
-   last_error gives one sentence, valid until the next call. */
+/* The verbs of one integrator. All [owner thread]; render blocks. Every call may be refused with a status,
+   and then last_error gives one sentence, valid until the next call. */
 typedef struct CrtIntegrator {
     uint32_t struct_size;
     uint32_t reserved;
@@ -166,10 +170,11 @@ typedef struct CrtIntegrator {
 /*
  * What a backend brings itself, so that the host does not make it: bits of CrtBackend::brings.
  *
- * CRT_BRINGS_ACCELERATOR: it finds hits with an acceleration structure of its own wherever the scene says CRT_ACCELERATOR_BVH,
- * for every ray whose origin lies within accelerator_reach of 0 on each axis (lengths as in the blob: the scene lies within 1).
- * A scene whose rays all start there may then come without a BVH: CrtScene::nodes is empty, and the slots of triangles are
- * in the order of their ids. A scene whose camera stands farther away comes with nodes.
+ * CRT_BRINGS_ACCELERATOR: it finds hits with an acceleration structure of its own wherever the scene says
+ * CRT_ACCELERATOR_BVH, for every ray whose origin lies within accelerator_reach of 0 on each axis (lengths
+ * as in the blob: the scene lies within 1). A scene whose rays all start there may then come without a BVH:
+ * CrtScene::nodes is empty, and the slots of triangles are in the order of their ids. A scene whose camera
+ * stands farther away comes with nodes.
  */
 #define CRT_BRINGS_ACCELERATOR ((uint64_t)1)
 
@@ -182,14 +187,16 @@ typedef struct CrtBackend {
     const char *version;
     const char *build;    /* compiler and libraries, for humans */
     uint64_t features;    /* mask of kernel/features.h that it can run */
-    /* Lists devices: writes at most `capacity`, sets *count to how many there are. No device is a normal answer: CRT_NO_DEVICE
-       with a one-sentence reason in `reason` (NUL-terminated, cut to reason_size). Quick; touches no kernel. [any thread] */
+    /* Lists devices: writes at most `capacity`, sets *count to how many there are. No device is a normal
+       answer: CRT_NO_DEVICE with a one-sentence reason in `reason` (NUL-terminated, cut to reason_size).
+       Quick; touches no kernel. [any thread] */
     CrtStatus (*probe)(const CrtHost *host, CrtDevice *devices, uint32_t capacity, uint32_t *count,
                        char *reason, uint32_t reason_size);
     /* Opens a device. On failure *integrator is untouched and `reason` says why. [any thread] */
     CrtStatus (*create)(const CrtHost *host, const CrtCreateInfo *info, CrtIntegrator *integrator,
                         char *reason, uint32_t reason_size);
-    /* Since 1.1: CRT_BITS_VERSION (kernel/bits_version.h) of the headers it was built with. Without it: 1. */
+    /* Since 1.1: CRT_BITS_VERSION (kernel/bits_version.h) of the headers it was built with. Without it: 1.
+     */
     uint32_t bits_version;
     uint32_t reserved;
     /* Since 1.2: bits of CRT_BRINGS_…, and what belongs to them. Without it: nothing. */

@@ -1,8 +1,8 @@
 #include "backend/integrator.h"
 
 #include "base/error.h"
-#include "kernel/layout.h"
 #include "base/log.h"
+#include "kernel/layout.h"
 
 #include <algorithm>
 #include <cmath>
@@ -46,10 +46,12 @@ using Rectangle = std::array<std::uint32_t, 4>;
 
 std::uint64_t areaOf(const Rectangle& r) { return std::uint64_t{r[2] - r[0]} * (r[3] - r[1]); }
 
-bool overlap(const Rectangle& a, const Rectangle& b) { return a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]; }
+bool overlap(const Rectangle& a, const Rectangle& b) {
+    return a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+}
 
-/// Which samples the backend's film holds. A film knows ranges of samples that every pixel has; ranges rendered rectangle by rectangle
-/// are held back here until their rectangles cover the window.
+/// Which samples the backend's film holds. A film knows ranges of samples that every pixel has; ranges
+/// rendered rectangle by rectangle are held back here until their rectangles cover the window.
 class Coverage {
 public:
     Coverage() = default;
@@ -59,14 +61,16 @@ public:
     void add(SampleRange samples, const Rectangle& rectangle) {
         if (areaOf(rectangle) == window_area_) {
             for (const Part& part : parts_) {
-                if (part.samples.first < samples.second && samples.first < part.samples.second) twice(samples);
+                if (part.samples.first < samples.second && samples.first < part.samples.second)
+                    twice(samples);
             }
             whole_.add(samples);
             return;
         }
         // Refuses samples that are already there for all pixels.
         SampleRanges(whole_).add(samples);
-        const auto same = std::find_if(parts_.begin(), parts_.end(), [&](const Part& part) { return part.samples == samples; });
+        const auto same = std::find_if(parts_.begin(), parts_.end(),
+                                       [&](const Part& part) { return part.samples == samples; });
         for (const Part& part : parts_) {
             if (part.samples.first >= samples.second || samples.first >= part.samples.second) continue;
             for (const Rectangle& other : part.rectangles) {
@@ -94,7 +98,8 @@ private:
     };
 
     [[noreturn]] static void twice(SampleRange samples) {
-        throw Error(ErrorKind::Usage, fmt::format("samples {}-{} would be rendered twice in some pixels", samples.first, samples.second));
+        throw Error(ErrorKind::Usage, fmt::format("samples {}-{} would be rendered twice in some pixels",
+                                                  samples.first, samples.second));
     }
 
     std::uint64_t window_area_ = 0;
@@ -115,16 +120,19 @@ struct Integrator::Impl {
     std::uint32_t width = 0, height = 0, channels = 0;
     bool has_primitives = false;
     Coverage coverage;
-    /// A cancelled or failed render leaves part of a range in the backend's film: nothing can be read until the next setScene.
+    /// A cancelled or failed render leaves part of a range in the backend's film: nothing can be read until
+    /// the next setScene.
     bool film_is_whole = true;
 
-    // Of the call in progress. Plugins may report from any of their threads; the caller's function sees one at a time.
+    // Of the call in progress. Plugins may report from any of their threads; the caller's function sees one
+    // at a time.
     std::mutex progress_mutex;
     const std::function<bool(double)>* progress = nullptr;
     bool cancelled = false;
     std::exception_ptr progress_error;
 
-    Impl(const LoadedBackend& loaded, const IntegratorOptions& options) : backend(loaded), host(makeHost(options.use_cache)) {
+    Impl(const LoadedBackend& loaded, const IntegratorOptions& options)
+        : backend(loaded), host(makeHost(options.use_cache)) {
         host.user = this;
         host.progress = onProgress;
 
@@ -138,17 +146,21 @@ struct Integrator::Impl {
         // Says how much room there is; the plugin fills in its own verbs and leaves the rest alone.
         table.struct_size = sizeof(table);
         char reason[1024] = "";
-        const CrtStatus status = call("create", [&] { return backend.table->create(&host, &info, &table, reason, sizeof(reason)); });
+        const CrtStatus status = call(
+            "create", [&] { return backend.table->create(&host, &info, &table, reason, sizeof(reason)); });
         reason[sizeof(reason) - 1] = '\0';
         if (status != CRT_OK) {
-            throw Error(kindOf(status), fmt::format("backend '{}' cannot be used: {}", backend.name, *reason != '\0' ? reason : statusText(status)));
+            throw Error(kindOf(status), fmt::format("backend '{}' cannot be used: {}", backend.name,
+                                                    *reason != '\0' ? reason : statusText(status)));
         }
         created = true;
         constexpr std::size_t first_size = offsetof(CrtIntegrator, destroy) + sizeof(CrtIntegrator::destroy);
-        if (table.struct_size < first_size || !table.set_scene || !table.render || !table.read_film || !table.get_report || !table.last_error ||
-            !table.destroy) {
+        if (table.struct_size < first_size || !table.set_scene || !table.render || !table.read_film ||
+            !table.get_report || !table.last_error || !table.destroy) {
             destroy();  // a constructor that throws gets no destructor call
-            throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: its integrator lacks verbs", backend.name));
+            throw Error(
+                ErrorKind::Internal,
+                fmt::format("backend '{}' broke the contract: its integrator lacks verbs", backend.name));
         }
     }
 
@@ -162,7 +174,8 @@ struct Integrator::Impl {
             table.destroy(table.state);
         } catch (...) {
             try {
-                logWarning("backend '{}' broke the contract: an exception crossed the border from destroy", backend.name);
+                logWarning("backend '{}' broke the contract: an exception crossed the border from destroy",
+                           backend.name);
             } catch (...) {
                 // Not even that can be said; a destructor may not throw.
             }
@@ -176,12 +189,16 @@ struct Integrator::Impl {
             return body();
         } catch (const std::exception& error) {
             film_is_whole = false;
-            throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: an exception crossed the border from {} ({})",
-                                                         backend.name, verb, error.what()));
+            throw Error(
+                ErrorKind::Internal,
+                fmt::format("backend '{}' broke the contract: an exception crossed the border from {} ({})",
+                            backend.name, verb, error.what()));
         } catch (...) {
             film_is_whole = false;
-            throw Error(ErrorKind::Internal,
-                        fmt::format("backend '{}' broke the contract: an exception crossed the border from {}", backend.name, verb));
+            throw Error(
+                ErrorKind::Internal,
+                fmt::format("backend '{}' broke the contract: an exception crossed the border from {}",
+                            backend.name, verb));
         }
     }
 
@@ -215,21 +232,26 @@ struct Integrator::Impl {
             sentence = table.last_error(table.state);
             return CrtStatus{CRT_OK};
         });
-        throw Error(kindOf(status), fmt::format("backend '{}': {}", backend.name,
-                                                sentence != nullptr && *sentence != '\0' ? sentence : statusText(status)));
+        throw Error(kindOf(status),
+                    fmt::format("backend '{}': {}", backend.name,
+                                sentence != nullptr && *sentence != '\0' ? sentence : statusText(status)));
     }
 
-    /// A plugin leaves out samples that are no numbers and counts what it keeps (crt_backend.h). One pixel that is none, once in a checkpoint, would
-    /// stay there for good.
+    /// A plugin leaves out samples that are no numbers and counts what it keeps (crt_backend.h). One pixel
+    /// that is none, once in a checkpoint, would stay there for good.
     void checkContents(const Film& part) const {
         const std::uint64_t asked = part.samples.count();
         for (std::size_t pixel = 0; pixel < part.counts.size(); ++pixel) {
             const double* const sums = &part.sums[pixel * channels * 2];
-            bool finite = true;  // Without a way out of the loop, so that it becomes one of vectors: films have hundreds of millions of sums.
+            bool finite = true;  // Without a way out of the loop, so that it becomes one of vectors: films
+                                 // have hundreds of millions of sums.
             for (std::size_t i = 0; i < channels * std::size_t{2}; ++i) finite &= std::isfinite(sums[i]);
             if (finite && part.counts[pixel] <= asked) continue;
-            const std::string what = finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked) : "is not a number";
-            throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: pixel {},{} of its film {}; what was rendered before is kept",
+            const std::string what =
+                finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked)
+                       : "is not a number";
+            throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: pixel {},{} of "
+                                                         "its film {}; what was rendered before is kept",
                                                          backend.name, pixel % width, pixel / width, what));
         }
     }
@@ -265,12 +287,15 @@ struct Integrator::Impl {
     }
 };
 
-Integrator::Integrator(const LoadedBackend& backend, const IntegratorOptions& options) : impl_(std::make_unique<Impl>(backend, options)) {}
+Integrator::Integrator(const LoadedBackend& backend, const IntegratorOptions& options)
+    : impl_(std::make_unique<Impl>(backend, options)) {}
 Integrator::~Integrator() = default;
 Integrator::Integrator(Integrator&&) noexcept = default;
 Integrator& Integrator::operator=(Integrator&&) noexcept = default;
 
-CompileOptions compileOptionsFor(const LoadedBackend& backend) { return {.accelerator_reach = acceleratorReach(backend)}; }
+CompileOptions compileOptionsFor(const LoadedBackend& backend) {
+    return {.accelerator_reach = acceleratorReach(backend)};
+}
 
 CompileOptions Integrator::compileOptions() const { return compileOptionsFor(impl_->backend); }
 
@@ -278,10 +303,13 @@ void Integrator::setScene(const CompiledScene& scene, const std::function<void(d
     Impl& self = *impl_;
     const std::uint64_t lacking = scene.features & ~self.backend.table->features;
     if (lacking != 0) {
-        throw Error(ErrorKind::Backend, fmt::format("backend '{}' cannot render this scene: it lacks {}", self.backend.name, featureNames(lacking)));
+        throw Error(ErrorKind::Backend, fmt::format("backend '{}' cannot render this scene: it lacks {}",
+                                                    self.backend.name, featureNames(lacking)));
     }
     if (scene.without_nodes && acceleratorReach(self.backend) == 0) {
-        throw Error(ErrorKind::Internal, fmt::format("backend '{}' needs the BVH that was left out of this scene", self.backend.name));
+        throw Error(
+            ErrorKind::Internal,
+            fmt::format("backend '{}' needs the BVH that was left out of this scene", self.backend.name));
     }
     CrtSceneBlob blob{};
     blob.struct_size = sizeof(blob);
@@ -293,7 +321,8 @@ void Integrator::setScene(const CompiledScene& scene, const std::function<void(d
         if (progress) progress(done);
         return false;  // A scene is always set as a whole.
     };
-    const CrtStatus status = self.whileListening(show, "set_scene", [&] { return self.table.set_scene(self.table.state, &blob); });
+    const CrtStatus status = self.whileListening(
+        show, "set_scene", [&] { return self.table.set_scene(self.table.state, &blob); });
     if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
     self.check(status);
     self.width = scene.width;
@@ -308,15 +337,19 @@ void Integrator::setScene(const CompiledScene& scene, const std::function<void(d
 bool Integrator::render(const RenderRange& range, const std::function<bool(double)>& progress) {
     Impl& self = *impl_;
     if (!self.has_scene) throw Error(ErrorKind::Internal, "render was called before setScene");
-    if (!self.film_is_whole) throw Error(ErrorKind::Internal, "render was called after a cancelled or failed one without setScene between");
+    if (!self.film_is_whole)
+        throw Error(ErrorKind::Internal,
+                    "render was called after a cancelled or failed one without setScene between");
     Rectangle r = range.rectangle;
     if (r == Rectangle{0, 0, 0, 0}) r = {0, 0, self.width, self.height};
     if (r[0] >= r[2] || r[1] >= r[3] || r[2] > self.width || r[3] > self.height) {
         throw Error(ErrorKind::Internal,
-                    fmt::format("rectangle {},{} {},{} is empty or leaves the film of {}×{}", r[0], r[1], r[2], r[3], self.width, self.height));
+                    fmt::format("rectangle {},{} {},{} is empty or leaves the film of {}×{}", r[0], r[1],
+                                r[2], r[3], self.width, self.height));
     }
     if (range.sample_count > std::numeric_limits<std::uint64_t>::max() - range.first_sample) {
-        throw Error(ErrorKind::Usage, fmt::format("{} samples from sample {} on exceed 64 bits", range.sample_count, range.first_sample));
+        throw Error(ErrorKind::Usage, fmt::format("{} samples from sample {} on exceed 64 bits",
+                                                  range.sample_count, range.first_sample));
     }
     if (range.sample_count == 0) return true;
     Coverage coverage = self.coverage;
@@ -332,7 +365,8 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
     request.sample_count = range.sample_count;
 
     self.film_is_whole = false;  // until the range is in it as a whole
-    const CrtStatus status = self.whileListening(progress, "render", [&] { return self.table.render(self.table.state, &request); });
+    const CrtStatus status = self.whileListening(
+        progress, "render", [&] { return self.table.render(self.table.state, &request); });
     if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
     if (status == CRT_CANCELLED && self.cancelled) return false;
     self.check(status);
@@ -345,8 +379,12 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
 void Integrator::readFilm(Film& film) {
     Impl& self = *impl_;
     if (!self.has_scene) throw Error(ErrorKind::Internal, "readFilm was called before setScene");
-    if (!self.film_is_whole) throw Error(ErrorKind::Internal, "the film holds part of a cancelled or failed range and cannot be read");
-    if (!self.coverage.isWhole()) throw Error(ErrorKind::Internal, "the film cannot be read: the rectangles rendered do not cover it yet");
+    if (!self.film_is_whole)
+        throw Error(ErrorKind::Internal,
+                    "the film holds part of a cancelled or failed range and cannot be read");
+    if (!self.coverage.isWhole())
+        throw Error(ErrorKind::Internal,
+                    "the film cannot be read: the rectangles rendered do not cover it yet");
     const FilmShape& shape = film.shape();
     if (shape.width != self.width || shape.height != self.height || shape.channels != self.channels ||
         ((shape.aovs & kAovPrimitive) != 0) != self.has_primitives) {

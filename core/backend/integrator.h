@@ -25,12 +25,14 @@ struct IntegratorOptions {
 CompileOptions compileOptionsFor(const LoadedBackend& backend);
 
 struct RenderRange {
-    std::array<std::uint32_t, 4> rectangle{0, 0, 0, 0};  ///< x0, y0, x1, y1 within the crop window; all zero: all of it.
+    std::array<std::uint32_t, 4> rectangle{
+        0, 0, 0, 0};  ///< x0, y0, x1, y1 within the crop window; all zero: all of it.
     std::uint64_t first_sample = 0;
     std::uint64_t sample_count = 0;
 };
 
-/// Move-only. Errors: Backend (no device, unsupported scene), Device (failed, out of memory), Internal (contract broken).
+/// Move-only. Errors: Backend (no device, unsupported scene), Device (failed, out of memory), Internal
+/// (contract broken).
 class Integrator {
 public:
     /// Opens a device of a loaded backend.
@@ -41,15 +43,17 @@ public:
 
     CompileOptions compileOptions() const;
 
-    /// The scene must outlive nothing: what is needed is copied. Clears the film. `progress` gets [0,1] from backends that
-    /// tell how far they are.
+    /// The scene must outlive nothing: what is needed is copied. Clears the film. `progress` gets [0,1] from
+    /// backends that tell how far they are.
     void setScene(const CompiledScene& scene, const std::function<void(double)>& progress = {});
 
-    /// Adds a range to the backend's film. `progress` gets [0,1] and returns true to cancel. Returns false when cancelled.
+    /// Adds a range to the backend's film. `progress` gets [0,1] and returns true to cancel. Returns false
+    /// when cancelled.
     bool render(const RenderRange& range, const std::function<bool(double)>& progress = {});
 
-    /// Adds what the backend's film holds to `film` (which has this scene's shape; without samples, its contents do not matter). A film that
-    /// has samples is left alone when that fails; one without is empty then.
+    /// Adds what the backend's film holds to `film` (which has this scene's shape; without samples, its
+    /// contents do not matter). A film that has samples is left alone when that fails; one without is empty
+    /// then.
     void readFilm(Film& film);
 
     CrtBackendReport report();

@@ -1,7 +1,7 @@
 #include "backend/kernel_source.h"
 
-#include "base/code_trust.h"
 #include "backend/crt_layout_hash.h"
+#include "base/code_trust.h"
 #include "base/error.h"
 #include "base/input_file.h"
 
@@ -24,7 +24,8 @@ using TextOf = std::function<std::optional<std::string>(const std::string&)>;
 
 std::optional<std::string> embeddedText(const std::string& name) {
     const KernelFile* end = kKernelFiles + kKernelFileCount;
-    const KernelFile* found = std::find_if(kKernelFiles, end, [&](const KernelFile& file) { return name == file.name; });
+    const KernelFile* found =
+        std::find_if(kKernelFiles, end, [&](const KernelFile& file) { return name == file.name; });
     if (found == end) return std::nullopt;
     return found->text;
 }
@@ -42,9 +43,12 @@ std::optional<std::string> textIn(const std::string& directory, const std::strin
     }
 }
 
-/// The directive of a preprocessor line ("include", "if", …) and what follows it; empty when the line is none.
+/// The directive of a preprocessor line ("include", "if", …) and what follows it; empty when the line is
+/// none.
 std::pair<std::string_view, std::string_view> directiveOf(std::string_view line) {
-    const auto skip_blanks = [&] { line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size())); };
+    const auto skip_blanks = [&] {
+        line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    };
     skip_blanks();
     if (line.empty() || line.front() != '#') return {};
     line.remove_prefix(1);
@@ -64,8 +68,10 @@ public:
     void expand(const std::string& name, bool certain) {
         const std::optional<std::string> text = text_of_(name);
         if (!text) {
-            throw Error(ErrorKind::Internal, chain_.empty() ? fmt::format("there is no kernel header {}", name)
-                                                            : fmt::format("kernel header {} includes {}, which does not exist", chain_.back(), name));
+            throw Error(ErrorKind::Internal,
+                        chain_.empty() ? fmt::format("there is no kernel header {}", name)
+                                       : fmt::format("kernel header {} includes {}, which does not exist",
+                                                     chain_.back(), name));
         }
         if (certain) done_.insert(name);
         chain_.push_back(name);
@@ -82,7 +88,8 @@ public:
             if (directive == "if" || directive == "ifdef" || directive == "ifndef") ++depth;
             if (directive == "endif") --depth;
             const std::size_t quote = argument.find('"', 1);
-            if (directive == "include" && !argument.empty() && argument.front() == '"' && quote != std::string_view::npos) {
+            if (directive == "include" && !argument.empty() && argument.front() == '"' &&
+                quote != std::string_view::npos) {
                 include(std::string(argument.substr(1, quote - 1)), certain && depth <= 1);
             } else {
                 out_.append(line);
@@ -96,7 +103,8 @@ public:
 
 private:
     void include(const std::string& name, bool certain) {
-        const bool running = std::find(chain_.begin(), chain_.end(), name) != chain_.end();  // a circle: the guard ends it
+        const bool running =
+            std::find(chain_.begin(), chain_.end(), name) != chain_.end();  // a circle: the guard ends it
         if (!running && done_.count(name) == 0) expand(name, certain);
     }
 
@@ -119,15 +127,19 @@ const char* kernelSource(const std::string& name) {
     const std::string directory = value != nullptr ? value : "";
     if (name.find('/') != std::string::npos) return nullptr;
 
-    // Texts are kept for good, because plugins hold pointers to them. Leaked, so that they outlive every static object.
+    // Texts are kept for good, because plugins hold pointers to them. Leaked, so that they outlive every
+    // static object.
     static std::mutex mutex;
     static auto* const texts = new std::map<std::pair<std::string, std::string>, std::string>;
     const std::lock_guard lock(mutex);
     const auto [place, is_new] = texts->try_emplace({directory, name});
     if (!is_new) return place->second.c_str();
     try {
-        // The directory replaces the embedded texts as a whole: a kernel of two origins would puzzle whoever debugs it.
-        const TextOf text_of = [&](const std::string& header) { return directory.empty() ? embeddedText(header) : textIn(directory, header); };
+        // The directory replaces the embedded texts as a whole: a kernel of two origins would puzzle whoever
+        // debugs it.
+        const TextOf text_of = [&](const std::string& header) {
+            return directory.empty() ? embeddedText(header) : textIn(directory, header);
+        };
         if (!text_of(name)) {
             texts->erase(place);
             return nullptr;
@@ -135,8 +147,11 @@ const char* kernelSource(const std::string& name) {
         if (!directory.empty()) {
             for (const char* header : {CRT_LAYOUT_HEADERS}) {
                 if (text_of(header) != embeddedText(header)) {
-                    throw Error(ErrorKind::Backend, fmt::format("CRT_KERNEL_DIR ({}) holds another {} than this crt was built with: rebuild crt",
-                                                                directory, header));
+                    throw Error(
+                        ErrorKind::Backend,
+                        fmt::format(
+                            "CRT_KERNEL_DIR ({}) holds another {} than this crt was built with: rebuild crt",
+                            directory, header));
                 }
             }
         }

@@ -1,13 +1,13 @@
 #include "backend/loader.h"
 
-#include "base/code_trust.h"
 #include "backend/crt_layout_hash.h"
 #include "backend/kernel_source.h"
+#include "base/code_trust.h"
 #include "base/error.h"
-#include "kernel/bits_version.h"
 #include "base/log.h"
 #include "base/modules.h"
 #include "base/words.h"
+#include "kernel/bits_version.h"
 
 #include <dlfcn.h>
 #include <elf.h>
@@ -53,9 +53,11 @@ auto acrossBorder(const std::string& name, const char* function, Call&& call) {
     try {
         return call();
     } catch (const std::exception& error) {
-        refuse(fmt::format("backend '{}' broke the contract: an exception crossed the border from {} ({})", name, function, error.what()));
+        refuse(fmt::format("backend '{}' broke the contract: an exception crossed the border from {} ({})",
+                           name, function, error.what()));
     } catch (...) {
-        refuse(fmt::format("backend '{}' broke the contract: an exception crossed the border from {}", name, function));
+        refuse(fmt::format("backend '{}' broke the contract: an exception crossed the border from {}", name,
+                           function));
     }
 }
 
@@ -68,7 +70,8 @@ std::set<std::string> installedBackends() {
         std::error_code unreadable;  // an absent directory holds no plugins
         for (const fs::directory_entry& file : fs::directory_iterator(directory, unreadable)) {
             const std::string stem = file.path().stem().string();
-            if (file.path().extension() == kFileSuffix && stem.rfind(kFilePrefix, 0) == 0) names.insert(stem.substr(std::string_view(kFilePrefix).size()));
+            if (file.path().extension() == kFileSuffix && stem.rfind(kFilePrefix, 0) == 0)
+                names.insert(stem.substr(std::string_view(kFilePrefix).size()));
         }
     }
     return names;
@@ -87,14 +90,16 @@ std::optional<std::string> findPlugin(const std::string& name) {
 
 [[noreturn]] void refuseAbsent(const std::string& name) {
     std::string searched;
-    for (const std::string& directory : pluginDirectories()) searched += (searched.empty() ? "" : ", ") + directory;
+    for (const std::string& directory : pluginDirectories())
+        searched += (searched.empty() ? "" : ", ") + directory;
 
     std::set<std::string> candidates = installedBackends();
-    const bool known = std::find(std::begin(kKnownBackends), std::end(kKnownBackends), name) != std::end(kKnownBackends);
+    const bool known =
+        std::find(std::begin(kKnownBackends), std::end(kKnownBackends), name) != std::end(kKnownBackends);
     candidates.insert(std::begin(kKnownBackends), std::end(kKnownBackends));
     const std::string hint = known ? "" : didYouMean(name, {candidates.begin(), candidates.end()});
-    refuse(fmt::format("backend '{}' is {}: no {}{}{} in {}{}", name, known ? "not installed" : "unknown", kFilePrefix, name, kFileSuffix,
-                       searched, hint.empty() ? "" : "; " + hint));
+    refuse(fmt::format("backend '{}' is {}: no {}{}{} in {}{}", name, known ? "not installed" : "unknown",
+                       kFilePrefix, name, kFileSuffix, searched, hint.empty() ? "" : "; " + hint));
 }
 
 /// Of a table that is large enough for version 1.0, which had no such member.
@@ -105,33 +110,44 @@ std::uint32_t bitsVersionOf(const CrtBackend& table) {
 
 /// Of a table of version 1.2 or newer; older ones bring nothing.
 bool hasBrings(const CrtBackend& table) {
-    return table.struct_size >= offsetof(CrtBackend, accelerator_reach) + sizeof(CrtBackend::accelerator_reach);
+    return table.struct_size >=
+           offsetof(CrtBackend, accelerator_reach) + sizeof(CrtBackend::accelerator_reach);
 }
 
 /// Whether a driver for a GPU runs here: then a backend without a device is worth a word.
 bool hasGpuDriver() {
     std::error_code unreadable;
-    return fs::exists("/dev/nvidiactl", unreadable) || fs::exists("/dev/dxg", unreadable) || fs::exists("/dev/kfd", unreadable);
+    return fs::exists("/dev/nvidiactl", unreadable) || fs::exists("/dev/dxg", unreadable) ||
+           fs::exists("/dev/kfd", unreadable);
 }
 
 /// The checks between dlsym and the first use of the table. `name` is what the user asked for.
 void checkTable(const std::string& name, const std::string& path, const CrtBackend* table) {
-    if (table == nullptr) refuse(fmt::format("backend '{}' ({}) broke the contract: {} returned no table", name, path, CRT_BACKEND_ENTRY_NAME));
+    if (table == nullptr)
+        refuse(fmt::format("backend '{}' ({}) broke the contract: {} returned no table", name, path,
+                           CRT_BACKEND_ENTRY_NAME));
 
-    // The first eight bytes are the same in every version; nothing beyond may be read before the sizes are known to agree.
+    // The first eight bytes are the same in every version; nothing beyond may be read before the sizes are
+    // known to agree.
     constexpr std::size_t version_size = offsetof(CrtBackend, abi_minor) + sizeof(CrtBackend::abi_minor);
     constexpr std::size_t first_size = offsetof(CrtBackend, create) + sizeof(CrtBackend::create);
     if (table->struct_size >= version_size && table->abi_major != CRT_ABI_MAJOR) {
-        refuse(fmt::format("backend '{}' ({}) speaks version {}.{} of the plugin interface and this crt speaks {}.{}: rebuild the plugin", name,
-                           path, table->abi_major, table->abi_minor, CRT_ABI_MAJOR, CRT_ABI_MINOR));
+        refuse(
+            fmt::format("backend '{}' ({}) speaks version {}.{} of the plugin interface and this crt speaks "
+                        "{}.{}: rebuild the plugin",
+                        name, path, table->abi_major, table->abi_minor, CRT_ABI_MAJOR, CRT_ABI_MINOR));
     }
     if (table->struct_size < first_size) {
-        refuse(fmt::format("backend '{}' ({}) broke the contract: its table has {} bytes where version {} needs {}", name, path, table->struct_size,
-                           CRT_ABI_MAJOR, first_size));
+        refuse(fmt::format(
+            "backend '{}' ({}) broke the contract: its table has {} bytes where version {} needs {}", name,
+            path, table->struct_size, CRT_ABI_MAJOR, first_size));
     }
     if (table->layout_hash != CRT_LAYOUT_HASH) {
-        refuse(fmt::format("backend '{}' ({}) was built for another scene layout, {:016x} ({}), and this crt has {:016x} ({}): rebuild the plugin",
-                           name, path, table->layout_hash, orUnknown(table->build), std::uint64_t{CRT_LAYOUT_HASH}, kHostBuild));
+        refuse(
+            fmt::format("backend '{}' ({}) was built for another scene layout, {:016x} ({}), and this crt "
+                        "has {:016x} ({}): rebuild the plugin",
+                        name, path, table->layout_hash, orUnknown(table->build),
+                        std::uint64_t{CRT_LAYOUT_HASH}, kHostBuild));
     }
     if (bitsVersionOf(*table) != CRT_BITS_VERSION) {
         refuse(fmt::format(
@@ -141,28 +157,38 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
             name, path, bitsVersionOf(*table), orUnknown(table->build), CRT_BITS_VERSION, kHostBuild));
     }
     // Not a number is no reach either.
-    if (hasBrings(*table) && (table->brings & CRT_BRINGS_ACCELERATOR) != 0 && !(table->accelerator_reach >= 1)) {
-        refuse(fmt::format("backend '{}' ({}) broke the contract: it brings an acceleration structure that reaches {}, and scenes reach 1", name,
-                           path, table->accelerator_reach));
+    if (hasBrings(*table) && (table->brings & CRT_BRINGS_ACCELERATOR) != 0 &&
+        !(table->accelerator_reach >= 1)) {
+        refuse(
+            fmt::format("backend '{}' ({}) broke the contract: it brings an acceleration structure that "
+                        "reaches {}, and scenes reach 1",
+                        name, path, table->accelerator_reach));
     }
     if (table->name == nullptr || table->probe == nullptr || table->create == nullptr) {
         refuse(fmt::format("backend '{}' ({}) broke the contract: its table lacks {}", name, path,
-                           table->name == nullptr ? "a name" : table->probe == nullptr ? "probe" : "create"));
+                           table->name == nullptr    ? "a name"
+                           : table->probe == nullptr ? "probe"
+                                                     : "create"));
     }
 }
 
-/// Whether a library has all the bytes that its segments take. dlopen maps them unasked, and the first touch of one behind the end of the file is a SIGBUS.
+/// Whether a library has all the bytes that its segments take. dlopen maps them unasked, and the first touch
+/// of one behind the end of the file is a SIGBUS.
 bool isCut(const std::string& file) {
     std::ifstream in(file, std::ios::binary);
     ElfW(Ehdr) header{};
     std::error_code unknown;
     const std::uintmax_t bytes = fs::file_size(file, unknown);
-    if (!in.read(reinterpret_cast<char*>(&header), sizeof header) || unknown || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0) return false;  // dlopen knows.
+    if (!in.read(reinterpret_cast<char*>(&header), sizeof header) || unknown ||
+        std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0)
+        return false;  // dlopen knows.
     for (unsigned i = 0; i < header.e_phnum; ++i) {
         ElfW(Phdr) segment{};
         in.seekg(static_cast<std::streamoff>(header.e_phoff + std::uint64_t{i} * sizeof segment));
         if (!in.read(reinterpret_cast<char*>(&segment), sizeof segment)) return true;
-        if (segment.p_type == PT_LOAD && (segment.p_offset > bytes || segment.p_filesz > bytes - segment.p_offset)) return true;
+        if (segment.p_type == PT_LOAD &&
+            (segment.p_offset > bytes || segment.p_filesz > bytes - segment.p_offset))
+            return true;
     }
     return false;
 }
@@ -171,7 +197,8 @@ bool isCut(const std::string& file) {
 void refuseUntrusted(const std::string& name, const std::string& path) {
     std::error_code unreadable;
     if (!fs::exists(path, unreadable)) return;  // A link to nowhere: dlopen says so.
-    if (const std::string why = trust::whyNotByName(path); !why.empty()) refuse(fmt::format("backend '{}' ({}) is refused: {}", name, path, why));
+    if (const std::string why = trust::whyNotByName(path); !why.empty())
+        refuse(fmt::format("backend '{}' ({}) is refused: {}", name, path, why));
 }
 
 /// Existing and usable, made if need be; empty with a debug message otherwise.
@@ -224,7 +251,8 @@ const char* keep(const std::string& text) {
 
 void hostLog(void*, CrtLogLevel level, const char* message) noexcept {
     try {
-        const auto known = static_cast<CrtLogLevel>(std::clamp<CrtLogLevel>(level, CRT_LOG_DEBUG, CRT_LOG_ERROR));
+        const auto known =
+            static_cast<CrtLogLevel>(std::clamp<CrtLogLevel>(level, CRT_LOG_DEBUG, CRT_LOG_ERROR));
         logMessage(static_cast<LogLevel>(known), message != nullptr ? message : "(null)");
     } catch (...) {
         // A message that cannot be written is lost; there is no further place to say so.
@@ -242,8 +270,10 @@ const char* hostKernelSource(void*, const char* name) noexcept {
     }
 }
 
-static_assert(static_cast<int>(LogLevel::Debug) == CRT_LOG_DEBUG && static_cast<int>(LogLevel::Info) == CRT_LOG_INFO &&
-              static_cast<int>(LogLevel::Warning) == CRT_LOG_WARNING && static_cast<int>(LogLevel::Error) == CRT_LOG_ERROR);
+static_assert(static_cast<int>(LogLevel::Debug) == CRT_LOG_DEBUG &&
+              static_cast<int>(LogLevel::Info) == CRT_LOG_INFO &&
+              static_cast<int>(LogLevel::Warning) == CRT_LOG_WARNING &&
+              static_cast<int>(LogLevel::Error) == CRT_LOG_ERROR);
 
 }  // namespace
 
@@ -264,12 +294,15 @@ LoadedBackend loadBackend(const std::string& name) {
     }
 
     refuseUntrusted(name, path);
-    // dlopen searches the system's directories for a name without '/'. Links are followed here: the way that was looked at is the one taken.
+    // dlopen searches the system's directories for a name without '/'. Links are followed here: the way that
+    // was looked at is the one taken.
     std::error_code unknown;
     const fs::path real = fs::canonical(path, unknown);
     const std::string file = unknown ? fs::absolute(path).string() : real.string();
-    if (isCut(file)) refuse(fmt::format("backend '{}' ({}) cannot be opened: the file is cut short", name, path));
-    // NOW: a missing symbol is told here and not in the middle of a render. LOCAL: the libraries of one plugin are not those of another.
+    if (isCut(file))
+        refuse(fmt::format("backend '{}' ({}) cannot be opened: the file is cut short", name, path));
+    // NOW: a missing symbol is told here and not in the middle of a render. LOCAL: the libraries of one
+    // plugin are not those of another.
     void* library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
         const char* reason = ::dlerror();
@@ -279,12 +312,14 @@ LoadedBackend loadBackend(const std::string& name) {
     void* const symbol = ::dlsym(library, CRT_BACKEND_ENTRY_NAME);
     if (symbol == nullptr) {
         const char* reason = ::dlerror();
-        refuse(fmt::format("backend '{}' ({}) is not a crt backend, or built for another major version: {}", name, path, orUnknown(reason)));
+        refuse(fmt::format("backend '{}' ({}) is not a crt backend, or built for another major version: {}",
+                           name, path, orUnknown(reason)));
     }
     const auto entry = reinterpret_cast<CrtBackendEntry>(symbol);
     const CrtBackend* table = acrossBorder(name, CRT_BACKEND_ENTRY_NAME, [&] { return entry(); });
     checkTable(name, path, table);
-    logDebug("opened backend '{}' {} ({}), built with {}", table->name, orUnknown(table->version), path, orUnknown(table->build));
+    logDebug("opened backend '{}' {} ({}), built with {}", table->name, orUnknown(table->version), path,
+             orUnknown(table->build));
     return {table->name, path, table};
 }
 
@@ -299,24 +334,29 @@ std::vector<CrtDevice> probeDevices(const LoadedBackend& backend) {
         std::uint32_t count = 0;
         char reason[512] = "";
         const CrtStatus status = acrossBorder(backend.name, "probe", [&] {
-            return backend.table->probe(&host, devices.data(), static_cast<std::uint32_t>(devices.size()), &count, reason, sizeof(reason));
+            return backend.table->probe(&host, devices.data(), static_cast<std::uint32_t>(devices.size()),
+                                        &count, reason, sizeof(reason));
         });
         reason[sizeof(reason) - 1] = '\0';
         if (status != CRT_OK || count == 0) {
-            refuse(fmt::format("backend '{}' has no usable device: {}", backend.name, *reason != '\0' ? reason : "it gives no reason"));
+            refuse(fmt::format("backend '{}' has no usable device: {}", backend.name,
+                               *reason != '\0' ? reason : "it gives no reason"));
         }
         if (count <= devices.size()) {
             devices.resize(count);
             break;
         }
-        if (count > 4096) refuse(fmt::format("backend '{}' broke the contract: it claims {} devices", backend.name, count));
+        if (count > 4096)
+            refuse(
+                fmt::format("backend '{}' broke the contract: it claims {} devices", backend.name, count));
         devices.resize(count);  // more than there was room for: ask again
     }
     for (CrtDevice& device : devices) {
         device.name[sizeof(device.name) - 1] = '\0';
         device.driver[sizeof(device.driver) - 1] = '\0';
     }
-    std::stable_sort(devices.begin(), devices.end(), [](const CrtDevice& a, const CrtDevice& b) { return a.score > b.score; });
+    std::stable_sort(devices.begin(), devices.end(),
+                     [](const CrtDevice& a, const CrtDevice& b) { return a.score > b.score; });
     return devices;
 }
 
@@ -332,7 +372,8 @@ std::vector<BackendStatus> listBackends() {
         status.name = name;
         status.path = findPlugin(name).value_or("");
         try {
-            status.refused = !status.path.empty() && fs::exists(status.path) && !trust::whyNotByName(status.path).empty();
+            status.refused =
+                !status.path.empty() && fs::exists(status.path) && !trust::whyNotByName(status.path).empty();
             const LoadedBackend backend = loadBackend(name);
             status.version = orUnknown(backend.table->version);
             status.build = orUnknown(backend.table->build);
@@ -366,7 +407,8 @@ LoadedBackend openBackend(const std::string& name) {
     if (name != "auto") return loadBackend(name);
     std::vector<PassedOver> passed_over;
     LoadedBackend backend = chooseBackend(passed_over);
-    for (const PassedOver& passed : passed_over) logMessage(passed.is_absent ? LogLevel::Debug : LogLevel::Info, passed.reason);
+    for (const PassedOver& passed : passed_over)
+        logMessage(passed.is_absent ? LogLevel::Debug : LogLevel::Info, passed.reason);
     return backend;
 }
 

@@ -10,8 +10,8 @@
 
 namespace crt {
 
-/// A plugin that passed every check. The library stays open for the life of the process: its threads and atexit handlers may outlive any
-/// integrator, and unloading buys nothing.
+/// A plugin that passed every check. The library stays open for the life of the process: its threads and
+/// atexit handlers may outlive any integrator, and unloading buys nothing.
 struct LoadedBackend {
     std::string name;
     std::string path;
@@ -21,12 +21,14 @@ struct LoadedBackend {
 /// CrtBackend::accelerator_reach of a backend that brings an acceleration structure of its own, else 0.
 double acceleratorReach(const LoadedBackend& backend);
 
-/// Opens exactly crt_backend_<name>.so, or `name` itself when it holds a '/'. Throws crt::Error(Backend) with one sentence: absent (where it
-/// was looked for), cannot be opened (dlerror()), not a crt backend, table too small, ABI or layout differs (both builds named), or could have been written by others
+/// Opens exactly crt_backend_<name>.so, or `name` itself when it holds a '/'. Throws crt::Error(Backend)
+/// with one sentence: absent (where it was looked for), cannot be opened (dlerror()), not a crt backend,
+/// table too small, ABI or layout differs (both builds named), or could have been written by others
 /// (code_trust.h), which is found before anything of it is run.
 LoadedBackend loadBackend(const std::string& name);
 
-/// Devices of a backend, best score first. Throws crt::Error(Backend) with the plugin's reason when there is none.
+/// Devices of a backend, best score first. Throws crt::Error(Backend) with the plugin's reason when there is
+/// none.
 std::vector<CrtDevice> probeDevices(const LoadedBackend& backend);
 
 /// One line of `crt plugins`.
@@ -48,11 +50,12 @@ struct PassedOver {
     bool is_absent = false;  ///< Not installed, or for hardware of which nothing is there: as expected.
 };
 
-/// Picks a backend for `auto`: cuda, embree, opencl in that order, the first with a device. `reasons` gets those passed over.
+/// Picks a backend for `auto`: cuda, embree, opencl in that order, the first with a device. `reasons` gets
+/// those passed over.
 LoadedBackend chooseBackend(std::vector<PassedOver>& reasons);
 
-/// What --backend asks for: the one of that name, or for "auto" what chooseBackend picks, with a line in the log for each one passed over
-/// (only with -v for what is absent).
+/// What --backend asks for: the one of that name, or for "auto" what chooseBackend picks, with a line in the
+/// log for each one passed over (only with -v for what is absent).
 LoadedBackend openBackend(const std::string& name);
 
 /// Text of a fixed array that a plugin filled, not necessarily up to a terminator.
@@ -61,8 +64,8 @@ std::string arrayText(const char (&text)[N]) {
     return {text, strnlen(text, N)};
 }
 
-/// The host table given to every plugin: log, kernel sources, cache directory ($CRT_CACHE_DIR, $XDG_CACHE_HOME/crt, ~/.cache/crt).
-/// `use_cache` false leaves cache_directory null.
+/// The host table given to every plugin: log, kernel sources, cache directory ($CRT_CACHE_DIR,
+/// $XDG_CACHE_HOME/crt, ~/.cache/crt). `use_cache` false leaves cache_directory null.
 CrtHost makeHost(bool use_cache);
 
 }  // namespace crt

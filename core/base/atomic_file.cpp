@@ -35,8 +35,10 @@ std::string missingFolder(const std::string& directory) {
     }
     constexpr std::size_t kMostNeighbours = 1000;
     std::vector<std::string> neighbours;
-    for (fs::directory_iterator entry(above, error), end; !error && entry != end && neighbours.size() < kMostNeighbours; entry.increment(error))
-        if (std::error_code ignored; entry->is_directory(ignored)) neighbours.push_back(entry->path().filename().string());
+    for (fs::directory_iterator entry(above, error), end;
+         !error && entry != end && neighbours.size() < kMostNeighbours; entry.increment(error))
+        if (std::error_code ignored; entry->is_directory(ignored))
+            neighbours.push_back(entry->path().filename().string());
     const std::string hint = didYouMean(missing.filename().string(), neighbours);
     return fmt::format("there is no folder '{}'; {}", missing.string(),
                        hint.empty() ? fmt::format("make it first: mkdir -p '{}'", directory) : hint);
@@ -46,7 +48,8 @@ std::string missingFolder(const std::string& directory) {
     throw Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, why), {path});
 }
 
-/// Where a link leads in the end, also when nothing is there yet: std::filesystem takes such a link for a file that is to be made.
+/// Where a link leads in the end, also when nothing is there yet: std::filesystem takes such a link for a
+/// file that is to be made.
 std::string targetOf(const std::string& path) {
     constexpr int kMostLinks = 40;  // As many as Linux follows.
     std::error_code ignored;
@@ -68,17 +71,21 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
     final_ = targetOf(path);
     // Renaming over these would replace a device node or fail at the very end of a render.
     if (fs::is_directory(final_, ignored)) refuse(path_, "it is a directory");
-    if (fs::exists(final_, ignored) && !fs::is_regular_file(final_, ignored)) refuse(path_, "it is not a regular file");
-    // open() rather than mkstemp() so that the file gets the permissions that the user's umask says. The process id alone does not make the
-    // name unique: in a container every program may be process 1, and an earlier one may have died here.
+    if (fs::exists(final_, ignored) && !fs::is_regular_file(final_, ignored))
+        refuse(path_, "it is not a regular file");
+    // open() rather than mkstemp() so that the file gets the permissions that the user's umask says. The
+    // process id alone does not make the name unique: in a container every program may be process 1, and an
+    // earlier one may have died here.
     for (int attempt = 0; descriptor_ < 0; ++attempt) {
         temporary_ = fmt::format("{}.{}-{}.tmp", final_, ::getpid(), attempt);
         descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         const int error_number = errno;
-        if (descriptor_ >= 0 || error_number == EINTR || (error_number == EEXIST && attempt < 1000)) continue;
+        if (descriptor_ >= 0 || error_number == EINTR || (error_number == EEXIST && attempt < 1000))
+            continue;
         if (error_number == ENOENT && final_ != path_)
             refuse(path_, fmt::format("it is a link to '{}', whose directory does not exist", final_));
-        if (error_number == ENOENT) refuse(path_, fmt::format("the directory '{}' does not exist", directoryOf(final_)));
+        if (error_number == ENOENT)
+            refuse(path_, fmt::format("the directory '{}' does not exist", directoryOf(final_)));
         fail("cannot write", error_number);
     }
 }
@@ -89,7 +96,8 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::fail(const char* what, int error_number) const {
-    throw Error(ErrorKind::Output, fmt::format("{} '{}': {}", what, path_, std::strerror(error_number)), {path_});
+    throw Error(ErrorKind::Output, fmt::format("{} '{}': {}", what, path_, std::strerror(error_number)),
+                {path_});
 }
 
 void AtomicFile::write(const void* bytes, std::size_t size) {

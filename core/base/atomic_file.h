@@ -1,5 +1,6 @@
-/// Files that are either whole or not there: written under a temporary name in the same directory, synced, renamed.
-/// Whoever reads the final name, or looks at it after a crash, sees the old file or the new one, never half of either.
+/// Files that are either whole or not there: written under a temporary name in the same directory, synced,
+/// renamed. Whoever reads the final name, or looks at it after a crash, sees the old file or the new one,
+/// never half of either.
 #pragma once
 
 #include <cstddef>
@@ -8,11 +9,12 @@
 
 namespace crt {
 
-/// One file on its way to its final name. Every failure is a crt::Error(Output) naming the final file. [one thread]
+/// One file on its way to its final name. Every failure is a crt::Error(Output) naming the final file. [one
+/// thread]
 class AtomicFile {
 public:
-    /// Opens the temporary. A symbolic link is followed, so that the link stays and its target is replaced, or made
-    /// where the link led to nothing.
+    /// Opens the temporary. A symbolic link is followed, so that the link stays and its target is replaced,
+    /// or made where the link led to nothing.
     explicit AtomicFile(const std::string& path);
     /// Removes the temporary unless commit() succeeded.
     ~AtomicFile();
@@ -36,9 +38,9 @@ private:
     bool committed_ = false;
 };
 
-/// Finds out before a render, rather than after it, that `path` cannot be written: creates and removes a temporary file
-/// beside it. Makes no folder, which would hide a typing error. Throws crt::Error(Output) with one sentence. What can still
-/// go wrong later is a full disk.
+/// Finds out before a render, rather than after it, that `path` cannot be written: creates and removes a
+/// temporary file beside it. Makes no folder, which would hide a typing error. Throws crt::Error(Output)
+/// with one sentence. What can still go wrong later is a full disk.
 void checkWritable(const std::string& path);
 
 /// Makes the folder that a command fills, in one that is there already. Throws crt::Error(Output).

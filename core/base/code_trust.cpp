@@ -34,7 +34,9 @@ const Program& program() {
     return found;
 }
 
-bool trustedOwner(uid_t owner) { return owner == 0 || owner == ::geteuid() || (program().known && owner == program().status.st_uid); }
+bool trustedOwner(uid_t owner) {
+    return owner == 0 || owner == ::geteuid() || (program().known && owner == program().status.st_uid);
+}
 
 /// Room for the texts of one entry of the user or group database.
 std::vector<char> room() { return std::vector<char>(std::size_t{1} << 16); }
@@ -42,14 +44,16 @@ std::vector<char> room() { return std::vector<char>(std::size_t{1} << 16); }
 std::string nameOfUser(uid_t user) {
     std::vector<char> texts = room();
     struct passwd entry {}, *found = nullptr;
-    if (::getpwuid_r(user, &entry, texts.data(), texts.size(), &found) == 0 && found != nullptr) return found->pw_name;
+    if (::getpwuid_r(user, &entry, texts.data(), texts.size(), &found) == 0 && found != nullptr)
+        return found->pw_name;
     return std::to_string(user);
 }
 
 std::string homeOfUser() {
     std::vector<char> texts = room();
     struct passwd entry {}, *found = nullptr;
-    if (::getpwuid_r(::geteuid(), &entry, texts.data(), texts.size(), &found) != 0 || found == nullptr) return {};
+    if (::getpwuid_r(::geteuid(), &entry, texts.data(), texts.size(), &found) != 0 || found == nullptr)
+        return {};
     char path[PATH_MAX];
     return ::realpath(found->pw_dir, path) != nullptr ? path : "";
 }
@@ -57,18 +61,24 @@ std::string homeOfUser() {
 std::string nameOfGroup(gid_t group) {
     std::vector<char> texts = room();
     struct group entry {}, *found = nullptr;
-    if (::getgrgid_r(group, &entry, texts.data(), texts.size(), &found) == 0 && found != nullptr) return found->gr_name;
+    if (::getgrgid_r(group, &entry, texts.data(), texts.size(), &found) == 0 && found != nullptr)
+        return found->gr_name;
     return std::to_string(group);
 }
 
-/// Whether a group has no members but one trusted user: the group of the user's name that systems with "user private groups" make, under
-/// which a umask of 002 is harmless.
+/// Whether a group has no members but one trusted user: the group of the user's name that systems with "user
+/// private groups" make, under which a umask of 002 is harmless.
 bool privateGroup(gid_t group) {
     std::vector<char> group_texts = room(), user_texts = room();
     struct group group_entry {}, *found_group = nullptr;
-    if (::getgrgid_r(group, &group_entry, group_texts.data(), group_texts.size(), &found_group) != 0 || found_group == nullptr) return false;
+    if (::getgrgid_r(group, &group_entry, group_texts.data(), group_texts.size(), &found_group) != 0 ||
+        found_group == nullptr)
+        return false;
     struct passwd user_entry {}, *found_user = nullptr;
-    if (::getpwnam_r(found_group->gr_name, &user_entry, user_texts.data(), user_texts.size(), &found_user) != 0 || found_user == nullptr) return false;
+    if (::getpwnam_r(found_group->gr_name, &user_entry, user_texts.data(), user_texts.size(), &found_user) !=
+            0 ||
+        found_user == nullptr)
+        return false;
     if (found_user->pw_gid != group || !trustedOwner(found_user->pw_uid)) return false;
     for (char** member = found_group->gr_mem; *member != nullptr; ++member)
         if (std::strcmp(*member, found_user->pw_name) != 0) return false;
@@ -84,7 +94,8 @@ std::string modeText(mode_t mode) {
 std::string quoted(const std::string& name) { return "'" + name + "'"; }
 
 bool isAbove(const std::string& folder, const std::string& path) {
-    return folder == "/" || (path.size() > folder.size() && path.compare(0, folder.size(), folder) == 0 && path[folder.size()] == '/');
+    return folder == "/" || (path.size() > folder.size() && path.compare(0, folder.size(), folder) == 0 &&
+                             path[folder.size()] == '/');
 }
 
 std::string folderOf(const std::string& path) {
@@ -96,19 +107,25 @@ std::string folderOf(const std::string& path) {
 
 std::string whyNot(const struct stat& status, const std::string& name) {
     const mode_t mode = status.st_mode;
-    if (!trustedOwner(status.st_uid)) return quoted(name) + " belongs to another user (" + nameOfUser(status.st_uid) + "), who could have put anything there";
+    if (!trustedOwner(status.st_uid))
+        return quoted(name) + " belongs to another user (" + nameOfUser(status.st_uid) +
+               "), who could have put anything there";
     if (S_ISDIR(mode) && (mode & S_ISVTX) != 0) return {};
     const Program& p = program();
-    const std::string remedy = " can write to " + quoted(name) + " (mode " + modeText(mode) + ") and could have put anything there; chmod go-w " + name;
+    const std::string remedy = " can write to " + quoted(name) + " (mode " + modeText(mode) +
+                               ") and could have put anything there; chmod go-w " + name;
     if ((mode & S_IWOTH) != 0 && !(p.known && (p.status.st_mode & S_IWOTH) != 0)) return "everyone" + remedy;
-    const bool group_of_program = p.known && (p.status.st_mode & S_IWGRP) != 0 && p.status.st_gid == status.st_gid;
-    if ((mode & S_IWGRP) != 0 && !group_of_program && !privateGroup(status.st_gid)) return "the group " + nameOfGroup(status.st_gid) + remedy;
+    const bool group_of_program =
+        p.known && (p.status.st_mode & S_IWGRP) != 0 && p.status.st_gid == status.st_gid;
+    if ((mode & S_IWGRP) != 0 && !group_of_program && !privateGroup(status.st_gid))
+        return "the group " + nameOfGroup(status.st_gid) + remedy;
     return {};
 }
 
 std::string whyNotByName(const std::string& path) {
     char real[PATH_MAX];
-    if (::realpath(path.c_str(), real) == nullptr) return quoted(path) + " cannot be opened: " + std::strerror(errno);
+    if (::realpath(path.c_str(), real) == nullptr)
+        return quoted(path) + " cannot be opened: " + std::strerror(errno);
     // On the descriptor: not blocking, for a pipe waits for who writes to it.
     const int descriptor = ::open(real, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (descriptor < 0) return quoted(path) + " cannot be opened: " + std::strerror(errno);
@@ -120,7 +137,8 @@ std::string whyNotByName(const std::string& path) {
     const std::string home = homeOfUser();
     for (std::string folder = folderOf(real); why.empty(); folder = folderOf(folder)) {
         if (program().known && isAbove(folder, program().path)) break;  // So are all further up.
-        if (::stat(folder.c_str(), &status) != 0) return quoted(folder) + " cannot be looked at: " + std::strerror(errno);
+        if (::stat(folder.c_str(), &status) != 0)
+            return quoted(folder) + " cannot be looked at: " + std::strerror(errno);
         why = whyNot(status, folder);
         if (folder == "/" || folder == home) break;
     }

@@ -1,6 +1,7 @@
-/// Whether a file may be run as code (plugins, compiled kernels, kernel texts): not if somebody could have written it who may not decide what
-/// this program does. The rules are OpenSSH's for its configuration, with one addition (docs/decisions/0014): the owner and the writers of
-/// the program itself are trusted, because who can change the program needs no plugin.
+/// Whether a file may be run as code (plugins, compiled kernels, kernel texts): not if somebody could have
+/// written it who may not decide what this program does. The rules are OpenSSH's for its configuration, with
+/// one addition (docs/decisions/0014): the owner and the writers of the program itself are trusted, because
+/// who can change the program needs no plugin.
 ///
 /// Uses nothing of the core: it is part of crt::kernel_cache too.
 #pragma once
@@ -11,14 +12,16 @@ struct stat;
 
 namespace crt::trust {
 
-/// Who else can write to an open file or folder, as a sentence about `name` with what to do about it; empty when nobody. It belongs to this
-/// user, to root or to the program's owner, and neither everyone nor a group of other people can write to it. A folder with the sticky bit, as
-/// /tmp has, may be written to by everyone: there nobody can rename or remove what is another's. [any thread]
+/// Who else can write to an open file or folder, as a sentence about `name` with what to do about it; empty
+/// when nobody. It belongs to this user, to root or to the program's owner, and neither everyone nor a group
+/// of other people can write to it. A folder with the sticky bit, as /tmp has, may be written to by
+/// everyone: there nobody can rename or remove what is another's. [any thread]
 std::string whyNot(const struct stat& status, const std::string& name);
 
-/// The same for code that is opened by its name later: a regular file, links followed, and all folders on the way to it, so that what was looked at is
-/// what will be opened. Folders on the way to the program itself, and above the user's home, are not asked. A file that cannot be
-/// looked at gives its reason. [any thread]
+/// The same for code that is opened by its name later: a regular file, links followed, and all folders on
+/// the way to it, so that what was looked at is what will be opened. Folders on the way to the program
+/// itself, and above the user's home, are not asked. A file that cannot be looked at gives its reason. [any
+/// thread]
 std::string whyNotByName(const std::string& path);
 
 }  // namespace crt::trust

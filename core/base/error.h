@@ -1,5 +1,5 @@
-/// crt's one exception type. Inside the core everything that can go wrong is thrown as crt::Error; the program
-/// turns it into one message and an exit code, the plugin border into a status.
+/// crt's one exception type. Inside the core everything that can go wrong is thrown as crt::Error; the
+/// program turns it into one message and an exit code, the plugin border into a status.
 #pragma once
 
 #include <stdexcept>
@@ -15,7 +15,8 @@ struct SourcePlace {
     int column = 0;
 };
 
-/// What kind of failure this is. The values are the program's exit codes (docs/architecture.md, "Exit codes").
+/// What kind of failure this is. The values are the program's exit codes (docs/architecture.md, "Exit
+/// codes").
 enum class ErrorKind : int {
     Internal = 1,  ///< A broken invariant: a bug in crt.
     Usage = 2,     ///< The command line is wrong.

@@ -27,7 +27,9 @@ std::string valueInFile(const char* path, std::string_view key, char separator) 
         const std::size_t at = line.find(separator);
         if (at == std::string::npos) continue;
         std::size_t first = at + 1, last = line.size();
-        const auto trimmed = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0 || c == '"'; };
+        const auto trimmed = [](char c) {
+            return std::isspace(static_cast<unsigned char>(c)) != 0 || c == '"';
+        };
         while (first < last && trimmed(line[first])) ++first;
         while (last > first && trimmed(line[last - 1])) --last;
         return line.substr(first, last - first);
@@ -81,18 +83,24 @@ std::uint64_t availableHostMemory() {
         file >> number;
         return file ? number : std::numeric_limits<std::uint64_t>::max();
     };
-    const auto left = [](std::uint64_t limit, std::uint64_t used) { return limit > used ? limit - used : 0; };
+    const auto left = [](std::uint64_t limit, std::uint64_t used) {
+        return limit > used ? limit - used : 0;
+    };
 
     std::uint64_t bytes = std::numeric_limits<std::uint64_t>::max();
-    if (const std::uint64_t kilobytes = kilobytesIn("/proc/meminfo", "MemAvailable:"); kilobytes > 0) bytes = kilobytes * 1024;
+    if (const std::uint64_t kilobytes = kilobytesIn("/proc/meminfo", "MemAvailable:"); kilobytes > 0)
+        bytes = kilobytes * 1024;
     // Inside a container its own group is the root of what it sees. Version 2, then version 1.
-    for (const auto& [limit, used] : {std::pair{"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"},
-                                      std::pair{"/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"}})
+    for (const auto& [limit, used] :
+         {std::pair{"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"},
+          std::pair{"/sys/fs/cgroup/memory/memory.limit_in_bytes",
+                    "/sys/fs/cgroup/memory/memory.usage_in_bytes"}})
         if (const std::uint64_t most = numberIn(limit); most != std::numeric_limits<std::uint64_t>::max())
             bytes = std::min(bytes, left(most, numberIn(used)));
     rlimit address_space{};
     if (getrlimit(RLIMIT_AS, &address_space) == 0 && address_space.rlim_cur != RLIM_INFINITY)
-        bytes = std::min<std::uint64_t>(bytes, left(address_space.rlim_cur, kilobytesIn("/proc/self/status", "VmSize:") * 1024));
+        bytes = std::min<std::uint64_t>(
+            bytes, left(address_space.rlim_cur, kilobytesIn("/proc/self/status", "VmSize:") * 1024));
     return bytes;
 }
 

@@ -17,8 +17,8 @@ std::string utcNow();
 /// The most memory this process ever held, in bytes (VmHWM); 0 when the system does not tell.
 std::uint64_t peakHostMemory();
 
-/// What this process may still take without the system's ending it, in bytes: the least of the machine's free memory, the cgroup's (a
-/// container's) and the limit on address space (ulimit -v).
+/// What this process may still take without the system's ending it, in bytes: the least of the machine's
+/// free memory, the cgroup's (a container's) and the limit on address space (ulimit -v).
 std::uint64_t availableHostMemory();
 
 /// What this program was built from and with.

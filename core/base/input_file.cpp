@@ -33,7 +33,8 @@ std::string sizeText(std::uint64_t bytes) {
     double size = static_cast<double>(bytes) / 1024;
     std::size_t unit = 0;
     for (; size >= 1024 && unit + 1 < std::size(kUnits); ++unit) size /= 1024;
-    return fmt::format("{:.{}f} {}", size, size < 10 && size != static_cast<int>(size) ? 1 : 0, kUnits[unit]);
+    return fmt::format("{:.{}f} {}", size, size < 10 && size != static_cast<int>(size) ? 1 : 0,
+                       kUnits[unit]);
 }
 
 const char* kindOf(mode_t mode) {
@@ -49,13 +50,17 @@ std::string readAll(int descriptor, std::uint64_t expected_bytes, std::uint64_t 
     text.reserve(expected_bytes);
     for (;;) {
         const std::size_t size = text.size();
-        text.resize(std::max<std::size_t>(size + kBlock, std::min<std::size_t>(expected_bytes, size + 64 * kBlock)));
+        text.resize(
+            std::max<std::size_t>(size + kBlock, std::min<std::size_t>(expected_bytes, size + 64 * kBlock)));
         const ssize_t count = ::read(descriptor, text.data() + size, text.size() - size);
         text.resize(size + static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
         if (count < 0 && errno == EINTR) continue;
-        if (count < 0) throw InputRefused(fmt::format("cannot be read to its end: {}", std::strerror(errno)));
+        if (count < 0)
+            throw InputRefused(fmt::format("cannot be read to its end: {}", std::strerror(errno)));
         if (count == 0) return text;
-        if (text.size() > most_bytes) throw InputRefused(fmt::format("has more than {}, the most for a file of this kind", sizeText(most_bytes)));
+        if (text.size() > most_bytes)
+            throw InputRefused(
+                fmt::format("has more than {}, the most for a file of this kind", sizeText(most_bytes)));
     }
 }
 
@@ -70,7 +75,9 @@ int openInput(const std::string& path) {
     if (known && S_ISREG(status.st_mode)) return descriptor;
     ::close(descriptor);
     if (!known) throw InputRefused(fmt::format("cannot be opened: {}", std::strerror(errno)));
-    throw InputRefused(S_ISDIR(status.st_mode) ? "is a directory" : fmt::format("is {}, not a regular file", kindOf(status.st_mode)));
+    throw InputRefused(S_ISDIR(status.st_mode)
+                           ? "is a directory"
+                           : fmt::format("is {}, not a regular file", kindOf(status.st_mode)));
 }
 
 void requireInput(const std::string& path) { const Descriptor file(openInput(path)); }
@@ -78,13 +85,16 @@ void requireInput(const std::string& path) { const Descriptor file(openInput(pat
 std::string readInput(const std::string& path, std::uint64_t most_bytes) {
     const Descriptor file(openInput(path));
     struct stat status {};
-    if (::fstat(file.get(), &status) != 0) throw InputRefused(fmt::format("cannot be read: {}", std::strerror(errno)));
+    if (::fstat(file.get(), &status) != 0)
+        throw InputRefused(fmt::format("cannot be read: {}", std::strerror(errno)));
     const auto bytes = static_cast<std::uint64_t>(std::max<off_t>(status.st_size, 0));
     if (bytes > most_bytes)
-        throw InputRefused(fmt::format("has {}, and the most for a file of this kind is {}", sizeText(bytes), sizeText(most_bytes)));
+        throw InputRefused(fmt::format("has {}, and the most for a file of this kind is {}", sizeText(bytes),
+                                       sizeText(most_bytes)));
     constexpr std::uint64_t kWorthAsking = std::uint64_t{256} << 20;
     if (bytes > kWorthAsking && bytes > availableHostMemory())
-        throw InputRefused(fmt::format("has {}, and {} of memory are free", sizeText(bytes), sizeText(availableHostMemory())));
+        throw InputRefused(fmt::format("has {}, and {} of memory are free", sizeText(bytes),
+                                       sizeText(availableHostMemory())));
     return readAll(file.get(), bytes, most_bytes);
 }
 

@@ -29,8 +29,8 @@ bool colourForbidden() {
 }
 
 struct Log {
-    // One lock over message and hooks together: a progress bar is cleared, the message written and the bar redrawn
-    // before another thread's message may come between. The sink needs no lock of its own.
+    // One lock over message and hooks together: a progress bar is cleared, the message written and the bar
+    // redrawn before another thread's message may come between. The sink needs no lock of its own.
     std::mutex mutex;
     spdlog::logger logger;
     LogHook hook = nullptr;
@@ -47,8 +47,8 @@ struct Log {
     }
 };
 
-/// Made at the first message and never destroyed, so that destructors of static objects and threads still running while
-/// the process ends may log.
+/// Made at the first message and never destroyed, so that destructors of static objects and threads still
+/// running while the process ends may log.
 Log& log() {
     static Log* const instance = new Log;
     return *instance;

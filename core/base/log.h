@@ -1,4 +1,5 @@
-/// Levelled log. spdlog stays inside log.cpp: nothing else in the core includes it, so that its ABI crosses no border.
+/// Levelled log. spdlog stays inside log.cpp: nothing else in the core includes it, so that its ABI crosses
+/// no border.
 #pragma once
 
 #include <fmt/format.h>
@@ -33,7 +34,8 @@ void logWarning(fmt::format_string<Args...> text, Args&&... args) {
 /// Number of warnings logged so far; the report repeats it so that a warning is never lost in a scroll-back.
 int warningCount();
 
-/// Called around each message by whoever draws on the terminal (the progress bar): first to clear its line, then to redraw.
+/// Called around each message by whoever draws on the terminal (the progress bar): first to clear its line,
+/// then to redraw.
 using LogHook = void (*)(bool before_message, void* user);
 void setLogHook(LogHook hook, void* user);
 

@@ -30,7 +30,8 @@ fs::path thisModule() {
     Dl_info info{};
     link_map* map = nullptr;
     std::error_code unknown;
-    if (dladdr1(reinterpret_cast<void*>(&thisModule), &info, reinterpret_cast<void**>(&map), RTLD_DL_LINKMAP) != 0 &&
+    if (dladdr1(reinterpret_cast<void*>(&thisModule), &info, reinterpret_cast<void**>(&map),
+                RTLD_DL_LINKMAP) != 0 &&
         map != nullptr && map->l_name != nullptr && *map->l_name != '\0')
         return fs::canonical(map->l_name, unknown);
     return fs::read_symlink("/proc/self/exe", unknown);  // The program has no name in the list of libraries.
@@ -46,7 +47,8 @@ fs::path installedTree() {
 
 std::vector<std::string> pluginDirectories() {
     std::vector<std::string> folders = foldersOf("CRT_BACKEND_PATH");
-    if (const fs::path tree = installedTree(); !tree.empty()) folders.push_back((tree / "lib" / "crt").string());
+    if (const fs::path tree = installedTree(); !tree.empty())
+        folders.push_back((tree / "lib" / "crt").string());
     return folders;
 }
 

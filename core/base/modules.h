@@ -1,5 +1,5 @@
-/// Where crt finds what is installed with it: plugins and meshes, relative to the file that holds this code (the
-/// program, libcrt.so, a Python module), so that an installed tree can be moved.
+/// Where crt finds what is installed with it: plugins and meshes, relative to the file that holds this code
+/// (the program, libcrt.so, a Python module), so that an installed tree can be moved.
 #pragma once
 
 #include <string>
@@ -7,11 +7,12 @@
 
 namespace crt {
 
-/// Folders searched for plugins, in order: each of CRT_BACKEND_PATH (separated by ':'), then lib/crt of the tree.
+/// Folders searched for plugins, in order: each of CRT_BACKEND_PATH (separated by ':'), then lib/crt of the
+/// tree.
 std::vector<std::string> pluginDirectories();
 
-/// Folders searched for meshes that are not beside the scene: those of CRT_MESH_PATH (separated by ':'), else
-/// share/crt/meshes of the tree.
+/// Folders searched for meshes that are not beside the scene: those of CRT_MESH_PATH (separated by ':'),
+/// else share/crt/meshes of the tree.
 std::vector<std::string> meshDirectories();
 
 }  // namespace crt

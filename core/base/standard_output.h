@@ -1,4 +1,5 @@
-/// What commands print on standard output. Nothing throws on the way: a full disk is told once, at the end, and a reader that has had enough
+/// What commands print on standard output. Nothing throws on the way: a full disk is told once, at the end,
+/// and a reader that has had enough
 /// (`crt schema | head -1`) is no fault.
 #pragma once
 
@@ -22,10 +23,12 @@ void printOut(fmt::format_string<Args...> format, Args&&... args) {
 /// Sends on what has been printed so far.
 void flushStandardOutput();
 
-/// The same at the end of the program: crt::Error(Output) when something was lost, other than to a closed pipe.
+/// The same at the end of the program: crt::Error(Output) when something was lost, other than to a closed
+/// pipe.
 std::optional<Error> finishStandardOutput();
 
-/// Standard streams that whoever started crt has closed: opened on nothing, so that no output file gets their number and their text.
+/// Standard streams that whoever started crt has closed: opened on nothing, so that no output file gets
+/// their number and their text.
 void openClosedStreams();
 
 }  // namespace crt

@@ -31,7 +31,8 @@ double upperTail(double confidence) {
     return 0.5 + 0.5 * confidence;
 }
 
-/// Above this many degrees of freedom series that Boost's quantiles add up no longer end; the expansions below are right to 1e-13 there.
+/// Above this many degrees of freedom series that Boost's quantiles add up no longer end; the expansions
+/// below are right to 1e-13 there.
 constexpr double kManyDof = 1e9;
 
 /// Wilson and Hilferty 1931: the cube root of χ²/dof is normal, up to O(1/dof) of its deviation.
@@ -48,7 +49,8 @@ double fisherOfManyDof(double z, double numerator_dof, double denominator_dof) {
 }
 
 /// Two variance/count pairs and their Welch–Satterthwaite degrees of freedom.
-double satterthwaite(double variance_of_mean_a, std::uint64_t count_a, double variance_of_mean_b, std::uint64_t count_b) {
+double satterthwaite(double variance_of_mean_a, std::uint64_t count_a, double variance_of_mean_b,
+                     std::uint64_t count_b) {
     const double sum = variance_of_mean_a + variance_of_mean_b;
     const double na = static_cast<double>(count_a), nb = static_cast<double>(count_b);
     if (sum == 0) return na + nb - 2;
@@ -59,7 +61,8 @@ double satterthwaite(double variance_of_mean_a, std::uint64_t count_a, double va
 
 }  // namespace
 
-// ---------------------------------------------------------------------------------------------------------------- distributions
+// ----------------------------------------------------------------------------------------------------------
+// distributions
 
 double normalQuantile(double p) {
     requireProbability(p, "a quantile is asked for a probability between 0 and 1");
@@ -81,8 +84,10 @@ double chiSquaredQuantile(double p, double dof) {
 
 double fisherQuantile(double p, double numerator_dof, double denominator_dof) {
     requireProbability(p, "a quantile is asked for a probability between 0 and 1");
-    require(numerator_dof > 0 && denominator_dof > 0, "Fisher's distribution needs degrees of freedom above 0");
-    if (std::min(numerator_dof, denominator_dof) > kManyDof) return fisherOfManyDof(normalQuantile(p), numerator_dof, denominator_dof);
+    require(numerator_dof > 0 && denominator_dof > 0,
+            "Fisher's distribution needs degrees of freedom above 0");
+    if (std::min(numerator_dof, denominator_dof) > kManyDof)
+        return fisherOfManyDof(normalQuantile(p), numerator_dof, denominator_dof);
     return boost::math::quantile(boost::math::fisher_f{numerator_dof, denominator_dof}, p);
 }
 
@@ -98,7 +103,8 @@ double studentTwoSided(double t, double dof) {
     return 2 * boost::math::cdf(boost::math::complement(boost::math::students_t{dof}, std::abs(t)));
 }
 
-// ------------------------------------------------------------------------------------------------------------------------ means
+// ----------------------------------------------------------------------------------------------------------
+// means
 
 double Summary::standardError() const { return std::sqrt(variance / static_cast<double>(count)); }
 
@@ -125,7 +131,8 @@ Interval meanInterval(const Summary& summary, double confidence) {
 WelchResult welch(const Summary& a, const Summary& b, double confidence) {
     const double p = upperTail(confidence);
     require(a.count >= 2 && b.count >= 2, "Welch's test needs two values or more on each side");
-    const double va = a.variance / static_cast<double>(a.count), vb = b.variance / static_cast<double>(b.count);
+    const double va = a.variance / static_cast<double>(a.count),
+                 vb = b.variance / static_cast<double>(b.count);
     WelchResult result;
     result.difference = a.mean - b.mean;
     result.standard_error = std::sqrt(va + vb);
@@ -137,12 +144,14 @@ WelchResult welch(const Summary& a, const Summary& b, double confidence) {
     result.dof = satterthwaite(va, a.count, vb, b.count);
     result.t = result.difference == 0 ? 0 : result.difference / result.standard_error;
     result.p = studentTwoSided(result.t, result.dof);
-    const double half = result.standard_error == 0 ? 0 : studentQuantile(p, result.dof) * result.standard_error;
+    const double half =
+        result.standard_error == 0 ? 0 : studentQuantile(p, result.dof) * result.standard_error;
     result.interval = {result.difference - half, result.difference + half};
     return result;
 }
 
-// --------------------------------------------------------------------------------------------------------------------- verdicts
+// ----------------------------------------------------------------------------------------------------------
+// verdicts
 
 const char* verdictName(Verdict verdict) {
     switch (verdict) {
@@ -163,10 +172,12 @@ Verdict equivalence(const Interval& difference, double delta) {
 std::vector<bool> holm(std::span<const double> p_values, double alpha) {
     requireProbability(alpha, "alpha lies between 0 and 1");
     // NaN has no place in an order, and must not slip through as not rejected.
-    require(std::none_of(p_values.begin(), p_values.end(), [](double p) { return std::isnan(p); }), "a p-value is NaN");
+    require(std::none_of(p_values.begin(), p_values.end(), [](double p) { return std::isnan(p); }),
+            "a p-value is NaN");
     std::vector<std::size_t> order(p_values.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) { return p_values[i] < p_values[j]; });
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t i, std::size_t j) { return p_values[i] < p_values[j]; });
     std::vector<bool> rejected(p_values.size(), false);
     for (std::size_t i = 0; i < order.size(); ++i) {
         if (p_values[order[i]] > alpha / static_cast<double>(order.size() - i)) break;
@@ -178,13 +189,15 @@ std::vector<bool> holm(std::span<const double> p_values, double alpha) {
 double sidak(double alpha, std::uint64_t tests) {
     requireProbability(alpha, "alpha lies between 0 and 1");
     require(tests > 0, "there is no test to share alpha with");
-    return -std::expm1(std::log1p(-alpha) / static_cast<double>(tests));  // With many tests 1 − (…) would have no digits left.
+    return -std::expm1(std::log1p(-alpha) /
+                       static_cast<double>(tests));  // With many tests 1 − (…) would have no digits left.
 }
 
 double kolmogorovSmirnovUniform(std::span<const double> p_values) {
     require(!p_values.empty(), "the Kolmogorov–Smirnov test needs a value");
     std::vector<double> sorted(p_values.begin(), p_values.end());
-    require(std::all_of(sorted.begin(), sorted.end(), [](double p) { return p >= 0 && p <= 1; }), "a p-value is not between 0 and 1");
+    require(std::all_of(sorted.begin(), sorted.end(), [](double p) { return p >= 0 && p <= 1; }),
+            "a p-value is not between 0 and 1");
     std::sort(sorted.begin(), sorted.end());
     const double n = static_cast<double>(sorted.size());
     double distance = 0;
@@ -218,7 +231,8 @@ Interval clopperPearson(std::uint64_t successes, std::uint64_t trials, double co
     return interval;
 }
 
-// ------------------------------------------------------------------------------------------------------------ bootstrap and fits
+// ----------------------------------------------------------------------------------------------------------
+// bootstrap and fits
 
 namespace {
 
@@ -250,7 +264,8 @@ double quantileOf(const std::vector<double>& sorted, double p) {
 
 }  // namespace
 
-Interval bootstrap(std::size_t count, const ResampledStatistic& statistic, std::size_t resamples, double confidence, std::uint64_t seed) {
+Interval bootstrap(std::size_t count, const ResampledStatistic& statistic, std::size_t resamples,
+                   double confidence, std::uint64_t seed) {
     const double tail = upperTail(confidence);
     require(count >= 2 && resamples >= 2, "a bootstrap needs two items and two resamples or more");
     require(count < (std::uint64_t{1} << 32), "a bootstrap takes fewer than 2^32 items");
@@ -258,20 +273,26 @@ Interval bootstrap(std::size_t count, const ResampledStatistic& statistic, std::
     std::iota(drawn.begin(), drawn.end(), std::size_t{0});
     const double whole = statistic(drawn);
 
-    // std::uniform_int_distribution differs between libraries; this does not. Its bias is below 2^-32 · count.
+    // std::uniform_int_distribution differs between libraries; this does not. Its bias is below 2^-32 ·
+    // count.
     std::mt19937_64 random(seed);
     std::vector<double> values(resamples);
     for (double& value : values) {
         for (std::size_t& index : drawn) index = static_cast<std::size_t>(((random() >> 32) * count) >> 32);
         value = statistic(drawn);
     }
-    if (!std::isfinite(whole) || std::any_of(values.begin(), values.end(), [](double v) { return std::isnan(v); })) return {kNan, kNan};
+    if (!std::isfinite(whole) ||
+        std::any_of(values.begin(), values.end(), [](double v) { return std::isnan(v); }))
+        return {kNan, kNan};
     std::sort(values.begin(), values.end());
 
     const auto [first, last] = std::equal_range(values.begin(), values.end(), whole);
-    const double below = static_cast<double>(first - values.begin()), equal = static_cast<double>(last - first);
+    const double below = static_cast<double>(first - values.begin()),
+                 equal = static_cast<double>(last - first);
     const double part = (below + 0.5 * equal) / static_cast<double>(resamples);
-    if (part <= 0 || part >= 1) return {std::min(values.front(), whole), std::max(values.back(), whole)};  // No bias correction reaches there.
+    if (part <= 0 || part >= 1)
+        return {std::min(values.front(), whole),
+                std::max(values.back(), whole)};  // No bias correction reaches there.
     const double bias = normalQuantile(part), accelerated = acceleration(count, statistic);
     const auto corrected = [&](double z) {
         const double shifted = bias + (bias + z) / (1 - accelerated * (bias + z));
@@ -281,10 +302,12 @@ Interval bootstrap(std::size_t count, const ResampledStatistic& statistic, std::
     return {corrected(-z), corrected(z)};
 }
 
-LineFit weightedLine(std::span<const double> x, std::span<const double> y, std::span<const double> weights, Weights meaning) {
+LineFit weightedLine(std::span<const double> x, std::span<const double> y, std::span<const double> weights,
+                     Weights meaning) {
     require(x.size() == y.size() && x.size() == weights.size(), "a line needs as many y and weights as x");
     require(x.size() >= 2, "a line needs two points or more");
-    require(std::all_of(weights.begin(), weights.end(), [](double w) { return w > 0; }), "the weights of a line are above 0");
+    require(std::all_of(weights.begin(), weights.end(), [](double w) { return w > 0; }),
+            "the weights of a line are above 0");
     double w = 0, mean_x = 0, mean_y = 0;
     for (std::size_t i = 0; i < x.size(); ++i) {
         w += weights[i];
@@ -311,7 +334,9 @@ LineFit weightedLine(std::span<const double> x, std::span<const double> y, std::
     }
     fit.dof = static_cast<double>(x.size()) - 2;
     fit.r2 = yy == 0 ? 1 : 1 - fit.chi_squared / yy;
-    const double factor = meaning == Weights::InverseVariances ? 1 : fit.dof > 0 ? fit.chi_squared / fit.dof : kNan;
+    const double factor = meaning == Weights::InverseVariances ? 1
+                          : fit.dof > 0                        ? fit.chi_squared / fit.dof
+                                                               : kNan;
     fit.slope_variance = factor / xx;
     fit.intercept_variance = factor * (1 / w + mean_x * mean_x / xx);
     fit.covariance = -factor * mean_x / xx;

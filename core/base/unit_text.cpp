@@ -32,14 +32,23 @@ std::string rateText(double per_second, const char* unit) {
     };
     for (const Prefix prefix : {Prefix{1e9, "G"}, Prefix{1e6, "M"}, Prefix{1e3, "k"}}) {
         const double value = per_second / prefix.scale;
-        if (value >= 1) return fmt::format("{:.{}f} {}{}", value, value < 9.995 ? 2 : value < 99.95 ? 1 : 0, prefix.letter, unit);
+        if (value >= 1)
+            return fmt::format("{:.{}f} {}{}", value,
+                               value < 9.995   ? 2
+                               : value < 99.95 ? 1
+                                               : 0,
+                               prefix.letter, unit);
     }
     return fmt::format("{:.0f} {}", per_second, unit);
 }
 
 std::string percentText(double fraction) {
     const double percent = fraction * 100;
-    return fmt::format("{:.{}f} %", percent, percent < 0.0995 ? 3 : percent < 0.995 ? 2 : percent < 99.5 ? 1 : 0);
+    return fmt::format("{:.{}f} %", percent,
+                       percent < 0.0995  ? 3
+                       : percent < 0.995 ? 2
+                       : percent < 99.5  ? 1
+                                         : 0);
 }
 
 std::string bytesText(double bytes) {

@@ -28,12 +28,15 @@ std::string notDecimal(const std::string& text) {
     if (lower == "nan" || lower == ".nan" || lower == "inf" || lower == ".inf" || lower == "infinity")
         return "NaN and infinity have no place in a scene";
     if (lower.starts_with('+') || lower.starts_with('-')) return "it is not a number";
-    if (lower.starts_with("0x") || lower.starts_with("0o") || lower.starts_with("0b")) return "write it in decimal";
+    if (lower.starts_with("0x") || lower.starts_with("0o") || lower.starts_with("0b"))
+        return "write it in decimal";
     if (lower.size() > 1 && lower[0] == '0' && lower[1] >= '0' && lower[1] <= '9') {
         const std::size_t first = std::min(lower.find_first_not_of('0'), lower.size() - 1);
-        return fmt::format("leading zeros mean octal to some YAML readers; write {}{}", text[0] == '-' ? "-" : "", lower.substr(first));
+        return fmt::format("leading zeros mean octal to some YAML readers; write {}{}",
+                           text[0] == '-' ? "-" : "", lower.substr(first));
     }
-    // from_chars would take "inf" and "nan" in more spellings, so let only what can be in a decimal number through.
+    // from_chars would take "inf" and "nan" in more spellings, so let only what can be in a decimal number
+    // through.
     if (lower.empty() || lower.find_first_not_of("0123456789.e+-") != std::string::npos ||
         lower.find_first_of("0123456789") == std::string::npos)
         return "it is not a number";
@@ -70,7 +73,8 @@ std::size_t editDistance(std::string_view a, std::string_view b) {
         now[0] = i;
         for (std::size_t j = 1; j <= b.size(); ++j) {
             now[j] = std::min({last[j] + 1, now[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
-            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) now[j] = std::min(now[j], before[j - 2] + 1);
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+                now[j] = std::min(now[j], before[j - 2] + 1);
         }
         before.swap(last);
         last.swap(now);
@@ -134,8 +138,9 @@ std::vector<std::string> parseList(const std::string& text, const std::string& o
     std::vector<std::string> words = splitAt(text, ',');
     for (const std::string& word : words)
         if (word.empty())
-            throw Error(ErrorKind::Usage, fmt::format("{} takes names with commas between them, such as cuda,embree, not '{}'",
-                                                      option, text));
+            throw Error(ErrorKind::Usage,
+                        fmt::format("{} takes names with commas between them, such as cuda,embree, not '{}'",
+                                    option, text));
     return words;
 }
 

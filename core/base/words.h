@@ -27,11 +27,12 @@ bool looksLikeNumber(std::string_view text);
 /// The parts between separators; one part where there is none.
 std::vector<std::string> splitAt(const std::string& text, char separator);
 
-/// "cuda,embree": words between commas, none of them empty. `option` stands in the message of the crt::Error(Usage).
+/// "cuda,embree": words between commas, none of them empty. `option` stands in the message of the
+/// crt::Error(Usage).
 std::vector<std::string> parseList(const std::string& text, const std::string& option);
 
-/// The candidate nearest to `word` by Damerau–Levenshtein distance, if it is within 2 or a third of the length (1 for words
-/// of up to three letters).
+/// The candidate nearest to `word` by Damerau–Levenshtein distance, if it is within 2 or a third of the
+/// length (1 for words of up to three letters).
 std::optional<std::string> nearestWord(std::string_view word, const std::vector<std::string>& candidates);
 /// "did you mean 'x'?" or nothing.
 std::string didYouMean(std::string_view word, const std::vector<std::string>& candidates);

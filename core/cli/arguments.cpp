@@ -1,8 +1,8 @@
 #include "cli/arguments.h"
 
-#include "film/checkpoint.h"
 #include "base/error.h"
 #include "base/words.h"
+#include "film/checkpoint.h"
 
 #include <fmt/format.h>
 
@@ -24,9 +24,10 @@ bool endsWith(const std::string& text, std::string_view end) {
     return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-/// "option word" → "option=word" where the word ends in `extension`, else "option=otherwise": an option whose value may be left out must not swallow
-/// what comes after it.
-void giveValue(std::vector<std::string>& arguments, const char* option, std::string_view extension, const char* otherwise) {
+/// "option word" → "option=word" where the word ends in `extension`, else "option=otherwise": an option
+/// whose value may be left out must not swallow what comes after it.
+void giveValue(std::vector<std::string>& arguments, const char* option, std::string_view extension,
+               const char* otherwise) {
     for (std::size_t i = 0; i < arguments.size(); ++i) {
         if (arguments[i] == "--") break;
         if (arguments[i] != option) continue;
@@ -44,7 +45,9 @@ void giveValue(std::vector<std::string>& arguments, const char* option, std::str
 std::uint64_t parseCount(const std::string& text, const std::string& option, std::uint64_t least) {
     const Parsed<std::uint64_t> number = parseUnsigned(text);
     if (!number.value || *number.value < least)
-        refuse(option, least == 0 ? "a whole number" : fmt::format("a whole number of at least {}", least).c_str(), text);
+        refuse(option,
+               least == 0 ? "a whole number" : fmt::format("a whole number of at least {}", least).c_str(),
+               text);
     return *number.value;
 }
 
@@ -72,12 +75,18 @@ double parseDuration(const std::string& text, const std::string& option) {
         double value = 0;
         const auto [after, error] = std::from_chars(at, end, value, std::chars_format::fixed);
         if (error != std::errc{} || !(value >= 0)) refuse(option, kExpected, text);
-        const char* unit_end = std::find_if(after, end, [](char c) { return (c >= '0' && c <= '9') || c == '.'; });
+        const char* unit_end =
+            std::find_if(after, end, [](char c) { return (c >= '0' && c <= '9') || c == '.'; });
         const std::string_view unit(after, static_cast<std::size_t>(unit_end - after));
-        const double unit_seconds = unit == "h" ? 3600 : unit == "m" || unit == "min" ? 60 : unit == "s" || unit.empty() ? 1 : unit == "ms" ? 1e-3 : 0;
+        const double unit_seconds = unit == "h"                    ? 3600
+                                    : unit == "m" || unit == "min" ? 60
+                                    : unit == "s" || unit.empty()  ? 1
+                                    : unit == "ms"                 ? 1e-3
+                                                                   : 0;
         // Larger units first, and a number without a unit only alone: "1h30" could mean minutes or seconds.
         const bool alone = at == text.data() && unit_end == end;
-        if (unit_seconds == 0 || unit_seconds >= last_unit || (unit.empty() && !alone)) refuse(option, kExpected, text);
+        if (unit_seconds == 0 || unit_seconds >= last_unit || (unit.empty() && !alone))
+            refuse(option, kExpected, text);
         seconds += value * unit_seconds;
         last_unit = unit_seconds;
         at = unit_end;
@@ -100,13 +109,15 @@ std::array<int, 4> parseRectangle(const std::string& text, const std::string& op
     if (parts.size() != rectangle.size()) refuse(option, "four pixel numbers x0,y0,x1,y1", text);
     for (std::size_t i = 0; i < rectangle.size(); ++i) {
         const auto number = parseUnsigned(parts[i]);
-        if (!number.value || *number.value > std::numeric_limits<int>::max()) refuse(option, "four pixel numbers x0,y0,x1,y1", text);
+        if (!number.value || *number.value > std::numeric_limits<int>::max())
+            refuse(option, "four pixel numbers x0,y0,x1,y1", text);
         rectangle[i] = static_cast<int>(*number.value);
     }
     return rectangle;
 }
 
-std::vector<std::string> writtenOut(std::vector<std::string> arguments, const std::vector<std::string>& commands) {
+std::vector<std::string> writtenOut(std::vector<std::string> arguments,
+                                    const std::vector<std::string>& commands) {
     if (arguments.empty()) return arguments;
     const std::string first = arguments.front();
     const bool for_all = first == "-h" || first == "--help" || first == "--version";
@@ -114,10 +125,12 @@ std::vector<std::string> writtenOut(std::vector<std::string> arguments, const st
         const std::filesystem::path path(first);
         std::error_code unreadable;
         // A word that is no file and does not look like one was meant as a command.
-        const bool word = first[0] != '-' && !path.has_extension() && !path.has_parent_path() && !std::filesystem::exists(path, unreadable);
+        const bool word = first[0] != '-' && !path.has_extension() && !path.has_parent_path() &&
+                          !std::filesystem::exists(path, unreadable);
         if (word) {
             const std::string hint = didYouMean(first, commands);
-            throw Error(ErrorKind::Usage, fmt::format("'{}' is neither a command nor a scene file{}", first, hint.empty() ? "" : "; " + hint));
+            throw Error(ErrorKind::Usage, fmt::format("'{}' is neither a command nor a scene file{}", first,
+                                                      hint.empty() ? "" : "; " + hint));
         }
         arguments.insert(arguments.begin(), "render");
     }
@@ -127,7 +140,8 @@ std::vector<std::string> writtenOut(std::vector<std::string> arguments, const st
 }
 
 std::string shellLine(const std::vector<std::string>& words) {
-    constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_@%+=:,./-";
+    constexpr std::string_view kPlain =
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_@%+=:,./-";
     std::string line;
     for (const std::string& word : words) {
         if (!line.empty()) line += ' ';

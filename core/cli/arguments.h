@@ -10,7 +10,8 @@
 
 namespace crt {
 
-/// A whole number of at least `least`; 1e3 is one. `option` stands in the message of the crt::Error(Usage), here and below.
+/// A whole number of at least `least`; 1e3 is one. `option` stands in the message of the crt::Error(Usage),
+/// here and below.
 std::uint64_t parseCount(const std::string& text, const std::string& option, std::uint64_t least);
 
 /// A number of at least zero.
@@ -28,10 +29,13 @@ SampleRange parseSampleRange(const std::string& text, const std::string& option)
 /// "x0,y0,x1,y1".
 std::array<int, 4> parseRectangle(const std::string& text, const std::string& option);
 
-/// What the program's arguments (without its name) mean once abbreviations are written out: a first word that is none of `commands` is
-/// preceded by "render"; "--resume FILE.crtfilm" becomes "--resume=FILE.crtfilm" and "--resume" before anything else "--resume=auto", so that it
-/// never swallows the scene; the same with compare's "--json FILE.json", or "--json=-". Throws crt::Error(Usage) for a first word that is a command misspelt.
-std::vector<std::string> writtenOut(std::vector<std::string> arguments, const std::vector<std::string>& commands);
+/// What the program's arguments (without its name) mean once abbreviations are written out: a first word
+/// that is none of `commands` is preceded by "render"; "--resume FILE.crtfilm" becomes
+/// "--resume=FILE.crtfilm" and "--resume" before anything else "--resume=auto", so that it never swallows
+/// the scene; the same with compare's "--json FILE.json", or "--json=-". Throws crt::Error(Usage) for a
+/// first word that is a command misspelt.
+std::vector<std::string> writtenOut(std::vector<std::string> arguments,
+                                    const std::vector<std::string>& commands);
 
 /// The arguments as one line that a POSIX shell reads back as them.
 std::string shellLine(const std::vector<std::string>& words);

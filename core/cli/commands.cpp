@@ -1,20 +1,20 @@
 #include "cli/commands.h"
 #include "film/error_text.h"
 
-#include "base/unit_text.h"
-#include "base/atomic_file.h"
 #include "backend/loader.h"
-#include "film/checkpoint.h"
+#include "base/atomic_file.h"
+#include "base/log.h"
+#include "base/stage.h"
+#include "base/standard_output.h"
+#include "base/unit_text.h"
+#include "cli/stage_progress.h"
 #include "compile/compile.h"
+#include "film/checkpoint.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
 #include "kernel/features.h"
-#include "base/log.h"
 #include "render/output_guard.h"
 #include "render/outputs.h"
-#include "cli/stage_progress.h"
-#include "base/stage.h"
-#include "base/standard_output.h"
 
 #include <fmt/format.h>
 
@@ -38,7 +38,9 @@ void row(const char* name, const std::string& value) {
     printOut("  {:<{}} {}\n", name, kColumn - 1, indented);
 }
 
-std::string counted(std::uint64_t n, const char* one, const char* many) { return fmt::format("{} {}", n, n == 1 ? one : many); }
+std::string counted(std::uint64_t n, const char* one, const char* many) {
+    return fmt::format("{} {}", n, n == 1 ? one : many);
+}
 
 const char* name(MaterialType type) {
     switch (type) {
@@ -72,14 +74,16 @@ std::string vectorText(const Vec3d& v) { return fmt::format("({:g}, {:g}, {:g})"
 
 std::string cameraText(const Camera& camera) {
     const auto degrees = [](double tangent) { return 2 * std::atan(tangent) * 57.29577951308232; };
-    std::string text = fmt::format("at {} looking at {}, field of view {:.1f} x {:.1f} degrees", vectorText(camera.position),
-                                   vectorText(camera.target), degrees(camera.tan_half_width), degrees(camera.tan_half_height));
+    std::string text = fmt::format("at {} looking at {}, field of view {:.1f} x {:.1f} degrees",
+                                   vectorText(camera.position), vectorText(camera.target),
+                                   degrees(camera.tan_half_width), degrees(camera.tan_half_height));
     if (camera.aperture_radius > 0) text += fmt::format(", lens of radius {:g}", camera.aperture_radius);
     return text;
 }
 
 std::string filmText(const Scene& scene) {
-    std::string text = fmt::format("{} x {} pixels, {} filter", scene.film.width, scene.film.height, name(scene.film.filter));
+    std::string text = fmt::format("{} x {} pixels, {} filter", scene.film.width, scene.film.height,
+                                   name(scene.film.filter));
     const auto& [x0, y0, x1, y1] = scene.film.crop;
     if (x1 > x0) text += fmt::format(", cropped to [{}, {}) x [{}, {})", x0, x1, y0, y1);
     return text;
@@ -89,21 +93,27 @@ std::string materialsText(const Scene& scene) {
     constexpr std::size_t kShown = 100;
     std::string text;
     for (std::size_t i = 0; i < std::min(kShown, scene.materials.size()); ++i)
-        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", scene.materials[i].name, name(scene.materials[i].type));
-    if (scene.materials.size() > kShown) text += fmt::format(" and {} more", scene.materials.size() - kShown);
+        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", scene.materials[i].name,
+                            name(scene.materials[i].type));
+    if (scene.materials.size() > kShown)
+        text += fmt::format(" and {} more", scene.materials.size() - kShown);
     return text.empty() ? "none" : text;
 }
 
 std::string lightsText(const Scene& scene, const CompiledScene& compiled) {
     std::string text;
-    if (compiled.emitters > 0) text = counted(compiled.emitters, "emitting triangle or parallelogram", "emitting triangles or parallelograms");
+    if (compiled.emitters > 0)
+        text = counted(compiled.emitters, "emitting triangle or parallelogram",
+                       "emitting triangles or parallelograms");
     if (scene.environment) text += text.empty() ? "constant environment" : ", constant environment";
     return text.empty() ? "none: every image will be black" : text;
 }
 
 std::string acceleratorText(const CompiledScene& compiled) {
-    if (compiled.features & CRT_FEATURE_BVH) return fmt::format("BVH, {}", counted(compiled.nodes, "node of four", "nodes of four"));
-    if (compiled.features & CRT_FEATURE_AABB) return fmt::format("a box around each of {}", counted(compiled.objects, "object", "objects"));
+    if (compiled.features & CRT_FEATURE_BVH)
+        return fmt::format("BVH, {}", counted(compiled.nodes, "node of four", "nodes of four"));
+    if (compiled.features & CRT_FEATURE_AABB)
+        return fmt::format("a box around each of {}", counted(compiled.objects, "object", "objects"));
     return compiled.triangles == 0 ? "none: there is nothing to hit" : "a loop over all triangles";
 }
 
@@ -115,19 +125,23 @@ void showScene(const SceneRequest& what) {
     printOut("{}{}\n", what.file, scene.title.empty() ? "" : ": " + scene.title);
     row("film", filmText(scene));
     row("camera", cameraText(scene.camera));
-    row("geometry", counted(compiled.objects, "object", "objects") + ", " + counted(compiled.triangles, "triangle", "triangles"));
+    row("geometry", counted(compiled.objects, "object", "objects") + ", " +
+                        counted(compiled.triangles, "triangle", "triangles"));
     row("materials", materialsText(scene));
     row("lights", lightsText(scene, compiled));
-    row("sampler", fmt::format("{}, seed {}, {} samples per pixel", name(scene.sampler.type), scene.sampler.seed, scene.sampler.samples));
+    row("sampler", fmt::format("{}, seed {}, {} samples per pixel", name(scene.sampler.type),
+                               scene.sampler.seed, scene.sampler.samples));
     row("accelerator", acceleratorText(compiled));
     row("needs", featureNames(compiled.features));
     std::string left_out;
-    for (const auto& [thing, why] : compiled.left_out) left_out += fmt::format("{}{}: {}", left_out.empty() ? "" : "\n", thing, why);
+    for (const auto& [thing, why] : compiled.left_out)
+        left_out += fmt::format("{}{}: {}", left_out.empty() ? "" : "\n", thing, why);
     row("left out", left_out.empty() ? "nothing" : left_out);
     row("scene blob", bytesText(static_cast<double>(compiled.size_bytes)));
     row("scene hash", compiled.hash);
-    row("times", fmt::format("{} to read, {} to compile, {} of it for the accelerator", durationText(scene.parse_seconds),
-                             durationText(compiled.compile_seconds), durationText(compiled.build_seconds)));
+    row("times", fmt::format("{} to read, {} to compile, {} of it for the accelerator",
+                             durationText(scene.parse_seconds), durationText(compiled.compile_seconds),
+                             durationText(compiled.build_seconds)));
 }
 
 std::string aovText(std::uint32_t aovs) {
@@ -153,8 +167,9 @@ void showRecord(const FilmRecord& record) {
     };
     optional_row("title", record.title);
     if (record.isCropped())
-        row("window", fmt::format("[{}, {}) x [{}, {}) of {} x {} pixels", record.window[0], record.window[2], record.window[1],
-                                  record.window[3], record.width, record.height));
+        row("window",
+            fmt::format("[{}, {}) x [{}, {}) of {} x {} pixels", record.window[0], record.window[2],
+                        record.window[1], record.window[3], record.width, record.height));
     row("developed in", developmentText(record.development));
     std::vector<std::string> lights;
     for (const auto& [name, white] : record.whites) lights.push_back(name);
@@ -169,7 +184,8 @@ void showFilm(const std::string& file) {
     const auto [film, identity] = readCheckpoint(file);
     const bool independent = identity.record && identity.record->independent_samples;
     const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, independent);
-    printOut("{}: {}\n", file, identity.record && identity.record->complete == true ? "film" : "partial render");
+    printOut("{}: {}\n", file,
+             identity.record && identity.record->complete == true ? "film" : "partial render");
     row("film", fmt::format("{} x {} pixels", film.shape().width, film.shape().height));
     row("aovs", aovText(film.shape().aovs));
     row("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
@@ -185,7 +201,8 @@ void showImage(const std::string& file) {
     printOut("{}: image\n", file);
     row("size", fmt::format("{} x {} pixels", image.width, image.height));
     row("channels", fmt::format("{}", fmt::join(image.channels, ", ")));
-    if (!image.integer_channels.empty()) row("integers", fmt::format("{}", fmt::join(image.integer_channels, ", ")));
+    if (!image.integer_channels.empty())
+        row("integers", fmt::format("{}", fmt::join(image.integer_channels, ", ")));
     for (const auto& [key, value] : image.metadata) row(key.c_str(), value);
 }
 
@@ -222,7 +239,9 @@ int mergeFilms(const MergeArguments& arguments) {
     if (has_scene) {
         FilmRecord record = recordOf(scene);
         requireSameScene(arguments.parts.front(), identity,
-                         {.scene_hash = compileScene(scene, requestedAovs(scene)).hash, .version = CRT_VERSION, .record = record});
+                         {.scene_hash = compileScene(scene, requestedAovs(scene)).hash,
+                          .version = CRT_VERSION,
+                          .record = record});
         if (identity.record) record.addRun(*identity.record);
         identity.record = std::move(record);
     }
@@ -233,8 +252,8 @@ int mergeFilms(const MergeArguments& arguments) {
         if (output.format == OutputFormat::Exr) output.aovs = identity.record->aovs;
         writeOutput(output, film, identity);
     }
-    logInfo("{} samples per pixel from {} to {}", film.samples.count(), counted(arguments.parts.size(), "part", "parts"),
-            fmt::join(arguments.outputs, ", "));
+    logInfo("{} samples per pixel from {} to {}", film.samples.count(),
+            counted(arguments.parts.size(), "part", "parts"), fmt::join(arguments.outputs, ", "));
     return 0;
 }
 

@@ -1,4 +1,5 @@
-/// The subcommands of crt beside render (job.h): one function each, from checked arguments to an exit code. What they print goes to stdout.
+/// The subcommands of crt beside render (job.h): one function each, from checked arguments to an exit code.
+/// What they print goes to stdout.
 #pragma once
 
 #include "cli/progress.h"
@@ -16,8 +17,8 @@ namespace crt {
 /// `crt info`: what a scene needs, or what a film or an image holds, by the name's extension.
 int showInfo(const SceneRequest& what);
 
-/// `crt compare A B`: exit code 7 when the images differ (compare.h says what that means). `crt compare --backends X,Y SCENE`: 7 when the verdict is
-/// not PASS.
+/// `crt compare A B`: exit code 7 when the images differ (compare.h says what that means). `crt compare
+/// --backends X,Y SCENE`: 7 when the verdict is not PASS.
 struct CompareArguments {
     std::string first, second;    ///< With backends, the first is the scene and there is no second.
     CompareOptions options;
@@ -36,16 +37,17 @@ struct MergeArguments {
     std::vector<std::string> parts;
     std::vector<std::string> outputs;
     bool overwrite = false;  ///< Also over a film of more samples.
-    SceneRequest scene;  ///< As rendered, for films that do not say themselves how to develop them; an empty name means none.
+    SceneRequest scene;  ///< As rendered, for films that do not say themselves how to develop them; an empty
+                         ///< name means none.
 };
 int mergeFilms(const MergeArguments& arguments);
 
-/// `crt develop`: images of films, with other exposure, white balance, colour space or crop window than the scene's,
-/// and without a backend or the scene. Films of disjoint samples are added up first.
+/// `crt develop`: images of films, with other exposure, white balance, colour space or crop window than the
+/// scene's, and without a backend or the scene. Films of disjoint samples are added up first.
 struct DevelopArguments {
     std::vector<std::string> films;
     std::vector<std::string> outputs;
-    std::vector<SceneOverride> changes;      ///< Keys of `film` that no sample depends on; others are refused.
+    std::vector<SceneOverride> changes;  ///< Keys of `film` that no sample depends on; others are refused.
     std::optional<std::array<int, 4>> crop;  ///< Of the whole film; x0, y0, x1, y1, half open.
     std::vector<std::string> aovs;           ///< Of EXR files; empty: those of the scene. "none": none.
 };

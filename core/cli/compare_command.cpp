@@ -1,12 +1,12 @@
-#include "cli/terminal_watch.h"
 #include "base/atomic_file.h"
+#include "base/error.h"
+#include "base/standard_output.h"
 #include "cli/commands.h"
+#include "cli/terminal_watch.h"
+#include "image/image_io.h"
 #include "judge/compare/compare_backends.h"
 #include "judge/compare/compare_text.h"
-#include "base/error.h"
-#include "image/image_io.h"
 #include "render/output_guard.h"
-#include "base/standard_output.h"
 
 #include <fmt/format.h>
 
@@ -25,7 +25,8 @@ constexpr int kDifferent = 7;
 /// Do files of this name hold what a screen shows, and not radiance?
 bool isDisplayReferred(const std::string& file) {
     std::string extension = std::filesystem::path(file).extension();
-    std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](unsigned char c) { return std::tolower(c); });
     return extension != ".exr" && extension != ".pfm" && extension != ".hdr";
 }
 
@@ -38,7 +39,8 @@ void writeText(const std::string& file, const std::string& text) {
 /// Text to stdout and JSON to its file, or JSON to stdout.
 void print(const CompareArguments& arguments, const std::string& text, const std::string& json) {
     printOut("{}\n", arguments.json_file == "-" ? json : text);
-    if (!arguments.json_file.empty() && arguments.json_file != "-") writeText(arguments.json_file, json + "\n");
+    if (!arguments.json_file.empty() && arguments.json_file != "-")
+        writeText(arguments.json_file, json + "\n");
 }
 
 /// Of images that do not match there is nothing but that to say. Throws crt::Error(Usage) when more was
@@ -59,15 +61,20 @@ std::vector<std::string> named(const std::vector<std::string>& files) {
         if (!file.empty() && file != "-") names.push_back(file);
     return names;
 }
-std::vector<std::string> inputs(const CompareArguments& arguments) { return named({arguments.first, arguments.second, arguments.reference}); }
+std::vector<std::string> inputs(const CompareArguments& arguments) {
+    return named({arguments.first, arguments.second, arguments.reference});
+}
 std::vector<std::string> outputs(const CompareArguments& arguments) {
     return named({arguments.difference_file, arguments.map_file, arguments.json_file});
 }
 
 int compareFiles(const CompareArguments& arguments) {
     if (arguments.second.empty())
-        throw Error(ErrorKind::Usage, fmt::format("there is nothing to compare '{}' with; name a second image, or backends with --backends",
-                                                  arguments.first));
+        throw Error(
+            ErrorKind::Usage,
+            fmt::format(
+                "there is nothing to compare '{}' with; name a second image, or backends with --backends",
+                arguments.first));
     if (arguments.scene.seed || arguments.scene.crop || !arguments.scene.overrides.empty())
         throw Error(ErrorKind::Usage, "--set, --seed and --crop change a scene, and need --backends");
     refuseOverInputs(inputs(arguments), outputs(arguments));
@@ -83,7 +90,8 @@ int compareFiles(const CompareArguments& arguments) {
     std::optional<NoiseComparison> noise;
     if (comparable) noise = compareNoise(a, b);
     std::optional<ReferenceComparison> reference;
-    if (reference_image && result.mismatch.empty()) reference = compareWithReference(a, b, *reference_image, options.display_referred);
+    if (reference_image && result.mismatch.empty())
+        reference = compareWithReference(a, b, *reference_image, options.display_referred);
 
     const Comparison comparison{&result, noise ? &*noise : nullptr, reference ? &*reference : nullptr};
     print(arguments, comparisonText(comparison), comparisonJson(comparison));
@@ -102,7 +110,8 @@ int compareFiles(const CompareArguments& arguments) {
 
 int compareBackends(const CompareArguments& arguments) {
     if (!arguments.second.empty())
-        throw Error(ErrorKind::Usage, fmt::format("--backends takes one scene: '{}' is one too many", arguments.second));
+        throw Error(ErrorKind::Usage,
+                    fmt::format("--backends takes one scene: '{}' is one too many", arguments.second));
     SceneRequest request = arguments.scene;
     request.file = arguments.first;
     const Scene scene = loadScene(request);

@@ -1,13 +1,13 @@
-#include "base/unit_text.h"
-#include "film/error_text.h"
 #include "base/atomic_file.h"
-#include "film/checkpoint.h"
-#include "cli/commands.h"
-#include "film/error_estimate.h"
-#include "render/light_checks.h"
 #include "base/log.h"
-#include "render/outputs.h"
+#include "base/unit_text.h"
+#include "cli/commands.h"
 #include "cli/progress.h"
+#include "film/checkpoint.h"
+#include "film/error_estimate.h"
+#include "film/error_text.h"
+#include "render/light_checks.h"
+#include "render/outputs.h"
 #include "scene/yaml/scene_schema.h"
 #include "scene/yaml/yaml_reader.h"
 
@@ -21,14 +21,15 @@
 namespace crt {
 namespace {
 
-constexpr std::array<const char*, 5> kDevelopmentKeys{"film.exposure_ev", "film.white_balance", "film.color_space", "film.crop",
-                                                      "film.apply_to_float"};
+constexpr std::array<const char*, 5> kDevelopmentKeys{
+    "film.exposure_ev", "film.white_balance", "film.color_space", "film.crop", "film.apply_to_float"};
 
 bool isSceneKey(std::string_view path) {
     const std::string_view first = path.substr(0, path.find('.'));
     const KeySchema* key = schemaSection("").find(first);
     if (key == nullptr) return false;
-    if (key->shape != ValueShape::One || key->kind != ValueKind::Section || first.size() == path.size()) return true;
+    if (key->shape != ValueShape::One || key->kind != ValueKind::Section || first.size() == path.size())
+        return true;
     const std::string_view rest = path.substr(first.size() + 1);
     return schemaSection(key->section).find(rest.substr(0, rest.find('.'))) != nullptr;
 }
@@ -38,18 +39,24 @@ void requireDevelopmentKey(const std::string& path) {
     if (std::find(kDevelopmentKeys.begin(), kDevelopmentKeys.end(), path) != kDevelopmentKeys.end()) return;
     const std::string offer = fmt::format("crt develop changes {}", fmt::join(kDevelopmentKeys, ", "));
     if (isSceneKey(path))
-        throw Error(ErrorKind::Usage, fmt::format("--set {}: the samples of a film depend on '{}', so this needs a render ('crt render'); {}", path,
-                                                  path, offer));
+        throw Error(
+            ErrorKind::Usage,
+            fmt::format(
+                "--set {}: the samples of a film depend on '{}', so this needs a render ('crt render'); {}",
+                path, path, offer));
     const std::vector<std::string> keys(kDevelopmentKeys.begin(), kDevelopmentKeys.end());
     const bool short_form = std::find(keys.begin(), keys.end(), "film." + path) != keys.end();
-    const std::string hint = short_form ? fmt::format("did you mean 'film.{}'?", path) : didYouMean(path, keys);
-    throw Error(ErrorKind::Usage, fmt::format("--set {}: there is no key '{}'; {}", path, path, hint.empty() ? offer : hint));
+    const std::string hint =
+        short_form ? fmt::format("did you mean 'film.{}'?", path) : didYouMean(path, keys);
+    throw Error(ErrorKind::Usage,
+                fmt::format("--set {}: there is no key '{}'; {}", path, path, hint.empty() ? offer : hint));
 }
 
 /// The name in `film.white_balance=lamp`; empty for other forms of a spectrum.
 std::string nameIn(std::string value) {
     const auto strip = [&value](const char* characters) {
-        const std::size_t first = value.find_first_not_of(characters), last = value.find_last_not_of(characters);
+        const std::size_t first = value.find_first_not_of(characters),
+                          last = value.find_last_not_of(characters);
         value = first == std::string::npos ? "" : value.substr(first, last - first + 1);
     };
     strip(" \t");
@@ -58,7 +65,8 @@ std::string nameIn(std::string value) {
     return plain && value != "null" && !looksLikeNumber(value) ? value : std::string();
 }
 
-/// The white that a name says: a light of the film's scene, or an illuminant (nothing: let the reader find it).
+/// The white that a name says: a light of the film's scene, or an illuminant (nothing: let the reader find
+/// it).
 std::optional<Vec3d> namedWhite(const FilmRecord& record, const std::string& name) {
     if (const auto found = record.whites.find(name); found != record.whites.end()) return found->second;
     if (name.empty() || illuminantSpectrum(name)) return std::nullopt;
@@ -74,9 +82,12 @@ void setWindow(FilmRecord& record, const std::array<int, 4>& window) {
     const auto& [x0, y0, x1, y1] = window;
     const auto& [left, top, right, bottom] = record.window;
     if (x0 < left || y0 < top || x1 > right || y1 > bottom || x0 >= x1 || y0 >= y1)
-        throw Error(ErrorKind::Usage, fmt::format("the crop window {},{},{},{} is no rectangle within {},{},{},{}, which the film holds "
-                                                  "of {} × {} pixels",
-                                                  x0, y0, x1, y1, left, top, right, bottom, record.width, record.height));
+        throw Error(
+            ErrorKind::Usage,
+            fmt::format(
+                "the crop window {},{},{},{} is no rectangle within {},{},{},{}, which the film holds "
+                "of {} × {} pixels",
+                x0, y0, x1, y1, left, top, right, bottom, record.width, record.height));
     record.window = window;
 }
 
@@ -90,10 +101,12 @@ void applyChanges(FilmRecord& record, const DevelopArguments& arguments) {
             continue;
         }
         white = namedWhite(record, nameIn(change.value));
-        std::erase_if(to_read, [](const SceneOverride& earlier) { return earlier.path == "film.white_balance"; });
+        std::erase_if(to_read,
+                      [](const SceneOverride& earlier) { return earlier.path == "film.white_balance"; });
         if (!white) to_read.push_back(change);
     }
-    const std::string film = fmt::format("crt: 1\nfilm: {{resolution: [{}, {}]}}\n", record.width, record.height);
+    const std::string film =
+        fmt::format("crt: 1\nfilm: {{resolution: [{}, {}]}}\n", record.width, record.height);
     const Scene scene = parseScene(film, arguments.films.front(), ".", to_read);
     const Development read = developmentOf(scene);
     Development& development = record.development;
@@ -116,8 +129,10 @@ std::uint32_t aovsNamed(const std::vector<std::string>& names) {
         const std::uint32_t bit = aovNamed(name);
         if (bit == 0) {
             const std::string hint = didYouMean(name, aovNames());
-            throw Error(ErrorKind::Usage, fmt::format("--aovs: there is no AOV '{}'; {}", name,
-                                                      hint.empty() ? fmt::format("there are {}", fmt::join(aovNames(), ", ")) : hint));
+            throw Error(
+                ErrorKind::Usage,
+                fmt::format("--aovs: there is no AOV '{}'; {}", name,
+                            hint.empty() ? fmt::format("there are {}", fmt::join(aovNames(), ", ")) : hint));
         }
         aovs |= bit;
     }
@@ -128,9 +143,14 @@ std::uint32_t aovsNamed(const std::vector<std::string>& names) {
 OutputPlan planDevelopment(const DevelopArguments& arguments) {
     OutputPlan plan = planOutputs(arguments.outputs, Scene{});
     if (!plan.films.empty())
-        throw Error(ErrorKind::Usage, fmt::format("'{}': crt develop makes images; 'crt merge' adds films to one", plan.films.front()));
-    const bool has_exr = std::any_of(plan.images.begin(), plan.images.end(), [](const Output& o) { return o.format == OutputFormat::Exr; });
-    if (!arguments.aovs.empty() && !has_exr) throw Error(ErrorKind::Usage, "--aovs: only .exr files hold more than the image, and no output is one");
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}': crt develop makes images; 'crt merge' adds films to one",
+                                plan.films.front()));
+    const bool has_exr = std::any_of(plan.images.begin(), plan.images.end(),
+                                     [](const Output& o) { return o.format == OutputFormat::Exr; });
+    if (!arguments.aovs.empty() && !has_exr)
+        throw Error(ErrorKind::Usage,
+                    "--aovs: only .exr files hold more than the image, and no output is one");
     for (const SceneOverride& change : arguments.changes) requireDevelopmentKey(change.path);
     const std::uint32_t aovs = aovsNamed(arguments.aovs);
     for (Output& image : plan.images)
@@ -149,16 +169,19 @@ int develop(const DevelopArguments& arguments) {
     const std::array<int, 4> held = record.window;
     applyChanges(record, arguments);
     if (record.window != held)
-        film = cropped(film, {record.window[0] - held[0], record.window[1] - held[1], record.window[2] - held[0], record.window[3] - held[1]});
+        film = cropped(film, {record.window[0] - held[0], record.window[1] - held[1],
+                              record.window[2] - held[0], record.window[3] - held[1]});
 
     for (Output& image : plan.images) {
         if (image.format == OutputFormat::Exr && arguments.aovs.empty()) image.aovs = record.aovs;
         writeOutput(image, film, identity);
     }
-    if (film.samples.count() > 0 && isBlack(film)) logWarning("the image is black: no path met a light while the film was rendered");
-    const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, record.independent_samples);
-    logInfo("{} × {} pixels, {} samples per pixel{}", film.shape().width, film.shape().height, film.samples.count(),
-            error ? ", " + errorText(*error) : "");
+    if (film.samples.count() > 0 && isBlack(film))
+        logWarning("the image is black: no path met a light while the film was rendered");
+    const std::optional<ErrorEstimate> error =
+        estimateError(film, PixelSet::All, record.independent_samples);
+    logInfo("{} × {} pixels, {} samples per pixel{}", film.shape().width, film.shape().height,
+            film.samples.count(), error ? ", " + errorText(*error) : "");
     logInfo("wrote {}", fmt::join(arguments.outputs, ", "));
     return 0;
 }

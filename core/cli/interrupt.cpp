@@ -16,8 +16,8 @@ std::atomic<std::int64_t> g_first_at{0};
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<std::int64_t>::is_always_lock_free,
               "a signal handler may touch nothing that takes a lock");
 
-// timeout(1) signals its child and then the child's process group, so one wish to stop arrives twice within microseconds.
-// No person presses Ctrl-C twice this fast.
+// timeout(1) signals its child and then the child's process group, so one wish to stop arrives twice within
+// microseconds. No person presses Ctrl-C twice this fast.
 constexpr std::int64_t kOneWishNanoseconds = 200'000'000;
 
 std::int64_t monotonicNanoseconds() {
@@ -40,8 +40,10 @@ extern "C" void onSignal(int signal) {
     g_first_at = monotonicNanoseconds();
     g_signal = signal;
     constexpr std::string_view text = "\ncrt: finishing the running chunk; once more to leave at once\n";
-    // A terminal has just shown ^C on the line of the bar, so a person there gets an answer; a log file is told by the report.
-    if (signal == SIGINT && isatty(STDERR_FILENO) != 0 && write(STDERR_FILENO, text.data(), text.size()) < 0) {
+    // A terminal has just shown ^C on the line of the bar, so a person there gets an answer; a log file is
+    // told by the report.
+    if (signal == SIGINT && isatty(STDERR_FILENO) != 0 &&
+        write(STDERR_FILENO, text.data(), text.size()) < 0) {
         // Nothing can be done about it here.
     }
     errno = saved_errno;

@@ -1,5 +1,5 @@
-/// Ctrl-C, kill and a closing terminal, made gentle: the first signal asks the render to stop after the chunk it is working
-/// on, so that image and checkpoint are written; the second leaves at once.
+/// Ctrl-C, kill and a closing terminal, made gentle: the first signal asks the render to stop after the
+/// chunk it is working on, so that image and checkpoint are written; the second leaves at once.
 #pragma once
 
 #include <csignal>
@@ -8,9 +8,10 @@
 
 namespace crt {
 
-/// Catches SIGINT, SIGTERM, SIGHUP and SIGXCPU (the soft limit on processor time: the hard one, which follows, kills) for as long as it lives; one at a time. Outside it the signals end the process as usual,
-/// which is right while there is nothing to save. A signal that the parent had set to be ignored (nohup, a background job of a
-/// shell script) stays ignored.
+/// Catches SIGINT, SIGTERM, SIGHUP and SIGXCPU (the soft limit on processor time: the hard one, which
+/// follows, kills) for as long as it lives; one at a time. Outside it the signals end the process as usual,
+/// which is right while there is nothing to save. A signal that the parent had set to be ignored (nohup, a
+/// background job of a shell script) stays ignored.
 class InterruptGuard {
 public:
     InterruptGuard();
@@ -29,14 +30,16 @@ private:
     std::vector<Saved> saved_;
 };
 
-/// From now on, writing to a pipe that nobody reads (`crt … -v 2>&1 | head -1`) or beyond the limit on file sizes (ulimit -f) fails as writing
-/// to a full disk does, and no longer ends the process before its image is written.
+/// From now on, writing to a pipe that nobody reads (`crt … -v 2>&1 | head -1`) or beyond the limit on file
+/// sizes (ulimit -f) fails as writing to a full disk does, and no longer ends the process before its image
+/// is written.
 void ignoreWriteSignals();
 
 /// "SIGINT", "SIGTERM", "SIGHUP".
 std::string signalName(int signal);
 
-/// The exit code of a process that a signal ended, as shells have it: 130 for SIGINT, 143 for SIGTERM, 152 for SIGXCPU.
+/// The exit code of a process that a signal ended, as shells have it: 130 for SIGINT, 143 for SIGTERM, 152
+/// for SIGXCPU.
 inline int signalExitCode(int signal) { return 128 + signal; }
 
 }  // namespace crt

@@ -21,7 +21,8 @@ constexpr std::chrono::seconds kLineInterval{10};
 
 bool terminalCanDraw() {
     const char* term = std::getenv("TERM");
-    return isatty(STDERR_FILENO) != 0 && term != nullptr && *term != '\0' && std::string_view(term) != "dumb";
+    return isatty(STDERR_FILENO) != 0 && term != nullptr && *term != '\0' &&
+           std::string_view(term) != "dumb";
 }
 
 int terminalColumns() {
@@ -38,27 +39,34 @@ void writeStderr(std::string_view text) {
     }
 }
 
-/// What the target error, or 1 % where there is none, would still take. Power-of-two checks may make it more.
+/// What the target error, or 1 % where there is none, would still take. Power-of-two checks may make it
+/// more.
 std::string stillNeeded(const ProgressState& state) {
     const double target = state.target_error > 0 ? state.target_error : 0.01;
     // A bound forecasts nothing: the error lies below it by an unknown factor.
-    if (!state.error->known() || state.error->half_width_95 <= target || !(state.samples > state.start_samples)) return {};
+    if (!state.error->known() || state.error->half_width_95 <= target ||
+        !(state.samples > state.start_samples))
+        return {};
     const stats::Interval samples = state.error->samplesFor(target, state.samples);
     const double each = state.elapsed_seconds / (state.samples - state.start_samples);
     return fmt::format("  {:.3g} % at {} spp, in {}-{}", target * 100, sampleCountText(samples),
-                       clockText((samples.lower - state.samples) * each), clockText((samples.upper - state.samples) * each));
+                       clockText((samples.lower - state.samples) * each),
+                       clockText((samples.upper - state.samples) * each));
 }
 
 }  // namespace
 
 std::string progressText(const ProgressState& state) {
-    if (!state.label.empty() && state.target == 0) return fmt::format("{}  {}", state.label, clockText(state.elapsed_seconds));
+    if (!state.label.empty() && state.target == 0)
+        return fmt::format("{}  {}", state.label, clockText(state.elapsed_seconds));
     // What is left cannot be told from nothing.
     if (!state.label.empty() && state.secondsLeft() < 0)
         return fmt::format("{:3.0f} %  {}", std::floor(state.fraction() * 100), state.label);
     if (!state.label.empty())
-        return fmt::format("{:3.0f} %  {}  {} left", std::floor(state.fraction() * 100), state.label, clockText(state.secondsLeft()));
-    std::string text = fmt::format("{:3.0f} %  {:.0f}", std::floor(state.fraction() * 100), std::floor(state.samples));
+        return fmt::format("{:3.0f} %  {}  {} left", std::floor(state.fraction() * 100), state.label,
+                           clockText(state.secondsLeft()));
+    std::string text =
+        fmt::format("{:3.0f} %  {:.0f}", std::floor(state.fraction() * 100), std::floor(state.samples));
     text += state.target > 0 ? fmt::format("/{} spp", state.target) : std::string(" spp");
     if (state.pathsPerSecond() > 0) text += "  " + rateText(state.pathsPerSecond(), "paths/s");
     if (state.secondsLeft() >= 0) text += "  " + clockText(state.secondsLeft()) + " left";
@@ -75,7 +83,8 @@ std::string progressLine(const ProgressState& state) {
 
 std::string progressBar(const ProgressState& state, int columns) {
     const std::string text = progressText(state);
-    // One column stays free: a character in the last one makes some terminals wrap, and the line could not be cleared.
+    // One column stays free: a character in the last one makes some terminals wrap, and the line could not
+    // be cleared.
     const int room = columns - 1 - static_cast<int>(text.size());
     if (room < 0) return text.substr(0, static_cast<std::size_t>(std::max(0, columns - 1)));
     const int cells = std::min(room - 3, 40);  // Two brackets and a space.

@@ -12,13 +12,15 @@
 namespace crt {
 
 enum class ProgressMode {
-    Auto,   ///< A bar when stderr is a terminal that can move its cursor, else lines.
+    Auto,  ///< A bar when stderr is a terminal that can move its cursor, else lines.
     Bar,
-    Lines,  ///< At most one per ten seconds, through the log. Never a carriage return: log files keep every one.
+    Lines,  ///< At most one per ten seconds, through the log. Never a carriage return: log files keep every
+            ///< one.
     None,
 };
 
-/// "43 %  28/64 spp  12.3 Mpaths/s  0:42 left  error 1.90 % (1.86-1.94)  1 % at 54-110 spp, in 0:40-2:12"; a target error stands instead of 1 %.
+/// "43 %  28/64 spp  12.3 Mpaths/s  0:42 left  error 1.90 % (1.86-1.94)  1 % at 54-110 spp, in 0:40-2:12"; a
+/// target error stands instead of 1 %.
 std::string progressText(const ProgressState& state);
 /// The same for a log: not aligned.
 std::string progressLine(const ProgressState& state);

@@ -19,7 +19,8 @@ void TerminalWatch::renderingBegins() {
 void TerminalWatch::renderingEnds() {
     stages_.reset();
     progress_.reset();
-    if (!interrupt_ && signals_ != Signals::Never) interrupt_.emplace();  // What is written next must not be cut short.
+    if (!interrupt_ && signals_ != Signals::Never)
+        interrupt_.emplace();  // What is written next must not be cut short.
 }
 
 void TerminalWatch::progress(const ProgressState& state) {

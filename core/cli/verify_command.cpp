@@ -3,10 +3,10 @@
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/input_file.h"
-#include "cli/terminal_watch.h"
 #include "base/log.h"
-#include "base/unit_text.h"
 #include "base/standard_output.h"
+#include "base/unit_text.h"
+#include "cli/terminal_watch.h"
 #include "judge/verify/report.h"
 #include "judge/verify/run.h"
 
@@ -35,9 +35,14 @@ std::vector<std::string> splitAtCommas(const std::vector<std::string>& lists) {
 
 void lookFirstIn(const std::string& directory) {
     if (!std::filesystem::is_directory(directory))
-        throw Error(ErrorKind::Usage, fmt::format("--plugin-path '{}' is not a directory; it should be the one with crt_backend_<name>.so", directory));
+        throw Error(
+            ErrorKind::Usage,
+            fmt::format(
+                "--plugin-path '{}' is not a directory; it should be the one with crt_backend_<name>.so",
+                directory));
     const char* others = std::getenv("CRT_BACKEND_PATH");
-    const std::string path = fmt::format("{}:{}", std::filesystem::absolute(directory).string(), others != nullptr ? others : "");
+    const std::string path =
+        fmt::format("{}:{}", std::filesystem::absolute(directory).string(), others != nullptr ? others : "");
     setenv("CRT_BACKEND_PATH", path.c_str(), 1);
 }
 
@@ -49,16 +54,18 @@ std::string readText(const std::string& file) {
     }
 }
 
-/// The line on a terminal that tells which case runs, and since when. Cases take from a millisecond to a minute: what is left cannot be told from what
-/// is done.
+/// The line on a terminal that tells which case runs, and since when. Cases take from a millisecond to a
+/// minute: what is left cannot be told from what is done.
 class Line {
 public:
     Line(std::size_t cases, bool quiet) : cases_(cases), shown_(!quiet && isatty(STDERR_FILENO) != 0) {}
 
     void before(const Case& next, std::size_t index) {
         if (!shown_) return;
-        const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-        fmt::print(stderr, "\r\033[K  {} of {}, {} so far: {} {}", index + 1, cases_, clockText(seconds), next.id, next.title);
+        const double seconds =
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+        fmt::print(stderr, "\r\033[K  {} of {}, {} so far: {} {}", index + 1, cases_, clockText(seconds),
+                   next.id, next.title);
         std::fflush(stderr);
     }
     void clear() const {
@@ -106,8 +113,9 @@ int verify(const Arguments& arguments) {
     TerminalWatch watch(ProgressMode::None, TerminalWatch::Signals::Always);
     Line line(cases.size(), arguments.quiet);
     const bool colored = isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
-    const SuiteResult suite =
-        runCases(backend, arguments.integrator, arguments.level, cases, [&](const Case& next, std::size_t index, const CaseResult* result) {
+    const SuiteResult suite = runCases(
+        backend, arguments.integrator, arguments.level, cases,
+        [&](const Case& next, std::size_t index, const CaseResult* result) {
             if (result == nullptr) {
                 line.before(next, index);
                 return;
@@ -115,7 +123,8 @@ int verify(const Arguments& arguments) {
             line.clear();
             if (!arguments.quiet || failed(result->verdict)) printOut("{}", caseText(*result, colored));
             flushStandardOutput();
-        }, watch);
+        },
+        watch);
     printOut("{} on {}, level {}: {}\n", suite.backend, suite.device, name(suite.level), summaryText(suite));
     if (!arguments.output.empty()) {
         writeReports(arguments.output, suite);

@@ -1,8 +1,8 @@
 /// The block of memory that a compiled scene is (kernel/layout.h), while it grows.
 #pragma once
 
-#include "compile/compile.h"
 #include "base/error.h"
+#include "compile/compile.h"
 #include "kernel/layout.h"
 
 #include <cstddef>

@@ -1,7 +1,7 @@
 #include "compile/bvh_build.h"
 
-#include "kernel/bvh.h"
 #include "base/stage.h"
+#include "kernel/bvh.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,9 +19,11 @@ constexpr std::uint32_t kLargestLeaf = 15;  // what a child reference can count
 constexpr float kTraversalCost = 1.2f;      // of a box test in triangle tests; flat between 0.8 and 2
 
 struct Box {
-    std::array<float, 3> lower{std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(),
+    std::array<float, 3> lower{std::numeric_limits<float>::infinity(),
+                               std::numeric_limits<float>::infinity(),
                                std::numeric_limits<float>::infinity()};
-    std::array<float, 3> upper{-std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(),
+    std::array<float, 3> upper{-std::numeric_limits<float>::infinity(),
+                               -std::numeric_limits<float>::infinity(),
                                -std::numeric_limits<float>::infinity()};
 
     void grow(const TriangleBounds& b) {
@@ -63,10 +65,15 @@ struct Split {
 class Builder {
 public:
     Builder(const std::vector<TriangleBounds>& triangles, bool median_only, Stage& stage)
-        : triangles_(triangles), median_only_(median_only), stage_(stage), order_(triangles.size()), centroids_(triangles.size()) {
+        : triangles_(triangles),
+          median_only_(median_only),
+          stage_(stage),
+          order_(triangles.size()),
+          centroids_(triangles.size()) {
         std::iota(order_.begin(), order_.end(), 0u);
         for (std::size_t i = 0; i < triangles.size(); ++i)
-            for (std::size_t k = 0; k < 3; ++k) centroids_[i][k] = 0.5f * (triangles[i].lower[k] + triangles[i].upper[k]);
+            for (std::size_t k = 0; k < 3; ++k)
+                centroids_[i][k] = 0.5f * (triangles[i].lower[k] + triangles[i].upper[k]);
         nodes_.reserve(triangles.size());
         build(0, static_cast<std::uint32_t>(triangles.size()));
     }
@@ -75,8 +82,8 @@ public:
     std::vector<std::uint32_t>& order() { return order_; }
 
 private:
-    // Depth is bounded by the caller's retry with median splits, so recursion is safe: a median tree has at most 31 levels, and a SAH
-    // split always leaves triangles on both sides.
+    // Depth is bounded by the caller's retry with median splits, so recursion is safe: a median tree has at
+    // most 31 levels, and a SAH split always leaves triangles on both sides.
     std::uint32_t build(std::uint32_t begin, std::uint32_t end, int depth = 0) {
         stage_.at(begin);  // what lies before it is done
         const auto index = static_cast<std::uint32_t>(nodes_.size());
@@ -88,7 +95,8 @@ private:
         }
         nodes_[index].box = box;
         const std::uint32_t count = end - begin;
-        const Split split = count > 1 && !median_only_ && depth < kSahDepth ? findSplit(begin, end, centroid_box) : Split{};
+        const Split split =
+            count > 1 && !median_only_ && depth < kSahDepth ? findSplit(begin, end, centroid_box) : Split{};
         const float leaf_cost = static_cast<float>(count) * box.halfArea();
         const bool split_pays = split.axis >= 0 && split.cost + kTraversalCost * box.halfArea() < leaf_cost;
         if (count <= kLeafSize && (count == 1 || !split_pays)) {
@@ -99,9 +107,10 @@ private:
         std::uint32_t middle = begin;
         if (split.axis >= 0 && (split_pays || count > kLargestLeaf)) {
             const auto axis = static_cast<std::size_t>(split.axis);
-            middle = static_cast<std::uint32_t>(std::partition(order_.begin() + begin, order_.begin() + end,
-                                                               [&](std::uint32_t t) { return centroids_[t][axis] < split.position; }) -
-                                                order_.begin());
+            middle = static_cast<std::uint32_t>(
+                std::partition(order_.begin() + begin, order_.begin() + end,
+                               [&](std::uint32_t t) { return centroids_[t][axis] < split.position; }) -
+                order_.begin());
         } else if (count <= kLargestLeaf && !median_only_ && split.axis >= 0) {
             nodes_[index].first = begin;
             nodes_[index].count = count;
@@ -125,7 +134,8 @@ private:
             std::array<std::uint32_t, kBins> counts{};
             for (std::uint32_t i = begin; i < end; ++i) {
                 const std::uint32_t t = order_[i];
-                const auto bin = static_cast<std::size_t>(std::clamp(static_cast<int>((centroids_[t][axis] - lower) * scale), 0, kBins - 1));
+                const auto bin = static_cast<std::size_t>(
+                    std::clamp(static_cast<int>((centroids_[t][axis] - lower) * scale), 0, kBins - 1));
                 boxes[bin].grow(triangles_[t]);
                 ++counts[bin];
             }
@@ -144,21 +154,28 @@ private:
                 count += counts[b - 1];
                 if (count == 0 || count == end - begin) continue;
                 const float cost = static_cast<float>(count) * box.halfArea() + right_cost[b];
-                if (cost < best.cost) best = {static_cast<int>(axis), lower + static_cast<float>(b) / scale, cost};
+                if (cost < best.cost)
+                    best = {static_cast<int>(axis), lower + static_cast<float>(b) / scale, cost};
             }
         }
         return best;
     }
 
-    // Halves by the widest axis of the centroids; ids decide ties, so that the tree is the same on every machine.
+    // Halves by the widest axis of the centroids; ids decide ties, so that the tree is the same on every
+    // machine.
     std::uint32_t medianSplit(std::uint32_t begin, std::uint32_t end, const Box& centroid_box) {
         std::size_t axis = 0;
         for (std::size_t k = 1; k < 3; ++k)
-            if (centroid_box.upper[k] - centroid_box.lower[k] > centroid_box.upper[axis] - centroid_box.lower[axis]) axis = k;
+            if (centroid_box.upper[k] - centroid_box.lower[k] >
+                centroid_box.upper[axis] - centroid_box.lower[axis])
+                axis = k;
         const std::uint32_t middle = begin + (end - begin) / 2;
-        std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end, [&](std::uint32_t a, std::uint32_t b) {
-            return centroids_[a][axis] != centroids_[b][axis] ? centroids_[a][axis] < centroids_[b][axis] : a < b;
-        });
+        std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
+                         [&](std::uint32_t a, std::uint32_t b) {
+                             return centroids_[a][axis] != centroids_[b][axis]
+                                        ? centroids_[a][axis] < centroids_[b][axis]
+                                        : a < b;
+                         });
         return middle;
     }
 
@@ -193,7 +210,9 @@ private:
             // Open the inner child that rays enter most.
             auto widest = children.end();
             for (auto c = children.begin(); c != children.end(); ++c)
-                if (binary_[*c].count == 0 && (widest == children.end() || binary_[*c].box.halfArea() > binary_[*widest].box.halfArea())) widest = c;
+                if (binary_[*c].count == 0 && (widest == children.end() ||
+                                               binary_[*c].box.halfArea() > binary_[*widest].box.halfArea()))
+                    widest = c;
             if (widest == children.end()) break;
             const std::uint32_t opened = *widest;
             *widest = binary_[opened].left;
@@ -204,7 +223,8 @@ private:
             if (binary_[children[i]].count == 0) collapse(children[i], references[i], depth + 1);
     }
 
-    std::array<std::uint32_t, 4> writeNode(std::uint32_t target, const std::vector<std::uint32_t>& children) {
+    std::array<std::uint32_t, 4> writeNode(std::uint32_t target,
+                                           const std::vector<std::uint32_t>& children) {
         kernel::CrtNode4 node{};
         std::array<std::uint32_t, 4> references{};
         for (std::size_t c = 0; c < 4; ++c) {

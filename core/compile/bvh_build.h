@@ -1,4 +1,5 @@
-/// Four-wide BVH over triangles: binned SAH into a binary tree, then collapsed. Built once at load, on the host.
+/// Four-wide BVH over triangles: binned SAH into a binary tree, then collapsed. Built once at load, on the
+/// host.
 #pragma once
 
 #include "kernel/layout.h"
@@ -24,9 +25,10 @@ struct Bvh {
 /// The kernel's stack holds three entries a level (CRT_BVH_STACK).
 inline constexpr int kMaxBvhDepth = 31;
 
-/// `padding` is added around every box: the triangle test rounds the ray's offset to a vertex to a few 2^-24 of the coordinates, and a box must
-/// contain whatever the test may accept. At least one triangle.
-/// `stage` is what progress calls it (stage.h).
-Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding, const std::string& stage = "building the BVH");
+/// `padding` is added around every box: the triangle test rounds the ray's offset to a vertex to a few 2^-24
+/// of the coordinates, and a box must contain whatever the test may accept. At least one triangle. `stage`
+/// is what progress calls it (stage.h).
+Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding,
+             const std::string& stage = "building the BVH");
 
 }  // namespace crt

@@ -1,18 +1,18 @@
 #include "compile/compile.h"
 
+#include "base/log.h"
+#include "base/stage.h"
+#include "base/vec3d.h"
 #include "compile/blob_writer.h"
 #include "compile/bvh_build.h"
 #include "compile/distributions.h"
 #include "compile/flatten.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
-#include "kernel/surface.h"
-#include "base/log.h"
 #include "compile/near_scene.h"
 #include "compile/near_surfaces.h"
 #include "compile/scene_identity.h"
-#include "base/stage.h"
-#include "base/vec3d.h"
+#include "kernel/features.h"
+#include "kernel/layout.h"
+#include "kernel/surface.h"
 
 #include <algorithm>
 #include <bit>
@@ -46,7 +46,8 @@ Vec3d normalise(const Vec3d& v) {
 class SpectrumTable {
 public:
     std::uint32_t add(const Spectrum& spectrum) {
-        const auto [where, is_new] = index_.try_emplace(spectrum.values, static_cast<std::uint32_t>(index_.size()));
+        const auto [where, is_new] =
+            index_.try_emplace(spectrum.values, static_cast<std::uint32_t>(index_.size()));
         if (is_new) {
             for (const double v : spectrum.values) floats_.push_back(static_cast<float>(v));
             floats_.push_back(floats_.back());
@@ -64,7 +65,8 @@ private:
 /// Everything between Scene and blob, step by step in the order of the calls in compileScene.
 class Compiler {
 public:
-    Compiler(const Scene& scene, std::uint32_t aovs, const CompileOptions& options) : scene_(scene), options_(options) {
+    Compiler(const Scene& scene, std::uint32_t aovs, const CompileOptions& options)
+        : scene_(scene), options_(options) {
         header_.magic = CRT_SCENE_MAGIC;
         out_.aovs = aovs & kAovsOfFirstHits;
         out_.aovs |= replicatesOf(scene_) > 1 ? kAovReplicates : kAovSquares;
@@ -85,7 +87,9 @@ public:
         decideFeatures();
         explainLeftOut();
         finish();
-        out_.compile_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() - out_.build_seconds;
+        out_.compile_seconds =
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
+            out_.build_seconds;
         return std::move(out_);
     }
 
@@ -107,17 +111,22 @@ private:
             case Accelerator::Aabb: header_.accelerator = CRT_ACCELERATOR_AABB; break;
             case Accelerator::None: header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE; break;
             case Accelerator::Auto:
-                header_.accelerator = flat_.triangles.size() <= kBruteForceTriangles ? CRT_ACCELERATOR_BRUTE_FORCE : CRT_ACCELERATOR_BVH;
+                header_.accelerator = flat_.triangles.size() <= kBruteForceTriangles
+                                          ? CRT_ACCELERATOR_BRUTE_FORCE
+                                          : CRT_ACCELERATOR_BVH;
         }
         // Nothing to find, or, in the view of the boxes, nobody who looks.
-        if (flat_.triangles.empty() || scene_.integrator.type == IntegratorType::Aabb) header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;
+        if (flat_.triangles.empty() || scene_.integrator.type == IntegratorType::Aabb)
+            header_.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;
     }
 
-    /// Whether the backend finds all hits itself: rays start at the camera or at a surface, and surfaces lie within 1.
+    /// Whether the backend finds all hits itself: rays start at the camera or at a surface, and surfaces lie
+    /// within 1.
     bool backendFindsHits() const {
         double farthest = 1;
         for (std::size_t k = 0; k < 3; ++k)
-            farthest = std::max(farthest, std::abs(scene_.camera.position[k] - out_.centre[k]) * scale_ + scene_.camera.aperture_radius * scale_);
+            farthest = std::max(farthest, std::abs(scene_.camera.position[k] - out_.centre[k]) * scale_ +
+                                              scene_.camera.aperture_radius * scale_);
         // A little less, for what is rounded on the way to the ray.
         return farthest < options_.accelerator_reach * (1 - 1e-6);
     }
@@ -146,7 +155,8 @@ private:
             reserveBlob(bvh.nodes.size());
             header_.nodes = blob_.append(bvh.nodes);
             out_.nodes = bvh.nodes.size();
-            out_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+            out_.build_seconds =
+                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         }
         if (out_.nodes == 0) reserveBlob(0);
         slot_of_.resize(count);
@@ -162,11 +172,13 @@ private:
         std::vector<kernel::CrtFace> faces(count);
         for (std::size_t i = 0; i < count; ++i) faces[slot_of_[i]] = faceOf(i);
         header_.faces = blob_.append(faces);
-        if (header_.accelerator == CRT_ACCELERATOR_BRUTE_FORCE && scene_.integrator.type != IntegratorType::Aabb) {
+        if (header_.accelerator == CRT_ACCELERATOR_BRUTE_FORCE &&
+            scene_.integrator.type != IntegratorType::Aabb) {
             std::vector<std::uint32_t> all(count), occluders;
             for (std::uint32_t i = 0; i < count; ++i) {
                 all[i] = i;
-                if (count > kBruteForceTriangles || canOcclude(i)) occluders.push_back(i);  // asking takes quadratic time
+                if (count > kBruteForceTriangles || canOcclude(i))
+                    occluders.push_back(i);  // asking takes quadratic time
             }
             header_.triangles8 = blob_.append(blocksOf(all));
             header_.occluders8 = blob_.append(blocksOf(occluders));
@@ -194,20 +206,24 @@ private:
         for (std::size_t i = 0; i < slots.size(); ++i) {
             blocks[i / 8].slot[i % 8] = slots[i];
             const Extent extent = extentOf(slots[i]);
-            blocks[i / 8].height_slack[i % 8] = kernel::crt_height_slack(static_cast<float>(extent.coordinate), static_cast<float>(extent.size));
-            const Vec3d n = planeNormal(slots[i]);  // brute force keeps the author's order: slot and id are one
+            blocks[i / 8].height_slack[i % 8] = kernel::crt_height_slack(
+                static_cast<float>(extent.coordinate), static_cast<float>(extent.size));
+            const Vec3d n =
+                planeNormal(slots[i]);  // brute force keeps the author's order: slot and id are one
             setRow(blocks[i / 8], 0, i % 8, n, vertexOf(slots[i], 0));
             for (std::size_t v = 0; v < 3; ++v) {
                 const Vec3d edge = vertexOf(slots[i], (v + 1) % 3) - vertexOf(slots[i], v);
                 const double length = std::sqrt(dot(edge, edge));
-                setRow(blocks[i / 8], v + 1, i % 8, length > 0 ? cross(n, edge) * (1 / length) : Vec3d{}, vertexOf(slots[i], v));
+                setRow(blocks[i / 8], v + 1, i % 8, length > 0 ? cross(n, edge) * (1 / length) : Vec3d{},
+                       vertexOf(slots[i], v));
             }
         }
         return blocks;
     }
 
     /// The affine function that grows along `direction` and vanishes at `origin`.
-    static void setRow(kernel::CrtTriangle8& block, std::size_t row, std::size_t lane, const Vec3d& direction, const Vec3d& origin) {
+    static void setRow(kernel::CrtTriangle8& block, std::size_t row, std::size_t lane,
+                       const Vec3d& direction, const Vec3d& origin) {
         for (std::size_t k = 0; k < 3; ++k) block.row[row][k][lane] = static_cast<float>(direction[k]);
         block.row[row][3][lane] = static_cast<float>(-dot(direction, origin));
     }
@@ -219,10 +235,12 @@ private:
         return length > 0 ? n * (1 / length) : Vec3d{};
     }
 
-    Vec3d vertexOf(std::size_t i, std::size_t v) const { return {flat_.positions[i][v], flat_.positions[i][3 + v], flat_.positions[i][6 + v]}; }
+    Vec3d vertexOf(std::size_t i, std::size_t v) const {
+        return {flat_.positions[i][v], flat_.positions[i][3 + v], flat_.positions[i][6 + v]};
+    }
 
-    /// Whether triangle i can come between two points of the scene: not if the whole scene lies on one side of its plane, as it does for the walls of
-    /// a convex room.
+    /// Whether triangle i can come between two points of the scene: not if the whole scene lies on one side
+    /// of its plane, as it does for the walls of a convex room.
     bool canOcclude(std::size_t i) const {
         const Vec3d o = vertexOf(i, 0);
         const Vec3d n = cross(vertexOf(i, 1) - o, vertexOf(i, 2) - o);
@@ -236,7 +254,8 @@ private:
         return above && below;
     }
 
-    /// The largest coordinate of a triangle, and the largest extent of its two edges along an axis: what rounding depends on.
+    /// The largest coordinate of a triangle, and the largest extent of its two edges along an axis: what
+    /// rounding depends on.
     struct Extent {
         double coordinate = 0, size = 0;
     };
@@ -244,7 +263,8 @@ private:
         const Vec3d o = vertexOf(i, 0), a = vertexOf(i, 1) - o, b = vertexOf(i, 2) - o;
         Extent e;
         for (std::size_t k = 0; k < 3; ++k) {
-            e.coordinate = std::max({e.coordinate, std::abs(o[k]), std::abs(o[k] + a[k]), std::abs(o[k] + b[k])});
+            e.coordinate =
+                std::max({e.coordinate, std::abs(o[k]), std::abs(o[k] + a[k]), std::abs(o[k] + b[k])});
             e.size = std::max(e.size, std::abs(a[k]) + std::abs(b[k]));
         }
         return e;
@@ -256,16 +276,20 @@ private:
         const Vec3d n = cross(a, b);
         const double twice_area = std::sqrt(dot(n, n));
         const auto [coordinate, size] = extentOf(i);
-        for (std::size_t k = 0; k < 3; ++k) face.normal[k] = twice_area > 0 ? static_cast<float>(n[k] / twice_area) : 0.0f;
+        for (std::size_t k = 0; k < 3; ++k)
+            face.normal[k] = twice_area > 0 ? static_cast<float>(n[k] / twice_area) : 0.0f;
         face.clearance = kernel::crt_clearance(static_cast<float>(coordinate), static_cast<float>(size));
-        face.margin = kernel::crt_edge_margin(static_cast<float>(coordinate), static_cast<float>(size), static_cast<float>(twice_area));
+        face.margin = kernel::crt_edge_margin(static_cast<float>(coordinate), static_cast<float>(size),
+                                              static_cast<float>(twice_area));
         return face;
     }
 
-    /// Boxes of the objects, for the paper's culling and for the bounding-box view; triangles of an object are adjacent unless a BVH moved them.
+    /// Boxes of the objects, for the paper's culling and for the bounding-box view; triangles of an object
+    /// are adjacent unless a BVH moved them.
     void writeObjects() {
         out_.objects = flat_.placements;
-        const bool needed = header_.accelerator == CRT_ACCELERATOR_AABB || scene_.integrator.type == IntegratorType::Aabb;
+        const bool needed =
+            header_.accelerator == CRT_ACCELERATOR_AABB || scene_.integrator.type == IntegratorType::Aabb;
         if (!needed) return;
         std::vector<kernel::CrtObject> objects;
         for (std::size_t i = 0; i < flat_.triangles.size(); ++i) {
@@ -296,19 +320,22 @@ private:
         return 0.5 * std::sqrt(dot(n, n));
     }
 
-    /// If triangles i and i + 1 emit alike and make a parallelogram, as the halves of a quad do: the corner of triangle i across from their common edge.
+    /// If triangles i and i + 1 emit alike and make a parallelogram, as the halves of a quad do: the corner
+    /// of triangle i across from their common edge.
     std::optional<std::uint32_t> parallelogramCorner(std::size_t i) const {
         if (i + 1 >= flat_.triangles.size()) return std::nullopt;
         const FlatTriangle &one = flat_.triangles[i], &next = flat_.triangles[i + 1];
         if (next.object != one.object || next.emission != one.emission) return std::nullopt;
         for (std::size_t corner = 0; corner < 3; ++corner) {
-            const Vec3d o = vertexOf(i, corner), a = vertexOf(i, (corner + 1) % 3), b = vertexOf(i, (corner + 2) % 3);
+            const Vec3d o = vertexOf(i, corner), a = vertexOf(i, (corner + 1) % 3),
+                        b = vertexOf(i, (corner + 2) % 3);
             const Vec3d across = a + b - o;
             for (std::size_t v = 0; v < 3; ++v) {
                 // Turned the same way round: across, b, a.
                 const Vec3d gap = vertexOf(i + 1, v) - across;
                 const Vec3d edge = a - o;
-                if (vertexOf(i + 1, (v + 1) % 3) == b && vertexOf(i + 1, (v + 2) % 3) == a && dot(gap, gap) <= 1e-12 * dot(edge, edge))
+                if (vertexOf(i + 1, (v + 1) % 3) == b && vertexOf(i + 1, (v + 2) % 3) == a &&
+                    dot(gap, gap) <= 1e-12 * dot(edge, edge))
                     return static_cast<std::uint32_t>(corner);
             }
         }
@@ -322,7 +349,8 @@ private:
         std::vector<double> power;
         for (std::size_t i = 0; i < flat_.triangles.size(); ++i) {
             if (flat_.triangles[i].emission < 0) continue;
-            const Emission& emission = scene_.emissions[static_cast<std::size_t>(flat_.triangles[i].emission)];
+            const Emission& emission =
+                scene_.emissions[static_cast<std::size_t>(flat_.triangles[i].emission)];
             if (!(emission.radiance.max() > 0)) continue;
             double area = areaOf(i);
             if (!(area > 0)) continue;
@@ -342,17 +370,21 @@ private:
             emitters.push_back(emitter);
             // By luminance, but never zero for a lamp that the eye hardly sees: the film keeps all of XYZ.
             const Vec3d xyz = spectrumToXyz(emission.radiance);
-            power.push_back(area * (xyz[0] + xyz[1] + xyz[2] + 1e-6 * emission.radiance.max()) * (emission.two_sided ? 2 : 1));
+            power.push_back(area * (xyz[0] + xyz[1] + xyz[2] + 1e-6 * emission.radiance.max()) *
+                            (emission.two_sided ? 2 : 1));
         }
         const std::vector<std::uint64_t> first = choiceTable(power);
         for (std::size_t i = 0; i < emitters.size(); ++i) {
             emitters[i].choice = static_cast<std::uint32_t>(first[i]);
-            emitters[i].choice_probability = static_cast<float>(std::ldexp(static_cast<double>(first[i + 1] - first[i]), -32));
+            emitters[i].choice_probability =
+                static_cast<float>(std::ldexp(static_cast<double>(first[i + 1] - first[i]), -32));
         }
         header_.emitters = blob_.append(emitters);
         out_.emitters = emitters.size();
         if (out_.emitters == 0 && !scene_.environment)
-            logWarning("the scene has no light: the image will be black (add emission to an object, or an environment)");
+            logWarning(
+                "the scene has no light: the image will be black (add emission to an object, or an "
+                "environment)");
     }
 
     void writeMaterials() {
@@ -363,12 +395,14 @@ private:
         for (std::size_t i = 0; i < flat_.triangles.size(); ++i) {
             const FlatTriangle& t = flat_.triangles[i];
             kernel::CrtPrimitive& p = primitives[i];
-            const bool known = t.material >= 0 && static_cast<std::size_t>(t.material) < scene_.materials.size();
+            const bool known =
+                t.material >= 0 && static_cast<std::size_t>(t.material) < scene_.materials.size();
             if (known)
                 used[static_cast<std::size_t>(t.material)] = true;
             else
                 fallback_used = true;
-            p.material = known ? static_cast<std::uint32_t>(t.material) : static_cast<std::uint32_t>(scene_.materials.size());
+            p.material = known ? static_cast<std::uint32_t>(t.material)
+                               : static_cast<std::uint32_t>(scene_.materials.size());
             p.emitter = emitter_of_[i];
             p.object = t.object;
             p.normals = CRT_NONE;
@@ -385,7 +419,8 @@ private:
 
         std::vector<kernel::CrtMaterial> materials;
         for (std::size_t i = 0; i < scene_.materials.size(); ++i)
-            materials.push_back(used[i] && isPath() ? writeMaterial(scene_.materials[i]) : kernel::CrtMaterial{});
+            materials.push_back(used[i] && isPath() ? writeMaterial(scene_.materials[i])
+                                                    : kernel::CrtMaterial{});
         if (fallback_used || materials.empty()) {
             Material grey;  // faces that name no material
             grey.reflectance = constantSpectrum(0.5);
@@ -449,8 +484,10 @@ private:
         const bool cropped = film.crop != std::array<int, 4>{0, 0, 0, 0};
         header_.crop_x = cropped ? static_cast<std::uint32_t>(film.crop[0]) : 0;
         header_.crop_y = cropped ? static_cast<std::uint32_t>(film.crop[1]) : 0;
-        header_.width = cropped ? static_cast<std::uint32_t>(film.crop[2] - film.crop[0]) : header_.film_width;
-        header_.height = cropped ? static_cast<std::uint32_t>(film.crop[3] - film.crop[1]) : header_.film_height;
+        header_.width =
+            cropped ? static_cast<std::uint32_t>(film.crop[2] - film.crop[0]) : header_.film_width;
+        header_.height =
+            cropped ? static_cast<std::uint32_t>(film.crop[3] - film.crop[1]) : header_.film_height;
         header_.aovs = out_.aovs;
         const auto replicates = static_cast<std::uint32_t>(replicatesOf(scene_));
         header_.channels = channelsFor(out_.aovs, replicates);
@@ -473,22 +510,29 @@ private:
         kernel::CrtCamera& c = header_.camera;
         for (std::size_t k = 0; k < 3; ++k) {
             c.origin[k] = static_cast<float>((camera.position[k] - out_.centre[k]) * scale_);
-            c.corner[k] = static_cast<float>(view[k] - right[k] * camera.tan_half_width + up[k] * camera.tan_half_height);
+            c.corner[k] = static_cast<float>(view[k] - right[k] * camera.tan_half_width +
+                                             up[k] * camera.tan_half_height);
             c.step_x[k] = static_cast<float>(right[k] * 2 * camera.tan_half_width / scene_.film.width);
             c.step_y[k] = static_cast<float>(-up[k] * 2 * camera.tan_half_height / scene_.film.height);
             c.lens_x[k] = static_cast<float>(right[k]);
             c.lens_y[k] = static_cast<float>(up[k]);
             if (!std::isfinite(c.origin[k] + c.corner[k] + c.step_x[k] + c.step_y[k]))
-                throw Error(ErrorKind::Scene, "the camera is too far from the scene for single precision", camera.place);
+                throw Error(ErrorKind::Scene, "the camera is too far from the scene for single precision",
+                            camera.place);
         }
-        // Unit directions in single precision are 2^-24 apart; two of them a pixel is the least that tells pixels apart.
-        const double pixel = 2 * std::min(camera.tan_half_width / scene_.film.width, camera.tan_half_height / scene_.film.height);
+        // Unit directions in single precision are 2^-24 apart; two of them a pixel is the least that tells
+        // pixels apart.
+        const double pixel = 2 * std::min(camera.tan_half_width / scene_.film.width,
+                                          camera.tan_half_height / scene_.film.height);
         if (pixel < std::ldexp(1.0, -23))
-            logWarning("a pixel is {:.2g} radians wide, finer than directions in single precision ({:.2g}): neighbouring pixels will repeat each other; "
-                       "use fewer pixels, a wider field of view, or a nearer camera",
-                       pixel, std::ldexp(1.0, -23));
+            logWarning(
+                "a pixel is {:.2g} radians wide, finer than directions in single precision ({:.2g}): "
+                "neighbouring pixels will repeat each other; "
+                "use fewer pixels, a wider field of view, or a nearer camera",
+                pixel, std::ldexp(1.0, -23));
         const Vec3d to_target = camera.target - camera.position;
-        const double focus = camera.focus_distance > 0 ? camera.focus_distance : std::sqrt(dot(to_target, to_target));
+        const double focus =
+            camera.focus_distance > 0 ? camera.focus_distance : std::sqrt(dot(to_target, to_target));
         c.lens_radius = static_cast<float>(camera.aperture_radius * scale_);
         c.focus_distance = static_cast<float>(focus * scale_);
     }
@@ -504,10 +548,15 @@ private:
             case SamplerType::Independent: header_.sampler = CRT_SAMPLER_INDEPENDENT; break;
             case SamplerType::XorShift: header_.sampler = CRT_SAMPLER_XORSHIFT; break;
         }
-        header_.seed = kernel::crt_seed(static_cast<std::uint32_t>(scene_.sampler.seed), static_cast<std::uint32_t>(scene_.sampler.seed >> 32));
+        header_.seed = kernel::crt_seed(static_cast<std::uint32_t>(scene_.sampler.seed),
+                                        static_cast<std::uint32_t>(scene_.sampler.seed >> 32));
         header_.max_depth = static_cast<std::uint32_t>(scene_.integrator.max_depth);
-        header_.roulette_depth = scene_.integrator.roulette ? static_cast<std::uint32_t>(scene_.integrator.roulette_depth) : CRT_NONE;
-        header_.nee = !scene_.integrator.nee ? CRT_NEE_NONE : scene_.integrator.mis ? CRT_NEE_MIS : CRT_NEE_ONLY;
+        header_.roulette_depth = scene_.integrator.roulette
+                                     ? static_cast<std::uint32_t>(scene_.integrator.roulette_depth)
+                                     : CRT_NONE;
+        header_.nee = !scene_.integrator.nee  ? CRT_NEE_NONE
+                      : scene_.integrator.mis ? CRT_NEE_MIS
+                                              : CRT_NEE_ONLY;
     }
 
     void decideFeatures() {
@@ -538,23 +587,31 @@ private:
     }
 
     void explainLeftOut() {
-        const auto left_out = [&](const char* what, const std::string& why) { out_.left_out.emplace_back(what, why); };
+        const auto left_out = [&](const char* what, const std::string& why) {
+            out_.left_out.emplace_back(what, why);
+        };
         const auto has = [&](std::uint32_t feature) { return (out_.features & feature) != 0; };
         if (header_.accelerator != CRT_ACCELERATOR_BVH)
             left_out("BVH", scene_.integrator.accelerator == Accelerator::Auto
-                                ? fmt::format("{} triangles: testing all of them is faster (up to {})", flat_.triangles.size(), kBruteForceTriangles)
+                                ? fmt::format("{} triangles: testing all of them is faster (up to {})",
+                                              flat_.triangles.size(), kBruteForceTriangles)
                                 : std::string("integrator.accelerator asks for another"));
         if (out_.without_nodes) left_out("BVH", "the backend builds an acceleration structure of its own");
         if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders_ < flat_.triangles.size())
-            left_out("shadow tests", fmt::format("{} of {} triangles have the whole scene on one side and cannot come between",
-                                                 flat_.triangles.size() - occluders_, flat_.triangles.size()));
+            left_out(
+                "shadow tests",
+                fmt::format("{} of {} triangles have the whole scene on one side and cannot come between",
+                            flat_.triangles.size() - occluders_, flat_.triangles.size()));
         if (!has(CRT_FEATURE_CONDUCTOR)) left_out("mirror and conductor", "no surface uses them");
         if (!has(CRT_FEATURE_DIELECTRIC)) left_out("dielectric", "no surface uses it");
-        if (!has(CRT_FEATURE_DISPERSION)) left_out("hero wavelength selection", "no index of refraction depends on wavelength");
+        if (!has(CRT_FEATURE_DISPERSION))
+            left_out("hero wavelength selection", "no index of refraction depends on wavelength");
         if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
         if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
         if (!has(CRT_FEATURE_NEE))
-            left_out("light sampling and shadow rays", !header_.nee ? "integrator.nee is false" : "no diffuse surface can be lit by an emitter");
+            left_out("light sampling and shadow rays", !header_.nee
+                                                           ? "integrator.nee is false"
+                                                           : "no diffuse surface can be lit by an emitter");
         if (!has(CRT_FEATURE_ENVIRONMENT)) left_out("environment", "there is none");
         if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
         if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
@@ -562,7 +619,8 @@ private:
         if (!has(CRT_FEATURE_REPLICATES))
             left_out("replicates", !isPath() ? "integrator.type is a view" : "sampler.replicates is 1");
         if (!has(CRT_FEATURE_VIEW)) left_out("normals and bounding-box views", "integrator.type is path");
-        for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"}, std::pair{CRT_FEATURE_INDEPENDENT, "independent sampler"},
+        for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"},
+                                            std::pair{CRT_FEATURE_INDEPENDENT, "independent sampler"},
                                             std::pair{CRT_FEATURE_XORSHIFT, "xorshift sampler"}})
             if (!has(feature)) left_out(name, "sampler.type is another");
     }
@@ -596,7 +654,9 @@ std::string objectOf(const Scene& scene, const CompiledScene& compiled, std::uin
     const auto* header = reinterpret_cast<const CrtScene*>(compiled.data());
     std::uint32_t placement = CRT_ARRAY(CrtPrimitive, compiled.data(), header->primitives)[primitive].object;
     for (const Object& object : scene.objects) {
-        if (placement < object.transforms.size()) return object.name.empty() ? std::string("an object without a name") : fmt::format("'{}'", object.name);
+        if (placement < object.transforms.size())
+            return object.name.empty() ? std::string("an object without a name")
+                                       : fmt::format("'{}'", object.name);
         placement -= static_cast<std::uint32_t>(object.transforms.size());
     }
     return "a surface";
@@ -610,14 +670,20 @@ CompiledScene compileScene(const Scene& scene, std::uint32_t aovs, const Compile
     if (compiled.without_nodes) reduced = nearScene(compiled);
     const CompiledScene& searched = reduced ? *reduced : compiled;
     if (const std::optional<CoplanarLight> found = findCoplanarLight(searched))
-        logWarning("{} lies in the plane of {} and overlaps it: rounding decides which of them is seen, and the image is wrong there; move the lamp {:.3g} "
-                       "or more towards the side that it lights, or cut a hole for it",
-                       objectOf(scene, compiled, found->light), objectOf(scene, compiled, found->surface), found->least_gap);
+        logWarning(
+            "{} lies in the plane of {} and overlaps it: rounding decides which of them is seen, and the "
+            "image is wrong there; move the lamp {:.3g} "
+            "or more towards the side that it lights, or cut a hole for it",
+            objectOf(scene, compiled, found->light), objectOf(scene, compiled, found->surface),
+            found->least_gap);
     if (scene.integrator.max_depth > 0)
         if (const NearSurfaces found = findNearSurfaces(searched); found.near > 0)
-            logWarning("{} of {} triangles looked at have another surface nearer than single precision can tell for triangles of this size (up to {:.3g} "
-                       "apart): light between them may be lost; divide the larger triangles there, or move the surfaces apart or together",
-                       found.near, found.asked, found.nearest_clearance);
+            logWarning(
+                "{} of {} triangles looked at have another surface nearer than single precision can tell "
+                "for triangles of this size (up to {:.3g} "
+                "apart): light between them may be lost; divide the larger triangles there, or move the "
+                "surfaces apart or together",
+                found.near, found.asked, found.nearest_clearance);
     return compiled;
 }
 
@@ -627,7 +693,8 @@ std::string featureNames(std::uint64_t mask) {
     if (mask & (1u << bit)) names += (names.empty() ? "" : ", ") + std::string(#name);
     CRT_FEATURE_LIST(CRT_FEATURE_NAME)
 #undef CRT_FEATURE_NAME
-    std::transform(names.begin(), names.end(), names.begin(), [](char c) { return c == '_' ? '-' : static_cast<char>(std::tolower(c)); });
+    std::transform(names.begin(), names.end(), names.begin(),
+                   [](char c) { return c == '_' ? '-' : static_cast<char>(std::tolower(c)); });
     return names;
 }
 

@@ -1,4 +1,5 @@
-/// Scene → CompiledScene: one flat, pointer-free blob (kernel/layout.h) and the feature mask that says what it needs.
+/// Scene → CompiledScene: one flat, pointer-free blob (kernel/layout.h) and the feature mask that says what
+/// it needs.
 #pragma once
 
 #include "scene/scene.h"
@@ -23,7 +24,8 @@ struct CompiledScene {
     std::uint64_t triangles = 0, emitters = 0, objects = 0, nodes = 0;
     int scale_exponent = 0;           ///< World lengths were multiplied by 2^scale_exponent after centring.
     Vec3d centre{};                   ///< In the author's units.
-    bool without_nodes = false;       ///< Scenes of CRT_ACCELERATOR_BVH: left to a backend that brings its own acceleration structure.
+    bool without_nodes = false;  ///< Scenes of CRT_ACCELERATOR_BVH: left to a backend that brings its own
+                                 ///< acceleration structure.
     std::string hash;  ///< 32 hex digits: what a film of this scene belongs to (scene_identity.h).
     double build_seconds = 0;         ///< BVH; 0 where none was built.
     double compile_seconds = 0;
@@ -32,13 +34,14 @@ struct CompiledScene {
     const unsigned char* data() const { return reinterpret_cast<const unsigned char*>(blob.data()); }
 };
 
-/// What the backend that will read the blob brings itself (crt_backend.h): nothing is built that it would not read.
+/// What the backend that will read the blob brings itself (crt_backend.h): nothing is built that it would
+/// not read.
 struct CompileOptions {
     double accelerator_reach = 0;  ///< Of the backend's own acceleration structure; 0: it needs the BVH.
 };
 
-/// `aovs` are the bits of Aov that outputs ask for. Warns about a scene without light. Throws crt::Error(Scene) for scenes that cannot be
-/// flattened (coordinates too large, more than 2^28 triangles).
+/// `aovs` are the bits of Aov that outputs ask for. Warns about a scene without light. Throws
+/// crt::Error(Scene) for scenes that cannot be flattened (coordinates too large, more than 2^28 triangles).
 CompiledScene compileScene(const Scene& scene, std::uint32_t aovs, const CompileOptions& options = {});
 
 /// "bvh, diffuse, nee": the names of a mask.

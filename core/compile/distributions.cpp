@@ -9,9 +9,10 @@
 namespace crt {
 namespace {
 
-/// Nodes of the inverse of the distribution with this density on [lower, upper], by trapezoids on `steps` intervals.
-std::vector<double> inverseDistribution(const std::function<double(double)>& density, double lower, double upper, std::size_t steps,
-                                        std::size_t cells) {
+/// Nodes of the inverse of the distribution with this density on [lower, upper], by trapezoids on `steps`
+/// intervals.
+std::vector<double> inverseDistribution(const std::function<double(double)>& density, double lower,
+                                        double upper, std::size_t steps, std::size_t cells) {
     const double width = (upper - lower) / static_cast<double>(steps);
     std::vector<double> cumulative(steps + 1, 0.0);
     for (std::size_t i = 0; i < steps; ++i) {
@@ -22,9 +23,11 @@ std::vector<double> inverseDistribution(const std::function<double(double)>& den
     for (std::size_t k = 0; k <= cells; ++k) {
         const double wanted = cumulative.back() * static_cast<double>(k) / static_cast<double>(cells);
         const auto above = std::upper_bound(cumulative.begin(), cumulative.end(), wanted);
-        const auto i = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(above - cumulative.begin() - 1, 0, static_cast<std::ptrdiff_t>(steps) - 1));
+        const auto i = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(
+            above - cumulative.begin() - 1, 0, static_cast<std::ptrdiff_t>(steps) - 1));
         const double span = cumulative[i + 1] - cumulative[i];
-        nodes[k] = lower + width * (static_cast<double>(i) + (span > 0 ? std::min(1.0, (wanted - cumulative[i]) / span) : 0.0));
+        nodes[k] = lower + width * (static_cast<double>(i) +
+                                    (span > 0 ? std::min(1.0, (wanted - cumulative[i]) / span) : 0.0));
     }
     nodes.front() = lower;
     nodes.back() = upper;
@@ -47,14 +50,17 @@ double blackmanHarris(double x, double radius) {
 std::vector<float> wavelengthTable(std::size_t cells) {
     const auto& cie = cieObserver();
     const auto density = [&](double wavelength_nm) {
-        const double position = std::clamp(wavelength_nm - kWavelengthMin_nm, 0.0, static_cast<double>(kSpectrumSize - 1));
-        const auto i = std::min(static_cast<std::size_t>(position), static_cast<std::size_t>(kSpectrumSize - 2));
+        const double position =
+            std::clamp(wavelength_nm - kWavelengthMin_nm, 0.0, static_cast<double>(kSpectrumSize - 1));
+        const auto i =
+            std::min(static_cast<std::size_t>(position), static_cast<std::size_t>(kSpectrumSize - 2));
         const double f = position - static_cast<double>(i);
         double sum = 0;
         for (const Spectrum& s : cie) sum += s[i] + f * (s[i + 1] - s[i]);
         return std::pow(sum, 0.4);
     };
-    return toFloat(inverseDistribution(density, kWavelengthMin_nm, kWavelengthMax_nm, 4 * (kSpectrumSize - 1), cells));
+    return toFloat(
+        inverseDistribution(density, kWavelengthMin_nm, kWavelengthMax_nm, 4 * (kSpectrumSize - 1), cells));
 }
 
 std::vector<float> filterTable(const FilmSettings& film, std::size_t cells) {
@@ -65,11 +71,13 @@ std::vector<float> filterTable(const FilmSettings& film, std::size_t cells) {
             return toFloat(inverseDistribution([](double) { return 1.0; }, -radius, radius, cells, cells));
         case PixelFilter::Gaussian: {
             const double edge = gaussian(radius, film.filter_sigma);
-            return toFloat(inverseDistribution([&](double x) { return std::max(0.0, gaussian(x, film.filter_sigma) - edge); }, -radius, radius,
-                                               64 * cells, cells));
+            return toFloat(inverseDistribution(
+                [&](double x) { return std::max(0.0, gaussian(x, film.filter_sigma) - edge); }, -radius,
+                radius, 64 * cells, cells));
         }
         case PixelFilter::BlackmanHarris:
-            return toFloat(inverseDistribution([&](double x) { return blackmanHarris(x, radius); }, -radius, radius, 64 * cells, cells));
+            return toFloat(inverseDistribution([&](double x) { return blackmanHarris(x, radius); }, -radius,
+                                               radius, 64 * cells, cells));
     }
     return {};
 }
@@ -79,7 +87,8 @@ std::vector<std::uint64_t> choiceTable(const std::vector<double>& weights) {
     if (weights.empty()) return first;
     constexpr std::uint64_t kAll = std::uint64_t{1} << 32;
     const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
-    // One each, and of the rest what the weights so far are worth. Rounding each share by itself could give away more than there is.
+    // One each, and of the rest what the weights so far are worth. Rounding each share by itself could give
+    // away more than there is.
     const auto rest = static_cast<double>(kAll - weights.size());
     double sum = 0;
     for (const double w : weights) {

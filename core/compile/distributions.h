@@ -8,16 +8,18 @@
 
 namespace crt {
 
-/// cells + 1 wavelengths in nm, 360 … 830, increasing: the inverse of a distribution whose density follows (x̄ + ȳ + z̄)^0.4
-/// (docs/decisions/0008-wavelengths.md). Linear between nodes, so each cell has the density 1/(cells·Δλ) exactly.
+/// cells + 1 wavelengths in nm, 360 … 830, increasing: the inverse of a distribution whose density follows
+/// (x̄ + ȳ + z̄)^0.4 (docs/decisions/0008-wavelengths.md). Linear between nodes, so each cell has the
+/// density 1/(cells·Δλ) exactly.
 std::vector<float> wavelengthTable(std::size_t cells);
 
-/// cells + 1 offsets from the pixel centre, in pixels: the inverse of the distribution proportional to the film's filter along one axis.
-/// Empty for the box of radius ½, which is uniform in the pixel.
+/// cells + 1 offsets from the pixel centre, in pixels: the inverse of the distribution proportional to the
+/// film's filter along one axis. Empty for the box of radius ½, which is uniform in the pixel.
 std::vector<float> filterTable(const FilmSettings& film, std::size_t cells);
 
-/// Shares of 2^32 proportional to `weights` (≥ 0, one of them > 0), at least 1 each: item i is chosen by the 32-bit numbers
-/// in [first[i], first[i+1]). Returns weights.size() + 1 boundaries, the last 2^32; {0} for no items.
+/// Shares of 2^32 proportional to `weights` (≥ 0, one of them > 0), at least 1 each: item i is chosen by the
+/// 32-bit numbers in [first[i], first[i+1]). Returns weights.size() + 1 boundaries, the last 2^32; {0} for
+/// no items.
 std::vector<std::uint64_t> choiceTable(const std::vector<double>& weights);
 
 }  // namespace crt

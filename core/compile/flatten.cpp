@@ -3,8 +3,8 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/stage.h"
-#include "scene/scene_limits.h"
 #include "base/vec3d.h"
+#include "scene/scene_limits.h"
 
 #include <fmt/format.h>
 
@@ -22,14 +22,16 @@ Vec3d transformPoint(const Matrix4d& m, const Vec3d& p) {
             m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]};
 }
 
-/// Rows of the cofactor matrix of the linear part: transforms normals, and its sign is that of the determinant.
+/// Rows of the cofactor matrix of the linear part: transforms normals, and its sign is that of the
+/// determinant.
 Matrix3d cofactors(const Matrix4d& m) {
     const Vec3d a{m[0], m[1], m[2]}, b{m[4], m[5], m[6]}, c{m[8], m[9], m[10]};
     return {cross(b, c), cross(c, a), cross(a, b)};
 }
 
 /// Appends the mesh of an object as one of its transforms places it.
-void place(const Object& object, const Mesh& mesh, const Matrix4d& transform, FlatScene& flat, Stage& stage) {
+void place(const Object& object, const Mesh& mesh, const Matrix4d& transform, FlatScene& flat,
+           Stage& stage) {
     const Matrix3d normal_matrix = cofactors(transform);
     const Vec3d first_row{transform[0], transform[1], transform[2]};
     // A mirroring transform turns the order of vertices round; turning it back keeps the outside outside.
@@ -40,11 +42,13 @@ void place(const Object& object, const Mesh& mesh, const Matrix4d& transform, Fl
         t.material = !mesh.material.empty() && mesh.material[i] >= 0 ? mesh.material[i] : object.material;
         t.emission = !mesh.emission.empty() && mesh.emission[i] >= 0 ? mesh.emission[i] : object.emission;
         t.smooth = !mesh.normal_index.empty() &&
-                   std::all_of(mesh.normal_index[i].begin(), mesh.normal_index[i].end(), [](std::uint32_t n) { return n != kNoNormal; });
+                   std::all_of(mesh.normal_index[i].begin(), mesh.normal_index[i].end(),
+                               [](std::uint32_t n) { return n != kNoNormal; });
         for (std::size_t k = 0; k < 3; ++k) {
             const std::size_t from = mirrored && k > 0 ? 3 - k : k;
             t.positions[k] = transformPoint(transform, mesh.positions[mesh.triangles[i][from]]);
-            if (!std::all_of(t.positions[k].begin(), t.positions[k].end(), [](double x) { return std::isfinite(x); }))
+            if (!std::all_of(t.positions[k].begin(), t.positions[k].end(),
+                             [](double x) { return std::isfinite(x); }))
                 throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity", object.place);
             if (t.smooth) {
                 const Vec3d n = multiply(normal_matrix, mesh.normals[mesh.normal_index[i][from]]);
@@ -101,8 +105,9 @@ bool hasArea(const std::array<Vec3d, 3>& p) {
     return dot(n, n) > 1e-30 * std::max(dot(a, a), dot(b, b));
 }
 
-/// Centre and power-of-two scale in double, so that far-away and huge or tiny scenes lose nothing in float, and moving or scaling
-/// a scene by representable amounts gives the same bits. Triangles without area have no part in it: nobody sees them.
+/// Centre and power-of-two scale in double, so that far-away and huge or tiny scenes lose nothing in float,
+/// and moving or scaling a scene by representable amounts gives the same bits. Triangles without area have
+/// no part in it: nobody sees them.
 void normaliseLengths(FlatScene& flat) {
     const std::size_t count = flat.triangles.size();
     std::vector<bool> seen(count, true);
@@ -113,7 +118,8 @@ void normaliseLengths(FlatScene& flat) {
         without_area += seen[i] ? 0 : 1;
     }
     if (without_area > 0) {
-        logWarning("{} triangle{} no area and will not be seen", without_area, without_area == 1 ? " has" : "s have");
+        logWarning("{} triangle{} no area and will not be seen", without_area,
+                   without_area == 1 ? " has" : "s have");
         if (without_area < count) measure(flat, seen);
     }
     flat.positions.resize(count);
@@ -131,17 +137,24 @@ void normaliseLengths(FlatScene& flat) {
 FlatScene flattenScene(const Scene& scene) {
     // Before anything is written out.
     std::uint64_t count = 0;
-    for (const Object& object : scene.objects) count += std::uint64_t{scene.meshes[object.mesh].triangles.size()} * object.transforms.size();
-    if (count >= kMostTriangles) throw Error(ErrorKind::Scene, fmt::format("written out, the scene has {} triangles; crt renders up to 268 million", count));
+    for (const Object& object : scene.objects)
+        count += std::uint64_t{scene.meshes[object.mesh].triangles.size()} * object.transforms.size();
+    if (count >= kMostTriangles)
+        throw Error(
+            ErrorKind::Scene,
+            fmt::format("written out, the scene has {} triangles; crt renders up to 268 million", count));
     if (scene.input_bytes > 0)
-        if (const std::string why = ExpansionLimit(scene.input_bytes).refusal(count, "triangles", kBytesPerTriangle); !why.empty())
+        if (const std::string why =
+                ExpansionLimit(scene.input_bytes).refusal(count, "triangles", kBytesPerTriangle);
+            !why.empty())
             throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", scene.file, why), {scene.file});
 
     FlatScene flat;
     flat.triangles.reserve(count);
     Stage stage("placing triangles", static_cast<double>(count));
     for (const Object& object : scene.objects)
-        for (const Matrix4d& transform : object.transforms) place(object, scene.meshes[object.mesh], transform, flat, stage);
+        for (const Matrix4d& transform : object.transforms)
+            place(object, scene.meshes[object.mesh], transform, flat, stage);
     normaliseLengths(flat);
     return flat;
 }

@@ -1,4 +1,5 @@
-/// Objects and transforms → one list of triangles, and lengths that single precision can hold (docs/architecture.md, "Lengths").
+/// Objects and transforms → one list of triangles, and lengths that single precision can hold
+/// (docs/architecture.md, "Lengths").
 #pragma once
 
 #include "scene/scene.h"
@@ -16,20 +17,22 @@ struct FlatTriangle {
     bool smooth = false;
     std::int32_t material = -1;
     std::int32_t emission = -1;
-    std::uint32_t object = 0;        ///< Number of the placement: an object has one for each of its transforms.
+    std::uint32_t object = 0;  ///< Number of the placement: an object has one for each of its transforms.
 };
 
 /// All triangles of a scene, in the author's order.
 struct FlatScene {
     std::vector<FlatTriangle> triangles;
     std::uint32_t placements = 0;
-    /// x of the three vertices, y, z: centred, scaled, and rounded to single precision. Those of a triangle without area are one point.
+    /// x of the three vertices, y, z: centred, scaled, and rounded to single precision. Those of a triangle
+    /// without area are one point.
     std::vector<std::array<float, 9>> positions;
     Vec3d centre{};                  ///< In the author's units.
     int scale_exponent = 0;          ///< Lengths were multiplied by 2^scale_exponent after centring.
 };
 
-/// Warns about triangles without area. Throws crt::Error(Scene) when there are too many triangles, or a transform moves a vertex to infinity.
+/// Warns about triangles without area. Throws crt::Error(Scene) when there are too many triangles, or a
+/// transform moves a vertex to infinity.
 FlatScene flattenScene(const Scene& scene);
 
 }  // namespace crt

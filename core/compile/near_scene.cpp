@@ -1,10 +1,10 @@
 #include "compile/near_scene.h"
 
+#include "base/log.h"
 #include "compile/blob_writer.h"
 #include "compile/bvh_build.h"
-#include "kernel/surface.h"
-#include "base/log.h"
 #include "compile/near_surfaces.h"
+#include "kernel/surface.h"
 
 #include <algorithm>
 #include <bit>

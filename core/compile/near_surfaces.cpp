@@ -25,17 +25,21 @@ kernel::CrtContext contextOf(const CompiledScene& scene) {
 constexpr std::uint64_t kTriangles = 10000;
 constexpr std::uint64_t kEmitters = 100000;
 
-/// Tests of a triangle against another, some hundredths of a second of them. Where thousands lie on one spot each is a neighbour of each: then fewer
-/// triangles are asked, and the time stays what it is.
+/// Tests of a triangle against another, some hundredths of a second of them. Where thousands lie on one spot
+/// each is a neighbour of each: then fewer triangles are asked, and the time stays what it is.
 constexpr std::uint64_t kTriangleTests = 4000000;
 
-/// All of [0, count) in an order whose every beginning is spread evenly: multiples of the golden section, modulo count.
+/// All of [0, count) in an order whose every beginning is spread evenly: multiples of the golden section,
+/// modulo count.
 class EvenOrder {
 public:
-    explicit EvenOrder(std::uint64_t count) : count_(count), step_(static_cast<std::uint64_t>(static_cast<double>(count) * 0.6180339887498949)) {
+    explicit EvenOrder(std::uint64_t count)
+        : count_(count), step_(static_cast<std::uint64_t>(static_cast<double>(count) * 0.6180339887498949)) {
         while (count_ > 1 && std::gcd(step_, count_) != 1) ++step_;
     }
-    std::uint64_t operator[](std::uint64_t i) const { return static_cast<std::uint64_t>(static_cast<unsigned __int128>(i) * step_ % count_); }
+    std::uint64_t operator[](std::uint64_t i) const {
+        return static_cast<std::uint64_t>(static_cast<unsigned __int128>(i) * step_ % count_);
+    }
 
 private:
     std::uint64_t count_, step_;
@@ -85,7 +89,8 @@ double largestEdge(const Corners& c) {
     return std::sqrt(squared);
 }
 
-/// Whether the corners of the smaller lie in the plane of the larger, whose normal is known better, as well as rays can tell.
+/// Whether the corners of the smaller lie in the plane of the larger, whose normal is known better, as well
+/// as rays can tell.
 bool inOnePlane(const Corners& a, const Corners& b) {
     const Corners &large = largestEdge(a) < largestEdge(b) ? b : a, &small = &large == &a ? b : a;
     return std::all_of(small.p.begin(), small.p.end(), [&](const Vec3d& corner) {
@@ -93,14 +98,16 @@ bool inOnePlane(const Corners& a, const Corners& b) {
     });
 }
 
-/// Whether two triangles of one plane have area in common: by the separating axes of their edges. What merely touches has not.
+/// Whether two triangles of one plane have area in common: by the separating axes of their edges. What
+/// merely touches has not.
 bool overlap(const Corners& a, const Corners& b) {
     const auto apart = [](const Corners& of, const Corners& other) {
         for (std::size_t v = 0; v < 3; ++v) {
             const Vec3d edge = of.p[(v + 1) % 3] - of.p[v];
             const Vec3d inwards = cross(of.normal, edge) * (1 / std::sqrt(dot(edge, edge)));
             double farthest = -std::numeric_limits<double>::infinity();
-            for (const Vec3d& corner : other.p) farthest = std::max(farthest, dot(inwards, corner - of.p[v]));
+            for (const Vec3d& corner : other.p)
+                farthest = std::max(farthest, dot(inwards, corner - of.p[v]));
             if (farthest <= std::max(of.clearance, other.clearance)) return true;
         }
         return false;
@@ -110,7 +117,8 @@ bool overlap(const Corners& a, const Corners& b) {
 
 /// Slots whose bounding boxes meet `box`, until `visit` returns true or no test is left in `tests`.
 template <class Visit>
-void visitNeighbours(const kernel::CrtContext& context, const Box& box, std::uint64_t& tests, const Visit& visit) {
+void visitNeighbours(const kernel::CrtContext& context, const Box& box, std::uint64_t& tests,
+                     const Visit& visit) {
     using namespace kernel;
     const CrtScene& scene = *context.scene;
     // A false answer goes on; so do the tests, while there are any.
@@ -140,7 +148,8 @@ void visitNeighbours(const kernel::CrtContext& context, const Box& box, std::uin
 }
 
 /// The closest triangle that a ray meets within its reach, which is short.
-kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::CrtRay& ray, std::uint64_t& tests) {
+kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::CrtRay& ray,
+                             std::uint64_t& tests) {
     using namespace kernel;
     const Vec3d o{ray.o.x, ray.o.y, ray.o.z}, d{ray.d.x, ray.d.y, ray.d.z};
     const auto point = [&](double t) {
@@ -161,13 +170,14 @@ kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::Cr
     return best;
 }
 
-/// Slots by id; CRT_NONE for triangles that a reduced scene (near_scene.h) lacks. By ids, so that every order of slots is
-/// asked about the same triangles.
+/// Slots by id; CRT_NONE for triangles that a reduced scene (near_scene.h) lacks. By ids, so that every
+/// order of slots is asked about the same triangles.
 std::vector<std::uint32_t> slotsOf(const CompiledScene& scene, const kernel::CrtContext& context) {
     using namespace kernel;
     const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
     std::vector<std::uint32_t> slots(scene.triangles, CRT_NONE);
-    for (std::uint32_t slot = 0; slot < context.scene->triangle_count; ++slot) slots[triangles[slot].id] = slot;
+    for (std::uint32_t slot = 0; slot < context.scene->triangle_count; ++slot)
+        slots[triangles[slot].id] = slot;
     return slots;
 }
 
@@ -180,7 +190,9 @@ std::vector<std::uint32_t> askedTriangles(std::uint64_t triangles) {
     return ids;
 }
 
-std::uint64_t askedEmitterStep(std::uint64_t emitters) { return std::max<std::uint64_t>(1, emitters / kEmitters); }
+std::uint64_t askedEmitterStep(std::uint64_t emitters) {
+    return std::max<std::uint64_t>(1, emitters / kEmitters);
+}
 
 std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     using namespace kernel;
@@ -191,7 +203,8 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     std::vector<std::uint32_t> lights;  // Slots, in the order of ids.
     if (scene.emitters > 0)
         for (const std::uint32_t slot : slotsOf(scene, context)) {
-            const std::uint32_t emitter = slot != CRT_NONE ? primitives[triangles[slot].id].emitter : CRT_NONE;
+            const std::uint32_t emitter =
+                slot != CRT_NONE ? primitives[triangles[slot].id].emitter : CRT_NONE;
             if (emitter != CRT_NONE && emitter % step == 0) lights.push_back(slot);
         }
     std::uint64_t tests = kTriangleTests;
@@ -237,9 +250,11 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
         if (dot3(normal, normal) == 0.0f) continue;  // no area
         ++found.asked;
         CrtRay ray;
-        ray.o = (crt_triangle_vertex(triangles + slot, 0) + crt_triangle_vertex(triangles + slot, 1) + crt_triangle_vertex(triangles + slot, 2)) *
+        ray.o = (crt_triangle_vertex(triangles + slot, 0) + crt_triangle_vertex(triangles + slot, 1) +
+                 crt_triangle_vertex(triangles + slot, 2)) *
                 (1.0f / 3.0f);
-        const float touching = 16 * CRT_EPSILON * std::max({std::abs(ray.o.x), std::abs(ray.o.y), std::abs(ray.o.z)});
+        const float touching =
+            16 * CRT_EPSILON * std::max({std::abs(ray.o.x), std::abs(ray.o.y), std::abs(ray.o.z)});
         for (const float side : {1.0f, -1.0f}) {
             // Begins beyond what touches, among it the triangle itself.
             ray.d = normal * side;
@@ -251,7 +266,8 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
             const float clearance = std::max(faces[slot].clearance, faces[hit.slot].clearance);
             if (hit.t + touching > clearance) continue;
             ++found.near;
-            found.nearest_clearance = std::max(found.nearest_clearance, std::ldexp(static_cast<double>(clearance), -scene.scale_exponent));
+            found.nearest_clearance = std::max(
+                found.nearest_clearance, std::ldexp(static_cast<double>(clearance), -scene.scale_exponent));
             break;
         }
     }

@@ -1,4 +1,5 @@
-/// Warns of geometry that single precision cannot tell apart: surfaces nearer to each other than a ray's start is known.
+/// Warns of geometry that single precision cannot tell apart: surfaces nearer to each other than a ray's
+/// start is known.
 #pragma once
 
 #include "compile/compile.h"
@@ -11,8 +12,10 @@ namespace crt {
 
 struct NearSurfaces {
     std::uint64_t asked = 0;     ///< Triangles that were looked at: all, or an even choice of them.
-    std::uint64_t near = 0;      ///< Of those: with another surface nearer than the clearance of either (kernel/surface.h), yet not touching.
-    double nearest_clearance = 0;  ///< The largest clearance that was too large for its neighbour, in the author's units.
+    std::uint64_t near = 0;      ///< Of those: with another surface nearer than the clearance of either
+                                 ///< (kernel/surface.h), yet not touching.
+    double nearest_clearance =
+        0;  ///< The largest clearance that was too large for its neighbour, in the author's units.
 };
 
 /// Ids of the triangles that findNearSurfaces asks about, in its order.
@@ -20,18 +23,20 @@ std::vector<std::uint32_t> askedTriangles(std::uint64_t triangles);
 /// findCoplanarLight asks about emitters whose numbers are multiples of this.
 std::uint64_t askedEmitterStep(std::uint64_t emitters);
 
-/// A lamp in the plane of another surface, which it overlaps: rays meet both at one distance but for rounding, and see now one, now the other.
+/// A lamp in the plane of another surface, which it overlaps: rays meet both at one distance but for
+/// rounding, and see now one, now the other.
 struct CoplanarLight {
     std::uint32_t light = 0, surface = 0;  ///< Primitive ids of one such pair.
-    double least_gap = 0;                  ///< So far apart, in the author's units, they would be told apart.
+    double least_gap = 0;  ///< So far apart, in the author's units, they would be told apart.
 };
 
-/// One such pair; nothing where there is none. Of very many emitters, or of many on one spot, an even choice is looked at: the time is
-/// bounded, whatever the scene.
+/// One such pair; nothing where there is none. Of very many emitters, or of many on one spot, an even choice
+/// is looked at: the time is bounded, whatever the scene.
 std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene);
 
-/// From the middle of each triangle along its normal, to both sides. Surfaces within a few ulp of each other touch, as a box does that stands
-/// on a floor; that is what an author means, and is safe. The time is bounded as above; `asked` says how many it was enough for.
+/// From the middle of each triangle along its normal, to both sides. Surfaces within a few ulp of each other
+/// touch, as a box does that stands on a floor; that is what an author means, and is safe. The time is
+/// bounded as above; `asked` says how many it was enough for.
 NearSurfaces findNearSurfaces(const CompiledScene& scene);
 
 }  // namespace crt

@@ -1,9 +1,9 @@
 #include "film/checkpoint.h"
 
 #include "base/atomic_file.h"
-#include "film/film_pack.h"
 #include "base/input_file.h"
 #include "base/log.h"
+#include "film/film_pack.h"
 
 #include <fmt/format.h>
 
@@ -80,7 +80,8 @@ private:
 };
 
 /// Sample ranges, version and record: the part of the header whose size varies.
-std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identity, const std::string& record) {
+std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identity,
+                                    const std::string& record) {
     const auto& ranges = film.samples.ranges();
     const std::size_t range_bytes = ranges.size() * 16;
     const std::size_t record_begin = range_bytes + roundUp8(identity.version.size());
@@ -89,7 +90,8 @@ std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identi
         std::memcpy(&bytes[i * 16], &ranges[i].first, 8);
         std::memcpy(&bytes[i * 16 + 8], &ranges[i].second, 8);
     }
-    if (!identity.version.empty()) std::memcpy(&bytes[range_bytes], identity.version.data(), identity.version.size());
+    if (!identity.version.empty())
+        std::memcpy(&bytes[range_bytes], identity.version.data(), identity.version.size());
     if (!record.empty()) std::memcpy(&bytes[record_begin], record.data(), record.size());
     return bytes;
 }
@@ -145,11 +147,13 @@ bool sizesFit(const Header& h) {
 }
 
 FilmRecord readRecordOf(const std::string& path, const std::vector<unsigned char>& tail, const Header& h) {
-    const auto* text = reinterpret_cast<const char*>(tail.data()) + h.range_count * std::size_t{16} + roundUp8(h.version_bytes);
+    const auto* text = reinterpret_cast<const char*>(tail.data()) + h.range_count * std::size_t{16} +
+                       roundUp8(h.version_bytes);
     try {
         FilmRecord record = readRecord({text, h.record_bytes});
         const auto& [x0, y0, x1, y1] = record.window;
-        if (static_cast<std::uint32_t>(x1 - x0) != h.width || static_cast<std::uint32_t>(y1 - y0) != h.height)
+        if (static_cast<std::uint32_t>(x1 - x0) != h.width ||
+            static_cast<std::uint32_t>(y1 - y0) != h.height)
             throw Error(ErrorKind::Usage, "is of a film of another size");
         return record;
     } catch (const Error& error) {
@@ -161,12 +165,15 @@ FilmRecord readRecordOf(const std::string& path, const std::vector<unsigned char
 
 void writeCheckpoint(const std::string& path, const Film& film, const FilmIdentity& identity) {
     if (!isHexHash(identity.scene_hash.data(), identity.scene_hash.size()))
-        throw Error(ErrorKind::Internal, fmt::format("'{}' is not a scene hash of 32 hex digits", identity.scene_hash));
+        throw Error(ErrorKind::Internal,
+                    fmt::format("'{}' is not a scene hash of 32 hex digits", identity.scene_hash));
     if (identity.version.size() > kVersionBytesMax || film.samples.ranges().size() > kRangesMax)
-        throw Error(ErrorKind::Internal, "the film has too many sample ranges, or crt too long a version, for a checkpoint");
+        throw Error(ErrorKind::Internal,
+                    "the film has too many sample ranges, or crt too long a version, for a checkpoint");
 
     const std::string record = identity.record ? recordText(*identity.record) : std::string();
-    if (record.size() > kRecordBytesMax) throw Error(ErrorKind::Internal, "the film has too long a record for a checkpoint");
+    if (record.size() > kRecordBytesMax)
+        throw Error(ErrorKind::Internal, "the film has too long a record for a checkpoint");
     const std::vector<unsigned char> tail = packTail(film, identity, record);
     Header header{};
     header.magic = kMagic;
@@ -199,28 +206,34 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
 std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     const std::unique_ptr<std::FILE, CloseFile> file = openFilm(path);
     struct stat status {};
-    if (::fstat(::fileno(file.get()), &status) != 0) refuse(path, fmt::format("cannot be read: {}", std::strerror(errno)));
+    if (::fstat(::fileno(file.get()), &status) != 0)
+        refuse(path, fmt::format("cannot be read: {}", std::strerror(errno)));
     const auto actual_bytes = static_cast<std::uint64_t>(status.st_size);
     if (actual_bytes == 0) refuse(path, "is empty, not a crt film");
 
     Header header{};
     readExactly(file.get(), path, &header, std::min<std::uint64_t>(actual_bytes, sizeof header));
-    if (std::memcmp(header.magic.data(), kMagic.data(), std::min<std::uint64_t>(actual_bytes, kMagic.size())) != 0)
+    if (std::memcmp(header.magic.data(), kMagic.data(),
+                    std::min<std::uint64_t>(actual_bytes, kMagic.size())) != 0)
         refuse(path, "is not a crt film: it does not begin with the mark of one");
-    if (actual_bytes >= 12 && header.format_version != kCheckpointVersion && header.format_version != kCheckpointVersionUnpacked)
-        refuse(path, fmt::format("is a crt film of format {}; this crt reads formats {} and {}", header.format_version,
-                                 kCheckpointVersionUnpacked, kCheckpointVersion));
+    if (actual_bytes >= 12 && header.format_version != kCheckpointVersion &&
+        header.format_version != kCheckpointVersionUnpacked)
+        refuse(path, fmt::format("is a crt film of format {}; this crt reads formats {} and {}",
+                                 header.format_version, kCheckpointVersionUnpacked, kCheckpointVersion));
     if (actual_bytes < sizeof header)
-        refuse(path, fmt::format("is truncated: it has {} bytes and its header alone takes {}", actual_bytes, sizeof header));
+        refuse(path, fmt::format("is truncated: it has {} bytes and its header alone takes {}", actual_bytes,
+                                 sizeof header));
     // Sizes before anything is allocated: a damaged width must not ask for a terabyte.
     if (actual_bytes < header.file_bytes)
         refuse(path, fmt::format("is truncated: it has {} of {} bytes", actual_bytes, header.file_bytes));
-    if (actual_bytes > header.file_bytes || header.version_bytes > kVersionBytesMax || header.range_count > kRangesMax ||
-        header.record_bytes > kRecordBytesMax || !sizesFit(header))
+    if (actual_bytes > header.file_bytes || header.version_bytes > kVersionBytesMax ||
+        header.range_count > kRangesMax || header.record_bytes > kRecordBytesMax || !sizesFit(header))
         refuse(path, "is damaged: its header contradicts its size");
-    // A side of no pixels makes any other side fit the size; walking four thousand million empty rows would take a minute.
+    // A side of no pixels makes any other side fit the size; walking four thousand million empty rows would
+    // take a minute.
     if (std::min(header.width, header.height) < 1 || std::max(header.width, header.height) > kSideMax)
-        refuse(path, fmt::format("is damaged: its header says {} x {} pixels, and films have 1 to {} a side", header.width, header.height, kSideMax));
+        refuse(path, fmt::format("is damaged: its header says {} x {} pixels, and films have 1 to {} a side",
+                                 header.width, header.height, kSideMax));
 
     const char* const kBadChecksum = "is damaged: its checksum does not match its content";
     Checksum checksum;
@@ -241,7 +254,8 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     const auto make_film = [&] {
         try {
             const bool squares = header.format_version == kCheckpointVersionUnpacked;
-            return Film({header.width, header.height, header.channels, header.aovs | (squares ? kAovSquares : 0u)});
+            return Film(
+                {header.width, header.height, header.channels, header.aovs | (squares ? kAovSquares : 0u)});
         } catch (const Error& error) {
             if (error.kind() != ErrorKind::Internal) throw;  // Too large for this machine is not damaged.
             refuse(path, kBadChecksum);
@@ -265,14 +279,16 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         if (checksum.value() != header.checksum) refuse(path, kBadChecksum);
     }
 
-    // From here on the file is what a crt wrote; what is checked still is what could only be a bug of that crt.
+    // From here on the file is what a crt wrote; what is checked still is what could only be a bug of that
+    // crt.
     FilmIdentity identity{
         std::string(header.scene_hash.data(), kHashDigits),
         std::string(reinterpret_cast<const char*>(tail.data()) + header.range_count * std::size_t{16},
                     header.version_bytes),
         header.bits_version};
     if (header.record_bytes > 0) identity.record = readRecordOf(path, tail, header);
-    if (!isHexHash(identity.scene_hash.data(), identity.scene_hash.size())) refuse(path, "holds a scene hash that is not one");
+    if (!isHexHash(identity.scene_hash.data(), identity.scene_hash.size()))
+        refuse(path, "holds a scene hash that is not one");
     try {
         for (std::uint32_t i = 0; i < header.range_count; ++i) {
             SampleRange range;
@@ -309,7 +325,8 @@ void requireSameScene(const std::string& path, const FilmIdentity& found, const 
     if (found.scene_hash != expected.scene_hash)
         refuse(path, fmt::format("is of another scene, seed or film: {}", differenceText(found, expected)));
     if (found.version != expected.version)
-        logWarning("'{}' was rendered by crt {}, this is {}: samples may differ between versions", path, found.version, expected.version);
+        logWarning("'{}' was rendered by crt {}, this is {}: samples may differ between versions", path,
+                   found.version, expected.version);
 }
 
 std::string joinVersions(const std::string& a, const std::string& b) {
@@ -358,8 +375,8 @@ std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& p
                 {paths[i]});
         if (identity.scene_hash != merged.second.scene_hash)
             throw Error(ErrorKind::Usage,
-                        fmt::format("'{}' is of another scene, seed or film than '{}': {}", paths[i], paths.front(),
-                                    differenceText(identity, merged.second)),
+                        fmt::format("'{}' is of another scene, seed or film than '{}': {}", paths[i],
+                                    paths.front(), differenceText(identity, merged.second)),
                         {paths[i]});
         requireSameScene(paths[i], identity, merged.second);
         merged.second.version = joinVersions(merged.second.version, identity.version);

@@ -1,5 +1,5 @@
-#include "film/checkpoint_writer.h"
 #include "film/checkpoint.h"
+#include "film/checkpoint_writer.h"
 
 #include "base/log.h"
 
@@ -11,7 +11,8 @@ namespace crt {
 namespace {
 
 /// What went wrong, if anything did.
-std::optional<Error> tryTo(const CheckpointWriter::Write& write, const Film& film, const FilmIdentity& identity) {
+std::optional<Error> tryTo(const CheckpointWriter::Write& write, const Film& film,
+                           const FilmIdentity& identity) {
     try {
         write(film, identity);
         return std::nullopt;
@@ -25,7 +26,9 @@ std::optional<Error> tryTo(const CheckpointWriter::Write& write, const Film& fil
 }  // namespace
 
 CheckpointWriter::CheckpointWriter(const std::string& path)
-    : CheckpointWriter([path](const Film& film, const FilmIdentity& identity) { writeCheckpoint(path, film, identity); }) {}
+    : CheckpointWriter([path](const Film& film, const FilmIdentity& identity) {
+          writeCheckpoint(path, film, identity);
+      }) {}
 
 bool CheckpointWriter::idle() const {
     return !writing_.valid() || writing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;

@@ -10,16 +10,20 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
-/// Below it a handful of paths makes the estimate, and an interval would not cover what it claims (docs/results/calibration.md).
+/// Below it a handful of paths makes the estimate, and an interval would not cover what it claims
+/// (docs/results/calibration.md).
 constexpr double kLeastDegreesOfFreedom = 4;
 
-/// What the brightest pixel says of pixels as bright that no path has met yet: so many more squares like its own.
+/// What the brightest pixel says of pixels as bright that no path has met yet: so many more squares like its
+/// own.
 constexpr double kUnseen = 0.5;
 
-/// From so many pixels on the scatter of variances is measured; of fewer, where a measurement would be noise, replicates are taken as normal.
+/// From so many pixels on the scatter of variances is measured; of fewer, where a measurement would be
+/// noise, replicates are taken as normal.
 constexpr double kPixelsToMeasure = 32;
 
-/// Whether the variance between replicates is that of the film's mean: all have samples, and about equally many.
+/// Whether the variance between replicates is that of the film's mean: all have samples, and about equally
+/// many.
 bool balanced(const Film& film) {
     std::uint64_t least = std::numeric_limits<std::uint64_t>::max(), most = 0;
     for (std::uint32_t r = 0; r < film.replicates(); ++r) {
@@ -37,7 +41,8 @@ bool belongs(std::uint32_t x, std::uint32_t y, PixelSet which) {
 class PixelMap {
 public:
     template <class Function>
-    PixelMap(const Film& film, const Function& function) : width_(film.shape().width), height_(film.shape().height) {
+    PixelMap(const Film& film, const Function& function)
+        : width_(film.shape().width), height_(film.shape().height) {
         values_.reserve(std::size_t{width_} * height_);
         for (std::uint32_t y = 0; y < height_; ++y)
             for (std::uint32_t x = 0; x < width_; ++x) values_.push_back(function(x, y));
@@ -55,8 +60,9 @@ public:
     }
     bool known(std::uint32_t x, std::uint32_t y) const { return std::isfinite(at(x, y)); }
 
-    /// Square of a value's deviation from the mean of its k neighbours in the set, times k/(k + 1): the value's variance, and more where neighbours have
-    /// other means. With one degree of freedom a pixel's variance scatters more than those of neighbours differ, so that this is hardly too large.
+    /// Square of a value's deviation from the mean of its k neighbours in the set, times k/(k + 1): the
+    /// value's variance, and more where neighbours have other means. With one degree of freedom a pixel's
+    /// variance scatters more than those of neighbours differ, so that this is hardly too large.
     double squaredDeviation(std::uint32_t x, std::uint32_t y, PixelSet which) const {
         double sum = 0, count = 0;
         for (std::uint32_t j = y > 0 ? y - 1 : 0; j <= std::min(y + 1, height_ - 1); ++j)
@@ -75,7 +81,8 @@ private:
     std::vector<double> values_;
 };
 
-/// Sums over the pixels of a set, variances in units of the largest, so that no square overflows: a checkpoint may hold any finite sums.
+/// Sums over the pixels of a set, variances in units of the largest, so that no square overflows: a
+/// checkpoint may hold any finite sums.
 struct VarianceSums {
     double pixels = 0, known = 0, sum = 0, most = 0, squares = 0;
 };
@@ -96,9 +103,10 @@ VarianceSums sumsOf(const Film& film, const PixelMap& variances, PixelSet which)
     return s;
 }
 
-/// Variance of the sum S of variances, in their units, as it enters the relative error √S/M, whatever the distribution of samples.
-double measuredSpread(const Film& film, const LuminanceVariance& variance, const PixelMap& variances, PixelSet which, const VarianceSums& sums, double largest,
-                      double luminance) {
+/// Variance of the sum S of variances, in their units, as it enters the relative error √S/M, whatever the
+/// distribution of samples.
+double measuredSpread(const Film& film, const LuminanceVariance& variance, const PixelMap& variances,
+                      PixelSet which, const VarianceSums& sums, double largest, double luminance) {
     const auto total = [&](const auto& of) {
         double sum = 0;
         for (std::uint32_t y = 0; y < film.shape().height; ++y)
@@ -107,27 +115,31 @@ double measuredSpread(const Film& film, const LuminanceVariance& variance, const
         return sum;
     };
     if (variance.fromReplicates() && variance.degreesOfFreedom() >= 3)
-        return total([&](std::uint32_t x, std::uint32_t y) { return variance.varianceOfVariance(x, y, largest); });
+        return total(
+            [&](std::uint32_t x, std::uint32_t y) { return variance.varianceOfVariance(x, y, largest); });
     // What a pixel adds to log(√S/M): where a bright path raises both S and M, they partly cancel.
     const PixelMap influence(film, [&](std::uint32_t x, std::uint32_t y) {
         return 0.5 * variances.at(x, y) / sums.sum - film.mean(x, y, 1) / luminance;
     });
-    return 4 * sums.sum * sums.sum * total([&](std::uint32_t x, std::uint32_t y) { return influence.squaredDeviation(x, y, which); });
+    return 4 * sums.sum * sums.sum *
+           total([&](std::uint32_t x, std::uint32_t y) { return influence.squaredDeviation(x, y, which); });
 }
 
 }  // namespace
 
-LuminanceVariance::LuminanceVariance(const Film& film) : film_(film), from_replicates_(balanced(film)), squares_(firstChannel(film.shape().aovs, kAovSquares)) {
+LuminanceVariance::LuminanceVariance(const Film& film)
+    : film_(film), from_replicates_(balanced(film)), squares_(firstChannel(film.shape().aovs, kAovSquares)) {
     if (!from_replicates_) {
         dof_ = squares_ != 0 ? static_cast<double>(film.samples.count()) - 1 : 0;
         return;
     }
-    for (std::uint32_t r = 0; r < film.replicates(); ++r) samples_[r] = static_cast<double>(film.replicateSamples(r));
+    for (std::uint32_t r = 0; r < film.replicates(); ++r)
+        samples_[r] = static_cast<double>(film.replicateSamples(r));
     dof_ = film.replicates() - 1;
 }
 
-/// Analysis of variance between replicates with means m_r of n_r samples each: s² = Σ n_r (m_r − m)²/(R − 1), and s²/n for the mean of all n
-/// samples. With equal n_r it is the variance of the R means over R.
+/// Analysis of variance between replicates with means m_r of n_r samples each: s² = Σ n_r (m_r − m)²/(R −
+/// 1), and s²/n for the mean of all n samples. With equal n_r it is the variance of the R means over R.
 double LuminanceVariance::betweenReplicates(std::uint32_t x, std::uint32_t y) const {
     const auto n = static_cast<double>(film_.samples.count());
     const double mean = film_.sum(x, y, 1) / n;
@@ -142,7 +154,9 @@ double LuminanceVariance::betweenReplicates(std::uint32_t x, std::uint32_t y) co
 double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
     if (!(dof_ >= 1)) return kUnknown;
     const std::uint64_t n = film_.counts[std::size_t{y} * film_.shape().width + x];
-    if (from_replicates_) return n == film_.samples.count() ? betweenReplicates(x, y) : kUnknown;  // Whose samples were dropped is not known.
+    if (from_replicates_)
+        return n == film_.samples.count() ? betweenReplicates(x, y)
+                                          : kUnknown;  // Whose samples were dropped is not known.
     if (n < 2) return kUnknown;
     const double mean = film_.mean(x, y, 1);
     // Rounding can push the difference of nearly equal numbers below zero.
@@ -150,7 +164,8 @@ double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
     return spread / static_cast<double>(n - 1);
 }
 
-/// Var k₂ of R values is estimated without bias by (2R k₂² + (R − 1) k₄) / (R (R + 1)) (Kendall and Stuart 1969, 12.16); the variance of the mean is k₂/R.
+/// Var k₂ of R values is estimated without bias by (2R k₂² + (R − 1) k₄) / (R (R + 1)) (Kendall and Stuart
+/// 1969, 12.16); the variance of the mean is k₂/R.
 double LuminanceVariance::varianceOfVariance(std::uint32_t x, std::uint32_t y, double unit) const {
     const double r = dof_ + 1, mean = film_.mean(x, y, 1);
     double squares = 0, fourth_powers = 0;
@@ -160,7 +175,8 @@ double LuminanceVariance::varianceOfVariance(std::uint32_t x, std::uint32_t y, d
         fourth_powers += d * d * d * d;
     }
     const double k2 = squares / (r - 1);
-    const double k4 = (r * (r + 1) * fourth_powers - 3 * (r - 1) * squares * squares) / ((r - 1) * (r - 2) * (r - 3));
+    const double k4 =
+        (r * (r + 1) * fourth_powers - 3 * (r - 1) * squares * squares) / ((r - 1) * (r - 2) * (r - 3));
     return (2 * r * k2 * k2 + (r - 1) * k4) / (r * (r + 1)) / (r * r);
 }
 
@@ -175,10 +191,12 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, boo
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
         for (std::uint32_t x = 0; x < film.shape().width; ++x) luminance += film.mean(x, y, 1);
     const double total = sums.sum * unit;
-    if (sums.known == 0 || !(luminance > 0) || !std::isfinite(luminance) || !std::isfinite(total)) return std::nullopt;
+    if (sums.known == 0 || !(luminance > 0) || !std::isfinite(luminance) || !std::isfinite(total))
+        return std::nullopt;
 
     ErrorEstimate e;
-    e.knowledge = variance.fromReplicates() || independent_samples ? ErrorKnowledge::Known : ErrorKnowledge::Bound;
+    e.knowledge =
+        variance.fromReplicates() || independent_samples ? ErrorKnowledge::Known : ErrorKnowledge::Bound;
     e.mean_luminance = luminance / static_cast<double>(film.counts.size());
     e.mean_standard_error = std::sqrt(total / sums.known / sums.pixels);
     e.relative_rmse = std::sqrt(total / sums.known) / e.mean_luminance;
@@ -186,30 +204,42 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, boo
         e.degrees_of_freedom = d * sums.known;
         return e;
     }
-    // Normal replicates have Var v = 2 v²/d, whose unbiased estimate is 2 v²/(d + 2); longer tails have more.
+    // Normal replicates have Var v = 2 v²/d, whose unbiased estimate is 2 v²/(d + 2); longer tails have
+    // more.
     const double normal = 2 * sums.squares / (d + 2);
     double spread = normal;
     if (sums.known >= kPixelsToMeasure)
-        spread = std::max(normal, measuredSpread(film, variance, variances, which, sums, unit, luminance) + (d < 3 ? kUnseen * sums.most * sums.most : 0));
+        spread = std::max(normal, measuredSpread(film, variance, variances, which, sums, unit, luminance) +
+                                      (d < 3 ? kUnseen * sums.most * sums.most : 0));
     e.degrees_of_freedom = std::clamp(2 * sums.sum * sums.sum / spread, 1.0, d * sums.known);
-    if (e.known() && e.degrees_of_freedom < std::min(kLeastDegreesOfFreedom, d * sums.known)) e.knowledge = ErrorKnowledge::NotYet;
-    e.relative_rmse_95 = {e.relative_rmse * std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.975, e.degrees_of_freedom)),
-                          e.relative_rmse * std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.025, e.degrees_of_freedom))};
-    // The squared error that the image has scatters like the normal part of one degree of freedom a pixel, and the tails' part.
-    const double squared_error = std::clamp(2 * sums.sum * sums.sum / (d * normal + (spread - normal)), 1.0, sums.known);
-    e.half_width_95 = e.relative_rmse * std::sqrt(stats::fisherQuantile(0.95, squared_error, e.degrees_of_freedom));
+    if (e.known() && e.degrees_of_freedom < std::min(kLeastDegreesOfFreedom, d * sums.known))
+        e.knowledge = ErrorKnowledge::NotYet;
+    e.relative_rmse_95 = {
+        e.relative_rmse *
+            std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.975, e.degrees_of_freedom)),
+        e.relative_rmse *
+            std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.025, e.degrees_of_freedom))};
+    // The squared error that the image has scatters like the normal part of one degree of freedom a pixel,
+    // and the tails' part.
+    const double squared_error =
+        std::clamp(2 * sums.sum * sums.sum / (d * normal + (spread - normal)), 1.0, sums.known);
+    e.half_width_95 =
+        e.relative_rmse * std::sqrt(stats::fisherQuantile(0.95, squared_error, e.degrees_of_freedom));
     return e;
 }
 
 stats::Interval ErrorEstimate::meanInterval(double confidence) const {
     if (mean_standard_error == 0) return {mean_luminance, mean_luminance};
-    const double half_width = stats::studentQuantile(0.5 + 0.5 * confidence, degrees_of_freedom) * mean_standard_error;
+    const double half_width =
+        stats::studentQuantile(0.5 + 0.5 * confidence, degrees_of_freedom) * mean_standard_error;
     return {mean_luminance - half_width, mean_luminance + half_width};
 }
 
 stats::Interval ErrorEstimate::samplesFor(double target, double samples_now) const {
-    const double scale = half_width_95 / relative_rmse;  // Of the expectation's interval to the half-width's.
-    const double least = std::max(1.0, relative_rmse_95.lower * scale / target), most = std::max(1.0, relative_rmse_95.upper * scale / target);
+    const double scale =
+        half_width_95 / relative_rmse;  // Of the expectation's interval to the half-width's.
+    const double least = std::max(1.0, relative_rmse_95.lower * scale / target),
+                 most = std::max(1.0, relative_rmse_95.upper * scale / target);
     return {samples_now * least, samples_now * most * most};
 }
 

@@ -1,30 +1,34 @@
-/// What a film knows of its own error, without a reference: the spread between its replicates (layout.h: CRT_REPLICATES_MAX), which is unbiased for
-/// any sampler; or, where there are none, the spread between samples, unbiased for independent ones and an upper bound for a Sobol sequence. All of
-/// it is about luminance Y. None of it sees a bias that all samples share.
+/// What a film knows of its own error, without a reference: the spread between its replicates (layout.h:
+/// CRT_REPLICATES_MAX), which is unbiased for any sampler; or, where there are none, the spread between
+/// samples, unbiased for independent ones and an upper bound for a Sobol sequence. All of it is about
+/// luminance Y. None of it sees a bias that all samples share.
 #pragma once
 
-#include "film/film.h"
 #include "base/statistics.h"
+#include "film/film.h"
 
 #include <array>
 #include <cstdint>
 
 namespace crt {
 
-/// Which pixels are asked. Those of one colour of a checkerboard are independent of those of the other: what the even ones decide, the odd ones judge.
+/// Which pixels are asked. Those of one colour of a checkerboard are independent of those of the other: what
+/// the even ones decide, the odd ones judge.
 enum class PixelSet { All, Even, Odd };
 
 /// Variance of the pixels' means of Y.
 class LuminanceVariance {
 public:
     explicit LuminanceVariance(const Film& film);
-    /// Of one pixel; infinite where it is not known: one sample says nothing about its own error, and zero would claim perfection.
+    /// Of one pixel; infinite where it is not known: one sample says nothing about its own error, and zero
+    /// would claim perfection.
     double operator()(std::uint32_t x, std::uint32_t y) const;
     /// Degrees of freedom of one pixel's estimate.
     double degreesOfFreedom() const { return dof_; }
     /// Whether it is the spread between replicates; else between samples.
     bool fromReplicates() const { return from_replicates_; }
-    /// Variance of operator() itself, over unit² so that nothing overflows, by unbiased k-statistics: whatever the distribution of replicates. Needs four.
+    /// Variance of operator() itself, over unit² so that nothing overflows, by unbiased k-statistics:
+    /// whatever the distribution of replicates. Needs four.
     double varianceOfVariance(std::uint32_t x, std::uint32_t y, double unit = 1) const;
 
 private:
@@ -44,28 +48,34 @@ enum class ErrorKnowledge {
     NotYet,  ///< So few paths carry the light that neither the estimate nor an interval can be trusted.
 };
 
-/// Relative to the image's mean luminance. Pixels are independent of each other, each with a scramble of its own.
+/// Relative to the image's mean luminance. Pixels are independent of each other, each with a scramble of its
+/// own.
 struct ErrorEstimate {
     ErrorKnowledge knowledge = ErrorKnowledge::Bound;
     double mean_luminance = 0;
     double mean_standard_error = 0;    ///< Of mean_luminance.
-    double relative_rmse = 0;          ///< √(mean of the pixels' variances) / mean luminance: expected root mean square error over the pixels.
+    double relative_rmse = 0;  ///< √(mean of the pixels' variances) / mean luminance: expected root mean
+                               ///< square error over the pixels.
     stats::Interval relative_rmse_95;  ///< Of that expectation: χ² with degrees_of_freedom.
-    /// With probability 95 % the root mean square error that this image really has is at most this: √(F₀.₉₅ · mean variance) / mean. For one pixel
-    /// it is Student's half-width t₀.₉₇₅ · standard error, for many it tends to relative_rmse.
+    /// With probability 95 % the root mean square error that this image really has is at most this: √(F₀.₉₅
+    /// · mean variance) / mean. For one pixel it is Student's half-width t₀.₉₇₅ · standard error, for many
+    /// it tends to relative_rmse.
     double half_width_95 = 0;
-    /// Of the mean's variance S: 2 S² / Var S (Satterthwaite 1946), where Var S is measured and not taken from the normal distribution.
+    /// Of the mean's variance S: 2 S² / Var S (Satterthwaite 1946), where Var S is measured and not taken
+    /// from the normal distribution.
     double degrees_of_freedom = 0;
 
     bool known() const { return knowledge == ErrorKnowledge::Known; }
     /// Student's interval of the image's mean luminance.
     stats::Interval meanInterval(double confidence) const;
-    /// Samples per pixel until half_width_95 is `target`: between a rate of 1/N, which Sobol points reach on smooth images, from the lower end of the
-    /// error's interval, and 1/√N from its upper end.
+    /// Samples per pixel until half_width_95 is `target`: between a rate of 1/N, which Sobol points reach on
+    /// smooth images, from the lower end of the error's interval, and 1/√N from its upper end.
     stats::Interval samplesFor(double target, double samples_now) const;
 };
 
-/// Nothing where nothing is known: too few samples, or no light found yet. With `independent_samples` the spread between samples is no mere bound.
-std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which = PixelSet::All, bool independent_samples = false);
+/// Nothing where nothing is known: too few samples, or no light found yet. With `independent_samples` the
+/// spread between samples is no mere bound.
+std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which = PixelSet::All,
+                                           bool independent_samples = false);
 
 }  // namespace crt

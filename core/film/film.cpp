@@ -1,11 +1,11 @@
 #include "film/film.h"
 
-#include "scene/aov.h"
-#include "film/error_estimate.h"
 #include "base/host.h"
+#include "film/error_estimate.h"
+#include "film/luminance_error.h"
 #include "image/image_metadata.h"
 #include "kernel/layout.h"
-#include "film/luminance_error.h"
+#include "scene/aov.h"
 
 #include <fmt/format.h>
 
@@ -25,8 +25,8 @@ void twoSum(double a, double b, double& sum, double& error) {
     error = (a - (sum - b_part)) + (b - b_part);
 }
 
-/// pair += other, to about 2^-104 of the larger (Joldes, Muller and Popescu 2017, algorithm 6, with the branch-free two-sum throughout because
-/// a backend's pairs need not be normalised).
+/// pair += other, to about 2^-104 of the larger (Joldes, Muller and Popescu 2017, algorithm 6, with the
+/// branch-free two-sum throughout because a backend's pairs need not be normalised).
 void addPair(double* pair, const double* other) {
     double high, high_error, low, low_error;
     twoSum(pair[0], other[0], high, high_error);
@@ -37,12 +37,15 @@ void addPair(double* pair, const double* other) {
 
 bool hasRightChannels(const FilmShape& shape) {
     const std::uint32_t replicates = shape.replicates();
-    return shape.channels == channelsFor(shape.aovs, replicates) && std::has_single_bit(replicates) && replicates <= CRT_REPLICATES_MAX;
+    return shape.channels == channelsFor(shape.aovs, replicates) && std::has_single_bit(replicates) &&
+           replicates <= CRT_REPLICATES_MAX;
 }
 
 /// Samples of `range` that belong to a replicate: they take turns.
 std::uint64_t samplesOfReplicate(SampleRange range, std::uint64_t replicate, std::uint64_t replicates) {
-    const auto below = [=](std::uint64_t end) { return end / replicates + (end % replicates > replicate ? 1 : 0); };
+    const auto below = [=](std::uint64_t end) {
+        return end / replicates + (end % replicates > replicate ? 1 : 0);
+    };
     return below(range.second) - below(range.first);
 }
 
@@ -60,12 +63,15 @@ void SampleRanges::add(SampleRange range) {
                     fmt::format("sample range {} ends before it begins", rangeText(range)));
     if (range.first == range.second) return;
     // `next` is the first range that begins at or after this one ends; only the one before it can overlap.
-    const auto next = std::lower_bound(ranges_.begin(), ranges_.end(), range.second,
-                                       [](const SampleRange& r, std::uint64_t end) { return r.first < end; });
+    const auto next =
+        std::lower_bound(ranges_.begin(), ranges_.end(), range.second,
+                         [](const SampleRange& r, std::uint64_t end) { return r.first < end; });
     const auto before = next == ranges_.begin() ? ranges_.end() : std::prev(next);
     if (before != ranges_.end() && before->second > range.first)
-        throw Error(ErrorKind::Usage, fmt::format("samples {} overlap samples {}, which are already there: the same samples "
-                                                  "would count twice", rangeText(range), rangeText(*before)));
+        throw Error(ErrorKind::Usage,
+                    fmt::format("samples {} overlap samples {}, which are already there: the same samples "
+                                "would count twice",
+                                rangeText(range), rangeText(*before)));
     const bool joins_before = before != ranges_.end() && before->second == range.first;
     const bool joins_next = next != ranges_.end() && next->first == range.second;
     if (joins_before && joins_next) {
@@ -97,16 +103,20 @@ std::string SampleRanges::text() const {
 
 Film::Film(FilmShape shape) : shape_(shape) {
     if (!hasRightChannels(shape))
-        throw Error(ErrorKind::Internal, fmt::format("a film with AOV mask {:#x} cannot have {} channels", shape.aovs, shape.channels));
+        throw Error(ErrorKind::Internal, fmt::format("a film with AOV mask {:#x} cannot have {} channels",
+                                                     shape.aovs, shape.channels));
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
-    // Said beforehand: a system that promises memory which it does not have would end the process in the middle.
+    // Said beforehand: a system that promises memory which it does not have would end the process in the
+    // middle.
     const std::uint64_t bytes = std::uint64_t{pixels} * (16 * std::uint64_t{shape.channels} + 8);
     constexpr std::uint64_t kWorthAsking = std::uint64_t{1} << 28;
     if (bytes > kWorthAsking && bytes > availableHostMemory())
-        throw Error(ErrorKind::Device, fmt::format("a film of {} × {} pixels with {} channels takes {:.1f} GB of memory, and {:.1f} GB are free; make it smaller, or "
-                                                   "render parts of it with --crop",
-                                                   shape.width, shape.height, shape.channels, static_cast<double>(bytes) / 1e9,
-                                                   static_cast<double>(availableHostMemory()) / 1e9));
+        throw Error(ErrorKind::Device,
+                    fmt::format("a film of {} × {} pixels with {} channels takes {:.1f} GB of memory, and "
+                                "{:.1f} GB are free; make it smaller, or "
+                                "render parts of it with --crop",
+                                shape.width, shape.height, shape.channels, static_cast<double>(bytes) / 1e9,
+                                static_cast<double>(availableHostMemory()) / 1e9));
     sums.assign(pixels * shape.channels * 2, 0.0);
     counts.assign(pixels, 0);
     if (shape.aovs & kAovPrimitive) primitives.assign(pixels, CRT_NONE);
@@ -114,11 +124,12 @@ Film::Film(FilmShape shape) : shape_(shape) {
 
 void Film::add(const Film& other) {
     if (!(shape_ == other.shape_))
-        throw Error(ErrorKind::Usage,
-                    fmt::format("films differ in shape: {}×{} with {} channels and AOV mask {:#x}, and {}×{} with {} channels and "
-                                "AOV mask {:#x}",
-                                shape_.width, shape_.height, shape_.channels, shape_.aovs, other.shape_.width, other.shape_.height,
-                                other.shape_.channels, other.shape_.aovs));
+        throw Error(ErrorKind::Usage, fmt::format("films differ in shape: {}×{} with {} channels and AOV "
+                                                  "mask {:#x}, and {}×{} with {} channels and "
+                                                  "AOV mask {:#x}",
+                                                  shape_.width, shape_.height, shape_.channels, shape_.aovs,
+                                                  other.shape_.width, other.shape_.height,
+                                                  other.shape_.channels, other.shape_.aovs));
     // The ranges first, on a copy: what throws must leave the film as it was.
     SampleRanges merged = samples;
     for (const SampleRange& range : other.samples.ranges()) merged.add(range);
@@ -128,7 +139,8 @@ void Film::add(const Film& other) {
     // The lower first sample wins, so that the id plane does not depend on who is added to whom.
     const auto& mine = samples.ranges();
     const auto& theirs = other.samples.ranges();
-    if (!theirs.empty() && (mine.empty() || theirs.front().first < mine.front().first)) primitives = other.primitives;
+    if (!theirs.empty() && (mine.empty() || theirs.front().first < mine.front().first))
+        primitives = other.primitives;
     samples = std::move(merged);
 }
 
@@ -162,7 +174,8 @@ double Film::replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replic
 
 std::uint64_t Film::replicateSamples(std::uint32_t replicate) const {
     std::uint64_t count = 0;
-    for (const SampleRange& range : samples.ranges()) count += samplesOfReplicate(range, replicate, replicates());
+    for (const SampleRange& range : samples.ranges())
+        count += samplesOfReplicate(range, replicate, replicates());
     return count;
 }
 
@@ -187,8 +200,10 @@ Film cropped(const Film& film, const std::array<int, 4>& window) {
     const auto copyRows = [&](const auto& from, auto& to, std::size_t values_a_pixel) {
         if (from.empty()) return;
         for (std::size_t y = 0; y < shape.height; ++y) {
-            const std::size_t first = (static_cast<std::size_t>(y0) + y) * whole.width + static_cast<std::size_t>(x0);
-            std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first * values_a_pixel), shape.width * values_a_pixel,
+            const std::size_t first =
+                (static_cast<std::size_t>(y0) + y) * whole.width + static_cast<std::size_t>(x0);
+            std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first * values_a_pixel),
+                        shape.width * values_a_pixel,
                         to.begin() + static_cast<std::ptrdiff_t>(y * shape.width * values_a_pixel));
         }
     };

@@ -1,13 +1,14 @@
 /// The film on the host: sums of samples, their algebra (add, merge, checkpoint) and what they resolve to.
 ///
-/// Every sum is an unevaluated pair hi + lo of doubles, so that the order of additions shows only some 2^-100 below the value:
-/// any split over threads, tiles, chunks, machines or resumes resolves to the same float image.
+/// Every sum is an unevaluated pair hi + lo of doubles, so that the order of additions shows only some
+/// 2^-100 below the value: any split over threads, tiles, chunks, machines or resumes resolves to the same
+/// float image.
 #pragma once
 
-#include "compile/compile.h"
-#include "image/development.h"
 #include "base/error.h"
+#include "compile/compile.h"
 #include "film/film_record.h"
+#include "image/development.h"
 #include "kernel/bits_version.h"
 
 #include <array>
@@ -41,8 +42,10 @@ private:
 struct FilmShape {
     std::uint32_t width = 0, height = 0;
     std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, then those of kernel/channels.h.
-    std::uint32_t aovs = 0;       ///< Bits of Aov that need film channels or the primitive plane, kAovReplicates among them.
-    /// Independent sequences that samples take turns between (layout.h); 1: the film does not tell them apart.
+    std::uint32_t aovs =
+        0;  ///< Bits of Aov that need film channels or the primitive plane, kAovReplicates among them.
+    /// Independent sequences that samples take turns between (layout.h); 1: the film does not tell them
+    /// apart.
     std::uint32_t replicates() const;
     bool operator==(const FilmShape&) const = default;
 };
@@ -57,15 +60,16 @@ public:
     std::vector<std::uint32_t> primitives; ///< [height][width] or empty
     SampleRanges samples;                  ///< Ranges asked for (every pixel has the same).
 
-    /// Adds another film of disjoint sample ranges. Primitive ids are taken from the film with the lower first sample.
-    /// Throws crt::Error(Usage) when shapes differ or ranges overlap.
+    /// Adds another film of disjoint sample ranges. Primitive ids are taken from the film with the lower
+    /// first sample. Throws crt::Error(Usage) when shapes differ or ranges overlap.
     void add(const Film& other);
 
     /// hi + lo rounded to double.
     double sum(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
     /// Mean of a channel; 0 when the pixel has no valid sample.
     double mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
-    /// Sum of Y of the samples of a replicate (layout.h), and how many samples were asked of it; error_estimate.h makes error bars of them.
+    /// Sum of Y of the samples of a replicate (layout.h), and how many samples were asked of it;
+    /// error_estimate.h makes error bars of them.
     std::uint32_t replicates() const { return shape_.replicates(); }
     double replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const;
     std::uint64_t replicateSamples(std::uint32_t replicate) const;

@@ -1,10 +1,10 @@
 #include "film/film_record.h"
 
-#include "scene/aov.h"
 #include "base/error.h"
-#include "scene/scene.h"
 #include "base/vec3d.h"
 #include "base/words.h"
+#include "scene/aov.h"
+#include "scene/scene.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -28,7 +28,8 @@ using Json = nlohmann::json;
 
 constexpr int kRecordVersion = 1;
 
-// ---- Camera ------------------------------------------------------------------------------------------------------------
+// ---- Camera
+// ----------------------------------------------------------------------------------------------------------
 
 Vec3d normalised(const Vec3d& v) { return v * (1 / length(v)); }
 
@@ -51,14 +52,15 @@ void addCamera(FilmRecord& record, const Camera& camera) {
     const Vec3d right = normalised(cross(view, camera.up)), up = cross(right, view);
     const Vec3d back{-view[0], -view[1], -view[2]};
     record.world_to_camera = matrixOf({{{right}, {up}, {back}, {{}, 1}}}, camera.position);
-    // x / depth runs from −tan_half_width to tan_half_width, and depth is w. The depth of the result is 1 / depth:
-    // nobody needs it, but a matrix that has an inverse is of more use than one that has none.
+    // x / depth runs from −tan_half_width to tan_half_width, and depth is w. The depth of the result is 1 /
+    // depth: nobody needs it, but a matrix that has an inverse is of more use than one that has none.
     const Vec3d x = right * (0.5 / camera.tan_half_width) + view * 0.5;
     const Vec3d y = view * 0.5 - up * (0.5 / camera.tan_half_height);
     record.world_to_ndc = matrixOf({{{x}, {y}, {{}, 1}, {view}}}, camera.position);
 }
 
-// ---- Traits ------------------------------------------------------------------------------------------------------------
+// ---- Traits
+// ----------------------------------------------------------------------------------------------------------
 
 class Digest {
 public:
@@ -93,16 +95,19 @@ private:
 std::string vectorText(const Vec3d& v) { return fmt::format("({}, {}, {})", v[0], v[1], v[2]); }
 
 std::string cameraText(const Camera& c) {
-    std::string text = fmt::format("at {} looking at {}, up {}, {:.4g} × {:.4g} wide at distance 1", vectorText(c.position),
-                                   vectorText(c.target), vectorText(c.up), 2 * c.tan_half_width, 2 * c.tan_half_height);
-    if (c.aperture_radius > 0) text += fmt::format(", lens of radius {} focused at {}", c.aperture_radius, c.focus_distance);
+    std::string text =
+        fmt::format("at {} looking at {}, up {}, {:.4g} × {:.4g} wide at distance 1", vectorText(c.position),
+                    vectorText(c.target), vectorText(c.up), 2 * c.tan_half_width, 2 * c.tan_half_height);
+    if (c.aperture_radius > 0)
+        text += fmt::format(", lens of radius {} focused at {}", c.aperture_radius, c.focus_distance);
     return text;
 }
 
 std::string filterText(const FilmSettings& film) {
     switch (film.filter) {
         case PixelFilter::Box: return fmt::format("box of radius {}", film.filter_radius);
-        case PixelFilter::Gaussian: return fmt::format("gaussian of radius {} and sigma {}", film.filter_radius, film.filter_sigma);
+        case PixelFilter::Gaussian:
+            return fmt::format("gaussian of radius {} and sigma {}", film.filter_radius, film.filter_sigma);
         case PixelFilter::BlackmanHarris: break;
     }
     return fmt::format("Blackman-Harris of radius {}", film.filter_radius);
@@ -112,15 +117,20 @@ const char* integratorText(IntegratorType type) {
     return type == IntegratorType::Path ? "path" : type == IntegratorType::Normals ? "normals" : "aabb";
 }
 const char* samplerText(SamplerType type) {
-    return type == SamplerType::Sobol ? "sobol" : type == SamplerType::Independent ? "independent" : "xorshift";
+    return type == SamplerType::Sobol         ? "sobol"
+           : type == SamplerType::Independent ? "independent"
+                                              : "xorshift";
 }
-std::string counted(std::uint64_t n, const char* one, const char* many) { return fmt::format("{} {}", n, n == 1 ? one : many); }
+std::string counted(std::uint64_t n, const char* one, const char* many) {
+    return fmt::format("{} {}", n, n == 1 ? one : many);
+}
 const char* onOff(bool on) { return on ? "on" : "off"; }
 
 std::string planesText(std::uint32_t aovs) {
     std::string text;
     for (const AovRow& row : kAovRows)
-        if ((aovs & kAovsOfFirstHits & row.aov) != 0) text += fmt::format("{}{}", text.empty() ? "" : ", ", row.name);
+        if ((aovs & kAovsOfFirstHits & row.aov) != 0)
+            text += fmt::format("{}{}", text.empty() ? "" : ", ", row.name);
     return text.empty() ? "none" : text;
 }
 
@@ -143,14 +153,18 @@ SceneTrait geometryTrait(const Scene& scene) {
         placements += object.transforms.size();
         triangles += object.transforms.size() * scene.meshes[object.mesh].triangles.size();
     }
-    return {"the geometry", fmt::format("{} in {}", counted(triangles, "triangle", "triangles"), counted(placements, "object", "objects")), digest.digits()};
+    return {"the geometry",
+            fmt::format("{} in {}", counted(triangles, "triangle", "triangles"),
+                        counted(placements, "object", "objects")),
+            digest.digits()};
 }
 
 SceneTrait materialsTrait(const Scene& scene) {
     Digest digest;
     for (const Material& material : scene.materials) {
         digest.add(material.type);
-        for (const Spectrum* spectrum : {&material.reflectance, &material.eta, &material.k}) digest.add(*spectrum);
+        for (const Spectrum* spectrum : {&material.reflectance, &material.eta, &material.k})
+            digest.add(*spectrum);
     }
     return {"the materials", counted(scene.materials.size(), "material", "materials"), digest.digits()};
 }
@@ -162,16 +176,20 @@ SceneTrait lightsTrait(const Scene& scene) {
         digest.add(emission.radiance);
     }
     if (scene.environment) digest.add(scene.environment->radiance);
-    return {"the light",
-            fmt::format("{}, {} environment", counted(scene.emissions.size(), "kind of lamp", "kinds of lamp"), scene.environment ? "an" : "no"),
-            digest.digits()};
+    return {
+        "the light",
+        fmt::format("{}, {} environment", counted(scene.emissions.size(), "kind of lamp", "kinds of lamp"),
+                    scene.environment ? "an" : "no"),
+        digest.digits()};
 }
 
 std::vector<SceneTrait> traitsOf(const Scene& scene, std::uint32_t aovs) {
     const auto& [x0, y0, x1, y1] = scene.film.crop;
     const IntegratorSettings& i = scene.integrator;
     return {{"the resolution", fmt::format("{} × {}", scene.film.width, scene.film.height), {}},
-            {"the crop window", x1 > x0 ? fmt::format("[{}, {}, {}, {}]", x0, y0, x1, y1) : "the whole film", {}},
+            {"the crop window",
+             x1 > x0 ? fmt::format("[{}, {}, {}, {}]", x0, y0, x1, y1) : "the whole film",
+             {}},
             {"the filter", filterText(scene.film), {}},
             {"the seed", std::to_string(scene.sampler.seed), {}},
             {"the sampler", samplerText(scene.sampler.type), {}},
@@ -188,7 +206,8 @@ std::vector<SceneTrait> traitsOf(const Scene& scene, std::uint32_t aovs) {
             {"the AOVs of first hits", planesText(aovs), {}}};
 }
 
-// ---- JSON --------------------------------------------------------------------------------------------------------------
+// ---- JSON
+// ----------------------------------------------------------------------------------------------------------
 
 constexpr std::array<const char*, 3> kSpaceNames{"srgb", "acescg", "xyz"};  // In the order of ColorSpace.
 
@@ -203,14 +222,16 @@ Json developmentJson(const Development& development) {
 /// Numbers that an image is made with must be ones that a scene could have.
 double inRange(const Json& json, double least, double most) {
     const double value = json.get<double>();
-    if (!(value >= least && value <= most)) throw Error(ErrorKind::Usage, fmt::format("has {} for a number", value));
+    if (!(value >= least && value <= most))
+        throw Error(ErrorKind::Usage, fmt::format("has {} for a number", value));
     return value;
 }
 
 Vec3d whiteFrom(const Json& json) {
     constexpr double kMost = 1e12;  // Of a colour with Y = 1.
     Vec3d white{};
-    for (std::size_t c = 0; c < 3; ++c) white[c] = inRange(json.at(c), c == 1 ? 1 : -kMost, c == 1 ? 1 : kMost);
+    for (std::size_t c = 0; c < 3; ++c)
+        white[c] = inRange(json.at(c), c == 1 ? 1 : -kMost, c == 1 ? 1 : kMost);
     return white;
 }
 
@@ -218,7 +239,8 @@ Development developmentFrom(const Json& json) {
     Development development;
     const auto name = json.at("color_space").get<std::string>();
     const auto found = std::find(kSpaceNames.begin(), kSpaceNames.end(), name);
-    if (found == kSpaceNames.end()) throw Error(ErrorKind::Usage, fmt::format("names the unknown colour space '{}'", name));
+    if (found == kSpaceNames.end())
+        throw Error(ErrorKind::Usage, fmt::format("names the unknown colour space '{}'", name));
     development.color_space = static_cast<ColorSpace>(found - kSpaceNames.begin());
     development.exposure_ev = inRange(json.at("exposure_ev"), -100, 100);
     development.apply_to_float = json.at("apply_to_float").get<bool>();
@@ -262,7 +284,8 @@ FilmRecord recordFrom(const Json& json) {
     record.world_to_camera = json.at("world_to_camera").get<RowMatrix4d>();
     record.world_to_ndc = json.at("world_to_ndc").get<RowMatrix4d>();
     for (const Json& trait : json.at("traits"))
-        record.traits.push_back({trait.at(0).get<std::string>(), trait.at(1).get<std::string>(), trait.at(2).get<std::string>()});
+        record.traits.push_back({trait.at(0).get<std::string>(), trait.at(1).get<std::string>(),
+                                 trait.at(2).get<std::string>()});
     record.backend = json.at("backend").get<std::string>();
     record.device = json.at("device").get<std::string>();
     record.date_utc = json.at("date_utc").get<std::string>();
@@ -283,8 +306,9 @@ FilmRecord recordOf(const Scene& scene) {
     record.independent_samples = scene.sampler.type != SamplerType::Sobol;
     record.width = scene.film.width;
     record.height = scene.film.height;
-    record.window = scene.film.crop[2] > scene.film.crop[0] ? scene.film.crop
-                                                            : std::array<int, 4>{0, 0, scene.film.width, scene.film.height};
+    record.window = scene.film.crop[2] > scene.film.crop[0]
+                        ? scene.film.crop
+                        : std::array<int, 4>{0, 0, scene.film.width, scene.film.height};
     for (const Output& output : scene.outputs) record.aovs |= output.aovs;
     record.development = developmentOf(scene);
     record.whites = scene.whites;
@@ -310,7 +334,8 @@ std::string recordText(const FilmRecord& record) {
               {"device", record.device},
               {"date_utc", record.date_utc}};
     for (const auto& [name, white] : record.whites) json["lights_xyz"][name] = white;
-    for (const SceneTrait& trait : record.traits) json["traits"].push_back({trait.name, trait.text, trait.digest});
+    for (const SceneTrait& trait : record.traits)
+        json["traits"].push_back({trait.name, trait.text, trait.digest});
     if (record.complete) json["complete"] = *record.complete;
     // Titles are bytes, not necessarily UTF-8.
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -332,9 +357,11 @@ std::vector<std::string> differingTraits(const FilmRecord& found, const FilmReco
         if (have == found.traits.end() || *have == want) continue;
         const bool plural = want.name.back() == 's' && want.name != "mis";
         if (have->text != want.text)
-            sentences.push_back(fmt::format("{} {} {}, not {}", want.name, plural ? "are" : "is", have->text, want.text));
+            sentences.push_back(
+                fmt::format("{} {} {}, not {}", want.name, plural ? "are" : "is", have->text, want.text));
         else
-            sentences.push_back(fmt::format("{} {} ({} in both)", want.name, plural ? "are others" : "is another", have->text));
+            sentences.push_back(fmt::format("{} {} ({} in both)", want.name,
+                                            plural ? "are others" : "is another", have->text));
     }
     return sentences;
 }
@@ -352,7 +379,10 @@ std::string dateUtc() {
         constexpr std::uint64_t kYear9999 = 253402300799;
         const Parsed<std::uint64_t> seconds = parseUnsigned(epoch);
         if (!seconds.value || *seconds.value > kYear9999)
-            throw Error(ErrorKind::Usage, fmt::format("SOURCE_DATE_EPOCH is '{}', and not the seconds since 1970 that it should be", epoch));
+            throw Error(
+                ErrorKind::Usage,
+                fmt::format("SOURCE_DATE_EPOCH is '{}', and not the seconds since 1970 that it should be",
+                            epoch));
         now = static_cast<std::time_t>(*seconds.value);
     }
     std::tm utc{};

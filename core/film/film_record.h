@@ -1,5 +1,6 @@
-/// What a film knows of the scene that its samples are of: enough to make images of it without the scene file, and to
-/// say in words why a film and a scene do not fit. Kept in .crtfilm files as JSON (checkpoint.h).
+/// What a film knows of the scene that its samples are of: enough to make images of it without the scene
+/// file, and to say in words why a film and a scene do not fit. Kept in .crtfilm files as JSON
+/// (checkpoint.h).
 #pragma once
 
 #include "image/development.h"
@@ -33,7 +34,8 @@ struct FilmRecord {
     Development development;
     std::map<std::string, Vec3d> whites;  ///< Named spectra of the scene that are lights: XYZ with Y = 1.
     RowMatrix4d world_to_camera{};        ///< x to the right, y up, the camera looks along −z.
-    RowMatrix4d world_to_ndc{};           ///< (0, 0) is the upper left corner of the whole film, (1, 1) the lower right.
+    RowMatrix4d
+        world_to_ndc{};  ///< (0, 0) is the upper left corner of the whole film, (1, 1) the lower right.
     std::vector<SceneTrait> traits;
 
     // Of the run that rendered it; empty or nothing when that is not known.
@@ -56,8 +58,8 @@ FilmRecord recordOf(const Scene& scene);
 std::string recordText(const FilmRecord& record);
 FilmRecord readRecord(std::string_view text);
 
-/// "the resolution is 256 × 256 and not 512 × 512": every trait in which `found` is not `expected`. Empty when there
-/// is none.
+/// "the resolution is 256 × 256 and not 512 × 512": every trait in which `found` is not `expected`. Empty
+/// when there is none.
 std::vector<std::string> differingTraits(const FilmRecord& found, const FilmRecord& expected);
 
 /// Now in UTC, "2026:11:22 05:40:00"; with SOURCE_DATE_EPOCH (reproducible-builds.org), that time. Throws

@@ -39,8 +39,8 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
     const double exposure = std::exp2(development.exposure_ev);
     const Matrix3d to_rgb = xyzToRgb(space);
     Matrix3d color = to_rgb;
-    // To D65 in every space: it is the white of sRGB, xyzToRgb takes it to ACEScg's own, and an XYZ image then still becomes the sRGB one by
-    // the standard matrix.
+    // To D65 in every space: it is the white of sRGB, xyzToRgb takes it to ACEScg's own, and an XYZ image
+    // then still becomes the sRGB one by the standard matrix.
     if (development.white) color = multiply(color, bradfordAdaptation(*development.white, d65WhiteXyz()));
     for (Vec3d& row : color)
         for (double& entry : row) entry *= exposure;
@@ -52,8 +52,8 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
         if (!development.white || !(xyz[1] > 0)) return exposure;
         return std::abs(stats::luminance(multiply(color, xyz), luminance_weights)) / xyz[1];
     };
-    // Albedo is a reflectance: the film has it as XYZ under equal-energy light, and a perfect white must come out as (1,1,1) in the RGB spaces
-    // whatever the exposure and white balance.
+    // Albedo is a reflectance: the film has it as XYZ under equal-energy light, and a perfect white must
+    // come out as (1,1,1) in the RGB spaces whatever the exposure and white balance.
     const Matrix3d albedo_color = multiply(to_rgb, bradfordAdaptation({1, 1, 1}, d65WhiteXyz()));
 
     Image image;

@@ -1,5 +1,5 @@
-/// How a film becomes the colours of an image: settings that no sample depends on, so that they can be changed
-/// after the render (`crt develop`).
+/// How a film becomes the colours of an image: settings that no sample depends on, so that they can be
+/// changed after the render (`crt develop`).
 #pragma once
 
 #include "spectra/spectra.h"
@@ -12,19 +12,21 @@ struct Scene;
 
 struct Development {
     ColorSpace color_space = ColorSpace::LinearSrgb;
-    /// XYZ with Y = 1 of the light that becomes the white of the colour space. Nothing: colours stay as they are.
+    /// XYZ with Y = 1 of the light that becomes the white of the colour space. Nothing: colours stay as they
+    /// are.
     std::optional<Vec3d> white;
     double exposure_ev = 0;       ///< Stops: values are multiplied by 2 to this power.
     bool apply_to_float = false;  ///< Files of floats get exposure and white balance too.
 
-    /// For EXR and PFM, and for whatever is measured: radiance in the colour space, without exposure and white
-    /// balance unless apply_to_float asks for them (docs/decisions/0013).
+    /// For EXR and PFM, and for whatever is measured: radiance in the colour space, without exposure and
+    /// white balance unless apply_to_float asks for them (docs/decisions/0013).
     Development forFloats() const;
 
     bool operator==(const Development&) const = default;
 };
 
-/// As scene.film says. Throws crt::Error(Scene) when the illuminant of the white balance has no visible light.
+/// As scene.film says. Throws crt::Error(Scene) when the illuminant of the white balance has no visible
+/// light.
 Development developmentOf(const Scene& scene);
 
 }  // namespace crt

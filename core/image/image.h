@@ -13,7 +13,8 @@ namespace crt {
 /// Row-major, for points as rows: p' = p · M, as OpenEXR has it.
 using RowMatrix4d = std::array<double, 16>;
 
-/// An image plane set: named float channels, row-major, top row first. What image_io writes and compare reads.
+/// An image plane set: named float channels, row-major, top row first. What image_io writes and compare
+/// reads.
 struct Image {
     std::uint32_t width = 0, height = 0;
     std::vector<std::string> channels;      ///< "R","G","B","Albedo.R",…,"sampleCount","id.primitive"
@@ -22,12 +23,12 @@ struct Image {
     std::vector<std::string> integer_channels;
     std::vector<std::pair<std::string, std::string>> metadata;  ///< crt/backend, crt/seed, …
     std::optional<std::array<double, 8>> chromaticities;
-    /// Where the pixels lie in the whole picture, in pixels from its upper left corner (EXR: data window), and how
-    /// large that is (EXR: display window); 0 × 0: they are all of it.
+    /// Where the pixels lie in the whole picture, in pixels from its upper left corner (EXR: data window),
+    /// and how large that is (EXR: display window); 0 × 0: they are all of it.
     std::int32_t left = 0, top = 0;
     std::uint32_t whole_width = 0, whole_height = 0;
-    /// For EXR: matrices for points as rows (film_record.h), and the chromaticity x, y of the light to be seen as
-    /// white where that was not applied.
+    /// For EXR: matrices for points as rows (film_record.h), and the chromaticity x, y of the light to be
+    /// seen as white where that was not applied.
     std::optional<RowMatrix4d> world_to_camera, world_to_ndc;
     std::optional<std::array<double, 2>> adopted_neutral;
 };

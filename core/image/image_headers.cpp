@@ -12,7 +12,8 @@
 namespace crt::image {
 namespace {
 
-/// The first bytes of a file, taken off the front. Little-endian as every machine that crt runs on (checkpoint.cpp).
+/// The first bytes of a file, taken off the front. Little-endian as every machine that crt runs on
+/// (checkpoint.cpp).
 class Bytes {
 public:
     explicit Bytes(std::string_view rest) : rest_(rest) {}
@@ -20,7 +21,8 @@ public:
     std::size_t left() const { return rest_.size(); }
     bool empty() const { return rest_.empty(); }
     std::string_view take(std::uint64_t size, const std::string& what) {
-        if (size > rest_.size()) throw DamagedHeader(fmt::format("{} goes beyond the end of the file", what));
+        if (size > rest_.size())
+            throw DamagedHeader(fmt::format("{} goes beyond the end of the file", what));
         const std::string_view taken = rest_.substr(0, size);
         rest_.remove_prefix(size);
         return taken;
@@ -34,7 +36,8 @@ public:
     std::string text(const std::string& what) {
         constexpr std::size_t kMaxLength = 255;
         const std::size_t end = rest_.find('\0');
-        if (end == std::string_view::npos || end > kMaxLength) throw DamagedHeader(fmt::format("{} has no end", what));
+        if (end == std::string_view::npos || end > kMaxLength)
+            throw DamagedHeader(fmt::format("{} has no end", what));
         const std::string value(rest_.substr(0, end));
         rest_.remove_prefix(end + 1);
         return value;
@@ -56,11 +59,30 @@ std::string beginningOf(const std::string& path) {
 
 /// Types of attributes whose size is the type's: OpenEXR reads that many bytes whatever the file says.
 const std::map<std::string_view, std::uint32_t>& fixedSizes() {
-    static const std::map<std::string_view, std::uint32_t> sizes{
-        {"box2f", 16},     {"box2i", 16}, {"chromaticities", 32}, {"compression", 1}, {"deepImageState", 1}, {"double", 8},   {"envmap", 1},
-        {"float", 4},      {"int", 4},    {"keycode", 28},        {"lineOrder", 1},   {"m33d", 72},          {"m33f", 36},    {"m44d", 128},
-        {"m44f", 64},      {"rational", 8}, {"tiledesc", 9},      {"timecode", 8},    {"v2d", 16},           {"v2f", 8},      {"v2i", 8},
-        {"v3d", 24},       {"v3f", 12},   {"v3i", 12}};
+    static const std::map<std::string_view, std::uint32_t> sizes{{"box2f", 16},
+                                                                 {"box2i", 16},
+                                                                 {"chromaticities", 32},
+                                                                 {"compression", 1},
+                                                                 {"deepImageState", 1},
+                                                                 {"double", 8},
+                                                                 {"envmap", 1},
+                                                                 {"float", 4},
+                                                                 {"int", 4},
+                                                                 {"keycode", 28},
+                                                                 {"lineOrder", 1},
+                                                                 {"m33d", 72},
+                                                                 {"m33f", 36},
+                                                                 {"m44d", 128},
+                                                                 {"m44f", 64},
+                                                                 {"rational", 8},
+                                                                 {"tiledesc", 9},
+                                                                 {"timecode", 8},
+                                                                 {"v2d", 16},
+                                                                 {"v2f", 8},
+                                                                 {"v2i", 8},
+                                                                 {"v3d", 24},
+                                                                 {"v3f", 12},
+                                                                 {"v3i", 12}};
     return sizes;
 }
 
@@ -69,12 +91,15 @@ struct Part {
     std::uint64_t width = 0, height = 0, channels = 0;
 };
 
-/// The value of an attribute, by "OpenEXR File Layout" (openexr.com). What is not named here is opaque to OpenEXR, too.
-void checkValue(const std::string& path, const std::string& name, const std::string& type, std::string_view value, Part& part) {
+/// The value of an attribute, by "OpenEXR File Layout" (openexr.com). What is not named here is opaque to
+/// OpenEXR, too.
+void checkValue(const std::string& path, const std::string& name, const std::string& type,
+                std::string_view value, Part& part) {
     const std::string what = fmt::format("its attribute '{}'", name);
     const auto fixed = fixedSizes().find(type);
     if (fixed != fixedSizes().end() && value.size() != fixed->second)
-        throw DamagedHeader(fmt::format("{} has {} bytes and its type, {}, takes {}", what, value.size(), type, fixed->second));
+        throw DamagedHeader(fmt::format("{} has {} bytes and its type, {}, takes {}", what, value.size(),
+                                        type, fixed->second));
     Bytes bytes(value);
     if (type == "chlist") {
         constexpr std::uint64_t kBytesAChannel = 16;  // Type, linearity, sampling.
@@ -86,7 +111,8 @@ void checkValue(const std::string& path, const std::string& name, const std::str
         while (!bytes.empty()) bytes.take(bytes.u32(what), what);
     } else if (type == "preview") {
         const std::uint64_t width = bytes.u32(what), height = bytes.u32(what);
-        if (bytes.left() % 4 != 0 || width > bytes.left() || height > bytes.left() || width * height != bytes.left() / 4)
+        if (bytes.left() % 4 != 0 || width > bytes.left() || height > bytes.left() ||
+            width * height != bytes.left() / 4)
             throw DamagedHeader(fmt::format("{} does not have {} x {} pixels", what, width, height));
     } else if (type == "tiledesc") {
         const std::uint64_t width = bytes.u32(what), height = bytes.u32(what);
@@ -94,7 +120,8 @@ void checkValue(const std::string& path, const std::string& name, const std::str
     } else if (type == "box2i" && (name == "dataWindow" || name == "displayWindow")) {
         std::int64_t corner[4];
         for (std::int64_t& c : corner) c = static_cast<std::int32_t>(bytes.u32(what));
-        if (corner[2] < corner[0] || corner[3] < corner[1]) throw DamagedHeader(fmt::format("{} is empty", what));
+        if (corner[2] < corner[0] || corner[3] < corner[1])
+            throw DamagedHeader(fmt::format("{} is empty", what));
         // The display window may be any size; it holds no pixels.
         if (name == "dataWindow") {
             part.width = static_cast<std::uint64_t>(corner[2] - corner[0] + 1);
@@ -120,7 +147,8 @@ void checkExrHeader(const std::string& path) {
             checkValue(path, name, type, bytes.take(bytes.u32(what), what), part);
             more = multipart;
         }
-        if (part.width == 0 || part.channels == 0) continue;  // OpenEXR says what is missing, and allocates nothing.
+        if (part.width == 0 || part.channels == 0)
+            continue;  // OpenEXR says what is missing, and allocates nothing.
         checkPixels(path, part.width, part.height, part.channels);
         constexpr std::uint64_t kMostBytesAChannel = 4;
         checkRows(part.width, part.height, part.channels * kMostBytesAChannel);
@@ -136,7 +164,8 @@ void checkPngHeader(const std::string& path) {
     for (std::uint64_t at = kSignatureBytes; name != "IEND";) {
         unsigned char head[kHeadBytes] = {};
         file.seekg(static_cast<std::streamoff>(at));
-        if (!file.read(reinterpret_cast<char*>(head), kHeadBytes)) throw DamagedHeader("it ends before its last chunk");
+        if (!file.read(reinterpret_cast<char*>(head), kHeadBytes))
+            throw DamagedHeader("it ends before its last chunk");
         const std::uint64_t size = std::uint64_t{head[0]} << 24 | head[1] << 16 | head[2] << 8 | head[3];
         name.assign(reinterpret_cast<const char*>(head) + 4, 4);
         at += kHeadBytes + size + kChecksumBytes;
@@ -144,19 +173,25 @@ void checkPngHeader(const std::string& path) {
     }
 }
 
-void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height, std::uint64_t channels) {
-    // Deflate, which EXR and PNG use, reaches 1032:1 on bytes; EXR's lossy DWAB some sixty times that on a constant image.
+void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height,
+                 std::uint64_t channels) {
+    // Deflate, which EXR and PNG use, reaches 1032:1 on bytes; EXR's lossy DWAB some sixty times that on a
+    // constant image.
     constexpr double kDecodedBytesAByte = 65536;
-    const double decoded_bytes = 4.0 * static_cast<double>(width) * static_cast<double>(height) * static_cast<double>(channels);
+    const double decoded_bytes =
+        4.0 * static_cast<double>(width) * static_cast<double>(height) * static_cast<double>(channels);
     if (decoded_bytes == 0) throw DamagedHeader("its header says that it has no pixels");
     if (decoded_bytes > kDecodedBytesAByte * static_cast<double>(std::filesystem::file_size(path)))
-        throw DamagedHeader(fmt::format("its header says {} x {} pixels, more than a file of its size can hold", width, height));
+        throw DamagedHeader(fmt::format(
+            "its header says {} x {} pixels, more than a file of its size can hold", width, height));
 }
 
 void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel) {
-    constexpr double kMostBytes = 1 << 30;  // 64 rows of 65,535 pixels, the widest film, with 64 channels of floats
+    constexpr double kMostBytes =
+        1 << 30;  // 64 rows of 65,535 pixels, the widest film, with 64 channels of floats
     const double row_bytes = static_cast<double>(width) * static_cast<double>(bytes_a_pixel);
-    if (row_bytes * static_cast<double>(kStripRows) > std::max(kMostBytes, row_bytes * static_cast<double>(height)))
+    if (row_bytes * static_cast<double>(kStripRows) >
+        std::max(kMostBytes, row_bytes * static_cast<double>(height)))
         throw DamagedHeader(fmt::format("its rows of {} pixels are longer than can be read", width));
 }
 

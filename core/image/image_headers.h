@@ -1,5 +1,6 @@
-/// Headers of EXR and PNG files, walked before their libraries see them: both allocate what a damaged file says, up to gigabytes for each attribute or
-/// chunk, and learn only then that the file ends. Part of the image module (image_module.h).
+/// Headers of EXR and PNG files, walked before their libraries see them: both allocate what a damaged file
+/// says, up to gigabytes for each attribute or chunk, and learn only then that the file ends. Part of the
+/// image module (image_module.h).
 #pragma once
 
 #include <cstdint>
@@ -13,13 +14,15 @@ struct DamagedHeader : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// Throws DamagedHeader unless attributes have the sizes that their types say and lie within the file, and its pixels may.
+/// Throws DamagedHeader unless attributes have the sizes that their types say and lie within the file, and
+/// its pixels may.
 void checkExrHeader(const std::string& path);
 /// Throws DamagedHeader unless every chunk lies within the file.
 void checkPngHeader(const std::string& path);
 /// Throws DamagedHeader when the file cannot hold as many pixels.
 void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height, std::uint64_t channels);
-/// Rows that OpenImageIO reads at a time, into memory for as many however few the image has. (It takes no fewer; left alone, it takes 256.)
+/// Rows that OpenImageIO reads at a time, into memory for as many however few the image has. (It takes no
+/// fewer; left alone, it takes 256.)
 inline constexpr std::uint64_t kStripRows = 64;
 /// Throws DamagedHeader when so many rows would take more than a gigabyte, and more than the image.
 void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel);

@@ -1,12 +1,12 @@
 #include "image/image_io.h"
 
 #include "base/code_trust.h"
-#include "base/modules.h"
 #include "base/error.h"
-#include "image/image_metadata.h"
-#include "image/image_module.h"
 #include "base/input_file.h"
 #include "base/log.h"
+#include "base/modules.h"
+#include "image/image_metadata.h"
+#include "image/image_module.h"
 
 #include <fmt/format.h>
 
@@ -41,7 +41,8 @@ std::array<std::size_t, 3> colorChannels(const Image& image) {
     constexpr const char* kNames[] = {"R", "G", "B"};
     for (std::size_t c = 0; c < 3; ++c) {
         const auto found = std::find(image.channels.begin(), image.channels.end(), kNames[c]);
-        if (found == image.channels.end()) throw Error(ErrorKind::Output, fmt::format("the image has no channel '{}'", kNames[c]));
+        if (found == image.channels.end())
+            throw Error(ErrorKind::Output, fmt::format("the image has no channel '{}'", kNames[c]));
         index[c] = static_cast<std::size_t>(found - image.channels.begin());
     }
     return index;
@@ -60,7 +61,8 @@ Matrix3d inverse(const Matrix3d& m) {
     return r;
 }
 
-// ---------------------------------------------------------------------------------------------------------------- PFM, PPM
+// ----------------------------------------------------------------------------------------------------------
+// PFM, PPM
 
 /// "PF", size, −1 for little-endian, then rows from the bottom up (Debevec's Portable FloatMap).
 void writePfm(const std::string& path, const Image& image) {
@@ -123,7 +125,9 @@ public:
     std::string_view pixels(std::size_t expected_bytes) {
         const std::size_t first = at_ + 1;
         const std::size_t there = first < bytes_.size() ? bytes_.size() - first : 0;
-        if (there < expected_bytes) refuseToRead(path_, fmt::format("it is truncated: it has {} of {} bytes of pixels", there, expected_bytes));
+        if (there < expected_bytes)
+            refuseToRead(path_, fmt::format("it is truncated: it has {} of {} bytes of pixels", there,
+                                            expected_bytes));
         return bytes_.substr(first, expected_bytes);
     }
 
@@ -143,7 +147,8 @@ Image emptyRgb(std::uint32_t width, std::uint32_t height) {
 }
 
 /// Bytes of an image, or 0 when they are more than any file here has.
-std::size_t pixelBytes(std::uint32_t width, std::uint32_t height, std::size_t bytes_a_pixel, const std::string& path) {
+std::size_t pixelBytes(std::uint32_t width, std::uint32_t height, std::size_t bytes_a_pixel,
+                       const std::string& path) {
     const unsigned __int128 bytes = static_cast<unsigned __int128>(width) * height * bytes_a_pixel;
     if (bytes >> 48) refuseToRead(path, fmt::format("its header says {} × {} pixels", width, height));
     return static_cast<std::size_t>(bytes);
@@ -191,7 +196,8 @@ Image readPpm(const std::string& path, std::string_view bytes) {
     return image;
 }
 
-// ------------------------------------------------------------------------------------------------------------ EXR, PNG, …
+// ----------------------------------------------------------------------------------------------------------
+// EXR, PNG, …
 
 /// Opens the codec module on first use and keeps it: OpenImageIO's threads outlive any one image.
 const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {
@@ -215,7 +221,8 @@ const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {
                 o.reason = fmt::format("the image module cannot be opened ({})", ::dlerror());
                 return o;
             }
-            const auto entry = reinterpret_cast<CrtImageModuleEntry>(::dlsym(library, CRT_IMAGE_MODULE_ENTRY_NAME));
+            const auto entry =
+                reinterpret_cast<CrtImageModuleEntry>(::dlsym(library, CRT_IMAGE_MODULE_ENTRY_NAME));
             const CrtImageModule* const table = entry != nullptr ? entry() : nullptr;
             if (table == nullptr || table->struct_size < sizeof(CrtImageModule)) {
                 o.reason = fmt::format("'{}' is not the image module of this version of crt", file);
@@ -225,12 +232,14 @@ const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {
             o.table = table;
             return o;
         }
-        o.reason = fmt::format("the image module " CRT_IMAGE_MODULE_FILE " is not in {}", fmt::join(directories, ", "));
+        o.reason = fmt::format("the image module " CRT_IMAGE_MODULE_FILE " is not in {}",
+                               fmt::join(directories, ", "));
         return o;
     }();
     if (opened.table == nullptr)
-        throw Error(kind, fmt::format("cannot {} '{}': {}; .pfm and .ppm work without it", kind == ErrorKind::Output ? "write" : "read", path,
-                                      opened.reason),
+        throw Error(kind,
+                    fmt::format("cannot {} '{}': {}; .pfm and .ppm work without it",
+                                kind == ErrorKind::Output ? "write" : "read", path, opened.reason),
                     {path});
     return *opened.table;
 }
@@ -252,7 +261,8 @@ template <std::size_t Size>
 std::array<float, Size> floatsOf(const std::optional<std::array<double, Size>>& values) {
     std::array<float, Size> floats{};
     if (values)
-        std::transform(values->begin(), values->end(), floats.begin(), [](double v) { return static_cast<float>(v); });
+        std::transform(values->begin(), values->end(), floats.begin(),
+                       [](double v) { return static_cast<float>(v); });
     return floats;
 }
 
@@ -270,7 +280,8 @@ using Reason = std::array<char, 512>;
 void writeExr(const std::string& path, const Image& image) {
     colorChannels(image);
     const CrtImageModule& module = imageModule(path, ErrorKind::Output);
-    const std::vector<const char*> float_names = pointers(image.channels), integer_names = pointers(image.integer_channels);
+    const std::vector<const char*> float_names = pointers(image.channels),
+                                   integer_names = pointers(image.integer_channels);
     const std::vector<CrtImageText> metadata = texts(image);
     const std::array<float, 8> primaries = floatsOf(image.chromaticities);
 
@@ -298,7 +309,8 @@ void writeExr(const std::string& path, const Image& image) {
 
     AtomicFile file(path);
     Reason reason{};
-    if (module.write_exr(file.temporaryPath().c_str(), &planes, reason.data(), reason.size()) != 0) refuseToWrite(path, reason.data());
+    if (module.write_exr(file.temporaryPath().c_str(), &planes, reason.data(), reason.size()) != 0)
+        refuseToWrite(path, reason.data());
     file.commit();
 }
 
@@ -310,8 +322,9 @@ void writePng(const std::string& path, const Image& image, const EncodedImage& e
         if (std::strcmp(text.name, kColorInteropIdKey) == 0) text.value = kDisplaySrgbId;
     AtomicFile file(path);
     Reason reason{};
-    if (module.write_png(file.temporaryPath().c_str(), image.width, image.height, encoded.rgb.data(), metadata.data(),
-                         static_cast<std::uint32_t>(metadata.size()), reason.data(), reason.size()) != 0)
+    if (module.write_png(file.temporaryPath().c_str(), image.width, image.height, encoded.rgb.data(),
+                         metadata.data(), static_cast<std::uint32_t>(metadata.size()), reason.data(),
+                         reason.size()) != 0)
         refuseToWrite(path, reason.data());
     file.commit();
 }
@@ -320,18 +333,22 @@ Image readWithModule(const std::string& path) {
     const CrtImageModule& module = imageModule(path, ErrorKind::Usage);
     const CrtImagePlanes* planes = nullptr;
     Reason reason{};
-    if (module.read(path.c_str(), &planes, reason.data(), reason.size()) != 0) refuseToRead(path, reason.data());
-    const std::unique_ptr<const CrtImagePlanes, void (*)(const CrtImagePlanes*)> guard(planes, module.free_image);
+    if (module.read(path.c_str(), &planes, reason.data(), reason.size()) != 0)
+        refuseToRead(path, reason.data());
+    const std::unique_ptr<const CrtImagePlanes, void (*)(const CrtImagePlanes*)> guard(planes,
+                                                                                       module.free_image);
 
     Image image;
     image.width = planes->width;
     image.height = planes->height;
     const std::size_t pixels = std::size_t{image.width} * image.height;
     image.channels.assign(planes->float_channels, planes->float_channels + planes->float_channel_count);
-    image.integer_channels.assign(planes->integer_channels, planes->integer_channels + planes->integer_channel_count);
+    image.integer_channels.assign(planes->integer_channels,
+                                  planes->integer_channels + planes->integer_channel_count);
     image.pixels.assign(planes->floats, planes->floats + pixels * planes->float_channel_count);
     image.integers.assign(planes->integers, planes->integers + pixels * planes->integer_channel_count);
-    for (std::uint32_t i = 0; i < planes->metadata_count; ++i) image.metadata.emplace_back(planes->metadata[i].name, planes->metadata[i].value);
+    for (std::uint32_t i = 0; i < planes->metadata_count; ++i)
+        image.metadata.emplace_back(planes->metadata[i].name, planes->metadata[i].value);
     const bool is_part = planes->whole_width != planes->width || planes->whole_height != planes->height ||
                          planes->left != 0 || planes->top != 0;
     if (is_part) {
@@ -349,12 +366,14 @@ Image readWithModule(const std::string& path) {
     image.chromaticities = chromaticities(ColorSpace::LinearSrgb);
     const std::size_t channels = image.channels.size();
     for (std::size_t i = 0; i < image.pixels.size(); ++i)
-        if (image.channels[i % channels] != "A") image.pixels[i] = static_cast<float>(srgbToLinear(image.pixels[i]));
+        if (image.channels[i % channels] != "A")
+            image.pixels[i] = static_cast<float>(srgbToLinear(image.pixels[i]));
     if (channels <= 2) {  // Grey, or grey with alpha.
         Image color = emptyRgb(image.width, image.height);
         color.metadata = std::move(image.metadata);
         color.chromaticities = image.chromaticities;
-        for (std::size_t p = 0; p < pixels; ++p) color.pixels.insert(color.pixels.end(), 3, image.pixels[p * channels]);
+        for (std::size_t p = 0; p < pixels; ++p)
+            color.pixels.insert(color.pixels.end(), 3, image.pixels[p * channels]);
         return color;
     }
     return image;
@@ -377,12 +396,15 @@ std::optional<Matrix3d> toLinearSrgb(const Image& image) {
     const auto is = [&](ColorSpace space) {
         const std::array<double, 8> known = chromaticities(space);
         // A file holds them as float.
-        return std::equal(known.begin(), known.end(), image.chromaticities->begin(), [](double a, double b) { return std::abs(a - b) < 1e-6; });
+        return std::equal(known.begin(), known.end(), image.chromaticities->begin(),
+                          [](double a, double b) { return std::abs(a - b) < 1e-6; });
     };
     if (is(ColorSpace::LinearSrgb)) return std::nullopt;
     for (const ColorSpace space : {ColorSpace::AcesCg, ColorSpace::Xyz})
         if (is(space)) return multiply(xyzToRgb(ColorSpace::LinearSrgb), inverse(xyzToRgb(space)));
-    throw Error(ErrorKind::Output, "the image's primaries are neither those of sRGB, of ACEScg nor of XYZ, so it cannot become 8-bit sRGB");
+    throw Error(ErrorKind::Output,
+                "the image's primaries are neither those of sRGB, of ACEScg nor of XYZ, so it cannot become "
+                "8-bit sRGB");
 }
 
 EncodedImage encodeSrgb8(const Image& image) {
@@ -402,7 +424,8 @@ EncodedImage encodeSrgb8(const Image& image) {
             // One rounding of float in the conversion from another space is no clipping worth a word.
             const bool worth_counting = !(rgb[c] >= -1e-6 && rgb[c] <= 1.0 + 1e-6);
             encoded.clipped_values += worth_counting;
-            encoded.rgb[3 * p + c] = static_cast<std::uint8_t>(std::floor(linearToSrgb(value) * 255.0 + 0.5));
+            encoded.rgb[3 * p + c] =
+                static_cast<std::uint8_t>(std::floor(linearToSrgb(value) * 255.0 + 0.5));
         }
     }
     return encoded;
@@ -412,7 +435,9 @@ void writeImage(const std::string& path, OutputFormat format, const Image& image
     if (image.width == 0 || image.height == 0) refuseToWrite(path, "the image has no pixels");
     if (image.pixels.size() != std::size_t{image.width} * image.height * image.channels.size() ||
         image.integers.size() != std::size_t{image.width} * image.height * image.integer_channels.size())
-        throw Error(ErrorKind::Internal, fmt::format("the image for '{}' does not have the pixels that its size and channels say", path));
+        throw Error(
+            ErrorKind::Internal,
+            fmt::format("the image for '{}' does not have the pixels that its size and channels say", path));
     switch (format) {
         case OutputFormat::Exr: return writeExr(path, image);
         case OutputFormat::Pfm: return writePfm(path, image);
@@ -425,12 +450,17 @@ void writeImage(const std::string& path, OutputFormat format, const Image& image
     } else {
         writePpm(path, image, encoded);
     }
-    if (const double brightest = largestColor(image); brightest > 0 && std::all_of(encoded.rgb.begin(), encoded.rgb.end(), [](std::uint8_t v) { return v == 0; }))
-        logWarning("'{}' is black: its brightest value is {:.2g}, too dark for 8 bits; about {} stops more of film.exposure_ev would show it", path,
-                   brightest, std::ceil(std::log2(0.5 / brightest)));
+    if (const double brightest = largestColor(image);
+        brightest > 0 &&
+        std::all_of(encoded.rgb.begin(), encoded.rgb.end(), [](std::uint8_t v) { return v == 0; }))
+        logWarning(
+            "'{}' is black: its brightest value is {:.2g}, too dark for 8 bits; about {} stops more of "
+            "film.exposure_ev would show it",
+            path, brightest, std::ceil(std::log2(0.5 / brightest)));
     if (encoded.clipped_values > 0)
-        logInfo("'{}': {:.2g} % of the colour values lie outside what 8 bits can show and were clipped", path,
-                100.0 * static_cast<double>(encoded.clipped_values) / static_cast<double>(encoded.rgb.size()));
+        logInfo(
+            "'{}': {:.2g} % of the colour values lie outside what 8 bits can show and were clipped", path,
+            100.0 * static_cast<double>(encoded.clipped_values) / static_cast<double>(encoded.rgb.size()));
 }
 
 Image readImage(const std::string& path) {

@@ -1,11 +1,12 @@
-/// Images to files and back. PFM and PPM are written here; EXR and PNG go through the codec module (image_module.h), which is opened when the
-/// first of them is read or written and not before.
+/// Images to files and back. PFM and PPM are written here; EXR and PNG go through the codec module
+/// (image_module.h), which is opened when the first of them is read or written and not before.
 ///
-/// Values. EXR and PFM hold linear floats as they are, whatever the colour space. PNG and PPM are 8-bit sRGB: an image in ACEScg or XYZ is
-/// converted to linear sRGB first, then encoded (IEC 61966-2-1) and rounded; what lies outside [0,1] is clipped and counted. Reading gives
-/// linear values back.
+/// Values. EXR and PFM hold linear floats as they are, whatever the colour space. PNG and PPM are 8-bit
+/// sRGB: an image in ACEScg or XYZ is converted to linear sRGB first, then encoded (IEC 61966-2-1) and
+/// rounded; what lies outside [0,1] is clipped and counted. Reading gives linear values back.
 ///
-/// Files are written under a temporary name and renamed. checkWritable() (atomic_file.h) says beforehand whether that can work.
+/// Files are written under a temporary name and renamed. checkWritable() (atomic_file.h) says beforehand
+/// whether that can work.
 #pragma once
 
 #include "base/atomic_file.h"
@@ -22,8 +23,9 @@ namespace crt {
 /// By the extension, whatever its case: ".exr", ".png", ".ppm", ".pfm".
 std::optional<OutputFormat> formatOfFile(const std::string& path);
 
-/// Writes `image`, which has the channels R, G and B. EXR keeps every channel (float, or uint32 for the integer ones), the metadata and the
-/// chromaticities; PNG keeps the metadata; PFM and PPM keep neither. Throws crt::Error(Output).
+/// Writes `image`, which has the channels R, G and B. EXR keeps every channel (float, or uint32 for the
+/// integer ones), the metadata and the chromaticities; PNG keeps the metadata; PFM and PPM keep neither.
+/// Throws crt::Error(Output).
 void writeImage(const std::string& path, OutputFormat format, const Image& image);
 
 /// Reads a PFM, PPM (8 or 16 bits), EXR, PNG or Radiance HDR, chosen by content. Channels named by the file;
@@ -34,8 +36,9 @@ Image readImage(const std::string& path);
 /// Value of a metadata key, or empty.
 std::string metadataValue(const Image& image, const std::string& key);
 
-/// From the image's colour space to linear sRGB; empty when it is sRGB already, which an image without chromaticities is taken for. Throws
-/// crt::Error(Output) for primaries that are none of sRGB's, ACEScg's and XYZ's.
+/// From the image's colour space to linear sRGB; empty when it is sRGB already, which an image without
+/// chromaticities is taken for. Throws crt::Error(Output) for primaries that are none of sRGB's, ACEScg's
+/// and XYZ's.
 std::optional<Matrix3d> toLinearSrgb(const Image& image);
 
 /// 8-bit sRGB of an image, row-major, top row first, three bytes a pixel; what PNG and PPM hold.

@@ -1,5 +1,5 @@
-// The image codec module: EXR and PNG through OpenImageIO, behind image_module.h. Built as a library of its own; nothing else in crt
-// includes OpenImageIO.
+// The image codec module: EXR and PNG through OpenImageIO, behind image_module.h. Built as a library of its
+// own; nothing else in crt includes OpenImageIO.
 #include "image/image_headers.h"
 #include "image/image_module.h"
 
@@ -36,7 +36,8 @@ constexpr const char* kIntAttributes[] = {"samplesPerPixel"};
 
 template <class Names>
 bool contains(const Names& names, const char* name) {
-    return std::any_of(std::begin(names), std::end(names), [name](const char* n) { return std::strcmp(n, name) == 0; });
+    return std::any_of(std::begin(names), std::end(names),
+                       [name](const char* n) { return std::strcmp(n, name) == 0; });
 }
 
 /// What the functions below throw on the way to guarded(), which never lets it out.
@@ -76,18 +77,21 @@ void addMetadata(ImageSpec& spec, const CrtImageText* metadata, std::uint32_t co
         if (contains(kFloatAttributes, name)) {
             spec.attribute(name, std::strtof(value, nullptr));
         } else if (contains(kIntAttributes, name)) {
-            spec.attribute(name, static_cast<int>(std::min<long long>(std::strtoll(value, nullptr, 10), 0x7fffffff)));
+            spec.attribute(
+                name, static_cast<int>(std::min<long long>(std::strtoll(value, nullptr, 10), 0x7fffffff)));
         } else {
             spec.attribute(name, value);
         }
     }
 }
 
-/// A file for OpenImageIO to write to that remembers the first failure. Left to itself the library writes through a buffer, and what the last flush
-/// of it could not write, on a full disk, it does not say: the image would be cut off in silence.
+/// A file for OpenImageIO to write to that remembers the first failure. Left to itself the library writes
+/// through a buffer, and what the last flush of it could not write, on a full disk, it does not say: the
+/// image would be cut off in silence.
 class CheckedFile final : public OIIO::Filesystem::IOProxy {
 public:
-    explicit CheckedFile(const char* path) : IOProxy(path, Write), descriptor_(::open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
+    explicit CheckedFile(const char* path)
+        : IOProxy(path, Write), descriptor_(::open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
         if (descriptor_ < 0) error_number_ = errno;
     }
     ~CheckedFile() override { CheckedFile::close(); }
@@ -112,7 +116,8 @@ public:
     std::size_t pwrite(const void* bytes, std::size_t size, std::int64_t offset) override {
         std::size_t done = 0;
         while (done < size) {
-            const ssize_t n = ::pwrite(descriptor_, static_cast<const char*>(bytes) + done, size - done, offset + static_cast<std::int64_t>(done));
+            const ssize_t n = ::pwrite(descriptor_, static_cast<const char*>(bytes) + done, size - done,
+                                       offset + static_cast<std::int64_t>(done));
             if (n < 0 && errno == EINTR) continue;
             if (n < 0 && error_number_ == 0) error_number_ = errno;
             if (n <= 0) break;
@@ -131,15 +136,18 @@ private:
     int error_number_ = 0;
 };
 
-void writeWith(const char* format, const char* path, const ImageSpec& spec, const TypeDesc& type, const void* pixels) {
+void writeWith(const char* format, const char* path, const ImageSpec& spec, const TypeDesc& type,
+               const void* pixels) {
     CheckedFile file(path);  // Outlives the writer, whose destructor may still write.
     file.requireNoFailure();
     const std::unique_ptr<ImageOutput> output = ImageOutput::create(format);
     if (!output) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
     output->set_ioproxy(&file);
     const auto write = [&] {
-        if (!output->open(path, spec)) throw Failure{wordsOr(output->geterror(), "the file cannot be opened")};
-        if (!output->write_image(type, pixels)) throw Failure{wordsOr(output->geterror(), "the pixels cannot be written")};
+        if (!output->open(path, spec))
+            throw Failure{wordsOr(output->geterror(), "the file cannot be opened")};
+        if (!output->write_image(type, pixels))
+            throw Failure{wordsOr(output->geterror(), "the pixels cannot be written")};
         if (!output->close()) throw Failure{wordsOr(output->geterror(), "the file cannot be completed")};
     };
     try {
@@ -155,10 +163,12 @@ void writeWith(const char* format, const char* path, const ImageSpec& spec, cons
     file.requireNoFailure();
 }
 
-std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reason, std::uint32_t reason_size) {
+std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reason,
+                      std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
         const std::uint32_t floats = image->float_channel_count, integers = image->integer_channel_count;
-        ImageSpec spec(static_cast<int>(image->width), static_cast<int>(image->height), static_cast<int>(floats + integers), TypeDesc::FLOAT);
+        ImageSpec spec(static_cast<int>(image->width), static_cast<int>(image->height),
+                       static_cast<int>(floats + integers), TypeDesc::FLOAT);
         spec.channelnames.clear();
         spec.channelformats.clear();
         for (std::uint32_t c = 0; c < floats; ++c) {
@@ -181,16 +191,22 @@ std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reaso
             spec.full_height = static_cast<int>(image->whole_height);
         }
         spec.attribute("compression", "zip");
-        if (image->chromaticities != nullptr) spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), image->chromaticities);
-        if (image->world_to_camera != nullptr) spec.attribute("worldToCamera", TypeDesc::TypeMatrix, image->world_to_camera);
-        if (image->world_to_ndc != nullptr) spec.attribute("worldToNDC", TypeDesc::TypeMatrix, image->world_to_ndc);
+        if (image->chromaticities != nullptr)
+            spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), image->chromaticities);
+        if (image->world_to_camera != nullptr)
+            spec.attribute("worldToCamera", TypeDesc::TypeMatrix, image->world_to_camera);
+        if (image->world_to_ndc != nullptr)
+            spec.attribute("worldToNDC", TypeDesc::TypeMatrix, image->world_to_ndc);
         if (image->adopted_neutral != nullptr)
-            spec.attribute("adoptedNeutral", TypeDesc(TypeDesc::FLOAT, TypeDesc::VEC2), image->adopted_neutral);
-        // Left to itself the library stamps the present time on every EXR, and the same image would never be the same file.
+            spec.attribute("adoptedNeutral", TypeDesc(TypeDesc::FLOAT, TypeDesc::VEC2),
+                           image->adopted_neutral);
+        // Left to itself the library stamps the present time on every EXR, and the same image would never be
+        // the same file.
         spec.attribute("DateTime", "");
         addMetadata(spec, image->metadata, image->metadata_count);
 
-        // "Native" pixels, float and integer side by side: handing OpenImageIO floats for a uint32 channel would scale them by 2^32.
+        // "Native" pixels, float and integer side by side: handing OpenImageIO floats for a uint32 channel
+        // would scale them by 2^32.
         const std::size_t pixels = std::size_t{image->width} * image->height;
         std::vector<unsigned char> packed(pixels * (floats + integers) * 4);
         unsigned char* next = packed.data();
@@ -200,12 +216,14 @@ std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reaso
             if (integers > 0) std::memcpy(next, image->integers + p * integers, integers * 4);
             next += integers * 4;
         }
-        writeWith("exr", path, spec, integers == 0 ? TypeDesc(TypeDesc::FLOAT) : TypeDesc(TypeDesc::UNKNOWN), packed.data());
+        writeWith("exr", path, spec, integers == 0 ? TypeDesc(TypeDesc::FLOAT) : TypeDesc(TypeDesc::UNKNOWN),
+                  packed.data());
     });
 }
 
-std::int32_t writePng(const char* path, std::uint32_t width, std::uint32_t height, const std::uint8_t* rgb, const CrtImageText* metadata,
-                      std::uint32_t metadata_count, char* reason, std::uint32_t reason_size) {
+std::int32_t writePng(const char* path, std::uint32_t width, std::uint32_t height, const std::uint8_t* rgb,
+                      const CrtImageText* metadata, std::uint32_t metadata_count, char* reason,
+                      std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
         ImageSpec spec(static_cast<int>(width), static_cast<int>(height), 3, TypeDesc::UINT8);
         spec.attribute("oiio:ColorSpace", "sRGB");
@@ -231,9 +249,10 @@ bool isInteger(const ImageSpec& spec, int channel) {
     return type.basetype == TypeDesc::UINT32 || type.basetype == TypeDesc::INT32;
 }
 
-/// What people compare renders with, by the bytes with which such a file begins. Not left to OpenImageIO: it hands a file that it does not know to each of
-/// some thirty readers in turn, video codecs among them, which costs 0.2 s and trusts the least hardened of them with whatever the file holds. TIFF and
-/// JPEG are not among them: their readers did not stand fuzzing (docs/decisions/0005).
+/// What people compare renders with, by the bytes with which such a file begins. Not left to OpenImageIO: it
+/// hands a file that it does not know to each of some thirty readers in turn, video codecs among them, which
+/// costs 0.2 s and trusts the least hardened of them with whatever the file holds. TIFF and JPEG are not
+/// among them: their readers did not stand fuzzing (docs/decisions/0005).
 struct KnownFormat {
     const char* name;  ///< As OpenImageIO calls it.
     std::string_view signature;
@@ -254,21 +273,27 @@ std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
         if (there.substr(0, format.signature.size()) != format.signature) continue;
         if (format.check_header != nullptr) format.check_header(path);
         std::unique_ptr<ImageInput> input = ImageInput::create(format.name);
-        if (!input) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
+        if (!input)
+            throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
         if (!input->open(path, spec)) throw Failure{wordsOr(input->geterror(), "it cannot be opened")};
         return input;
     }
-    throw Failure{"it is no EXR, PNG, PFM, PPM or Radiance HDR file; OpenImageIO's oiiotool makes one of others: oiiotool IN -o OUT.exr"};
+    throw Failure{
+        "it is no EXR, PNG, PFM, PPM or Radiance HDR file; OpenImageIO's oiiotool makes one of others: "
+        "oiiotool IN -o OUT.exr"};
 }
 
-std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* reason, std::uint32_t reason_size) {
+std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* reason,
+                       std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
         ImageSpec spec;
         const std::unique_ptr<ImageInput> input = openImage(path, spec);
         if (spec.deep) throw Failure{"it is a deep image"};
         if (spec.depth > 1) throw Failure{"it is a volume"};
-        const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)), height = static_cast<std::uint64_t>(std::max(spec.height, 0));
-        crt::image::checkPixels(path, width, height, static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
+        const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)),
+                   height = static_cast<std::uint64_t>(std::max(spec.height, 0));
+        crt::image::checkPixels(path, width, height,
+                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
         crt::image::checkRows(width, height, spec.pixel_bytes(true));
 
         auto owned = std::make_unique<OwnedImage>();
@@ -289,12 +314,16 @@ std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* rea
             const bool integer = isInteger(spec, first);
             int end = first + 1;
             while (end < spec.nchannels && isInteger(spec, end) == integer) ++end;
-            const std::size_t stride = 4 * (integer ? owned->integer_names.size() : owned->float_names.size());
+            const std::size_t stride =
+                4 * (integer ? owned->integer_names.size() : owned->float_names.size());
             void* target = integer ? static_cast<void*>(owned->integer_values.data() + integer_channel)
                                    : static_cast<void*>(owned->float_values.data() + float_channel);
-            const TypeDesc type = integer ? TypeDesc(spec.channelformat(first).basetype == TypeDesc::INT32 ? TypeDesc::INT32 : TypeDesc::UINT32)
-                                          : TypeDesc(TypeDesc::FLOAT);
-            if (pixels > 0 && !input->read_image(0, 0, first, end, type, target, static_cast<OIIO::stride_t>(stride)))
+            const TypeDesc type =
+                integer ? TypeDesc(spec.channelformat(first).basetype == TypeDesc::INT32 ? TypeDesc::INT32
+                                                                                         : TypeDesc::UINT32)
+                        : TypeDesc(TypeDesc::FLOAT);
+            if (pixels > 0 &&
+                !input->read_image(0, 0, first, end, type, target, static_cast<OIIO::stride_t>(stride)))
                 throw Failure{wordsOr(input->geterror(), "its pixels cannot be read")};
             (integer ? integer_channel : float_channel) += static_cast<std::size_t>(end - first);
             first = end;
@@ -333,7 +362,8 @@ std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* rea
         view.integers = owned->integer_values.data();
         view.metadata = owned->texts.data();
         view.metadata_count = static_cast<std::uint32_t>(owned->texts.size());
-        view.srgb_encoded = spec.format.basetype == TypeDesc::UINT8 || spec.format.basetype == TypeDesc::UINT16;
+        view.srgb_encoded =
+            spec.format.basetype == TypeDesc::UINT8 || spec.format.basetype == TypeDesc::UINT16;
         *image = owned.release();
     });
 }
@@ -347,7 +377,14 @@ void freeImage(const CrtImagePlanes* image) {
 extern "C" __attribute__((visibility("default"))) const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void);
 
 extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
-    static const bool reads_in_strips [[maybe_unused]] = OIIO::attribute("read_chunk", static_cast<int>(crt::image::kStripRows));
-    static const CrtImageModule table{sizeof(CrtImageModule), 0, "OpenImageIO " OIIO_VERSION_STRING, writeExr, writePng, readImage, freeImage};
+    static const bool reads_in_strips [[maybe_unused]] =
+        OIIO::attribute("read_chunk", static_cast<int>(crt::image::kStripRows));
+    static const CrtImageModule table{sizeof(CrtImageModule),
+                                      0,
+                                      "OpenImageIO " OIIO_VERSION_STRING,
+                                      writeExr,
+                                      writePng,
+                                      readImage,
+                                      freeImage};
     return &table;
 }

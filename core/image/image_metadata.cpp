@@ -1,8 +1,8 @@
 #include "image/image_metadata.h"
 
 #include "base/error.h"
-#include "image/image_io.h"
 #include "base/words.h"
+#include "image/image_io.h"
 
 #include <fmt/format.h>
 

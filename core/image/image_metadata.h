@@ -2,8 +2,8 @@
 /// compares share.
 #pragma once
 
-#include "image/image.h"
 #include "image/development.h"
+#include "image/image.h"
 
 #include <array>
 #include <optional>

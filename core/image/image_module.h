@@ -1,9 +1,11 @@
 /*
- * image_module.h: the border between crt and its image codec module, lib/crt/crt_image_oiio.so. C99. OpenImageIO and the thirty
- * libraries it brings are behind it, so that only a job that reads or writes EXR or PNG pays for them.
+ * image_module.h: the border between crt and its image codec module, lib/crt/crt_image_oiio.so. C99.
+ * OpenImageIO and the thirty libraries it brings are behind it, so that only a job that reads or writes EXR
+ * or PNG pays for them.
  *
- * The module exports one symbol, which returns a table. No C++ type and no exception crosses; what the module allocates the module frees.
- * Functions return 0, or non-zero with one sentence in `reason` (NUL-terminated, cut to reason_size). [any thread]
+ * The module exports one symbol, which returns a table. No C++ type and no exception crosses; what the
+ * module allocates the module frees. Functions return 0, or non-zero with one sentence in `reason`
+ * (NUL-terminated, cut to reason_size). [any thread]
  */
 #ifndef CRT_IMAGE_MODULE_H
 #define CRT_IMAGE_MODULE_H
@@ -34,13 +36,15 @@ typedef struct CrtImagePlanes {
     const uint32_t *integers;          /* [height][width][integer_channel_count] */
     const CrtImageText *metadata;
     uint32_t metadata_count;
-    uint32_t srgb_encoded;             /* read only: 1 when R, G and B are 8- or 16-bit sRGB codes scaled to [0,1], 0 when they are linear */
+    uint32_t srgb_encoded; /* read only: 1 when R, G and B are 8- or 16-bit sRGB codes scaled to [0,1], 0
+                              when they are linear */
     const float *chromaticities;       /* {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy}, or null */
-    /* The pixels are [left, left + width) × [top, top + height) of a picture of whole_width × whole_height, which is
-       0 × 0 where they are all of it. EXR: data window and display window. */
+    /* The pixels are [left, left + width) × [top, top + height) of a picture of whole_width × whole_height,
+       which is 0 × 0 where they are all of it. EXR: data window and display window. */
     int32_t left, top;
     uint32_t whole_width, whole_height;
-    /* EXR, to write only: 4 × 4, row-major, for points as rows, as OpenEXR defines the attributes of these names; or null. */
+    /* EXR, to write only: 4 × 4, row-major, for points as rows, as OpenEXR defines the attributes of these
+     * names; or null. */
     const float *world_to_camera, *world_to_ndc;
     const float *adopted_neutral;      /* to write only: {x, y}, or null */
 } CrtImagePlanes;
@@ -50,11 +54,13 @@ typedef struct CrtImageModule {
     uint32_t reserved;
     /* What is behind it, e.g. "OpenImageIO 2.4.7". */
     const char *build;
-    /* Every float channel as float, every integer channel as uint32, zip compressed. The file name need not end in .exr. */
+    /* Every float channel as float, every integer channel as uint32, zip compressed. The file name need not
+     * end in .exr. */
     int32_t (*write_exr)(const char *path, const CrtImagePlanes *image, char *reason, uint32_t reason_size);
     /* 8-bit RGB, sRGB-encoded, interleaved. */
-    int32_t (*write_png)(const char *path, uint32_t width, uint32_t height, const uint8_t *rgb, const CrtImageText *metadata,
-                         uint32_t metadata_count, char *reason, uint32_t reason_size);
+    int32_t (*write_png)(const char* path, uint32_t width, uint32_t height, const uint8_t* rgb,
+                         const CrtImageText* metadata, uint32_t metadata_count, char* reason,
+                         uint32_t reason_size);
     /* EXR, PNG or Radiance HDR, by content; the first image of a file that holds several. *image stays valid
        until freed. */
     int32_t (*read)(const char *path, const CrtImagePlanes **image, char *reason, uint32_t reason_size);

@@ -3,7 +3,8 @@
  * has the switch between them. Only the Lambertian can be evaluated for a given pair of directions; mirror,
  * conductor and dielectric are smooth: their pdf is a delta.
  *
- * w_o and w_i point away from the surface. Radiance is transported: crossing into an index η times the other scales it by 1/η².
+ * w_o and w_i point away from the surface. Radiance is transported: crossing into an index η times the other
+ * scales it by 1/η².
  */
 #ifndef CRT_BSDF_H
 #define CRT_BSDF_H
@@ -21,12 +22,12 @@ typedef struct CrtScatter {
     int valid;
 } CrtScatter;
 
-/* (η·cos of refraction)² at cos of incidence, η² − 1 + cos²; ≤ 0 in total internal reflection. In this order an index of 1 gives back cos² itself,
-   however grazing. */
+/* (η·cos of refraction)² at cos of incidence, η² − 1 + cos²; ≤ 0 in total internal reflection. In this order
+   an index of 1 gives back cos² itself, however grazing. */
 CRT_FN f32 crt_refraction(f32 cos_i, f32 eta) { return (eta - 1.0f) * (eta + 1.0f) + cos_i * cos_i; }
 
-/* Unpolarised reflectance of an interface at |cos| of incidence; eta: index beyond / index before. Exactly 1 in total internal reflection, exactly 0 for an
-   index of 1. */
+/* Unpolarised reflectance of an interface at |cos| of incidence; eta: index beyond / index before. Exactly 1
+   in total internal reflection, exactly 0 for an index of 1. */
 CRT_FN f32 crt_fresnel_dielectric(f32 cos_i, f32 eta) {
     const f32 refraction = crt_refraction(cos_i, eta);
     if (!(refraction > 0.0f)) return 1.0f;
@@ -36,7 +37,8 @@ CRT_FN f32 crt_fresnel_dielectric(f32 cos_i, f32 eta) {
     return 0.5f * (rs * rs + rp * rp);
 }
 
-/* Unpolarised reflectance of a conductor of complex index n + ik at cos of incidence, four wavelengths at once. */
+/* Unpolarised reflectance of a conductor of complex index n + ik at cos of incidence, four wavelengths at
+ * once. */
 CRT_FN vec4 crt_fresnel_conductor(f32 cos_i, vec4 n, vec4 k) {
     const f32 cos2 = cos_i * cos_i;
     const f32 sin2 = 1.0f - cos2;
@@ -56,7 +58,8 @@ CRT_FN vec4 crt_fresnel_conductor(f32 cos_i, vec4 n, vec4 k) {
 
 CRT_FN vec3 crt_reflect(vec3 wo, vec3 n) { return n * (2.0f * dot3(wo, n)) - wo; }
 
-/* Lambertian f·cos per unit reflectance for a direction at cos_s from the shading normal, and its pdf: both cos/π. */
+/* Lambertian f·cos per unit reflectance for a direction at cos_s from the shading normal, and its pdf: both
+ * cos/π. */
 CRT_FN f32 crt_lambert(f32 cos_s) { return cos_s * CRT_INV_PI; }
 
 CRT_FN CrtScatter crt_sample_diffuse(vec4 reflectance, vec3 ns, vec3 ng, CrtRandom2 u) {
@@ -84,9 +87,11 @@ CRT_FN CrtScatter crt_sample_mirror(vec4 reflectance, vec3 wo, vec3 ns, vec3 ng)
     return s;
 }
 
-/* Smooth dielectric. `eta`: index beyond the surface / index on w_o's side. `hero`: 1 in the hero's lane, 0 elsewhere. `dispersive`: the index differs
-   between the path's living wavelengths. `alone`: only the hero is alive. */
-CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec4 hero, int dispersive, int alone, f32 u) {
+/* Smooth dielectric. `eta`: index beyond the surface / index on w_o's side. `hero`: 1 in the hero's lane, 0
+   elsewhere. `dispersive`: the index differs between the path's living wavelengths. `alone`: only the hero
+   is alive. */
+CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec4 hero, int dispersive,
+                                        int alone, f32 u) {
     CrtScatter s;
     const f32 cos_i = crt_min(dot3(wo, ns), 1.0f);
     const f32 eta_hero = CRT_HAS(DISPERSION) ? sum4(eta * hero) : V4X(eta);
@@ -94,8 +99,9 @@ CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec
     vec4 fresnel = splat4(fresnel_hero);
     f32 reflect = fresnel_hero;
     if (CRT_HAS(DISPERSION) && dispersive && !alone) {
-        fresnel = make_vec4(crt_fresnel_dielectric(cos_i, V4X(eta)), crt_fresnel_dielectric(cos_i, V4Y(eta)),
-                            crt_fresnel_dielectric(cos_i, V4Z(eta)), crt_fresnel_dielectric(cos_i, V4W(eta)));
+        fresnel =
+            make_vec4(crt_fresnel_dielectric(cos_i, V4X(eta)), crt_fresnel_dielectric(cos_i, V4Y(eta)),
+                      crt_fresnel_dielectric(cos_i, V4Z(eta)), crt_fresnel_dielectric(cos_i, V4W(eta)));
         reflect = 0.25f * sum4(fresnel);
     }
     s.pdf = 0.0f;
@@ -113,7 +119,9 @@ CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec
     s.eta_square = eta_hero * eta_hero;
     s.weight = splat4((1.0f - fresnel_hero) / (1.0f - reflect) * (inverse_eta * inverse_eta));
     /* An index of exactly 1 is no surface: the direction passes unrounded. */
-    s.wi = eta_hero == 1.0f ? -wo : normalize3(wo * -inverse_eta + ns * (cos_i - crt_sqrt(crt_max(refraction, 0.0f))) * inverse_eta);
+    s.wi = eta_hero == 1.0f ? -wo
+                            : normalize3(wo * -inverse_eta +
+                                         ns * (cos_i - crt_sqrt(crt_max(refraction, 0.0f))) * inverse_eta);
     s.valid = refraction > 0.0f && dot3(s.wi, ng) < 0.0f;
     return s;
 }

@@ -1,6 +1,7 @@
 /*
- * bvh.h: software tracing, for backends without a tracer of their own: brute force for a handful of triangles, the paper's culling by object
- * boxes, and a four-wide BVH. Box tests only cull, conservatively; crt_intersect_triangle decides.
+ * bvh.h: software tracing, for backends without a tracer of their own: brute force for a handful of
+ * triangles, the paper's culling by object boxes, and a four-wide BVH. Box tests only cull, conservatively;
+ * crt_intersect_triangle decides.
  */
 #ifndef CRT_BVH_H
 #define CRT_BVH_H
@@ -11,7 +12,8 @@ CRT_KERNEL_BEGIN
 
 #define CRT_BVH_STACK 96 /* three entries a level; bvh_build.cpp keeps the tree below 32 levels */
 
-/* Which of a box's two planes a ray meets first, per axis, by the sign bit, so that −0 is told from +0; and 1/d, infinite where d is zero. */
+/* Which of a box's two planes a ray meets first, per axis, by the sign bit, so that −0 is told from +0; and
+ * 1/d, infinite where d is zero. */
 typedef struct CrtSlab {
     u32 near_x, near_y, near_z;
     vec3 inverse;
@@ -26,10 +28,13 @@ CRT_FN CrtSlab crt_slab(CrtRay ray) {
     return s;
 }
 
-#define CRT_SLAB_SLACK 1.0000005f /* 1 + 2γ(3), rounded up: rounding never loses a box that is touched (Ize 2013) */
+#define CRT_SLAB_SLACK \
+    1.0000005f /* 1 + 2γ(3), rounded up: rounding never loses a box that is touched (Ize 2013) */
 
-/* Entry distance of a ray into one box, or infinity. A NaN (0·∞: the origin on a plane that the ray runs along) counts as touching. */
-CRT_FN f32 crt_box(CRT_GLOBAL const f32 *lower, CRT_GLOBAL const f32 *upper, CrtRay ray, CrtSlab slab, f32 limit) {
+/* Entry distance of a ray into one box, or infinity. A NaN (0·∞: the origin on a plane that the ray runs
+ * along) counts as touching. */
+CRT_FN f32 crt_box(CRT_GLOBAL const f32 *lower, CRT_GLOBAL const f32 *upper, CrtRay ray, CrtSlab slab,
+                   f32 limit) {
     f32 enter = 0.0f;
     f32 leave = limit;
     const f32 tx0 = ((slab.near_x ? upper[0] : lower[0]) - V3X(ray.o)) * V3X(slab.inverse);
@@ -65,7 +70,8 @@ CRT_FN CrtHit crt_brute_force_closest(const CrtContext *ctx, CrtRay ray) {
     return best;
 }
 
-/* For a segment between two points of the scene: triangles that have the whole scene on one side cannot come between, and are not asked. */
+/* For a segment between two points of the scene: triangles that have the whole scene on one side cannot come
+ * between, and are not asked. */
 CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtTriangle8 *blocks = CRT_ARRAY(CrtTriangle8, ctx->blob, ctx->scene->occluders8);
@@ -74,8 +80,11 @@ CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
 #if CRT_SIMD8
     const f32 slack = crt_candidate_slack(ray.o);
     for (u32 b = 0u; b < count; ++b)
-        for (u32 lanes = crt_candidates8(blocks + b, ray, slack, ray.reach); lanes != 0u; lanes &= lanes - 1u)
-            if (crt_intersect_triangle(triangles + blocks[b].slot[crt_lowest_bit(lanes)], crt_shear(ray), ray.reach, &hit)) return 1;
+        for (u32 lanes = crt_candidates8(blocks + b, ray, slack, ray.reach); lanes != 0u;
+             lanes &= lanes - 1u)
+            if (crt_intersect_triangle(triangles + blocks[b].slot[crt_lowest_bit(lanes)], crt_shear(ray),
+                                       ray.reach, &hit))
+                return 1;
 #else
     const CrtShear shear = crt_shear(ray);
     for (u32 b = 0u; b < count; ++b)
@@ -93,7 +102,8 @@ CRT_FN CrtHit crt_aabb_closest(const CrtContext *ctx, CrtRay ray) {
     CrtHit best = crt_no_hit(ray.reach);
     for (u32 k = 0u; k < ctx->scene->objects.count; ++k) {
         if (!(crt_box(objects[k].lower, objects[k].upper, ray, slab, best.t) < CRT_INFINITY)) continue;
-        for (u32 i = 0u; i < objects[k].count; ++i) crt_test_closest(triangles, objects[k].first + i, shear, &best);
+        for (u32 i = 0u; i < objects[k].count; ++i)
+            crt_test_closest(triangles, objects[k].first + i, shear, &best);
     }
     return best;
 }
@@ -115,16 +125,22 @@ CRT_FN int crt_aabb_any(const CrtContext *ctx, CrtRay ray) {
 /* Entry distances into a node's four children; infinity where the ray misses. */
 CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtRay ray, CrtSlab slab, f32 limit) {
     const vec4 ox = splat4(V3X(ray.o)), oy = splat4(V3Y(ray.o)), oz = splat4(V3Z(ray.o));
-    const vec4 ix = splat4(V3X(slab.inverse)), iy = splat4(V3Y(slab.inverse)), iz = splat4(V3Z(slab.inverse));
+    const vec4 ix = splat4(V3X(slab.inverse)), iy = splat4(V3Y(slab.inverse)),
+               iz = splat4(V3Z(slab.inverse));
     CRT_GLOBAL const f32 *planes = &node->bounds[0][0];
     const vec4 enter = crt_max4((crt_load4(planes + 4u * slab.near_z) - oz) * iz,
                        crt_max4((crt_load4(planes + 4u * slab.near_y) - oy) * iy,
                        crt_max4((crt_load4(planes + 4u * slab.near_x) - ox) * ix, splat4(0.0f))));
-    const vec4 leave = crt_min4((crt_load4(planes + 4u * (slab.near_z ^ 1u)) - oz) * iz,
-                       crt_min4((crt_load4(planes + 4u * (slab.near_y ^ 1u)) - oy) * iy,
-                       crt_min4((crt_load4(planes + 4u * (slab.near_x ^ 1u)) - ox) * ix, splat4(limit)))) * CRT_SLAB_SLACK;
-    return make_vec4(V4X(enter) <= V4X(leave) ? V4X(enter) : CRT_INFINITY, V4Y(enter) <= V4Y(leave) ? V4Y(enter) : CRT_INFINITY,
-                     V4Z(enter) <= V4Z(leave) ? V4Z(enter) : CRT_INFINITY, V4W(enter) <= V4W(leave) ? V4W(enter) : CRT_INFINITY);
+    const vec4 leave =
+        crt_min4(
+            (crt_load4(planes + 4u * (slab.near_z ^ 1u)) - oz) * iz,
+            crt_min4((crt_load4(planes + 4u * (slab.near_y ^ 1u)) - oy) * iy,
+                     crt_min4((crt_load4(planes + 4u * (slab.near_x ^ 1u)) - ox) * ix, splat4(limit)))) *
+        CRT_SLAB_SLACK;
+    return make_vec4(V4X(enter) <= V4X(leave) ? V4X(enter) : CRT_INFINITY,
+                     V4Y(enter) <= V4Y(leave) ? V4Y(enter) : CRT_INFINITY,
+                     V4Z(enter) <= V4Z(leave) ? V4Z(enter) : CRT_INFINITY,
+                     V4W(enter) <= V4W(leave) ? V4W(enter) : CRT_INFINITY);
 }
 
 #define CRT_SORT_CHILDREN(ta, ca, tb, cb) \
@@ -137,8 +153,8 @@ CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtRay ray, CrtS
         cb = c_swap;                      \
     }
 
-/* Boxes let NaN in, so that none is lost that is touched; those of unused children too, which lead back to the root. A ray with a number that is
-   none must not get there. */
+/* Boxes let NaN in, so that none is lost that is touched; those of unused children too, which lead back to
+   the root. A ray with a number that is none must not get there. */
 CRT_FN int crt_is_ray(CrtRay ray) {
     const vec3 o = abs3(ray.o);
     const vec3 d = abs3(ray.d);
@@ -232,7 +248,8 @@ CRT_FN int crt_software_any(const CrtContext *ctx, CrtRay ray) {
     return 0;
 }
 
-/* The two hooks. A backend with a tracer of its own defines CRT_BACKEND_TRACE and both functions after including path.h. */
+/* The two hooks. A backend with a tracer of its own defines CRT_BACKEND_TRACE and both functions after
+ * including path.h. */
 #ifdef CRT_BACKEND_TRACE
 CRT_FN CrtHit crt_trace_closest(const CrtContext *ctx, CrtRay ray);
 CRT_FN int crt_trace_any(const CrtContext *ctx, CrtRay ray);

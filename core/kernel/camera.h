@@ -1,6 +1,6 @@
 /*
- * camera.h: film point → ray. Perspective, pinhole or thin lens; pixel filters by importance sampling (Ernst et al. 2006), so a sample belongs to
- * one pixel and has weight 1.
+ * camera.h: film point → ray. Perspective, pinhole or thin lens; pixel filters by importance sampling (Ernst
+ * et al. 2006), so a sample belongs to one pixel and has weight 1.
  */
 #ifndef CRT_CAMERA_H
 #define CRT_CAMERA_H
@@ -9,7 +9,8 @@
 
 CRT_KERNEL_BEGIN
 
-/* `reach` is how far the segment goes, in lengths of d: infinity, or 1 for a shadow ray that ends at o + d. */
+/* `reach` is how far the segment goes, in lengths of d: infinity, or 1 for a shadow ray that ends at o + d.
+ */
 typedef struct CrtRay {
     vec3 o, d;
     f32 reach;
@@ -52,10 +53,12 @@ CRT_FN CrtRay crt_camera_ray(const CrtContext *ctx, CrtSampler *sampler, u32 pix
     }
     CrtRay ray;
     ray.o = crt_load3(camera->origin);
-    ray.d = crt_fma3(crt_load3(camera->step_x), (f32)pixel_x + dx, crt_fma3(crt_load3(camera->step_y), (f32)pixel_y + dy, crt_load3(camera->corner)));
+    ray.d = crt_fma3(crt_load3(camera->step_x), (f32)pixel_x + dx,
+                     crt_fma3(crt_load3(camera->step_y), (f32)pixel_y + dy, crt_load3(camera->corner)));
     if (CRT_HAS(LENS) && camera->lens_radius > 0.0f) {
         const CrtRandom2 lens = crt_concentric_disk(crt_sample_2d(sampler, CRT_DIM_LENS));
-        const vec3 shift = (crt_load3(camera->lens_x) * lens.x + crt_load3(camera->lens_y) * lens.y) * camera->lens_radius;
+        const vec3 shift =
+            (crt_load3(camera->lens_x) * lens.x + crt_load3(camera->lens_y) * lens.y) * camera->lens_radius;
         ray.d = ray.d * camera->focus_distance - shift;
         ray.o = ray.o + shift;
     }

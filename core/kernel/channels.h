@@ -5,8 +5,9 @@
  *
  * CRT_CHANNEL_LIST(C) calls C(bit, NAME, Name, stem, width, SOURCE, "name in scenes", "EXR channels") for
  * what has film channels of its own, in the order in which the film holds them, after X, Y and Z. `width` is
- * their number; films of fewer replicates than there can be have fewer of those, which come last. CrtScene::<stem>_channel is the first of them. SOURCE says which kernel code adds
- * to them: FIRST_HIT has a function crt_first_hit_<stem> in path.h, SAMPLES is added by crt_add_sample.
+ * their number; films of fewer replicates than there can be have fewer of those, which come last.
+ * CrtScene::<stem>_channel is the first of them. SOURCE says which kernel code adds to them: FIRST_HIT has a
+ * function crt_first_hit_<stem> in path.h, SAMPLES is added by crt_add_sample.
  *
  * CRT_PLANE_LIST(P) calls P(bit, NAME, Name, TYPE, SOURCE, "name in scenes", "EXR channels") for what has
  * none: IDS is the film's plane of primitive ids, FILM is made of the film when it is resolved. TYPE is
@@ -35,7 +36,8 @@
 #define CRT_PLANE_ENUM(bit, NAME, Name, TYPE, SOURCE, name, exr) CRT_AOV_##NAME = 1 << bit,
 enum CrtAov { CRT_CHANNEL_LIST(CRT_CHANNEL_ENUM) CRT_PLANE_LIST(CRT_PLANE_ENUM) CRT_AOV_END };
 
-/* X, Y and Z of each sample. SQUARES is Y² of each, of which films without replicates know their variance. */
+/* X, Y and Z of each sample. SQUARES is Y² of each, of which films without replicates know their variance.
+ */
 #define CRT_CHANNELS_BASE 3u
 
 /* Of a film with everything. */

@@ -1,10 +1,11 @@
 /*
- * dialect.h: one vocabulary for three compilers (C++17, CUDA C++, OpenCL C 1.2). The only nest of compiler #ifs: every
- * other kernel header reads the same in all three.
+ * dialect.h: one vocabulary for three compilers (C++17, CUDA C++, OpenCL C 1.2). The only nest of compiler
+ * #ifs: every other kernel header reads the same in all three.
  *
- * Rules of the dialect: functions take and return values (or write through a private pointer); no recursion, no globals,
- * no function pointers, no overloads, no v[i], no swizzles, no brace-initialised vectors. Arithmetic is IEEE, never contracted:
- * crt_fma is written where a fused operation is meant. Data in memory is scalars, arrays of scalars, or CrtVec4.
+ * Rules of the dialect: functions take and return values (or write through a private pointer); no recursion,
+ * no globals, no function pointers, no overloads, no v[i], no swizzles, no brace-initialised vectors.
+ * Arithmetic is IEEE, never contracted: crt_fma is written where a fused operation is meant. Data in memory
+ * is scalars, arrays of scalars, or CrtVec4.
  *
  * Types: u32 i32 u64 f32 f64, vec3, vec4; vec8 and mask8 where CRT_SIMD8 is 1 (CPUs).
  */
@@ -151,12 +152,16 @@ CRT_FN u32 crt_reverse_bits(u32 x) {
 #endif
 CRT_FN bool crt_is_finite(f32 x) { return (crt_bits(x) & 0x7f800000u) != 0x7f800000u; }
 CRT_FN vec4 crt_load4(const f32 *p) { return *reinterpret_cast<const vec4 *>(p); }
-CRT_FN vec4 crt_sqrt4(vec4 v) { return make_vec4(crt_sqrt(v.x), crt_sqrt(v.y), crt_sqrt(v.z), crt_sqrt(v.w)); }
+CRT_FN vec4 crt_sqrt4(vec4 v) {
+    return make_vec4(crt_sqrt(v.x), crt_sqrt(v.y), crt_sqrt(v.z), crt_sqrt(v.w));
+}
 CRT_FN vec4 crt_min4(vec4 a, vec4 b) {
-    return make_vec4(a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z, a.w < b.w ? a.w : b.w);
+    return make_vec4(a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z,
+                     a.w < b.w ? a.w : b.w);
 }
 CRT_FN vec4 crt_max4(vec4 a, vec4 b) {
-    return make_vec4(a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z, a.w > b.w ? a.w : b.w);
+    return make_vec4(a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z,
+                     a.w > b.w ? a.w : b.w);
 }
 #define CRT_SIMD8 0
 #define CRT_ASSERT_SIZE(type, bytes) static_assert(sizeof(type) == (bytes), "layout of " #type)
@@ -169,7 +174,8 @@ CRT_FN vec4 crt_max4(vec4 a, vec4 b) {
 #include <immintrin.h>
 #endif
 #define CRT_FN static inline
-#define CRT_HOT_FN __attribute__((always_inline)) static inline /* called twice a vertex, where a call costs 1 % */
+#define CRT_HOT_FN \
+    __attribute__((always_inline)) static inline /* called twice a vertex, where a call costs 1 % */
 #define CRT_GLOBAL
 #define CRT_CONSTANT static constexpr
 #define CRT_KERNEL_BEGIN namespace crt { namespace kernel {
@@ -239,7 +245,9 @@ typedef f32 vec8 __attribute__((vector_size(32)));
 typedef i32 mask8 __attribute__((vector_size(32)));
 CRT_FN vec8 splat8(f32 s) { return vec8{s, s, s, s, s, s, s, s}; }
 CRT_FN vec8 crt_load8(const f32 *p) { return (vec8)_mm256_loadu_ps(p); }
-CRT_FN vec8 crt_fma8(vec8 a, vec8 b, vec8 c) { return (vec8)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c); }
+CRT_FN vec8 crt_fma8(vec8 a, vec8 b, vec8 c) {
+    return (vec8)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+}
 CRT_FN vec8 crt_min8(vec8 a, vec8 b) { return (vec8)_mm256_min_ps((__m256)a, (__m256)b); }
 CRT_FN mask8 crt_sign8(vec8 v) { return (mask8)v & static_cast<i32>(0x80000000u); }
 CRT_FN vec8 crt_flip8(vec8 v, mask8 signs) { return (vec8)((mask8)v ^ signs); }

@@ -1,8 +1,8 @@
 /*
- * features.h: what a scene can need, one bit a kind. compile.cpp derives the mask from the scene; a kernel compiled with
- * CRT_FEATURES = mask leaves the rest out. Bits name kinds, never values, so moving the camera never recompiles.
- * Test with `if (CRT_HAS(X))`: every compiler still parses what it leaves out. A kernel with more bits than the scene needs gives
- * the same bits in the image, only slower.
+ * features.h: what a scene can need, one bit a kind. compile.cpp derives the mask from the scene; a kernel
+ * compiled with CRT_FEATURES = mask leaves the rest out. Bits name kinds, never values, so moving the camera
+ * never recompiles. Test with `if (CRT_HAS(X))`: every compiler still parses what it leaves out. A kernel
+ * with more bits than the scene needs gives the same bits in the image, only slower.
  *
  * CRT_FEATURE_LIST(F) calls F(bit, NAME, "what leaves the kernel without it").
  */

@@ -1,9 +1,11 @@
 /*
- * intersect.h: the one ray–triangle test that decides hit, distance and barycentrics on every backend. Whatever finds candidates (BVH, Embree, eight
- * at a time) may be sloppy as long as it misses none; this has the last word.
+ * intersect.h: the one ray–triangle test that decides hit, distance and barycentrics on every backend.
+ * Whatever finds candidates (BVH, Embree, eight at a time) may be sloppy as long as it misses none; this has
+ * the last word.
  *
- * Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection", with the edge functions as Kahan differences of products: their sign is exact,
- * so the two triangles at an edge agree without a fallback to double.
+ * Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection", with the edge functions as Kahan
+ * differences of products: their sign is exact, so the two triangles at an edge agree without a fallback to
+ * double.
  */
 #ifndef CRT_INTERSECT_H
 #define CRT_INTERSECT_H
@@ -51,13 +53,15 @@ CRT_FN CrtShear crt_shear(CrtRay ray) {
     return s;
 }
 
-/* Around boxes, in lengths after normalisation (coordinates within ±1): the triangle test accepts hits whose offset from the ray is rounding, a few
-   2^-24; what culls must not cull what it would accept. */
+/* Around boxes, in lengths after normalisation (coordinates within ±1): the triangle test accepts hits whose
+   offset from the ray is rounding, a few 2^-24; what culls must not cull what it would accept. */
 #define CRT_BOX_PADDING 5e-7f
 
-/* Does the ray hit the triangle at 0 < t < limit? Fills t, b1, b2. There is no least t: a ray starts far enough off its surface (surface.h) that
-   the sign of t is right, and whatever is really in front, however near, must stop it, or light leaks through corners. */
-CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShear ray, f32 limit, CrtHit *hit) {
+/* Does the ray hit the triangle at 0 < t < limit? Fills t, b1, b2. There is no least t: a ray starts far
+   enough off its surface (surface.h) that the sign of t is right, and whatever is really in front, however
+   near, must stop it, or light leaks through corners. */
+CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShear ray, f32 limit,
+                                  CrtHit *hit) {
     CRT_GLOBAL const f32 *px = triangle->p + 3u * ray.kx;
     CRT_GLOBAL const f32 *py = triangle->p + 3u * ray.ky;
     CRT_GLOBAL const f32 *pz = triangle->p + 3u * ray.kz;
@@ -89,8 +93,10 @@ CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShe
 /* One ulp beyond the best hit, so that ties reach the comparison of ids. */
 CRT_FN f32 crt_tie_limit(f32 t) { return t < CRT_INFINITY ? crt_next_up(t) : CRT_INFINITY; }
 
-/* Tests one slot against the best hit so far; the nearer wins, and of equally near ones the lower primitive id, so the order of testing does not show. */
-CRT_FN void crt_test_closest(CRT_GLOBAL const CrtTriangle *triangles, u32 slot, CrtShear shear, CrtHit *best) {
+/* Tests one slot against the best hit so far; the nearer wins, and of equally near ones the lower primitive
+ * id, so the order of testing does not show. */
+CRT_FN void crt_test_closest(CRT_GLOBAL const CrtTriangle *triangles, u32 slot, CrtShear shear,
+                             CrtHit *best) {
     CrtHit hit;
     if (!crt_intersect_triangle(triangles + slot, shear, crt_tie_limit(best->t), &hit)) return;
     const u32 id = triangles[slot].id;
@@ -113,33 +119,46 @@ CRT_FN CrtHit crt_no_hit(f32 reach) {
 }
 
 #if CRT_SIMD8
-/* Slack of crt_candidates8 for a ray from o, in lengths: bounds the rounding of its edge distances (at most some 30 · 2^-24 of 1 + |o|, scene
-   coordinates being within ±1) and what the exact test accepts outside an edge. */
-CRT_FN f32 crt_candidate_slack(vec3 o) { return 64.0f * CRT_EPSILON * (1.0f + crt_abs(V3X(o)) + crt_abs(V3Y(o)) + crt_abs(V3Z(o))); }
+/* Slack of crt_candidates8 for a ray from o, in lengths: bounds the rounding of its edge distances (at most
+   some 30 · 2^-24 of 1 + |o|, scene coordinates being within ±1) and what the exact test accepts outside an
+   edge. */
+CRT_FN f32 crt_candidate_slack(vec3 o) {
+    return 64.0f * CRT_EPSILON * (1.0f + crt_abs(V3X(o)) + crt_abs(V3Y(o)) + crt_abs(V3Z(o)));
+}
 
 /* row · (x, y, z, w) for eight triangles. */
 CRT_FN vec8 crt_row8(CRT_GLOBAL const f32 *row, vec8 x, vec8 y, vec8 z, vec8 w) {
-    return crt_fma8(crt_load8(row), x, crt_fma8(crt_load8(row + 8), y, crt_fma8(crt_load8(row + 16), z, crt_load8(row + 24) * w)));
+    return crt_fma8(
+        crt_load8(row), x,
+        crt_fma8(crt_load8(row + 8), y, crt_fma8(crt_load8(row + 16), z, crt_load8(row + 24) * w)));
 }
 
-/* Lanes of eight triangles that the ray may hit before `limit`. In homogeneous form, without a division: with h the height of the origin over the
-   plane and n the height gained per length of the ray, the ray meets the plane at (n·o − h·d) / n. It may name a triangle that
-   crt_intersect_triangle refuses, never miss one that it accepts: close to a plane the sign of h is not known. The slack there is
-   smaller than the clearance of the triangle's own rays, or each would be a candidate of the triangle that it leaves: crt_height_slack. */
+/* Lanes of eight triangles that the ray may hit before `limit`. In homogeneous form, without a division:
+   with h the height of the origin over the plane and n the height gained per length of the ray, the ray
+   meets the plane at (n·o − h·d) / n. It may name a triangle that crt_intersect_triangle refuses, never miss
+   one that it accepts: close to a plane the sign of h is not known. The slack there is smaller than the
+   clearance of the triangle's own rays, or each would be a candidate of the triangle that it leaves:
+   crt_height_slack. */
 CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtRay ray, f32 slack, f32 limit) {
     CRT_GLOBAL const f32 *row = &block->row[0][0][0];
     const vec8 ox = splat8(V3X(ray.o)), oy = splat8(V3Y(ray.o)), oz = splat8(V3Z(ray.o));
     const vec8 dx = splat8(V3X(ray.d)), dy = splat8(V3Y(ray.d)), dz = splat8(V3Z(ray.d));
-    const vec8 h = crt_fma8(crt_load8(row), ox, crt_fma8(crt_load8(row + 8), oy, crt_fma8(crt_load8(row + 16), oz, crt_load8(row + 24))));
+    const vec8 h =
+        crt_fma8(crt_load8(row), ox,
+                 crt_fma8(crt_load8(row + 8), oy, crt_fma8(crt_load8(row + 16), oz, crt_load8(row + 24))));
     const vec8 n = crt_fma8(crt_load8(row), dx, crt_fma8(crt_load8(row + 8), dy, crt_load8(row + 16) * dz));
     const vec8 x = crt_fma8(ox, n, -h * dx);
     const vec8 y = crt_fma8(oy, n, -h * dy);
     const vec8 z = crt_fma8(oz, n, -h * dz);
     const vec8 edges = crt_min8(crt_flip8(crt_row8(row + 32, x, y, z, n), crt_sign8(n)),
-                        crt_min8(crt_flip8(crt_row8(row + 64, x, y, z, n), crt_sign8(n)), crt_flip8(crt_row8(row + 96, x, y, z, n), crt_sign8(n))));
+                                crt_min8(crt_flip8(crt_row8(row + 64, x, y, z, n), crt_sign8(n)),
+                                         crt_flip8(crt_row8(row + 96, x, y, z, n), crt_sign8(n))));
     const vec8 behind = crt_flip8(h, crt_sign8(n)); /* how far the origin is past the plane */
-    const vec8 inside = crt_min8(edges, crt_fma8(behind, splat8(-CRT_HEIGHT_SCALE), crt_load8(block->height_slack)));
-    return mask8_bits((inside > splat8(-slack)) & (behind > crt_fma8(crt_flip8(n, crt_sign8(n)), splat8(-crt_min(limit, 1e30f)), splat8(-slack))));
+    const vec8 inside =
+        crt_min8(edges, crt_fma8(behind, splat8(-CRT_HEIGHT_SCALE), crt_load8(block->height_slack)));
+    return mask8_bits(
+        (inside > splat8(-slack)) &
+        (behind > crt_fma8(crt_flip8(n, crt_sign8(n)), splat8(-crt_min(limit, 1e30f)), splat8(-slack))));
 }
 #endif
 

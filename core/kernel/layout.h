@@ -1,10 +1,11 @@
 /*
- * layout.h: the compiled scene as bytes. One pointer-free blob: a CrtScene header, then arrays that its spans point to. Written by
- * core/compile.cpp, read as it lies by every kernel. Fixed-width members, every struct a multiple of 16 bytes, sizes asserted.
- * A change here changes CRT_LAYOUT_HASH, and plugins built with another hash are refused.
+ * layout.h: the compiled scene as bytes. One pointer-free blob: a CrtScene header, then arrays that its
+ * spans point to. Written by core/compile/compile.cpp, read as it lies by every kernel. Fixed-width members, every
+ * struct a multiple of 16 bytes, sizes asserted. A change here changes CRT_LAYOUT_HASH, and plugins built
+ * with another hash are refused.
  *
- * Units: the scene is moved to its centre and scaled by a power of two at load (lengths here are in these units); radiance in
- * W·m⁻²·sr⁻¹·nm⁻¹; wavelengths in nm.
+ * Units: the scene is moved to its centre and scaled by a power of two at load (lengths here are in these
+ * units); radiance in W·m⁻²·sr⁻¹·nm⁻¹; wavelengths in nm.
  */
 #ifndef CRT_LAYOUT_H
 #define CRT_LAYOUT_H
@@ -21,7 +22,7 @@ CRT_KERNEL_BEGIN
 #define CRT_WAVELENGTH_COUNT 471u     /* 360, 361, … 830 nm */
 #define CRT_SPECTRUM_STRIDE 472u      /* floats from one spectrum to the next; the last repeats 830 nm */
 #define CRT_WAVELENGTH_TABLE 1024u    /* cells of the inverse distribution of wavelengths: TABLE + 1 nodes */
-#define CRT_FILTER_TABLE 256u         /* cells of the inverse distribution of the pixel filter: TABLE + 1 nodes */
+#define CRT_FILTER_TABLE 256u /* cells of the inverse distribution of the pixel filter: TABLE + 1 nodes */
 
 /* An array in the blob: `offset` in units of 16 bytes from its start. */
 typedef struct CrtSpan {
@@ -38,9 +39,10 @@ typedef struct CrtTriangle {
 } CrtTriangle;
 CRT_ASSERT_SIZE(CrtTriangle, 48);
 
-/* Eight triangles side by side, for the brute-force loops. A row (x, y, z, w) is an affine function of a point p: x·p.x + y·p.y + z·p.z + w. Row 0 is
-   the height over the triangle's plane; rows 1 to 3 the distance from each edge, positive inside. Unused lanes have slot CRT_NONE and are CRT_UNUSED_HEIGHT
-   below every point: farther than the slack of any ray, whose origin may be far outside the scene. */
+/* Eight triangles side by side, for the brute-force loops. A row (x, y, z, w) is an affine function of a
+   point p: x·p.x + y·p.y + z·p.z + w. Row 0 is the height over the triangle's plane; rows 1 to 3 the
+   distance from each edge, positive inside. Unused lanes have slot CRT_NONE and are CRT_UNUSED_HEIGHT below
+   every point: farther than the slack of any ray, whose origin may be far outside the scene. */
 #define CRT_UNUSED_HEIGHT 1e30f
 #define CRT_HEIGHT_SCALE 16.0f /* of heights that are compared with the slack of a ray */
 typedef struct CrtTriangle8 {
@@ -50,8 +52,8 @@ typedef struct CrtTriangle8 {
 } CrtTriangle8;
 CRT_ASSERT_SIZE(CrtTriangle8, 576);
 
-/* The plane of a triangle, by slot; how far off it a ray must start to be sure of its side, and how far from its edges, in barycentrics, to be
-   sure of its neighbours' (surface.h). */
+/* The plane of a triangle, by slot; how far off it a ray must start to be sure of its side, and how far from
+   its edges, in barycentrics, to be sure of its neighbours' (surface.h). */
 typedef struct CrtFace {
     f32 normal[3]; /* unit, by the order of the vertices */
     f32 clearance;
@@ -76,8 +78,9 @@ typedef struct CrtNormals {
 } CrtNormals;
 CRT_ASSERT_SIZE(CrtNormals, 48);
 
-/* Four children: bounds[2·axis + 0/1][child] is the lower/upper plane. child = index << 4 | count: count > 0 is a leaf of the triangle
-   slots index … index + count − 1, count = 0 an inner node. An unused child has lower = +inf, upper = −inf, so no ray enters it. */
+/* Four children: bounds[2·axis + 0/1][child] is the lower/upper plane. child = index << 4 | count: count > 0
+   is a leaf of the triangle slots index … index + count − 1, count = 0 an inner node. An unused child has
+   lower = +inf, upper = −inf, so no ray enters it. */
 typedef struct CrtNode4 {
     f32 bounds[6][4];
     u32 child[4];
@@ -85,7 +88,8 @@ typedef struct CrtNode4 {
 } CrtNode4;
 CRT_ASSERT_SIZE(CrtNode4, 128);
 
-/* Bounding box of one object's triangles; they lie together in the triangle array when the accelerator is AABB. */
+/* Bounding box of one object's triangles; they lie together in the triangle array when the accelerator is
+ * AABB. */
 typedef struct CrtObject {
     f32 lower[3];
     u32 first;
@@ -101,7 +105,8 @@ CRT_ASSERT_SIZE(CrtObject, 32);
 
 #define CRT_MATERIAL_DISPERSIVE 1u
 
-/* Spectra by index. Diffuse and mirror: a = reflectance. Conductor: a = n, b = k. Dielectric: a = index inside / outside. */
+/* Spectra by index. Diffuse and mirror: a = reflectance. Conductor: a = n, b = k. Dielectric: a = index
+ * inside / outside. */
 typedef struct CrtMaterial {
     u32 type;
     u32 a, b;
@@ -125,8 +130,8 @@ typedef struct CrtEmitter {
 } CrtEmitter;
 CRT_ASSERT_SIZE(CrtEmitter, 32);
 
-/* A film point (px, py), in pixels from the top left, looks along corner + px·step_x + py·step_y (not normalised; its component along the view
-   axis is 1). */
+/* A film point (px, py), in pixels from the top left, looks along corner + px·step_x + py·step_y (not
+   normalised; its component along the view axis is 1). */
 typedef struct CrtCamera {
     f32 origin[3];
     f32 lens_radius;
@@ -147,8 +152,8 @@ CRT_ASSERT_SIZE(CrtCamera, 96);
 #define CRT_SAMPLER_INDEPENDENT 1u
 #define CRT_SAMPLER_XORSHIFT 2u
 
-/* Next event estimation: none; combined with scattered rays by MIS; or alone wherever light sampling covers an emitter from a point, to test it
-   (scattered rays then count what is left to chance). */
+/* Next event estimation: none; combined with scattered rays by MIS; or alone wherever light sampling covers
+   an emitter from a point, to test it (scattered rays then count what is left to chance). */
 #define CRT_NEE_NONE 0u
 #define CRT_NEE_MIS 1u
 #define CRT_NEE_ONLY 2u
@@ -161,9 +166,10 @@ CRT_ASSERT_SIZE(CrtCamera, 96);
 #define CRT_ACCELERATOR_BVH 1u
 #define CRT_ACCELERATOR_AABB 2u
 
-/* Replicates are scrambled independently of each other, so that the spread of their means is an unbiased measure of the image's error. They take turns
-   sample by sample, so that all are equally full whenever a render stops. The film holds the sum of Y of each but the last, which is what is left of
-   the sum of all (docs/decisions/0007-replicates.md). */
+/* Replicates are scrambled independently of each other, so that the spread of their means is an unbiased
+   measure of the image's error. They take turns sample by sample, so that all are equally full whenever a
+   render stops. The film holds the sum of Y of each but the last, which is what is left of the sum of all
+   (docs/decisions/0007-replicates.md). */
 #define CRT_REPLICATES_MAX 16u
 
 /* A seed, and two words that differ for any two seeds, hashed from it once (crt_seed in sampler.h). */
@@ -205,7 +211,7 @@ typedef struct CrtScene {
     CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
     CrtSpan faces;               /* CrtFace, by slot */
     CrtSpan triangles8;          /* CrtTriangle8, only for brute force */
-    CrtSpan occluders8;          /* CrtTriangle8: those of them that can come between two points of the scene */
+    CrtSpan occluders8; /* CrtTriangle8: those of them that can come between two points of the scene */
     CrtSpan primitives;          /* CrtPrimitive, by id */
     CrtSpan normals;             /* CrtNormals */
     CrtSpan nodes;               /* CrtNode4, root first; only for BVH */

@@ -1,7 +1,8 @@
 /*
- * light.h: sampling the emitters. One emissive triangle, or two that make a parallelogram, is one light, chosen by power. How a point on it is found is
- * decided by the shaded point and the emitter alone, in crt_light_view, which sampling and the pdf both ask: uniformly in solid angle where the
- * emitter is seen large, else uniformly on its area; where neither works, scattered rays alone find it.
+ * light.h: sampling the emitters. One emissive triangle, or two that make a parallelogram, is one light,
+ * chosen by power. How a point on it is found is decided by the shaded point and the emitter alone, in
+ * crt_light_view, which sampling and the pdf both ask: uniformly in solid angle where the emitter is seen
+ * large, else uniformly on its area; where neither works, scattered rays alone find it.
  */
 #ifndef CRT_LIGHT_H
 #define CRT_LIGHT_H
@@ -10,20 +11,21 @@
 
 CRT_KERNEL_BEGIN
 
-/* Area over squared distance above which a light is sampled by solid angle. Below, area sampling has nearly the same variance at a
-   fifth of the cost; above, its 1/r² and cosine make it noisy. */
+/* Area over squared distance above which a light is sampled by solid angle. Below, area sampling has nearly
+   the same variance at a fifth of the cost; above, its 1/r² and cosine make it noisy. */
 #define CRT_SOLID_ANGLE_THRESHOLD 0.3f
 
 /* A light seen as nearly a hemisphere is left to chance: scattered rays find it all but always. */
 #define CRT_SOLID_ANGLE_MAX 6.0f
 
-/* Least height over the emitter's plane, as a share of the distance to its farthest corner, at which directions uniform in solid angle are found in
-   single precision: nearer, corners lie on the horizon, some across from each other, and rounding turns the arcs between
-   them by more than 1e-3. */
+/* Least height over the emitter's plane, as a share of the distance to its farthest corner, at which
+   directions uniform in solid angle are found in single precision: nearer, corners lie on the horizon, some
+   across from each other, and rounding turns the arcs between them by more than 1e-3. */
 #define CRT_SOLID_ANGLE_HEIGHT 2.5e-4f
 
-/* Nearer to the plane than that, points are sampled by area where the largest weight of one, area · cosine / distance² at the emitter's nearest point,
-   is at most this. Elsewhere the emitter is within a few heights, and left to chance. */
+/* Nearer to the plane than that, points are sampled by area where the largest weight of one, area · cosine /
+   distance² at the emitter's nearest point, is at most this. Elsewhere the emitter is within a few heights,
+   and left to chance. */
 #define CRT_AREA_WEIGHT_MAX 32.0f
 
 typedef struct CrtLightSample {
@@ -37,8 +39,8 @@ typedef struct CrtLightSample {
     u32 spectrum;
 } CrtLightSample;
 
-/* Solid angle of the triangle of the unit vectors a, b, c, given their |a·(b×c)|: tan(Ω/2) = |a·(b×c)| / (1 + a·b + b·c + c·a) (Van Oosterom
-   and Strackee 1983); accurate for the smallest triangles. */
+/* Solid angle of the triangle of the unit vectors a, b, c, given their |a·(b×c)|: tan(Ω/2) = |a·(b×c)| / (1
+   + a·b + b·c + c·a) (Van Oosterom and Strackee 1983); accurate for the smallest triangles. */
 CRT_FN f32 crt_solid_angle(f32 triple, vec3 a, vec3 b, vec3 c) {
     return 2.0f * crt_atan2(triple, 1.0f + dot3(a, b) + dot3(b, c) + dot3(c, a));
 }
@@ -52,7 +54,8 @@ typedef struct CrtLightShape {
 } CrtLightShape;
 
 CRT_FN CrtLightShape crt_light_shape(const CrtContext *ctx, CRT_GLOBAL const CrtEmitter *emitter) {
-    CRT_GLOBAL const CrtTriangle *triangle = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + emitter->slot;
+    CRT_GLOBAL const CrtTriangle *triangle =
+        CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + emitter->slot;
     CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
     const u32 corner = emitter->corner;
     CrtLightShape s;
@@ -80,7 +83,8 @@ typedef struct CrtLightView {
     f32 height;          /* of the point over the emitter's plane, against its normal: above 0 behind it */
     vec3 o, a, b, far;   /* by solid angle: unit directions to the corners */
     f32 triple, triple_far;
-    f32 omega, omega_far; /* solid angles of the triangle at o and, for a parallelogram, of the one across the diagonal */
+    f32 omega, omega_far; /* solid angles of the triangle at o and, for a parallelogram, of the one across
+                             the diagonal */
 } CrtLightView;
 
 /* Squared distance of p from the nearest point of the segment o … o + edge. */
@@ -103,10 +107,12 @@ CRT_FN f32 crt_edge_distance2(CrtLightShape s, vec3 p) {
     if (u >= 0.0f && v >= 0.0f && beyond <= determinant) return 0.0f;
     const f32 at_o = crt_min(crt_segment_distance2(s.o, s.a, p), crt_segment_distance2(s.o, s.b, p));
     if (!s.parallelogram) return crt_min(at_o, crt_segment_distance2(s.o + s.a, s.b - s.a, p));
-    return crt_min(at_o, crt_min(crt_segment_distance2(s.o + s.a, s.b, p), crt_segment_distance2(s.o + s.b, s.a, p)));
+    return crt_min(
+        at_o, crt_min(crt_segment_distance2(s.o + s.a, s.b, p), crt_segment_distance2(s.o + s.b, s.a, p)));
 }
 
-/* By pointer: called twice, it is not inlined, and copies of the shape in wide words wait for its narrow stores. */
+/* By pointer: called twice, it is not inlined, and copies of the shape in wide words wait for its narrow
+ * stores. */
 CRT_FN CrtLightView crt_light_view(const CrtLightShape *shape, vec3 p) {
     CrtLightView v;
     v.technique = CRT_LIGHT_BY_AREA;
@@ -121,15 +127,18 @@ CRT_FN CrtLightView crt_light_view(const CrtLightShape *shape, vec3 p) {
     if (!(height * height > CRT_SOLID_ANGLE_HEIGHT * CRT_SOLID_ANGLE_HEIGHT * farthest2)) {
         const f32 distance2 = crt_edge_distance2(*shape, p);
         const f32 weight = shape->area * height;
-        if (!(weight <= CRT_AREA_WEIGHT_MAX * distance2 * crt_sqrt(distance2))) v.technique = CRT_LIGHT_BY_CHANCE;
+        if (!(weight <= CRT_AREA_WEIGHT_MAX * distance2 * crt_sqrt(distance2)))
+            v.technique = CRT_LIGHT_BY_CHANCE;
         return v;
     }
-    const f32 inverse_o = 1.0f / crt_sqrt(oo), inverse_a = 1.0f / crt_sqrt(aa), inverse_b = 1.0f / crt_sqrt(bb), inverse_f = 1.0f / crt_sqrt(ff);
+    const f32 inverse_o = 1.0f / crt_sqrt(oo), inverse_a = 1.0f / crt_sqrt(aa),
+              inverse_b = 1.0f / crt_sqrt(bb), inverse_f = 1.0f / crt_sqrt(ff);
     v.o = o * inverse_o;
     v.a = a * inverse_a;
     v.b = b * inverse_b;
     v.far = far * inverse_f;
-    /* Six times the volume of p and the triangle: from height and area, since a product of vectors near one plane would be rounding. */
+    /* Six times the volume of p and the triangle: from height and area, since a product of vectors near one
+     * plane would be rounding. */
     const f32 volume = height * shape->area * (shape->parallelogram ? 1.0f : 2.0f) * (inverse_a * inverse_b);
     v.triple = volume * inverse_o;
     v.omega = crt_solid_angle(v.triple, v.o, v.a, v.b);
@@ -137,11 +146,13 @@ CRT_FN CrtLightView crt_light_view(const CrtLightShape *shape, vec3 p) {
         v.triple_far = volume * inverse_f;
         v.omega_far = crt_solid_angle(v.triple_far, v.far, v.b, v.a);
     }
-    v.technique = v.omega + v.omega_far < CRT_SOLID_ANGLE_MAX ? CRT_LIGHT_BY_SOLID_ANGLE : CRT_LIGHT_BY_CHANCE;
+    v.technique =
+        v.omega + v.omega_far < CRT_SOLID_ANGLE_MAX ? CRT_LIGHT_BY_SOLID_ANGLE : CRT_LIGHT_BY_CHANCE;
     return v;
 }
 
-/* pdf per steradian of a direction that meets the emitter's plane with `cosine` at `distance`, given the emitter; 0 where it is left to chance. */
+/* pdf per steradian of a direction that meets the emitter's plane with `cosine` at `distance`, given the
+ * emitter; 0 where it is left to chance. */
 CRT_FN f32 crt_light_density(CrtLightView view, f32 area, f32 cosine, f32 distance) {
     if (view.technique == CRT_LIGHT_BY_CHANCE) return 0.0f;
     if (view.technique == CRT_LIGHT_BY_SOLID_ANGLE) {
@@ -155,12 +166,15 @@ CRT_FN f32 crt_light_density(CrtLightView view, f32 area, f32 cosine, f32 distan
 CRT_FN vec3 crt_perpendicular(vec3 v, vec3 n) { return normalize3(v - n * dot3(v, n)); }
 
 /*
- * A direction uniform in the solid angle `omega` of the spherical triangle a, b, c, whose |a·(b×c)| is `triple` (after Arvo 1995). The side from a to
- * c is cut at x so that a, b, x has the wanted part w of the area; then a point on the arc from b to x is chosen. With Todhunter's
- * tan(w/2) = tan(ab/2) tan(ax/2) sin α / (1 + tan(ab/2) tan(ax/2) cos α) (1886, § 103) the cut is at tan(ax/2) = sin(w/2) / (tan(ab/2) sin(α − w/2)).
+ * A direction uniform in the solid angle `omega` of the spherical triangle a, b, c, whose |a·(b×c)| is
+ * `triple` (after Arvo 1995). The side from a to c is cut at x so that a, b, x has the wanted part w of the
+ * area; then a point on the arc from b to x is chosen. With Todhunter's tan(w/2) = tan(ab/2) tan(ax/2) sin α
+ * / (1 + tan(ab/2) tan(ax/2) cos α) (1886, § 103) the cut is at tan(ax/2) = sin(w/2) / (tan(ab/2) sin(α −
+ * w/2)).
  */
 CRT_FN vec3 crt_sample_spherical_triangle(vec3 a, vec3 b, vec3 c, f32 triple, f32 omega, CrtRandom2 u) {
-    /* The longest side, which may be nearly half a circle, is the one that is cut: arcs from the corner across from it are shorter. */
+    /* The longest side, which may be nearly half a circle, is the one that is cut: arcs from the corner
+     * across from it are shorter. */
     const f32 ab = dot3(a, b), bc = dot3(b, c), ca = dot3(c, a);
     vec3 p = a, q = b, r = c;
     f32 pq = ab, qr = bc, rp = ca;
@@ -216,7 +230,8 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
     s.cosine = s.distance = 0.0f;
     const int two_sided = (emitter->flags & CRT_EMITTER_TWO_SIDED) != 0u;
     /* Nothing to sample where the emitter's dark side is seen, or its plane. */
-    if (view.technique == CRT_LIGHT_BY_CHANCE || !(view.height < 0.0f || (two_sided && view.height > 0.0f))) return s;
+    if (view.technique == CRT_LIGHT_BY_CHANCE || !(view.height < 0.0f || (two_sided && view.height > 0.0f)))
+        return s;
     CrtRandom2 u = crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT);
     f32 cosine, distance;
     if (view.technique == CRT_LIGHT_BY_SOLID_ANGLE) {
@@ -226,7 +241,8 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
             s.wi = crt_sample_spherical_triangle(view.o, view.a, view.b, view.triple, view.omega, u);
         } else {
             u.x = (u.x - split) / (1.0f - split);
-            s.wi = crt_sample_spherical_triangle(view.far, view.b, view.a, view.triple_far, view.omega_far, u);
+            s.wi =
+                crt_sample_spherical_triangle(view.far, view.b, view.a, view.triple_far, view.omega_far, u);
         }
         cosine = dot3(shape.normal, s.wi);
         distance = view.height / cosine;
@@ -260,7 +276,8 @@ typedef struct CrtLightSeen {
 } CrtLightSeen;
 
 CRT_FN CrtLightSeen crt_light_seen(const CrtContext *ctx, u32 emitter_index, vec3 p, f32 distance) {
-    CRT_GLOBAL const CrtEmitter *emitter = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + emitter_index;
+    CRT_GLOBAL const CrtEmitter *emitter =
+        CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + emitter_index;
     const CrtLightShape shape = crt_light_shape(ctx, emitter);
     const CrtLightView view = crt_light_view(&shape, p);
     CrtLightSeen seen;
@@ -269,7 +286,8 @@ CRT_FN CrtLightSeen crt_light_seen(const CrtContext *ctx, u32 emitter_index, vec
     return seen;
 }
 
-/* Veach's power heuristic for one sample of each of two techniques, by the ratio of the other's probability to one's own. */
+/* Veach's power heuristic for one sample of each of two techniques, by the ratio of the other's probability
+ * to one's own. */
 CRT_FN f32 crt_power_heuristic(f32 ratio) { return 1.0f / (1.0f + ratio * ratio); }
 
 CRT_KERNEL_END

@@ -1,7 +1,7 @@
 /*
- * math.h: the elementary functions, frames and safe helpers of the kernel, built from IEEE operations alone so that every
- * backend computes the same bits. Errors are given in units in the last place (ulp) of the result and checked against long double in
- * tests/unit_kernel_math.cpp.
+ * math.h: the elementary functions, frames and safe helpers of the kernel, built from IEEE operations alone
+ * so that every backend computes the same bits. Errors are given in units in the last place (ulp) of the
+ * result and checked against long double in tests/unit_kernel_math.cpp.
  */
 #ifndef CRT_MATH_H
 #define CRT_MATH_H
@@ -21,14 +21,17 @@ CRT_FN f32 crt_min(f32 a, f32 b) { return a < b ? a : b; }
 CRT_FN f32 crt_max(f32 a, f32 b) { return a > b ? a : b; }
 CRT_FN f32 crt_clamp(f32 x, f32 lo, f32 hi) { return x < lo ? lo : (x > hi ? hi : x); }
 
-/* Fused where it matters for speed: contraction is switched off everywhere, so that no compiler chooses for itself, and this is the choice. */
+/* Fused where it matters for speed: contraction is switched off everywhere, so that no compiler chooses for
+ * itself, and this is the choice. */
 CRT_FN f32 dot3(vec3 a, vec3 b) { return crt_fma(V3X(a), V3X(b), crt_fma(V3Y(a), V3Y(b), V3Z(a) * V3Z(b))); }
 
 /* v·s + a, rounded once. */
-CRT_FN vec3 crt_fma3(vec3 v, f32 s, vec3 a) { return make_vec3(crt_fma(V3X(v), s, V3X(a)), crt_fma(V3Y(v), s, V3Y(a)), crt_fma(V3Z(v), s, V3Z(a))); }
+CRT_FN vec3 crt_fma3(vec3 v, f32 s, vec3 a) {
+    return make_vec3(crt_fma(V3X(v), s, V3X(a)), crt_fma(V3Y(v), s, V3Y(a)), crt_fma(V3Z(v), s, V3Z(a)));
+}
 
-/* a·b − c·d with an error of at most 1.5 ulp, by Kahan: exact sign, so an edge shared by two triangles is seen alike from both, whatever the compiler
-   contracts (Jeannerod, Louvet, Muller 2013). */
+/* a·b − c·d with an error of at most 1.5 ulp, by Kahan: exact sign, so an edge shared by two triangles is
+   seen alike from both, whatever the compiler contracts (Jeannerod, Louvet, Muller 2013). */
 CRT_FN f32 crt_difference_of_products(f32 a, f32 b, f32 c, f32 d) {
     const f32 cd = c * d;
     const f32 error = crt_fma(-c, d, cd);
@@ -50,7 +53,8 @@ CRT_FN vec3 abs3(vec3 v) { return make_vec3(crt_abs(V3X(v)), crt_abs(V3Y(v)), cr
 CRT_FN f32 sum4(vec4 v) { return (V4X(v) + V4Y(v)) + (V4Z(v) + V4W(v)); }
 CRT_FN f32 max4(vec4 v) { return crt_max(crt_max(V4X(v), V4Y(v)), crt_max(V4Z(v), V4W(v))); }
 
-/* An orthonormal basis around a unit normal (Duff et al. 2017, "Building an Orthonormal Basis, Revisited"). */
+/* An orthonormal basis around a unit normal (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+ */
 typedef struct CrtFrame {
     vec3 s, t, n;
 } CrtFrame;
@@ -66,16 +70,22 @@ CRT_FN CrtFrame crt_frame(vec3 n) {
     return f;
 }
 
-CRT_FN vec3 crt_to_world(CrtFrame f, vec3 v) { return crt_fma3(f.s, V3X(v), crt_fma3(f.t, V3Y(v), f.n * V3Z(v))); }
+CRT_FN vec3 crt_to_world(CrtFrame f, vec3 v) {
+    return crt_fma3(f.s, V3X(v), crt_fma3(f.t, V3Y(v), f.n * V3Z(v)));
+}
 
-/* sin(x) and cos(x) for |x| ≤ π/4, minimax polynomials (Cephes sinf, cosf): error at most 0.74 and 0.88 ulp, over all floats. */
+/* sin(x) and cos(x) for |x| ≤ π/4, minimax polynomials (Cephes sinf, cosf): error at most 0.74 and 0.88 ulp,
+ * over all floats. */
 CRT_FN f32 crt_sin_quarter(f32 x) {
     const f32 z = x * x;
     return crt_fma(crt_fma(crt_fma(-1.9515295891e-4f, z, 8.3321608736e-3f), z, -1.6666654611e-1f) * z, x, x);
 }
 CRT_FN f32 crt_cos_quarter(f32 x) {
     const f32 z = x * x;
-    return crt_fma(crt_fma(crt_fma(crt_fma(2.443315711809948e-5f, z, -1.388731625493765e-3f), z, 4.166664568298827e-2f), z, -0.5f), z, 1.0f);
+    return crt_fma(
+        crt_fma(crt_fma(crt_fma(2.443315711809948e-5f, z, -1.388731625493765e-3f), z, 4.166664568298827e-2f),
+                z, -0.5f),
+        z, 1.0f);
 }
 
 /* sin and cos of any |x| < 64: reduction by multiples of π/2 in three parts (Cody and Waite), absolute error
@@ -103,7 +113,8 @@ CRT_FN f32 crt_atan_unit(f32 x) {
         y = (x - 1.0f) / (x + 1.0f);
     }
     const f32 z = y * y;
-    const f32 p = crt_fma(crt_fma(crt_fma(8.05374449538e-2f, z, -1.38776856032e-1f), z, 1.99777106478e-1f), z, -3.33329491539e-1f);
+    const f32 p = crt_fma(crt_fma(crt_fma(8.05374449538e-2f, z, -1.38776856032e-1f), z, 1.99777106478e-1f),
+                          z, -3.33329491539e-1f);
     return offset + crt_fma(p * z, y, y);
 }
 

@@ -1,8 +1,8 @@
 /*
  * path.h: one sample of one pixel. The value of sample s of pixel p depends on (scene, seed, p, s) alone.
  *
- * A path is advanced vertex by vertex, so that a backend may schedule vertices as it likes; crt_render_pixel is the plain schedule: one loop over
- * the vertices of one sample after another.
+ * A path is advanced vertex by vertex, so that a backend may schedule vertices as it likes; crt_render_pixel
+ * is the plain schedule: one loop over the vertices of one sample after another.
  */
 #ifndef CRT_PATH_H
 #define CRT_PATH_H
@@ -32,7 +32,8 @@ typedef struct CrtPath {
     vec4 radiance;
     f32 scatter_pdf;  /* of the direction that led here; 0: camera or delta, no light sampling competes */
     vec3 p;           /* where it was scattered: a clearance off the ray's origin */
-    f32 eta_square;   /* product of squared relative indices crossed: roulette must not see the n² of being inside glass */
+    f32 eta_square;   /* product of squared relative indices crossed: roulette must not see the n² of being
+                         inside glass */
     u32 depth;        /* scattering events so far */
     int alone;        /* only the hero wavelength is alive */
     CrtFirstHit first;
@@ -43,13 +44,15 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     const u32 pixel_x = scene->crop_x + x;
     const u32 pixel_y = scene->crop_y + y;
-    path->sampler = crt_sampler_begin(scene->sampler, scene->replicate_shift, scene->seed, pixel_y * scene->film_width + pixel_x, sample);
+    path->sampler = crt_sampler_begin(scene->sampler, scene->replicate_shift, scene->seed,
+                                      pixel_y * scene->film_width + pixel_x, sample);
     path->ray = crt_camera_ray(ctx, &path->sampler, pixel_x, pixel_y);
     path->wavelengths = crt_sample_wavelengths(ctx, crt_sample_1d(&path->sampler, CRT_DIM_WAVELENGTH));
     path->hero = make_vec4(1.0f, 0.0f, 0.0f, 0.0f);
     if (CRT_HAS(DISPERSION) && (scene->features & (u32)CRT_FEATURE_DISPERSION) != 0u) {
         const u32 lane = crt_sample_bits(&path->sampler, CRT_DIM_HERO) >> 30;
-        path->hero = make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f, lane == 3u ? 1.0f : 0.0f);
+        path->hero = make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f,
+                               lane == 3u ? 1.0f : 0.0f);
     }
     path->throughput = splat4(1.0f);
     path->radiance = splat4(0.0f);
@@ -66,7 +69,8 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
 
 /* Emission met by the ray, weighted against the chance that light sampling had found it. */
 CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, CrtSurface surface, f32 t) {
-    CRT_GLOBAL const CrtEmitter *emitter = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + surface.emitter;
+    CRT_GLOBAL const CrtEmitter *emitter =
+        CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + surface.emitter;
     const int front = dot3(surface.ng, path->ray.d) < 0.0f;
     if (!front && (emitter->flags & CRT_EMITTER_TWO_SIDED) == 0u) return;
     f32 weight = 1.0f;
@@ -74,23 +78,27 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, CrtSurface su
         const f32 distance = length3(crt_fma3(path->ray.d, t, path->ray.o) - path->p);
         const CrtLightSeen light = crt_light_seen(ctx, surface.emitter, path->p, distance);
         if (light.pdf > 0.0f) {
-            /* The ray starts a clearance off p, from which lights are sampled. Close to a light that is another direction: both techniques estimate
-               what arrives at p, and are weighed by the area of the light per probability. */
+            /* The ray starts a clearance off p, from which lights are sampled. Close to a light that is
+               another direction: both techniques estimate what arrives at p, and are weighed by the area of
+               the light per probability. */
             const f32 nearer = t / distance;
             const f32 area = light.cosine / crt_abs(dot3(surface.ng, path->ray.d)) * nearer * nearer;
             const f32 ratio = light.pdf / path->scatter_pdf * area;
             if (ctx->scene->nee == CRT_NEE_ONLY || !(ratio < 1e15f)) return;
             const f32 clearance = length3(path->ray.o - path->p);
-            const f32 cosines = crt_fma(CRT_INV_PI / path->scatter_pdf, clearance, t) / distance; /* at p over that at the ray's origin */
+            const f32 cosines = crt_fma(CRT_INV_PI / path->scatter_pdf, clearance, t) /
+                                distance; /* at p over that at the ray's origin */
             weight = area * cosines * crt_power_heuristic(ratio);
         }
     }
-    path->radiance = path->radiance + path->throughput * crt_spectrum(ctx, emitter->spectrum, path->wavelengths.position) * weight;
+    path->radiance = path->radiance + path->throughput *
+                                          crt_spectrum(ctx, emitter->spectrum, path->wavelengths.position) *
+                                          weight;
 }
 
 /* Next event estimation at a Lambertian vertex; ns and ng are on the side of w_o. */
-CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurface surface, vec3 ns, vec3 ng, vec4 reflectance, u32 dimension,
-                                 CrtRayCount *rays) {
+CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurface surface, vec3 ns, vec3 ng,
+                                 vec4 reflectance, u32 dimension, CrtRayCount *rays) {
     const CrtLightSample light = crt_sample_light(ctx, &path->sampler, dimension, surface.p);
     const f32 cosine = dot3(light.wi, ns);
     if (!(light.pdf > 0.0f) || !(cosine > 0.0f) || !(dot3(light.wi, ng) > 0.0f)) return;
@@ -103,17 +111,21 @@ CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurfac
         rays->shadow += 1u;
         if (crt_trace_any(ctx, shadow)) return;
     }
-    const f32 scatter = crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction at p */
+    const f32 scatter =
+        crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction at p */
     f32 weight = scatter / light.pdf;
     if (ctx->scene->nee == CRT_NEE_MIS) {
-        /* By probabilities per area of the light (crt_add_emission): of the scattered ray lambert(cos)·|n·d|/|d|³, of light sampling pdf·cos/distance². */
+        /* By probabilities per area of the light (crt_add_emission): of the scattered ray
+         * lambert(cos)·|n·d|/|d|³, of light sampling pdf·cos/distance². */
         const f32 squared = dot3(shadow.d, shadow.d);
-        const f32 ratio = crt_lambert(crt_max(dot3(shadow.d, ns), 0.0f)) * crt_abs(dot3(light.normal, shadow.d)) * light.distance * light.distance /
+        const f32 ratio = crt_lambert(crt_max(dot3(shadow.d, ns), 0.0f)) *
+                          crt_abs(dot3(light.normal, shadow.d)) * light.distance * light.distance /
                           (light.pdf * light.cosine * squared * squared);
         weight = weight * crt_power_heuristic(ratio);
     }
-    path->radiance =
-        path->radiance + path->throughput * reflectance * crt_spectrum(ctx, light.spectrum, path->wavelengths.position) * weight;
+    path->radiance = path->radiance + path->throughput * reflectance *
+                                          crt_spectrum(ctx, light.spectrum, path->wavelengths.position) *
+                                          weight;
 }
 
 /* Traces the path's ray to its next vertex and scatters there. Returns 0 when the path has ended. */
@@ -123,7 +135,8 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
     const CrtHit hit = crt_trace_closest(ctx, path->ray);
     if (hit.slot == CRT_NONE) {
         if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE)
-            path->radiance = path->radiance + path->throughput * crt_spectrum(ctx, scene->environment, path->wavelengths.position);
+            path->radiance = path->radiance + path->throughput * crt_spectrum(ctx, scene->environment,
+                                                                              path->wavelengths.position);
         return 0;
     }
     const CrtSurface surface = crt_surface(ctx, hit);
@@ -131,7 +144,8 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
 
     const CrtMaterial material = CRT_ARRAY(CrtMaterial, ctx->blob, scene->materials)[surface.material];
     const vec3 wo = -path->ray.d;
-    /* Normals on the viewer's side; a shading normal that turns away from the viewer would reflect light from behind the surface. */
+    /* Normals on the viewer's side; a shading normal that turns away from the viewer would reflect light
+     * from behind the surface. */
     const int outside = dot3(wo, surface.ng) > 0.0f;
     const vec3 ng = outside ? surface.ng : -surface.ng;
     vec3 ns = outside ? surface.ns : -surface.ns;
@@ -145,8 +159,9 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
         if (material.type == CRT_MATERIAL_DIFFUSE || material.type == CRT_MATERIAL_MIRROR)
             path->first.albedo = crt_spectrum(ctx, material.a, path->wavelengths.position);
         if (material.type == CRT_MATERIAL_CONDUCTOR)
-            path->first.albedo = crt_fresnel_conductor(1.0f, crt_spectrum(ctx, material.a, path->wavelengths.position),
-                                                       crt_spectrum(ctx, material.b, path->wavelengths.position));
+            path->first.albedo =
+                crt_fresnel_conductor(1.0f, crt_spectrum(ctx, material.a, path->wavelengths.position),
+                                      crt_spectrum(ctx, material.b, path->wavelengths.position));
     }
     if (path->depth >= scene->max_depth) return 0;
 
@@ -159,7 +174,8 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
             if (CRT_HAS(DIFFUSE)) {
                 if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->emitters.count != 0u)
                     crt_add_direct_light(ctx, path, surface, ns, ng, a, dimension, rays);
-                scatter = crt_sample_diffuse(a, ns, ng, crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF));
+                scatter =
+                    crt_sample_diffuse(a, ns, ng, crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF));
             }
             break;
         case CRT_MATERIAL_MIRROR:
@@ -168,13 +184,16 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
         case CRT_MATERIAL_CONDUCTOR:
             if (CRT_HAS(CONDUCTOR))
                 scatter = crt_sample_mirror(
-                    crt_fresnel_conductor(crt_min(dot3(wo, ns), 1.0f), a, crt_spectrum(ctx, material.b, path->wavelengths.position)), wo, ns, ng);
+                    crt_fresnel_conductor(crt_min(dot3(wo, ns), 1.0f), a,
+                                          crt_spectrum(ctx, material.b, path->wavelengths.position)),
+                    wo, ns, ng);
             break;
         default:
             if (CRT_HAS(DIELECTRIC))
-                scatter = crt_sample_dielectric(outside ? a : splat4(1.0f) / a, wo, ns, ng, path->hero,
-                                                (material.flags & CRT_MATERIAL_DISPERSIVE) != 0u, path->alone,
-                                                crt_sample_1d(&path->sampler, dimension + CRT_DIM_BSDF));
+                scatter =
+                    crt_sample_dielectric(outside ? a : splat4(1.0f) / a, wo, ns, ng, path->hero,
+                                          (material.flags & CRT_MATERIAL_DISPERSIVE) != 0u, path->alone,
+                                          crt_sample_1d(&path->sampler, dimension + CRT_DIM_BSDF));
             break;
     }
     if (!scatter.valid) return 0;
@@ -205,7 +224,8 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
 
 /* XYZ of linear sRGB (IEC 61966-2-1), for views that are colours and not light. */
 CRT_FN vec4 crt_srgb_to_xyz(f32 r, f32 g, f32 b) {
-    return make_vec4(0.41239080f * r + 0.35758434f * g + 0.18048079f * b, 0.21263901f * r + 0.71516868f * g + 0.07219232f * b,
+    return make_vec4(0.41239080f * r + 0.35758434f * g + 0.18048079f * b,
+                     0.21263901f * r + 0.71516868f * g + 0.07219232f * b,
                      0.01933082f * r + 0.11919478f * g + 0.95053215f * b, 0.0f);
 }
 
@@ -237,7 +257,8 @@ CRT_FN vec4 crt_view(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
     if (which == CRT_NONE) return splat4(0.0f);
     /* A colour an object, in one of three shades by the axis of the face that the ray meets. */
     const u32 h = crt_hash(which + 1u);
-    const vec3 c = abs3((path->ray.o + path->ray.d * nearest) - (crt_load3(objects[which].lower) + crt_load3(objects[which].upper)) * 0.5f);
+    const vec3 c = abs3((path->ray.o + path->ray.d * nearest) -
+                        (crt_load3(objects[which].lower) + crt_load3(objects[which].upper)) * 0.5f);
     const vec3 extent = (crt_load3(objects[which].upper) - crt_load3(objects[which].lower)) * 0.5f;
     const f32 fx = V3X(extent) - V3X(c), fy = V3Y(extent) - V3Y(c), fz = V3Z(extent) - V3Z(c);
     const f32 shade = fx < fy ? (fx < fz ? 0.6f : 0.8f) : (fy < fz ? 1.0f : 0.8f);
@@ -286,7 +307,8 @@ CRT_FN void crt_add_aovs(const CrtContext *ctx, const CrtPath *path, CRT_GLOBAL 
     CRT_CHANNEL_LIST(CRT_ADD_CHANNEL)
 }
 
-/* A pixel of the crop window, some of whose samples are being taken: their sums go to its place in the film. */
+/* A pixel of the crop window, some of whose samples are being taken: their sums go to its place in the film.
+ */
 typedef struct CrtPixelWork {
     u32 x, y;
     u64 first_sample;
@@ -300,8 +322,9 @@ typedef struct CrtPixelWork {
 } CrtPixelWork;
 
 /* `sums`, `counts` and `primitives` as in CrtFilmView, for the whole film; `primitives` may be null. */
-CRT_FN CrtPixelWork crt_pixel_begin(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count, CRT_GLOBAL f64 *sums,
-                                    CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives) {
+CRT_FN CrtPixelWork crt_pixel_begin(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count,
+                                    CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts,
+                                    CRT_GLOBAL u32 *primitives) {
     const u64 pixel = (u64)y * ctx->scene->width + x;
     CrtPixelWork work;
     work.x = x;
@@ -326,21 +349,25 @@ CRT_FN void crt_add_sample(const CrtContext *ctx, CrtPixelWork *work, vec4 xyz) 
         crt_film_add(pairs + 0, (f64)V4X(xyz));
         crt_film_add(pairs + 2, luminance);
         crt_film_add(pairs + 4, (f64)V4Z(xyz));
-        if (scene->square_channel != 0u) crt_film_add(pairs + 2u * scene->square_channel, luminance * luminance);
+        if (scene->square_channel != 0u)
+            crt_film_add(pairs + 2u * scene->square_channel, luminance * luminance);
         if (CRT_HAS(REPLICATES) && scene->replicate_shift != 0u) {
             const u32 replicate = crt_replicate(work->first_sample + work->done, scene->replicate_shift);
-            if (replicate + 1u < 1u << scene->replicate_shift) crt_film_add(pairs + 2u * (scene->replicate_channel + replicate), luminance);
+            if (replicate + 1u < 1u << scene->replicate_shift)
+                crt_film_add(pairs + 2u * (scene->replicate_channel + replicate), luminance);
         }
         if (CRT_HAS(AOV)) {
             if (scene->channels > CRT_CHANNELS_BASE) crt_add_aovs(ctx, &work->path, pairs);
-            if (work->primitive != 0 && work->valid == 0u && *work->count == 0u) *work->primitive = work->path.first.primitive;
+            if (work->primitive != 0 && work->valid == 0u && *work->count == 0u)
+                *work->primitive = work->path.first.primitive;
         }
         work->valid += 1u;
     }
     work->done += 1u;
 }
 
-/* Takes the pixel one vertex further, into its next sample where a path has ended. Returns 0 when the last sample is done. */
+/* Takes the pixel one vertex further, into its next sample where a path has ended. Returns 0 when the last
+ * sample is done. */
 CRT_FN int crt_pixel_vertex(const CrtContext *ctx, CrtPixelWork *work, CrtRayCount *rays) {
     if (work->done >= work->sample_count) return 0;
     if (!work->alive) crt_path_begin(ctx, &work->path, work->x, work->y, work->first_sample + work->done);
@@ -358,10 +385,12 @@ CRT_FN int crt_pixel_vertex(const CrtContext *ctx, CrtPixelWork *work, CrtRayCou
 
 CRT_FN void crt_pixel_end(CrtPixelWork *work) { *work->count += work->valid; }
 
-/* ADDS samples [first_sample, first_sample + sample_count) of pixel (x, y) of the crop window to the film, and rays to *rays. One flat loop over the
-   vertices of all samples, so that on a GPU a lane whose path has ended begins its next sample while others go on bouncing. */
-CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count, CRT_GLOBAL f64 *sums,
-                             CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives, CrtRayCount *rays) {
+/* ADDS samples [first_sample, first_sample + sample_count) of pixel (x, y) of the crop window to the film,
+   and rays to *rays. One flat loop over the vertices of all samples, so that on a GPU a lane whose path has
+   ended begins its next sample while others go on bouncing. */
+CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count,
+                             CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives,
+                             CrtRayCount *rays) {
     CrtPixelWork work = crt_pixel_begin(ctx, x, y, first_sample, sample_count, sums, counts, primitives);
     while (crt_pixel_vertex(ctx, &work, rays)) continue;
     crt_pixel_end(&work);

@@ -1,6 +1,7 @@
 /*
- * sampler.h: the random numbers of sample s of pixel p. Counter-based: a number is a function of (seed, pixel, sample, dimension) alone, on every
- * backend, in any order, without end: dimensions never wrap. One dimension is one call, of one or two numbers.
+ * sampler.h: the random numbers of sample s of pixel p. Counter-based: a number is a function of (seed,
+ * pixel, sample, dimension) alone, on every backend, in any order, without end: dimensions never wrap. One
+ * dimension is one call, of one or two numbers.
  */
 #ifndef CRT_SAMPLER_H
 #define CRT_SAMPLER_H
@@ -57,8 +58,9 @@ CRT_FN CrtSeed crt_seed(u32 low, u32 high) {
     return s;
 }
 
-/* Key of a sequence of a pixel. The seed's two words enter one before and one after a hash: with one word, hash(pixel ^ word), seeds whose words
-   differ in their low bits alone would give the same keys to other pixels. */
+/* Key of a sequence of a pixel. The seed's two words enter one before and one after a hash: with one word,
+   hash(pixel ^ word), seeds whose words differ in their low bits alone would give the same keys to other
+   pixels. */
 CRT_FN u32 crt_pixel_key(CrtSeed seed, u32 pixel, u32 sequence) {
     return crt_hash(crt_hash(pixel ^ seed.first) + seed.second + sequence * 0x9e3779b9u);
 }
@@ -66,8 +68,8 @@ CRT_FN u32 crt_pixel_key(CrtSeed seed, u32 pixel, u32 sequence) {
 /* The middle of one of 2^23 cells of (0, 1): exact, and never 0 or 1, where warps degenerate. */
 CRT_FN f32 crt_unit(u32 bits) { return (f32)(bits >> 9) * (2.0f * CRT_EPSILON) + CRT_EPSILON; }
 
-/* Owen scrambling of a bit-reversed number: each bit is flipped by a hash of the bits below it (Laine and Karras 2011, constants by Vegdahl
-   2021, "Building a Better LK Hash"). */
+/* Owen scrambling of a bit-reversed number: each bit is flipped by a hash of the bits below it (Laine and
+   Karras 2011, constants by Vegdahl 2021, "Building a Better LK Hash"). */
 CRT_FN u32 crt_owen_reversed(u32 x, u32 seed) {
     x ^= x * 0x3d20adeau;
     x += seed;
@@ -77,7 +79,8 @@ CRT_FN u32 crt_owen_reversed(u32 x, u32 seed) {
     return x;
 }
 
-/* Second Sobol dimension of an index, bit-reversed: the Pascal matrix modulo 2, applied in five steps (Ahmed 2024). */
+/* Second Sobol dimension of an index, bit-reversed: the Pascal matrix modulo 2, applied in five steps (Ahmed
+ * 2024). */
 CRT_FN u32 crt_sobol1_reversed(u32 index) {
     index ^= (index >> 1) & 0x55555555u;
     index ^= (index >> 2) & 0x33333333u;
@@ -118,9 +121,10 @@ CRT_FN u32 crt_replicate(u64 sample, u32 shift) { return (u32)sample & ((1u << s
 CRT_FN u64 crt_index_in_replicate(u64 sample, u32 shift) { return sample >> shift; }
 
 /*
- * Numbers of sample `sample` of the pixel with index `pixel` in the whole film. With 2^replicate_shift replicates, Sobol samples take turns between
- * sequences that are each scrambled on their own (Owen 1997, "Monte Carlo variance of scrambled net quadrature", section 3). The other samplers'
- * samples are independent as it is.
+ * Numbers of sample `sample` of the pixel with index `pixel` in the whole film. With 2^replicate_shift
+ * replicates, Sobol samples take turns between sequences that are each scrambled on their own (Owen 1997,
+ * "Monte Carlo variance of scrambled net quadrature", section 3). The other samplers' samples are
+ * independent as it is.
  */
 CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, CrtSeed seed, u32 pixel, u64 sample) {
     CrtSampler s;
@@ -143,7 +147,8 @@ CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, CrtSeed seed,
         s.index = crt_reverse_bits((u32)index);
     }
     if (CRT_HAS(XORSHIFT) && kind == CRT_SAMPLER_XORSHIFT) {
-        /* Marsaglia's xorshift32 has one bad state, 0, and neighbouring seeds give neighbouring streams: seed it with a hash. */
+        /* Marsaglia's xorshift32 has one bad state, 0, and neighbouring seeds give neighbouring streams:
+         * seed it with a hash. */
         const u32 key = crt_pixel_key(seed, pixel, high);
         /* Not + crt_hash(key), which would be the same for key and key ^ low. */
         const u32 h = crt_hash(crt_hash(low ^ key) + crt_hash(key + 0x85ebca6bu));
@@ -170,7 +175,8 @@ CRT_FN u32 crt_sample_bits(CrtSampler *s, u32 dimension) {
     }
     if (CRT_HAS(INDEPENDENT) && s->kind == CRT_SAMPLER_INDEPENDENT) {
         if (s->block != (dimension >> 1)) {
-            const CrtPhilox r = crt_philox(s->pixel_key, s->index, s->index_high, dimension >> 1, s->seed_low, s->seed_high);
+            const CrtPhilox r =
+                crt_philox(s->pixel_key, s->index, s->index_high, dimension >> 1, s->seed_low, s->seed_high);
             s->block = dimension >> 1;
             s->b0 = r.x0;
             s->b1 = r.x1;
@@ -185,8 +191,8 @@ CRT_FN u32 crt_sample_bits(CrtSampler *s, u32 dimension) {
 
 CRT_FN f32 crt_sample_1d(CrtSampler *s, u32 dimension) { return crt_unit(crt_sample_bits(s, dimension)); }
 
-/* Two numbers, stratified together: padded pairs of the first two Sobol dimensions, index shuffled and values scrambled per (pixel,
-   dimension) (Burley 2020, "Practical Hash-based Owen Scrambling"). */
+/* Two numbers, stratified together: padded pairs of the first two Sobol dimensions, index shuffled and
+   values scrambled per (pixel, dimension) (Burley 2020, "Practical Hash-based Owen Scrambling"). */
 CRT_HOT_FN CrtRandom2 crt_sample_2d(CrtSampler *s, u32 dimension) {
     CrtRandom2 u;
     u.x = 0.0f;
@@ -195,7 +201,8 @@ CRT_HOT_FN CrtRandom2 crt_sample_2d(CrtSampler *s, u32 dimension) {
         const u32 h = crt_hash(s->pixel_key + dimension * 0x9e3779b9u);
         const u32 shuffled = crt_reverse_bits(crt_owen_reversed(s->index, h));
         u.x = crt_unit(crt_reverse_bits(crt_owen_reversed(shuffled, h * 0x2c1b3c6du + 0x297a2d39u)));
-        u.y = crt_unit(crt_reverse_bits(crt_owen_reversed(crt_sobol1_reversed(shuffled), h * 0x93d765ddu + 0x6e624eb7u)));
+        u.y = crt_unit(crt_reverse_bits(
+            crt_owen_reversed(crt_sobol1_reversed(shuffled), h * 0x93d765ddu + 0x6e624eb7u)));
         return u;
     }
     if (CRT_HAS(INDEPENDENT) && s->kind == CRT_SAMPLER_INDEPENDENT) {

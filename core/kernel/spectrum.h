@@ -1,5 +1,6 @@
 /*
- * spectrum.h: four wavelengths per path (hero wavelength sampling, Wilkie et al. 2014), spectra at them, and what the observer sees.
+ * spectrum.h: four wavelengths per path (hero wavelength sampling, Wilkie et al. 2014), spectra at them, and
+ * what the observer sees.
  */
 #ifndef CRT_SPECTRUM_H
 #define CRT_SPECTRUM_H
@@ -8,7 +9,8 @@
 
 CRT_KERNEL_BEGIN
 
-/* The scene as a kernel sees it: the blob and its header. A backend may carry its own handle along (CRT_CONTEXT_EXTRA). */
+/* The scene as a kernel sees it: the blob and its header. A backend may carry its own handle along
+ * (CRT_CONTEXT_EXTRA). */
 #ifndef CRT_CONTEXT_EXTRA
 #define CRT_CONTEXT_EXTRA
 #endif
@@ -23,8 +25,8 @@ typedef struct CrtWavelengths {
     vec4 weight;   /* 1 / (4 pdf(λ)), nm; zero for wavelengths that have been given up */
 } CrtWavelengths;
 
-/* Wavelength and 1/pdf at u ∈ [0,1): the tabulated inverse distribution, linear between nodes, so the density is constant in each cell and exactly
-   1/(N·Δλ). */
+/* Wavelength and 1/pdf at u ∈ [0,1): the tabulated inverse distribution, linear between nodes, so the
+   density is constant in each cell and exactly 1/(N·Δλ). */
 CRT_FN f32 crt_wavelength(const CrtContext *ctx, f32 u, f32 *inverse_pdf) {
     CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, ctx->scene->wavelengths);
     const f32 x = u * (f32)CRT_WAVELENGTH_TABLE;
@@ -56,9 +58,10 @@ CRT_FN f32 crt_lookup(CRT_GLOBAL const f32 *table, f32 position) {
 
 /* A spectrum of the scene at the path's wavelengths, linear between nanometres. */
 CRT_FN vec4 crt_spectrum(const CrtContext *ctx, u32 index, vec4 position) {
-    CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) + index * CRT_SPECTRUM_STRIDE;
-    return make_vec4(crt_lookup(table, V4X(position)), crt_lookup(table, V4Y(position)), crt_lookup(table, V4Z(position)),
-                     crt_lookup(table, V4W(position)));
+    CRT_GLOBAL const f32 *table =
+        CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) + index * CRT_SPECTRUM_STRIDE;
+    return make_vec4(crt_lookup(table, V4X(position)), crt_lookup(table, V4Y(position)),
+                     crt_lookup(table, V4Z(position)), crt_lookup(table, V4W(position)));
 }
 
 /* (x̄, ȳ, z̄, 0) / ∫ȳ at one wavelength. */

@@ -1,5 +1,6 @@
 /*
- * surface.h: hit → position, normals, material; and where a new ray may start without meeting the surface that it leaves.
+ * surface.h: hit → position, normals, material; and where a new ray may start without meeting the surface
+ * that it leaves.
  */
 #ifndef CRT_SURFACE_H
 #define CRT_SURFACE_H
@@ -21,36 +22,48 @@ CRT_FN vec3 crt_triangle_vertex(CRT_GLOBAL const CrtTriangle *triangle, u32 i) {
     return make_vec3(triangle->p[i], triangle->p[3u + i], triangle->p[6u + i]);
 }
 
-/* Rounding of the triangle test, relative to the triangle's size, that an origin must be clear of. Measured (tests/unit_kernel_rays.cpp): with .35
-   of the whole clearance no path in seven million steps leaves a closed room or meets its own wall; with a quarter, some twenty do. */
+/* Rounding of the triangle test, relative to the triangle's size, that an origin must be clear of. Measured
+   (tests/unit_kernel_rays.cpp): with .35 of the whole clearance no path in seven million steps leaves a
+   closed room or meets its own wall; with a quarter, some twenty do. */
 #define CRT_TEST_ERROR CRT_GAMMA(16.0f)
-/* A position nearer to an edge than this, in barycentrics, could by rounding lie beyond the neighbour across the edge. */
+/* A position nearer to an edge than this, in barycentrics, could by rounding lie beyond the neighbour across
+ * the edge. */
 #define CRT_EDGE_MARGIN 4e-6f
 #define CRT_EDGE_MARGIN_MAX 0.125f
 
-/* How far off its plane a ray must start that leaves a triangle with coordinates up to `coordinate` and edges up to `size`. A position is the sum of
-   nine rounded operations a term (PBRT 4e, 6.8.5, and two for b0); the test that the new ray meets shears the triangle along the ray, so that its
-   size in every axis counts. √3: both are per axis. */
-CRT_FN f32 crt_clearance(f32 coordinate, f32 size) { return 1.7320509f * (coordinate * CRT_GAMMA(9.0f) + size * CRT_TEST_ERROR); }
+/* How far off its plane a ray must start that leaves a triangle with coordinates up to `coordinate` and
+   edges up to `size`. A position is the sum of nine rounded operations a term (PBRT 4e, 6.8.5, and two for
+   b0); the test that the new ray meets shears the triangle along the ray, so that its size in every axis
+   counts. √3: both are per axis. */
+CRT_FN f32 crt_clearance(f32 coordinate, f32 size) {
+    return 1.7320509f * (coordinate * CRT_GAMMA(9.0f) + size * CRT_TEST_ERROR);
+}
 
-/* A ray's origin o may be taken for the wrong side of a triangle's plane within γ(1)·coordinate + γ(8)·size, by the triangle test, and 4 · 2^-24
-   (|ox| + |oy| + |oz|), by rounding of its height: less than the clearance. Eight triangles at a time (intersect.h) compare CRT_HEIGHT_SCALE times
-   the height with the slack of a ray, which is 64 · 2^-24 (1 + |ox| + |oy| + |oz|): this is what is left of the sum. */
+/* A ray's origin o may be taken for the wrong side of a triangle's plane within γ(1)·coordinate + γ(8)·size,
+   by the triangle test, and 4 · 2^-24
+   (|ox| + |oy| + |oz|), by rounding of its height: less than the clearance. Eight triangles at a time
+   (intersect.h) compare CRT_HEIGHT_SCALE times the height with the slack of a ray, which is 64 · 2^-24 (1 +
+   |ox| + |oy| + |oz|): this is what is left of the sum. */
 CRT_FN f32 crt_height_slack(f32 coordinate, f32 size) {
     return CRT_HEIGHT_SCALE * (CRT_GAMMA(1.0f) * coordinate + CRT_GAMMA(8.0f) * size) - 64.0f * CRT_EPSILON;
 }
 
-/* How far from its edges, in barycentrics, a path may start: a few ulp of the position against the triangle's height. A start in a corner within
-   rounding of the other wall might lie behind that wall, and leave a closed room. */
+/* How far from its edges, in barycentrics, a path may start: a few ulp of the position against the
+   triangle's height. A start in a corner within rounding of the other wall might lie behind that wall, and
+   leave a closed room. */
 CRT_FN f32 crt_edge_margin(f32 coordinate, f32 size, f32 twice_area) {
     const f32 rounding = 16.0f * CRT_EPSILON * (coordinate + size) * size;
-    return rounding < CRT_EDGE_MARGIN_MAX * twice_area ? crt_min(CRT_EDGE_MARGIN + rounding / twice_area, CRT_EDGE_MARGIN_MAX) : CRT_EDGE_MARGIN_MAX;
+    return rounding < CRT_EDGE_MARGIN_MAX * twice_area
+               ? crt_min(CRT_EDGE_MARGIN + rounding / twice_area, CRT_EDGE_MARGIN_MAX)
+               : CRT_EDGE_MARGIN_MAX;
 }
 
 CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
-    CRT_GLOBAL const CrtTriangle *triangle = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + hit.slot;
+    CRT_GLOBAL const CrtTriangle *triangle =
+        CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + hit.slot;
     CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + hit.slot;
-    CRT_GLOBAL const CrtPrimitive *primitive = CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + hit.id;
+    CRT_GLOBAL const CrtPrimitive *primitive =
+        CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + hit.id;
     f32 b0 = 1.0f - hit.b1 - hit.b2;
     f32 b1 = hit.b1;
     f32 b2 = hit.b2;
@@ -64,14 +77,16 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
         b2 *= scale;
     }
     CrtSurface s;
-    s.p = crt_fma3(crt_triangle_vertex(triangle, 0u), b0, crt_fma3(crt_triangle_vertex(triangle, 1u), b1, crt_triangle_vertex(triangle, 2u) * b2));
+    s.p = crt_fma3(crt_triangle_vertex(triangle, 0u), b0,
+                   crt_fma3(crt_triangle_vertex(triangle, 1u), b1, crt_triangle_vertex(triangle, 2u) * b2));
     s.ng = crt_load3(face->normal);
     s.clearance = face->clearance;
     s.ns = s.ng;
     s.material = primitive->material;
     s.emitter = primitive->emitter;
     if (CRT_HAS(SMOOTH_NORMALS) && primitive->normals != CRT_NONE) {
-        CRT_GLOBAL const CrtNormals *n = CRT_ARRAY(CrtNormals, ctx->blob, ctx->scene->normals) + primitive->normals;
+        CRT_GLOBAL const CrtNormals *n =
+            CRT_ARRAY(CrtNormals, ctx->blob, ctx->scene->normals) + primitive->normals;
         const vec3 ns = make_vec3(n->n[0] * b0 + n->n[1] * b1 + n->n[2] * b2,
                                   n->n[3] * b0 + n->n[4] * b1 + n->n[5] * b2,
                                   n->n[6] * b0 + n->n[7] * b1 + n->n[8] * b2);
@@ -85,7 +100,8 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     return s;
 }
 
-/* Origin of a ray leaving p on the side of direction w. No absolute epsilon: the clearance is the triangle's. */
+/* Origin of a ray leaving p on the side of direction w. No absolute epsilon: the clearance is the
+ * triangle's. */
 CRT_FN vec3 crt_offset_origin(vec3 p, f32 clearance, vec3 normal, vec3 w) {
     return crt_fma3(normal, dot3(w, normal) < 0.0f ? -clearance : clearance, p);
 }

@@ -1,20 +1,20 @@
 #include "render/job.h"
 
-#include "base/atomic_file.h"
 #include "backend/loader.h"
+#include "base/atomic_file.h"
+#include "base/log.h"
+#include "base/stage.h"
+#include "base/unit_text.h"
+#include "compile/compile.h"
 #include "film/checkpoint.h"
 #include "film/checkpoint_writer.h"
-#include "compile/compile.h"
+#include "film/error_text.h"
+#include "film/resolve.h"
 #include "render/light_checks.h"
-#include "base/log.h"
 #include "render/output_guard.h"
 #include "render/outputs.h"
 #include "render/report.h"
 #include "render/sampling.h"
-#include "base/stage.h"
-#include "base/unit_text.h"
-#include "film/error_text.h"
-#include "film/resolve.h"
 
 #include <fmt/format.h>
 
@@ -29,7 +29,9 @@ namespace {
 
 class Stopwatch {
 public:
-    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    }
 
 private:
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -52,20 +54,23 @@ std::vector<std::string> imageNames(const OutputPlan& plan) {
     return names;
 }
 
-/// Names them, and finds out now what cannot be written: nobody should learn after an hour that a directory is missing.
+/// Names them, and finds out now what cannot be written: nobody should learn after an hour that a directory
+/// is missing.
 Files planFiles(const Job& job, const Scene& scene) {
     Files files;
     files.outputs = planOutputs(job.outputs, scene);
     files.checkpoint = !job.checkpoint_file.empty() ? job.checkpoint_file
                        : !job.resume_file.empty()   ? job.resume_file
-                                                    : besideOutput(files.outputs.first, kCheckpointExtension);
-    files.checkpoint_wanted = job.resume || !job.checkpoint_file.empty();  // Who resumes once will want to resume again.
+                                                  : besideOutput(files.outputs.first, kCheckpointExtension);
+    files.checkpoint_wanted =
+        job.resume || !job.checkpoint_file.empty();  // Who resumes once will want to resume again.
     if (job.resume) {
         files.resume = !job.resume_file.empty() ? job.resume_file : files.checkpoint;
         std::error_code unreadable;
         if (!std::filesystem::exists(files.resume, unreadable)) {
             if (!job.resume_file.empty())
-                throw Error(ErrorKind::Usage, fmt::format("there is no checkpoint '{}' to resume", files.resume));
+                throw Error(ErrorKind::Usage,
+                            fmt::format("there is no checkpoint '{}' to resume", files.resume));
             // A batch job that is started again and again with one command line begins somewhere.
             logInfo("no checkpoint '{}' yet: starting from the first sample", files.resume);
             files.resume.clear();
@@ -92,13 +97,16 @@ Files planFiles(const Job& job, const Scene& scene) {
     return files;
 }
 
-/// A target error is decided on and judged by different replicates, so there must be some. Independent samples are the same with them.
+/// A target error is decided on and judged by different replicates, so there must be some. Independent
+/// samples are the same with them.
 void requireReplicates(Scene& scene) {
     if (replicatesOf(scene) > 1) return;
     if (scene.integrator.type != IntegratorType::Path)
         throw Error(ErrorKind::Usage, "--target-error is for integrator.type path: the views have no noise");
     if (scene.sampler.type == SamplerType::Sobol)
-        throw Error(ErrorKind::Usage, "--target-error needs the replicates that sampler.replicates: 1 leaves out; add --set sampler.replicates=2");
+        throw Error(ErrorKind::Usage,
+                    "--target-error needs the replicates that sampler.replicates: 1 leaves out; add --set "
+                    "sampler.replicates=2");
     scene.sampler.replicates = 2;
 }
 
@@ -112,7 +120,8 @@ EarlierFilm readEarlierFilm(const Files& files) {
 }
 
 /// An empty film, or what an earlier run of the same scene left; then `identity` names its version too.
-Film openFilm(const Files& files, const EarlierFilm& there, const CompiledScene& compiled, FilmIdentity& identity) {
+Film openFilm(const Files& files, const EarlierFilm& there, const CompiledScene& compiled,
+              FilmIdentity& identity) {
     Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
     if (!there) return film;
     const auto& [earlier, found] = *there;
@@ -133,7 +142,8 @@ SamplingPlan planSamples(const Job& job, const Scene& scene, const SampleRanges&
     plan.chunk = job.chunk;
     if (files.checkpoint_wanted) plan.checkpoint_interval_seconds = job.checkpoint_interval_seconds;
     if (job.samples) {
-        // An exact range says exactly which samples are new; those that the checkpoint has already would count twice.
+        // An exact range says exactly which samples are new; those that the checkpoint has already would
+        // count twice.
         SampleRanges together = there;
         together.add(*job.samples);
         plan.ranges = {*job.samples};
@@ -141,7 +151,8 @@ SamplingPlan planSamples(const Job& job, const Scene& scene, const SampleRanges&
         return plan;
     }
     const bool endless = !job.spp && (job.time_limit_seconds > 0 || job.target_error > 0);
-    plan.ranges = missingSamples({0, endless ? kEndlessSamples : job.spp.value_or(scene.sampler.samples)}, there);
+    plan.ranges =
+        missingSamples({0, endless ? kEndlessSamples : job.spp.value_or(scene.sampler.samples)}, there);
     if (endless) return plan;
     plan.target = there.count();
     for (const auto& [first, end] : plan.ranges) plan.target += end - first;
@@ -158,7 +169,8 @@ std::string driverOf(const std::vector<CrtDevice>& devices, const std::string& d
     return {};
 }
 
-/// Takes over what the backend says about itself. Being without it is a pity, but no reason to lose a render.
+/// Takes over what the backend says about itself. Being without it is a pity, but no reason to lose a
+/// render.
 void askForReport(Integrator& integrator, RunFacts& facts) {
     try {
         facts.backend = integrator.report();
@@ -183,12 +195,16 @@ CompileOptions compileOptionsFor(const std::optional<LoadedBackend>& backend) {
     return backend ? compileOptionsFor(*backend) : CompileOptions{.accelerator_reach = kNobodyTraces};
 }
 
-/// CompiledScene → Film, by a backend. Returns what failed while sampling, if anything did; the film holds what there is.
-std::optional<Error> renderSamples(const Job& job, const LoadedBackend& backend, const CompiledScene& compiled, const SamplingPlan& plan,
-                                   Film& film, Watch& watch, const std::function<void()>& save_checkpoint, RunFacts& facts) {
+/// CompiledScene → Film, by a backend. Returns what failed while sampling, if anything did; the film holds
+/// what there is.
+std::optional<Error> renderSamples(const Job& job, const LoadedBackend& backend,
+                                   const CompiledScene& compiled, const SamplingPlan& plan, Film& film,
+                                   Watch& watch, const std::function<void()>& save_checkpoint,
+                                   RunFacts& facts) {
     std::optional<Stage> stage(std::in_place, "opening the device");
     const Stopwatch opening;
-    const std::vector<CrtDevice> devices = probeDevices(backend);  // Says better than a failing create() why there is none.
+    const std::vector<CrtDevice> devices =
+        probeDevices(backend);  // Says better than a failing create() why there is none.
     Integrator integrator(backend, job.integrator);
     facts.open_seconds += opening.seconds();
     facts.backend_name = backend.name;
@@ -223,7 +239,8 @@ std::optional<Error> renderSamples(const Job& job, const LoadedBackend& backend,
     return result.failure;
 }
 
-/// What went wrong while writing, the first of it: one output that fails must not keep the others from being written.
+/// What went wrong while writing, the first of it: one output that fails must not keep the others from being
+/// written.
 class FirstFailure {
 public:
     explicit FirstFailure(std::optional<Error> earlier) : first_(std::move(earlier)) {}
@@ -258,7 +275,8 @@ void describeRun(FilmIdentity& identity, const RunFacts& facts) {
 }
 
 /// Where it was written: a larger film that lies there stays.
-std::string writeFilm(FilmGuard& films, const std::string& name, const Film& film, const FilmIdentity& identity) {
+std::string writeFilm(FilmGuard& films, const std::string& name, const Film& film,
+                      const FilmIdentity& identity) {
     const std::string place = films.placeFor(name, film.samples.count());
     writeCheckpoint(place, film, identity);
     if (place == name) films.written(name);
@@ -266,10 +284,12 @@ std::string writeFilm(FilmGuard& films, const std::string& name, const Film& fil
 }
 
 /// Film → images and checkpoints; their names go to facts.outputs.
-void writeFiles(Files& files, const Film& film, FilmIdentity& identity, RunFacts& facts, FirstFailure& failure) {
+void writeFiles(Files& files, const Film& film, FilmIdentity& identity, RunFacts& facts,
+                FirstFailure& failure) {
     const Stopwatch writing;
     // With nothing but a time to go by, the end of the time is the end of the work.
-    const bool complete = facts.stop == StopReason::Samples || facts.stop == StopReason::Target || (facts.stop == StopReason::Time && facts.target_samples == 0);
+    const bool complete = facts.stop == StopReason::Samples || facts.stop == StopReason::Target ||
+                          (facts.stop == StopReason::Time && facts.target_samples == 0);
     describeRun(identity, facts);
     identity.record->complete = complete;
 
@@ -283,7 +303,8 @@ void writeFiles(Files& files, const Film& film, FilmIdentity& identity, RunFacts
             if (name == files.checkpoint) files.saved = place;
         });
     };
-    for (const std::string& name : films) attemptFilm(name);  // First: everything else can be made from a film.
+    for (const std::string& name : films)
+        attemptFilm(name);  // First: everything else can be made from a film.
     for (const Output& output : files.outputs.images)
         failure.attempt([&] {
             writeOutput(output, film, identity);
@@ -305,8 +326,10 @@ std::string summary(const RunFacts& facts, const Film& film) {
     std::string text = fmt::format("{} samples per pixel", facts.samples.count());
     if (facts.resumed_samples > 0) text += fmt::format(", {} of them resumed", facts.resumed_samples);
     if (facts.rendered_samples > 0 && facts.sampling_seconds > 0) {
-        const double paths = static_cast<double>(facts.rendered_samples) * static_cast<double>(film.counts.size());
-        text += fmt::format(", {}, {}", durationText(facts.sampling_seconds), rateText(paths / facts.sampling_seconds, "paths/s"));
+        const double paths =
+            static_cast<double>(facts.rendered_samples) * static_cast<double>(film.counts.size());
+        text += fmt::format(", {}, {}", durationText(facts.sampling_seconds),
+                            rateText(paths / facts.sampling_seconds, "paths/s"));
     }
     if (facts.error) text += ", " + errorText(*facts.error);
     return text;
@@ -315,10 +338,13 @@ std::string summary(const RunFacts& facts, const Film& film) {
 /// How the target error was reached; else what it, or 1 %, would still take, where that is known.
 void tellTarget(const RunFacts& facts) {
     const double target = facts.target_error > 0 ? facts.target_error : 0.01;
-    const auto half_width = [](const std::optional<ErrorEstimate>& error) { return error ? percentText(error->half_width_95) : std::string("none"); };
+    const auto half_width = [](const std::optional<ErrorEstimate>& error) {
+        return error ? percentText(error->half_width_95) : std::string("none");
+    };
     if (facts.stop == StopReason::Target)
-        logInfo("target error {:.3g} % reached: 95 % half-width {}, of the even pixels {}, of the odd ones {}", target * 100,
-                half_width(facts.error), half_width(facts.deciding), half_width(facts.judging));
+        logInfo(
+            "target error {:.3g} % reached: 95 % half-width {}, of the even pixels {}, of the odd ones {}",
+            target * 100, half_width(facts.error), half_width(facts.deciding), half_width(facts.judging));
     else if (facts.target_error > 0 && !facts.error->known())
         logInfo("whether the target error is reached cannot be told: too few paths carry the light");
     if (!facts.error->known() || facts.error->half_width_95 <= target || facts.rendered_samples == 0) return;
@@ -326,8 +352,8 @@ void tellTarget(const RunFacts& facts) {
     const stats::Interval needed = facts.error->samplesFor(target, samples);
     const stats::Interval more{needed.lower - samples, needed.upper - samples};
     const double each = facts.sampling_seconds / static_cast<double>(facts.rendered_samples);
-    logInfo("{:.3g} % would take {} samples per pixel more, {} to {}", target * 100, sampleCountText(more), durationText(more.lower * each),
-            durationText(more.upper * each));
+    logInfo("{:.3g} % would take {} samples per pixel more, {} to {}", target * 100, sampleCountText(more),
+            durationText(more.lower * each), durationText(more.upper * each));
 }
 
 }  // namespace
@@ -339,8 +365,9 @@ Scene loadScene(const SceneRequest& request) {
     if (request.crop) {
         const auto& [x0, y0, x1, y1] = *request.crop;
         if (x0 < 0 || y0 < 0 || x0 >= x1 || y0 >= y1 || x1 > scene.film.width || y1 > scene.film.height)
-            throw Error(ErrorKind::Usage, fmt::format("--crop {},{},{},{} is no rectangle within the film of {} x {} pixels", x0, y0, x1,
-                                                      y1, scene.film.width, scene.film.height));
+            throw Error(ErrorKind::Usage,
+                        fmt::format("--crop {},{},{},{} is no rectangle within the film of {} x {} pixels",
+                                    x0, y0, x1, y1, scene.film.width, scene.film.height));
         scene.film.crop = *request.crop;
     }
     return scene;
@@ -372,7 +399,9 @@ int runJob(const Job& job, Watch& watch) {
     Film film = openFilm(files, earlier, compiled, identity);
     earlier.reset();
     facts.resumed_samples = film.samples.count();
-    CheckpointWriter checkpoint([&files](const Film& copy, const FilmIdentity& of) { writeFilm(files.films, files.checkpoint, copy, of); });
+    CheckpointWriter checkpoint([&files](const Film& copy, const FilmIdentity& of) {
+        writeFilm(files.films, files.checkpoint, copy, of);
+    });
     const auto saveCheckpoint = [&] {
         describeRun(identity, facts);
         checkpoint.save(film, identity);
@@ -380,7 +409,9 @@ int runJob(const Job& job, Watch& watch) {
     plan.checkpoint_possible = [&] { return checkpoint.idle(); };
 
     // Samples, from a backend into the film. None is opened when none is missing.
-    FirstFailure failure(backend ? renderSamples(job, *backend, compiled, plan, film, watch, saveCheckpoint, facts) : std::nullopt);
+    FirstFailure failure(
+        backend ? renderSamples(job, *backend, compiled, plan, film, watch, saveCheckpoint, facts)
+                : std::nullopt);
     if (!backend) watch.renderingEnds();
     checkpoint.finish();
     facts.samples = film.samples;
@@ -393,7 +424,8 @@ int runJob(const Job& job, Watch& watch) {
         facts.judging = estimateError(film, PixelSet::Odd, independent);
     }
     warnOfBlackFilm(film, scene);
-    if (facts.invalid_samples > 0) logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
+    if (facts.invalid_samples > 0)
+        logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
 
     // Images, and the report of how they came about.
     if (film.samples.count() > 0) writeFiles(files, film, identity, facts, failure);
@@ -403,14 +435,16 @@ int runJob(const Job& job, Watch& watch) {
     facts.exit_code = failure.get()                             ? failure.get()->exitCode()
                       : facts.stop == StopReason::Interrupted ? facts.request.exit_code
                                                               : 0;
-    if (!files.report.empty()) failure.attempt([&] { writeReport(files.report, reportJson(scene, compiled, facts)); });
+    if (!files.report.empty())
+        failure.attempt([&] { writeReport(files.report, reportJson(scene, compiled, facts)); });
 
     logInfo("{}", summary(facts, film));
     if (facts.error) tellTarget(facts);
     if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
     if (failure.get()) throw *failure.get();
     if (facts.stop == StopReason::Interrupted)
-        logInfo("stopped by {}; the same command with --resume {} goes on from here", facts.request.cause, files.saved);
+        logInfo("stopped by {}; the same command with --resume {} goes on from here", facts.request.cause,
+                files.saved);
     return facts.exit_code;
 }
 

@@ -35,12 +35,14 @@ struct Job {
     std::optional<std::uint64_t> spp;        ///< Render until every pixel has the samples [0, spp).
     std::optional<SampleRange> samples;      ///< Exactly these instead.
     double time_limit_seconds = 0;           ///< 0: none. Alone it replaces the scene's number of samples.
-    double target_error = 0;                 ///< Stop at this relative error; 0: none. Alone it replaces the scene's number of samples.
-    std::uint64_t chunk = 0;                 ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
+    double target_error =
+        0;  ///< Stop at this relative error; 0: none. Alone it replaces the scene's number of samples.
+    std::uint64_t chunk = 0;  ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
 
     bool resume = false;
     std::string resume_file;                 ///< Empty: the checkpoint of this job.
-    std::string checkpoint_file;             ///< Empty: beside the first output, and only when resuming or when stopped short.
+    std::string
+        checkpoint_file;  ///< Empty: beside the first output, and only when resuming or when stopped short.
     double checkpoint_interval_seconds = 600;
     bool overwrite = false;                  ///< Also a film of more samples, or what is no film.
 
@@ -49,8 +51,9 @@ struct Job {
     std::string command;                     ///< As typed, for the report.
 };
 
-/// Runs the job and returns the exit code: 0, or that of the StopRequest that ended the sampling early. Throws crt::Error for everything that
-/// goes wrong; when the device fails while rendering, after what there was has been saved.
+/// Runs the job and returns the exit code: 0, or that of the StopRequest that ended the sampling early.
+/// Throws crt::Error for everything that goes wrong; when the device fails while rendering, after what there
+/// was has been saved.
 int runJob(const Job& job, Watch& watch);
 
 }  // namespace crt

@@ -28,7 +28,8 @@ struct Face {
 };
 
 /// Emission of a triangle; null when it emits nothing.
-const Emission* emissionOf(const Scene& scene, const Object& object, const Mesh& mesh, std::size_t triangle) {
+const Emission* emissionOf(const Scene& scene, const Object& object, const Mesh& mesh,
+                           std::size_t triangle) {
     const std::int32_t own = mesh.emission.empty() ? -1 : mesh.emission[triangle];
     const std::int32_t index = own >= 0 ? own : object.emission;
     if (index < 0) return nullptr;
@@ -46,7 +47,8 @@ std::vector<Face> oneSidedFaces(const Scene& scene, const Object& object) {
         if (emission->two_sided) return {};
         for (const Matrix4d& transform : object.transforms) {
             std::array<Vec3d, 3> p;
-            for (std::size_t v = 0; v < 3; ++v) p[v] = placed(transform, mesh.positions[mesh.triangles[t][v]]);
+            for (std::size_t v = 0; v < 3; ++v)
+                p[v] = placed(transform, mesh.positions[mesh.triangles[t][v]]);
             Vec3d normal = cross(p[1] - p[0], p[2] - p[0]);
             const double norm = length(normal);
             if (!(norm > 0)) continue;
@@ -76,7 +78,9 @@ public:
     bool isEmpty(const Face& face) {
         constexpr double kRounding = 1e-12;  // Of double, many times over.
         const double least = kRounding * std::max(largest_, length(face.point));
-        const auto inFront = [&](const Vec3d& p, double reach) { return dot(p - face.point, face.normal) + reach > least; };
+        const auto inFront = [&](const Vec3d& p, double reach) {
+            return dot(p - face.point, face.normal) + reach > least;
+        };
         if (inFront(scene_.camera.position, scene_.camera.aperture_radius)) return false;
         for (const Object& object : scene_.objects)
             for (const Matrix4d& transform : object.transforms)
@@ -93,7 +97,9 @@ private:
     double largest_ = 0;
 };
 
-std::string nameOf(const Object& object) { return object.name.empty() ? "an object without a name" : fmt::format("'{}'", object.name); }
+std::string nameOf(const Object& object) {
+    return object.name.empty() ? "an object without a name" : fmt::format("'{}'", object.name);
+}
 
 /// What may be wrong in this scene.
 std::vector<std::string> reasonsForBlack(const Scene& scene) {
@@ -101,7 +107,8 @@ std::vector<std::string> reasonsForBlack(const Scene& scene) {
     for (const Object& object : scene.objects) {
         const Mesh& mesh = scene.meshes[object.mesh];
         bool emits = false;
-        for (std::size_t t = 0; t < mesh.triangles.size() && !emits; ++t) emits = emissionOf(scene, object, mesh, t) != nullptr;
+        for (std::size_t t = 0; t < mesh.triangles.size() && !emits; ++t)
+            emits = emissionOf(scene, object, mesh, t) != nullptr;
         if (!emits) continue;
         lamps.push_back(nameOf(object));
         if (!oneSidedFaces(scene, object).empty()) one_sided.push_back(nameOf(object));
@@ -112,12 +119,14 @@ std::vector<std::string> reasonsForBlack(const Scene& scene) {
     if (!one_sided.empty()) {
         constexpr std::size_t kShown = 3;
         const std::size_t shown = std::min(one_sided.size(), kShown);
-        reasons.push_back(fmt::format("{}{} may face away: a lamp lights the side from which its vertices run counter-clockwise, with "
-                                      "'two_sided: true' both",
-                                      fmt::join(one_sided.begin(), one_sided.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
-                                      shown < one_sided.size() ? fmt::format(" and {} more", one_sided.size() - shown) : ""));
+        reasons.push_back(fmt::format(
+            "{}{} may face away: a lamp lights the side from which its vertices run counter-clockwise, with "
+            "'two_sided: true' both",
+            fmt::join(one_sided.begin(), one_sided.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+            shown < one_sided.size() ? fmt::format(" and {} more", one_sided.size() - shown) : ""));
     }
-    if (scene.integrator.max_depth == 0) reasons.emplace_back("'max_depth: 0' shows lamps and no light on anything");
+    if (scene.integrator.max_depth == 0)
+        reasons.emplace_back("'max_depth: 0' shows lamps and no light on anything");
     if (!scene.integrator.nee && !sky) reasons.emplace_back("with 'nee: false' few paths meet a small lamp");
     reasons.emplace_back("the camera may be inside an object, or look past the scene");
     return reasons;
@@ -132,7 +141,8 @@ std::vector<std::string> idleLamps(const Scene& scene) {
     if (front.tooManyPoints()) return idle;
     for (const Object& object : scene.objects) {
         const std::vector<Face> faces = oneSidedFaces(scene, object);
-        if (!faces.empty() && std::all_of(faces.begin(), faces.end(), [&](const Face& face) { return front.isEmpty(face); }))
+        if (!faces.empty() &&
+            std::all_of(faces.begin(), faces.end(), [&](const Face& face) { return front.isEmpty(face); }))
             idle.push_back(nameOf(object));
         if (front.gaveUp()) break;
     }
@@ -141,9 +151,11 @@ std::vector<std::string> idleLamps(const Scene& scene) {
 
 void warnOfIdleLamps(const Scene& scene) {
     for (const std::string& lamp : idleLamps(scene))
-        logWarning("{} lights nothing: it emits on one side only, and neither a surface nor the camera is on that side; reverse the order "
-                   "of its vertices, or say 'two_sided: true'",
-                   lamp);
+        logWarning(
+            "{} lights nothing: it emits on one side only, and neither a surface nor the camera is on that "
+            "side; reverse the order "
+            "of its vertices, or say 'two_sided: true'",
+            lamp);
 }
 
 bool isBlack(const Film& film) {

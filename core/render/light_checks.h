@@ -9,9 +9,9 @@
 
 namespace crt {
 
-/// Names of the objects that emit and light nothing: one-sided, with neither a vertex of the scene nor the lens in
-/// front of any of their emitting faces. Exact but for rounding; empty for a scene in which looking would take more than
-/// about a second.
+/// Names of the objects that emit and light nothing: one-sided, with neither a vertex of the scene nor the
+/// lens in front of any of their emitting faces. Exact but for rounding; empty for a scene in which looking
+/// would take more than about a second.
 std::vector<std::string> idleLamps(const Scene& scene);
 
 /// One warning for each of them.

@@ -1,7 +1,7 @@
 #include "render/output_guard.h"
 
-#include "film/checkpoint.h"
 #include "base/error.h"
+#include "film/checkpoint.h"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,8 @@ namespace crt {
 namespace fs = std::filesystem;
 namespace {
 
-/// The same for all names of one file: by device and number of the file that is there, or by the name that it will have.
+/// The same for all names of one file: by device and number of the file that is there, or by the name that
+/// it will have.
 std::string identityOf(const std::string& path) {
     struct stat status {};
     if (::stat(path.c_str(), &status) == 0) return fmt::format("{}:{}", status.st_dev, status.st_ino);
@@ -24,24 +25,30 @@ std::string identityOf(const std::string& path) {
     return (unknown ? absolute.lexically_normal() : canonical).string();
 }
 
-constexpr std::uint64_t kNoFilm = std::numeric_limits<std::uint64_t>::max();  // Larger than any, so that it is never replaced.
+constexpr std::uint64_t kNoFilm =
+    std::numeric_limits<std::uint64_t>::max();  // Larger than any, so that it is never replaced.
 
 }  // namespace
 
-void refuseOverInputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs, const std::vector<std::string>& films) {
+void refuseOverInputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
+                      const std::vector<std::string>& films) {
     std::map<std::string, std::string> read, written;  // By identity, the name.
     for (const std::string& input : inputs) read.emplace(identityOf(input), input);
     const auto check = [&](const std::string& output) {
         const std::string identity = identityOf(output);
         if (const auto input = read.find(identity); input != read.end())
-            throw Error(ErrorKind::Usage,
-                        output == input->second
-                            ? fmt::format("the output '{}' would replace a file that is read", output)
-                            : fmt::format("the output '{}' would replace '{}', which is read: they are one file", output, input->second),
-                        {output});
+            throw Error(
+                ErrorKind::Usage,
+                output == input->second
+                    ? fmt::format("the output '{}' would replace a file that is read", output)
+                    : fmt::format("the output '{}' would replace '{}', which is read: they are one file",
+                                  output, input->second),
+                {output});
         if (const auto other = written.find(identity); other != written.end())
-            throw Error(ErrorKind::Usage, output == other->second ? fmt::format("two outputs have the same name '{}'", output)
-                                                                  : fmt::format("the outputs '{}' and '{}' are one file", other->second, output));
+            throw Error(ErrorKind::Usage,
+                        output == other->second
+                            ? fmt::format("two outputs have the same name '{}'", output)
+                            : fmt::format("the outputs '{}' and '{}' are one file", other->second, output));
         return identity;
     };
     for (const std::string& output : outputs) written.emplace(check(output), output);
@@ -61,7 +68,11 @@ void FilmGuard::look(const std::string& path, bool wanted, bool replace) {
             place.samples = readCheckpoint(path).first.samples.count();
         } catch (const Error& error) {
             if (wanted)
-                throw Error(ErrorKind::Usage, fmt::format("a film would replace '{}', which is none: {}; choose another name, or add --overwrite", path, error.what()), {path});
+                throw Error(ErrorKind::Usage,
+                            fmt::format("a film would replace '{}', which is none: {}; choose another name, "
+                                        "or add --overwrite",
+                                        path, error.what()),
+                            {path});
             place.samples = kNoFilm;
         }
     }
@@ -71,9 +82,11 @@ void FilmGuard::look(const std::string& path, bool wanted, bool replace) {
 void FilmGuard::requireRoom(std::uint64_t samples) const {
     for (const auto& [path, place] : places_)
         if (place.wanted && place.samples > samples)
-            throw Error(ErrorKind::Usage, fmt::format("'{}' holds {} samples per pixel and would be replaced by {}: add --resume to go on from it, or "
-                                                      "--overwrite to lose it, or choose another name",
-                                                      path, place.samples, samples),
+            throw Error(ErrorKind::Usage,
+                        fmt::format("'{}' holds {} samples per pixel and would be replaced by {}: add "
+                                    "--resume to go on from it, or "
+                                    "--overwrite to lose it, or choose another name",
+                                    path, place.samples, samples),
                         {path});
 }
 
@@ -84,7 +97,8 @@ std::string FilmGuard::placeFor(const std::string& path, std::uint64_t samples) 
     std::error_code unreadable;
     const std::string stem = fs::path(path).replace_extension().string();
     for (int number = 1; beside.empty(); ++number) {
-        const std::string name = fmt::format("{}.partial{}{}", stem, number > 1 ? std::to_string(number) : "", kCheckpointExtension);
+        const std::string name = fmt::format("{}.partial{}{}", stem,
+                                             number > 1 ? std::to_string(number) : "", kCheckpointExtension);
         if (!fs::exists(fs::symlink_status(name, unreadable))) beside = name;
     }
     return beside;

@@ -1,4 +1,5 @@
-/// What an output must not replace: a file that the run reads, another of its outputs, a film that holds more samples.
+/// What an output must not replace: a file that the run reads, another of its outputs, a film that holds
+/// more samples.
 #pragma once
 
 #include <cstdint>
@@ -8,21 +9,25 @@
 
 namespace crt {
 
-/// Throws crt::Error(Usage) when an output is one of the inputs, by whatever name or link, or when two outputs are one file. Names in
-/// `films` may coincide with each other: the same film is written to all of them.
-void refuseOverInputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs, const std::vector<std::string>& films = {});
+/// Throws crt::Error(Usage) when an output is one of the inputs, by whatever name or link, or when two
+/// outputs are one file. Names in `films` may coincide with each other: the same film is written to all of
+/// them.
+void refuseOverInputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
+                      const std::vector<std::string>& films = {});
 
 /// Films that lie where films will be written. [one thread]
 class FilmGuard {
 public:
-    /// Looks at what is there at `path`; with `replace` it may be anything. Throws crt::Error(Usage) for a file that is no whole film, unless
-    /// the name is only one of crt's making (`wanted` is false).
+    /// Looks at what is there at `path`; with `replace` it may be anything. Throws crt::Error(Usage) for a
+    /// file that is no whole film, unless the name is only one of crt's making (`wanted` is false).
     void look(const std::string& path, bool wanted, bool replace);
 
-    /// Throws crt::Error(Usage) when one of those that are wanted holds more than the `samples` per pixel that this run ends with.
+    /// Throws crt::Error(Usage) when one of those that are wanted holds more than the `samples` per pixel
+    /// that this run ends with.
     void requireRoom(std::uint64_t samples) const;
 
-    /// Where a film of `samples` per pixel goes that is meant for `path`: there, or beside it while a larger one lies there.
+    /// Where a film of `samples` per pixel goes that is meant for `path`: there, or beside it while a larger
+    /// one lies there.
     std::string placeFor(const std::string& path, std::uint64_t samples);
     /// To be called when it is written: a smaller film of this run beside it is removed.
     void written(const std::string& path);

@@ -1,5 +1,5 @@
-#include "render/outputs.h"
 #include "film/resolve.h"
+#include "render/outputs.h"
 
 #include "film/checkpoint.h"
 #include "image/image_io.h"
@@ -37,7 +37,11 @@ OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene
                 const std::uint32_t aovs = *format == OutputFormat::Exr ? requestedAovs(scene) : 0;
                 plan.images.push_back({.file = file, .format = *format, .aovs = aovs, .place = {}});
             } else {
-                throw Error(ErrorKind::Usage, fmt::format("the name of the output '{}' ends in none of .exr, .png, .ppm, .pfm and .crtfilm", file));
+                throw Error(
+                    ErrorKind::Usage,
+                    fmt::format(
+                        "the name of the output '{}' ends in none of .exr, .png, .ppm, .pfm and .crtfilm",
+                        file));
             }
         }
     }
@@ -80,7 +84,8 @@ Image developedImage(const Output& output, const Film& film, const FilmIdentity&
     }
 
     const auto& [x0, y0, x1, y1] = record.window;
-    if (record.isCropped()) add("crt/crop", fmt::format("{},{},{},{} of {}x{}", x0, y0, x1, y1, record.width, record.height));
+    if (record.isCropped())
+        add("crt/crop", fmt::format("{},{},{},{} of {}x{}", x0, y0, x1, y1, record.width, record.height));
     image.left = x0;
     image.top = y0;
     image.whole_width = static_cast<std::uint32_t>(record.width);
@@ -97,10 +102,10 @@ Image developedImage(const Output& output, const Film& film, const FilmIdentity&
 
 void requireRecord(const std::string& path, const FilmIdentity& identity) {
     if (!identity.record)
-        throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' is of an earlier crt, whose films do not say in which colours to develop them; name its scene: "
-                                "crt merge --scene SCENE -o IMAGE {}",
-                                path, path));
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is of an earlier crt, whose films do not say in "
+                                                  "which colours to develop them; name its scene: "
+                                                  "crt merge --scene SCENE -o IMAGE {}",
+                                                  path, path));
 }
 
 void writeOutput(const Output& output, const Film& film, const FilmIdentity& identity) {

@@ -1,8 +1,8 @@
 /// Which files a run writes, and writing them: shared by rendering, merging and developing.
 #pragma once
 
-#include "film/film.h"
 #include "film/checkpoint.h"
+#include "film/film.h"
 #include "scene/scene.h"
 
 #include <cstdint>
@@ -18,19 +18,20 @@ struct OutputPlan {
     std::string first;  ///< The first of all; checkpoint and report take their names from it.
 };
 
-/// The AOVs that a scene's outputs ask for together. They are measured wherever the images go, so that -o never changes what a
-/// checkpoint is worth.
+/// The AOVs that a scene's outputs ask for together. They are measured wherever the images go, so that -o
+/// never changes what a checkpoint is worth.
 std::uint32_t requestedAovs(const Scene& scene);
 
-/// Where `files` (-o) say, else the scene's outputs, else "<scene>.exr" and "<scene>.png" in the working directory. An EXR from -o holds
-/// the AOVs that the scene asks for. Throws crt::Error(Usage) when an extension says no format or two names are the same.
+/// Where `files` (-o) say, else the scene's outputs, else "<scene>.exr" and "<scene>.png" in the working
+/// directory. An EXR from -o holds the AOVs that the scene asks for. Throws crt::Error(Usage) when an
+/// extension says no format or two names are the same.
 OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene);
 
 /// "out/cornell.exr" → "out/cornell<suffix>".
 std::string besideOutput(const std::string& output, const char* suffix);
 
-/// The image that `output` holds: the film developed for its format, with everything that its identity knows as
-/// metadata. The identity must have a record. Throws crt::Error(Usage) for an AOV that the film lacks.
+/// The image that `output` holds: the film developed for its format, with everything that its identity knows
+/// as metadata. The identity must have a record. Throws crt::Error(Usage) for an AOV that the film lacks.
 Image developedImage(const Output& output, const Film& film, const FilmIdentity& identity);
 
 /// Refuses to develop a film that does not know how: crt::Error(Usage).

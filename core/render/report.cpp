@@ -43,7 +43,9 @@ const char* knowledgeName(ErrorKnowledge knowledge) {
 /// What the image knows of its own error (docs/error.md), relative to its mean luminance.
 Json estimateJson(const std::optional<ErrorEstimate>& error) {
     if (!error) return nullptr;
-    Json json{{"knowledge", knowledgeName(error->knowledge)}, {"mean_luminance", error->mean_luminance}, {"degrees_of_freedom", error->degrees_of_freedom}};
+    Json json{{"knowledge", knowledgeName(error->knowledge)},
+              {"mean_luminance", error->mean_luminance},
+              {"degrees_of_freedom", error->degrees_of_freedom}};
     // A number that cannot be trusted must not be read as one that can.
     if (error->knowledge == ErrorKnowledge::NotYet) return json;
     const stats::Interval mean = error->meanInterval(0.95);
@@ -62,12 +64,18 @@ Json errorJson(const RunFacts& facts) {
         const auto samples = static_cast<double>(facts.samples.count());
         const double target = facts.target_error > 0 ? facts.target_error : 0.01;
         const stats::Interval needed = facts.error->samplesFor(target, samples);
-        const double each = facts.rendered_samples > 0 ? facts.sampling_seconds / static_cast<double>(facts.rendered_samples) : std::nan("");
-        json["to_target"] = {{"half_width_95", target},
-                             {"more_samples", {std::ceil(needed.lower - samples), std::ceil(needed.upper - samples)}},
-                             {"more_seconds", {knownOrNull((needed.lower - samples) * each), knownOrNull((needed.upper - samples) * each)}}};
+        const double each = facts.rendered_samples > 0
+                                ? facts.sampling_seconds / static_cast<double>(facts.rendered_samples)
+                                : std::nan("");
+        json["to_target"] = {
+            {"half_width_95", target},
+            {"more_samples", {std::ceil(needed.lower - samples), std::ceil(needed.upper - samples)}},
+            {"more_seconds",
+             {knownOrNull((needed.lower - samples) * each), knownOrNull((needed.upper - samples) * each)}}};
     }
-    if (facts.target_error > 0) json["judged"] = {{"even_pixels", estimateJson(facts.deciding)}, {"odd_pixels", estimateJson(facts.judging)}};
+    if (facts.target_error > 0)
+        json["judged"] = {{"even_pixels", estimateJson(facts.deciding)},
+                          {"odd_pixels", estimateJson(facts.judging)}};
     return json;
 }
 
@@ -87,7 +95,8 @@ std::vector<std::string> featureList(std::uint64_t mask) {
 std::string reportJson(const Scene& scene, const CompiledScene& compiled, const RunFacts& facts) {
     const CrtBackendReport& b = facts.backend;
     const double rays = static_cast<double>(b.closest_rays) + static_cast<double>(b.shadow_rays);
-    // A device that can time itself says what the kernel cost; the wall clock has the launches and the reading on top.
+    // A device that can time itself says what the kernel cost; the wall clock has the launches and the
+    // reading on top.
     const double render_seconds = b.render_seconds > 0 ? b.render_seconds : facts.sampling_seconds;
 
     Json report;
@@ -95,12 +104,17 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
     report["host"] = {{"cpu", processorName()},
                       {"os", operatingSystem()},
                       {"threads", std::thread::hardware_concurrency()}};
-    report["backend"] = {{"name", facts.backend_name},       {"version", facts.backend_version},
-                         {"build", facts.backend_build},     {"path", facts.backend_path},
-                         {"device", arrayText(b.device)},    {"driver", facts.driver},
-                         {"kernel", arrayText(b.kernel)},    {"kernel_features", featureList(b.kernel_features)},
+    report["backend"] = {{"name", facts.backend_name},
+                         {"version", facts.backend_version},
+                         {"build", facts.backend_build},
+                         {"path", facts.backend_path},
+                         {"device", arrayText(b.device)},
+                         {"driver", facts.driver},
+                         {"kernel", arrayText(b.kernel)},
+                         {"kernel_features", featureList(b.kernel_features)},
                          {"kernel_from_cache", b.kernel_from_cache != 0},
-                         {"registers", b.registers},         {"spill_bytes", b.spill_bytes}};
+                         {"registers", b.registers},
+                         {"spill_bytes", b.spill_bytes}};
 
     Json files = Json::array();
     for (const std::string& file : scene.files_read) files.push_back(file);
@@ -122,12 +136,13 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
                           {"kept", featureList(compiled.features)},
                           {"left_out", std::move(left_out)}};
 
-    // parse, build, compile, open, prepare, sampling, write and other make up the total. The others are parts of these, or ran
-    // beside them: kernel_compile, cache and upload of prepare, and render of sampling.
+    // parse, build, compile, open, prepare, sampling, write and other make up the total. The others are
+    // parts of these, or ran beside them: kernel_compile, cache and upload of prepare, and render of
+    // sampling.
     const double build = compiled.build_seconds + b.build_seconds;
     const double prepare = facts.prepare_seconds - b.build_seconds;
-    const double told = scene.parse_seconds + build + compiled.compile_seconds + facts.open_seconds + prepare + facts.sampling_seconds +
-                        facts.write_seconds;
+    const double told = scene.parse_seconds + build + compiled.compile_seconds + facts.open_seconds +
+                        prepare + facts.sampling_seconds + facts.write_seconds;
     report["seconds"] = {{"parse", scene.parse_seconds},
                          {"build", build},
                          {"compile", compiled.compile_seconds},
@@ -163,11 +178,13 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
     Json outputs = Json::array();
     for (const std::string& file : facts.outputs) outputs.push_back(file);
     report["outputs"] = std::move(outputs);
-    report["stop"] = {{"reason", stopName(facts.stop)},
-                      {"signal", facts.stop == StopReason::Interrupted ? Json(facts.request.cause) : Json(nullptr)},
-                      {"failure", facts.failure.empty() ? Json(nullptr) : Json(facts.failure)},
-                      {"exit_code", facts.exit_code}};
-    // File names and command lines are bytes, not necessarily UTF-8; a report with a replacement character beats none.
+    report["stop"] = {
+        {"reason", stopName(facts.stop)},
+        {"signal", facts.stop == StopReason::Interrupted ? Json(facts.request.cause) : Json(nullptr)},
+        {"failure", facts.failure.empty() ? Json(nullptr) : Json(facts.failure)},
+        {"exit_code", facts.exit_code}};
+    // File names and command lines are bytes, not necessarily UTF-8; a report with a replacement character
+    // beats none.
     return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -1,4 +1,5 @@
-/// What a run did, as JSON: enough to repeat it, to compare two machines, and to see what was left out and what it cost.
+/// What a run did, as JSON: enough to repeat it, to compare two machines, and to see what was left out and
+/// what it cost.
 #pragma once
 
 #include "backend/crt_backend.h"
@@ -35,7 +36,8 @@ struct RunFacts {
     std::uint64_t chunks = 0;
     std::uint64_t invalid_samples = 0;
     std::optional<ErrorEstimate> error; ///< Of the film, by all replicates; nothing while unknown.
-    std::optional<ErrorEstimate> deciding, judging;  ///< With a target error: by even and by odd pixels, which must both reach it.
+    std::optional<ErrorEstimate> deciding,
+        judging;  ///< With a target error: by even and by odd pixels, which must both reach it.
     double target_error = 0;            ///< 0: none.
 
     StopReason stop = StopReason::Samples;

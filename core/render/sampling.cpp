@@ -12,11 +12,16 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
-constexpr double kChunkSeconds = 0.4;       // Aimed at, so that the promised half second holds when a chunk is dearer than the last.
-constexpr std::uint64_t kChunkGrowth = 8;   // The first chunk may hold a kernel's warm-up; it says little about the next.
-constexpr double kReadShare = 0.02;         // Of the time may go into reading the film back for safety and for the error estimate.
+constexpr double kChunkSeconds =
+    0.4;  // Aimed at, so that the promised half second holds when a chunk is dearer than the last.
+constexpr std::uint64_t kChunkGrowth =
+    8;  // The first chunk may hold a kernel's warm-up; it says little about the next.
+constexpr double kReadShare =
+    0.02;  // Of the time may go into reading the film back for safety and for the error estimate.
 constexpr double kReadBytesPerSecond = 2e9; // First guess of what reading costs; measured from then on.
 
 /// How many samples the next chunk should have.
@@ -29,7 +34,8 @@ public:
         if (last_count_ == 0) return 1;
         const double per_sample = std::max(last_seconds_, 1e-7) / static_cast<double>(last_count_);
         const double affordable = std::min(std::min(kChunkSeconds, seconds_left) / per_sample, 1e15);
-        return std::clamp<std::uint64_t>(static_cast<std::uint64_t>(affordable), 1, last_count_ * kChunkGrowth);
+        return std::clamp<std::uint64_t>(static_cast<std::uint64_t>(affordable), 1,
+                                         last_count_ * kChunkGrowth);
     }
 
     void finished(std::uint64_t count, double seconds) {
@@ -105,7 +111,8 @@ private:
 
 std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels) {
     constexpr std::uint64_t kFirstCheck = 64, kPaths = 1u << 20;
-    const std::uint64_t first = std::bit_ceil(std::max(kFirstCheck, kPaths / std::max<std::uint64_t>(pixels, 1)));
+    const std::uint64_t first =
+        std::bit_ceil(std::max(kFirstCheck, kPaths / std::max<std::uint64_t>(pixels, 1)));
     return samples < first ? first : std::bit_floor(samples) * 2;
 }
 
@@ -160,7 +167,8 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
             result.request = *request;
             return StopReason::Interrupted;
         }
-        if (plan.time_limit_seconds > 0 && secondsSince(start) >= plan.time_limit_seconds) return StopReason::Time;
+        if (plan.time_limit_seconds > 0 && secondsSince(start) >= plan.time_limit_seconds)
+            return StopReason::Time;
         if (targetReached()) return StopReason::Target;
         return std::nullopt;
     };
@@ -182,7 +190,8 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
         ++result.chunks;
         reader.deviceAdvanced();
         if (reader.due()) reader.read();
-        if (plan.checkpoint_interval_seconds > 0 && secondsSince(checkpoint_at) >= plan.checkpoint_interval_seconds &&
+        if (plan.checkpoint_interval_seconds > 0 &&
+            secondsSince(checkpoint_at) >= plan.checkpoint_interval_seconds &&
             (!plan.checkpoint_possible || plan.checkpoint_possible())) {
             const Clock::time_point pause = Clock::now();
             if (!reader.current()) reader.copy();
@@ -198,7 +207,9 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
         for (const auto& [first, end] : plan.ranges)
             for (std::uint64_t next = first; next < end;) {
                 if (const auto reason = reasonToStop()) return *reason;
-                const double left = plan.time_limit_seconds > 0 ? plan.time_limit_seconds - secondsSince(start) : kChunkSeconds;
+                const double left = plan.time_limit_seconds > 0
+                                        ? plan.time_limit_seconds - secondsSince(start)
+                                        : kChunkSeconds;
                 std::uint64_t count = std::min(sizer.next(left), end - next);
                 if (plan.target_error > 0) count = std::min(count, check_at - (resumed + result.rendered));
                 renderChunk(next, count);

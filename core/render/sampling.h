@@ -1,5 +1,6 @@
-/// The loop at the heart of a render: sample ranges in chunks, until the samples are there, the time is up, a signal comes or the
-/// device fails. Because a sample's value depends on nothing but scene, seed, pixel and index, where it stops never shows in the image.
+/// The loop at the heart of a render: sample ranges in chunks, until the samples are there, the time is up,
+/// a signal comes or the device fails. Because a sample's value depends on nothing but scene, seed, pixel
+/// and index, where it stops never shows in the image.
 #pragma once
 
 #include "backend/integrator.h"
@@ -32,13 +33,14 @@ enum class StopReason {
 
 struct SamplingPlan {
     std::vector<SampleRange> ranges;     ///< To render, in order.
-    std::uint64_t target = 0;            ///< Samples per pixel in the film when all ranges are there; 0: endless.
+    std::uint64_t target = 0;  ///< Samples per pixel in the film when all ranges are there; 0: endless.
     double time_limit_seconds = 0;       ///< 0: none. Looked at between chunks.
     bool independent_samples = false;    ///< By the scene's sampler: their spread tells the error.
-    double target_error = 0;             ///< Stop when half_width_95 (error_estimate.h) is at most this; 0: never.
+    double target_error = 0;  ///< Stop when half_width_95 (error_estimate.h) is at most this; 0: never.
     std::uint64_t chunk = 0;             ///< Samples per chunk; 0: adaptive, at most half a second.
     double checkpoint_interval_seconds = 0;  ///< 0: never call `checkpoint`.
-    std::function<bool()> checkpoint_possible{};  ///< When set and false, a checkpoint that is due waits for the next chunk.
+    std::function<bool()>
+        checkpoint_possible{};  ///< When set and false, a checkpoint that is due waits for the next chunk.
 };
 
 struct SamplingResult {
@@ -50,17 +52,19 @@ struct SamplingResult {
     double seconds = 0;
 };
 
-/// The target error is looked at when the film holds a power of two of samples per pixel, at least 64 and a million paths in all: looking all the time
-/// would stop at the luckiest moment, and looking early before a caustic or a hidden lamp has been met at all.
+/// The target error is looked at when the film holds a power of two of samples per pixel, at least 64 and a
+/// million paths in all: looking all the time would stop at the luckiest moment, and looking early before a
+/// caustic or a hidden lamp has been met at all.
 std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels);
 
-/// Whether half_width_95 is known and at most `target` for the image, and for its even and its odd pixels each: of two halves that are independent of
-/// each other, each can veto what the other would have stopped at by luck. An error that is not known (error_estimate.h) stops nothing; and the
-/// wider the pixels' variances scatter, the farther the half-width lies above the estimate.
+/// Whether half_width_95 is known and at most `target` for the image, and for its even and its odd pixels
+/// each: of two halves that are independent of each other, each can veto what the other would have stopped
+/// at by luck. An error that is not known (error_estimate.h) stops nothing; and the wider the pixels'
+/// variances scatter, the farther the half-width lies above the estimate.
 bool reachesTarget(const Film& film, double target, bool independent_samples = false);
 
-/// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at most a small part of the run
-/// behind: a backend that failed cannot be asked for its film any more. 
+/// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at
+/// most a small part of the run behind: a backend that failed cannot be asked for its film any more.
 /// `checkpoint` may save the film, which is up to date when it is called.
 SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint);

@@ -5,7 +5,8 @@
 namespace crt {
 
 double ProgressState::pathsPerSecond() const {
-    return elapsed_seconds > 0 ? (samples - start_samples) * static_cast<double>(pixels) / elapsed_seconds : 0;
+    return elapsed_seconds > 0 ? (samples - start_samples) * static_cast<double>(pixels) / elapsed_seconds
+                               : 0;
 }
 
 double ProgressState::fraction() const {
@@ -18,7 +19,8 @@ double ProgressState::fraction() const {
 double ProgressState::secondsLeft() const {
     double left = -1;
     const double here = samples - start_samples;
-    if (target > 0 && here > 0) left = std::max(0.0, (static_cast<double>(target) - samples) * elapsed_seconds / here);
+    if (target > 0 && here > 0)
+        left = std::max(0.0, (static_cast<double>(target) - samples) * elapsed_seconds / here);
     if (time_limit_seconds > 0) {
         const double until_limit = std::max(0.0, time_limit_seconds - elapsed_seconds);
         left = left < 0 ? until_limit : std::min(left, until_limit);

@@ -11,14 +11,14 @@ namespace crt {
 
 /// Where a render stands.
 struct ProgressState {
-    double samples = 0;             ///< Per pixel, with those of a resumed film; a fraction while a chunk runs.
+    double samples = 0;  ///< Per pixel, with those of a resumed film; a fraction while a chunk runs.
     std::uint64_t target = 0;       ///< Samples per pixel to reach; 0: until the time is up.
     double start_samples = 0;       ///< Per pixel, in the film before this run.
     double elapsed_seconds = 0;     ///< Of this run.
     double time_limit_seconds = 0;  ///< 0: none.
     std::uint64_t pixels = 0;       ///< Of the crop window.
-    std::string label;              ///< Instead of the samples, for work that is not one render. With target 0
-                                    ///< its length is unknown.
+    std::string label;  ///< Instead of the samples, for work that is not one render. With target 0
+                        ///< its length is unknown.
     double target_error = 0;        ///< half_width_95 to stop at; 0: none.
     std::optional<ErrorEstimate> error;  ///< Of the image so far.
 

@@ -1,9 +1,10 @@
-/// The host Scene: what the YAML says, resolved (files read, names looked up, spectra sampled) but still in the author's
-/// units and in double. Plain data without behaviour; scene_yaml.cpp fills it, compile.cpp flattens it.
+/// The host Scene: what the YAML says, resolved (files read, names looked up, spectra sampled) but still in
+/// the author's units and in double. Plain data without behaviour; scene_yaml.cpp fills it, compile.cpp
+/// flattens it.
 #pragma once
 
-#include "scene/aov.h"
 #include "base/error.h"
+#include "scene/aov.h"
 #include "spectra/spectra.h"
 
 #include <array>
@@ -24,11 +25,13 @@ struct Camera {
     Vec3d position{0, 0, 0};
     Vec3d target{0, 0, 1};
     Vec3d up{0, 1, 0};
-    /// Half the image plane's extent at unit distance: tan(fov/2) on the shorter side, or sensor/(2·focal_length).
+    /// Half the image plane's extent at unit distance: tan(fov/2) on the shorter side, or
+    /// sensor/(2·focal_length).
     double tan_half_width = 0.5;
     double tan_half_height = 0.5;
     double aperture_radius = 0;  ///< Scene units; 0 is a pinhole.
-    double focus_distance = 0;   ///< Scene units along the view axis; 0 means distance to target. Only used with an aperture.
+    double focus_distance =
+        0;  ///< Scene units along the view axis; 0 means distance to target. Only used with an aperture.
     SourcePlace place;
 };
 
@@ -37,7 +40,8 @@ enum class PixelFilter { Box, Gaussian, BlackmanHarris };
 struct FilmSettings {
     int width = 512;
     int height = 512;
-    std::array<int, 4> crop{0, 0, 0, 0};  ///< x0, y0, x1, y1, half open, in pixels; all zero means the whole film.
+    std::array<int, 4> crop{0, 0, 0,
+                            0};  ///< x0, y0, x1, y1, half open, in pixels; all zero means the whole film.
     PixelFilter filter = PixelFilter::Box;
     double filter_radius = 0.5;  ///< Pixels. Box .5, gaussian 1.5 and Blackman–Harris 1.5 by default.
     double filter_sigma = 0.5;   ///< Pixels, gaussian only.
@@ -56,7 +60,8 @@ struct IntegratorSettings {
     int roulette_depth = 4;   ///< First scattering event after which Russian roulette may end a path.
     bool roulette = true;
     bool nee = true;          ///< Next event estimation; false is the paper's indirect-only estimator.
-    bool mis = true;          ///< Combines it with scattered rays that meet lights; false: light sampling alone where it can.
+    bool mis = true;  ///< Combines it with scattered rays that meet lights; false: light sampling alone
+                      ///< where it can.
     Accelerator accelerator = Accelerator::Auto;
 };
 
@@ -75,7 +80,7 @@ struct Material {
     std::string name;
     MaterialType type = MaterialType::Diffuse;
     Spectrum reflectance;  ///< Diffuse and Mirror. In [0,1].
-    Spectrum eta;          ///< Conductor: real index n. Dielectric: index of the inside relative to the outside.
+    Spectrum eta;  ///< Conductor: real index n. Dielectric: index of the inside relative to the outside.
     Spectrum k;            ///< Conductor: extinction.
     SourcePlace place;
 };
@@ -85,9 +90,11 @@ struct Mesh {
     std::vector<Vec3d> positions;
     std::vector<Vec3d> normals;                           ///< Empty, or referenced by `normal_index`.
     std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Indices into positions.
-    std::vector<std::array<std::uint32_t, 3>> normal_index;  ///< Empty, or one per triangle; kNoNormal = flat.
-    std::vector<std::int32_t> material;                   ///< Empty, or one index into Scene::materials per triangle.
-    std::vector<std::int32_t> emission;                   ///< Empty, or one index into Scene::emissions per triangle, −1 none.
+    std::vector<std::array<std::uint32_t, 3>>
+        normal_index;                    ///< Empty, or one per triangle; kNoNormal = flat.
+    std::vector<std::int32_t> material;  ///< Empty, or one index into Scene::materials per triangle.
+    std::vector<std::int32_t>
+        emission;  ///< Empty, or one index into Scene::emissions per triangle, −1 none.
 };
 inline constexpr std::uint32_t kNoNormal = 0xffffffffu;
 
@@ -101,8 +108,10 @@ struct Object {
     std::string name;
     std::uint32_t mesh = 0;                    ///< Index into Scene::meshes.
     std::vector<Matrix4d> transforms{kIdentity4d};
-    std::int32_t material = -1;                ///< Index into Scene::materials; used where the mesh has no material of its own.
-    std::int32_t emission = -1;                ///< Index into Scene::emissions, −1 none; used where the mesh has none of its own.
+    std::int32_t material =
+        -1;  ///< Index into Scene::materials; used where the mesh has no material of its own.
+    std::int32_t emission =
+        -1;  ///< Index into Scene::emissions, −1 none; used where the mesh has none of its own.
     SourcePlace place;
 };
 
@@ -138,9 +147,10 @@ struct Scene {
     double parse_seconds = 0;
 };
 
-/// How many independent sequences the samples of a pixel are of (layout.h: CRT_REPLICATES_MAX); 1: the film keeps no sums of replicates. By default as
-/// few as give the image's error a thousand degrees of freedom, since the pixels of a film add theirs up and every further sequence costs
-/// noise. By the whole film, so that the crop window of an image has its bits.
+/// How many independent sequences the samples of a pixel are of (layout.h: CRT_REPLICATES_MAX); 1: the film
+/// keeps no sums of replicates. By default as few as give the image's error a thousand degrees of freedom,
+/// since the pixels of a film add theirs up and every further sequence costs noise. By the whole film, so
+/// that the crop window of an image has its bits.
 inline int replicatesOf(const Scene& scene) {
     if (scene.integrator.type != IntegratorType::Path) return 1;
     if (scene.sampler.replicates != 0) return scene.sampler.replicates;

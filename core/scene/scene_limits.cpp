@@ -36,13 +36,15 @@ std::vector<Light> lightsOf(const Scene& scene) {
     std::map<std::uint32_t, std::set<std::int32_t>> emissions_of;  // By mesh, which many objects may share.
     for (const Object& object : scene.objects) {
         if (object.emission >= 0)
-            add(scene.emissions[static_cast<std::size_t>(object.emission)].radiance.max(), fmt::format("'{}'", object.name), object.place);
+            add(scene.emissions[static_cast<std::size_t>(object.emission)].radiance.max(),
+                fmt::format("'{}'", object.name), object.place);
         const std::vector<std::int32_t>& by_triangle = scene.meshes[object.mesh].emission;
         const auto [known, first] = emissions_of.try_emplace(object.mesh);
         if (first) known->second.insert(by_triangle.begin(), by_triangle.end());
         for (const std::int32_t emission : known->second) {
             if (emission < 0) continue;
-            add(scene.emissions[static_cast<std::size_t>(emission)].radiance.max(), fmt::format("a material (Ke) of '{}'", object.name), object.place);
+            add(scene.emissions[static_cast<std::size_t>(emission)].radiance.max(),
+                fmt::format("a material (Ke) of '{}'", object.name), object.place);
         }
     }
     if (scene.environment) add(scene.environment->radiance.max(), "the environment", {scene.file});
@@ -54,7 +56,9 @@ std::string at(const SourcePlace& place) {
 }
 
 [[noreturn]] void refuse(const Light& light, const std::string& sentence) {
-    throw Error(ErrorKind::Scene, fmt::format("{}: error: {}; multiply all lights by one factor, and the image by its inverse", at(light.place), sentence),
+    throw Error(ErrorKind::Scene,
+                fmt::format("{}: error: {}; multiply all lights by one factor, and the image by its inverse",
+                            at(light.place), sentence),
                 light.place);
 }
 
@@ -69,29 +73,40 @@ ExpansionLimit::ExpansionLimit(std::uint64_t input_bytes) : bytes_(1'500'000'000
     const std::string_view unit = all.substr(static_cast<std::size_t>(end - all.data()));
     const double factor = unit == "MB" ? 1e6 : unit == "GB" ? 1e9 : unit == "TB" ? 1e12 : 0;
     if (problem != std::errc() || !(size > 0) || factor == 0 || size * factor > 1e18)
-        throw Error(ErrorKind::Usage, fmt::format("CRT_SCENE_MEMORY is '{}'; expected a size such as 20GB", all));
+        throw Error(ErrorKind::Usage,
+                    fmt::format("CRT_SCENE_MEMORY is '{}'; expected a size such as 20GB", all));
     bytes_ = static_cast<std::uint64_t>(size * factor);
 }
 
-std::string ExpansionLimit::refusal(std::uint64_t count, const std::string& things, std::uint64_t bytes_each) const {
+std::string ExpansionLimit::refusal(std::uint64_t count, const std::string& things,
+                                    std::uint64_t bytes_each) const {
     const double needed = static_cast<double>(count) * static_cast<double>(bytes_each);
     if (needed <= static_cast<double>(bytes_)) return {};
-    return fmt::format("written out, the scene has {} {}, which take {} of memory, and its files allow {}; set CRT_SCENE_MEMORY={}GB to allow it", count, things,
-                       bytesText(needed), bytesText(static_cast<double>(bytes_)), std::ceil(needed / 1e9));
+    return fmt::format(
+        "written out, the scene has {} {}, which take {} of memory, and its files allow {}; set "
+        "CRT_SCENE_MEMORY={}GB to allow it",
+        count, things, bytesText(needed), bytesText(static_cast<double>(bytes_)), std::ceil(needed / 1e9));
 }
 
 void checkRadiance(const Scene& scene) {
     const std::vector<Light> lights = lightsOf(scene);
     if (lights.empty()) return;
-    const auto [dimmest, brightest] = std::minmax_element(lights.begin(), lights.end(), [](const Light& a, const Light& b) { return a.radiance < b.radiance; });
+    const auto [dimmest, brightest] =
+        std::minmax_element(lights.begin(), lights.end(),
+                            [](const Light& a, const Light& b) { return a.radiance < b.radiance; });
     if (!(brightest->radiance <= kMostRadiance))
-        refuse(*brightest, fmt::format("the radiance of {} reaches {:g}, and single precision carries light up to {:g}", brightest->name,
-                                       brightest->radiance, kMostRadiance));
+        refuse(*brightest,
+               fmt::format("the radiance of {} reaches {:g}, and single precision carries light up to {:g}",
+                           brightest->name, brightest->radiance, kMostRadiance));
     if (brightest->radiance < kLeastRadiance)
-        refuse(*brightest, fmt::format("{} is the brightest light, of radiance {:g}, and single precision carries light from {:g}", brightest->name,
-                                       brightest->radiance, kLeastRadiance));
+        refuse(
+            *brightest,
+            fmt::format(
+                "{} is the brightest light, of radiance {:g}, and single precision carries light from {:g}",
+                brightest->name, brightest->radiance, kLeastRadiance));
     if (dimmest->radiance < static_cast<double>(std::numeric_limits<float>::min()))
-        logWarning("{}: {} has a radiance of {:g}, below single precision: it does not shine", at(dimmest->place), dimmest->name, dimmest->radiance);
+        logWarning("{}: {} has a radiance of {:g}, below single precision: it does not shine",
+                   at(dimmest->place), dimmest->name, dimmest->radiance);
 }
 
 }  // namespace crt

@@ -1,4 +1,5 @@
-/// What a scene may ask for, where the file itself is fine: radiance that single precision carries, and memory in proportion to the files.
+/// What a scene may ask for, where the file itself is fine: radiance that single precision carries, and
+/// memory in proportion to the files.
 #pragma once
 
 #include "scene/scene.h"
@@ -9,24 +10,28 @@
 
 namespace crt {
 
-/// W·m⁻²·sr⁻¹·nm⁻¹. A float goes from 1e-38 to 3e38; what lies between these bounds and those is room for the factors that a path multiplies
-/// radiance by (areas over squared distances, 1/pdf), so that neither a bright sample becomes infinite nor a dim one zero.
+/// W·m⁻²·sr⁻¹·nm⁻¹. A float goes from 1e-38 to 3e38; what lies between these bounds and those is room for
+/// the factors that a path multiplies radiance by (areas over squared distances, 1/pdf), so that neither a
+/// bright sample becomes infinite nor a dim one zero.
 inline constexpr double kMostRadiance = 1e25;
 inline constexpr double kLeastRadiance = 1e-25;
 
-/// Throws crt::Error(Scene), with the place, when a light of the scene is above kMostRadiance or the brightest is below kLeastRadiance: the image
-/// would be wrong or black without a word. Warns of a lamp that is too dim beside others to shine at all.
+/// Throws crt::Error(Scene), with the place, when a light of the scene is above kMostRadiance or the
+/// brightest is below kLeastRadiance: the image would be wrong or black without a word. Warns of a lamp that
+/// is too dim beside others to shine at all.
 void checkRadiance(const Scene& scene);
 
-/// How much memory a scene may take that its files do not show: placements, aliases and polygons written out. 1.5 GB, and 50 bytes for each byte of its
-/// files, so that a large model is never refused for its size alone; or what the environment variable CRT_SCENE_MEMORY says ("20GB").
+/// How much memory a scene may take that its files do not show: placements, aliases and polygons written
+/// out. 1.5 GB, and 50 bytes for each byte of its files, so that a large model is never refused for its size
+/// alone; or what the environment variable CRT_SCENE_MEMORY says ("20GB").
 class ExpansionLimit {
 public:
     /// Throws crt::Error(Usage) when CRT_SCENE_MEMORY is no size.
     explicit ExpansionLimit(std::uint64_t input_bytes);
 
     std::uint64_t bytes() const { return bytes_; }
-    /// Why `count` of `things` are too many, with what they would take and how to allow it; empty when they are not.
+    /// Why `count` of `things` are too many, with what they would take and how to allow it; empty when they
+    /// are not.
     std::string refusal(std::uint64_t count, const std::string& things, std::uint64_t bytes_each) const;
 
 private:

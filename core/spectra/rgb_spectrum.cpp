@@ -1,7 +1,8 @@
-/// RGB → smooth spectrum. W. Jakob and J. Hanika, "A Low-Dimensional Function Space for Efficient Spectral Upsampling",
-/// Computer Graphics Forum 38(2), 2019: a reflectance is the sigmoid of a quadratic in wavelength, which is smooth and
-/// cannot leave (0,1). The paper tabulates the three coefficients over the RGB cube; a scene has a handful of colours, so
-/// here they are solved for when the scene is read, to the last digit and without a table to ship.
+/// RGB → smooth spectrum. W. Jakob and J. Hanika, "A Low-Dimensional Function Space for Efficient Spectral
+/// Upsampling", Computer Graphics Forum 38(2), 2019: a reflectance is the sigmoid of a quadratic in
+/// wavelength, which is smooth and cannot leave (0,1). The paper tabulates the three coefficients over the
+/// RGB cube; a scene has a handful of colours, so here they are solved for when the scene is read, to the
+/// last digit and without a table to ship.
 #include "base/error.h"
 #include "spectra/spectra.h"
 
@@ -26,9 +27,11 @@ double sigmoidSlope(double x) {
 
 double inverseSigmoid(double y) { return (y - 0.5) / std::sqrt(y * (1.0 - y)); }
 
-/// Wavelength mapped to [-1,1]: the quadratic's coefficients are then of similar size and the normal matrix is well
-/// conditioned.
-double normalisedWavelength(std::size_t i) { return 2.0 * static_cast<double>(i) / (kSpectrumSize - 1) - 1.0; }
+/// Wavelength mapped to [-1,1]: the quadratic's coefficients are then of similar size and the normal matrix
+/// is well conditioned.
+double normalisedWavelength(std::size_t i) {
+    return 2.0 * static_cast<double>(i) / (kSpectrumSize - 1) - 1.0;
+}
 
 Spectrum sigmoidSpectrum(const Vec3d& c) {
     Spectrum s;
@@ -39,9 +42,9 @@ Spectrum sigmoidSpectrum(const Vec3d& c) {
     return s;
 }
 
-/// How much each wavelength of a reflectance under D65 adds to linear sRGB. Each channel sums to exactly what white gives,
-/// 1, also where the tabulated D65 and the rounded white point of sRGB differ in the fourth digit; so greys are constants
-/// and colours close to grey are close to constants.
+/// How much each wavelength of a reflectance under D65 adds to linear sRGB. Each channel sums to exactly
+/// what white gives, 1, also where the tabulated D65 and the rounded white point of sRGB differ in the
+/// fourth digit; so greys are constants and colours close to grey are close to constants.
 const std::array<Spectrum, 3>& rgbWeights() {
     static const std::array<Spectrum, 3> weights = [] {
         const Spectrum d65 = *illuminantSpectrum("D65");
@@ -50,7 +53,8 @@ const std::array<Spectrum, 3>& rgbWeights() {
         for (int channel = 0; channel < 3; ++channel) {
             double sum = 0.0;
             for (std::size_t i = 0; i < d65.values.size(); ++i) {
-                for (int j = 0; j < 3; ++j) w[channel][i] += to_rgb[channel][j] * cieObserver()[j][i] * d65[i];
+                for (int j = 0; j < 3; ++j)
+                    w[channel][i] += to_rgb[channel][j] * cieObserver()[j][i] * d65[i];
                 sum += w[channel][i];
             }
             for (double& v : w[channel].values) v /= sum;
@@ -88,7 +92,8 @@ Residual evaluate(const Vec3d& c, const Vec3d& rgb) {
     return r;
 }
 
-/// Solves the symmetric positive definite 3×3 system A x = b by Cholesky; false when A is not numerically definite.
+/// Solves the symmetric positive definite 3×3 system A x = b by Cholesky; false when A is not numerically
+/// definite.
 bool solve(Matrix3d A, const Vec3d& b, Vec3d& x) {
     for (int j = 0; j < 3; ++j) {
         for (int k = 0; k < j; ++k) A[j][j] -= A[j][k] * A[j][k];
@@ -111,8 +116,8 @@ bool solve(Matrix3d A, const Vec3d& b, Vec3d& x) {
     return true;
 }
 
-/// Gauss–Newton from `c`, with Levenberg–Marquardt damping because at the faces of the RGB cube the sigmoid saturates and
-/// a bare step would leave for infinity. Returns the squared error reached.
+/// Gauss–Newton from `c`, with Levenberg–Marquardt damping because at the faces of the RGB cube the sigmoid
+/// saturates and a bare step would leave for infinity. Returns the squared error reached.
 double fit(Vec3d& c, const Vec3d& rgb) {
     constexpr int kMaxSteps = 400;
     const double good_enough = 1e-24 * *std::max_element(rgb.begin(), rgb.end());
@@ -152,14 +157,18 @@ double fit(Vec3d& c, const Vec3d& rgb) {
 Spectrum rgbReflectance(const Vec3d& linear_srgb) {
     for (const double v : linear_srgb)
         if (!(v >= 0.0 && v <= 1.0))
-            throw Error(ErrorKind::Scene, fmt::format("a reflectance colour must lie in [0, 1], not [{}, {}, {}]", linear_srgb[0],
-                                                      linear_srgb[1], linear_srgb[2]));
-    if (linear_srgb[0] == linear_srgb[1] && linear_srgb[1] == linear_srgb[2]) return constantSpectrum(linear_srgb[0]);
+            throw Error(ErrorKind::Scene,
+                        fmt::format("a reflectance colour must lie in [0, 1], not [{}, {}, {}]",
+                                    linear_srgb[0], linear_srgb[1], linear_srgb[2]));
+    if (linear_srgb[0] == linear_srgb[1] && linear_srgb[1] == linear_srgb[2])
+        return constantSpectrum(linear_srgb[0]);
 
-    // Walk from the grey of the same mean to the colour: every fit starts close to its solution, so that the corners of
-    // the cube are reached without falling into the flat regions where all of the spectrum is saturated.
+    // Walk from the grey of the same mean to the colour: every fit starts close to its solution, so that the
+    // corners of the cube are reached without falling into the flat regions where all of the spectrum is
+    // saturated.
     constexpr int kWalk = 8;
-    const double grey = std::clamp((linear_srgb[0] + linear_srgb[1] + linear_srgb[2]) / 3.0, 1e-9, 1.0 - 1e-6);
+    const double grey =
+        std::clamp((linear_srgb[0] + linear_srgb[1] + linear_srgb[2]) / 3.0, 1e-9, 1.0 - 1e-6);
     Vec3d c{inverseSigmoid(grey), 0, 0};
     for (int step = 1; step <= kWalk; ++step) {
         const double along = static_cast<double>(step) / kWalk;
@@ -173,9 +182,11 @@ Spectrum rgbReflectance(const Vec3d& linear_srgb) {
 Spectrum rgbEmission(const Vec3d& linear_srgb) {
     for (const double v : linear_srgb)
         if (!(v >= 0.0) || !std::isfinite(v))
-            throw Error(ErrorKind::Scene, fmt::format("an emission colour must be finite and not negative, not [{}, {}, {}]",
-                                                      linear_srgb[0], linear_srgb[1], linear_srgb[2]));
-    // Half of the range: the sigmoid is smoothest there, and a light has no upper bound that would ask for more.
+            throw Error(ErrorKind::Scene,
+                        fmt::format("an emission colour must be finite and not negative, not [{}, {}, {}]",
+                                    linear_srgb[0], linear_srgb[1], linear_srgb[2]));
+    // Half of the range: the sigmoid is smoothest there, and a light has no upper bound that would ask for
+    // more.
     const double scale = 2.0 * *std::max_element(linear_srgb.begin(), linear_srgb.end());
     if (scale == 0.0) return constantSpectrum(0.0);
     Spectrum s = rgbReflectance({linear_srgb[0] / scale, linear_srgb[1] / scale, linear_srgb[2] / scale});

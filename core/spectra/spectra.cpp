@@ -14,9 +14,12 @@
 namespace crt {
 namespace {
 
-double wavelengthAt(std::size_t i) { return static_cast<double>(kWavelengthMin_nm) + static_cast<double>(i); }
+double wavelengthAt(std::size_t i) {
+    return static_cast<double>(kWavelengthMin_nm) + static_cast<double>(i);
+}
 
-/// Piecewise linear through (x, y); beyond the ends the end value or zero. `x` increases strictly and is not empty.
+/// Piecewise linear through (x, y); beyond the ends the end value or zero. `x` increases strictly and is not
+/// empty.
 Spectrum resample(const std::vector<double>& x, const std::vector<double>& y, Outside outside) {
     Spectrum s;
     std::size_t right = 0;  // First knot at or beyond the wavelength; only moves forward.
@@ -68,11 +71,12 @@ bool stepsAt(double nm, const std::vector<double>& x, const std::vector<double>&
     return (nm == x.front() && y.front() != 0) || (nm == x.back() && y.back() != 0);
 }
 
-/// Where a table has knots between two nanometres, reading it off at the nanometres would lose or invent lines that are narrower than
-/// that; and where it ends on a nanometre with a step to zero, the step would become a ramp of a nanometre
-/// and add half of it. In such cells each node gets ∫ f·(its share of the linear interpolation) instead, so
-/// that integral and mean wavelength are the table's. A cell without inner knots and steps is linear already
-/// and keeps its values; nothing leaves the range of the table's values and zero.
+/// Where a table has knots between two nanometres, reading it off at the nanometres would lose or invent
+/// lines that are narrower than that; and where it ends on a nanometre with a step to zero, the step would
+/// become a ramp of a nanometre and add half of it. In such cells each node gets ∫ f·(its share of the
+/// linear interpolation) instead, so that integral and mean wavelength are the table's. A cell without inner
+/// knots and steps is linear already and keeps its values; nothing leaves the range of the table's values
+/// and zero.
 void conserveIntegral(const std::vector<double>& x, const std::vector<double>& y, Outside outside,
                       Spectrum& s) {
     const Spectrum read_off = s;
@@ -174,20 +178,27 @@ Spectrum constantSpectrum(double value) {
     return s;
 }
 
-Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vector<double>& value, Outside outside) {
+Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vector<double>& value,
+                       Outside outside) {
     if (wavelength_nm.size() != value.size())
-        fail(fmt::format("a spectrum table has {} wavelengths but {} values", wavelength_nm.size(), value.size()));
+        fail(fmt::format("a spectrum table has {} wavelengths but {} values", wavelength_nm.size(),
+                         value.size()));
     if (wavelength_nm.empty()) fail("a spectrum table is empty");
     for (std::size_t i = 0; i < value.size(); ++i) {
-        if (!std::isfinite(wavelength_nm[i])) fail(fmt::format("wavelength {} of a spectrum table is not finite", i + 1));
-        if (!std::isfinite(value[i])) fail(fmt::format("the value at {} nm of a spectrum table is not finite", wavelength_nm[i]));
+        if (!std::isfinite(wavelength_nm[i]))
+            fail(fmt::format("wavelength {} of a spectrum table is not finite", i + 1));
+        if (!std::isfinite(value[i]))
+            fail(fmt::format("the value at {} nm of a spectrum table is not finite", wavelength_nm[i]));
         if (i > 0 && !(wavelength_nm[i] > wavelength_nm[i - 1]))
-            fail(fmt::format("wavelengths of a spectrum table must increase, but {} nm follows {} nm", wavelength_nm[i],
-                             wavelength_nm[i - 1]));
+            fail(fmt::format("wavelengths of a spectrum table must increase, but {} nm follows {} nm",
+                             wavelength_nm[i], wavelength_nm[i - 1]));
     }
-    if (outside == Outside::Error && (wavelength_nm.front() > kWavelengthMin_nm || wavelength_nm.back() < kWavelengthMax_nm))
-        fail(fmt::format("a spectrum table covers {} to {} nm, not all of {} to {} nm; say 'outside: clamp' or 'outside: zero'",
-                         wavelength_nm.front(), wavelength_nm.back(), kWavelengthMin_nm, kWavelengthMax_nm));
+    if (outside == Outside::Error &&
+        (wavelength_nm.front() > kWavelengthMin_nm || wavelength_nm.back() < kWavelengthMax_nm))
+        fail(
+            fmt::format("a spectrum table covers {} to {} nm, not all of {} to {} nm; say 'outside: clamp' "
+                        "or 'outside: zero'",
+                        wavelength_nm.front(), wavelength_nm.back(), kWavelengthMin_nm, kWavelengthMax_nm));
     if (outside == Outside::Zero && wavelength_nm.size() == 1)
         fail(fmt::format(
             "a spectrum table of one wavelength with 'outside: zero' is zero everywhere, because {} nm "
@@ -208,7 +219,8 @@ Spectrum readSpectrumFile(const std::string& path, Outside outside) {
 
     std::vector<double> wavelength, value;
     std::string_view rest = text;
-    if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);  // Spreadsheets like to write a byte-order mark.
+    if (rest.starts_with("\xEF\xBB\xBF"))
+        rest.remove_prefix(3);  // Spreadsheets like to write a byte-order mark.
     bool header_allowed = true;
     for (int line_number = 1; !rest.empty(); ++line_number) {
         const std::size_t newline = std::min(rest.find('\n'), rest.size());
@@ -219,7 +231,8 @@ Spectrum readSpectrumFile(const std::string& path, Outside outside) {
         const SourcePlace place{path, line_number};
         double w = 0, v = 0;
         if (!parseNumber(fields[0], w)) {
-            if (!header_allowed) fail(fmt::format("expected a wavelength in nm, found '{}'", fields[0]), place);
+            if (!header_allowed)
+                fail(fmt::format("expected a wavelength in nm, found '{}'", fields[0]), place);
             header_allowed = false;
             continue;
         }
@@ -230,7 +243,8 @@ Spectrum readSpectrumFile(const std::string& path, Outside outside) {
         if (!parseNumber(fields[1], v)) fail(fmt::format("expected a number, found '{}'", fields[1]), place);
         if (!std::isfinite(w) || !std::isfinite(v)) fail("wavelength and value must be finite", place);
         if (!wavelength.empty() && !(w > wavelength.back()))
-            fail(fmt::format("wavelengths must increase, but {} nm follows {} nm", w, wavelength.back()), place);
+            fail(fmt::format("wavelengths must increase, but {} nm follows {} nm", w, wavelength.back()),
+                 place);
         wavelength.push_back(w);
         value.push_back(v);
     }
@@ -251,13 +265,14 @@ Spectrum blackbodySpectrum(double temperature_K, bool normalise) {
     constexpr double kLight = 299792458.0;         // m s⁻¹
     constexpr double kBoltzmann = 1.380649e-23;    // J K⁻¹
     constexpr double kPerMetreToPerNanometre = 1e-9;
-    // Logarithms, because a cold body's radiance underflows while its shape, which is what `normalise` asks for, does not.
+    // Logarithms, because a cold body's radiance underflows while its shape, which is what `normalise` asks
+    // for, does not.
     Spectrum s;
     for (std::size_t i = 0; i < s.values.size(); ++i) {
         const double metres = wavelengthAt(i) * 1e-9;
         const double x = kPlanck * kLight / (metres * kBoltzmann * temperature_K);
-        s[i] = std::log(2.0 * kPlanck * kLight * kLight * kPerMetreToPerNanometre) - 5.0 * std::log(metres) - x -
-               std::log(-std::expm1(-x));
+        s[i] = std::log(2.0 * kPlanck * kLight * kLight * kPerMetreToPerNanometre) - 5.0 * std::log(metres) -
+               x - std::log(-std::expm1(-x));
     }
     const double shift = normalise ? s.max() : 0.0;
     for (double& v : s.values) v = std::exp(v - shift);
@@ -268,8 +283,10 @@ std::optional<Spectrum> illuminantSpectrum(std::string_view name) {
     for (const data::Illuminant& lamp : data::kIlluminants) {
         if (lamp.name != name) continue;
         std::vector<double> wavelength(lamp.power.size());
-        for (std::size_t i = 0; i < wavelength.size(); ++i) wavelength[i] = lamp.first_nm + static_cast<double>(i) * lamp.step_nm;
-        return luminanceNormalised(resample(wavelength, {lamp.power.begin(), lamp.power.end()}, Outside::Zero));
+        for (std::size_t i = 0; i < wavelength.size(); ++i)
+            wavelength[i] = lamp.first_nm + static_cast<double>(i) * lamp.step_nm;
+        return luminanceNormalised(
+            resample(wavelength, {lamp.power.begin(), lamp.power.end()}, Outside::Zero));
     }
     return std::nullopt;
 }
@@ -307,8 +324,10 @@ Spectrum sellmeierIndex(const std::array<double, 3>& B, const std::array<double,
         for (std::size_t t = 0; t < B.size(); ++t)
             if (B[t] != 0.0) n2 += B[t] * um * um / (um * um - C_um2[t]);
         if (!std::isfinite(n2) || n2 <= 0.0)
-            fail(fmt::format("these Sellmeier coefficients give n² = {:.4g} at {} nm; n² must be positive from {} to {} nm", n2,
-                             wavelengthAt(i), kWavelengthMin_nm, kWavelengthMax_nm));
+            fail(
+                fmt::format("these Sellmeier coefficients give n² = {:.4g} at {} nm; n² must be positive "
+                            "from {} to {} nm",
+                            n2, wavelengthAt(i), kWavelengthMin_nm, kWavelengthMax_nm));
         s[i] = std::sqrt(n2);
     }
     return s;
@@ -322,8 +341,9 @@ Spectrum cauchyIndex(const std::vector<double>& coefficients_um) {
         double n = 0.0;  // Horner in 1/λ².
         for (auto c = coefficients_um.rbegin(); c != coefficients_um.rend(); ++c) n = n / (um * um) + *c;
         if (!std::isfinite(n) || n <= 0.0)
-            fail(fmt::format("these Cauchy coefficients give n = {:.4g} at {} nm; n must be positive from {} to {} nm", n,
-                             wavelengthAt(i), kWavelengthMin_nm, kWavelengthMax_nm));
+            fail(fmt::format(
+                "these Cauchy coefficients give n = {:.4g} at {} nm; n must be positive from {} to {} nm", n,
+                wavelengthAt(i), kWavelengthMin_nm, kWavelengthMax_nm));
         s[i] = n;
     }
     return s;
@@ -335,7 +355,8 @@ std::optional<std::pair<Spectrum, Spectrum>> metalIndex(std::string_view name) {
         if (metal.symbol != name && metal.name != name) continue;
         std::vector<double> wavelength(data::kMetalSize);
         for (std::size_t i = 0; i < wavelength.size(); ++i)
-            wavelength[i] = kElectronVoltNanometre / (data::kMetalFirst_eV - data::kMetalStep_eV * static_cast<double>(i));
+            wavelength[i] = kElectronVoltNanometre /
+                            (data::kMetalFirst_eV - data::kMetalStep_eV * static_cast<double>(i));
         return std::pair{resample(wavelength, {metal.n.begin(), metal.n.end()}, Outside::Clamp),
                          resample(wavelength, {metal.k.begin(), metal.k.end()}, Outside::Clamp)};
     }
@@ -362,7 +383,8 @@ double linearToSrgb(double linear) {
 
 const std::array<Spectrum, 3>& cieObserver() {
     static_assert(data::kObserverSize == kSpectrumSize);
-    static const std::array<Spectrum, 3> observer{Spectrum{data::kCieX}, Spectrum{data::kCieY}, Spectrum{data::kCieZ}};
+    static const std::array<Spectrum, 3> observer{Spectrum{data::kCieX}, Spectrum{data::kCieY},
+                                                  Spectrum{data::kCieZ}};
     return observer;
 }
 
@@ -388,8 +410,10 @@ Vec3d spectrumToXyz(const Spectrum& radiance) {
 
 std::array<double, 8> chromaticities(ColorSpace space) {
     switch (space) {
-        case ColorSpace::LinearSrgb: return {0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290};  // ITU-R BT.709
-        case ColorSpace::AcesCg: return {0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767};  // AMPAS S-2014-004
+        case ColorSpace::LinearSrgb:
+            return {0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290};  // ITU-R BT.709
+        case ColorSpace::AcesCg:
+            return {0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767};  // AMPAS S-2014-004
         case ColorSpace::Xyz: break;
     }
     return {1, 0, 0, 1, 0, 0, 1.0 / 3.0, 1.0 / 3.0};
@@ -400,7 +424,8 @@ Matrix3d xyzToRgb(ColorSpace space) {
     switch (space) {
         case ColorSpace::LinearSrgb: return inverse(rgbToXyz(c));
         case ColorSpace::AcesCg:
-            return multiply(inverse(rgbToXyz(c)), bradfordAdaptation(d65WhiteXyz(), xyzFromChromaticity(c[6], c[7])));
+            return multiply(inverse(rgbToXyz(c)),
+                            bradfordAdaptation(d65WhiteXyz(), xyzFromChromaticity(c[6], c[7])));
         case ColorSpace::Xyz: break;
     }
     return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
@@ -408,7 +433,8 @@ Matrix3d xyzToRgb(ColorSpace space) {
 
 Matrix3d bradfordAdaptation(const Vec3d& from_white_xyz, const Vec3d& to_white_xyz) {
     // Lam 1985, as in the ICC profile specification, annex E.
-    constexpr Matrix3d kCone{{{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
+    constexpr Matrix3d kCone{
+        {{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
     const Vec3d from = multiply(kCone, from_white_xyz);
     const Vec3d to = multiply(kCone, to_white_xyz);
     Matrix3d scaled = kCone;

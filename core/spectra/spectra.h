@@ -1,5 +1,6 @@
-/// Spectra and colour on the host, in double: tables, named data, up-sampling from RGB, the CIE 1931 observer, and the
-/// matrices between XYZ and output colour spaces. The measured numbers live in spectra_data.cpp with their sources.
+/// Spectra and colour on the host, in double: tables, named data, up-sampling from RGB, the CIE 1931
+/// observer, and the matrices between XYZ and output colour spaces. The measured numbers live in
+/// spectra_data.cpp with their sources.
 #pragma once
 
 #include "base/vec3d.h"
@@ -17,12 +18,14 @@ namespace crt {
 
 inline constexpr int kWavelengthMin_nm = 360;
 inline constexpr int kWavelengthMax_nm = 830;
-inline constexpr int kSpectrumSize = kWavelengthMax_nm - kWavelengthMin_nm + 1;  ///< 471 values, one a nanometre.
+inline constexpr int kSpectrumSize =
+    kWavelengthMax_nm - kWavelengthMin_nm + 1;  ///< 471 values, one a nanometre.
 
 using Matrix3d = std::array<Vec3d, 3>;  ///< Rows.
 
-/// The samples of a spectrum. Copies share them until one of them is changed: scenes hold each spectrum several times, and some hold a hundred
-/// thousand. As with the containers of std, different objects may be used by different threads.
+/// The samples of a spectrum. Copies share them until one of them is changed: scenes hold each spectrum
+/// several times, and some hold a hundred thousand. As with the containers of std, different objects may be
+/// used by different threads.
 class SpectrumValues {
 public:
     using Array = std::array<double, kSpectrumSize>;
@@ -47,8 +50,12 @@ public:
     Array::iterator end() { return own().end(); }
     void fill(double value) { own().fill(value); }
 
-    bool operator==(const SpectrumValues& other) const { return shared_ == other.shared_ || *shared_ == *other.shared_; }
-    bool operator<(const SpectrumValues& other) const { return shared_ != other.shared_ && *shared_ < *other.shared_; }
+    bool operator==(const SpectrumValues& other) const {
+        return shared_ == other.shared_ || *shared_ == *other.shared_;
+    }
+    bool operator<(const SpectrumValues& other) const {
+        return shared_ != other.shared_ && *shared_ < *other.shared_;
+    }
 
 private:
     static const std::shared_ptr<Array>& zeros() {
@@ -63,8 +70,8 @@ private:
     std::shared_ptr<Array> shared_;
 };
 
-/// A function of wavelength, sampled at 360, 361, … 830 nm and linear between. Everything a scene names as a spectrum
-/// is resolved to this at load.
+/// A function of wavelength, sampled at 360, 361, … 830 nm and linear between. Everything a scene names as a
+/// spectrum is resolved to this at load.
 struct Spectrum {
     SpectrumValues values;
 
@@ -87,18 +94,19 @@ Spectrum constantSpectrum(double value);
 /// not strictly increasing, lengths differ, the table is empty, a value is not finite, `outside` is Error
 /// and 360–830 nm is not covered, or `outside` is Zero and there is one wavelength alone, which has no
 /// width.
-Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vector<double>& value, Outside outside);
+Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vector<double>& value,
+                       Outside outside);
 
-/// Reads two-column .spd or .csv text (wavelength_nm, value; '#' comments; separators blank, tab, comma, semicolon; an
-/// optional header line). Errors carry file:line.
+/// Reads two-column .spd or .csv text (wavelength_nm, value; '#' comments; separators blank, tab, comma,
+/// semicolon; an optional header line). Errors carry file:line.
 Spectrum readSpectrumFile(const std::string& path, Outside outside);
 
-/// Planck's law for temperature_K, normalised to 1 at its maximum within 360–830 nm when `normalise`, otherwise in
-/// W·m⁻²·sr⁻¹·nm⁻¹ (CODATA 2018 h, c, k).
+/// Planck's law for temperature_K, normalised to 1 at its maximum within 360–830 nm when `normalise`,
+/// otherwise in W·m⁻²·sr⁻¹·nm⁻¹ (CODATA 2018 h, c, k).
 Spectrum blackbodySpectrum(double temperature_K, bool normalise);
 
-/// CIE illuminant "A", "D50", "D65", "F2", "F7" or "F11", relative power scaled so that its luminance ∫S·ȳ/∫ȳ is 1.
-/// Empty when the name is unknown; illuminantNames() lists the known ones.
+/// CIE illuminant "A", "D50", "D65", "F2", "F7" or "F11", relative power scaled so that its luminance
+/// ∫S·ȳ/∫ȳ is 1. Empty when the name is unknown; illuminantNames() lists the known ones.
 std::optional<Spectrum> illuminantSpectrum(std::string_view name);
 const std::vector<std::string>& illuminantNames();
 
@@ -110,15 +118,18 @@ Spectrum sellmeierIndex(const std::array<double, 3>& B, const std::array<double,
 /// n(λ) by Cauchy: n = A + B/λ² + …, λ in µm.
 Spectrum cauchyIndex(const std::vector<double>& coefficients_um);
 
-/// Complex refractive index (n, k) of a named metal: "Ag", "Al", "Au", "Cu" (or silver, aluminium, gold, copper).
+/// Complex refractive index (n, k) of a named metal: "Ag", "Al", "Au", "Cu" (or silver, aluminium, gold,
+/// copper).
 std::optional<std::pair<Spectrum, Spectrum>> metalIndex(std::string_view name);
 const std::vector<std::string>& metalNames();
 
-/// Smooth spectrum for a linear sRGB colour in [0,1] used as reflectance, by Jakob and Hanika 2019 ("A Low-Dimensional
-/// Function Space for Efficient Spectral Upsampling"): sigmoid of a quadratic, coefficients found by Gauss–Newton at load.
-/// The result under D65 gives back the colour; values stay within (0,1). Components outside [0,1] throw crt::Error(Scene).
+/// Smooth spectrum for a linear sRGB colour in [0,1] used as reflectance, by Jakob and Hanika 2019 ("A
+/// Low-Dimensional Function Space for Efficient Spectral Upsampling"): sigmoid of a quadratic, coefficients
+/// found by Gauss–Newton at load. The result under D65 gives back the colour; values stay within (0,1).
+/// Components outside [0,1] throw crt::Error(Scene).
 Spectrum rgbReflectance(const Vec3d& linear_srgb);
-/// The same for an unbounded emission colour: rgbReflectance(rgb / (2·max)) · 2·max · D65 (luminance-normalised).
+/// The same for an unbounded emission colour: rgbReflectance(rgb / (2·max)) · 2·max · D65
+/// (luminance-normalised).
 Spectrum rgbEmission(const Vec3d& linear_srgb);
 /// sRGB-encoded component in [0,1] to linear, IEC 61966-2-1.
 double srgbToLinear(double encoded);
@@ -132,8 +143,9 @@ Vec3d spectrumToXyz(const Spectrum& radiance);
 
 /// Output colour spaces.
 enum class ColorSpace { LinearSrgb, AcesCg, Xyz };
-/// Matrix from CIE XYZ (Y=1 scale) to the linear RGB of the space; identity for Xyz. No chromatic adaptation except what the
-/// space's white needs by definition (ACEScg is taken with its own ~D60 white, Bradford-adapted from D65).
+/// Matrix from CIE XYZ (Y=1 scale) to the linear RGB of the space; identity for Xyz. No chromatic adaptation
+/// except what the space's white needs by definition (ACEScg is taken with its own ~D60 white,
+/// Bradford-adapted from D65).
 Matrix3d xyzToRgb(ColorSpace space);
 /// {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy} for the EXR chromaticities attribute.
 std::array<double, 8> chromaticities(ColorSpace space);

@@ -31,7 +31,8 @@ struct Glass {
 extern const std::array<Glass, 7> kGlasses;
 
 inline constexpr int kMetalSize = 56;
-inline constexpr double kMetalFirst_eV = 4.15;  ///< Photon energy of the first sample; the rest follow downwards.
+inline constexpr double kMetalFirst_eV =
+    4.15;  ///< Photon energy of the first sample; the rest follow downwards.
 inline constexpr double kMetalStep_eV = 0.05;
 
 /// Complex refractive index n + ik at kMetalFirst_eV, kMetalFirst_eV − kMetalStep_eV, …

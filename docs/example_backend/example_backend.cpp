@@ -1,5 +1,6 @@
-// A complete crt backend in one file: the light transport of kernel/path.h compiled as plain C++ and run pixel by pixel on one thread.
-// It gives the same bits as every other backend, only slowly. Copy it to begin your own.
+// A complete crt backend in one file: the light transport of kernel/path.h compiled as plain C++ and run
+// pixel by pixel on one thread. It gives the same bits as every other backend, only slowly. Copy it to begin
+// your own.
 #include "backend/sdk/plugin_guard.h"
 #include "kernel/path.h"
 
@@ -9,9 +10,11 @@ namespace {
 
 using crt::plugin::Host;
 
-// What `crt plugins` lists. A backend that finds nothing to run on throws crt::plugin::PluginError(CRT_NO_DEVICE, "why").
+// What `crt plugins` lists. A backend that finds nothing to run on throws
+// crt::plugin::PluginError(CRT_NO_DEVICE, "why").
 std::vector<CrtDevice> listDevices(const Host&) {
-    // The score decides between devices and tells how much is to be expected: a CPU about its number of threads.
+    // The score decides between devices and tells how much is to be expected: a CPU about its number of
+    // threads.
     return {crt::plugin::makeDevice(0, "portable C++, one thread", "", 0, 1.0)};
 }
 
@@ -21,7 +24,8 @@ public:
     ExampleIntegrator(const Host& host, const CrtCreateInfo& info)
         : host_(host), device_(crt::plugin::chooseDevice(listDevices(host), info.device)) {}
 
-    // The scene is one block of bytes without pointers: copied as it is, or uploaded to a device in one go. Film and report begin anew.
+    // The scene is one block of bytes without pointers: copied as it is, or uploaded to a device in one go.
+    // Film and report begin anew.
     void setScene(const CrtSceneBlob& scene) {
         scene_.resize((scene.size_bytes + sizeof(Block) - 1) / sizeof(Block));
         std::memcpy(scene_.data(), scene.data, scene.size_bytes);
@@ -33,8 +37,8 @@ public:
         seconds_ = 0;
     }
 
-    // Adds samples to the film. In which order, on how many threads, in what pieces: that is the backend's own affair, because the value
-    // of a sample depends on the scene, the pixel and its number alone.
+    // Adds samples to the film. In which order, on how many threads, in what pieces: that is the backend's
+    // own affair, because the value of a sample depends on the scene, the pixel and its number alone.
     bool render(const CrtRenderRange& range) {
         const auto start = std::chrono::steady_clock::now();
         const crt::kernel::CrtContext context{blob(), &header()};
@@ -43,9 +47,11 @@ public:
             for (std::uint32_t x = range.x0; x < range.x1; ++x) {
                 // The kernel counts the rays of one call in 32 bits.
                 for (std::uint64_t done = 0; done < range.sample_count;) {
-                    const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(range.sample_count - done, 1u << 16));
+                    const auto count = static_cast<std::uint32_t>(
+                        std::min<std::uint64_t>(range.sample_count - done, 1u << 16));
                     crt::kernel::CrtRayCount rays{};
-                    crt::kernel::crt_render_pixel(&context, x, y, range.first_sample + done, count, sums_.data(), counts_.data(),
+                    crt::kernel::crt_render_pixel(&context, x, y, range.first_sample + done, count,
+                                                  sums_.data(), counts_.data(),
                                                   primitives_.empty() ? nullptr : primitives_.data(), &rays);
                     closest_rays_ += rays.closest;
                     shadow_rays_ += rays.shadow;
@@ -81,7 +87,9 @@ private:
     };
 
     const unsigned char* blob() const { return reinterpret_cast<const unsigned char*>(scene_.data()); }
-    const crt::kernel::CrtScene& header() const { return *reinterpret_cast<const crt::kernel::CrtScene*>(blob()); }
+    const crt::kernel::CrtScene& header() const {
+        return *reinterpret_cast<const crt::kernel::CrtScene*>(blob());
+    }
 
     Host host_;
     CrtDevice device_;

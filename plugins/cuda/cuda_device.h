@@ -1,7 +1,8 @@
-/// The CUDA driver, found at run time, and its devices: listing, judging and choosing them, and what every other file here speaks of it.
+/// The CUDA driver, found at run time, and its devices: listing, judging and choosing them, and what every
+/// other file here speaks of it.
 ///
-/// Nothing is linked: libcuda.so.1 belongs to the display driver, and a plugin that needs it to load could not say that it is missing
-/// (docs/decisions/0006-cuda-driver-api.md).
+/// Nothing is linked: libcuda.so.1 belongs to the display driver, and a plugin that needs it to load could
+/// not say that it is missing (docs/decisions/0006-cuda-driver-api.md).
 #pragma once
 
 #include "backend/crt_backend.h"
@@ -16,14 +17,16 @@
 
 namespace crt::cuda {
 
-// cuda.h turns some of these names into versioned ones (cuMemAlloc into cuMemAlloc_v2), here and wherever they are called.
-#define CRT_CUDA_DRIVER_FUNCTIONS(F)                                                                                                \
-    F(cuInit) F(cuDriverGetVersion) F(cuGetErrorName) F(cuGetErrorString)                                                           \
-    F(cuDeviceGetCount) F(cuDeviceGet) F(cuDeviceGetName) F(cuDeviceGetAttribute) F(cuDeviceTotalMem)                               \
-    F(cuDevicePrimaryCtxRetain) F(cuDevicePrimaryCtxRelease) F(cuCtxSetCurrent)                                                     \
-    F(cuModuleLoadData) F(cuModuleUnload) F(cuModuleGetFunction)                                                                    \
-    F(cuFuncGetAttribute) F(cuFuncSetCacheConfig) F(cuOccupancyMaxActiveBlocksPerMultiprocessor) F(cuLaunchKernel)                  \
-    F(cuMemAlloc) F(cuMemFree) F(cuMemGetInfo) F(cuMemcpyHtoD) F(cuMemcpyDtoH) F(cuMemsetD8)                       \
+// cuda.h turns some of these names into versioned ones (cuMemAlloc into cuMemAlloc_v2), here and wherever
+// they are called.
+#define CRT_CUDA_DRIVER_FUNCTIONS(F)                                                                  \
+    F(cuInit) F(cuDriverGetVersion) F(cuGetErrorName) F(cuGetErrorString)                             \
+    F(cuDeviceGetCount) F(cuDeviceGet) F(cuDeviceGetName) F(cuDeviceGetAttribute) F(cuDeviceTotalMem) \
+    F(cuDevicePrimaryCtxRetain) F(cuDevicePrimaryCtxRelease) F(cuCtxSetCurrent)                       \
+    F(cuModuleLoadData) F(cuModuleUnload) F(cuModuleGetFunction)                                      \
+    F(cuFuncGetAttribute) F(cuFuncSetCacheConfig) F(cuOccupancyMaxActiveBlocksPerMultiprocessor)      \
+        F(cuLaunchKernel)                                                                             \
+    F(cuMemAlloc) F(cuMemFree) F(cuMemGetInfo) F(cuMemcpyHtoD) F(cuMemcpyDtoH) F(cuMemsetD8)          \
     F(cuEventCreate) F(cuEventDestroy) F(cuEventRecord) F(cuEventSynchronize) F(cuEventElapsedTime)
 
 /// The driver's functions, initialised. One for the process; never closed, as drivers leave threads behind.
@@ -39,7 +42,8 @@ struct Driver {
     void check(CUresult result, const std::string& what) const;
 };
 
-/// Opens the driver at the first call. Throws PluginError(CRT_NO_DEVICE) with one sentence where there is none, or too old a one. [any thread]
+/// Opens the driver at the first call. Throws PluginError(CRT_NO_DEVICE) with one sentence where there is
+/// none, or too old a one. [any thread]
 const Driver& driver();
 
 /// One GPU, usable or not.
@@ -69,7 +73,8 @@ public:
     Context(const Context&) = delete;
     Context& operator=(const Context&) = delete;
 
-    /// Makes it the calling thread's: at the start of every verb, since the owner thread may be another one each time.
+    /// Makes it the calling thread's: at the start of every verb, since the owner thread may be another one
+    /// each time.
     void makeCurrent() const;
     /// The same for a destructor: when it fails the device is lost, and there is nothing to give back.
     void tryMakeCurrent() const noexcept { driver().cuCtxSetCurrent(context_); }
@@ -84,7 +89,8 @@ class Memory {
 public:
     Memory() = default;
     Memory(std::uint64_t bytes, const Device& device, const char* what);
-    Memory(Memory&& other) noexcept : address_(std::exchange(other.address_, 0)), bytes_(std::exchange(other.bytes_, 0)) {}
+    Memory(Memory&& other) noexcept
+        : address_(std::exchange(other.address_, 0)), bytes_(std::exchange(other.bytes_, 0)) {}
     Memory& operator=(Memory&& other) noexcept {
         std::swap(address_, other.address_);
         std::swap(bytes_, other.bytes_);

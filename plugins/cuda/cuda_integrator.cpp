@@ -15,16 +15,21 @@ constexpr std::uint64_t kFirstPaths = 1u << 18;
 /// Of the device's memory that films of slices may take, of what is free of it, and of any device's.
 constexpr std::uint64_t kSliceShare = 16, kFreeShare = 2, kSliceBytes = std::uint64_t{512} << 20;
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 std::uint64_t divideUp(std::uint64_t a, std::uint64_t b) { return (a + b - 1) / b; }
 
 }  // namespace
 
-std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, std::uint32_t samples, std::uint64_t most) {
-    // So many times the device is filled anew that its idle end, half a filling on average, is a few percent.
+std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, std::uint32_t samples,
+                           std::uint64_t most) {
+    // So many times the device is filled anew that its idle end, half a filling on average, is a few
+    // percent.
     constexpr std::uint64_t kFillings = 16;
-    // A thread's paths should outweigh its start and its share of crt_add_slices, unless that leaves the device empty.
+    // A thread's paths should outweigh its start and its share of crt_add_slices, unless that leaves the
+    // device empty.
     const std::uint64_t least_samples = blocks < resident_blocks ? 1 : 8;
     const std::uint64_t wanted = divideUp(kFillings * resident_blocks, std::max<std::uint64_t>(blocks, 1));
     constexpr std::uint64_t kGridRows = 65535;
@@ -81,7 +86,8 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     context_.makeCurrent();
     const auto& scene = *static_cast<const kernel::CrtScene*>(blob.data);
 
-    // The old film goes first: two need not fit side by side. Until all of the new one is there, there is no scene.
+    // The old film goes first: two need not fit side by side. Until all of the new one is there, there is no
+    // scene.
     blob_ = Memory();
     film_ = DeviceFilm();
     slices_ = DeviceFilm();
@@ -132,7 +138,8 @@ double CudaIntegrator::launch(const Launch& launch) {
     const Driver& cuda = driver();
     const Module& module = program_->current();
 
-    const std::uint64_t blocks = divideUp(launch.x1 - launch.x0, kBlockWidth) * divideUp(launch.y1 - launch.y0, kBlockHeight);
+    const std::uint64_t blocks =
+        divideUp(launch.x1 - launch.x0, kBlockWidth) * divideUp(launch.y1 - launch.y0, kBlockHeight);
     const std::uint64_t most =
         sliceBudget(device_.memory_bytes, device_.memory_bytes) / std::max<std::uint64_t>(film_.bytes(), 1);
     std::uint32_t slices =
@@ -141,22 +148,27 @@ double CudaIntegrator::launch(const Launch& launch) {
 
     DeviceFilm& target = slices > 1 ? slices_ : film_;
     CUdeviceptr blob = blob_.address(), rays = rays_.address();
-    CUdeviceptr sums = target.sums.address(), counts = target.counts.address(), primitives = target.primitives.address();
+    CUdeviceptr sums = target.sums.address(), counts = target.counts.address(),
+                primitives = target.primitives.address();
     Launch range = launch;
     kernel::CrtScene scene = scene_;
-    void* render_arguments[] = {&scene,    &blob,         &range.x0, &range.y0,           &range.x1, &range.y1, &range.first_sample,
-                                &range.sample_count, &sums, &counts,   &primitives, &rays};
+    void* render_arguments[] = {&scene,    &blob,     &range.x0,           &range.y0,
+                                &range.x1, &range.y1, &range.first_sample, &range.sample_count,
+                                &sums,     &counts,   &primitives,         &rays};
 
     cuda.check(cuda.cuEventRecord(start_, nullptr), "recording an event");
-    cuda.check(cuda.cuLaunchKernel(module.render(), static_cast<unsigned>(blocks), slices, 1, kBlock, 1, 1, 0, nullptr, render_arguments, nullptr),
+    cuda.check(cuda.cuLaunchKernel(module.render(), static_cast<unsigned>(blocks), slices, 1, kBlock, 1, 1,
+                                   0, nullptr, render_arguments, nullptr),
                "launching the kernel");
     if (slices > 1) {
-        CUdeviceptr film_sums = film_.sums.address(), film_counts = film_.counts.address(), film_primitives = film_.primitives.address();
-        void* add_arguments[] = {&range.x0, &range.y0,   &range.x1,        &range.y1, &scene.width, &scene.height, &scene.channels,
-                                 &slices,   &film_sums, &film_counts, &film_primitives, &sums, &counts, &primitives};
+        CUdeviceptr film_sums = film_.sums.address(), film_counts = film_.counts.address(),
+                    film_primitives = film_.primitives.address();
+        void* add_arguments[] = {&range.x0,        &range.y0,       &range.x1, &range.y1,  &scene.width,
+                                 &scene.height,    &scene.channels, &slices,   &film_sums, &film_counts,
+                                 &film_primitives, &sums,           &counts,   &primitives};
         const std::uint64_t threads = launch.pixels() * scene_.channels;
-        cuda.check(cuda.cuLaunchKernel(module.addSlices(), static_cast<unsigned>(divideUp(threads, kBlock)), 1, 1, kBlock, 1, 1, 0, nullptr,
-                                       add_arguments, nullptr),
+        cuda.check(cuda.cuLaunchKernel(module.addSlices(), static_cast<unsigned>(divideUp(threads, kBlock)),
+                                       1, 1, kBlock, 1, 1, 0, nullptr, add_arguments, nullptr),
                    "launching the sum of the slices");
     }
     cuda.check(cuda.cuEventRecord(end_, nullptr), "recording an event");

@@ -14,14 +14,17 @@
 
 namespace crt::cuda {
 
-/// In how many parts, each with a film of its own, a launch of `blocks` blocks should divide its samples so that a device that holds
-/// `resident_blocks` at once is full, and does not end on a few last blocks. At most `most`.
-std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, std::uint32_t samples, std::uint64_t most);
+/// In how many parts, each with a film of its own, a launch of `blocks` blocks should divide its samples so
+/// that a device that holds `resident_blocks` at once is full, and does not end on a few last blocks. At
+/// most `most`.
+std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, std::uint32_t samples,
+                           std::uint64_t most);
 
 /// Bytes that films of slices may take on a device of so many bytes, so many of them free.
 std::uint64_t sliceBudget(std::uint64_t device_bytes, std::uint64_t free_bytes);
 
-/// One GPU with one scene. Film and scene live on the device between calls. Failures are thrown as PluginError.
+/// One GPU with one scene. Film and scene live on the device between calls. Failures are thrown as
+/// PluginError.
 class CudaIntegrator {
 public:
     CudaIntegrator(const plugin::Host& host, const CrtCreateInfo& info);

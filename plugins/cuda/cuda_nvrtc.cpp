@@ -28,8 +28,9 @@ std::string firstLines(const std::string& text, int line_count) {
     return text.substr(0, end) + "(more lines follow)";
 }
 
-/// NVRTC asks the loader for its companion by bare name, which finds it only in the system's folders. One that lies beside an NVRTC opened by path is
-/// loaded beforehand: the loader then knows it by its name. Without it, compiling fails with a message that says so.
+/// NVRTC asks the loader for its companion by bare name, which finds it only in the system's folders. One
+/// that lies beside an NVRTC opened by path is loaded beforehand: the loader then knows it by its name.
+/// Without it, compiling fails with a message that says so.
 void loadBuiltins(const std::string& nvrtc_path, int major, int minor) {
     const std::size_t slash = nvrtc_path.rfind('/');
     if (slash == std::string::npos) return;
@@ -47,7 +48,8 @@ std::vector<std::string> nvrtcCandidates(const char* cuda_home) {
     std::vector<std::string> candidates;
     for (const std::string& folder : folders)
         for (const std::string& name : names)
-            if (std::find(candidates.begin(), candidates.end(), folder + name) == candidates.end()) candidates.push_back(folder + name);
+            if (std::find(candidates.begin(), candidates.end(), folder + name) == candidates.end())
+                candidates.push_back(folder + name);
     return candidates;
 }
 
@@ -56,7 +58,8 @@ Nvrtc Nvrtc::open(const std::vector<std::string>& candidates) {
     for (const std::string& path : candidates) {
         void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
         if (library == nullptr) {
-            if (refusals.empty()) refusals = dlerror();  // of the name that should have been found: the others say the same
+            if (refusals.empty())
+                refusals = dlerror();  // of the name that should have been found: the others say the same
             continue;
         }
         Nvrtc nvrtc;
@@ -83,27 +86,35 @@ Nvrtc Nvrtc::open(const std::vector<std::string>& candidates) {
 
 std::string Nvrtc::name() const { return "NVRTC " + std::to_string(major_) + "." + std::to_string(minor_); }
 
-bool Nvrtc::supports(int arch) const { return std::find(archs_.begin(), archs_.end(), arch) != archs_.end(); }
+bool Nvrtc::supports(int arch) const {
+    return std::find(archs_.begin(), archs_.end(), arch) != archs_.end();
+}
 
-Cubin Nvrtc::compile(const std::string& text, const std::string& file, const std::vector<std::string>& options) const {
+Cubin Nvrtc::compile(const std::string& text, const std::string& file,
+                     const std::vector<std::string>& options) const {
     const auto check = [&](nvrtcResult result, const char* what) {
-        if (result != NVRTC_SUCCESS) throw std::runtime_error(name() + " cannot " + what + ": " + nvrtcGetErrorString_(result));
+        if (result != NVRTC_SUCCESS)
+            throw std::runtime_error(name() + " cannot " + what + ": " + nvrtcGetErrorString_(result));
     };
     ProgramOwner owner{nullptr, nvrtcDestroyProgram_};
-    check(nvrtcCreateProgram_(&owner.program, text.c_str(), file.c_str(), 0, nullptr, nullptr), "create a program");
+    check(nvrtcCreateProgram_(&owner.program, text.c_str(), file.c_str(), 0, nullptr, nullptr),
+          "create a program");
 
     std::vector<const char*> arguments;
     for (const std::string& option : options) arguments.push_back(option.c_str());
-    const nvrtcResult result = nvrtcCompileProgram_(owner.program, static_cast<int>(arguments.size()), arguments.data());
+    const nvrtcResult result =
+        nvrtcCompileProgram_(owner.program, static_cast<int>(arguments.size()), arguments.data());
 
     Cubin cubin;
     std::size_t log_size = 0;
     if (nvrtcGetProgramLogSize_(owner.program, &log_size) == NVRTC_SUCCESS && log_size > 1) {
         cubin.log.resize(log_size);
-        if (nvrtcGetProgramLog_(owner.program, cubin.log.data()) == NVRTC_SUCCESS) cubin.log.resize(log_size - 1);  // its NUL
+        if (nvrtcGetProgramLog_(owner.program, cubin.log.data()) == NVRTC_SUCCESS)
+            cubin.log.resize(log_size - 1);  // its NUL
     }
     if (result != NVRTC_SUCCESS)
-        throw std::runtime_error(name() + " cannot compile the kernel (" + nvrtcGetErrorString_(result) + "):\n" + firstLines(cubin.log, 20));
+        throw std::runtime_error(name() + " cannot compile the kernel (" + nvrtcGetErrorString_(result) +
+                                 "):\n" + firstLines(cubin.log, 20));
 
     std::size_t size = 0;
     check(nvrtcGetCUBINSize_(owner.program, &size), "tell the size of the kernel");

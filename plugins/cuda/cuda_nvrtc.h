@@ -1,4 +1,5 @@
-/// NVRTC, NVIDIA's run-time compiler, found at run time: a machine may have the driver and not the toolkit, and then runs the precompiled kernel.
+/// NVRTC, NVIDIA's run-time compiler, found at run time: a machine may have the driver and not the toolkit,
+/// and then runs the precompiled kernel.
 #pragma once
 
 #include <nvrtc.h>
@@ -8,13 +9,13 @@
 
 namespace crt::cuda {
 
-#define CRT_NVRTC_FUNCTIONS(F)                                                                                   \
-    F(nvrtcVersion) F(nvrtcGetErrorString) F(nvrtcGetNumSupportedArchs) F(nvrtcGetSupportedArchs)               \
-    F(nvrtcCreateProgram) F(nvrtcDestroyProgram) F(nvrtcCompileProgram) F(nvrtcGetProgramLogSize)                \
+#define CRT_NVRTC_FUNCTIONS(F)                                                                    \
+    F(nvrtcVersion) F(nvrtcGetErrorString) F(nvrtcGetNumSupportedArchs) F(nvrtcGetSupportedArchs) \
+    F(nvrtcCreateProgram) F(nvrtcDestroyProgram) F(nvrtcCompileProgram) F(nvrtcGetProgramLogSize) \
     F(nvrtcGetProgramLog) F(nvrtcGetCUBINSize) F(nvrtcGetCUBIN)
 
-/// Where NVRTC may lie, in the order of trying: by its name (the loader's own search, the newest version first), then in the toolkit that
-/// $CUDA_HOME names, then in /usr/local/cuda. `cuda_home` may be null.
+/// Where NVRTC may lie, in the order of trying: by its name (the loader's own search, the newest version
+/// first), then in the toolkit that $CUDA_HOME names, then in /usr/local/cuda. `cuda_home` may be null.
 std::vector<std::string> nvrtcCandidates(const char* cuda_home);
 
 /// A compiled kernel, and what the assembler said about it.
@@ -25,7 +26,8 @@ struct Cubin {
 
 class Nvrtc {
 public:
-    /// The first candidate that can be opened; never closed. Throws std::runtime_error with one sentence when there is none. [any thread]
+    /// The first candidate that can be opened; never closed. Throws std::runtime_error with one sentence
+    /// when there is none. [any thread]
     static Nvrtc open(const std::vector<std::string>& candidates);
 
     const std::string& path() const { return path_; }
@@ -37,8 +39,10 @@ public:
     /// Whether it makes machine code for compute capability arch / 10.
     bool supports(int arch) const;
 
-    /// Compiles `text`, whose errors call it `file`. Throws std::runtime_error with the first 20 lines of the log. [any thread]
-    Cubin compile(const std::string& text, const std::string& file, const std::vector<std::string>& options) const;
+    /// Compiles `text`, whose errors call it `file`. Throws std::runtime_error with the first 20 lines of
+    /// the log. [any thread]
+    Cubin compile(const std::string& text, const std::string& file,
+                  const std::vector<std::string>& options) const;
 
 private:
     Nvrtc() = default;

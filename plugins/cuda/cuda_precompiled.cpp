@@ -1,4 +1,5 @@
-// The fat binary that nvcc made, taken into the library as it is. CRT_FATBIN is its path, given by CMakeLists.txt.
+// The fat binary that nvcc made, taken into the library as it is. CRT_FATBIN is its path, given by
+// CMakeLists.txt.
 #include "cuda_precompiled.h"
 
 __asm__(

@@ -23,7 +23,9 @@ namespace {
 
 class Stopwatch {
 public:
-    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    }
 
 private:
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -42,12 +44,15 @@ std::uint32_t numberBefore(const std::string& line, const std::string& word) {
     const std::size_t last = line.find_last_of("0123456789", end);
     if (last == std::string::npos) return 0;
     const std::size_t before = line.find_last_not_of("0123456789", last);
-    return static_cast<std::uint32_t>(std::stoul(line.substr(before == std::string::npos ? 0 : before + 1, last)));
+    return static_cast<std::uint32_t>(
+        std::stoul(line.substr(before == std::string::npos ? 0 : before + 1, last)));
 }
 
 }  // namespace
 
-std::string kernelText(const std::string& path_text) { return path_text + "\n#line 1 \"kernels.cu\"\n" + kKernelText; }
+std::string kernelText(const std::string& path_text) {
+    return path_text + "\n#line 1 \"kernels.cu\"\n" + kKernelText;
+}
 
 std::vector<std::string> nvrtcOptions(int arch, std::uint32_t features, int blocks_per_multiprocessor) {
     char mask[48];
@@ -63,8 +68,8 @@ std::vector<std::string> nvrtcOptions(int arch, std::uint32_t features, int bloc
             "-DCRT_BLOCKS_PER_SM=" + std::to_string(blocks_per_multiprocessor)};
 }
 
-KernelCache::Key cacheKey(const std::string& text, int arch, std::uint32_t features, const std::string& compiler,
-                          const std::string& driver_version) {
+KernelCache::Key cacheKey(const std::string& text, int arch, std::uint32_t features,
+                          const std::string& compiler, const std::string& driver_version) {
     std::string options;
     for (const int blocks : kBlocksPerMultiprocessor)
         for (const std::string& option : nvrtcOptions(arch, features, blocks)) options += option + ' ';
@@ -72,17 +77,21 @@ KernelCache::Key cacheKey(const std::string& text, int arch, std::uint32_t featu
 }
 
 ResourceUse resourceUse(const std::string& log, const std::string& kernel) {
-    // "… Function properties for crt_render", then a line about the stack and the spills, and one with "Used 96 registers"; each kernel in turn.
+    // "… Function properties for crt_render", then a line about the stack and the spills, and one with "Used
+    // 96 registers"; each kernel in turn.
     ResourceUse use;
     bool ours = false;
     std::istringstream lines(log);
     for (std::string line; std::getline(lines, line);) {
-        if (line.find("Compiling entry function") != std::string::npos) ours = line.find("'" + kernel + "'") != std::string::npos;
-        if (line.find("Function properties for") != std::string::npos) ours = line.find(kernel) != std::string::npos;
+        if (line.find("Compiling entry function") != std::string::npos)
+            ours = line.find("'" + kernel + "'") != std::string::npos;
+        if (line.find("Function properties for") != std::string::npos)
+            ours = line.find(kernel) != std::string::npos;
         if (!ours) continue;
         if (line.find("stack frame") != std::string::npos) {
             use.stack_bytes = numberBefore(line, " bytes stack frame");
-            use.spill_bytes = numberBefore(line, " bytes spill stores") + numberBefore(line, " bytes spill loads");
+            use.spill_bytes =
+                numberBefore(line, " bytes spill stores") + numberBefore(line, " bytes spill loads");
         }
         if (line.find(" registers") != std::string::npos) use.registers = numberBefore(line, " registers");
     }
@@ -98,23 +107,31 @@ Cubin compileLean(const Nvrtc& compiler, const std::string& text, int arch, std:
     return cubin;
 }
 
-Module::Module(const void* image, std::uint32_t features, std::string name) : features_(features), name_(std::move(name)) {
+Module::Module(const void* image, std::uint32_t features, std::string name)
+    : features_(features), name_(std::move(name)) {
     const Driver& cuda = driver();
     cuda.check(cuda.cuModuleLoadData(&module_, image), "loading the " + name_ + " kernel");
     try {
-        cuda.check(cuda.cuModuleGetFunction(&render_, module_, "crt_render"), "taking crt_render from the module");
-        cuda.check(cuda.cuModuleGetFunction(&add_slices_, module_, "crt_add_slices"), "taking crt_add_slices from the module");
+        cuda.check(cuda.cuModuleGetFunction(&render_, module_, "crt_render"),
+                   "taking crt_render from the module");
+        cuda.check(cuda.cuModuleGetFunction(&add_slices_, module_, "crt_add_slices"),
+                   "taking crt_add_slices from the module");
         // No kernel uses shared memory: all of it may cache the scene.
         cuda.check(cuda.cuFuncSetCacheConfig(render_, CU_FUNC_CACHE_PREFER_L1), "preferring the L1 cache");
 
         int registers = 0, local_bytes = 0, blocks = 0;
-        cuda.check(cuda.cuFuncGetAttribute(&registers, CU_FUNC_ATTRIBUTE_NUM_REGS, render_), "asking for registers");
-        cuda.check(cuda.cuFuncGetAttribute(&local_bytes, CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES, render_), "asking for local memory");
-        cuda.check(cuda.cuOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, render_, kBlock, 0), "asking for the occupancy");
-        // Local memory is the BVH's traversal stack, which is meant to be there, and what did not fit into registers.
+        cuda.check(cuda.cuFuncGetAttribute(&registers, CU_FUNC_ATTRIBUTE_NUM_REGS, render_),
+                   "asking for registers");
+        cuda.check(cuda.cuFuncGetAttribute(&local_bytes, CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES, render_),
+                   "asking for local memory");
+        cuda.check(cuda.cuOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, render_, kBlock, 0),
+                   "asking for the occupancy");
+        // Local memory is the BVH's traversal stack, which is meant to be there, and what did not fit into
+        // registers.
         constexpr int kTraversalStack = CRT_BVH_STACK * (sizeof(kernel::u32) + sizeof(kernel::f32));
         registers_ = static_cast<std::uint32_t>(registers);
-        spill_bytes_ = static_cast<std::uint32_t>(std::max(0, local_bytes - ((features_ & CRT_FEATURE_BVH) ? kTraversalStack : 0)));
+        spill_bytes_ = static_cast<std::uint32_t>(
+            std::max(0, local_bytes - ((features_ & CRT_FEATURE_BVH) ? kTraversalStack : 0)));
         resident_blocks_ = static_cast<std::uint32_t>(std::max(blocks, 1));
     } catch (...) {
         cuda.cuModuleUnload(module_);
@@ -138,9 +155,12 @@ Module::~Module() {
     if (module_ != nullptr) driver().cuModuleUnload(module_);
 }
 
-CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::uint32_t scene_features, CrtKernelChoice choice)
+CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::uint32_t scene_features,
+                         CrtKernelChoice choice)
     : host_(host), features_(choice == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene_features) {
-    const auto loadPrecompiled = [&] { precompiled_ = Module(kPrecompiledKernels, CRT_FEATURES_ALL, "precompiled"); };
+    const auto loadPrecompiled = [&] {
+        precompiled_ = Module(kPrecompiledKernels, CRT_FEATURES_ALL, "precompiled");
+    };
     if (choice == CRT_KERNEL_FULL) {
         loadPrecompiled();
         return;
@@ -150,10 +170,12 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ui
     try {
         compiler = &nvrtc();
     } catch (const std::runtime_error& error) {
-        host_.log(CRT_LOG_INFO, std::string("cuda: ") + error.what() + ": using the precompiled kernel with everything in");
+        host_.log(CRT_LOG_INFO, std::string("cuda: ") + error.what() +
+                                    ": using the precompiled kernel with everything in");
     }
     if (compiler != nullptr && !compiler->supports(device.arch)) {
-        host_.log(CRT_LOG_INFO, "cuda: " + compiler->name() + " does not know '" + device.name + "': using the precompiled kernel");
+        host_.log(CRT_LOG_INFO, "cuda: " + compiler->name() + " does not know '" + device.name +
+                                    "': using the precompiled kernel");
         compiler = nullptr;
     }
     if (compiler == nullptr) {
@@ -166,14 +188,18 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ui
     const std::string text = kernelText(host_.kernelSource("path.h"));
     const KernelCache::Key key = cacheKey(text, device.arch, features_, compiler->name(), driver().version);
     std::string refused;
-    const std::optional<std::vector<unsigned char>> cubin = KernelCache(host_.cacheDirectory()).load(key, &refused);
-    if (!refused.empty()) host_.log(CRT_LOG_WARNING, "cuda: a cached kernel is refused, and compiled again: " + refused);
+    const std::optional<std::vector<unsigned char>> cubin =
+        KernelCache(host_.cacheDirectory()).load(key, &refused);
+    if (!refused.empty())
+        host_.log(CRT_LOG_WARNING, "cuda: a cached kernel is refused, and compiled again: " + refused);
     if (cubin) {
         try {
             lean_ = Module(cubin->data(), features_, lean_name_);
             from_cache_ = true;
         } catch (const plugin::PluginError& error) {
-            host_.log(CRT_LOG_DEBUG, std::string("cuda: the cached kernel is refused, and compiled again: ") + error.what());
+            host_.log(
+                CRT_LOG_DEBUG,
+                std::string("cuda: the cached kernel is refused, and compiled again: ") + error.what());
         }
     }
     cache_seconds_ = cache_time.seconds();
@@ -182,17 +208,20 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ui
     const char* directory = host_.cacheDirectory();
     try {
         compiling_ = std::make_unique<CompileProcess>(
-            compileProgram(), CompileJob{compiler->path(), text, device.arch, features_, directory != nullptr ? directory : "", key});
+            compileProgram(), CompileJob{compiler->path(), text, device.arch, features_,
+                                         directory != nullptr ? directory : "", key});
         if (choice == CRT_KERNEL_LEAN_ONLY) {
             std::optional<CompiledKernel> compiled;
-            while (!(compiled = compiling_->poll())) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+            while (!(compiled = compiling_->poll()))
+                std::this_thread::sleep_for(std::chrono::milliseconds(5));
             compiling_.reset();
             takeLean(*compiled);
             return;
         }
     } catch (const std::runtime_error& error) {
         compiling_.reset();
-        host_.log(CRT_LOG_WARNING, std::string("cuda: using the precompiled kernel with everything in: ") + error.what());
+        host_.log(CRT_LOG_WARNING,
+                  std::string("cuda: using the precompiled kernel with everything in: ") + error.what());
     }
     loadPrecompiled();
 }
@@ -213,7 +242,8 @@ const Module& CudaProgram::current() {
     } catch (const std::exception& error) {
         // The precompiled kernel gives the same image.
         compiling_.reset();
-        host_.log(CRT_LOG_WARNING, std::string("cuda: going on with the precompiled kernel: ") + error.what());
+        host_.log(CRT_LOG_WARNING,
+                  std::string("cuda: going on with the precompiled kernel: ") + error.what());
     }
     return lean_ ? lean_ : precompiled_;
 }

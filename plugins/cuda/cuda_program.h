@@ -1,5 +1,6 @@
-/// From a feature mask to a kernel that can be launched: the precompiled one at once, and the lean one from the disk cache or, compiled by a
-/// process of its own, as soon as it is ready. Both give the same bits, so a render may go over from one to the other between launches.
+/// From a feature mask to a kernel that can be launched: the precompiled one at once, and the lean one from
+/// the disk cache or, compiled by a process of its own, as soon as it is ready. Both give the same bits, so
+/// a render may go over from one to the other between launches.
 #pragma once
 
 #include "cuda_compile_process.h"
@@ -24,16 +25,18 @@ constexpr std::uint32_t kRayCounters = 1024;
 /// The whole text that NVRTC compiles: the host's text of kernel/path.h, then kernels.cu.
 std::string kernelText(const std::string& path_text);
 
-/// How many blocks a multiprocessor should hold at once, in the order of trying: more hide memory better, but leave each thread fewer registers.
-/// The first that does not spill wins; the last is not judged.
+/// How many blocks a multiprocessor should hold at once, in the order of trying: more hide memory better,
+/// but leave each thread fewer registers. The first that does not spill wins; the last is not judged.
 constexpr int kBlocksPerMultiprocessor[] = {4, 3};
 
-/// Options for NVRTC. Arithmetic stays IEEE: nothing is contracted, divisions and square roots are rounded correctly, subnormals are kept.
+/// Options for NVRTC. Arithmetic stays IEEE: nothing is contracted, divisions and square roots are rounded
+/// correctly, subnormals are kept.
 std::vector<std::string> nvrtcOptions(int arch, std::uint32_t features, int blocks_per_multiprocessor);
 
-/// Key of the machine code: everything that decides it, and the driver's version, so that no driver has to take what another one was given.
-plugin::KernelCache::Key cacheKey(const std::string& text, int arch, std::uint32_t features, const std::string& compiler,
-                                  const std::string& driver_version);
+/// Key of the machine code: everything that decides it, and the driver's version, so that no driver has to
+/// take what another one was given.
+plugin::KernelCache::Key cacheKey(const std::string& text, int arch, std::uint32_t features,
+                                  const std::string& compiler, const std::string& driver_version);
 
 /// What a kernel takes on the device, as the assembler reports it (--ptxas-options=-v).
 struct ResourceUse {
@@ -43,7 +46,8 @@ struct ResourceUse {
 };
 ResourceUse resourceUse(const std::string& log, const std::string& kernel);
 
-/// Machine code for a mask, with as many blocks on a multiprocessor as go without spilling. Throws std::runtime_error. [any thread]
+/// Machine code for a mask, with as many blocks on a multiprocessor as go without spilling. Throws
+/// std::runtime_error. [any thread]
 Cubin compileLean(const Nvrtc& nvrtc, const std::string& text, int arch, std::uint32_t features);
 
 /// The kernels of one loaded module.
@@ -76,7 +80,8 @@ private:
 /// The kernel for one mask on one device. Used by one thread at a time, the context current.
 class CudaProgram {
 public:
-    CudaProgram(const plugin::Host& host, const Device& device, std::uint32_t scene_features, CrtKernelChoice choice);
+    CudaProgram(const plugin::Host& host, const Device& device, std::uint32_t scene_features,
+                CrtKernelChoice choice);
     CudaProgram(const CudaProgram&) = delete;
     CudaProgram& operator=(const CudaProgram&) = delete;
 

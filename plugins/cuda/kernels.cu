@@ -1,10 +1,11 @@
 /*
- * kernels.cu: the CUDA entry points. nvcc compiles this file ahead of time with everything in; while the program runs, the host's text of
- * kernel/path.h stands above it, and NVRTC compiles what one scene needs.
+ * kernels.cu: the CUDA entry points. nvcc compiles this file ahead of time with everything in; while the
+ * program runs, the host's text of kernel/path.h stands above it, and NVRTC compiles what one scene needs.
  *
- * A thread renders one pixel over a range of samples. Where the image is too small to fill the device, the range is split over `slices`
- * rows of the grid: each adds to a film of its own, and crt_add_slices then adds those to the film in the order of the samples, so the result
- * does not depend on which block ran first. No thread waits for another: tests run these very functions as plain loops.
+ * A thread renders one pixel over a range of samples. Where the image is too small to fill the device, the
+ * range is split over `slices` rows of the grid: each adds to a film of its own, and crt_add_slices then
+ * adds those to the film in the order of the samples, so the result does not depend on which block ran
+ * first. No thread waits for another: tests run these very functions as plain loops.
  */
 #ifndef CRT_PATH_H
 #include "kernel/path.h"
@@ -14,22 +15,26 @@
 #define CRT_BLOCK_WIDTH 16u
 #define CRT_BLOCK_HEIGHT 8u
 
-/* Ray counters are spread, so that threads of different blocks do not queue for one address; the host adds them up. */
+/* Ray counters are spread, so that threads of different blocks do not queue for one address; the host adds
+ * them up. */
 #define CRT_RAY_COUNTERS 1024u
 
-/* Blocks that a multiprocessor should hold at once: what whoever compiles this trades registers for (cuda_program.h). */
+/* Blocks that a multiprocessor should hold at once: what whoever compiles this trades registers for
+ * (cuda_program.h). */
 #ifndef CRT_BLOCKS_PER_SM
 #define CRT_BLOCKS_PER_SM 4
 #endif
 
 /*
- * Samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1). `scene` is the blob's header once more: as a kernel
- * argument it lies in constant memory, where all threads read the same word at once. `sums`, `counts`, `primitives` are the film when the grid
- * has one row, else one film after another, one for each row.
+ * Samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1). `scene` is the
+ * blob's header once more: as a kernel argument it lies in constant memory, where all threads read the same
+ * word at once. `sums`, `counts`, `primitives` are the film when the grid has one row, else one film after
+ * another, one for each row.
  */
 extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
-crt_render(const __grid_constant__ CrtScene scene, const unsigned char *blob, u32 x0, u32 y0, u32 x1, u32 y1, u64 first_sample,
-           u32 sample_count, f64 *sums, u64 *counts, u32 *primitives, u64 *rays) {
+    crt_render(const __grid_constant__ CrtScene scene, const unsigned char* blob, u32 x0, u32 y0, u32 x1,
+               u32 y1, u64 first_sample, u32 sample_count, f64* sums, u64* counts, u32* primitives,
+               u64* rays) {
     const u32 blocks_across = (x1 - x0 + CRT_BLOCK_WIDTH - 1u) / CRT_BLOCK_WIDTH;
     const u32 warp = threadIdx.x / 32u;
     const u32 lane = threadIdx.x % 32u;
@@ -48,19 +53,20 @@ crt_render(const __grid_constant__ CrtScene scene, const unsigned char *blob, u3
     CrtRayCount traced;
     traced.closest = 0u;
     traced.shadow = 0u;
-    crt_render_pixel(&context, x, y, first_sample + first, last - first, sums + film * scene.channels * 2u, counts + film,
-                     primitives != 0 ? primitives + film : 0, &traced);
+    crt_render_pixel(&context, x, y, first_sample + first, last - first, sums + film * scene.channels * 2u,
+                     counts + film, primitives != 0 ? primitives + film : 0, &traced);
 
     u64 *counter = rays + 2u * ((blockIdx.x + 37u * blockIdx.y) % CRT_RAY_COUNTERS);
     atomicAdd(counter, (u64)traced.closest);
     atomicAdd(counter + 1, (u64)traced.shadow);
 }
 
-/* Adds `slices` films, which lie one after another, to the film, in order, and clears them for the next launch. One thread a channel of a pixel of
-   [x0, x1) × [y0, y1). */
+/* Adds `slices` films, which lie one after another, to the film, in order, and clears them for the next
+   launch. One thread a channel of a pixel of [x0, x1) × [y0, y1). */
 extern "C" __global__ void __launch_bounds__(CRT_BLOCK)
-crt_add_slices(u32 x0, u32 y0, u32 x1, u32 y1, u32 width, u32 height, u32 channels, u32 slices, f64 *sums, u64 *counts, u32 *primitives,
-               f64 *slice_sums, u64 *slice_counts, u32 *slice_primitives) {
+    crt_add_slices(u32 x0, u32 y0, u32 x1, u32 y1, u32 width, u32 height, u32 channels, u32 slices,
+                   f64* sums, u64* counts, u32* primitives, f64* slice_sums, u64* slice_counts,
+                   u32* slice_primitives) {
     const u64 thread = (u64)blockIdx.x * CRT_BLOCK + threadIdx.x;
     const u64 in_rectangle = thread / channels;
     const u32 channel = (u32)(thread % channels);
@@ -80,7 +86,8 @@ crt_add_slices(u32 x0, u32 y0, u32 x1, u32 y1, u32 width, u32 height, u32 channe
     for (u32 slice = 0u; slice < slices; ++slice) {
         const u64 part = slice * film + pixel;
         /* The primitive belongs to the first valid sample, as in crt_render_pixel. */
-        if (primitives != 0 && counts[pixel] == 0u && slice_counts[part] != 0u) primitives[pixel] = slice_primitives[part];
+        if (primitives != 0 && counts[pixel] == 0u && slice_counts[part] != 0u)
+            primitives[pixel] = slice_primitives[part];
         counts[pixel] += slice_counts[part];
         slice_counts[part] = 0u;
     }

@@ -18,13 +18,16 @@ namespace {
 using kernel::u64;  // CRT_ARRAY computes with it
 using Clock = std::chrono::steady_clock;
 
-double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 /// The model name that Linux gives the processor.
 std::string processorName() {
     std::ifstream info("/proc/cpuinfo");
     for (std::string line; std::getline(info, line);)
-        if (line.rfind("model name", 0) == 0 && line.find(':') != std::string::npos) return line.substr(line.find(':') + 2);
+        if (line.rfind("model name", 0) == 0 && line.find(':') != std::string::npos)
+            return line.substr(line.find(':') + 2);
     return "CPU";
 }
 
@@ -35,7 +38,9 @@ bool processorFits() { return __builtin_cpu_supports("avx2") && __builtin_cpu_su
 
 std::vector<CrtDevice> probeDevices(const plugin::Host&) {
     if (!processorFits())
-        throw plugin::PluginError(CRT_NO_DEVICE, "this processor has no AVX2 and FMA, which the Embree backend is compiled for; use the opencl backend");
+        throw plugin::PluginError(CRT_NO_DEVICE,
+                                  "this processor has no AVX2 and FMA, which the Embree backend is compiled "
+                                  "for; use the opencl backend");
     const auto threads = static_cast<double>(tbb::this_task_arena::max_concurrency());
     return {plugin::makeDevice(0, processorName(), "Embree " + Device::version(), 0, threads)};
 }
@@ -43,7 +48,8 @@ std::vector<CrtDevice> probeDevices(const plugin::Host&) {
 EmbreeIntegrator::EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo& info)
     : host_(host),
       info_(info),
-      threads_(info.threads != 0 ? info.threads : static_cast<unsigned>(tbb::this_task_arena::max_concurrency())),
+      threads_(info.threads != 0 ? info.threads
+                                 : static_cast<unsigned>(tbb::this_task_arena::max_concurrency())),
       parallelism_(tbb::global_control::max_allowed_parallelism, threads_),
       arena_(static_cast<int>(threads_)) {
     plugin::chooseDevice(probeDevices(host), info.device);
@@ -65,7 +71,9 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
         if (!device_) device_ = std::make_unique<Device>();
         const auto* triangles = CRT_ARRAY(kernel::CrtTriangle, blob(), scene().triangles);
         const auto progress = [this](double done) { host_.cancelled(done); };
-        arena_.execute([&] { tracer_ = std::make_unique<Tracer>(*device_, triangles, scene().triangle_count, progress); });
+        arena_.execute([&] {
+            tracer_ = std::make_unique<Tracer>(*device_, triangles, scene().triangle_count, progress);
+        });
         build_seconds_ = secondsSince(start);
     }
 
@@ -79,7 +87,10 @@ std::uint32_t EmbreeIntegrator::tileSize(const CrtRenderRange& range) const {
     if (info_.tile_size != 0) return info_.tile_size;
     // Large enough to stay in the cache's good books, small enough that every thread gets several.
     std::uint32_t size = 16;
-    const auto tiles = [&] { return static_cast<std::uint64_t>((range.x1 - range.x0 + size - 1) / size) * ((range.y1 - range.y0 + size - 1) / size); };
+    const auto tiles = [&] {
+        return static_cast<std::uint64_t>((range.x1 - range.x0 + size - 1) / size) *
+               ((range.y1 - range.y0 + size - 1) / size);
+    };
     while (size > 1 && tiles() < 8ull * threads_) size /= 2;
     return size;
 }
@@ -89,13 +100,15 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
     const std::uint32_t size = tileSize(range);
     const std::uint32_t columns = (range.x1 - range.x0 + size - 1) / size;
     const std::uint32_t rows = (range.y1 - range.y0 + size - 1) / size;
-    // Samples of one job: a tile with more is done in several, so that progress moves and a cancel is obeyed.
+    // Samples of one job: a tile with more is done in several, so that progress moves and a cancel is
+    // obeyed.
     constexpr std::uint64_t kSamplesPerJob = 64;
 
     std::atomic<std::uint64_t> closest{0}, shadow{0}, done{0};
     std::atomic<bool> cancelled{false};
     std::mutex progress_mutex;
-    const double all = static_cast<double>(columns) * rows * static_cast<double>(std::max<std::uint64_t>(range.sample_count, 1));
+    const double all = static_cast<double>(columns) * rows *
+                       static_cast<double>(std::max<std::uint64_t>(range.sample_count, 1));
     arena_.execute([&] {
         tbb::parallel_for(
             tbb::blocked_range<std::uint32_t>(0, columns * rows, 1),
@@ -111,16 +124,21 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
                     job.sums = sums_.data();
                     job.counts = counts_.data();
                     job.primitives = primitives_.empty() ? nullptr : primitives_.data();
-                    for (std::uint64_t s = 0; s < range.sample_count && !cancelled.load(std::memory_order_relaxed); s += kSamplesPerJob) {
+                    for (std::uint64_t s = 0;
+                         s < range.sample_count && !cancelled.load(std::memory_order_relaxed);
+                         s += kSamplesPerJob) {
                         job.first_sample = range.first_sample + s;
-                        job.sample_count = static_cast<std::uint32_t>(std::min(kSamplesPerJob, range.sample_count - s));
+                        job.sample_count =
+                            static_cast<std::uint32_t>(std::min(kSamplesPerJob, range.sample_count - s));
                         const RayTotals rays = program_->render(job);
                         closest += rays.closest;
                         shadow += rays.shadow;
                         done += job.sample_count;
-                        // One thread at a time tells the host; the others have better things to do than wait.
+                        // One thread at a time tells the host; the others have better things to do than
+                        // wait.
                         const std::unique_lock lock(progress_mutex, std::try_to_lock);
-                        if (lock.owns_lock() && host_.cancelled(static_cast<double>(done.load()) / all)) cancelled = true;
+                        if (lock.owns_lock() && host_.cancelled(static_cast<double>(done.load()) / all))
+                            cancelled = true;
                     }
                 }
             },

@@ -9,7 +9,8 @@
 
 namespace crt::embree {
 
-/// Samples [first_sample, +sample_count) of the pixels [x0,x1) × [y0,y1), into the film's arrays (CrtFilmView's layout).
+/// Samples [first_sample, +sample_count) of the pixels [x0,x1) × [y0,y1), into the film's arrays
+/// (CrtFilmView's layout).
 struct TileJob {
     const unsigned char* blob;
     const Tracer* tracer;  ///< Null: the kernel traces by itself.

@@ -20,12 +20,13 @@ using kernel::CrtRay;
 using kernel::CrtShear;
 using kernel::CrtTriangle;
 
-/// Embree's distances may differ from the shared test's in the last bits: what culls is given this much more reach.
+/// Embree's distances may differ from the shared test's in the last bits: what culls is given this much more
+/// reach.
 constexpr float kReachSlack = 1.0f + 1e-5f;
 
-/// Embree tests the boxes of user primitives without its robust mode's care: planes err by some 7 · 2^-24 of the coordinates that take part,
-/// whatever the scene's flags say. For rays that start within Tracer::kReach of the scene (which lies within ±1) this holds what they touch, with room
-/// to spare.
+/// Embree tests the boxes of user primitives without its robust mode's care: planes err by some 7 · 2^-24 of
+/// the coordinates that take part, whatever the scene's flags say. For rays that start within Tracer::kReach
+/// of the scene (which lies within ±1) this holds what they touch, with room to spare.
 constexpr float kBoxPadding = 8 * CRT_BOX_PADDING;
 
 #if RTC_VERSION_MAJOR >= 4
@@ -45,12 +46,14 @@ struct Query {
     float reach;
 };
 
-/// Tests one triangle whose box the ray meets, and lets Embree go no further than just beyond the best hit, so that ties still come here.
+/// Tests one triangle whose box the ray meets, and lets Embree go no further than just beyond the best hit,
+/// so that ties still come here.
 void closestHit(const RTCIntersectFunctionNArguments* arguments) {
     Query& query = *reinterpret_cast<Query*>(arguments->context);
     const float before = query.best.t;
     crt_test_closest(query.triangles, arguments->primID, query.shear, &query.best);
-    if (query.best.t < before) RTCRayN_tfar(RTCRayHitN_RayN(arguments->rayhit, 1), 1, 0) = query.best.t * kReachSlack;
+    if (query.best.t < before)
+        RTCRayN_tfar(RTCRayHitN_RayN(arguments->rayhit, 1), 1, 0) = query.best.t * kReachSlack;
 }
 
 void anyHit(const RTCOccludedFunctionNArguments* arguments) {
@@ -61,7 +64,8 @@ void anyHit(const RTCOccludedFunctionNArguments* arguments) {
 }
 
 void triangleBounds(const RTCBoundsFunctionArguments* arguments) {
-    const CrtTriangle& triangle = static_cast<const CrtTriangle*>(arguments->geometryUserPtr)[arguments->primID];
+    const CrtTriangle& triangle =
+        static_cast<const CrtTriangle*>(arguments->geometryUserPtr)[arguments->primID];
     const auto bound = [&](std::uint32_t axis, float& lower, float& upper) {
         const float* p = triangle.p + 3 * axis;
         lower = std::min({p[0], p[1], p[2]}) - kBoxPadding;
@@ -118,15 +122,18 @@ struct Device::Impl {
 };
 
 Device::Device() : impl_(new Impl) {
-    // No "threads=": Embree would limit the whole process to that many, and to the number of processors. The caller's limit holds for it as well.
+    // No "threads=": Embree would limit the whole process to that many, and to the number of processors. The
+    // caller's limit holds for it as well.
     impl_->device = rtcNewDevice(nullptr);
-    if (impl_->device == nullptr) throw plugin::PluginError(CRT_NO_DEVICE, errorText(nullptr, "Embree could not be started"));
+    if (impl_->device == nullptr)
+        throw plugin::PluginError(CRT_NO_DEVICE, errorText(nullptr, "Embree could not be started"));
 }
 
 Device::~Device() { rtcReleaseDevice(impl_->device); }
 
 std::string Device::version() {
-    return std::to_string(RTC_VERSION_MAJOR) + "." + std::to_string(RTC_VERSION_MINOR) + "." + std::to_string(RTC_VERSION_PATCH);
+    return std::to_string(RTC_VERSION_MAJOR) + "." + std::to_string(RTC_VERSION_MINOR) + "." +
+           std::to_string(RTC_VERSION_PATCH);
 }
 
 struct Tracer::Impl {
@@ -134,7 +141,8 @@ struct Tracer::Impl {
     const CrtTriangle* triangles = nullptr;
 };
 
-Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t count, const std::function<void(double)>& progress)
+Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t count,
+               const std::function<void(double)>& progress)
     : impl_(new Impl) {
     RTCDevice rtc = device.impl_->device;
     impl_->triangles = triangles;
@@ -148,7 +156,8 @@ Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(impl_->scene, geometry);
     rtcReleaseGeometry(geometry);
-    rtcSetSceneProgressMonitorFunction(impl_->scene, reportProgress, const_cast<std::function<void(double)>*>(&progress));
+    rtcSetSceneProgressMonitorFunction(impl_->scene, reportProgress,
+                                       const_cast<std::function<void(double)>*>(&progress));
     rtcCommitScene(impl_->scene);
     rtcSetSceneProgressMonitorFunction(impl_->scene, nullptr, nullptr);
     if (rtcGetDeviceError(rtc) != RTC_ERROR_NONE) {

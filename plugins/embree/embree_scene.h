@@ -1,5 +1,6 @@
-/// The blob's triangles in an Embree scene. Embree finds candidates; the kernel's shared triangle test has the last word, so that hits are the same
-/// bits as on every other backend. The one file pair that knows Embree, and hides the difference between Embree 3 and 4.
+/// The blob's triangles in an Embree scene. Embree finds candidates; the kernel's shared triangle test has
+/// the last word, so that hits are the same bits as on every other backend. The one file pair that knows
+/// Embree, and hides the difference between Embree 3 and 4.
 #pragma once
 
 namespace crt::embree {
@@ -34,18 +35,21 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-/// An Embree BVH over the triangle slots of a blob, which must outlive it. Throws PluginError when Embree cannot build it.
+/// An Embree BVH over the triangle slots of a blob, which must outlive it. Throws PluginError when Embree
+/// cannot build it.
 class Tracer {
 public:
     /// `progress` gets the part of it that is built, in [0,1], from any thread.
-    Tracer(const Device& device, const kernel::CrtTriangle* triangles, std::uint32_t count, const std::function<void(double)>& progress);
+    Tracer(const Device& device, const kernel::CrtTriangle* triangles, std::uint32_t count,
+           const std::function<void(double)>& progress);
     ~Tracer();
     Tracer(const Tracer&) = delete;
     Tracer& operator=(const Tracer&) = delete;
 
     /// Rays that start within this of 0 on each axis are taken.
     static constexpr float kReach = 4;
-    /// Whether Embree is sure to find what this ray meets: not for rays from far outside the scene, and those that are none.
+    /// Whether Embree is sure to find what this ray meets: not for rays from far outside the scene, and
+    /// those that are none.
     static bool takes(const kernel::CrtRay& ray);
     kernel::CrtHit closest(const kernel::CrtRay& ray) const;
     bool any(const kernel::CrtRay& ray) const;

@@ -3,5 +3,5 @@
 
 #include "kernel/features.h"
 
-CRT_DEFINE_BACKEND_BUILT_WITH(crt::embree::EmbreeIntegrator, crt::embree::probeDevices, "embree", CRT_HEADERS_VERSION, CRT_COMPILER_TEXT,
-                              CRT_FEATURES_ALL)
+CRT_DEFINE_BACKEND_BUILT_WITH(crt::embree::EmbreeIntegrator, crt::embree::probeDevices, "embree",
+                              CRT_HEADERS_VERSION, CRT_COMPILER_TEXT, CRT_FEATURES_ALL)

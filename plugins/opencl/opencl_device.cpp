@@ -13,11 +13,13 @@ using plugin::PluginError;
 
 namespace {
 
-// Of the loader's extension (cl_icd.h does not give it to programs): the loader is there, but no platform is installed.
+// Of the loader's extension (cl_icd.h does not give it to programs): the loader is there, but no platform is
+// installed.
 constexpr cl_int kPlatformNotFound = -1001;
 
 std::string trimmed(std::string text) {
-    while (!text.empty() && (text.back() == '\0' || std::isspace(static_cast<unsigned char>(text.back())))) text.pop_back();
+    while (!text.empty() && (text.back() == '\0' || std::isspace(static_cast<unsigned char>(text.back()))))
+        text.pop_back();
     text.erase(0, std::min(text.find_first_not_of(" \t\r\n"), text.size()));
     return text;
 }
@@ -25,7 +27,8 @@ std::string trimmed(std::string text) {
 template <class T>
 T deviceInfo(cl_device_id device, cl_device_info what) {
     T value{};
-    // A query that a device does not know leaves zero: for all that is asked here, zero means "no" or "none".
+    // A query that a device does not know leaves zero: for all that is asked here, zero means "no" or
+    // "none".
     clGetDeviceInfo(device, what, sizeof value, &value, nullptr);
     return value;
 }
@@ -56,7 +59,8 @@ std::string whatIsMissing(cl_device_id id, bool is_cpu) {
     const auto single = deviceInfo<cl_device_fp_config>(id, CL_DEVICE_SINGLE_FP_CONFIG);
     if (!(single & CL_FP_DENORM)) return "flushes subnormal numbers to zero";
     // A CPU divides by its IEEE instruction whether or not its driver says so.
-    if (!is_cpu && !(single & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT)) return "has no correctly rounded division and square root";
+    if (!is_cpu && !(single & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT))
+        return "has no correctly rounded division and square root";
     return {};
 }
 
@@ -67,8 +71,8 @@ Device describe(cl_platform_id platform, cl_device_id id, std::uint32_t index) {
     device.name = deviceText(id, CL_DEVICE_NAME);
     device.driver = deviceText(id, CL_DRIVER_VERSION) + ", " + platformText(platform, CL_PLATFORM_VERSION);
     device.is_cpu = (deviceInfo<cl_device_type>(id, CL_DEVICE_TYPE) & CL_DEVICE_TYPE_CPU) != 0;
-    device.has_correct_division_option =
-        (deviceInfo<cl_device_fp_config>(id, CL_DEVICE_SINGLE_FP_CONFIG) & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
+    device.has_correct_division_option = (deviceInfo<cl_device_fp_config>(id, CL_DEVICE_SINGLE_FP_CONFIG) &
+                                          CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
     device.compute_units = deviceInfo<cl_uint>(id, CL_DEVICE_MAX_COMPUTE_UNITS);
     device.memory_bytes = deviceInfo<cl_ulong>(id, CL_DEVICE_GLOBAL_MEM_SIZE);
     device.largest_buffer_bytes = deviceInfo<cl_ulong>(id, CL_DEVICE_MAX_MEM_ALLOC_SIZE);
@@ -81,7 +85,8 @@ std::string listUnusable(const std::vector<Device>& devices) {
     std::string list;
     for (const Device& device : devices)
         if (!device.unusable.empty())
-            list += (list.empty() ? "" : ", ") + std::to_string(device.index) + " '" + device.name + "' " + device.unusable;
+            list += (list.empty() ? "" : ", ") + std::to_string(device.index) + " '" + device.name + "' " +
+                    device.unusable;
     return list;
 }
 
@@ -148,8 +153,10 @@ std::string errorName(cl_int error) {
 
 void check(cl_int result, const std::string& what) {
     if (result == CL_SUCCESS) return;
-    const bool memory = result == CL_MEM_OBJECT_ALLOCATION_FAILURE || result == CL_OUT_OF_RESOURCES || result == CL_OUT_OF_HOST_MEMORY;
-    throw PluginError(memory ? CRT_OUT_OF_MEMORY : CRT_DEVICE_FAILED, what + " failed: " + errorName(result));
+    const bool memory = result == CL_MEM_OBJECT_ALLOCATION_FAILURE || result == CL_OUT_OF_RESOURCES ||
+                        result == CL_OUT_OF_HOST_MEMORY;
+    throw PluginError(memory ? CRT_OUT_OF_MEMORY : CRT_DEVICE_FAILED,
+                      what + " failed: " + errorName(result));
 }
 
 double Device::score() const {
@@ -166,7 +173,8 @@ std::vector<Device> listDevices() {
         throw PluginError(CRT_NO_DEVICE, "the OpenCL platforms cannot be listed: " + errorName(listed));
     if (platform_count == 0)
         throw PluginError(CRT_NO_DEVICE,
-                          "no OpenCL platform is installed (for a CPU: the package pocl-opencl-icd; for a GPU: its vendor's driver)");
+                          "no OpenCL platform is installed (for a CPU: the package pocl-opencl-icd; for a "
+                          "GPU: its vendor's driver)");
     std::vector<cl_platform_id> platforms(platform_count);
     check(clGetPlatformIDs(platform_count, platforms.data(), nullptr), "listing the OpenCL platforms");
 
@@ -175,14 +183,19 @@ std::vector<Device> listDevices() {
     for (cl_platform_id platform : platforms) {
         cl_uint count = 0;
         std::vector<cl_device_id> ids;
-        if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, nullptr, &count) == CL_SUCCESS) ids.resize(count);
-        if (ids.empty() || clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, count, ids.data(), nullptr) != CL_SUCCESS) {
-            empty_platforms += (empty_platforms.empty() ? "'" : ", '") + platformText(platform, CL_PLATFORM_NAME) + "'";
+        if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, nullptr, &count) == CL_SUCCESS)
+            ids.resize(count);
+        if (ids.empty() ||
+            clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, count, ids.data(), nullptr) != CL_SUCCESS) {
+            empty_platforms +=
+                (empty_platforms.empty() ? "'" : ", '") + platformText(platform, CL_PLATFORM_NAME) + "'";
             continue;
         }
-        for (cl_device_id id : ids) devices.push_back(describe(platform, id, static_cast<std::uint32_t>(devices.size())));
+        for (cl_device_id id : ids)
+            devices.push_back(describe(platform, id, static_cast<std::uint32_t>(devices.size())));
     }
-    if (devices.empty()) throw PluginError(CRT_NO_DEVICE, "no OpenCL platform has a device: " + empty_platforms);
+    if (devices.empty())
+        throw PluginError(CRT_NO_DEVICE, "no OpenCL platform has a device: " + empty_platforms);
     return devices;
 }
 
@@ -191,7 +204,8 @@ std::vector<Device> usableDevices() {
     std::vector<Device> usable;
     for (const Device& device : devices)
         if (device.unusable.empty()) usable.push_back(device);
-    if (usable.empty()) throw PluginError(CRT_NO_DEVICE, "no OpenCL device can be used: " + listUnusable(devices));
+    if (usable.empty())
+        throw PluginError(CRT_NO_DEVICE, "no OpenCL device can be used: " + listUnusable(devices));
     return usable;
 }
 
@@ -224,17 +238,19 @@ const Session& openSession(const Device& device, std::uint32_t threads) {
     session.target = device.id;
     session.compute_units = compute_units;
     if (divided) {
-        const cl_device_partition_property by_counts[] = {CL_DEVICE_PARTITION_BY_COUNTS, static_cast<cl_device_partition_property>(compute_units),
-                                                          CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};
+        const cl_device_partition_property by_counts[] = {
+            CL_DEVICE_PARTITION_BY_COUNTS, static_cast<cl_device_partition_property>(compute_units),
+            CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};
         check(clCreateSubDevices(device.id, by_counts, 1, &session.target, nullptr),
-              "taking " + std::to_string(compute_units) + " of the " + std::to_string(device.compute_units) + " compute units of '" +
-                  device.name + "'");
+              "taking " + std::to_string(compute_units) + " of the " + std::to_string(device.compute_units) +
+                  " compute units of '" + device.name + "'");
         session.part = SubDevice(session.target);
     }
     cl_int result = CL_SUCCESS;
     session.context = Context(clCreateContext(nullptr, 1, &session.target, nullptr, nullptr, &result));
     check(result, "opening '" + device.name + "'");
-    session.queue = Queue(clCreateCommandQueue(session.context.get(), session.target, CL_QUEUE_PROFILING_ENABLE, &result));
+    session.queue = Queue(
+        clCreateCommandQueue(session.context.get(), session.target, CL_QUEUE_PROFILING_ENABLE, &result));
     check(result, "creating a command queue on '" + device.name + "'");
     return sessions.emplace(std::pair(device.id, compute_units), std::move(session)).first->second;
 }

@@ -1,4 +1,5 @@
-/// OpenCL devices: listing, judging and choosing them, and the vocabulary every other file here uses (handles, checked calls).
+/// OpenCL devices: listing, judging and choosing them, and the vocabulary every other file here uses
+/// (handles, checked calls).
 #pragma once
 
 #include "backend/crt_backend.h"
@@ -16,7 +17,8 @@ namespace crt::opencl {
 /// "CL_BUILD_PROGRAM_FAILURE" for −11, and so on.
 std::string errorName(cl_int error);
 
-/// Throws unless `result` is CL_SUCCESS: one sentence that begins with `what` and names the error. Lack of memory gets a status of its own.
+/// Throws unless `result` is CL_SUCCESS: one sentence that begins with `what` and names the error. Lack of
+/// memory gets a status of its own.
 void check(cl_int result, const std::string& what);
 
 /// Owns one OpenCL object.
@@ -51,7 +53,8 @@ using SubDevice = Handle<cl_device_id, clReleaseDevice>;
 /// One device of one platform, usable or not.
 struct Device {
     cl_device_id id = nullptr;
-    std::uint32_t index = 0;  ///< Among all devices of all platforms, in the order the ICD loader lists them.
+    std::uint32_t index =
+        0;  ///< Among all devices of all platforms, in the order the ICD loader lists them.
     std::string name;
     std::string driver;    ///< Driver version and platform version.
     bool is_cpu = false;
@@ -71,7 +74,8 @@ std::vector<Device> listDevices();
 /// Those that can be used. Throws PluginError(CRT_NO_DEVICE) that says of each why not when there is none.
 std::vector<Device> usableDevices();
 
-/// The device that --device means (crt::plugin::chooseDevice). Throws when there is none, and then also says what is wrong with the others.
+/// The device that --device means (crt::plugin::chooseDevice). Throws when there is none, and then also says
+/// what is wrong with the others.
 Device chooseDevice(const char* wanted);
 
 /// A device, or some of a CPU's compute units, opened for work.
@@ -83,9 +87,10 @@ struct Session {
     std::uint32_t compute_units = 0;
 };
 
-/// The session with `threads` compute units (0, or more than there are: all; only a CPU can be divided), opened at the first call and shared from
-/// then on until the process ends. It is never closed: PoCL's workers (3.1) look at the queue and the device of a command for a moment after they have
-/// reported it complete, and crash when those are gone. [any thread]
+/// The session with `threads` compute units (0, or more than there are: all; only a CPU can be divided),
+/// opened at the first call and shared from then on until the process ends. It is never closed: PoCL's
+/// workers (3.1) look at the queue and the device of a command for a moment after they have reported it
+/// complete, and crash when those are gone. [any thread]
 const Session& openSession(const Device& device, std::uint32_t threads);
 
 }  // namespace crt::opencl

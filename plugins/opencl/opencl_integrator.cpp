@@ -16,7 +16,9 @@ namespace {
 
 constexpr double kLaunchSeconds = 0.05;
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 std::string megabytes(std::uint64_t bytes) {
     char text[32];
@@ -26,7 +28,8 @@ std::string megabytes(std::uint64_t bytes) {
 
 template <class T>
 void setArgument(cl_kernel kernel, cl_uint index, const T& value) {
-    check(clSetKernelArg(kernel, index, sizeof value, &value), "setting kernel argument " + std::to_string(index));
+    check(clSetKernelArg(kernel, index, sizeof value, &value),
+          "setting kernel argument " + std::to_string(index));
 }
 
 }  // namespace
@@ -40,19 +43,24 @@ OpenClIntegrator::OpenClIntegrator(const plugin::Host& host, const CrtCreateInfo
       // Every device has traced these in far less than a second.
       pacer_(kLaunchSeconds, device_.is_cpu ? 4096 : 65536, groupSize(device_).y) {
     if (info.threads != 0 && !device_.is_cpu)
-        host_.log(CRT_LOG_DEBUG, "opencl: '" + device_.name + "' is not a CPU: the number of threads does not apply");
+        host_.log(CRT_LOG_DEBUG,
+                  "opencl: '" + device_.name + "' is not a CPU: the number of threads does not apply");
 }
 
-Buffer OpenClIntegrator::allocate(cl_mem_flags flags, std::uint64_t bytes, const void* content, const char* what) {
+Buffer OpenClIntegrator::allocate(cl_mem_flags flags, std::uint64_t bytes, const void* content,
+                                  const char* what) {
     if (bytes > device_.largest_buffer_bytes)
-        throw PluginError(CRT_OUT_OF_MEMORY, std::string(what) + " needs " + megabytes(bytes) + ", but '" + device_.name +
-                                                 "' gives at most " + megabytes(device_.largest_buffer_bytes) + " in one buffer");
+        throw PluginError(CRT_OUT_OF_MEMORY, std::string(what) + " needs " + megabytes(bytes) + ", but '" +
+                                                 device_.name + "' gives at most " +
+                                                 megabytes(device_.largest_buffer_bytes) + " in one buffer");
     if (allocated_bytes_ + bytes > device_.memory_bytes)
-        throw PluginError(CRT_OUT_OF_MEMORY, std::string(what) + " needs " + megabytes(bytes) + " beside the " +
-                                                 megabytes(allocated_bytes_) + " in use, but '" + device_.name + "' has only " +
+        throw PluginError(CRT_OUT_OF_MEMORY, std::string(what) + " needs " + megabytes(bytes) +
+                                                 " beside the " + megabytes(allocated_bytes_) +
+                                                 " in use, but '" + device_.name + "' has only " +
                                                  megabytes(device_.memory_bytes));
     cl_int result = CL_SUCCESS;
-    Buffer buffer(clCreateBuffer(session_.context.get(), flags | (content != nullptr ? CL_MEM_COPY_HOST_PTR : 0), bytes,
+    Buffer buffer(clCreateBuffer(session_.context.get(),
+                                 flags | (content != nullptr ? CL_MEM_COPY_HOST_PTR : 0), bytes,
                                  const_cast<void*>(content), &result));
     check(result, "allocating " + megabytes(bytes) + " on '" + device_.name + "' for " + what);
     allocated_bytes_ += bytes;
@@ -61,7 +69,9 @@ Buffer OpenClIntegrator::allocate(cl_mem_flags flags, std::uint64_t bytes, const
 }
 
 void OpenClIntegrator::fill(const Buffer& buffer, std::uint64_t bytes, cl_uint pattern) {
-    check(clEnqueueFillBuffer(session_.queue.get(), buffer.get(), &pattern, sizeof pattern, 0, bytes, 0, nullptr, nullptr), "clearing the film");
+    check(clEnqueueFillBuffer(session_.queue.get(), buffer.get(), &pattern, sizeof pattern, 0, bytes, 0,
+                              nullptr, nullptr),
+          "clearing the film");
 }
 
 void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
@@ -88,7 +98,8 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     fill(counts_, pixels * sizeof(cl_ulong), 0);
     fill(rays_, 4 * sizeof(cl_uint), 0);
     if (scene.aovs & CRT_AOV_PRIMITIVE) {
-        primitives_ = allocate(CL_MEM_READ_WRITE, pixels * sizeof(cl_uint), nullptr, "the film's primitives");
+        primitives_ =
+            allocate(CL_MEM_READ_WRITE, pixels * sizeof(cl_uint), nullptr, "the film's primitives");
         fill(primitives_, pixels * sizeof(cl_uint), CRT_NONE);
     }
     check(clFinish(session_.queue.get()), "uploading the scene");
@@ -117,14 +128,18 @@ double OpenClIntegrator::launch(const Launch& launch) {
                                    (launch.y1 - launch.y0 + local[1] - 1) / local[1] * local[1]};
     const double enqueued_at = now();
     cl_event enqueued = nullptr;
-    check(clEnqueueNDRangeKernel(session_.queue.get(), kernel, 2, nullptr, global, local, 0, nullptr, &enqueued), "launching the kernel");
+    check(clEnqueueNDRangeKernel(session_.queue.get(), kernel, 2, nullptr, global, local, 0, nullptr,
+                                 &enqueued),
+          "launching the kernel");
     const Event event(enqueued);
     check(clWaitForEvents(1, &enqueued), "rendering on '" + device_.name + "'");
 
     const double waited = now() - enqueued_at;
     cl_ulong start = 0, end = 0;
-    check(clGetEventProfilingInfo(enqueued, CL_PROFILING_COMMAND_START, sizeof start, &start, nullptr), "reading the kernel's start");
-    check(clGetEventProfilingInfo(enqueued, CL_PROFILING_COMMAND_END, sizeof end, &end, nullptr), "reading the kernel's end");
+    check(clGetEventProfilingInfo(enqueued, CL_PROFILING_COMMAND_START, sizeof start, &start, nullptr),
+          "reading the kernel's start");
+    check(clGetEventProfilingInfo(enqueued, CL_PROFILING_COMMAND_END, sizeof end, &end, nullptr),
+          "reading the kernel's end");
     return launchSeconds(start, end, waited);
 }
 
@@ -144,7 +159,9 @@ bool OpenClIntegrator::render(const CrtRenderRange& range) {
 void OpenClIntegrator::readFilm(const CrtFilmView& film) {
     const std::size_t pixels = std::size_t{film.width} * film.height;
     const auto read = [&](const Buffer& buffer, std::size_t bytes, void* to) {
-        check(clEnqueueReadBuffer(session_.queue.get(), buffer.get(), CL_TRUE, 0, bytes, to, 0, nullptr, nullptr), "reading the film back");
+        check(clEnqueueReadBuffer(session_.queue.get(), buffer.get(), CL_TRUE, 0, bytes, to, 0, nullptr,
+                                  nullptr),
+              "reading the film back");
     };
     read(sums_, pixels * film.channels * 2 * sizeof(double), film.sums);
     read(counts_, pixels * sizeof(std::uint64_t), film.counts);
@@ -153,8 +170,9 @@ void OpenClIntegrator::readFilm(const CrtFilmView& film) {
 
 void OpenClIntegrator::report(CrtBackendReport& report) {
     plugin::writeText(report.device, device_.name);
-    plugin::writeText(report.kernel, std::string(kernel_choice_ == CRT_KERNEL_FULL ? "full" : "lean") + " kernel, " +
-                                         std::to_string(session_.compute_units) + " of " + std::to_string(device_.compute_units) + " compute units");
+    plugin::writeText(report.kernel, std::string(kernel_choice_ == CRT_KERNEL_FULL ? "full" : "lean") +
+                                         " kernel, " + std::to_string(session_.compute_units) + " of " +
+                                         std::to_string(device_.compute_units) + " compute units");
     report.kernel_from_cache = program_.from_cache ? 1 : 0;
     report.kernel_features = program_.features;
     report.compile_seconds = program_.compile_seconds;
@@ -165,7 +183,8 @@ void OpenClIntegrator::report(CrtBackendReport& report) {
     report.peak_memory_bytes = device_.is_cpu ? 0 : peak_bytes_;
     if (rays_) {
         cl_uint counts[4] = {};
-        check(clEnqueueReadBuffer(session_.queue.get(), rays_.get(), CL_TRUE, 0, sizeof counts, counts, 0, nullptr, nullptr),
+        check(clEnqueueReadBuffer(session_.queue.get(), rays_.get(), CL_TRUE, 0, sizeof counts, counts, 0,
+                                  nullptr, nullptr),
               "reading the ray counters");
         report.closest_rays = (std::uint64_t{counts[1]} << 32) | counts[0];
         report.shadow_rays = (std::uint64_t{counts[3]} << 32) | counts[2];

@@ -12,7 +12,8 @@
 
 namespace crt::opencl {
 
-/// One device with one scene. Film and scene live on the device between calls. Failures are thrown as PluginError.
+/// One device with one scene. Film and scene live on the device between calls. Failures are thrown as
+/// PluginError.
 class OpenClIntegrator {
 public:
     OpenClIntegrator(const plugin::Host& host, const CrtCreateInfo& info);

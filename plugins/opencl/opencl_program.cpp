@@ -18,7 +18,9 @@ namespace {
 
 class Stopwatch {
 public:
-    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    }
 
 private:
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -27,37 +29,48 @@ private:
 /// What the compiler said, at most `line_count` lines of it.
 std::string buildLog(cl_program program, cl_device_id target, int line_count) {
     std::size_t size = 0;
-    if (clGetProgramBuildInfo(program, target, CL_PROGRAM_BUILD_LOG, 0, nullptr, &size) != CL_SUCCESS || size < 2) return "(no build log)";
+    if (clGetProgramBuildInfo(program, target, CL_PROGRAM_BUILD_LOG, 0, nullptr, &size) != CL_SUCCESS ||
+        size < 2)
+        return "(no build log)";
     std::string log(size, '\0');
     clGetProgramBuildInfo(program, target, CL_PROGRAM_BUILD_LOG, size, log.data(), nullptr);
     log.resize(log.find_last_not_of(std::string("\0\n\r ", 4)) + 1);
     std::size_t end = 0;
-    for (int line = 0; line < line_count && end != std::string::npos; ++line) end = log.find('\n', end + (line > 0 ? 1 : 0));
+    for (int line = 0; line < line_count && end != std::string::npos; ++line)
+        end = log.find('\n', end + (line > 0 ? 1 : 0));
     return end == std::string::npos ? log : log.substr(0, end) + "\n(more lines follow)";
 }
 
 std::vector<unsigned char> programBinary(cl_program program) {
     // One device, so one binary.
     std::size_t size = 0;
-    check(clGetProgramInfo(program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, nullptr), "asking for the size of the compiled kernel");
+    check(clGetProgramInfo(program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, nullptr),
+          "asking for the size of the compiled kernel");
     std::vector<unsigned char> binary(size);
     unsigned char* pointer = binary.data();
-    if (size != 0) check(clGetProgramInfo(program, CL_PROGRAM_BINARIES, sizeof pointer, &pointer, nullptr), "reading the compiled kernel back");
+    if (size != 0)
+        check(clGetProgramInfo(program, CL_PROGRAM_BINARIES, sizeof pointer, &pointer, nullptr),
+              "reading the compiled kernel back");
     return binary;
 }
 
-/// A program from a cached binary; empty when the driver does not take it, for whatever reason: then the text is compiled again.
-ProgramHandle fromBinary(const Session& session, const std::vector<unsigned char>& binary, const std::string& options) {
+/// A program from a cached binary; empty when the driver does not take it, for whatever reason: then the
+/// text is compiled again.
+ProgramHandle fromBinary(const Session& session, const std::vector<unsigned char>& binary,
+                         const std::string& options) {
     const unsigned char* pointer = binary.data();
     const std::size_t size = binary.size();
     cl_int status = CL_SUCCESS, result = CL_SUCCESS;
-    ProgramHandle program(clCreateProgramWithBinary(session.context.get(), 1, &session.target, &size, &pointer, &status, &result));
+    ProgramHandle program(clCreateProgramWithBinary(session.context.get(), 1, &session.target, &size,
+                                                    &pointer, &status, &result));
     if (result != CL_SUCCESS || status != CL_SUCCESS) return {};
-    if (clBuildProgram(program.get(), 1, &session.target, options.c_str(), nullptr, nullptr) != CL_SUCCESS) return {};
+    if (clBuildProgram(program.get(), 1, &session.target, options.c_str(), nullptr, nullptr) != CL_SUCCESS)
+        return {};
     return program;
 }
 
-ProgramHandle fromText(const Session& session, const Device& device, const std::string& text, const std::string& options) {
+ProgramHandle fromText(const Session& session, const Device& device, const std::string& text,
+                       const std::string& options) {
     const char* pointer = text.c_str();
     const std::size_t size = text.size();
     cl_int result = CL_SUCCESS;
@@ -65,8 +78,9 @@ ProgramHandle fromText(const Session& session, const Device& device, const std::
     check(result, "creating the OpenCL program");
     result = clBuildProgram(program.get(), 1, &session.target, options.c_str(), nullptr, nullptr);
     if (result != CL_SUCCESS)
-        throw PluginError(CRT_DEVICE_FAILED, "'" + device.name + "' cannot compile the kernel (" + errorName(result) + ", options " + options +
-                                                 "):\n" + buildLog(program.get(), session.target, 20));
+        throw PluginError(CRT_DEVICE_FAILED, "'" + device.name + "' cannot compile the kernel (" +
+                                                 errorName(result) + ", options " + options + "):\n" +
+                                                 buildLog(program.get(), session.target, 20));
     return program;
 }
 
@@ -77,35 +91,44 @@ GroupSize groupSize(const Device& device) { return device.is_cpu ? GroupSize{1, 
 std::string buildOptions(const Device& device, std::uint32_t features) {
     const GroupSize group = groupSize(device);
     char options[256];
-    std::snprintf(options, sizeof options, "-cl-std=CL1.2 -DCRT_FEATURES=0x%xu -DCRT_SIMD8=%d -DCRT_GROUP_X=%u -DCRT_GROUP_Y=%u", features,
-                  device.is_cpu ? 1 : 0,  // a GPU's lanes are its work-items: eight-wide vectors only cost it registers
-                  group.x, group.y);
-    return options + std::string(device.has_correct_division_option ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
+    std::snprintf(
+        options, sizeof options,
+        "-cl-std=CL1.2 -DCRT_FEATURES=0x%xu -DCRT_SIMD8=%d -DCRT_GROUP_X=%u -DCRT_GROUP_Y=%u", features,
+        device.is_cpu ? 1
+                      : 0,  // a GPU's lanes are its work-items: eight-wide vectors only cost it registers
+        group.x, group.y);
+    return options +
+           std::string(device.has_correct_division_option ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
 }
 
-Program buildProgram(const plugin::Host& host, const Device& device, const Session& session, std::uint32_t features) {
+Program buildProgram(const plugin::Host& host, const Device& device, const Session& session,
+                     std::uint32_t features) {
     Program built;
     built.features = features;
     const std::string options = buildOptions(device, features);
-    const std::string text = std::string(host.kernelSource("path.h")) + "\n#line 1 \"kernels.cl\"\n" + kKernelText;
+    const std::string text =
+        std::string(host.kernelSource("path.h")) + "\n#line 1 \"kernels.cl\"\n" + kKernelText;
 
     Stopwatch cache_time;
     const KernelCache cache(host.cacheDirectory());
     const KernelCache::Key key = KernelCache::makeKey({"opencl", text, options, device.name, device.driver});
     std::string refused;
     const std::optional<std::vector<unsigned char>> binary = cache.load(key, &refused);
-    if (!refused.empty()) host.log(CRT_LOG_WARNING, "opencl: a cached kernel is refused, and compiled again: " + refused);
+    if (!refused.empty())
+        host.log(CRT_LOG_WARNING, "opencl: a cached kernel is refused, and compiled again: " + refused);
     if (binary) {
         built.program = fromBinary(session, *binary, options);
         built.from_cache = static_cast<bool>(built.program);
-        if (!built.from_cache) host.log(CRT_LOG_DEBUG, "opencl: the driver refuses the cached kernel; compiling it again");
+        if (!built.from_cache)
+            host.log(CRT_LOG_DEBUG, "opencl: the driver refuses the cached kernel; compiling it again");
     }
     built.cache_seconds = cache_time.seconds();
 
     if (!built.program) {
         const Stopwatch compile_time;
         built.program = fromText(session, device, text, options);
-        // PoCL generates the machine code only at the first launch, 0.7 s that no time of ours counts, and keeps it in a cache of its own.
+        // PoCL generates the machine code only at the first launch, 0.7 s that no time of ours counts, and
+        // keeps it in a cache of its own.
         const std::vector<unsigned char> compiled = programBinary(built.program.get());
         built.compile_seconds = compile_time.seconds();
 

@@ -8,7 +8,8 @@ namespace {
 
 std::vector<CrtDevice> probeDevices(const crt::plugin::Host&) {
     std::vector<CrtDevice> devices;
-    for (const crt::opencl::Device& device : crt::opencl::usableDevices()) devices.push_back(device.describe());
+    for (const crt::opencl::Device& device : crt::opencl::usableDevices())
+        devices.push_back(device.describe());
     return devices;
 }
 

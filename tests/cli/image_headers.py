@@ -5,12 +5,20 @@ import zlib
 
 
 def exr_header(path):
-    """Attributes of a single-part OpenEXR file: name -> (type, value), values unpacked where the type is a simple one."""
+    """Attributes of a single-part OpenEXR file: name -> (type, value), values unpacked where the type is a
+    simple one."""
     with open(path, "rb") as file:
         data = file.read(1 << 16)
     if data[:4] != b"\x76\x2f\x31\x01":
         raise ValueError(f"{path} is no EXR file")
-    formats = {"box2i": "<4i", "v2f": "<2f", "float": "<f", "int": "<i", "m44f": "<16f", "chromaticities": "<8f"}
+    formats = {
+        "box2i": "<4i",
+        "v2f": "<2f",
+        "float": "<f",
+        "int": "<i",
+        "m44f": "<16f",
+        "chromaticities": "<8f",
+    }
     at, header = 8, {}
     while data[at] != 0:
         name, kind, rest = data[at:].split(b"\0", 2)[0], data[at:].split(b"\0", 2)[1], None

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""`crt converge`, `crt reference` and --target-error from outside, with the first real backend; skipped by name when there is none.
+"""`crt converge`, `crt reference` and --target-error from outside, with the first real backend; skipped by
+name when there is none.
 
-    test_converge.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
+test_converge.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 """
 
 import json
@@ -31,7 +32,19 @@ class Converging(CliTest):
             return [json.loads(line) for line in file]
 
     def test_a_run_writes_its_files_and_keeps_to_its_time(self):
-        self.crt("converge", "scene.yaml", "--backends", f"{self.backend},nosuch", "--time", "3s", "--max-spp", "64", "-o", "out", *SMALL)
+        self.crt(
+            "converge",
+            "scene.yaml",
+            "--backends",
+            f"{self.backend},nosuch",
+            "--time",
+            "3s",
+            "--max-spp",
+            "64",
+            "-o",
+            "out",
+            *SMALL,
+        )
         for name in ("report.html", "results.jsonl", "results.csv", "summary.json", "manifest.json"):
             self.assertTrue(os.path.getsize(self.path(f"out/{name}")) > 0, name)
         rows = self.rows("out")
@@ -42,17 +55,82 @@ class Converging(CliTest):
             self.assertIn("nosuch", file.read())  # What was left out is said.
 
     def test_a_reference_judges_its_own_scene_only(self):
-        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", "4096", "--same-estimator", "-b", self.backend, *SMALL)
-        self.crt("converge", "scene.yaml", "--backends", self.backend, "--reference", "ref.exr", "--time", "2s", "--max-spp", "16", "-o", "out", *SMALL)
-        run = self.crt("converge", "scene.yaml", "--backends", self.backend, "--reference", "ref.exr", "--time", "2s", "-o", "other", *SMALL,
-                       "--set", "camera.fov=20", expect=2)
+        self.crt(
+            "reference",
+            "scene.yaml",
+            "-o",
+            "ref.exr",
+            "--spp",
+            "4096",
+            "--same-estimator",
+            "-b",
+            self.backend,
+            *SMALL,
+        )
+        self.crt(
+            "converge",
+            "scene.yaml",
+            "--backends",
+            self.backend,
+            "--reference",
+            "ref.exr",
+            "--time",
+            "2s",
+            "--max-spp",
+            "16",
+            "-o",
+            "out",
+            *SMALL,
+        )
+        run = self.crt(
+            "converge",
+            "scene.yaml",
+            "--backends",
+            self.backend,
+            "--reference",
+            "ref.exr",
+            "--time",
+            "2s",
+            "-o",
+            "other",
+            *SMALL,
+            "--set",
+            "camera.fov=20",
+            expect=2,
+        )
         self.assert_one_error(run, "another scene")
         # A luminance that it has not fails: exit code 7.
-        self.crt("converge", "scene.yaml", "--backends", self.backend, "--reference", "12345", "--time", "2s", "--max-spp", "16", "-o", "wrong", *SMALL,
-                 expect=7)
+        self.crt(
+            "converge",
+            "scene.yaml",
+            "--backends",
+            self.backend,
+            "--reference",
+            "12345",
+            "--time",
+            "2s",
+            "--max-spp",
+            "16",
+            "-o",
+            "wrong",
+            *SMALL,
+            expect=7,
+        )
 
     def test_an_earlier_run_is_not_overwritten_but_resumed(self):
-        arguments = ["converge", "scene.yaml", "--backends", self.backend, "--time", "2s", "--max-spp", "8", "-o", "out", *SMALL]
+        arguments = [
+            "converge",
+            "scene.yaml",
+            "--backends",
+            self.backend,
+            "--time",
+            "2s",
+            "--max-spp",
+            "8",
+            "-o",
+            "out",
+            *SMALL,
+        ]
         self.crt(*arguments)
         first = {(row["replicate"], row["samples_per_pixel"]): row["image_mean"] for row in self.rows("out")}
         self.assert_one_error(self.crt(*arguments, expect=2), "--resume")
@@ -67,21 +145,28 @@ class Converging(CliTest):
 
     def test_resume_refuses_what_is_not_the_same_experiment(self):
         self.converge("scene.yaml", *SMALL)
-        cases = [("the size", ["--set", "film.resolution=[32,32]", "--set", "sampler.type=independent"]),
-                 ("the size", ["--set", "film.resolution=[4,4]", "--set", "sampler.type=independent"]),
-                 ("the maximum depth", [*SMALL, "--set", "integrator.max_depth=2"]),
-                 ("the sampler", ["--set", "film.resolution=[16,16]"]),
-                 ("the seed", [*SMALL, "--set", "sampler.seed=77"]),
-                 ("light sampling", [*SMALL, "--set", "integrator.nee=false"]),
-                 ("the colour", [*SMALL, "--set", "film.exposure_ev=1", "--set", "film.apply_to_float=true"]),
-                 ("the colour", [*SMALL, "--set", "film.color_space=acescg"]),
-                 ("the camera", [*SMALL, "--set", "camera.fov=20"]),
-                 ("the geometry of scene, %s was another (4 triangles in 2 objects in both)" % self.backend,
-                  [*SMALL, "--set", "objects.0.mesh.positions.0.0=-1"]),
-                 ("the materials of scene, %s was another" % self.backend, [*SMALL, "--set", "materials.floor.reflectance=0.2"]),
-                 ("the reference", [*SMALL, "--reference", "0.5"]),
-                 ("the number of threads", [*SMALL, "-t", "1"]),
-                 ("it has no", [*SMALL, "--vary", "roulette=true,false"])]
+        cases = [
+            ("the size", ["--set", "film.resolution=[32,32]", "--set", "sampler.type=independent"]),
+            ("the size", ["--set", "film.resolution=[4,4]", "--set", "sampler.type=independent"]),
+            ("the maximum depth", [*SMALL, "--set", "integrator.max_depth=2"]),
+            ("the sampler", ["--set", "film.resolution=[16,16]"]),
+            ("the seed", [*SMALL, "--set", "sampler.seed=77"]),
+            ("light sampling", [*SMALL, "--set", "integrator.nee=false"]),
+            ("the colour", [*SMALL, "--set", "film.exposure_ev=1", "--set", "film.apply_to_float=true"]),
+            ("the colour", [*SMALL, "--set", "film.color_space=acescg"]),
+            ("the camera", [*SMALL, "--set", "camera.fov=20"]),
+            (
+                "the geometry of scene, %s was another (4 triangles in 2 objects in both)" % self.backend,
+                [*SMALL, "--set", "objects.0.mesh.positions.0.0=-1"],
+            ),
+            (
+                "the materials of scene, %s was another" % self.backend,
+                [*SMALL, "--set", "materials.floor.reflectance=0.2"],
+            ),
+            ("the reference", [*SMALL, "--reference", "0.5"]),
+            ("the number of threads", [*SMALL, "-t", "1"]),
+            ("it has no", [*SMALL, "--vary", "roulette=true,false"]),
+        ]
         before = self.rows("out")
         for what, changed in cases:
             with self.subTest(what=what, changed=changed):
@@ -89,7 +174,9 @@ class Converging(CliTest):
                 self.assert_one_error(run, "another experiment", what)
         self.assertEqual(self.rows("out"), before)
         # What is measured is scene radiance, whatever a screen is shown.
-        self.converge("scene.yaml", *SMALL, "--set", "film.exposure_ev=1", "--set", "film.white_balance=A", "--resume")
+        self.converge(
+            "scene.yaml", *SMALL, "--set", "film.exposure_ev=1", "--set", "film.white_balance=A", "--resume"
+        )
 
     def test_resume_refuses_what_it_cannot_read(self):
         self.converge("scene.yaml", *SMALL)
@@ -140,23 +227,61 @@ class Converging(CliTest):
         self.assert_one_error(run, "--vary nee", "twice")
 
     def test_a_reference_of_other_colours_is_refused(self):
-        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", "64", "--same-estimator", "-b", self.backend,
-                 *SMALL)
+        self.crt(
+            "reference",
+            "scene.yaml",
+            "-o",
+            "ref.exr",
+            "--spp",
+            "64",
+            "--same-estimator",
+            "-b",
+            self.backend,
+            *SMALL,
+        )
         for changed in ("film.exposure_ev=1", "film.color_space=acescg",
                         "film.white_balance={illuminant: A}"):
             with self.subTest(changed=changed):
-                run = self.converge("scene.yaml", "--reference", "ref.exr", "--set", changed, "--set", "film.apply_to_float=true",
-                                    *SMALL, folder="o" + changed[5:8], expect=2)
+                run = self.converge(
+                    "scene.yaml",
+                    "--reference",
+                    "ref.exr",
+                    "--set",
+                    changed,
+                    "--set",
+                    "film.apply_to_float=true",
+                    *SMALL,
+                    folder="o" + changed[5:8],
+                    expect=2,
+                )
                 self.assert_one_error(run, "a reference in other colours")
-        self.converge("scene.yaml", "--reference", "ref.exr", "--set", "film.exposure_ev=1", *SMALL, folder="same")
+        self.converge(
+            "scene.yaml", "--reference", "ref.exr", "--set", "film.exposure_ev=1", *SMALL, folder="same"
+        )
 
     def test_a_reference_of_another_scene_says_what_differs(self):
-        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", "64", "--same-estimator", "-b", self.backend, *SMALL)
-        for change, words in (("film.resolution=[8,8]", "the resolution is 16 × 16, not 8 × 8"),
-                              ("integrator.max_depth=3", "max_depth is 16, not 3"), ("camera.fov=20", "the camera is at"),
-                              ("materials.floor.reflectance=0.2", "the materials are others")):
+        self.crt(
+            "reference",
+            "scene.yaml",
+            "-o",
+            "ref.exr",
+            "--spp",
+            "64",
+            "--same-estimator",
+            "-b",
+            self.backend,
+            *SMALL,
+        )
+        for change, words in (
+            ("film.resolution=[8,8]", "the resolution is 16 × 16, not 8 × 8"),
+            ("integrator.max_depth=3", "max_depth is 16, not 3"),
+            ("camera.fov=20", "the camera is at"),
+            ("materials.floor.reflectance=0.2", "the materials are others"),
+        ):
             with self.subTest(change=change):
-                run = self.converge("scene.yaml", "--reference", "ref.exr", *SMALL, "--set", change, folder="o", expect=2)
+                run = self.converge(
+                    "scene.yaml", "--reference", "ref.exr", *SMALL, "--set", change, folder="o", expect=2
+                )
                 self.assert_one_error(run, "a reference of another scene", words)
                 self.assertNotIn("the seed", run.stderr)
 
@@ -182,8 +307,24 @@ class Converging(CliTest):
         self.assertLess(summary["environment"]["spent_seconds"], 6)
 
     def test_void_rows_fail_in_text_and_exit_code(self):
-        run = self.crt("converge", "scene.yaml", "--backends", "fake", "--reference", "0.5", "--time", "2s",
-                       "--max-spp", "64", "-o", "out", "--set", "film.resolution=[8,8]", expect=7, CRT_FAKE_FAULT="nan")
+        run = self.crt(
+            "converge",
+            "scene.yaml",
+            "--backends",
+            "fake",
+            "--reference",
+            "0.5",
+            "--time",
+            "2s",
+            "--max-spp",
+            "64",
+            "-o",
+            "out",
+            "--set",
+            "film.resolution=[8,8]",
+            expect=7,
+            CRT_FAKE_FAULT="nan",
+        )
         self.assertIn("FAIL", run.stderr)
         self.assertIn("void", run.stderr)
         self.assertEqual(self.summary("out")["fits"][0]["verdict"], "FAIL")
@@ -197,11 +338,31 @@ class Converging(CliTest):
         self.assertLess(max(starts.values()), 0.5, starts)
 
     def test_vary_takes_combinations_and_names_what_it_does_not_know(self):
-        self.crt("converge", "scene.yaml", "--backends", self.backend, "--vary", "sampler=sobol,independent", "--vary", "nee=true,false", "--time", "3s",
-                 "--max-spp", "4", "-o", "out", "--set", "film.resolution=[8,8]")
-        self.assertEqual({row["variant"] for row in self.rows("out")},
-                         {f"sampler={s} nee={n}" for s in ("sobol", "independent") for n in ("true", "false")})
-        self.assert_one_error(self.crt("converge", "scene.yaml", "--vary", "smapler=sobol", expect=2), "did you mean 'sampler'")
+        self.crt(
+            "converge",
+            "scene.yaml",
+            "--backends",
+            self.backend,
+            "--vary",
+            "sampler=sobol,independent",
+            "--vary",
+            "nee=true,false",
+            "--time",
+            "3s",
+            "--max-spp",
+            "4",
+            "-o",
+            "out",
+            "--set",
+            "film.resolution=[8,8]",
+        )
+        self.assertEqual(
+            {row["variant"] for row in self.rows("out")},
+            {f"sampler={s} nee={n}" for s in ("sobol", "independent") for n in ("true", "false")},
+        )
+        self.assert_one_error(
+            self.crt("converge", "scene.yaml", "--vary", "smapler=sobol", expect=2), "did you mean 'sampler'"
+        )
 
     def test_target_error_stops_when_it_is_reached(self):
         self.crt("scene.yaml", "-b", self.backend, "--target-error", "2%", "-o", "a.pfm", *SMALL)
@@ -210,8 +371,22 @@ class Converging(CliTest):
         self.assertLessEqual(report["error"]["half_width_95"], 0.025)
         samples = report["samples"]["per_pixel"]
         self.assertEqual(samples & (samples - 1), 0)
-        self.assert_one_error(self.crt("scene.yaml", "-b", self.backend, "--target-error", "2%", "--set", "sampler.replicates=1", expect=2), "replicates")
-        self.assert_one_error(self.crt("scene.yaml", "--target-error", "200%", expect=2), "an error such as 1%")
+        self.assert_one_error(
+            self.crt(
+                "scene.yaml",
+                "-b",
+                self.backend,
+                "--target-error",
+                "2%",
+                "--set",
+                "sampler.replicates=1",
+                expect=2,
+            ),
+            "replicates",
+        )
+        self.assert_one_error(
+            self.crt("scene.yaml", "--target-error", "200%", expect=2), "an error such as 1%"
+        )
 
 
 if __name__ == "__main__":

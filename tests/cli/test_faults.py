@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""What happens to the program from outside: killed at any moment, disks that fill up or turn read-only, backends that hang, lie or lose their device, and
-storms of signals. Always the same demand: what was saved stays, and the exit code and one sentence say what happened (docs/architecture.md).
+"""What happens to the program from outside: killed at any moment, disks that fill up or turn read-only,
+backends that hang, lie or lose their device, and
+storms of signals. Always the same demand: what was saved stays, and the exit code and one sentence say what
+happened (docs/architecture.md).
 
     test_faults.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 
@@ -26,7 +28,18 @@ class KilledAtAnyMoment(CliTest):
 
     ROUNDS = 25
     # Large enough that writing it is most of what the program does: 1 MB a checkpoint.
-    BIG = ["--set", "film.resolution=[128,128]", "--chunk", "1", "--spp", "100000", "--checkpoint", "c.crtfilm", "--checkpoint-every", "1ms"]
+    BIG = [
+        "--set",
+        "film.resolution=[128,128]",
+        "--chunk",
+        "1",
+        "--spp",
+        "100000",
+        "--checkpoint",
+        "c.crtfilm",
+        "--checkpoint-every",
+        "1ms",
+    ]
 
     def test_the_checkpoint_is_the_old_or_the_new_one(self):
         random.seed(1)
@@ -36,7 +49,8 @@ class KilledAtAnyMoment(CliTest):
             before = self.identity("c.crtfilm")
             process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", *resume, *self.BIG)
             self.assertIn("fake on pattern", self.line_with(process, "fake on pattern"))
-            # Every other round has time for a checkpoint, however slow the machine or the build; the others may die before their first.
+            # Every other round has time for a checkpoint, however slow the machine or the build; the others
+            # may die before their first.
             if round_number % 2 == 0:
                 self.wait_until(lambda: self.identity("c.crtfilm") != before)
             time.sleep(random.uniform(0.0, 0.25))
@@ -47,8 +61,23 @@ class KilledAtAnyMoment(CliTest):
             for name in leftovers:
                 os.remove(name)
             # A complete run of no further sample reads the whole file, checksum included.
-            self.crt("scene.yaml", "-b", "fake", "--set", "film.resolution=[128,128]", "-o", "b.pfm", "--spp", "1", "--resume", "c.crtfilm", "--checkpoint", "d.crtfilm",
-                     "--report", "r.json")
+            self.crt(
+                "scene.yaml",
+                "-b",
+                "fake",
+                "--set",
+                "film.resolution=[128,128]",
+                "-o",
+                "b.pfm",
+                "--spp",
+                "1",
+                "--resume",
+                "c.crtfilm",
+                "--checkpoint",
+                "d.crtfilm",
+                "--report",
+                "r.json",
+            )
             resumed = self.report("r.json")["samples"]["resumed"]
             self.assertGreaterEqual(resumed, resumed_before, "samples that were saved are gone")
             resumed_before = resumed
@@ -82,7 +111,12 @@ def can_mount():
         return False
     probe = "/tmp/crt-mount-probe"
     os.makedirs(probe, exist_ok=True)
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "crt-test", probe], capture_output=True).returncode == 0
+    mounted = (
+        subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=64k", "crt-test", probe], capture_output=True
+        ).returncode
+        == 0
+    )
     if mounted:
         subprocess.run(["umount", probe], capture_output=True)
     os.rmdir(probe)
@@ -96,7 +130,9 @@ class SmallDisk(CliTest):
     def setUp(self):
         super().setUp()
         os.mkdir(self.path("disk"))
-        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=768k", "crt-test", self.path("disk")], check=True)
+        subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=768k", "crt-test", self.path("disk")], check=True
+        )
         self.addCleanup(subprocess.run, ["umount", "-l", self.path("disk")], check=False)
 
     def fill(self):
@@ -111,7 +147,9 @@ class SmallDisk(CliTest):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "disk/c.crtfilm")
         before = read_bytes(self.path("disk/c.crtfilm"))
         self.fill()
-        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "disk/c.crtfilm", expect=6)
+        run = self.crt(
+            "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "disk/c.crtfilm", expect=6
+        )
         self.assert_one_error(run, "disk/c.crtfilm", "No space left")
         self.assertEqual(read_bytes(self.path("disk/c.crtfilm")), before)
         self.assertEqual(glob.glob(self.path("disk/*.tmp")), [])
@@ -127,7 +165,20 @@ class SmallDisk(CliTest):
                 self.crt("scene.yaml", "-b", "fake", "-o", name, "--report", "none")
                 before = read_bytes(self.path(name))
                 self.fill()
-                run = self.crt("scene.yaml", "-b", "fake", "--seed", "1", "-o", name, "--checkpoint", "kept.crtfilm", "--report", "none", expect=6)
+                run = self.crt(
+                    "scene.yaml",
+                    "-b",
+                    "fake",
+                    "--seed",
+                    "1",
+                    "-o",
+                    name,
+                    "--checkpoint",
+                    "kept.crtfilm",
+                    "--report",
+                    "none",
+                    expect=6,
+                )
                 self.assert_one_error(run, name)
                 self.assertEqual(read_bytes(self.path(name)), before)
                 self.assertTrue(os.path.exists(self.path("kept.crtfilm")))
@@ -136,8 +187,22 @@ class SmallDisk(CliTest):
                     os.remove(self.path(file))
 
     def test_rendering_goes_on_while_the_disk_is_full(self):
-        process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", "--checkpoint", "disk/c.crtfilm", "--checkpoint-every", "50ms", "--chunk", "1", "--spp", "40",
-                             fault="slow")
+        process = self.start(
+            "scene.yaml",
+            "-b",
+            "fake",
+            "-o",
+            "a.pfm",
+            "--checkpoint",
+            "disk/c.crtfilm",
+            "--checkpoint-every",
+            "50ms",
+            "--chunk",
+            "1",
+            "--spp",
+            "40",
+            fault="slow",
+        )
         self.wait_for_rendering(process)
         self.fill()
         time.sleep(0.4)
@@ -149,14 +214,33 @@ class SmallDisk(CliTest):
 
     def test_a_read_only_disk_is_found_before_rendering(self):
         subprocess.run(["mount", "-o", "remount,ro", self.path("disk")], check=True)
-        for arguments in (["-o", "disk/a.pfm"], ["-o", "a.pfm", "--checkpoint", "disk/c.crtfilm"], ["-o", "a.pfm", "--report", "disk/r.json"]):
+        for arguments in (
+            ["-o", "disk/a.pfm"],
+            ["-o", "a.pfm", "--checkpoint", "disk/c.crtfilm"],
+            ["-o", "a.pfm", "--report", "disk/r.json"],
+        ):
             with self.subTest(arguments=arguments):
                 # A backend that does not exist would be exit code 4: the output is looked at earlier.
-                self.assert_one_error(self.crt("scene.yaml", "-b", "nonsense", *arguments, expect=6), "Read-only file system")
+                self.assert_one_error(
+                    self.crt("scene.yaml", "-b", "nonsense", *arguments, expect=6), "Read-only file system"
+                )
 
     def test_a_disk_that_turns_read_only_keeps_what_it_has(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "disk/c.crtfilm")
-        process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "30", "--resume", "disk/c.crtfilm", "--chunk", "1", fault="slow")
+        process = self.start(
+            "scene.yaml",
+            "-b",
+            "fake",
+            "-o",
+            "a.pfm",
+            "--spp",
+            "30",
+            "--resume",
+            "disk/c.crtfilm",
+            "--chunk",
+            "1",
+            fault="slow",
+        )
         self.assertIn("resuming", process.stderr.readline())
         self.wait_for_rendering(process)
         subprocess.run(["mount", "-o", "remount,ro", self.path("disk")], check=True)
@@ -164,7 +248,19 @@ class SmallDisk(CliTest):
         self.assertEqual(process.returncode, 6, messages)
         self.assertIn("Read-only file system", messages)
         self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 30)
-        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "30", "--resume", "disk/c.crtfilm", "--checkpoint", "e.crtfilm")
+        self.crt(
+            "scene.yaml",
+            "-b",
+            "fake",
+            "-o",
+            "b.pfm",
+            "--spp",
+            "30",
+            "--resume",
+            "disk/c.crtfilm",
+            "--checkpoint",
+            "e.crtfilm",
+        )
         self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
 
 
@@ -172,14 +268,18 @@ class ReadOnlyDirectory(CliTest):
     @unittest.skipIf(os.geteuid() == 0, "root may write anywhere")
     def test_it_is_found_before_rendering(self):
         os.mkdir(self.path("out"), 0o555)
-        self.assert_one_error(self.crt("scene.yaml", "-b", "nonsense", "-o", "out/a.pfm", expect=6), "Permission denied")
+        self.assert_one_error(
+            self.crt("scene.yaml", "-b", "nonsense", "-o", "out/a.pfm", expect=6), "Permission denied"
+        )
 
 
 class UnsoundBackends(CliTest):
     def test_a_backend_that_hangs_is_left_by_the_second_signal(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm")
         saved = read_bytes(self.path("c.crtfilm"))
-        process = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm", fault="hang")
+        process = self.start(
+            "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm", fault="hang"
+        )
         self.assertIn("resuming", process.stderr.readline())
         self.wait_for_rendering(process)
         process.send_signal(signal.SIGINT)
@@ -195,15 +295,50 @@ class UnsoundBackends(CliTest):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm")
         for fault, words in (("nan_film", "is not a number"), ("count_film", "were asked for")):
             with self.subTest(fault=fault):
-                run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm", fault=fault, expect=1)
+                run = self.crt(
+                    "scene.yaml",
+                    "-b",
+                    "fake",
+                    "-o",
+                    "a.pfm",
+                    "--spp",
+                    "16",
+                    "--resume",
+                    "c.crtfilm",
+                    fault=fault,
+                    expect=1,
+                )
                 self.assert_one_error(run, "broke the contract", words)
-                self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "16", "--resume", "c.crtfilm", "--checkpoint", "d.crtfilm")
+                self.crt(
+                    "scene.yaml",
+                    "-b",
+                    "fake",
+                    "-o",
+                    "b.pfm",
+                    "--spp",
+                    "16",
+                    "--resume",
+                    "c.crtfilm",
+                    "--checkpoint",
+                    "d.crtfilm",
+                )
                 self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
                 self.assertEqual(read_bytes(self.path("b.pfm")), read_bytes(self.path("whole.pfm")))
 
     def test_a_backend_that_throws_keeps_what_was_saved(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm")
-        run = self.crt("scene.yaml", "-b", "throws_in_render", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm", expect=1)
+        run = self.crt(
+            "scene.yaml",
+            "-b",
+            "throws_in_render",
+            "-o",
+            "a.pfm",
+            "--spp",
+            "16",
+            "--resume",
+            "c.crtfilm",
+            expect=1,
+        )
         self.assert_one_error(run, "broke the contract", "throws_in_render")
         self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "16", "--resume", "c.crtfilm")
         self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
@@ -217,38 +352,84 @@ class LostGpu(CliTest):
         build = os.path.dirname(os.path.dirname(test_cli.FAKE_DIR.rstrip("/")))
         self.driver = os.path.join(build, "tests", "fake_cuda")
         plugins = os.path.join(build, "lib", "crt")
-        if not os.path.exists(os.path.join(self.driver, "libcuda.so.1")) or not os.path.exists(os.path.join(plugins, "crt_backend_cuda.so")):
+        if not os.path.exists(os.path.join(self.driver, "libcuda.so.1")) or not os.path.exists(
+            os.path.join(plugins, "crt_backend_cuda.so")
+        ):
             self.skipTest("built without the CUDA backend")
-        self.gpu = {"LD_LIBRARY_PATH": self.driver, "CRT_BACKEND_PATH": plugins, "CRT_CACHE_DIR": self.path("cache")}
+        self.gpu = {
+            "LD_LIBRARY_PATH": self.driver,
+            "CRT_BACKEND_PATH": plugins,
+            "CRT_CACHE_DIR": self.path("cache"),
+        }
 
     def test_a_launch_that_fails(self):
-        run = self.crt("scene.yaml", "-b", "cuda", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm", CRT_FAKE_CUDA="launch", expect=5, **self.gpu)
+        run = self.crt(
+            "scene.yaml",
+            "-b",
+            "cuda",
+            "-o",
+            "a.pfm",
+            "--spp",
+            "8",
+            "--checkpoint",
+            "c.crtfilm",
+            CRT_FAKE_CUDA="launch",
+            expect=5,
+            **self.gpu,
+        )
         self.assert_one_error(run, "CUDA_ERROR_LAUNCH_FAILED")
         self.assertFalse(os.path.exists(self.path("a.pfm")))
 
     def test_memory_that_does_not_suffice(self):
         # 7000 x 7000 pixels: sums of 3 GB on a device of one.
-        run = self.crt("scene.yaml", "-b", "cuda", "-o", "a.pfm", "--set", "film.resolution=[7000,7000]", "--set", "sampler.replicates=1", "--spp", "1",
-                       expect=5, **self.gpu)
+        run = self.crt(
+            "scene.yaml",
+            "-b",
+            "cuda",
+            "-o",
+            "a.pfm",
+            "--set",
+            "film.resolution=[7000,7000]",
+            "--set",
+            "sampler.replicates=1",
+            "--spp",
+            "1",
+            expect=5,
+            **self.gpu,
+        )
         self.assert_one_error(run, "the film needs 3136.0 MB", "MB free")
 
 
 class Radiance(CliTest):
-    """At the ends of what scenes may ask for (core/scene_limits.h) nothing is rounded that is not rounded in the middle."""
+    """At the ends of what scenes may ask for (core/scene/scene_limits.h) nothing is rounded that is not
+    rounded in the middle."""
 
     def test_powers_of_two_round_nothing(self):
         backend = test_cli.first_real_backend()
         if backend is None:
             self.skipTest("no backend can render light here")
         glass = "materials:\n  glass: {type: dielectric, ior: 1.5}\n"
-        pane = ("  - name: pane\n    mesh: {positions: [[-1, 1, -1], [-1, 1, 1], [1, 1.2, 1], [1, 1.2, -1]], faces: [[0, 1, 2, 3]]}\n    material: glass\n")
+        pane = "  - name: pane\n    mesh: {positions: [[-1, 1, -1], [-1, 1, 1], [1, 1.2, 1], [1, 1.2, -1]], faces: [[0, 1, 2, 3]]}\n    material: glass\n"
         lamp = "emission: {radiance: {blackbody: 4000, scale: 5}}"
         self.assertIn(lamp, test_cli.SCENE)
         images = {}
         for exponent in (0, 83, -83):
             light = f"emission: {{radiance: {2.0 ** exponent!r}}}"
-            self.write("scene.yaml", test_cli.SCENE.replace("materials:\n", glass).replace(lamp, light) + pane)
-            self.crt("scene.yaml", "-b", backend, "-o", "a.pfm", "--spp", "64", "--report", "none", CRT_BACKEND_PATH="")
+            self.write(
+                "scene.yaml", test_cli.SCENE.replace("materials:\n", glass).replace(lamp, light) + pane
+            )
+            self.crt(
+                "scene.yaml",
+                "-b",
+                backend,
+                "-o",
+                "a.pfm",
+                "--spp",
+                "64",
+                "--report",
+                "none",
+                CRT_BACKEND_PATH="",
+            )
             images[exponent] = test_cli.read_pfm(self.path("a.pfm"))[2]
         self.assertGreater(max(images[0]), 0)
         for exponent in (83, -83):
@@ -257,7 +438,9 @@ class Radiance(CliTest):
 
 class SignalStorm(CliTest):
     def test_a_burst_is_one_wish_to_stop(self):
-        process = self.start("scene.yaml", "-b", "fake", "--spp", "64", "-o", "a.pfm", "--chunk", "1", fault="slow")
+        process = self.start(
+            "scene.yaml", "-b", "fake", "--spp", "64", "-o", "a.pfm", "--chunk", "1", fault="slow"
+        )
         self.wait_for_rendering(process)
         for _ in range(20):
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -271,17 +454,45 @@ class SignalStorm(CliTest):
 
     def test_a_storm_ends_the_program_and_spares_what_was_saved(self):
         self.crt("scene.yaml", "-b", "fake", "--spp", "8", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
-        process = self.start("scene.yaml", "-b", "fake", "--spp", "100000", "-o", "a.pfm", "--resume", "c.crtfilm", "--checkpoint-every", "1ms", "--chunk", "1", fault="slow")
+        process = self.start(
+            "scene.yaml",
+            "-b",
+            "fake",
+            "--spp",
+            "100000",
+            "-o",
+            "a.pfm",
+            "--resume",
+            "c.crtfilm",
+            "--checkpoint-every",
+            "1ms",
+            "--chunk",
+            "1",
+            fault="slow",
+        )
         self.assertIn("resuming", process.stderr.readline())
         self.wait_for_rendering(process)
         end = time.monotonic() + 10
         while process.poll() is None and time.monotonic() < end:
             process.send_signal(random.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP)))
         process.communicate(timeout=10)
-        # By itself, or, when all is done and signals have their usual meaning again, by the last signal; a shell says 128 + n in both cases.
+        # By itself, or, when all is done and signals have their usual meaning again, by the last signal; a
+        # shell says 128 + n in both cases.
         code = process.returncode if process.returncode >= 0 else 128 - process.returncode
         self.assertIn(code, (130, 143, 129))
-        self.crt("scene.yaml", "-b", "fake", "--spp", "1", "-o", "b.pfm", "--resume", "c.crtfilm", "--checkpoint", "d.crtfilm")
+        self.crt(
+            "scene.yaml",
+            "-b",
+            "fake",
+            "--spp",
+            "1",
+            "-o",
+            "b.pfm",
+            "--resume",
+            "c.crtfilm",
+            "--checkpoint",
+            "d.crtfilm",
+        )
         self.assertGreaterEqual(self.report("b.report.json")["samples"]["resumed"], 8)
 
 

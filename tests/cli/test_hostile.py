@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""What must not be able to harm crt: some 430 inputs and 60 faults, each with what happens. Always the same demand: an exit code of the documented ones and the
-right one, a message that says why, no crash, no hang, no memory that the input does not account for, and every file that was there still there.
+"""What must not be able to harm crt: some 430 inputs and 60 faults, each with what happens. Always the same
+demand: an exit code of the documented ones and the
+right one, a message that says why, no crash, no hang, no memory that the input does not account for, and
+every file that was there still there.
 
     test_hostile.py CRT FAKE_PLUGIN_DIR [--write docs/results/hostile.md] [--only TEXT] [--slower FACTOR]
 
@@ -25,7 +27,9 @@ import time
 import zlib
 
 SECONDS = 10            # Of processor time; longer is a hang.
-WAIT_SECONDS = 60       # In all: who waits for a pipe takes no processor time. Much longer, for machines that are busy.
+WAIT_SECONDS = (
+    60  # In all: who waits for a pipe takes no processor time. Much longer, for machines that are busy.
+)
 MEMORY_BYTES = 2 << 30  # More is an input that eats memory: none here has 10 MB.
 
 ROOT = os.geteuid() == 0
@@ -41,7 +45,20 @@ OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 class Case:
     """One line of the table: what is asked, and what must happen."""
 
-    def __init__(self, group, asked, arguments, codes, words=(), prepare=None, env=None, changed=(), made=(), after=None, **how):
+    def __init__(
+        self,
+        group,
+        asked,
+        arguments,
+        codes,
+        words=(),
+        prepare=None,
+        env=None,
+        changed=(),
+        made=(),
+        after=None,
+        **how,
+    ):
         self.group, self.asked, self.arguments = group, asked, arguments
         self.codes = codes if isinstance(codes, tuple) else (codes,)
         self.words = (words,) if isinstance(words, str) else words  # All of a tuple, any of a set.
@@ -49,7 +66,7 @@ class Case:
         self.changed = set(changed)  # Files that were there and may differ afterwards.
         self.made = tuple(made)      # Files that must be there afterwards.
         self.after = after           # Asked of the folder afterwards; says what is wrong, or nothing.
-        self.how = how               # stdout, stderr, stdin: where to; limits; send: a signal after rendering has begun.
+        self.how = how  # stdout, stderr, stdin: where to; limits; send: a signal after rendering has begun.
 
 
 class Folder:
@@ -108,10 +125,23 @@ def scene_cases():
         scene(asked, HEAD + line + "\n", codes, words, **options)
 
     def shape(asked, mesh, words=(), codes=3, extra="", **options):
-        scene(asked, HEAD + MATERIALS + f"objects: [{{mesh: {mesh}, material: m{extra}}}]\n", codes, words, **options)
+        scene(
+            asked,
+            HEAD + MATERIALS + f"objects: [{{mesh: {mesh}, material: m{extra}}}]\n",
+            codes,
+            words,
+            **options,
+        )
 
     def spectrum(asked, text, words=(), codes=3, **options):
-        scene(asked, HEAD + f"materials: {{m: {{type: diffuse, reflectance: {text}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n", codes, words, **options)
+        scene(
+            asked,
+            HEAD
+            + f"materials: {{m: {{type: diffuse, reflectance: {text}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n",
+            codes,
+            words,
+            **options,
+        )
 
     scene("an empty file", "", words="there is nothing in this file")
     scene("a comment alone", "# nothing\n", words="there is nothing in this file")
@@ -120,7 +150,11 @@ def scene_cases():
     scene("Latin-1", b"crt: 1\ntitle: caf\xe9\n", words="byte 0xe9")
     scene("an overlong UTF-8 sequence", b"crt: 1\ntitle: \xc0\xaf\n", words="byte 0xc0")
     scene("a PNG", b"\x89PNG\r\n\x1a\n", words="is not text")
-    scene("64 kB of noise", bytes(hashlib.sha512(str(i).encode()).digest()[0] for i in range(65536)), words="is not text")
+    scene(
+        "64 kB of noise",
+        bytes(hashlib.sha512(str(i).encode()).digest()[0] for i in range(65536)),
+        words="is not text",
+    )
     scene("an escape sequence for terminals", "crt: 1\ntitle: \x1b[2J\n", words="byte 0x1b")
     scene("a tab as indentation", "crt: 1\nfilm:\n\tresolution: [8, 8]\n", words="indent with blanks")
     scene("an open bracket", HEAD + "outputs: [", words="not valid YAML")
@@ -130,8 +164,13 @@ def scene_cases():
     scene("a tag", HEAD + "title: !!python/object:os.system x\n", words="tag")
     scene("an alias of nothing", HEAD + "title: *nowhere\n", words="not valid YAML")
     scene("an alias within its own value", HEAD + "objects: &a [*a]\n", words="a cycle has no end")
-    scene("a billion laughs", HEAD + "spectra:\n  a0: &a0 [1,1,1,1,1,1,1,1,1,1]\n" +
-          "".join(f"  a{i}: &a{i} [{','.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10)), words=("aliases", "CRT_SCENE_MEMORY="))
+    scene(
+        "a billion laughs",
+        HEAD
+        + "spectra:\n  a0: &a0 [1,1,1,1,1,1,1,1,1,1]\n"
+        + "".join(f"  a{i}: &a{i} [{','.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10)),
+        words=("aliases", "CRT_SCENE_MEMORY="),
+    )
     scene("brackets 10,000 deep", HEAD + "objects: " + "[" * 10000, words="deep")
     scene("maps 10,000 deep", HEAD + "camera: " + "{a: " * 10000, words="deep")
     scene("a line of a megabyte", HEAD + "title: " + "x" * 1000000 + "\n", 0)
@@ -149,11 +188,24 @@ def scene_cases():
     key("a number in octal", "sampler: {samples: 012}", {"duplicate key", "octal"})
     key("a hexadecimal number", "integrator: {max_depth: 0x10}", "decimal")
     key("yes for true", "integrator: {nee: yes}", "write true")
-    for size, word in (("[0, 8]", "must be"), ("[-8, 8]", "must be"), ("[8]", "a list of 2"), ("[8, 8, 8]", "a list of 2"), ("[1e9, 1]", "must be"), ("[8.5, 8]", "whole"),
-                       ("[65535, 65535]", "a film has at most")):
+    for size, word in (
+        ("[0, 8]", "must be"),
+        ("[-8, 8]", "must be"),
+        ("[8]", "a list of 2"),
+        ("[8, 8, 8]", "a list of 2"),
+        ("[1e9, 1]", "must be"),
+        ("[8.5, 8]", "whole"),
+        ("[65535, 65535]", "a film has at most"),
+    ):
         scene(f"a film of {size}", f"crt: 1\nfilm: {{resolution: {size}}}\n", words=word)
-    scene("a film of 40000 × 40000 pixels, rendered", "crt: 1\nfilm: {resolution: [40000, 40000]}\nenvironment: {radiance: 1}\n", 5, "memory",
-          arguments=("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "1"), limits={resource.RLIMIT_AS: 4 << 30})
+    scene(
+        "a film of 40000 × 40000 pixels, rendered",
+        "crt: 1\nfilm: {resolution: [40000, 40000]}\nenvironment: {radiance: 1}\n",
+        5,
+        "memory",
+        arguments=("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "1"),
+        limits={resource.RLIMIT_AS: 4 << 30},
+    )
     for crop in ("[0, 0, 9, 8]", "[4, 4, 4, 8]", "[5, 0, 4, 8]"):
         scene(f"a crop of {crop}", f"crt: 1\nfilm: {{resolution: [8, 8], crop: {crop}}}\n", words="window")
     for fov in (0, 180, -10, "wide"):
@@ -163,70 +215,220 @@ def scene_cases():
     key("up of no length", "camera: {up: [0, 0, 0]}", "length 0")
     key("a camera at 1e300", "camera: {position: [1e300, 0, 0]}", codes=(0, 3))
     key("a lens of negative radius", "camera: {aperture_radius: -1}", "aperture_radius")
-    for name, value in (("samples", 0), ("samples", -1), ("samples", "1e30"), ("seed", -1), ("seed", 18446744073709551616), ("replicates", 3), ("type", "halton")):
-        scene(f"sampler.{name}: {value}", f"crt: 1\nsampler: {{{name}: {value}}}\n", words={"must be", "cannot be had", "whole number", "expected"})
+    for name, value in (
+        ("samples", 0),
+        ("samples", -1),
+        ("samples", "1e30"),
+        ("seed", -1),
+        ("seed", 18446744073709551616),
+        ("replicates", 3),
+        ("type", "halton"),
+    ):
+        scene(
+            f"sampler.{name}: {value}",
+            f"crt: 1\nsampler: {{{name}: {value}}}\n",
+            words={"must be", "cannot be had", "whole number", "expected"},
+        )
     for value in (-1, "1e10", 1.5):
         key(f"integrator.max_depth: {value}", f"integrator: {{max_depth: {value}}}", "max_depth")
     key("objects that are no list", "objects: 7", "expected a list")
     key("an object that is no map", "objects: [7]", "expected a map")
     key("an object without geometry", "objects: [{material: m}]", "needs")
     shape("a mesh without faces", "{positions: [[0,0,0]]}", "'faces' is missing")
-    shape("faces that lead nowhere", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,7]]}", "there are only 3")
+    shape(
+        "faces that lead nowhere",
+        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,7]]}",
+        "there are only 3",
+    )
     shape("a negative index", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,-1]]}", "must be")
-    shape("an index of 2^40", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,1099511627776]]}", {"must be", "there are only"})
+    shape(
+        "an index of 2^40",
+        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,1099511627776]]}",
+        {"must be", "there are only"},
+    )
     shape("an index of 1.5", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,1.5]]}", "whole")
     shape("a face of two corners", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1]]}", "3 or more")
     shape("points in the plane", "{positions: [[0,0],[1,0],[0,1]], faces: [[0,1,2]]}", "3 numbers")
     shape("a face without area", "{positions: [[0,0,0],[1,0,0],[2,0,0]], faces: [[0,1,2]]}", codes=(0, 3))
-    shape("coordinates of 1e308", "{positions: [[1e308,0,0],[-1e308,0,0],[0,1e308,0]], faces: [[0,1,2]]}", codes=(0, 3))
-    shape("coordinates of 1e-308", "{positions: [[1e-308,0,0],[0,0,0],[0,1e-308,0]], faces: [[0,1,2]]}", codes=(0, 3))
-    shape("a normal of no length", "{positions: [[0,0,0],[1,0,0],[0,1,0]], normals: [[0,0,0],[0,0,1],[0,0,1]], faces: [[0,1,2]]}", "length 0")
-    shape("a transform by 0", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}", "flattens", extra=", transform: [{scale: 0}]")
-    shape("transforms to infinity", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}", "beyond a double", extra=", transform: [{scale: 1e200}, {scale: 1e200}]")
-    shape("a matrix that flattens", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}", "inverted", extra=", transform: [{matrix: [1,0,0,0,1,0,0,0,1,0,0,0,0,0,0,1]}]")
-    shape("no placement at all", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}", "nowhere", extra=", transforms: []")
-    scene("a material that is not there", HEAD + f"objects: [{{{TRIANGLE}, material: m}}]\n", words="there is no material")
+    shape(
+        "coordinates of 1e308",
+        "{positions: [[1e308,0,0],[-1e308,0,0],[0,1e308,0]], faces: [[0,1,2]]}",
+        codes=(0, 3),
+    )
+    shape(
+        "coordinates of 1e-308",
+        "{positions: [[1e-308,0,0],[0,0,0],[0,1e-308,0]], faces: [[0,1,2]]}",
+        codes=(0, 3),
+    )
+    shape(
+        "a normal of no length",
+        "{positions: [[0,0,0],[1,0,0],[0,1,0]], normals: [[0,0,0],[0,0,1],[0,0,1]], faces: [[0,1,2]]}",
+        "length 0",
+    )
+    shape(
+        "a transform by 0",
+        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}",
+        "flattens",
+        extra=", transform: [{scale: 0}]",
+    )
+    shape(
+        "transforms to infinity",
+        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}",
+        "beyond a double",
+        extra=", transform: [{scale: 1e200}, {scale: 1e200}]",
+    )
+    shape(
+        "a matrix that flattens",
+        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}",
+        "inverted",
+        extra=", transform: [{matrix: [1,0,0,0,1,0,0,0,1,0,0,0,0,0,0,1]}]",
+    )
+    shape(
+        "no placement at all",
+        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}",
+        "nowhere",
+        extra=", transforms: []",
+    )
+    scene(
+        "a material that is not there",
+        HEAD + f"objects: [{{{TRIANGLE}, material: m}}]\n",
+        words="there is no material",
+    )
     scene("no material", HEAD + f"objects: [{{{TRIANGLE}}}]\n", words="'material' is missing")
     scene("a spectrum that is itself", HEAD + "spectra: {a: a}\n", words="defined by itself")
     scene("spectra in a circle", HEAD + "spectra: {a: b, b: c, c: a}\n", words="defined by itself")
-    for text, word in (("2", "must be"), ("-1", "must be"), ("{rgb: [1, 1]}", "3 numbers"), ("{rgb: [2, 0, 0]}", "must be"), ("{rgb: [nan, 0, 0]}", "NaN"),
-                       ("{table: {nm: [700, 400], value: [1, 1]}}", "must increase"), ("{table: {nm: [400, 700], value: [1]}}", "wavelengths but"),
-                       ("{table: {nm: [], value: []}}", "a list"), ("{blackbody: 0}", "must be"), ("{blackbody: -5}", "must be"), ("{blackbody: 1e300}", "must be"),
-                       ("{glass: sand}", "expected"), ("{file: none.spd}", "cannot find"), ("{}", "empty map"), ("[1, 2]", "expected"), ("{ref: nobody}", "there is no spectrum")):
+    for text, word in (
+        ("2", "must be"),
+        ("-1", "must be"),
+        ("{rgb: [1, 1]}", "3 numbers"),
+        ("{rgb: [2, 0, 0]}", "must be"),
+        ("{rgb: [nan, 0, 0]}", "NaN"),
+        ("{table: {nm: [700, 400], value: [1, 1]}}", "must increase"),
+        ("{table: {nm: [400, 700], value: [1]}}", "wavelengths but"),
+        ("{table: {nm: [], value: []}}", "a list"),
+        ("{blackbody: 0}", "must be"),
+        ("{blackbody: -5}", "must be"),
+        ("{blackbody: 1e300}", "must be"),
+        ("{glass: sand}", "expected"),
+        ("{file: none.spd}", "cannot find"),
+        ("{}", "empty map"),
+        ("[1, 2]", "expected"),
+        ("{ref: nobody}", "there is no spectrum"),
+    ):
         spectrum(f"a reflectance of {text}", text, word)
     for text in ("1e26", "1e38", "1e308", "{blackbody: 6000, scale: 1e30}", "-1"):
-        scene(f"a radiance of {text}", HEAD + f"environment: {{radiance: {text}}}\n", words="must be 0 to 1e+25")
-    scene("no light but one of radiance 1e-50", HEAD + "environment: {radiance: 1e-50}\n", words="single precision carries light from 1e-25")
+        scene(
+            f"a radiance of {text}",
+            HEAD + f"environment: {{radiance: {text}}}\n",
+            words="must be 0 to 1e+25",
+        )
+    scene(
+        "no light but one of radiance 1e-50",
+        HEAD + "environment: {radiance: 1e-50}\n",
+        words="single precision carries light from 1e-25",
+    )
     scene("an output of a kind unknown", HEAD + "outputs: [{file: a.docx}]\n", words="does not end in")
     scene("an output twice", HEAD + "outputs: [{file: a.exr}, {file: a.exr}]\n", words="written twice")
     placement = "[{translate: [1, 2, 3]}]"
-    scene("10,000 moved placements behind 1,000 aliases (44 kB)",
-          HEAD + MATERIALS + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n" + "- *o\n" * 1000,
-          words=("values behind aliases, which take", "CRT_SCENE_MEMORY="))
+    scene(
+        "10,000 moved placements behind 1,000 aliases (44 kB)",
+        HEAD
+        + MATERIALS
+        + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n"
+        + "- *o\n" * 1000,
+        words=("values behind aliases, which take", "CRT_SCENE_MEMORY="),
+    )
     placement = "[]"  # A single value, so that there may be more of them.
-    scene("10,000 placements behind 1,000 aliases",
-          HEAD + MATERIALS + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n" + "- *o\n" * 1000,
-          words=("placements, which take", "CRT_SCENE_MEMORY="))
-    scene("the same behind 500, allowed but for its triangles", HEAD + MATERIALS + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n" +
-          "- *o\n" * 500, words=("triangles, which take", "CRT_SCENE_MEMORY="))
-    scene("a face of 5,000 corners behind 20,000 aliases (167 kB)",
-          HEAD + MATERIALS + "objects: [{material: m, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [&f [" + ",".join(["0,1,2"] * 1700) + "]" + ", *f" * 20000 + "]}}]\n",
-          words="CRT_SCENE_MEMORY=")
-    scene("a hundred thousand spectra and materials", HEAD + "spectra:\n" + "".join(f"  s{i}: {i % 100 / 100}\n" for i in range(100000)) + "materials:\n" +
-          "".join(f"  m{i}: {{type: diffuse, reflectance: s{i}}}\n" for i in range(100000)) + f"objects: [{{{TRIANGLE}, material: m7}}]\n", 0)
-    scene("ten thousand names misspelt among ten thousand", HEAD + "spectra:\n" + "".join(f"  spectrum{i}: 1\n" for i in range(10000)) + "materials:\n" +
-          "".join(f"  m{i}: {{type: diffuse, reflectance: spektrum{i}}}\n" for i in range(10000)), words=("there is no spectrum", "more errors"))
-    scene("40,000 triangles on one spot", HEAD + MATERIALS + "objects: [{material: m, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [" + ",".join(["[0,1,2]"] * 40000) + "]}}]\n", 0)
-    scene("40,000 lamps on one spot", HEAD + MATERIALS + "objects: [{material: m, emission: {radiance: 1}, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [" +
-          ",".join(["[0,1,2]"] * 40000) + "]}}]\n", 0)
-    scene("20,000 outputs", HEAD + "outputs:\n" + "".join(f"- {{file: o{i}.pfm}}\n" for i in range(20000)), 0)
+    scene(
+        "10,000 placements behind 1,000 aliases",
+        HEAD
+        + MATERIALS
+        + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n"
+        + "- *o\n" * 1000,
+        words=("placements, which take", "CRT_SCENE_MEMORY="),
+    )
+    scene(
+        "the same behind 500, allowed but for its triangles",
+        HEAD
+        + MATERIALS
+        + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n"
+        + "- *o\n" * 500,
+        words=("triangles, which take", "CRT_SCENE_MEMORY="),
+    )
+    scene(
+        "a face of 5,000 corners behind 20,000 aliases (167 kB)",
+        HEAD
+        + MATERIALS
+        + "objects: [{material: m, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [&f ["
+        + ",".join(["0,1,2"] * 1700)
+        + "]"
+        + ", *f" * 20000
+        + "]}}]\n",
+        words="CRT_SCENE_MEMORY=",
+    )
+    scene(
+        "a hundred thousand spectra and materials",
+        HEAD
+        + "spectra:\n"
+        + "".join(f"  s{i}: {i % 100 / 100}\n" for i in range(100000))
+        + "materials:\n"
+        + "".join(f"  m{i}: {{type: diffuse, reflectance: s{i}}}\n" for i in range(100000))
+        + f"objects: [{{{TRIANGLE}, material: m7}}]\n",
+        0,
+    )
+    scene(
+        "ten thousand names misspelt among ten thousand",
+        HEAD
+        + "spectra:\n"
+        + "".join(f"  spectrum{i}: 1\n" for i in range(10000))
+        + "materials:\n"
+        + "".join(f"  m{i}: {{type: diffuse, reflectance: spektrum{i}}}\n" for i in range(10000)),
+        words=("there is no spectrum", "more errors"),
+    )
+    scene(
+        "40,000 triangles on one spot",
+        HEAD
+        + MATERIALS
+        + "objects: [{material: m, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: ["
+        + ",".join(["[0,1,2]"] * 40000)
+        + "]}}]\n",
+        0,
+    )
+    scene(
+        "40,000 lamps on one spot",
+        HEAD
+        + MATERIALS
+        + "objects: [{material: m, emission: {radiance: 1}, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: ["
+        + ",".join(["[0,1,2]"] * 40000)
+        + "]}}]\n",
+        0,
+    )
+    scene(
+        "20,000 outputs", HEAD + "outputs:\n" + "".join(f"- {{file: o{i}.pfm}}\n" for i in range(20000)), 0
+    )
 
-    for asked, name in (("a folder", "folder"), ("a named pipe", "pipe"), ("/dev/zero", "/dev/zero"), ("/dev/urandom", "/dev/urandom"), ("/dev/full", "/dev/full"),
-                        ("a socket", "socket"), ("a sparse terabyte", "sparse"), ("nothing", "none.yaml"), ("a link to itself", "loop"),
-                        ("a name of 300 letters", "n" * 300), ("a file as a folder", "scene.yaml/x")):
-        words = {"folder": "this is a directory", "pipe": "for standard input write '-'", "sparse": "the most for a file of this kind"}.get(name, ())
+    for asked, name in (
+        ("a folder", "folder"),
+        ("a named pipe", "pipe"),
+        ("/dev/zero", "/dev/zero"),
+        ("/dev/urandom", "/dev/urandom"),
+        ("/dev/full", "/dev/full"),
+        ("a socket", "socket"),
+        ("a sparse terabyte", "sparse"),
+        ("nothing", "none.yaml"),
+        ("a link to itself", "loop"),
+        ("a name of 300 letters", "n" * 300),
+        ("a file as a folder", "scene.yaml/x"),
+    ):
+        words = {
+            "folder": "this is a directory",
+            "pipe": "for standard input write '-'",
+            "sparse": "the most for a file of this kind",
+        }.get(name, ())
         case("scene", f"{asked} in place of the scene", ["info", name], 3, words, endless_files)
-    case("scene", "an endless standard input", ["info", "-"], 3, "more than 256 MiB", None, stdin="/dev/zero")
+    case(
+        "scene", "an endless standard input", ["info", "-"], 3, "more than 256 MiB", None, stdin="/dev/zero"
+    )
     case("scene", "an empty standard input", ["info", "-"], 3, "there is nothing in this file", None)
 
 
@@ -252,7 +454,9 @@ def endless_files(folder):
 def mesh_cases():
     def mesh(asked, text, codes=3, words=(), files=None, material="m", **options):
         def prepare(folder):
-            folder.write("scene.yaml", HEAD + MATERIALS + f"objects: [{{obj: mesh.obj, material: {material}}}]\n")
+            folder.write(
+                "scene.yaml", HEAD + MATERIALS + f"objects: [{{obj: mesh.obj, material: {material}}}]\n"
+            )
             folder.write("mesh.obj", text)
             for name, data in (files or {}).items():
                 folder.write(name, data)
@@ -261,8 +465,23 @@ def mesh_cases():
     corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
     mesh("an empty OBJ", "", words="no faces")
     mesh("an OBJ without faces", corners, words="no faces")
-    for face in ("f 0 1 2", "f 1 2 4", "f 1 2 -9", "f 1 2", "f 1.5 2 3", "f a b c", "f 1 2 99999999999999999999", "f 1/1/1/1 2 3", "f 1//9 2 3", "f 1 2 3 /"):
-        mesh(f"the face '{face}'", corners + face + "\n", (0, 3) if "//9" in face or face.endswith("/") or face.startswith("f 1/1/1/1") else 3)
+    for face in (
+        "f 0 1 2",
+        "f 1 2 4",
+        "f 1 2 -9",
+        "f 1 2",
+        "f 1.5 2 3",
+        "f a b c",
+        "f 1 2 99999999999999999999",
+        "f 1/1/1/1 2 3",
+        "f 1//9 2 3",
+        "f 1 2 3 /",
+    ):
+        mesh(
+            f"the face '{face}'",
+            corners + face + "\n",
+            (0, 3) if "//9" in face or face.endswith("/") or face.startswith("f 1/1/1/1") else 3,
+        )
     for vertex in ("v 1 2", "v", "v nan 0 0", "v 1e999 0 0", "v inf 0 0", "v 1,5 0 0", "v a b c"):
         mesh(f"the vertex '{vertex}'", vertex + "\n" + OBJ, (0, 3))
     mesh("a normal of -1.#IND00", corners + "vn -1.#IND00 0 0\nf 1//1 2//1 3//1\n", (0, 3))
@@ -280,25 +499,75 @@ def mesh_cases():
     mesh("coordinates of 1e308", "v 1e308 0 0\nv -1e308 0 0\nv 0 1e308 0\nf 1 2 3\n", (0, 3))
     mesh("lines that end in CR", OBJ.replace("\n", "\r"), 0)
     mesh("40,000 triangles on one spot", corners + "f 1 2 3\n" * 40000, 0)
-    mesh("a star of 40,000 corners", "".join(f"v {(1 if i % 2 else .5) * ((i / 20000) if i < 20000 else 2 - i / 20000):.6f} {i % 2} {(i * 7919 % 40000) / 4e7:.7f}\n" for i in range(40000)) +
-         "f " + " ".join(str(i + 1) for i in range(40000)) + "\n", (0, 3))
-    for name, what in (("folder", "a folder"), ("pipe", "a named pipe"), ("/dev/zero", "/dev/zero"), ("/dev/urandom", "/dev/urandom"), ("zero", "a link to /dev/zero"),
-                       ("sparse", "a sparse terabyte"), ("none.obj", "nothing"), ("loop", "a link to itself"), ("socket", "a socket")):
+    mesh(
+        "a star of 40,000 corners",
+        "".join(
+            f"v {(1 if i % 2 else .5) * ((i / 20000) if i < 20000 else 2 - i / 20000):.6f} {i % 2} {(i * 7919 % 40000) / 4e7:.7f}\n"
+            for i in range(40000)
+        )
+        + "f "
+        + " ".join(str(i + 1) for i in range(40000))
+        + "\n",
+        (0, 3),
+    )
+    for name, what in (
+        ("folder", "a folder"),
+        ("pipe", "a named pipe"),
+        ("/dev/zero", "/dev/zero"),
+        ("/dev/urandom", "/dev/urandom"),
+        ("zero", "a link to /dev/zero"),
+        ("sparse", "a sparse terabyte"),
+        ("none.obj", "nothing"),
+        ("loop", "a link to itself"),
+        ("socket", "a socket"),
+    ):
         def prepare(folder, name=name):
             endless_files(folder)
             folder.write("scene.yaml", HEAD + MATERIALS + f"objects: [{{obj: '{name}', material: m}}]\n")
         case("mesh", f"{what} in place of an OBJ", ["info", "scene.yaml"], 3, (), prepare)
 
     def mtl(asked, text, codes=(0, 3), words=(), **options):
-        mesh(asked, "mtllib a.mtl\n" + corners + "usemtl a\nf 1 2 3\n", codes, words, files={"a.mtl": text}, material="from_mtl", **options)
+        mesh(
+            asked,
+            "mtllib a.mtl\n" + corners + "usemtl a\nf 1 2 3\n",
+            codes,
+            words,
+            files={"a.mtl": text},
+            material="from_mtl",
+            **options,
+        )
 
-    for line in ("Kd nan 0 0", "Kd 1", "Kd -1 -1 -1", "Kd 1e999 0 0", "Kd a b c", "Ni 0", "Ni nan", "d -3", "d 7", "illum 99", "Ns -1", "map_Kd " + "x" * 100000, "Tf 1",
-                 "crt_reflectance none.spd", "crt_reflectance a.mtl"):
+    for line in (
+        "Kd nan 0 0",
+        "Kd 1",
+        "Kd -1 -1 -1",
+        "Kd 1e999 0 0",
+        "Kd a b c",
+        "Ni 0",
+        "Ni nan",
+        "d -3",
+        "d 7",
+        "illum 99",
+        "Ns -1",
+        "map_Kd " + "x" * 100000,
+        "Tf 1",
+        "crt_reflectance none.spd",
+        "crt_reflectance a.mtl",
+    ):
         mtl(f"the MTL line '{line[:40]}'", f"newmtl a\n{line}\n")
-    mtl("an MTL whose light is 1e30", "newmtl a\nKe 1e30 1e30 1e30\n", 3, "single precision carries light up to 1e+25")
+    mtl(
+        "an MTL whose light is 1e30",
+        "newmtl a\nKe 1e30 1e30 1e30\n",
+        3,
+        "single precision carries light up to 1e+25",
+    )
     mtl("an MTL of noise", bytes(range(256)) * 256)
     mtl("a newmtl without a name", "newmtl\nKd 1 1 1\n")
-    mtl("50,000 materials", "".join(f"newmtl a{i}\nKd 1 1 1\n" for i in range(50000)) + "newmtl a\nKd 1 1 1\n", 0)
+    mtl(
+        "50,000 materials",
+        "".join(f"newmtl a{i}\nKd 1 1 1\n" for i in range(50000)) + "newmtl a\nKd 1 1 1\n",
+        0,
+    )
     mesh("an OBJ that is its own MTL", "mtllib mesh.obj\n" + OBJ, (0, 3), material="from_mtl")
     mesh("a material that no MTL has", "usemtl x\n" + OBJ, (0, 3), material="from_mtl")
     for name in ("folder", "pipe", "/dev/zero", "zero", "sparse", "none.mtl"):
@@ -310,42 +579,96 @@ def mesh_cases():
 
 
 def spectrum_cases():
-    for asked, text in (("empty", ""), ("a header alone", "nm,value\n"), ("words", "red\ngreen\n"), ("one column", "400\n500\n"), ("three columns", "400 1 2\n"),
-                        ("falling wavelengths", "500 1\n400 1\n"), ("NaN", "400 nan\n500 1\n"), ("infinity", "400 1e999\n"), ("noise", bytes(range(128, 256)) * 100),
-                        ("NULs", b"\0" * 10000), ("a value of 1e300", "400 1e300\n700 1e300\n"), ("one wavelength of 10 MB", "400 1" + " " * 10000000)):
+    for asked, text in (
+        ("empty", ""),
+        ("a header alone", "nm,value\n"),
+        ("words", "red\ngreen\n"),
+        ("one column", "400\n500\n"),
+        ("three columns", "400 1 2\n"),
+        ("falling wavelengths", "500 1\n400 1\n"),
+        ("NaN", "400 nan\n500 1\n"),
+        ("infinity", "400 1e999\n"),
+        ("noise", bytes(range(128, 256)) * 100),
+        ("NULs", b"\0" * 10000),
+        ("a value of 1e300", "400 1e300\n700 1e300\n"),
+        ("one wavelength of 10 MB", "400 1" + " " * 10000000),
+    ):
         def prepare(folder, text=text):
-            folder.write("scene.yaml", HEAD + f"materials: {{m: {{type: diffuse, reflectance: {{file: s.spd, outside: clamp}}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n")
+            folder.write(
+                "scene.yaml",
+                HEAD
+                + f"materials: {{m: {{type: diffuse, reflectance: {{file: s.spd, outside: clamp}}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n",
+            )
             folder.write("s.spd", text)
-        case("spectrum", f"a spectrum file: {asked}", ["info", "scene.yaml"], (0, 3) if "10 MB" in asked else 3, (), prepare)
+        case(
+            "spectrum",
+            f"a spectrum file: {asked}",
+            ["info", "scene.yaml"],
+            (0, 3) if "10 MB" in asked else 3,
+            (),
+            prepare,
+        )
     for name in ("folder", "pipe", "/dev/zero", "noise", "sparse"):
         def prepare(folder, name=name):
             endless_files(folder)
-            folder.write("scene.yaml", HEAD + f"materials: {{m: {{type: diffuse, reflectance: {{file: '{name}', outside: clamp}}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n")
+            folder.write(
+                "scene.yaml",
+                HEAD
+                + f"materials: {{m: {{type: diffuse, reflectance: {{file: '{name}', outside: clamp}}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n",
+            )
         case("spectrum", f"{name} in place of a spectrum", ["info", "scene.yaml"], 3, (), prepare)
 
 
-# --------------------------------------------------------------------------------------------------------- films and images
+# ---------------------------------------------------------------------------------------------------------
+# films and images
 
 def png(width, height, rows=None):
     def chunk(name, data):
         return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-    data = zlib.compress(rows if rows is not None else b"".join(b"\0" + b"\x80" * (3 * width) for _ in range(height)))
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
+    data = zlib.compress(
+        rows if rows is not None else b"".join(b"\0" + b"\x80" * (3 * width) for _ in range(height))
+    )
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+        + chunk(b"IDAT", data)
+        + chunk(b"IEND", b"")
+    )
 
 
 def image_cases(samples):
     def image(asked, name, data, codes=2, words=(), **options):
-        case("image", asked, ["info", name], codes, words, lambda folder: folder.write(name, data), **options)
+        case(
+            "image", asked, ["info", name], codes, words, lambda folder: folder.write(name, data), **options
+        )
 
     for end in ("exr", "png", "pfm", "ppm"):
         image(f"an empty .{end}", f"a.{end}", b"", words="empty")
         image(f"a .{end} of one byte", f"a.{end}", b"P")
         image(f"a .{end} that is text", f"a.{end}", "not an image\n" * 100)
-        image(f"a .{end} that is noise", f"a.{end}", bytes(hashlib.sha1(str(i).encode()).digest()[0] for i in range(5000)))
-    for header in (b"PF\n-1 4\n-1\n", b"PF\n0 4\n-1\n", b"PF\n4294967296 1\n-1\n", b"PF\n2000000000 2000000000\n-1\n", b"PF\n4 4\n0\n", b"PF\n4 4\nnan\n", b"PF\n4 4\n-1\n", b"PF\n# no end",
-                   b"PF " + b"9" * 100000):
+        image(
+            f"a .{end} that is noise",
+            f"a.{end}",
+            bytes(hashlib.sha1(str(i).encode()).digest()[0] for i in range(5000)),
+        )
+    for header in (
+        b"PF\n-1 4\n-1\n",
+        b"PF\n0 4\n-1\n",
+        b"PF\n4294967296 1\n-1\n",
+        b"PF\n2000000000 2000000000\n-1\n",
+        b"PF\n4 4\n0\n",
+        b"PF\n4 4\nnan\n",
+        b"PF\n4 4\n-1\n",
+        b"PF\n# no end",
+        b"PF " + b"9" * 100000,
+    ):
         image(f"a PFM that begins {header[:24]!r}", "a.pfm", header)
-    for header in (b"P6\n4 4\n0\n", b"P6\n4 4\n99999\n", b"P6\n4 4\n255\nxx", b"P6\n2147483647 2147483647\n255\n"):
+    for header in (
+        b"P6\n4 4\n0\n",
+        b"P6\n4 4\n99999\n",
+        b"P6\n4 4\n255\nxx",
+        b"P6\n2147483647 2147483647\n255\n",
+    ):
         image(f"a PPM that begins {header[:32]!r}", "a.ppm", header)
     image("a PNG of 2^31 pixels a side in 100 bytes", "a.png", png(2147483647, 2147483647, b"\0"))
     image("a PNG of 60000 x 60000 in 100 bytes", "a.png", png(60000, 60000, b"\0" * 1000))
@@ -358,19 +681,54 @@ def image_cases(samples):
         damaged = bytearray(samples["exr"])
         damaged[at:at + 4] = b"\xff\xff\xff\x7f"
         image(f"an EXR with 2^31 - 1 at byte {at}", "a.exr", bytes(damaged), (0, 2))
-    for name, what in (("pipe.exr", "a named pipe"), ("zero.exr", "a link to /dev/zero"), ("folder.exr", "a folder"), ("none.exr", "nothing"), ("sparse.exr", "a sparse terabyte")):
+    for name, what in (
+        ("pipe.exr", "a named pipe"),
+        ("zero.exr", "a link to /dev/zero"),
+        ("folder.exr", "a folder"),
+        ("none.exr", "nothing"),
+        ("sparse.exr", "a sparse terabyte"),
+    ):
         case("image", f"{what} in place of an image", ["info", name], 2, (), odd_files("exr"))
     for name in ("pipe.exr", "zero.exr"):
-        case("image", f"{name} to compare with", ["compare", "a.pfm", name], 2, (), odd_files("exr", {"a.pfm": samples["pfm"]}))
-        case("image", f"{name} as reference", ["compare", "a.pfm", "a.pfm", "--reference", name], 2, (), odd_files("exr", {"a.pfm": samples["pfm"]}))
-    case("image", "images of two sizes", ["compare", "a.pfm", "b.png"], 7, (), lambda folder: (folder.write("a.pfm", samples["pfm"]), folder.write("b.png", png(3, 3))))
+        case(
+            "image",
+            f"{name} to compare with",
+            ["compare", "a.pfm", name],
+            2,
+            (),
+            odd_files("exr", {"a.pfm": samples["pfm"]}),
+        )
+        case(
+            "image",
+            f"{name} as reference",
+            ["compare", "a.pfm", "a.pfm", "--reference", name],
+            2,
+            (),
+            odd_files("exr", {"a.pfm": samples["pfm"]}),
+        )
+    case(
+        "image",
+        "images of two sizes",
+        ["compare", "a.pfm", "b.png"],
+        7,
+        (),
+        lambda folder: (folder.write("a.pfm", samples["pfm"]), folder.write("b.png", png(3, 3))),
+    )
 
 
 def film_cases(samples):
     film = samples["crtfilm"]
 
     def check(asked, data, codes=2, words=(), **options):
-        case("film", asked, ["info", "a.crtfilm"], codes, words, lambda folder: folder.write("a.crtfilm", data), **options)
+        case(
+            "film",
+            asked,
+            ["info", "a.crtfilm"],
+            codes,
+            words,
+            lambda folder: folder.write("a.crtfilm", data),
+            **options,
+        )
 
     check("an empty film", b"", words="is empty")
     check("a film of text", "film\n" * 100, words="mark")
@@ -385,15 +743,46 @@ def film_cases(samples):
         damaged[at:at + 4] = b"\xff\xff\xff\xff"
         check(f"a film with 2^32 - 1 at byte {at}", bytes(damaged))
     check("a film with more behind its end", film + b"more")
-    for name, what in (("pipe.crtfilm", "a named pipe"), ("zero.crtfilm", "a link to /dev/zero"), ("folder.crtfilm", "a folder"), ("none.crtfilm", "nothing"),
-                       ("sparse.crtfilm", "a sparse terabyte")):
+    for name, what in (
+        ("pipe.crtfilm", "a named pipe"),
+        ("zero.crtfilm", "a link to /dev/zero"),
+        ("folder.crtfilm", "a folder"),
+        ("none.crtfilm", "nothing"),
+        ("sparse.crtfilm", "a sparse terabyte"),
+    ):
         case("film", f"{what} in place of a film", ["info", name], 2, (), odd_files("crtfilm"))
-        case("film", f"{what} to merge", ["merge", name, name, "-o", "out.crtfilm"], 2, (), odd_files("crtfilm"))
-    case("film", "a film merged with itself", ["merge", "a.crtfilm", "a.crtfilm", "-o", "b.crtfilm"], 2, "cannot be merged", lambda folder: folder.write("a.crtfilm", film))
-    case("film", "a film of another scene, resumed", ["scene.yaml", "-b", "fake", "-o", "a.pfm", "--seed", "9", "--resume", "a.crtfilm"], 2, "another scene",
-         lambda folder: (folder.write("scene.yaml", GOOD), folder.write("a.crtfilm", film)))
-    case("film", "an image, resumed", ["scene.yaml", "-b", "fake", "-o", "b.pfm", "--resume=a.pfm"], 2, "is not a crt film",
-         lambda folder: (folder.write("scene.yaml", GOOD), folder.write("a.pfm", samples["pfm"])))
+        case(
+            "film",
+            f"{what} to merge",
+            ["merge", name, name, "-o", "out.crtfilm"],
+            2,
+            (),
+            odd_files("crtfilm"),
+        )
+    case(
+        "film",
+        "a film merged with itself",
+        ["merge", "a.crtfilm", "a.crtfilm", "-o", "b.crtfilm"],
+        2,
+        "cannot be merged",
+        lambda folder: folder.write("a.crtfilm", film),
+    )
+    case(
+        "film",
+        "a film of another scene, resumed",
+        ["scene.yaml", "-b", "fake", "-o", "a.pfm", "--seed", "9", "--resume", "a.crtfilm"],
+        2,
+        "another scene",
+        lambda folder: (folder.write("scene.yaml", GOOD), folder.write("a.crtfilm", film)),
+    )
+    case(
+        "film",
+        "an image, resumed",
+        ["scene.yaml", "-b", "fake", "-o", "b.pfm", "--resume=a.pfm"],
+        2,
+        "is not a crt film",
+        lambda folder: (folder.write("scene.yaml", GOOD), folder.write("a.pfm", samples["pfm"])),
+    )
 
 
 def odd_files(extension, more=None):
@@ -408,7 +797,8 @@ def odd_files(extension, more=None):
     return prepare
 
 
-# ------------------------------------------------------------------------------------------------- command line, environment
+# ------------------------------------------------------------------------------------------------- command
+# line, environment
 
 RENDER = ["scene.yaml", "-b", "fake", "-o", "a.pfm", "--report", "none"]
 
@@ -426,22 +816,66 @@ def argument_cases():
     words_of("an empty word", [""], (2, 3))
     words_of("a command that is none", ["explode", "scene.yaml"])
     words_of("two scenes", ["scene.yaml", "scene.yaml", "-b", "fake"])
-    for option, values in (("--spp", ("0", "-1", "many", "1e99", "99999999999999999999", "")), ("--time", ("0", "-1s", "soon", "1e999s")), ("--target-error", ("0", "200%", "nan")),
-                           ("--samples", ("5:5", "9:1", ":", "x", "0:99999999999999999999")), ("--crop", ("0,0,9,9", "1,2,3", "4,4,2,2")),
-                           ("--set", ("film", "=1", "film.resolution", "film.nonsense=1", "film.resolution=[0,0]", "film.resolution=[", "a.b.c.d=1", "objects.9.name=x")),
-                           ("--seed", ("-1", "1.5", "x")), ("--threads", ("-1", "99999999")), ("--tile", ("0", "x")), ("--chunk", ("0", "-1")), ("--kernel", ("huge",)),
-                           ("--device", ("99", "nobody's")), ("--checkpoint-every", ("0s", "never"))):
+    for option, values in (
+        ("--spp", ("0", "-1", "many", "1e99", "99999999999999999999", "")),
+        ("--time", ("0", "-1s", "soon", "1e999s")),
+        ("--target-error", ("0", "200%", "nan")),
+        ("--samples", ("5:5", "9:1", ":", "x", "0:99999999999999999999")),
+        ("--crop", ("0,0,9,9", "1,2,3", "4,4,2,2")),
+        (
+            "--set",
+            (
+                "film",
+                "=1",
+                "film.resolution",
+                "film.nonsense=1",
+                "film.resolution=[0,0]",
+                "film.resolution=[",
+                "a.b.c.d=1",
+                "objects.9.name=x",
+            ),
+        ),
+        ("--seed", ("-1", "1.5", "x")),
+        ("--threads", ("-1", "99999999")),
+        ("--tile", ("0", "x")),
+        ("--chunk", ("0", "-1")),
+        ("--kernel", ("huge",)),
+        ("--device", ("99", "nobody's")),
+        ("--checkpoint-every", ("0s", "never")),
+    ):
         for value in values:
             words_of(f"{option} '{value}'", [*RENDER, f"{option}={value}"], (2, 3, 4))
-    for name in ("a.docx", "a", "", "/dev/null", "/dev/full", "/proc/self/x.pfm", "missing/missing/a.pfm", "scene.yaml/a.pfm", "x" * 300 + ".pfm", "folder.pfm"):
-        case("arguments", f"an output '{name[:30]}'", ["scene.yaml", "-b", "fake", "--report", "none", "-o", name], (2, 6), (),
-             lambda folder: (good(folder), os.mkdir(folder / "folder.pfm")))
+    for name in (
+        "a.docx",
+        "a",
+        "",
+        "/dev/null",
+        "/dev/full",
+        "/proc/self/x.pfm",
+        "missing/missing/a.pfm",
+        "scene.yaml/a.pfm",
+        "x" * 300 + ".pfm",
+        "folder.pfm",
+    ):
+        case(
+            "arguments",
+            f"an output '{name[:30]}'",
+            ["scene.yaml", "-b", "fake", "--report", "none", "-o", name],
+            (2, 6),
+            (),
+            lambda folder: (good(folder), os.mkdir(folder / "folder.pfm")),
+        )
     for backend in ("nonsense", "/etc/passwd", "../fake", "", "x" * 5000, "/dev/zero", "/dev/null", "."):
-        words_of(f"the backend '{backend[:20]}'", ["scene.yaml", "-o", "a.pfm", f"--backend={backend}"], (2, 4))
+        words_of(
+            f"the backend '{backend[:20]}'", ["scene.yaml", "-o", "a.pfm", f"--backend={backend}"], (2, 4)
+        )
     words_of("an argument of 100,000 letters", [*RENDER, "--" + "x" * 100000])
     words_of("an argument that is no UTF-8", [*RENDER, b"--\xff\xfe"])
     words_of("an argument with an escape sequence", [*RENDER, "--\x1b[2J"])
-    words_of("2,000 outputs", ["scene.yaml", "-b", "fake", "--report", "none"] + [f"-oo{i}.docx" for i in range(2000)])
+    words_of(
+        "2,000 outputs",
+        ["scene.yaml", "-b", "fake", "--report", "none"] + [f"-oo{i}.docx" for i in range(2000)],
+    )
     words_of("info of nothing", ["info"])
     words_of("merge of nothing", ["merge", "-o", "a.crtfilm"])
     words_of("merge to nowhere", ["merge", "a.crtfilm"])
@@ -454,8 +888,21 @@ def argument_cases():
 
 
 def environment_cases():
-    def with_variable(asked, codes, words=(), prepare=good, arguments=RENDER, changed=(), made=("a.pfm",), **env):
-        case("environment", asked, arguments, codes, words, prepare, env=env, changed=changed, made=made if codes == 0 else ())
+
+    def with_variable(
+        asked, codes, words=(), prepare=good, arguments=RENDER, changed=(), made=("a.pfm",), **env
+    ):
+        case(
+            "environment",
+            asked,
+            arguments,
+            codes,
+            words,
+            prepare,
+            env=env,
+            changed=changed,
+            made=made if codes == 0 else (),
+        )
 
     with_variable("CRT_CACHE_DIR=/dev/null", 0, CRT_CACHE_DIR="/dev/null")
     with_variable("CRT_CACHE_DIR is a file", 0, CRT_CACHE_DIR="scene.yaml")
@@ -468,15 +915,32 @@ def environment_cases():
     with_variable("CRT_SCENE_MEMORY=-1GB", 2, "CRT_SCENE_MEMORY", CRT_SCENE_MEMORY="-1GB")
     with_variable("CRT_BACKEND=nonsense", 4, arguments=["scene.yaml", "-o", "a.pfm"], CRT_BACKEND="nonsense")
     with_variable("CRT_DEVICE=nonsense", (2, 4), CRT_DEVICE="nonsense")
-    with_variable("CRT_BACKEND_PATH of 1,000 folders that are not there", 0, CRT_BACKEND_PATH=":".join(f"/none/{i}" for i in range(1000)) + ":FAKE")
-    with_variable("CRT_MESH_PATH of colons", 3, "cannot find", prepare=lambda folder: folder.write("scene.yaml", HEAD + MATERIALS + "objects: [{obj: none.obj, material: m}]\n"),
-                  CRT_MESH_PATH=":::::/:::")
+    with_variable(
+        "CRT_BACKEND_PATH of 1,000 folders that are not there",
+        0,
+        CRT_BACKEND_PATH=":".join(f"/none/{i}" for i in range(1000)) + ":FAKE",
+    )
+    with_variable(
+        "CRT_MESH_PATH of colons",
+        3,
+        "cannot find",
+        prepare=lambda folder: folder.write(
+            "scene.yaml", HEAD + MATERIALS + "objects: [{obj: none.obj, material: m}]\n"
+        ),
+        CRT_MESH_PATH=":::::/:::",
+    )
 
     def shared_cache(folder):
         good(folder)
         os.mkdir(folder / "cache")
         os.chmod(folder / "cache", 0o777)
-    with_variable("a cache folder that everyone can write to", 0, "no kernel cache, so kernels are compiled anew: everyone can write", shared_cache, CRT_CACHE_DIR="cache")
+    with_variable(
+        "a cache folder that everyone can write to",
+        0,
+        "no kernel cache, so kernels are compiled anew: everyone can write",
+        shared_cache,
+        CRT_CACHE_DIR="cache",
+    )
 
     def plugin(asked, change, codes, words=(), arguments=("scene.yaml", "-b", "planted", "-o", "a.pfm")):
         def prepare(folder):
@@ -503,29 +967,82 @@ def environment_cases():
         os.mkdir(path)
 
     plugin("a plugin that is whole", lambda *_: None, 0)
-    plugin("a plugin that everyone can write to", lambda _, path: os.chmod(path, 0o777), 4, "is refused: everyone can write to")
-    plugin("a plugin in a folder that everyone can write to", lambda folder, _: os.chmod(folder / "plugins", 0o777), 4, "is refused: everyone can write to")
-    plugin("the same, listed", lambda folder, _: os.chmod(folder / "plugins", 0o777), 0, "refused", arguments=("plugins",))
+    plugin(
+        "a plugin that everyone can write to",
+        lambda _, path: os.chmod(path, 0o777),
+        4,
+        "is refused: everyone can write to",
+    )
+    plugin(
+        "a plugin in a folder that everyone can write to",
+        lambda folder, _: os.chmod(folder / "plugins", 0o777),
+        4,
+        "is refused: everyone can write to",
+    )
+    plugin(
+        "the same, listed",
+        lambda folder, _: os.chmod(folder / "plugins", 0o777),
+        0,
+        "refused",
+        arguments=("plugins",),
+    )
     plugin("a plugin in a sticky folder", lambda folder, _: os.chmod(folder / "plugins", 0o1777), 0)
     if ROOT:
-        plugin("another user's plugin", lambda _, path: os.chown(path, 65534, 65534), 4, "belongs to another user")
-        plugin("a plugin in another user's folder", lambda folder, _: os.chown(folder / "plugins", 65534, 65534), 4, "belongs to another user")
+        plugin(
+            "another user's plugin",
+            lambda _, path: os.chown(path, 65534, 65534),
+            4,
+            "belongs to another user",
+        )
+        plugin(
+            "a plugin in another user's folder",
+            lambda folder, _: os.chown(folder / "plugins", 65534, 65534),
+            4,
+            "belongs to another user",
+        )
     plugin("a text as plugin", replaced(b"text\n"), 4, "cannot be opened")
     plugin("an empty plugin", replaced(b""), 4, "cannot be opened")
-    plugin("noise with the mark of a library", replaced(b"\x7fELF" + bytes(range(256)) * 40), 4, "cannot be opened")
+    plugin(
+        "noise with the mark of a library",
+        replaced(b"\x7fELF" + bytes(range(256)) * 40),
+        4,
+        "cannot be opened",
+    )
     plugin("a pipe as plugin", as_pipe, 4, "is not a regular file")
     plugin("a folder as plugin", as_folder, 4, "is not a regular file")
     plugin("half a plugin", lambda _, path: os.truncate(path, os.path.getsize(path) // 2), 4)
-    for name in ("no_symbol", "no_table", "small_table", "wrong_abi", "wrong_bits", "wrong_layout", "no_device", "missing_library", "throws_in_entry", "throws_in_probe"):
+    for name in (
+        "no_symbol",
+        "no_table",
+        "small_table",
+        "wrong_abi",
+        "wrong_bits",
+        "wrong_layout",
+        "no_device",
+        "missing_library",
+        "throws_in_entry",
+        "throws_in_probe",
+    ):
         case("plugins", f"the plugin '{name}'", ["scene.yaml", "-b", name, "-o", "a.pfm"], 4, (), good)
 
 
 # ------------------------------------------------------------------------------------------------------------------- faults
 
 def fault_cases(samples):
-    commands = {"--help": ["--help"], "--version": ["--version"], "schema": ["schema"], "schema --markdown": ["schema", "--markdown"], "verify --list": ["verify", "--list"],
-                "verify --markdown": ["verify", "--markdown"], "plugins": ["plugins"], "info of a scene": ["info", "scene.yaml"], "info of a film": ["info", "a.crtfilm"],
-                "info of an image": ["info", "a.pfm"], "compare": ["compare", "a.pfm", "a.pfm"], "compare --json": ["compare", "a.pfm", "a.pfm", "--json"]}
+    commands = {
+        "--help": ["--help"],
+        "--version": ["--version"],
+        "schema": ["schema"],
+        "schema --markdown": ["schema", "--markdown"],
+        "verify --list": ["verify", "--list"],
+        "verify --markdown": ["verify", "--markdown"],
+        "plugins": ["plugins"],
+        "info of a scene": ["info", "scene.yaml"],
+        "info of a film": ["info", "a.crtfilm"],
+        "info of an image": ["info", "a.pfm"],
+        "compare": ["compare", "a.pfm", "a.pfm"],
+        "compare --json": ["compare", "a.pfm", "a.pfm", "--json"],
+    }
 
     def files(folder):
         good(folder)
@@ -533,73 +1050,314 @@ def fault_cases(samples):
         folder.write("a.pfm", samples["pfm"])
 
     for name, arguments in commands.items():
-        case("fault", f"{name} on a full disk", arguments, 6, "cannot write to standard output: No space left", files, stdout="/dev/full")
+        case(
+            "fault",
+            f"{name} on a full disk",
+            arguments,
+            6,
+            "cannot write to standard output: No space left",
+            files,
+            stdout="/dev/full",
+        )
     for name in ("schema", "plugins", "info of a scene"):
-        case("fault", f"{name} without standard output", commands[name], 6, "cannot write to standard output", files, stdout="closed")
+        case(
+            "fault",
+            f"{name} without standard output",
+            commands[name],
+            6,
+            "cannot write to standard output",
+            files,
+            stdout="closed",
+        )
         case("fault", f"{name} to a reader that is gone", commands[name], 0, (), files, stdout="broken")
-    case("fault", "compare of two that differ, to a reader that is gone", ["compare", "a.pfm", "b.png"], 7, (), lambda folder: (files(folder), folder.write("b.png", png(3, 3))), stdout="broken")
+    case(
+        "fault",
+        "compare of two that differ, to a reader that is gone",
+        ["compare", "a.pfm", "b.png"],
+        7,
+        (),
+        lambda folder: (files(folder), folder.write("b.png", png(3, 3))),
+        stdout="broken",
+    )
     for place in ("/dev/full", "closed", "broken"):
-        case("fault", f"a render whose messages go to {place}", ["scene.yaml", "-v", "-b", "fake", "-o", "a.pfm", "--spp", "50", "--chunk", "1"], 0, (), good, stderr=place,
-             made=("a.pfm", "a.report.json"))
-    case("fault", "a render without standard streams", RENDER, 0, (), good, stdin="closed", stdout="closed", stderr="closed", made=("a.pfm",),
-         after=lambda folder: "" if open(folder / "a.pfm", "rb").read(2) == b"PF" else "the image begins with something else")
-    case("fault", "an error without standard streams", ["none.yaml"], 3, (), good, stdin="closed", stdout="closed", stderr="closed")
+        case(
+            "fault",
+            f"a render whose messages go to {place}",
+            ["scene.yaml", "-v", "-b", "fake", "-o", "a.pfm", "--spp", "50", "--chunk", "1"],
+            0,
+            (),
+            good,
+            stderr=place,
+            made=("a.pfm", "a.report.json"),
+        )
+    case(
+        "fault",
+        "a render without standard streams",
+        RENDER,
+        0,
+        (),
+        good,
+        stdin="closed",
+        stdout="closed",
+        stderr="closed",
+        made=("a.pfm",),
+        after=lambda folder: (
+            "" if open(folder / "a.pfm", "rb").read(2) == b"PF" else "the image begins with something else"
+        ),
+    )
+    case(
+        "fault",
+        "an error without standard streams",
+        ["none.yaml"],
+        3,
+        (),
+        good,
+        stdin="closed",
+        stdout="closed",
+        stderr="closed",
+    )
 
     def limited(asked, arguments, codes, limits, words=(), **options):
         case("fault", asked, arguments, codes, words, options.pop("prepare", good), limits=limits, **options)
 
-    limited("a limit of 1 kB on files (SIGXFSZ)", [*RENDER, "--set", "film.resolution=[64,64]"], 6, {resource.RLIMIT_FSIZE: 1024}, "File too large")
-    limited("a limit of 60 kB on files: the image fits, the film does not",
-            [*RENDER, "--set", "film.resolution=[64,64]", "--set", "sampler.replicates=16", "--checkpoint", "c.crtfilm", "--spp", "64"], 6,
-            {resource.RLIMIT_FSIZE: 60000}, "File too large", made=("a.pfm",))
-    limited("a second of processor time (SIGXCPU)", [*RENDER, "--set", "film.resolution=[512,512]", "--spp", "1000000"], 152, {resource.RLIMIT_CPU: 1}, "SIGXCPU",
-            made=("a.pfm", "a.crtfilm"))
+    limited(
+        "a limit of 1 kB on files (SIGXFSZ)",
+        [*RENDER, "--set", "film.resolution=[64,64]"],
+        6,
+        {resource.RLIMIT_FSIZE: 1024},
+        "File too large",
+    )
+    limited(
+        "a limit of 60 kB on files: the image fits, the film does not",
+        [
+            *RENDER,
+            "--set",
+            "film.resolution=[64,64]",
+            "--set",
+            "sampler.replicates=16",
+            "--checkpoint",
+            "c.crtfilm",
+            "--spp",
+            "64",
+        ],
+        6,
+        {resource.RLIMIT_FSIZE: 60000},
+        "File too large",
+        made=("a.pfm",),
+    )
+    limited(
+        "a second of processor time (SIGXCPU)",
+        [*RENDER, "--set", "film.resolution=[512,512]", "--spp", "1000000"],
+        152,
+        {resource.RLIMIT_CPU: 1},
+        "SIGXCPU",
+        made=("a.pfm", "a.crtfilm"),
+    )
     limited("eight open files", RENDER, (0, 1, 4, 5, 6), {resource.RLIMIT_NOFILE: 8})
-    limited("200 MB of address space", [*RENDER, "--set", "film.resolution=[4096,4096]"], 5, {resource.RLIMIT_AS: 200 << 20}, "memory")
+    limited(
+        "200 MB of address space",
+        [*RENDER, "--set", "film.resolution=[4096,4096]"],
+        5,
+        {resource.RLIMIT_AS: 200 << 20},
+        "memory",
+    )
     limited("a stack of 256 kB", RENDER, 0, {resource.RLIMIT_STACK: 256 << 10}, made=("a.pfm",))
-    limited("a stack of 256 kB and brackets 10,000 deep", ["info", "scene.yaml"], 3, {resource.RLIMIT_STACK: 256 << 10},
-            prepare=lambda folder: folder.write("scene.yaml", HEAD + "objects: " + "[" * 10000))
-    limited("no core file and no message queue", RENDER, 0, {resource.RLIMIT_CORE: 0, resource.RLIMIT_MSGQUEUE: 0}, made=("a.pfm",))
+    limited(
+        "a stack of 256 kB and brackets 10,000 deep",
+        ["info", "scene.yaml"],
+        3,
+        {resource.RLIMIT_STACK: 256 << 10},
+        prepare=lambda folder: folder.write("scene.yaml", HEAD + "objects: " + "[" * 10000),
+    )
+    limited(
+        "no core file and no message queue",
+        RENDER,
+        0,
+        {resource.RLIMIT_CORE: 0, resource.RLIMIT_MSGQUEUE: 0},
+        made=("a.pfm",),
+    )
 
     slow = ["scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "100000", "--chunk", "1"]
-    for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGXCPU, 152)):
-        case("fault", f"{number.name} while rendering", slow, code, (), good, env={"CRT_FAKE_FAULT": "slow"}, send=(number,), made=("a.pfm", "a.crtfilm", "a.report.json"))
-    case("fault", "SIGPIPE, SIGXFSZ and then SIGINT while rendering", slow, 130, (), good, env={"CRT_FAKE_FAULT": "slow"}, send=(signal.SIGPIPE, signal.SIGXFSZ, signal.SIGINT),
-         made=("a.pfm", "a.crtfilm"))
-    case("fault", "SIGXCPU again and again", slow, 152, (), good, env={"CRT_FAKE_FAULT": "slow"}, send=(signal.SIGXCPU,) * 5, made=("a.pfm", "a.crtfilm"))
+    for number, code in (
+        (signal.SIGINT, 130),
+        (signal.SIGTERM, 143),
+        (signal.SIGHUP, 129),
+        (signal.SIGXCPU, 152),
+    ):
+        case(
+            "fault",
+            f"{number.name} while rendering",
+            slow,
+            code,
+            (),
+            good,
+            env={"CRT_FAKE_FAULT": "slow"},
+            send=(number,),
+            made=("a.pfm", "a.crtfilm", "a.report.json"),
+        )
+    case(
+        "fault",
+        "SIGPIPE, SIGXFSZ and then SIGINT while rendering",
+        slow,
+        130,
+        (),
+        good,
+        env={"CRT_FAKE_FAULT": "slow"},
+        send=(signal.SIGPIPE, signal.SIGXFSZ, signal.SIGINT),
+        made=("a.pfm", "a.crtfilm"),
+    )
+    case(
+        "fault",
+        "SIGXCPU again and again",
+        slow,
+        152,
+        (),
+        good,
+        env={"CRT_FAKE_FAULT": "slow"},
+        send=(signal.SIGXCPU,) * 5,
+        made=("a.pfm", "a.crtfilm"),
+    )
     for fault, code in (("device", 5), ("oom", 5), ("nan_film", 1), ("count_film", 1)):
-        case("fault", f"a backend with the fault '{fault}'", RENDER, code, (), good, env={"CRT_FAKE_FAULT": fault})
+        case(
+            "fault",
+            f"a backend with the fault '{fault}'",
+            RENDER,
+            code,
+            (),
+            good,
+            env={"CRT_FAKE_FAULT": fault},
+        )
 
     def model(folder):
-        folder.write("scene.yaml", HEAD + "materials: {m: {type: diffuse, reflectance: {file: s.spd, outside: clamp}}}\nobjects: [{obj: mesh.obj, material: m}, {obj: own.obj}]\n")
+        folder.write(
+            "scene.yaml",
+            HEAD
+            + "materials: {m: {type: diffuse, reflectance: {file: s.spd, outside: clamp}}}\nobjects: [{obj: mesh.obj, material: m}, {obj: own.obj}]\n",
+        )
         folder.write("mesh.obj", OBJ)
         folder.write("own.obj", "mtllib own.mtl\nusemtl a\n" + OBJ)
         folder.write("own.mtl", "newmtl a\nKd 1 1 1\n")
         folder.write("s.spd", "400 0.5\n700 0.5\n")
         os.link(folder / "mesh.obj", folder / "hard.pfm")
         os.symlink("own.mtl", folder / "soft.crtfilm")
-    for option, name in (("--report", "scene.yaml"), ("--checkpoint", "mesh.obj"), ("--report", "own.mtl"), ("--report", "s.spd"), ("-o", "hard.pfm"), ("-o", "soft.crtfilm"),
-                         ("--checkpoint", "soft.crtfilm"), ("--report", "../" + "FOLDER" + "/scene.yaml")):
-        case("fault", f"{option} {name.replace('FOLDER', '…')} over an input", ["scene.yaml", "-b", "fake", *([] if option == "-o" else ["-o", "a.pfm"]), option, name], 2, "which is read" if name not in ("scene.yaml", "own.mtl", "s.spd", "mesh.obj") else "would replace", model)
-    case("fault", "a report over the image", ["scene.yaml", "-b", "fake", "-o", "a.pfm", "--report", "a.pfm"], 2, "two outputs", good)
-    case("fault", "a merge over a part", ["merge", "a.crtfilm", "-o", "a.crtfilm"], 2, "would replace", files)
-    case("fault", "a difference image over an image", ["compare", "a.pfm", "a.pfm", "--diff", "a.pfm"], 2, "would replace", files)
+    for option, name in (
+        ("--report", "scene.yaml"),
+        ("--checkpoint", "mesh.obj"),
+        ("--report", "own.mtl"),
+        ("--report", "s.spd"),
+        ("-o", "hard.pfm"),
+        ("-o", "soft.crtfilm"),
+        ("--checkpoint", "soft.crtfilm"),
+        ("--report", "../" + "FOLDER" + "/scene.yaml"),
+    ):
+        case(
+            "fault",
+            f"{option} {name.replace('FOLDER', '…')} over an input",
+            ["scene.yaml", "-b", "fake", *([] if option == "-o" else ["-o", "a.pfm"]), option, name],
+            2,
+            (
+                "which is read"
+                if name not in ("scene.yaml", "own.mtl", "s.spd", "mesh.obj")
+                else "would replace"
+            ),
+            model,
+        )
+    case(
+        "fault",
+        "a report over the image",
+        ["scene.yaml", "-b", "fake", "-o", "a.pfm", "--report", "a.pfm"],
+        2,
+        "two outputs",
+        good,
+    )
+    case(
+        "fault", "a merge over a part", ["merge", "a.crtfilm", "-o", "a.crtfilm"], 2, "would replace", files
+    )
+    case(
+        "fault",
+        "a difference image over an image",
+        ["compare", "a.pfm", "a.pfm", "--diff", "a.pfm"],
+        2,
+        "would replace",
+        files,
+    )
     film = ["scene.yaml", "-b", "fake", "-o", "b.pfm", "--report", "none"]
-    case("fault", "--checkpoint over a film of more samples", [*film, "--spp", "1", "--checkpoint", "a.crtfilm"], 2, ("--resume", "--overwrite"), files)
-    case("fault", "-o over a film of more samples", ["scene.yaml", "-b", "fake", "-o", "a.crtfilm", "--spp", "1", "--report", "none"], 2, ("--resume", "--overwrite"), files)
-    case("fault", "the same with --overwrite", [*film, "--spp", "1", "--checkpoint", "a.crtfilm", "--overwrite"], 0, (), files, changed=("a.crtfilm",), made=("b.pfm",))
-    case("fault", "--checkpoint over a file that is no film", [*film, "--checkpoint", "notes.txt"], 2, "--overwrite", lambda folder: (good(folder), folder.write("notes.txt", "notes\n")))
-    case("fault", "Ctrl-C beside a film of more samples", ["scene.yaml", "-b", "fake", "-o", "a.exr", "-o", "a.pfm", "--spp", "100000", "--chunk", "1"], 130, "a.partial.crtfilm",
-         lambda folder: (good(folder), folder.write("a.crtfilm", large_film(samples))), env={"CRT_FAKE_FAULT": "slow"}, send=(signal.SIGINT,), made=("a.partial.crtfilm", "a.pfm"))
+    case(
+        "fault",
+        "--checkpoint over a film of more samples",
+        [*film, "--spp", "1", "--checkpoint", "a.crtfilm"],
+        2,
+        ("--resume", "--overwrite"),
+        files,
+    )
+    case(
+        "fault",
+        "-o over a film of more samples",
+        ["scene.yaml", "-b", "fake", "-o", "a.crtfilm", "--spp", "1", "--report", "none"],
+        2,
+        ("--resume", "--overwrite"),
+        files,
+    )
+    case(
+        "fault",
+        "the same with --overwrite",
+        [*film, "--spp", "1", "--checkpoint", "a.crtfilm", "--overwrite"],
+        0,
+        (),
+        files,
+        changed=("a.crtfilm",),
+        made=("b.pfm",),
+    )
+    case(
+        "fault",
+        "--checkpoint over a file that is no film",
+        [*film, "--checkpoint", "notes.txt"],
+        2,
+        "--overwrite",
+        lambda folder: (good(folder), folder.write("notes.txt", "notes\n")),
+    )
+    case(
+        "fault",
+        "Ctrl-C beside a film of more samples",
+        ["scene.yaml", "-b", "fake", "-o", "a.exr", "-o", "a.pfm", "--spp", "100000", "--chunk", "1"],
+        130,
+        "a.partial.crtfilm",
+        lambda folder: (good(folder), folder.write("a.crtfilm", large_film(samples))),
+        env={"CRT_FAKE_FAULT": "slow"},
+        send=(signal.SIGINT,),
+        made=("a.partial.crtfilm", "a.pfm"),
+    )
 
     def links(folder):
         good(folder)
         os.mkdir(folder / "store")
         os.symlink("store/image.pfm", folder / "a.pfm")
         os.symlink("absent/image.pfm", folder / "lost.pfm")
-    case("fault", "an output link to a file that is not there yet", RENDER, 0, (), links, made=("store/image.pfm",))
-    case("fault", "an output link into a folder that is not there", ["scene.yaml", "-b", "fake", "-o", "lost.pfm", "--report", "none"], 6, "does not exist", links)
-    case("fault", "an output link to itself", ["scene.yaml", "-b", "fake", "-o", "loop.pfm", "--report", "none"], 6, "leads to itself", lambda folder: (good(folder), os.symlink("loop.pfm", folder / "loop.pfm")))
+    case(
+        "fault",
+        "an output link to a file that is not there yet",
+        RENDER,
+        0,
+        (),
+        links,
+        made=("store/image.pfm",),
+    )
+    case(
+        "fault",
+        "an output link into a folder that is not there",
+        ["scene.yaml", "-b", "fake", "-o", "lost.pfm", "--report", "none"],
+        6,
+        "does not exist",
+        links,
+    )
+    case(
+        "fault",
+        "an output link to itself",
+        ["scene.yaml", "-b", "fake", "-o", "loop.pfm", "--report", "none"],
+        6,
+        "leads to itself",
+        lambda folder: (good(folder), os.symlink("loop.pfm", folder / "loop.pfm")),
+    )
 
 
 def large_film(samples):
@@ -635,7 +1393,14 @@ def start(case_, folder, env):
                 child.append(descriptor_for(place, number == 0))
 
         def prepare():
-            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGXFSZ, signal.SIGXCPU):
+            for number in (
+                signal.SIGINT,
+                signal.SIGTERM,
+                signal.SIGHUP,
+                signal.SIGPIPE,
+                signal.SIGXFSZ,
+                signal.SIGXCPU,
+            ):
                 signal.signal(number, signal.SIG_DFL)
             for what, limit in case_.how.get("limits", {}).items():
                 # Only the soft limit of processor time: the hard one kills.
@@ -645,10 +1410,18 @@ def start(case_, folder, env):
                     os.close(number)
 
         arguments = [os.fsencode(word) if isinstance(word, str) else word for word in case_.arguments]
-        arguments = [word.replace(b"FOLDER", os.fsencode(os.path.basename(folder.path))) for word in arguments]
-        process = subprocess.Popen([os.fsencode(CRT), *arguments], cwd=folder.path, env=env, stdin=child[0] if child[0] is not None else subprocess.DEVNULL,
-                                   stdout=child[1] if child[1] is not None else subprocess.DEVNULL, stderr=child[2] if child[2] is not None else subprocess.DEVNULL,
-                                   preexec_fn=prepare)
+        arguments = [
+            word.replace(b"FOLDER", os.fsencode(os.path.basename(folder.path))) for word in arguments
+        ]
+        process = subprocess.Popen(
+            [os.fsencode(CRT), *arguments],
+            cwd=folder.path,
+            env=env,
+            stdin=child[0] if child[0] is not None else subprocess.DEVNULL,
+            stdout=child[1] if child[1] is not None else subprocess.DEVNULL,
+            stderr=child[2] if child[2] is not None else subprocess.DEVNULL,
+            preexec_fn=prepare,
+        )
         for number, descriptor in enumerate(child):
             if descriptor is not None and captured[number] is None:
                 os.close(descriptor)
@@ -724,7 +1497,12 @@ def run(case_, number):
         wrong.append(f"took {memory / 1e9:.1f} GB")
     if case_.words and captured[2] is not None and not says(case_.words, text):
         wrong.append(f"says nothing of {case_.words}")
-    if code not in (0, 7) and captured[2] is not None and "crt: error:" not in text and "crt: info: stopped by" not in text:
+    if (
+        code not in (0, 7)
+        and captured[2] is not None
+        and "crt: error:" not in text
+        and "crt: info: stopped by" not in text
+    ):
         wrong.append("gives no reason")
     if "internal error" in text and 1 not in case_.codes:
         wrong.append("calls it an internal error")
@@ -737,11 +1515,23 @@ def run(case_, number):
     if case_.after and not wrong and case_.after(folder):
         wrong.append(case_.after(folder))
     shutil.rmtree(folder.path)
-    return {"case": case_, "code": code, "seconds": seconds, "processor": usage.ru_utime + usage.ru_stime if usage else 0, "memory": memory, "text": text, "wrong": wrong}
+    return {
+        "case": case_,
+        "code": code,
+        "seconds": seconds,
+        "processor": usage.ru_utime + usage.ru_stime if usage else 0,
+        "memory": memory,
+        "text": text,
+        "wrong": wrong,
+    }
 
 
 def says(words, text):
-    return any(word in text for word in words) if isinstance(words, set) else all(word in text for word in words)
+    return (
+        any(word in text for word in words)
+        if isinstance(words, set)
+        else all(word in text for word in words)
+    )
 
 
 def wait_for_rendering(stream, process):
@@ -762,7 +1552,12 @@ def make_samples():
     env = environment(Case("", "", [], 0))
     outputs = ["-o", "a.exr", "-o", "a.pfm", "-o", "a.crtfilm", "--report", "none"]
     subprocess.run([CRT, "scene.yaml", "-b", "fake", *outputs, "-q"], cwd=folder.path, env=env, check=True)
-    subprocess.run([CRT, "scene.yaml", "-b", "fake", "-o", "large.crtfilm", "--spp", "90000", "--report", "none", "-q"], cwd=folder.path, env=env, check=True)
+    subprocess.run(
+        [CRT, "scene.yaml", "-b", "fake", "-o", "large.crtfilm", "--spp", "90000", "--report", "none", "-q"],
+        cwd=folder.path,
+        env=env,
+        check=True,
+    )
     samples = {name: open(folder / f"a.{name}", "rb").read() for name in ("exr", "pfm", "crtfilm")}
     samples["large"] = open(folder / "large.crtfilm", "rb").read()
     shutil.rmtree(folder.path)
@@ -773,23 +1568,40 @@ def sentence(result):
     """The first line that says what happened."""
     if result["case"].how.get("stderr") or result["code"] == 0:
         return ""
-    lines = [line for line in result["text"].splitlines() if "error:" in line and not line.endswith("as it is:")]
+    lines = [
+        line for line in result["text"].splitlines() if "error:" in line and not line.endswith("as it is:")
+    ]
     lines = lines or [line for line in result["text"].splitlines() if "stopped by" in line]
     text = lines[0].replace("crt: error: ", "").replace("crt: info: ", "") if lines else ""
-    text = text.replace(WORK, "…").replace(FAKE, "…").replace(os.path.dirname(os.path.dirname(CRT)), "…").replace("|", "\\|")
+    text = (
+        text.replace(WORK, "…")
+        .replace(FAKE, "…")
+        .replace(os.path.dirname(os.path.dirname(CRT)), "…")
+        .replace("|", "\\|")
+    )
     return text if len(text) <= 160 else text[:159] + "…"
 
 
 def markdown(results):
     faults = sum(r["case"].group == "fault" for r in results)
-    lines = ["# Hostile inputs and faults", "", "Written by `tests/cli/test_hostile.py --write`, which makes every input, runs crt on it, and is part of `scripts/test`.", "",
-             f"{len(results) - faults} inputs and {faults} faults. Demanded of each: the exit code of the table, no crash, no hang (10 s of processor time), less than 2 GB of memory, every file that was "
-             "there unchanged, no temporary file left.", ""]
+    lines = [
+        "# Hostile inputs and faults",
+        "",
+        "Written by `tests/cli/test_hostile.py --write`, which makes every input, runs crt on it, and is part of `scripts/test`.",
+        "",
+        f"{len(results) - faults} inputs and {faults} faults. Demanded of each: the exit code of the table, no crash, no hang (10 s of processor time), less than 2 GB of memory, every file that was "
+        "there unchanged, no temporary file left.",
+        "",
+    ]
     for group in dict.fromkeys(r["case"].group for r in results):
         lines += [f"## {group.capitalize()}", "", "| # | asked | exit code | said |", "|---|---|---|---|"]
         for number, r in enumerate(results, 1):
             if r["case"].group == group:
-                asked = r["case"].asked.replace("|", "\\|").encode("ascii", "backslashreplace").decode() if "\x1b" in r["case"].asked else r["case"].asked.replace("|", "\\|")
+                asked = (
+                    r["case"].asked.replace("|", "\\|").encode("ascii", "backslashreplace").decode()
+                    if "\x1b" in r["case"].asked
+                    else r["case"].asked.replace("|", "\\|")
+                )
                 lines.append(f"| {number} | {asked} | {r['code']} | {sentence(r)} |")
         lines.append("")
     return "\n".join(lines)
@@ -825,10 +1637,14 @@ def main():
     failed = [r for r in results if r["wrong"]]
     for r in failed:
         words = " ".join(w if isinstance(w, str) else repr(w) for w in r["case"].arguments)
-        print(f"FAILED {r['case'].group}: {r['case'].asked}\n  crt {words[:200]}\n  {'; '.join(r['wrong'])}\n  {sentence(r) or r['text'][:300]}")
+        print(
+            f"FAILED {r['case'].group}: {r['case'].asked}\n  crt {words[:200]}\n  {'; '.join(r['wrong'])}\n  {sentence(r) or r['text'][:300]}"
+        )
     slowest = max(results, key=lambda r: r["processor"])
     largest = max(results, key=lambda r: r["memory"])
-    print(f"{len(results)} cases, {len(failed)} failed; slowest {slowest['processor']:.1f} s of processor time ({slowest['case'].asked}), largest {largest['memory'] / 1e6:.0f} MB ({largest['case'].asked})")
+    print(
+        f"{len(results)} cases, {len(failed)} failed; slowest {slowest['processor']:.1f} s of processor time ({slowest['case'].asked}), largest {largest['memory'] / 1e6:.0f} MB ({largest['case'].asked})"
+    )
     if options.write and not failed:
         with open(options.write, "w", encoding="utf-8") as file:
             file.write(markdown(results))

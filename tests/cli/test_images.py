@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What image files say of themselves: colour tags, dates, windows, matrices. Headers are read here, not by the library that wrote them.
+"""What image files say of themselves: colour tags, dates, windows, matrices. Headers are read here, not by
+the library that wrote them.
 
     test_images.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 
@@ -23,12 +24,29 @@ class Headers(CliTest):
         self.write("lit.yaml", LIT)
 
     def render(self, *options):
-        self.crt("lit.yaml", "-b", "fake", "--report", "none", "-o", "a.exr", "-o", "a.png", *options, SOURCE_DATE_EPOCH=self.EPOCH)
-        return {name: value for name, (_, value) in exr_header(self.path("a.exr")).items()}, png_texts(self.path("a.png"))
+        self.crt(
+            "lit.yaml",
+            "-b",
+            "fake",
+            "--report",
+            "none",
+            "-o",
+            "a.exr",
+            "-o",
+            "a.png",
+            *options,
+            SOURCE_DATE_EPOCH=self.EPOCH
+        )
+        return {name: value for name, (_, value) in exr_header(self.path("a.exr")).items()}, png_texts(
+            self.path("a.png")
+        )
 
     def test_each_file_names_the_colour_space_of_its_own_pixels(self):
-        for space, interop, red in (("srgb", "lin_rec709_scene", (0.64, 0.33)), ("acescg", "lin_ap1_scene", (0.713, 0.293)),
-                                    ("xyz", "lin_ciexyzd65_scene", (1, 0))):
+        for space, interop, red in (
+            ("srgb", "lin_rec709_scene", (0.64, 0.33)),
+            ("acescg", "lin_ap1_scene", (0.713, 0.293)),
+            ("xyz", "lin_ciexyzd65_scene", (1, 0)),
+        ):
             exr, png = self.render("--set", "film.color_space=" + space)
             self.assertEqual(exr["colorInteropID"], interop)
             self.assertEqual(tuple(round(v, 6) for v in exr["chromaticities"][:2]), red)
@@ -45,7 +63,18 @@ class Headers(CliTest):
         self.render("-o", "a.crtfilm")
         self.crt("develop", "a.crtfilm", "-o", "b.exr", SOURCE_DATE_EPOCH="1800000000")
         self.assertEqual(exr_header(self.path("b.exr"))["capDate"][1], "2023:11:14 22:13:20")
-        self.crt("lit.yaml", "-b", "fake", "-o", "b.exr", "-o", "b.crtfilm", "--samples", "16:20", SOURCE_DATE_EPOCH="1800000000")
+        self.crt(
+            "lit.yaml",
+            "-b",
+            "fake",
+            "-o",
+            "b.exr",
+            "-o",
+            "b.crtfilm",
+            "--samples",
+            "16:20",
+            SOURCE_DATE_EPOCH="1800000000",
+        )
         self.crt("develop", "b.crtfilm", "a.crtfilm", "-o", "b.exr")
         self.assertEqual(exr_header(self.path("b.exr"))["capDate"][1], "2027:01:15 08:00:00")
         # Without the variable it is now, in UTC.

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Models of other people, from outside: what is said about a mesh without materials or of another format, and that McGuire's Cornell box
+"""Models of other people, from outside: what is said about a mesh without materials or of another format,
+and that McGuire's Cornell box
 has the luminance that Mitsuba 3 gives to the same numbers.
 
     test_models.py CRT CONFIG_DIR FAKE_PLUGIN_DIR REPOSITORY BACKEND [unittest arguments]
@@ -38,31 +39,47 @@ class Meshes(CliTest):
 
     def test_a_mesh_without_materials_is_refused_with_the_line_to_add(self):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n", keys="", expect=3)
-        self.assertIn("mesh.yaml:5:17: error: 2 of 2 triangles of object 0 have no material (the OBJ names 'lost.mtl', which is not there); "
-                      "give them one with 'material: NAME'", said)
+        self.assertIn(
+            "mesh.yaml:5:17: error: 2 of 2 triangles of object 0 have no material (the OBJ names 'lost.mtl', which is not there); "
+            "give them one with 'material: NAME'",
+            said,
+        )
         self.assertIn("for instance 'material: grey'", said)
         self.assertFalse(os.path.exists(self.path("a.pfm")))
 
     def test_the_same_mesh_renders_with_one(self):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n")
-        self.assertIn("warning: mesh.obj: material 'red' is not defined, and no file 'lost.mtl' is there: 2 of 2 triangles have none of their own", said)
+        self.assertIn(
+            "warning: mesh.obj: material 'red' is not defined, and no file 'lost.mtl' is there: 2 of 2 triangles have none of their own",
+            said,
+        )
 
     def test_one_line_says_what_became_of_the_materials(self):
         said = self.render("mtllib mesh.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n", keys="",
                            mtl="newmtl a\nKd 1 1 1\nKs 1 1 1\nd 0\nnewmtl b\nd 0\nNi 1.5\n")
-        self.assertEqual([line for line in said.splitlines() if "mesh.obj" in line],
-                         ["crt: warning: mesh.obj: 2 materials: 1 diffuse, 1 glass; d below 1 without Ni above 1 read as opaque "
-                          "(crt has no opacity) (1); dropped: Ks (1)"])
+        self.assertEqual(
+            [line for line in said.splitlines() if "mesh.obj" in line],
+            [
+                "crt: warning: mesh.obj: 2 materials: 1 diffuse, 1 glass; d below 1 without Ni above 1 read as opaque "
+                "(crt has no opacity) (1); dropped: Ks (1)"
+            ],
+        )
 
     def test_another_format_is_named(self):
-        self.assertIn("mesh.obj: this is a PLY file; crt reads OBJ", self.render("ply\nformat ascii 1.0\n", expect=3))
+        self.assertIn(
+            "mesh.obj: this is a PLY file; crt reads OBJ", self.render("ply\nformat ascii 1.0\n", expect=3)
+        )
 
     def test_an_index_that_leads_nowhere_is_refused_with_its_line(self):
-        self.assertIn("mesh.obj:6: a face names vertex 7, but the file has 4", self.render(SQUARE + "f 1 2 3\nf 1 2 7\n", expect=3))
+        self.assertIn(
+            "mesh.obj:6: a face names vertex 7, but the file has 4",
+            self.render(SQUARE + "f 1 2 3\nf 1 2 7\n", expect=3),
+        )
 
 
 class CornellBox(CliTest):
-    """The reference is what Mitsuba 3 gave in wavelengths when bench/run mtl-agreement was last run (docs/results/mtl-agreement.json)."""
+    """The reference is what Mitsuba 3 gave in wavelengths when bench/run mtl-agreement was last run
+    (docs/results/mtl-agreement.json)."""
 
     SIZE = 128
 
@@ -78,7 +95,17 @@ class CornellBox(CliTest):
         with open(self.path("cornell_original.obj"), encoding="utf-8") as file:
             obj = file.read()
         self.write("cornell_original.obj", re.sub(r"mtllib \S+", f"mtllib {mtl}", obj))
-        self.crt("cornell_original.yaml", "-b", BACKEND, "--spp", "256", "--set", "film.color_space=xyz", "-o", "a.pfm")
+        self.crt(
+            "cornell_original.yaml",
+            "-b",
+            BACKEND,
+            "--spp",
+            "256",
+            "--set",
+            "film.color_space=xyz",
+            "-o",
+            "a.pfm",
+        )
         with open(self.path("a.pfm"), "rb") as file:
             data = file.read()
         header = re.match(rb"PF\n(\d+) (\d+)\n-[0-9.]+\n", data)
@@ -88,13 +115,20 @@ class CornellBox(CliTest):
 
     def test_luminance_is_that_of_mitsuba_whoever_wrote_the_mtl(self):
         images = {mtl: self.luminance(mtl) for mtl in ("cornell_original.mtl", "maya.mtl", "sponza.mtl")}
-        with open(os.path.join(REPOSITORY, "docs", "results", "mtl-agreement.json"), encoding="utf-8") as file:
+        with open(
+            os.path.join(REPOSITORY, "docs", "results", "mtl-agreement.json"), encoding="utf-8"
+        ) as file:
             patches = json.load(file)["patches"]
         self.assertGreater(len(patches), 5)
         for name, patch in patches.items():
             x, y, width, height = patch["x_y_width_height"]
-            pixels = [value for row in images["cornell_original.mtl"][y:y + height] for value in row[x:x + width]]
-            # 1 %, and three standard errors of the mean of this image: of 256 samples a pixel, as independent ones would have it.
+            pixels = [
+                value
+                for row in images["cornell_original.mtl"][y : y + height]
+                for value in row[x : x + width]
+            ]
+            # 1 %, and three standard errors of the mean of this image: of 256 samples a pixel, as
+            # independent ones would have it.
             noise = statistics.pstdev(pixels) / len(pixels) ** 0.5 if name != "whole image" else 0
             mean = statistics.fmean(pixels)
             self.assertLess(abs(mean - patch["mitsuba_luminance"]), 0.01 * mean + 3 * noise, name)

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""What people wait for: loading and building say how far they are and can be stopped, times add up, nothing is built that
+"""What people wait for: loading and building say how far they are and can be stopped, times add up, nothing
+is built that
 nobody reads, and checkpoints are small and written beside the render.
 
     test_waiting.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 
-No test measures time: slow work is as slow as a test says (CRT_FAKE_SCENE_SECONDS), or larger than any machine reads at once.
+No test measures time: slow work is as slow as a test says (CRT_FAKE_SCENE_SECONDS), or larger than any
+machine reads at once.
 """
 
 import glob
@@ -56,10 +58,20 @@ def write_grid(path, side):
     """A wavy sheet of 2 side² triangles."""
     with open(path, "w", encoding="ascii") as file:
         for y in range(side + 1):
-            file.write("".join(f"v {x / side:.6f} {(x * 7 + y * 3) % 5 / side:.6f} {y / side:.6f}\n" for x in range(side + 1)))
+            file.write(
+                "".join(
+                    f"v {x / side:.6f} {(x * 7 + y * 3) % 5 / side:.6f} {y / side:.6f}\n"
+                    for x in range(side + 1)
+                )
+            )
         for y in range(side):
             first = y * (side + 1) + 1
-            file.write("".join(f"f {first + x} {first + x + 1} {first + x + side + 2} {first + x + side + 1}\n" for x in range(side)))
+            file.write(
+                "".join(
+                    f"f {first + x} {first + x + 1} {first + x + side + 2} {first + x + side + 1}\n"
+                    for x in range(side)
+                )
+            )
 
 
 class Waiting(unittest.TestCase):
@@ -80,8 +92,15 @@ class Waiting(unittest.TestCase):
         self.write("mesh.yaml", MESH)
 
     def crt(self, *arguments, expect=0, **changes):
-        run = subprocess.run([CRT, *arguments], cwd=self.directory, env=environment(**changes), stdin=subprocess.DEVNULL,
-                             capture_output=True, text=True, timeout=280)
+        run = subprocess.run(
+            [CRT, *arguments],
+            cwd=self.directory,
+            env=environment(**changes),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=280,
+        )
         self.assertEqual(run.returncode, expect, f"crt {' '.join(arguments)}\n{run.stdout}{run.stderr}")
         return run
 
@@ -93,7 +112,9 @@ class Waiting(unittest.TestCase):
         return "embree" in [s["name"] for s in self.usable()]
 
     def usable(self):
-        listing = subprocess.run([CRT, "plugins"], env=environment(CRT_BACKEND_PATH=""), capture_output=True, text=True).stdout
+        listing = subprocess.run(
+            [CRT, "plugins"], env=environment(CRT_BACKEND_PATH=""), capture_output=True, text=True
+        ).stdout
         found, name = [], None
         for line in listing.splitlines():
             if not line.startswith(" "):
@@ -103,7 +124,8 @@ class Waiting(unittest.TestCase):
         return found
 
     def on_terminal(self, *arguments, until, timeout=120, **changes):
-        """What a terminal of 100 columns shows until `until` is there; then Ctrl-C. Returns (text, exit status)."""
+        """What a terminal of 100 columns shows until `until` is there; then Ctrl-C. Returns (text, exit
+        status)."""
         pid, terminal = pty.fork()
         if pid == 0:
             default_signals()
@@ -134,14 +156,19 @@ class Waiting(unittest.TestCase):
         os.close(terminal)
         return shown.decode(errors="replace"), status
 
-    # --- E10: something is said -----------------------------------------------------------------------------------------
+    # --- E10: something is said
+    # -----------------------------------------------------------------------------------------
 
     def test_a_log_says_what_a_large_mesh_waits_for(self):
         self.write_mesh_scene(1000)
         lines = self.crt("mesh.yaml", "-b", "fake", "-o", "a.pfm").stderr.splitlines()
         report = self.report()
         first = next((i for i, line in enumerate(lines) if SUMMARY in line), len(lines))
-        stages = [line for line in lines[:first] if re.search(r"(reading|making triangles of|placing|building|compiling|looking for) ", line)]
+        stages = [
+            line
+            for line in lines[:first]
+            if re.search(r"(reading|making triangles of|placing|building|compiling|looking for) ", line)
+        ]
         if report["seconds"]["total"] - report["seconds"]["sampling"] - report["seconds"]["write"] > 2:
             self.assertTrue(stages, "\n".join(lines))
         self.assertNotIn("\r", "".join(lines))
@@ -157,14 +184,26 @@ class Waiting(unittest.TestCase):
         self.assertEqual(run.stderr, "")
 
     def test_a_terminal_shows_a_bar_and_ctrl_c_ends_it_at_once(self):
-        shown, status = self.on_terminal("empty.yaml", "-b", "fake", "-o", "a.pfm", until="2 %  preparing the scene for fake",
-                                         CRT_FAKE_SCENE_SECONDS="100")
+        shown, status = self.on_terminal(
+            "empty.yaml",
+            "-b",
+            "fake",
+            "-o",
+            "a.pfm",
+            until="2 %  preparing the scene for fake",
+            CRT_FAKE_SCENE_SECONDS="100",
+        )
         self.assertRegex(shown, r"\r\x1b\[K\[=*> *\] +\d+ %  preparing the scene for fake")
-        # Nothing is there to be saved: the signal ends the process, as it does any other. The device would take 100 s more.
-        self.assertTrue(status is not None and os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGINT, f"status {status}")
+        # Nothing is there to be saved: the signal ends the process, as it does any other. The device would
+        # take 100 s more.
+        self.assertTrue(
+            status is not None and os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGINT,
+            f"status {status}",
+        )
         self.assertEqual(os.listdir(self.directory), ["empty.yaml"])
 
-    # --- E12: nothing is built that nobody reads, and seconds add up ------------------------------------------------------
+    # --- E12: nothing is built that nobody reads, and seconds add up
+    # ------------------------------------------------------
 
     def test_seconds_add_up(self):
         self.write_mesh_scene(200)
@@ -174,7 +213,9 @@ class Waiting(unittest.TestCase):
             seconds = self.report()["seconds"]
             stages = ["parse", "build", "compile", "open", "prepare", "sampling", "write", "other"]
             for stage in stages:
-                self.assertGreaterEqual(seconds[stage], 0, stage)  # What is counted twice makes 'other' negative.
+                self.assertGreaterEqual(
+                    seconds[stage], 0, stage
+                )  # What is counted twice makes 'other' negative.
             self.assertAlmostEqual(sum(seconds[stage] for stage in stages), seconds["total"], places=6)
             self.assertGreater(seconds["build"], 0)
 
@@ -191,8 +232,12 @@ class Waiting(unittest.TestCase):
         self.crt("mesh.yaml", "-b", "embree", "-o", "a.pfm", CRT_BACKEND_PATH="")
         report = self.report()
         self.assertEqual(report["scene"]["nodes"], 0)
-        self.assertIn({"what": "BVH", "why": "the backend builds an acceleration structure of its own"}, report["features"]["left_out"])
-        # From so far away Embree's boxes are too small for what rounding does: then the scene's own BVH is needed.
+        self.assertIn(
+            {"what": "BVH", "why": "the backend builds an acceleration structure of its own"},
+            report["features"]["left_out"],
+        )
+        # From so far away Embree's boxes are too small for what rounding does: then the scene's own BVH is
+        # needed.
         far = ["--set", "camera.position=[0,100,-400]", "--set", "camera.fov=0.5"]
         self.crt("mesh.yaml", "-b", "embree", "-o", "far.pfm", *far, CRT_BACKEND_PATH="")
         self.assertGreater(self.report("far.report.json")["scene"]["nodes"], 0)
@@ -200,8 +245,13 @@ class Waiting(unittest.TestCase):
         for name, options in (("a", []), ("far", far)):
             self.crt("mesh.yaml", "-b", "example", "-o", f"{name}_example.pfm", *options)
             self.assertGreater(self.report(f"{name}_example.report.json")["scene"]["nodes"], 0)
-            self.assertEqual(self.report(f"{name}_example.report.json")["scene"]["hash"], self.report(f"{name}.report.json")["scene"]["hash"])
-            with open(self.path(f"{name}.pfm"), "rb") as one, open(self.path(f"{name}_example.pfm"), "rb") as other:
+            self.assertEqual(
+                self.report(f"{name}_example.report.json")["scene"]["hash"],
+                self.report(f"{name}.report.json")["scene"]["hash"],
+            )
+            with open(self.path(f"{name}.pfm"), "rb") as one, open(
+                self.path(f"{name}_example.pfm"), "rb"
+            ) as other:
                 self.assertEqual(one.read(), other.read())
 
     def test_nothing_is_built_when_nothing_is_missing(self):
@@ -212,28 +262,67 @@ class Waiting(unittest.TestCase):
         with open(self.path("a.pfm"), "rb") as one, open(self.path("b.pfm"), "rb") as other:
             self.assertEqual(one.read(), other.read())
 
-    # --- checkpoints ----------------------------------------------------------------------------------------------------
+    # --- checkpoints
+    # ----------------------------------------------------------------------------------------------------
 
     def test_films_of_the_scenes_take_little_space(self):
         if not self.has_embree():
             self.skipTest("embree cannot run here")
         for scene in sorted(glob.glob(os.path.join(CONFIG_DIR, "*.yaml"))):
             with self.subTest(scene=os.path.basename(scene)):
-                self.crt(scene, "-b", "embree", "-o", "a.crtfilm", "--spp", "8", "--set", "film.resolution=[128,128]", CRT_BACKEND_PATH="")
+                self.crt(
+                    scene,
+                    "-b",
+                    "embree",
+                    "-o",
+                    "a.crtfilm",
+                    "--spp",
+                    "8",
+                    "--set",
+                    "film.resolution=[128,128]",
+                    CRT_BACKEND_PATH="",
+                )
                 self.assertLessEqual(os.path.getsize(self.path("a.crtfilm")) / 128**2, 150)
                 os.remove(self.path("a.crtfilm"))
 
     def test_a_checkpoint_is_written_while_the_render_goes_on(self):
         # The copy has the samples of its time, and the render ends with all of them.
-        process = subprocess.Popen([CRT, "empty.yaml", "-b", "fake", "-o", "a.pfm", "--checkpoint", "c.crtfilm", "--checkpoint-every", "0.01s",
-                                    "--spp", "40", "--chunk", "1", "-v"],
-                                   cwd=self.directory, env=environment(CRT_FAKE_FAULT="slow"), stdin=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                                   text=True, preexec_fn=default_signals)
+        process = subprocess.Popen(
+            [
+                CRT,
+                "empty.yaml",
+                "-b",
+                "fake",
+                "-o",
+                "a.pfm",
+                "--checkpoint",
+                "c.crtfilm",
+                "--checkpoint-every",
+                "0.01s",
+                "--spp",
+                "40",
+                "--chunk",
+                "1",
+                "-v",
+            ],
+            cwd=self.directory,
+            env=environment(CRT_FAKE_FAULT="slow"),
+            stdin=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=default_signals,
+        )
         seen = set()
         while process.poll() is None:
             if os.path.exists(self.path("c.crtfilm")):
                 # Whenever it is looked at, it is whole: it is renamed into its place.
-                listing = subprocess.run([CRT, "info", "c.crtfilm"], cwd=self.directory, capture_output=True, text=True, timeout=60)
+                listing = subprocess.run(
+                    [CRT, "info", "c.crtfilm"],
+                    cwd=self.directory,
+                    capture_output=True,
+                    text=True,
+                    timeout=60,
+                )
                 self.assertEqual(listing.returncode, 0, listing.stderr)
                 seen.add(re.search(r"samples +(\S+)", listing.stdout)[1])
             time.sleep(0.02)
@@ -242,7 +331,9 @@ class Waiting(unittest.TestCase):
         self.assertEqual(process.returncode, 0, log)
         self.assertIn("checkpoint: the device waited for", log)
         self.assertGreater(len(seen), 1, log)
-        final = subprocess.run([CRT, "info", "c.crtfilm"], cwd=self.directory, capture_output=True, text=True, timeout=60).stdout
+        final = subprocess.run(
+            [CRT, "info", "c.crtfilm"], cwd=self.directory, capture_output=True, text=True, timeout=60
+        ).stdout
         self.assertRegex(final, r"samples +40\b")
 
 

@@ -1,8 +1,8 @@
-/// The few words of CUDA that plugins/cuda/kernels.cu uses, for a C++ compiler on a machine without a GPU. Include it before kernels.cu and after
-/// all other headers: NVRTC's own macro is defined here.
+/// The few words of CUDA that plugins/cuda/kernels.cu uses, for a C++ compiler on a machine without a GPU.
+/// Include it before kernels.cu and after all other headers: NVRTC's own macro is defined here.
 ///
-/// This checks what the entry points compute: which pixels and samples each thread takes, and the sum of the slices. It says nothing about
-/// nvcc's arithmetic; that is for a machine with a GPU.
+/// This checks what the entry points compute: which pixels and samples each thread takes, and the sum of the
+/// slices. It says nothing about nvcc's arithmetic; that is for a machine with a GPU.
 #pragma once
 
 #include <cstdint>

@@ -47,13 +47,16 @@ bool isAllocated(CUdeviceptr address, std::size_t bytes) {
 void* host(CUdeviceptr address) { return reinterpret_cast<void*>(address); }
 
 int modules_loaded = 0;
-double clockSeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double clockSeconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 /// Looks for what was not given back when the process ends.
 struct LeakCheck {
     ~LeakCheck() {
         if (allocated == 0 && modules_loaded == 0) return;
-        std::fprintf(stderr, "fake CUDA driver: %zu bytes and %d modules were not given back\n", allocated, modules_loaded);
+        std::fprintf(stderr, "fake CUDA driver: %zu bytes and %d modules were not given back\n", allocated,
+                     modules_loaded);
         std::_Exit(99);
     }
 } leak_check;
@@ -174,15 +177,19 @@ CRT_FAKE cuOccupancyMaxActiveBlocksPerMultiprocessor(int* blocks, CUfunction, in
     *blocks = 4;
     return CUDA_SUCCESS;
 }
-CRT_FAKE cuLaunchKernel(CUfunction function, unsigned grid_x, unsigned grid_y, unsigned grid_z, unsigned block_x, unsigned block_y,
-                        unsigned block_z, unsigned shared_bytes, CUstream, void** arguments, void** extra) {
+CRT_FAKE cuLaunchKernel(CUfunction function, unsigned grid_x, unsigned grid_y, unsigned grid_z,
+                        unsigned block_x, unsigned block_y, unsigned block_z, unsigned shared_bytes,
+                        CUstream, void** arguments, void** extra) {
     if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
     if (goesWrong("launch")) return CUDA_ERROR_LAUNCH_FAILED;
-    if (grid_x == 0 || grid_y == 0 || grid_y > 65535 || grid_z != 1 || block_y != 1 || block_z != 1 || shared_bytes != 0 || extra != nullptr)
+    if (grid_x == 0 || grid_y == 0 || grid_y > 65535 || grid_z != 1 || block_y != 1 || block_z != 1 ||
+        shared_bytes != 0 || extra != nullptr)
         return CUDA_ERROR_INVALID_VALUE;
     const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
-    return crt::cuda_on_host::launchByName(function->name.c_str(), grid_x, grid_y, block_x, arguments, threads) ? CUDA_SUCCESS
-                                                                                                                : CUDA_ERROR_INVALID_VALUE;
+    return crt::cuda_on_host::launchByName(function->name.c_str(), grid_x, grid_y, block_x, arguments,
+                                           threads)
+               ? CUDA_SUCCESS
+               : CUDA_ERROR_INVALID_VALUE;
 }
 
 CRT_FAKE cuMemAlloc(CUdeviceptr* address, std::size_t bytes) {

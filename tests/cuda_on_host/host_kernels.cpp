@@ -14,7 +14,8 @@
 namespace crt::cuda_on_host {
 namespace {
 
-/// kernel<<<grid, CRT_BLOCK>>>: blocks are dealt to `host_threads` threads, in no order that could be relied on.
+/// kernel<<<grid, CRT_BLOCK>>>: blocks are dealt to `host_threads` threads, in no order that could be relied
+/// on.
 template <class Kernel>
 void launchGrid(unsigned grid_x, unsigned grid_y, unsigned host_threads, const Kernel& kernel) {
     std::atomic<std::uint64_t> next{0};
@@ -51,15 +52,20 @@ void callWith(void (*kernel)(Parameters...), void** arguments, std::index_sequen
     kernel(*static_cast<std::remove_const_t<Parameters>*>(arguments[I])...);
 }
 template <class... Parameters>
-void launchWith(void (*kernel)(Parameters...), unsigned grid_x, unsigned grid_y, void** arguments, unsigned host_threads) {
-    launchGrid(grid_x, grid_y, host_threads, [&] { callWith(kernel, arguments, std::index_sequence_for<Parameters...>{}); });
+void launchWith(void (*kernel)(Parameters...), unsigned grid_x, unsigned grid_y, void** arguments,
+                unsigned host_threads) {
+    launchGrid(grid_x, grid_y, host_threads,
+               [&] { callWith(kernel, arguments, std::index_sequence_for<Parameters...>{}); });
 }
 
 }  // namespace
 
-bool hasKernel(const char* name) { return std::strcmp(name, "crt_render") == 0 || std::strcmp(name, "crt_add_slices") == 0; }
+bool hasKernel(const char* name) {
+    return std::strcmp(name, "crt_render") == 0 || std::strcmp(name, "crt_add_slices") == 0;
+}
 
-bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned block, void** arguments, unsigned host_threads) {
+bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned block, void** arguments,
+                  unsigned host_threads) {
     if (!hasKernel(name) || block != CRT_BLOCK) return false;
     if (std::strcmp(name, "crt_render") == 0)
         launchWith(crt_render, grid_x, grid_y, arguments, host_threads);
@@ -70,24 +76,26 @@ bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned b
 
 std::uint32_t rayCounterPairs() { return CRT_RAY_COUNTERS; }
 
-void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film, std::uint64_t* rays,
-                  unsigned host_threads) {
+void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t slices,
+                  const FilmPointers& film, std::uint64_t* rays, unsigned host_threads) {
     const CrtScene scene = header(scene_blob);
     const unsigned across = (launch.x1 - launch.x0 + CRT_BLOCK_WIDTH - 1) / CRT_BLOCK_WIDTH;
     const unsigned down = (launch.y1 - launch.y0 + CRT_BLOCK_HEIGHT - 1) / CRT_BLOCK_HEIGHT;
     launchGrid(across * down, slices, host_threads, [&] {
-        crt_render(scene, static_cast<const unsigned char*>(scene_blob), launch.x0, launch.y0, launch.x1, launch.y1, launch.first_sample,
-                   launch.sample_count, film.sums, device(film.counts), film.primitives, device(rays));
+        crt_render(scene, static_cast<const unsigned char*>(scene_blob), launch.x0, launch.y0, launch.x1,
+                   launch.y1, launch.first_sample, launch.sample_count, film.sums, device(film.counts),
+                   film.primitives, device(rays));
     });
 }
 
-void launchAddSlices(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film, const FilmPointers& parts,
-                     unsigned host_threads) {
+void launchAddSlices(const void* scene_blob, const Launch& launch, std::uint32_t slices,
+                     const FilmPointers& film, const FilmPointers& parts, unsigned host_threads) {
     const CrtScene scene = header(scene_blob);
     const auto grid = static_cast<unsigned>((launch.pixels() * scene.channels + CRT_BLOCK - 1) / CRT_BLOCK);
     launchGrid(grid, 1, host_threads, [&] {
-        crt_add_slices(launch.x0, launch.y0, launch.x1, launch.y1, scene.width, scene.height, scene.channels, slices, film.sums,
-                       device(film.counts), film.primitives, parts.sums, device(parts.counts), parts.primitives);
+        crt_add_slices(launch.x0, launch.y0, launch.x1, launch.y1, scene.width, scene.height, scene.channels,
+                       slices, film.sums, device(film.counts), film.primitives, parts.sums,
+                       device(parts.counts), parts.primitives);
     });
 }
 

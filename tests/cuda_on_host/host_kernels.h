@@ -1,4 +1,5 @@
-/// Launches of the CUDA kernels, run as loops over grid, block and thread. The kernels promise that no thread waits for another; so any order will do.
+/// Launches of the CUDA kernels, run as loops over grid, block and thread. The kernels promise that no
+/// thread waits for another; so any order will do.
 #pragma once
 
 #include "backend/sdk/launch_pacer.h"
@@ -17,15 +18,17 @@ struct FilmPointers {
 std::uint32_t rayCounterPairs();
 
 /// crt_render over `launch`, in `slices` rows of the grid. `rays` has rayCounterPairs() pairs.
-void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film, std::uint64_t* rays,
-                  unsigned host_threads);
+void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t slices,
+                  const FilmPointers& film, std::uint64_t* rays, unsigned host_threads);
 
 /// crt_add_slices over the pixels of `launch`.
-void launchAddSlices(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film, const FilmPointers& parts,
-                     unsigned host_threads);
+void launchAddSlices(const void* scene_blob, const Launch& launch, std::uint32_t slices,
+                     const FilmPointers& film, const FilmPointers& parts, unsigned host_threads);
 
-/// A kernel by its name, with arguments as cuLaunchKernel takes them: a pointer to each. False when there is none of that name.
-bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned block, void** arguments, unsigned host_threads);
+/// A kernel by its name, with arguments as cuLaunchKernel takes them: a pointer to each. False when there is
+/// none of that name.
+bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned block, void** arguments,
+                  unsigned host_threads);
 bool hasKernel(const char* name);
 
 }  // namespace crt::cuda_on_host

@@ -1,4 +1,5 @@
-// A backend for tests: the CUDA kernels on the host's processor, so that the conformance suite sees the very entry points that a GPU runs.
+// A backend for tests: the CUDA kernels on the host's processor, so that the conformance suite sees the very
+// entry points that a GPU runs.
 #include "host_kernels.h"
 
 #include "backend/sdk/launch_pacer.h"
@@ -27,7 +28,8 @@ public:
         : host_(host),
           tile_size_(info.tile_size),
           threads_(info.threads != 0 ? info.threads : std::max(1u, std::thread::hardware_concurrency())) {
-        plugin::chooseDevice(probeDevices(host), info.device);  // there is one, but another may have been asked for
+        plugin::chooseDevice(probeDevices(host),
+                             info.device);  // there is one, but another may have been asked for
     }
 
     void setScene(const CrtSceneBlob& blob) {
@@ -45,14 +47,17 @@ public:
         if (host_.cancelled(0.0)) return false;
         for (Launch launch; pacer_.next(launch);) {
             const auto start = std::chrono::steady_clock::now();
-            // Slices where there are samples for them, and without where there are not: both ways of the real backend.
+            // Slices where there are samples for them, and without where there are not: both ways of the
+            // real backend.
             if (launch.sample_count >= kSlices) {
                 launchRender(blob_.data(), launch, kSlices, slices_.pointers(), rays_.data(), threads_);
-                launchAddSlices(blob_.data(), launch, kSlices, film_.pointers(), slices_.pointers(), threads_);
+                launchAddSlices(blob_.data(), launch, kSlices, film_.pointers(), slices_.pointers(),
+                                threads_);
             } else {
                 launchRender(blob_.data(), launch, 1, film_.pointers(), rays_.data(), threads_);
             }
-            const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+            const double seconds =
+                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
             pacer_.finished(launch, seconds);
             render_seconds_ += seconds;
             paths_ += launch.paths();
@@ -64,7 +69,8 @@ public:
     void readFilm(const CrtFilmView& film) {
         std::copy(film_.sums.begin(), film_.sums.end(), film.sums);
         std::copy(film_.counts.begin(), film_.counts.end(), film.counts);
-        if (film.primitives != nullptr) std::copy(film_.primitives.begin(), film_.primitives.end(), film.primitives);
+        if (film.primitives != nullptr)
+            std::copy(film_.primitives.begin(), film_.primitives.end(), film.primitives);
     }
 
     void report(CrtBackendReport& report) {
@@ -94,7 +100,9 @@ private:
             counts.resize(pixels);
             if (scene.aovs & CRT_AOV_PRIMITIVE) primitives.assign(pixels, CRT_NONE);
         }
-        FilmPointers pointers() { return {sums.data(), counts.data(), primitives.empty() ? nullptr : primitives.data()}; }
+        FilmPointers pointers() {
+            return {sums.data(), counts.data(), primitives.empty() ? nullptr : primitives.data()};
+        }
 
         std::vector<double> sums;
         std::vector<std::uint64_t> counts;
@@ -115,4 +123,5 @@ private:
 }  // namespace
 }  // namespace crt::cuda_on_host
 
-CRT_DEFINE_BACKEND(crt::cuda_on_host::HostIntegrator, crt::cuda_on_host::probeDevices, "cuda_on_host", CRT_HEADERS_VERSION, CRT_FEATURES_ALL)
+CRT_DEFINE_BACKEND(crt::cuda_on_host::HostIntegrator, crt::cuda_on_host::probeDevices, "cuda_on_host",
+                   CRT_HEADERS_VERSION, CRT_FEATURES_ALL)

@@ -3,7 +3,8 @@
 
     test_compiler_process.py CRT SCENE FAKE_CUDA_DIR FAKE_NVRTC_DIR [unittest arguments]
 
-Nothing here measures time. The fake compiler takes as long as a test says, and the test looks at what was there first.
+Nothing here measures time. The fake compiler takes as long as a test says, and the test looks at what was
+there first.
 """
 
 import json
@@ -29,8 +30,24 @@ class CompilerProcess(unittest.TestCase):
         environment = dict(os.environ, CRT_FAKE_NVRTC_SECONDS=compiler, CRT_CACHE_DIR=str(self.cache),
                            LD_LIBRARY_PATH=f"{FAKE_NVRTC}:{FAKE_CUDA}")
         # Pipes: a process left behind that held one open would keep this waiting.
-        run = subprocess.run([CRT, SCENE, "-b", "cuda", "-o", "a.pfm", "--set", f"film.resolution=[{resolution},{resolution}]", *options],
-                             cwd=self.folder, env=environment, capture_output=True, text=True, timeout=300)
+        run = subprocess.run(
+            [
+                CRT,
+                SCENE,
+                "-b",
+                "cuda",
+                "-o",
+                "a.pfm",
+                "--set",
+                f"film.resolution=[{resolution},{resolution}]",
+                *options,
+            ],
+            cwd=self.folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
         self.assertEqual(run.returncode, 0, run.stderr)
         return run, json.loads((self.folder / "a.report.json").read_text())["backend"]
 
@@ -42,7 +59,10 @@ class CompilerProcess(unittest.TestCase):
         for process in pathlib.Path("/proc").glob("[0-9]*"):
             try:
                 environment = (process / "environ").read_bytes().split(b"\0")
-                if os.readlink(process / "exe").endswith("/crt_nvrtc") and b"CRT_CACHE_DIR=" + os.fsencode(self.cache) in environment:
+                if (
+                    os.readlink(process / "exe").endswith("/crt_nvrtc")
+                    and b"CRT_CACHE_DIR=" + os.fsencode(self.cache) in environment
+                ):
                     found.append(process.name)
             except OSError:
                 pass  # Ended meanwhile, or another user's.
@@ -51,7 +71,11 @@ class CompilerProcess(unittest.TestCase):
     def test_a_render_ends_while_the_compiler_works_and_the_next_one_has_the_kernel(self):
         _, backend = self.render("4", "--spp", "1")
         self.assertEqual(backend["kernel"], "precompiled")
-        self.assertEqual(self.kernels(), [], "the render waited for the compiler, or the machine is so slow that this tells nothing")
+        self.assertEqual(
+            self.kernels(),
+            [],
+            "the render waited for the compiler, or the machine is so slow that this tells nothing",
+        )
         self.assertEqual(len(self.compilers()), 1)
         deadline = time.monotonic() + 100
         while not self.kernels() and time.monotonic() < deadline:
@@ -76,7 +100,9 @@ class CompilerProcess(unittest.TestCase):
     def test_what_the_compiler_refuses_is_told_and_costs_nothing(self):
         run, backend = self.render("fail", "--time", "3", "--spp", "1000000")
         self.assertEqual(backend["kernel"], "precompiled")
-        self.assertIn("going on with the precompiled kernel: NVRTC 13.0 cannot compile the kernel", run.stderr)
+        self.assertIn(
+            "going on with the precompiled kernel: NVRTC 13.0 cannot compile the kernel", run.stderr
+        )
         self.assertIn("told by the fake compiler", run.stderr)
 
     def test_a_compiler_that_crashes_costs_nothing(self):

@@ -3,8 +3,10 @@
 
     check_headers.py cxx|cuda|opencl COMPILER KERNEL_FOLDER
 
-Syntax and types only. A header that leans on another without including it, or that strays from the common subset of C++17, CUDA C++ and
-OpenCL C 1.2, fails here with its name. Exit code 77, which ctest shows as skipped, where the compiler is missing.
+Syntax and types only. A header that leans on another without including it, or that strays from the common
+subset of C++17, CUDA C++ and
+OpenCL C 1.2, fails here with its name. Exit code 77, which ctest shows as skipped, where the compiler is
+missing.
 """
 
 import pathlib
@@ -19,9 +21,33 @@ WARNINGS = ["-Wall", "-Wextra", "-Wshadow", "-Werror", "-Wno-unused-function"]
 # Suffix, then what makes the compiler only look.
 LANGUAGES = {
     "cxx": (".cpp", ["-std=c++17", "-fsyntax-only", *WARNINGS]),
-    "cuda": (".cu", ["-std=c++17", "-arch=sm_90", "-ptx", "--fmad=false", "-Werror=all-warnings", "-diag-suppress=177", "-o", "/dev/null"]),
+    "cuda": (
+        ".cu",
+        [
+            "-std=c++17",
+            "-arch=sm_90",
+            "-ptx",
+            "--fmad=false",
+            "-Werror=all-warnings",
+            "-diag-suppress=177",
+            "-o",
+            "/dev/null",
+        ],
+    ),
     # Run times define __OPENCL_VERSION__; a bare clang leaves it to them.
-    "opencl": (".cl", ["-x", "cl", "-cl-std=CL1.2", "-D__OPENCL_VERSION__=120", "-Xclang", "-finclude-default-header", "-fsyntax-only", *WARNINGS]),
+    "opencl": (
+        ".cl",
+        [
+            "-x",
+            "cl",
+            "-cl-std=CL1.2",
+            "-D__OPENCL_VERSION__=120",
+            "-Xclang",
+            "-finclude-default-header",
+            "-fsyntax-only",
+            *WARNINGS,
+        ],
+    ),
 }
 
 
@@ -48,7 +74,9 @@ def main() -> int:
                 command = [compiler, *options, *mask, "-I", str(folder.parent), str(unit)]
                 result = subprocess.run(command, capture_output=True, text=True, check=False)
                 ok = result.returncode == 0
-                print(f"dialect_{header.stem}_{language}{' (no features)' if mask else ''}: {'ok' if ok else 'FAILED'}")
+                print(
+                    f"dialect_{header.stem}_{language}{' (no features)' if mask else ''}: {'ok' if ok else 'FAILED'}"
+                )
                 if not ok:
                     failed.append(header.name)
                     print(result.stdout + result.stderr)

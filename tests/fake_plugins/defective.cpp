@@ -1,5 +1,5 @@
-// A plugin with one defect, chosen by CRT_FAKE_DEFECT. Written against the C interface alone, because plugin_guard.h would not let most of
-// these happen.
+// A plugin with one defect, chosen by CRT_FAKE_DEFECT. Written against the C interface alone, because
+// plugin_guard.h would not let most of these happen.
 #include "backend/crt_backend.h"
 #include "backend/crt_layout_hash.h"
 #include "kernel/bits_version.h"
@@ -31,7 +31,8 @@ constexpr Defect kDefect = CRT_FAKE_DEFECT;
 
 void say(char* reason, uint32_t size, const char* text) { std::snprintf(reason, size, "%s", text); }
 
-CrtStatus probe(const CrtHost*, CrtDevice* devices, uint32_t capacity, uint32_t* count, char* reason, uint32_t reason_size) {
+CrtStatus probe(const CrtHost*, CrtDevice* devices, uint32_t capacity, uint32_t* count, char* reason,
+                uint32_t reason_size) {
     if (kDefect == throws_in_probe) throw std::runtime_error("probe fell over");
     if (kDefect == no_device) {
         *count = 0;
@@ -60,7 +61,8 @@ void destroy(CrtIntegratorState*) {}
 
 CrtStatus create(const CrtHost*, const CrtCreateInfo*, CrtIntegrator* integrator, char*, uint32_t) {
     if (kDefect == throws_in_create) throw std::runtime_error("create fell over");
-    *integrator = {sizeof(CrtIntegrator), 0, nullptr, setScene, render, readFilm, getReport, lastError, destroy};
+    *integrator = {
+        sizeof(CrtIntegrator), 0, nullptr, setScene, render, readFilm, getReport, lastError, destroy};
     return CRT_OK;
 }
 

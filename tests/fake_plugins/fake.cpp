@@ -1,5 +1,5 @@
-// The test double: a backend that keeps every promise of crt_backend.h and renders fake_pattern.h instead of a scene, so that job, film,
-// checkpoints and resume can be tested in microseconds.
+// The test double: a backend that keeps every promise of crt_backend.h and renders fake_pattern.h instead of
+// a scene, so that job, film, checkpoints and resume can be tested in microseconds.
 //
 // CRT_FAKE_FAULT makes the next render calls go wrong:
 //   oom     out of device memory, half-way through the range
@@ -27,10 +27,12 @@ namespace {
 using crt::plugin::PluginError;
 
 std::vector<CrtDevice> listDevices(const crt::plugin::Host&) {
-    return {crt::plugin::makeDevice(0, "pattern", "", 0, 1.0), crt::plugin::makeDevice(1, "second pattern", "", 0, 0.5)};
+    return {crt::plugin::makeDevice(0, "pattern", "", 0, 1.0),
+            crt::plugin::makeDevice(1, "second pattern", "", 0, 0.5)};
 }
 
-/// Adds `value` to an unevaluated pair hi + lo without losing a bit that the pair can hold (Knuth's two-sum).
+/// Adds `value` to an unevaluated pair hi + lo without losing a bit that the pair can hold (Knuth's
+/// two-sum).
 void addTo(double* pair, double value) {
     const double sum = pair[0] + value;
     const double part = sum - pair[0];
@@ -69,11 +71,14 @@ public:
         const std::uint64_t seed = (std::uint64_t{scene_.seed.high} << 32) | scene_.seed.low;
         for (std::uint32_t y = range.y0; y < range.y1; ++y) {
             const double done = double(y - range.y0) / (range.y1 - range.y0);
-            if (done >= 0.5 && fault == "oom") throw PluginError(CRT_OUT_OF_MEMORY, "the device has no memory left for 12 more rows");
-            if (done >= 0.5 && fault == "device") throw PluginError(CRT_DEVICE_FAILED, "the device fell off the bus");
+            if (done >= 0.5 && fault == "oom")
+                throw PluginError(CRT_OUT_OF_MEMORY, "the device has no memory left for 12 more rows");
+            if (done >= 0.5 && fault == "device")
+                throw PluginError(CRT_DEVICE_FAILED, "the device fell off the bus");
             if (fault == "slow") std::this_thread::sleep_for(std::chrono::milliseconds(2));
             if (host_.cancelled(done)) return false;
-            for (std::uint32_t x = range.x0; x < range.x1; ++x) renderPixel(range, seed, x, y, fault == "nan");
+            for (std::uint32_t x = range.x0; x < range.x1; ++x)
+                renderPixel(range, seed, x, y, fault == "nan");
         }
         host_.cancelled(1.0);
         seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -84,7 +89,8 @@ public:
         std::copy(sums_.begin(), sums_.end(), film.sums);
         std::copy(counts_.begin(), counts_.end(), film.counts);
         if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);
-        if (wantedFault() == "nan_film") film.sums[sums_.size() / 2] = std::numeric_limits<double>::quiet_NaN();
+        if (wantedFault() == "nan_film")
+            film.sums[sums_.size() / 2] = std::numeric_limits<double>::quiet_NaN();
         if (wantedFault() == "count_film") film.counts[0] += 1;
     }
 
@@ -102,7 +108,8 @@ private:
         return value != nullptr ? value : "";
     }
 
-    void renderPixel(const CrtRenderRange& range, std::uint64_t seed, std::uint32_t x, std::uint32_t y, bool with_invalid) {
+    void renderPixel(const CrtRenderRange& range, std::uint64_t seed, std::uint32_t x, std::uint32_t y,
+                     bool with_invalid) {
         const std::uint32_t film_x = scene_.crop_x + x, film_y = scene_.crop_y + y;
         const std::size_t pixel = std::size_t{y} * scene_.width + x;
         primitives_[pixel] = crt::fake::primitiveAt(film_x, film_y);
@@ -111,14 +118,16 @@ private:
             ++paths_;
             if (with_invalid && crt::fake::isInvalid(film_x, film_y, sample)) continue;
             ++counts_[pixel];
-            const std::uint32_t without = scene_.replicate_shift != 0 ? scene_.replicate_channel : scene_.channels;
+            const std::uint32_t without =
+                scene_.replicate_shift != 0 ? scene_.replicate_channel : scene_.channels;
             const auto add = [&](std::uint32_t channel, std::uint32_t value) {
                 addTo(&sums_[(pixel * scene_.channels + channel) * 2],
                       CRT_FAKE_FACTOR * crt::fake::sampleValue(seed, film_x, film_y, sample, value));
             };
             for (std::uint32_t c = 0; c < without; ++c) add(c, c);
             // Y of the replicate whose turn it is; the last has no channel.
-            const auto replicate = static_cast<std::uint32_t>(sample % (std::uint64_t{1} << scene_.replicate_shift));
+            const auto replicate =
+                static_cast<std::uint32_t>(sample % (std::uint64_t{1} << scene_.replicate_shift));
             if (without + replicate < scene_.channels) add(without + replicate, 1);
         }
     }

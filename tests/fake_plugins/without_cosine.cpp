@@ -1,5 +1,5 @@
-// The example backend with a mistake in its physics: the light of lamps is not weighted by the cosine at which it arrives on a diffuse surface.
-// `crt verify` must fail it, and say so.
+// The example backend with a mistake in its physics: the light of lamps is not weighted by the cosine at
+// which it arrives on a diffuse surface. `crt verify` must fail it, and say so.
 #include "backend/sdk/plugin_guard.h"
 #include "kernel/light.h"
 

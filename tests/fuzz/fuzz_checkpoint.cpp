@@ -1,5 +1,6 @@
-// Checkpoint files → Film → checkpoint file. A random file never has the right checksum, so the first byte of the input chooses: 0 takes the rest
-// as it is; 1 puts in the checksum that belongs to it; anything else the size of the file as well.
+// Checkpoint files → Film → checkpoint file. A random file never has the right checksum, so the first byte
+// of the input chooses: 0 takes the rest as it is; 1 puts in the checksum that belongs to it; anything else
+// the size of the file as well.
 #include "fuzz_target.h"
 
 #include "film/checkpoint.h"
@@ -44,12 +45,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         // What follows a resume: adding to an empty film, errors and an image.
         Film resumed(film.shape());
         resumed.add(film);
-        if (resumed.samples.ranges() != film.samples.ranges()) fuzz::finding("film", "samples got lost while adding");
+        if (resumed.samples.ranges() != film.samples.ranges())
+            fuzz::finding("film", "samples got lost while adding");
         (void)crt::estimateError(resumed);
         (void)resumed.invalidSamples();
         const Image image = resolveImage(resumed, Development{}, film.shape().aovs);
-        if (image.width != film.shape().width || image.height != film.shape().height) fuzz::finding("film", "resolves to another size");
-        if (mergeCheckpoints({path}).first.samples.ranges() != film.samples.ranges()) fuzz::finding("film", "a merge of one is not that one");
+        if (image.width != film.shape().width || image.height != film.shape().height)
+            fuzz::finding("film", "resolves to another size");
+        if (mergeCheckpoints({path}).first.samples.ranges() != film.samples.ranges())
+            fuzz::finding("film", "a merge of one is not that one");
     });
     return 0;
 }

@@ -1,4 +1,5 @@
-// Image files: PFM and PPM by crt, EXR (pixels and metadata) and PNG by the codec module, as `crt compare` and `crt info` read them.
+// Image files: PFM and PPM by crt, EXR (pixels and metadata) and PNG by the codec module, as `crt compare`
+// and `crt info` read them.
 #include "fuzz_target.h"
 
 #include "image/image_io.h"
@@ -18,7 +19,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::expectRefusalOrSuccess(ErrorKind::Usage, [&] {
         const Image image = readImage(path);
         const std::size_t pixels = std::size_t{image.width} * image.height;
-        if (image.pixels.size() != pixels * image.channels.size() || image.integers.size() != pixels * image.integer_channels.size())
+        if (image.pixels.size() != pixels * image.channels.size() ||
+            image.integers.size() != pixels * image.integer_channels.size())
             fuzz::finding("image", "does not have the pixels that its size and channels say");
         (void)metadataValue(image, "crt/sceneHash");
     });

@@ -18,7 +18,8 @@ void checkMesh(const crt::LoadedMesh& loaded) {
             if (index >= mesh.positions.size()) finding("mesh", "an index is out of range");
     for (const auto& triangle : mesh.normal_index)
         for (const std::uint32_t index : triangle)
-            if (index != crt::kNoNormal && index >= mesh.normals.size()) finding("mesh", "a normal's index is out of range");
+            if (index != crt::kNoNormal && index >= mesh.normals.size())
+                finding("mesh", "a normal's index is out of range");
     for (const auto& position : mesh.positions)
         for (const double x : position)
             if (!std::isfinite(x)) finding("mesh", "a coordinate is not finite");
@@ -28,7 +29,8 @@ void checkMesh(const crt::LoadedMesh& loaded) {
                 for (const double x : mesh.normals[index])
                     if (!std::isfinite(x)) finding("mesh", "a normal in use is not finite");
     for (const std::int32_t m : mesh.material)
-        if (m < -1 || m >= static_cast<std::int32_t>(loaded.materials.size())) finding("mesh", "a material's index is out of range");
+        if (m < -1 || m >= static_cast<std::int32_t>(loaded.materials.size()))
+            finding("mesh", "a material's index is out of range");
     if (!mesh.material.empty() && mesh.material.size() != mesh.triangles.size())
         finding("mesh", "has not one material a triangle");
     for (const crt::LoadedMaterial& m : loaded.materials)

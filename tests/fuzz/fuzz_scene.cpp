@@ -1,4 +1,5 @@
-// Scene YAML → Scene → CompiledScene. The text is a whole scene file; beside it lie a mesh and a spectrum that it may name.
+// Scene YAML → Scene → CompiledScene. The text is a whole scene file; beside it lie a mesh and a spectrum
+// that it may name.
 #include "fuzz_target.h"
 
 #include "compile/compile.h"
@@ -24,7 +25,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::expectRefusalOrSuccess(ErrorKind::Scene, [&] {
         const Scene scene = parseScene(text, "scene.yaml", neighbours.path());
         const CompiledScene compiled = compileScene(scene, kAovsOfFirstHits);
-        if (compiled.hash.size() != 32 || compiled.size_bytes > compiled.blob.size() * sizeof(CompiledScene::Line))
+        if (compiled.hash.size() != 32 ||
+            compiled.size_bytes > compiled.blob.size() * sizeof(CompiledScene::Line))
             fuzz::finding("compiled scene", "is not what its sizes say");
     });
     return 0;

@@ -25,8 +25,9 @@ namespace crt::fuzz {
     std::abort();
 }
 
-/// Runs `body`. Hostile input may be refused, by an error that says whose fault it is; it may not find a bug in crt (Internal), and nothing but
-/// crt::Error may come out: std::bad_alloc or std::out_of_range would reach the user as an internal error.
+/// Runs `body`. Hostile input may be refused, by an error that says whose fault it is; it may not find a bug
+/// in crt (Internal), and nothing but crt::Error may come out: std::bad_alloc or std::out_of_range would
+/// reach the user as an internal error.
 template <class Body>
 void expectRefusalOrSuccess(ErrorKind refusal, Body&& body) {
     try {
@@ -42,7 +43,9 @@ void expectRefusalOrSuccess(ErrorKind refusal, Body&& body) {
 /// A directory, in memory where there is one, where this process keeps the files of one run.
 class Directory {
 public:
-    Directory() : folder_(::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm") : std::filesystem::temp_directory_path()) {
+    Directory()
+        : folder_(::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm")
+                                                  : std::filesystem::temp_directory_path()) {
         setLogLevel(LogLevel::Off);
     }
 
@@ -53,11 +56,14 @@ public:
     std::string write(const char* name, const void* bytes, std::size_t size) const {
         std::string path = file(name);
         const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-        if (descriptor < 0 || ::write(descriptor, bytes, size) != static_cast<ssize_t>(size)) finding("cannot write", path.c_str());
+        if (descriptor < 0 || ::write(descriptor, bytes, size) != static_cast<ssize_t>(size))
+            finding("cannot write", path.c_str());
         ::close(descriptor);
         return path;
     }
-    std::string write(const char* name, std::string_view text) const { return write(name, text.data(), text.size()); }
+    std::string write(const char* name, std::string_view text) const {
+        return write(name, text.data(), text.size());
+    }
 
 private:
     verify::TemporaryFolder folder_;

@@ -23,13 +23,16 @@ void printEntry(const std::string& word) {
 }  // namespace
 
 int main() {
-    std::set<std::string> words{"from_mtl", "a.obj", "a.mtl", "a.spd", "null", "[", "]", "{", "}", "- ", ": ", "&a ", "*a", "<<: ", "---\n", "1e308", "-1e-308", ".inf", ".nan", "\n  "};
+    std::set<std::string> words{
+        "from_mtl", "a.obj", "a.mtl", "a.spd", "null",  "[",     "]",       "{",    "}",    "- ",
+        ": ",       "&a ",   "*a",    "<<: ",  "---\n", "1e308", "-1e-308", ".inf", ".nan", "\n  "};
     for (const crt::SectionSchema& section : crt::sceneSchema())
         for (const crt::KeySchema& key : section.keys) {
             words.insert(key.name + ": ");
             words.insert(key.choices.begin(), key.choices.end());
             if (!key.fallback.empty()) words.insert(key.fallback);
         }
-    for (const auto* names : {&crt::glassNames(), &crt::metalNames(), &crt::illuminantNames()}) words.insert(names->begin(), names->end());
+    for (const auto* names : {&crt::glassNames(), &crt::metalNames(), &crt::illuminantNames()})
+        words.insert(names->begin(), names->end());
     for (const std::string& word : words) printEntry(word);
 }

@@ -30,7 +30,8 @@ constexpr unsigned char kVersion = 1;
 constexpr const char* kEntrySuffix = ".crtkernel";
 constexpr const char* kTemporarySuffix = ".crttmp";
 
-/// Before the payload in an entry file. All members are naturally aligned and there is no padding, so it is written as it lies.
+/// Before the payload in an entry file. All members are naturally aligned and there is no padding, so it is
+/// written as it lies.
 struct Header {
     unsigned char magic[7];
     unsigned char version;
@@ -88,7 +89,8 @@ private:
 /// Unique among all threads of all processes that share the directory.
 std::string temporaryPath(const std::string& entry) {
     static std::atomic<unsigned> counter{0};
-    return entry + '.' + std::to_string(::getpid()) + '.' + std::to_string(counter.fetch_add(1)) + kTemporarySuffix;
+    return entry + '.' + std::to_string(::getpid()) + '.' + std::to_string(counter.fetch_add(1)) +
+           kTemporarySuffix;
 }
 
 }  // namespace
@@ -130,25 +132,29 @@ std::optional<std::vector<unsigned char>> KernelCache::load(const Key& key, std:
     const File file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW));
     struct stat status;
     if (!file.isOpen() || ::fstat(file.get(), &status) != 0) return std::nullopt;
-    const std::string why = S_ISREG(status.st_mode) ? trust::whyNot(status, name) : "'" + name + "' is not a regular file";
+    const std::string why =
+        S_ISREG(status.st_mode) ? trust::whyNot(status, name) : "'" + name + "' is not a regular file";
     if (!why.empty()) {
         if (refused != nullptr) *refused = why;
         return std::nullopt;
     }
     if (static_cast<std::uint64_t>(status.st_size) > max_bytes_) return std::nullopt;
 
-    // A damaged entry is not removed here: meanwhile another process may have put a good one in its place. store() replaces it.
+    // A damaged entry is not removed here: meanwhile another process may have put a good one in its place.
+    // store() replaces it.
     Header header;
-    if (!file.read(&header, sizeof(header)) || std::memcmp(header.magic, kMagic, sizeof(kMagic)) != 0 || header.version != kVersion ||
-        std::memcmp(header.key, key.data(), key.size()) != 0 ||
+    if (!file.read(&header, sizeof(header)) || std::memcmp(header.magic, kMagic, sizeof(kMagic)) != 0 ||
+        header.version != kVersion || std::memcmp(header.key, key.data(), key.size()) != 0 ||
         header.payload_size != static_cast<std::uint64_t>(status.st_size) - sizeof(header)) {
         return std::nullopt;
     }
     std::vector<unsigned char> payload(header.payload_size);
-    if (!file.read(payload.data(), payload.size()) || XXH3_64bits(payload.data(), payload.size()) != header.checksum) return std::nullopt;
+    if (!file.read(payload.data(), payload.size()) ||
+        XXH3_64bits(payload.data(), payload.size()) != header.checksum)
+        return std::nullopt;
 
-    // The time of modification is the time of last use, which evict() goes by: access times are often switched off. May fail in a
-    // directory that is read-only; then the entry only looks older than it is.
+    // The time of modification is the time of last use, which evict() goes by: access times are often
+    // switched off. May fail in a directory that is read-only; then the entry only looks older than it is.
     (void)::futimens(file.get(), nullptr);
     return payload;
 }
@@ -163,8 +169,8 @@ bool KernelCache::store(const Key& key, const void* data, std::size_t size) cons
     header.payload_size = size;
     header.checksum = XXH3_64bits(data, size);
 
-    // Written under another name and renamed, so that a reader sees the old entry, none, or the whole new one. Not synced: after a power
-    // cut the checksum tells, and the kernel is compiled again.
+    // Written under another name and renamed, so that a reader sees the old entry, none, or the whole new
+    // one. Not synced: after a power cut the checksum tells, and the kernel is compiled again.
     const std::string entry = path(key);
     const std::string temporary = temporaryPath(entry);
     File file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
@@ -188,7 +194,8 @@ void KernelCache::evict() const {
         std::vector<Entry> entries;
         std::uint64_t total = 0;
         const auto now = fs::file_time_type::clock::now();
-        for (const fs::directory_entry& file : fs::directory_iterator(directory_, fs::directory_options::skip_permission_denied)) {
+        for (const fs::directory_entry& file :
+             fs::directory_iterator(directory_, fs::directory_options::skip_permission_denied)) {
             // Another process may remove any of these at any time; then there is nothing to count.
             std::error_code gone;
             const fs::file_time_type used = file.last_write_time(gone);
@@ -203,7 +210,8 @@ void KernelCache::evict() const {
             }
         }
         if (total <= max_bytes_) return;
-        std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.used < b.used; });
+        std::sort(entries.begin(), entries.end(),
+                  [](const Entry& a, const Entry& b) { return a.used < b.used; });
         for (const Entry& entry : entries) {
             if (total <= max_bytes_) break;
             std::error_code gone;

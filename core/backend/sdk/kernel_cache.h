@@ -1,8 +1,9 @@
-/// Disk cache of compiled kernels, for backends that compile while they run. Content-addressed: the key is a hash of everything that
-/// decides the binary, so an entry is never stale and nothing has to be invalidated.
+/// Disk cache of compiled kernels, for backends that compile while they run. Content-addressed: the key is a
+/// hash of everything that decides the binary, so an entry is never stale and nothing has to be invalidated.
 ///
-/// A cache must never make anything fail: a damaged, foreign or unreadable entry is an absent one, and an entry that cannot be written is
-/// not written. Any number of processes and threads may share one directory. Uses nothing of the core but this header.
+/// A cache must never make anything fail: a damaged, foreign or unreadable entry is an absent one, and an
+/// entry that cannot be written is not written. Any number of processes and threads may share one directory.
+/// Uses nothing of the core but this header.
 #pragma once
 
 #include <array>
@@ -24,15 +25,16 @@ public:
     /// `directory` as the host gives it: existing and writable, or null for a cache that holds nothing.
     explicit KernelCache(const char* directory, std::uint64_t max_bytes = kDefaultMaxBytes);
 
-    /// Key of a binary that depends on exactly these texts, in this order: kernel text, options, device, compiler, driver.
+    /// Key of a binary that depends on exactly these texts, in this order: kernel text, options, device,
+    /// compiler, driver.
     static Key makeKey(const std::vector<std::string_view>& parts);
 
-    /// The binary stored under `key`, and marks it as used now. What it holds will be run: an entry that another user could have written is
-    /// not loaded, and `refused`, where given, says why. [any thread]
+    /// The binary stored under `key`, and marks it as used now. What it holds will be run: an entry that
+    /// another user could have written is not loaded, and `refused`, where given, says why. [any thread]
     std::optional<std::vector<unsigned char>> load(const Key& key, std::string* refused = nullptr) const;
 
-    /// Stores a binary, then removes what was used longest ago until all entries fit into max_bytes. Returns whether it is stored.
-    /// [any thread]
+    /// Stores a binary, then removes what was used longest ago until all entries fit into max_bytes. Returns
+    /// whether it is stored. [any thread]
     bool store(const Key& key, const void* data, std::size_t size) const;
 
     /// Where an entry lies. Empty when the cache is off.

@@ -1,5 +1,6 @@
-/// Cuts a render range into launches of a wanted duration, so that progress shows and a cancel is obeyed in time whatever the scene
-/// costs. Header-only and free of the core: a backend that works in launches includes it. Never changes the image.
+/// Cuts a render range into launches of a wanted duration, so that progress shows and a cancel is obeyed in
+/// time whatever the scene costs. Header-only and free of the core: a backend that works in launches
+/// includes it. Never changes the image.
 #pragma once
 
 #include "backend/crt_backend.h"
@@ -31,14 +32,17 @@ inline double launchSeconds(std::uint64_t start_ns, std::uint64_t end_ns, double
                       waited_seconds);
 }
 
-/// Learns from every launch how many paths fit into the wanted time, and keeps that from one range to the next.
+/// Learns from every launch how many paths fit into the wanted time, and keeps that from one range to the
+/// next.
 ///
 ///     pacer.begin(range, tile_size);
-///     for (Launch launch; pacer.next(launch);) { …; pacer.finished(launch, seconds); progress(pacer.done()); }
+///     for (Launch launch; pacer.next(launch);) { …; pacer.finished(launch, seconds);
+///     progress(pacer.done()); }
 class LaunchPacer {
 public:
-    /// `first_paths` is the size of the very first launch: small enough to be quick on the slowest device. Launches are cut between rows
-    /// that are multiples of `row_step` apart where the budget allows it, for devices that work on blocks of pixels.
+    /// `first_paths` is the size of the very first launch: small enough to be quick on the slowest device.
+    /// Launches are cut between rows that are multiples of `row_step` apart where the budget allows it, for
+    /// devices that work on blocks of pixels.
     LaunchPacer(double target_seconds, std::uint64_t first_paths, std::uint32_t row_step = 1)
         : target_seconds_(target_seconds), budget_(static_cast<double>(first_paths)), row_step_(row_step) {}
 
@@ -80,16 +84,19 @@ public:
     }
 
     /// Share of the range that is finished.
-    double done() const { return total_ == 0 ? 1.0 : static_cast<double>(finished_) / static_cast<double>(total_); }
+    double done() const {
+        return total_ == 0 ? 1.0 : static_cast<double>(finished_) / static_cast<double>(total_);
+    }
 
 private:
-    /// Samples per pixel and launch where a pass over all pixels exceeds the budget: enough that reading and writing a pixel's sums costs
-    /// nothing beside its paths.
+    /// Samples per pixel and launch where a pass over all pixels exceeds the budget: enough that reading and
+    /// writing a pixel's sums costs nothing beside its paths.
     static constexpr std::uint64_t kWorthwhileSamples = 16;
 
     static std::uint64_t divideUp(std::uint64_t a, std::uint64_t b) { return (a + b - 1) / b; }
 
-    /// Divides `left` into equal parts of at most about `wanted`, so that no small remainder is launched by itself; the size of the next.
+    /// Divides `left` into equal parts of at most about `wanted`, so that no small remainder is launched by
+    /// itself; the size of the next.
     static std::uint64_t evenPart(std::uint64_t left, std::uint64_t wanted) {
         wanted = std::clamp<std::uint64_t>(wanted, 1, left);
         return divideUp(left, divideUp(left, wanted));
@@ -110,7 +117,8 @@ private:
     /// Rows of the launch at (x_, y_): as many as the budget allows, within the tile.
     std::uint32_t rows() const {
         const std::uint32_t left = std::min(tile_height_ - row_in_tile_, height_ - y_);
-        const std::uint64_t wanted = static_cast<std::uint64_t>(budget_) / (std::uint64_t{tile_width_} * chunk_);
+        const std::uint64_t wanted =
+            static_cast<std::uint64_t>(budget_) / (std::uint64_t{tile_width_} * chunk_);
         const std::uint64_t even = divideUp(evenPart(left, wanted), row_step_) * row_step_;
         return static_cast<std::uint32_t>(std::min<std::uint64_t>(even, left));
     }
@@ -136,7 +144,8 @@ private:
 
     CrtRenderRange range_{};
     std::uint32_t width_ = 0, height_ = 0, tile_width_ = 0, tile_height_ = 0;
-    std::uint32_t x_ = 0, y_ = 0, row_in_tile_ = 0;  ///< Where the next launch starts, from the range's corner.
+    std::uint32_t x_ = 0, y_ = 0,
+                  row_in_tile_ = 0;  ///< Where the next launch starts, from the range's corner.
     std::uint32_t chunk_ = 0;                        ///< Samples per pixel of this pass.
     std::uint64_t sample_ = 0;                       ///< First sample of this pass, from the range's first.
     std::uint64_t finished_ = 0, total_ = 0;         ///< Paths.

@@ -1,27 +1,29 @@
-/// plugin_guard.h: writing a backend as a C++ class. Header-only; belongs to the plugin's side of the border.
+/// plugin_guard.h: writing a backend as a C++ class. Header-only; belongs to the plugin's side of the
+/// border.
 ///
 ///     class MyIntegrator {
 ///     public:
 ///         MyIntegrator(const crt::plugin::Host& host, const CrtCreateInfo& info);  // opens the device
 ///         void setScene(const CrtSceneBlob& scene);       // copies what it needs, clears the film
-///         bool render(const CrtRenderRange& range);       // adds to the film; false when the host cancelled
-///         void readFilm(const CrtFilmView& film);
-///         void report(CrtBackendReport& report);          // all zero when it comes in
+///         bool render(const CrtRenderRange& range);       // adds to the film; false when the host
+///         cancelled void readFilm(const CrtFilmView& film); void report(CrtBackendReport& report); // all
+///         zero when it comes in
 ///     };
 ///     std::vector<CrtDevice> probeDevices(const crt::plugin::Host& host);
 ///
 ///     CRT_DEFINE_BACKEND(MyIntegrator, probeDevices, "mine", "1.0.0", CRT_FEATURES_ALL)
 ///
-/// An integrator with an acceleration structure of its own says so, and gets no BVH in scenes whose rays all start
-/// within reach (CRT_BRINGS_ACCELERATOR):
+/// An integrator with an acceleration structure of its own says so, and gets no BVH in scenes whose rays all
+/// start within reach (CRT_BRINGS_ACCELERATOR):
 ///
 ///         static constexpr double kAcceleratorReach = 4;
 ///
-/// Any of these may throw: PluginError for a failure with a status and a sentence of its own, std::bad_alloc, or anything. The table
-/// made here turns every exception into a status and a message, so that none crosses the border. It also looks after struct_size in
-/// both directions: the class always sees whole structs of the headers it was compiled with, and the host's are never overrun.
-/// And the class only sees calls that make sense: setScene with a blob that begins with a scene, render of a rectangle within that scene's
-/// film, readFilm into a view of its size.
+/// Any of these may throw: PluginError for a failure with a status and a sentence of its own,
+/// std::bad_alloc, or anything. The table made here turns every exception into a status and a message, so
+/// that none crosses the border. It also looks after struct_size in both directions: the class always sees
+/// whole structs of the headers it was compiled with, and the host's are never overrun. And the class only
+/// sees calls that make sense: setScene with a blob that begins with a scene, render of a rectangle within
+/// that scene's film, readFilm into a view of its size.
 #pragma once
 
 #include "backend/crt_backend.h"
@@ -42,8 +44,9 @@
 #include <vector>
 
 /// Whether the writer of the sized struct `*pointer` knew `member`.
-#define CRT_HAS_MEMBER(pointer, member)                                                         \
-    ((pointer)->struct_size >= offsetof(std::remove_cv_t<std::remove_reference_t<decltype(*(pointer))>>, member) + \
+#define CRT_HAS_MEMBER(pointer, member)                                                     \
+    ((pointer)->struct_size >=                                                              \
+        offsetof(std::remove_cv_t<std::remove_reference_t<decltype(*(pointer))>>, member) + \
                                    sizeof((pointer)->member))
 
 /// Compiler of this translation unit, for CrtBackend::build.
@@ -67,7 +70,8 @@ private:
     std::string sentence_;
 };
 
-/// Copies `text` into a fixed buffer, NUL-terminated; what does not fit is cut between characters, not within one.
+/// Copies `text` into a fixed buffer, NUL-terminated; what does not fit is cut between characters, not
+/// within one.
 inline void writeText(char* buffer, std::size_t size, const char* text) noexcept {
     if (buffer == nullptr || size == 0) return;
     std::size_t length = std::strlen(text);
@@ -85,37 +89,52 @@ void writeText(char (&buffer)[N], const std::string& text) noexcept {
 
 /// Size of each struct in the first minor revision of this ABI: whoever gives less breaks the contract.
 template <class T> constexpr std::size_t kFirstSize = 0;
-template <> inline constexpr std::size_t kFirstSize<CrtHost> = offsetof(CrtHost, kernel_source) + sizeof(CrtHost::kernel_source);
-template <> inline constexpr std::size_t kFirstSize<CrtDevice> = offsetof(CrtDevice, score) + sizeof(CrtDevice::score);
-template <> inline constexpr std::size_t kFirstSize<CrtCreateInfo> = offsetof(CrtCreateInfo, tile_size) + sizeof(CrtCreateInfo::tile_size);
-template <> inline constexpr std::size_t kFirstSize<CrtSceneBlob> = offsetof(CrtSceneBlob, size_bytes) + sizeof(CrtSceneBlob::size_bytes);
+template <>
+inline constexpr std::size_t kFirstSize<CrtHost> = offsetof(CrtHost, kernel_source) +
+                                                   sizeof(CrtHost::kernel_source);
+template <>
+inline constexpr std::size_t kFirstSize<CrtDevice> = offsetof(CrtDevice, score) + sizeof(CrtDevice::score);
+template <>
+inline constexpr std::size_t kFirstSize<CrtCreateInfo> = offsetof(CrtCreateInfo, tile_size) +
+                                                         sizeof(CrtCreateInfo::tile_size);
+template <>
+inline constexpr std::size_t kFirstSize<CrtSceneBlob> = offsetof(CrtSceneBlob, size_bytes) +
+                                                        sizeof(CrtSceneBlob::size_bytes);
 template <> inline constexpr std::size_t kFirstSize<CrtRenderRange> =
     offsetof(CrtRenderRange, sample_count) + sizeof(CrtRenderRange::sample_count);
-template <> inline constexpr std::size_t kFirstSize<CrtFilmView> = offsetof(CrtFilmView, primitives) + sizeof(CrtFilmView::primitives);
+template <>
+inline constexpr std::size_t kFirstSize<CrtFilmView> = offsetof(CrtFilmView, primitives) +
+                                                       sizeof(CrtFilmView::primitives);
 template <> inline constexpr std::size_t kFirstSize<CrtBackendReport> =
     offsetof(CrtBackendReport, spill_bytes) + sizeof(CrtBackendReport::spill_bytes);
-template <> inline constexpr std::size_t kFirstSize<CrtIntegrator> = offsetof(CrtIntegrator, destroy) + sizeof(CrtIntegrator::destroy);
+template <>
+inline constexpr std::size_t kFirstSize<CrtIntegrator> = offsetof(CrtIntegrator, destroy) +
+                                                         sizeof(CrtIntegrator::destroy);
 
 template <class T>
 void requireSized(const T* from_host, const char* what) {
     if (from_host == nullptr) throw PluginError(CRT_INVALID_ARGUMENT, std::string(what) + " is null");
     if (from_host->struct_size < kFirstSize<T>) {
-        throw PluginError(CRT_INVALID_ARGUMENT, std::string(what) + " has struct_size " + std::to_string(from_host->struct_size) +
+        throw PluginError(CRT_INVALID_ARGUMENT, std::string(what) + " has struct_size " +
+                                                    std::to_string(from_host->struct_size) +
                                                     ", too small for any revision of this ABI");
     }
 }
 
-/// The host's struct as this plugin knows it: members that the host does not have are zero, those that only the host has are dropped.
+/// The host's struct as this plugin knows it: members that the host does not have are zero, those that only
+/// the host has are dropped.
 template <class T>
 T readSized(const T* from_host, const char* what) {
     requireSized(from_host, what);
     T copy{};
-    std::memcpy(static_cast<void*>(&copy), from_host, std::min<std::size_t>(from_host->struct_size, sizeof(T)));
+    std::memcpy(static_cast<void*>(&copy), from_host,
+                std::min<std::size_t>(from_host->struct_size, sizeof(T)));
     copy.struct_size = static_cast<std::uint32_t>(sizeof(T));
     return copy;
 }
 
-/// The other way: fills the host's struct as far as both sides know it, and says in struct_size how far that is.
+/// The other way: fills the host's struct as far as both sides know it, and says in struct_size how far that
+/// is.
 template <class T>
 void writeSized(T* to_host, const T& value) noexcept {
     const std::size_t size = std::min<std::size_t>(to_host->struct_size, sizeof(T));
@@ -138,10 +157,13 @@ public:
     }
     /// Null when caching is off.
     const char* cacheDirectory() const noexcept { return table_->cache_directory; }
-    /// Text of a kernel header with its includes expanded. Throws PluginError when the host has none of that name.
+    /// Text of a kernel header with its includes expanded. Throws PluginError when the host has none of that
+    /// name.
     const char* kernelSource(const char* name) const {
-        const char* text = table_->kernel_source != nullptr ? table_->kernel_source(table_->user, name) : nullptr;
-        if (text == nullptr) throw PluginError(CRT_INTERNAL, std::string("the host has no kernel source named ") + name);
+        const char* text =
+            table_->kernel_source != nullptr ? table_->kernel_source(table_->user, name) : nullptr;
+        if (text == nullptr)
+            throw PluginError(CRT_INTERNAL, std::string("the host has no kernel source named ") + name);
         return text;
     }
 
@@ -150,7 +172,8 @@ private:
 };
 
 /// A device as probe() lists it.
-inline CrtDevice makeDevice(std::uint32_t index, const std::string& name, const std::string& driver, std::uint64_t memory_bytes, double score) {
+inline CrtDevice makeDevice(std::uint32_t index, const std::string& name, const std::string& driver,
+                            std::uint64_t memory_bytes, double score) {
     CrtDevice device{};
     device.struct_size = sizeof(CrtDevice);
     device.index = index;
@@ -161,7 +184,8 @@ inline CrtDevice makeDevice(std::uint32_t index, const std::string& name, const 
     return device;
 }
 
-/// The rounding mode and treatment of subnormals that the kernel is written for, whatever the host's thread has set; put back at the end.
+/// The rounding mode and treatment of subnormals that the kernel is written for, whatever the host's thread
+/// has set; put back at the end.
 class DefaultFloatEnvironment {
 public:
     DefaultFloatEnvironment() noexcept {
@@ -176,7 +200,8 @@ private:
     std::fenv_t hosts_;
 };
 
-/// Runs `body`, which returns a status, and lets no exception out: its text goes to `text`, its kind becomes the status.
+/// Runs `body`, which returns a status, and lets no exception out: its text goes to `text`, its kind becomes
+/// the status.
 template <class Body>
 CrtStatus guarded(char* text, std::size_t text_size, Body&& body) noexcept {
     const DefaultFloatEnvironment environment;
@@ -198,12 +223,13 @@ CrtStatus guarded(char* text, std::size_t text_size, Body&& body) noexcept {
     }
 }
 
-/// The verbs of CrtIntegrator for the class `I`. What the host sees as CrtIntegratorState is one object of this class.
+/// The verbs of CrtIntegrator for the class `I`. What the host sees as CrtIntegratorState is one object of
+/// this class.
 template <class I>
 class IntegratorVerbs {
 public:
-    static CrtStatus create(const CrtHost* host, const CrtCreateInfo* info, CrtIntegrator* integrator, char* reason,
-                            std::uint32_t reason_size) noexcept {
+    static CrtStatus create(const CrtHost* host, const CrtCreateInfo* info, CrtIntegrator* integrator,
+                            char* reason, std::uint32_t reason_size) noexcept {
         return guarded(reason, reason_size, [&] {
             requireSized(integrator, "the integrator to fill");
             const Host face(host);
@@ -225,7 +251,9 @@ public:
 private:
     IntegratorVerbs(const Host& host, const CrtCreateInfo& info) : integrator_(host, info) {}
 
-    static IntegratorVerbs& from(CrtIntegratorState* state) noexcept { return *reinterpret_cast<IntegratorVerbs*>(state); }
+    static IntegratorVerbs& from(CrtIntegratorState* state) noexcept {
+        return *reinterpret_cast<IntegratorVerbs*>(state);
+    }
 
     template <class Body>
     static CrtStatus verb(CrtIntegratorState* state, Body&& body) noexcept {
@@ -239,7 +267,8 @@ private:
         return verb(state, [&](IntegratorVerbs& self) {
             const CrtSceneBlob blob = readSized(scene, "the scene");
             if (blob.data == nullptr || reinterpret_cast<std::uintptr_t>(blob.data) % 64 != 0) {
-                throw PluginError(CRT_INVALID_ARGUMENT, "the scene's data is null or not aligned to 64 bytes");
+                throw PluginError(CRT_INVALID_ARGUMENT,
+                                  "the scene's data is null or not aligned to 64 bytes");
             }
             const auto& header = *static_cast<const kernel::CrtScene*>(blob.data);
             if (blob.size_bytes < sizeof header || header.magic != CRT_SCENE_MAGIC) {
@@ -247,14 +276,16 @@ private:
             }
             self.film_ = FilmShape{};  // until the integrator has the new scene as a whole
             self.integrator_.setScene(blob);
-            self.film_ = {header.width, header.height, header.channels, (header.aovs & CRT_AOV_PRIMITIVE) != 0};
+            self.film_ = {header.width, header.height, header.channels,
+                          (header.aovs & CRT_AOV_PRIMITIVE) != 0};
             return CRT_OK;
         });
     }
     static CrtStatus render(CrtIntegratorState* state, const CrtRenderRange* range) noexcept {
         return verb(state, [&](IntegratorVerbs& self) {
             const CrtRenderRange r = readSized(range, "the range");
-            if (self.film_.channels == 0) throw PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
+            if (self.film_.channels == 0)
+                throw PluginError(CRT_INVALID_ARGUMENT, "render was called before set_scene");
             if (r.x0 > r.x1 || r.y0 > r.y1 || r.x1 > self.film_.width || r.y1 > self.film_.height) {
                 throw PluginError(CRT_INVALID_ARGUMENT, "the range's rectangle is not within the film");
             }
@@ -267,12 +298,15 @@ private:
             if (view.sums == nullptr || view.counts == nullptr) {
                 throw PluginError(CRT_INVALID_ARGUMENT, "the film view has no sums or no counts");
             }
-            if (self.film_.channels == 0) throw PluginError(CRT_INVALID_ARGUMENT, "read_film was called before set_scene");
-            if (view.width != self.film_.width || view.height != self.film_.height || view.channels != self.film_.channels) {
+            if (self.film_.channels == 0)
+                throw PluginError(CRT_INVALID_ARGUMENT, "read_film was called before set_scene");
+            if (view.width != self.film_.width || view.height != self.film_.height ||
+                view.channels != self.film_.channels) {
                 throw PluginError(CRT_INVALID_ARGUMENT, "the film view is not of the scene's size");
             }
             if (view.primitives != nullptr && !self.film_.primitives) {
-                throw PluginError(CRT_INVALID_ARGUMENT, "the film view wants primitives, for which the scene does not ask");
+                throw PluginError(CRT_INVALID_ARGUMENT,
+                                  "the film view wants primitives, for which the scene does not ask");
             }
             self.integrator_.readFilm(view);
             return CRT_OK;
@@ -289,7 +323,9 @@ private:
             return CRT_OK;
         });
     }
-    static const char* lastError(CrtIntegratorState* state) noexcept { return state != nullptr ? from(state).error_ : "no integrator"; }
+    static const char* lastError(CrtIntegratorState* state) noexcept {
+        return state != nullptr ? from(state).error_ : "no integrator";
+    }
     static void destroy(CrtIntegratorState* state) noexcept {
         // A destructor that throws ends the process (noexcept): there is nobody left to tell.
         if (state != nullptr) delete &from(state);
@@ -308,8 +344,8 @@ private:
 
 /// probe() over a function that returns the devices; none is CRT_NO_DEVICE.
 template <std::vector<CrtDevice> (*List)(const Host&)>
-CrtStatus probe(const CrtHost* host, CrtDevice* devices, std::uint32_t capacity, std::uint32_t* count, char* reason,
-                std::uint32_t reason_size) noexcept {
+CrtStatus probe(const CrtHost* host, CrtDevice* devices, std::uint32_t capacity, std::uint32_t* count,
+                char* reason, std::uint32_t reason_size) noexcept {
     return guarded(reason, reason_size, [&]() -> CrtStatus {
         if (count == nullptr || (devices == nullptr && capacity != 0)) {
             throw PluginError(CRT_INVALID_ARGUMENT, "probe was called without room for an answer");
@@ -334,11 +370,13 @@ CrtStatus probe(const CrtHost* host, CrtDevice* devices, std::uint32_t capacity,
 template <class I, class = void>
 constexpr double kAcceleratorReachOf = 0;
 template <class I>
-inline constexpr double kAcceleratorReachOf<I, std::void_t<decltype(I::kAcceleratorReach)>> = I::kAcceleratorReach;
+inline constexpr double kAcceleratorReachOf<I, std::void_t<decltype(I::kAcceleratorReach)>> =
+    I::kAcceleratorReach;
 
 /// The table of a backend whose integrator is the class `I`.
 template <class I, std::vector<CrtDevice> (*List)(const Host&)>
-constexpr CrtBackend makeBackend(const char* name, const char* version, const char* build, std::uint64_t features) noexcept {
+constexpr CrtBackend makeBackend(const char* name, const char* version, const char* build,
+                                 std::uint64_t features) noexcept {
     CrtBackend table{};
     table.struct_size = sizeof(CrtBackend);
     table.abi_major = CRT_ABI_MAJOR;
@@ -356,8 +394,8 @@ constexpr CrtBackend makeBackend(const char* name, const char* version, const ch
     return table;
 }
 
-/// Which device --device means: "" or null the best score, digits an index, else the first (best) whose name holds the text, in any case.
-/// Throws PluginError(CRT_NO_DEVICE) that lists what there is.
+/// Which device --device means: "" or null the best score, digits an index, else the first (best) whose name
+/// holds the text, in any case. Throws PluginError(CRT_NO_DEVICE) that lists what there is.
 inline const CrtDevice& chooseDevice(const std::vector<CrtDevice>& devices, const char* wanted) {
     const std::string text = wanted != nullptr ? wanted : "";
     const bool is_index = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
@@ -368,8 +406,9 @@ inline const CrtDevice& chooseDevice(const std::vector<CrtDevice>& devices, cons
     };
     const CrtDevice* best = nullptr;
     for (const CrtDevice& device : devices) {
-        const bool matches = text.empty() || (is_index ? std::to_string(device.index) == text
-                                                       : lower(device.name).find(lower(text)) != std::string::npos);
+        const bool matches =
+            text.empty() || (is_index ? std::to_string(device.index) == text
+                                      : lower(device.name).find(lower(text)) != std::string::npos);
         if (matches && (best == nullptr || device.score > best->score)) best = &device;
     }
     if (best != nullptr) return *best;
@@ -383,13 +422,15 @@ inline const CrtDevice& chooseDevice(const std::vector<CrtDevice>& devices, cons
 
 }  // namespace crt::plugin
 
-/// Defines the entry symbol of the library. `features` is the mask of kernel/features.h that the backend can run.
+/// Defines the entry symbol of the library. `features` is the mask of kernel/features.h that the backend can
+/// run.
 #define CRT_DEFINE_BACKEND(Integrator, list_devices, name, version, features) \
     CRT_DEFINE_BACKEND_BUILT_WITH(Integrator, list_devices, name, version, CRT_COMPILER_TEXT, features)
 
 /// The same with a text about compiler and libraries, such as CRT_COMPILER_TEXT ", Embree 3.13.5".
-#define CRT_DEFINE_BACKEND_BUILT_WITH(Integrator, list_devices, name, version, build, features)                           \
-    extern "C" CRT_EXPORT const CrtBackend* crt_backend_v1(void) {                                                        \
-        static constexpr CrtBackend table = crt::plugin::makeBackend<Integrator, list_devices>(name, version, build, features); \
-        return &table;                                                                                                    \
+#define CRT_DEFINE_BACKEND_BUILT_WITH(Integrator, list_devices, name, version, build, features)      \
+    extern "C" CRT_EXPORT const CrtBackend* crt_backend_v1(void) {                                   \
+        static constexpr CrtBackend table = crt::plugin::makeBackend<Integrator, list_devices>(name, \
+            version, build, features);                                                               \
+        return &table;                                                                               \
     }

@@ -1,10 +1,10 @@
 #include "judge/compare/compare.h"
 
 #include "base/error.h"
+#include "film/luminance_error.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
 #include "judge/compare/image_noise.h"
-#include "film/luminance_error.h"
 #include "judge/stats/metrics.h"
 
 #include <fmt/format.h>
@@ -27,15 +27,20 @@ struct Plane {
     std::uint32_t bits(std::size_t pixel) const {
         return isInteger() ? integers[pixel * stride] : std::bit_cast<std::uint32_t>(floats[pixel * stride]);
     }
-    double value(std::size_t pixel) const { return isInteger() ? static_cast<double>(integers[pixel * stride]) : floats[pixel * stride]; }
+    double value(std::size_t pixel) const {
+        return isInteger() ? static_cast<double>(integers[pixel * stride]) : floats[pixel * stride];
+    }
 };
 
 /// By name: the same image may have its channels in another order.
 std::optional<Plane> findPlane(const Image& image, const std::string& name) {
-    if (const auto f = std::find(image.channels.begin(), image.channels.end(), name); f != image.channels.end())
+    if (const auto f = std::find(image.channels.begin(), image.channels.end(), name);
+        f != image.channels.end())
         return Plane{image.pixels.data() + (f - image.channels.begin()), nullptr, image.channels.size()};
-    if (const auto i = std::find(image.integer_channels.begin(), image.integer_channels.end(), name); i != image.integer_channels.end())
-        return Plane{nullptr, image.integers.data() + (i - image.integer_channels.begin()), image.integer_channels.size()};
+    if (const auto i = std::find(image.integer_channels.begin(), image.integer_channels.end(), name);
+        i != image.integer_channels.end())
+        return Plane{nullptr, image.integers.data() + (i - image.integer_channels.begin()),
+                     image.integer_channels.size()};
     return std::nullopt;
 }
 
@@ -60,8 +65,10 @@ std::int64_t place(float v) {
 
 /// Floats between two, when both are numbers.
 std::optional<std::uint64_t> ulpsBetween(const Plane& a, const Plane& b, std::size_t pixel) {
-    if (a.isInteger() || b.isInteger() || !std::isfinite(a.value(pixel)) || !std::isfinite(b.value(pixel))) return std::nullopt;
-    return static_cast<std::uint64_t>(std::abs(place(a.floats[pixel * a.stride]) - place(b.floats[pixel * b.stride])));
+    if (a.isInteger() || b.isInteger() || !std::isfinite(a.value(pixel)) || !std::isfinite(b.value(pixel)))
+        return std::nullopt;
+    return static_cast<std::uint64_t>(
+        std::abs(place(a.floats[pixel * a.stride]) - place(b.floats[pixel * b.stride])));
 }
 
 /// Values of the named planes, pixel by pixel.
@@ -82,7 +89,8 @@ void addMetrics(CompareResult& result, const std::vector<float>& a, const std::v
     result.metrics_valid = m.valid();
     if (!m.valid()) return;
     for (std::size_t i = 0; i < a.size(); ++i)
-        result.max_ulp = std::max(result.max_ulp, static_cast<std::uint64_t>(std::abs(place(a[i]) - place(b[i]))));
+        result.max_ulp =
+            std::max(result.max_ulp, static_cast<std::uint64_t>(std::abs(place(a[i]) - place(b[i]))));
     result.max_absolute = m.max_absolute;
     result.p99_absolute = m.p99_absolute;
     result.mse = m.mse;
@@ -101,18 +109,21 @@ void addLooks(CompareResult& result, const Image& a, const Image& b, bool displa
     const auto seen_b = linearSrgb(b, b.chromaticities ? b.chromaticities : a.chromaticities);
     if (!seen_a || !seen_b) return;
     // Same colours look the same; the answer is known without seconds of FLIP.
-    result.looks = *seen_a == *seen_b ? Looks{0, !display_referred, 0, 0} : compareLooks(*seen_a, *seen_b, a.width, a.height, display_referred);
+    result.looks = *seen_a == *seen_b ? Looks{0, !display_referred, 0, 0}
+                                      : compareLooks(*seen_a, *seen_b, a.width, a.height, display_referred);
 }
 
-/// Why pixels of two crop windows of one picture do not belong together; empty when they do, or when one does not say
-/// which part of a picture it is.
+/// Why pixels of two crop windows of one picture do not belong together; empty when they do, or when one
+/// does not say which part of a picture it is.
 std::string windowConflict(const Image& a, const Image& b) {
     if (a.whole_width == 0 || b.whole_width == 0) return {};
-    const auto same = [](const Image& i) { return std::array<std::int64_t, 4>{i.left, i.top, i.whole_width, i.whole_height}; };
+    const auto same = [](const Image& i) {
+        return std::array<std::int64_t, 4>{i.left, i.top, i.whole_width, i.whole_height};
+    };
     if (same(a) == same(b)) return {};
     const auto window = [](const Image& i) {
-        return fmt::format("[{}, {}) × [{}, {}) of {} × {} pixels", i.left, i.left + std::int64_t{i.width}, i.top, i.top + std::int64_t{i.height},
-                           i.whole_width, i.whole_height);
+        return fmt::format("[{}, {}) × [{}, {}) of {} × {} pixels", i.left, i.left + std::int64_t{i.width},
+                           i.top, i.top + std::int64_t{i.height}, i.whole_width, i.whole_height);
     };
     return fmt::format("A and B are different parts of a picture: {} and {}", window(a), window(b));
 }
@@ -124,9 +135,12 @@ struct ColorPair {
 };
 ColorPair colorPair(const Image& a, const Image& b) {
     if (a.width != b.width || a.height != b.height)
-        throw Error(ErrorKind::Usage, fmt::format("the images differ in size ({} × {} and {} × {}), so there is no difference image", a.width,
-                                                  a.height, b.width, b.height));
-    if (!hasColor(a) || !hasColor(b)) throw Error(ErrorKind::Usage, "only images with channels R, G and B have a difference image");
+        throw Error(
+            ErrorKind::Usage,
+            fmt::format("the images differ in size ({} × {} and {} × {}), so there is no difference image",
+                        a.width, a.height, b.width, b.height));
+    if (!hasColor(a) || !hasColor(b))
+        throw Error(ErrorKind::Usage, "only images with channels R, G and B have a difference image");
     ColorPair pair{{*findPlane(a, "R"), *findPlane(a, "G"), *findPlane(a, "B")},
                    {*findPlane(b, "R"), *findPlane(b, "G"), *findPlane(b, "B")},
                    std::size_t{a.width} * a.height};
@@ -146,7 +160,8 @@ Image rgbImage(const Image& like) {
 
 bool hasColor(const Image& image) {
     for (const char* name : {"R", "G", "B"})
-        if (std::find(image.channels.begin(), image.channels.end(), name) == image.channels.end()) return false;
+        if (std::find(image.channels.begin(), image.channels.end(), name) == image.channels.end())
+            return false;
     return true;
 }
 
@@ -154,7 +169,8 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
     CompareResult result;
     result.tolerance = options.tolerance;
     if (a.width != b.width || a.height != b.height) {
-        result.mismatch = fmt::format("the images differ in size: {} × {} and {} × {} pixels", a.width, a.height, b.width, b.height);
+        result.mismatch = fmt::format("the images differ in size: {} × {} and {} × {} pixels", a.width,
+                                      a.height, b.width, b.height);
         return result;
     }
     result.mismatch = windowConflict(a, b);
@@ -163,12 +179,15 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
     result.height = a.height;
     result.other_channels = missingFrom(a, b);
     for (const std::string& name : missingFrom(b, a))
-        if (std::find(result.other_channels.begin(), result.other_channels.end(), name) == result.other_channels.end())
+        if (std::find(result.other_channels.begin(), result.other_channels.end(), name) ==
+            result.other_channels.end())
             result.other_channels.push_back(name);
 
     const bool color = hasColor(a) && hasColor(b);
     if ((options.all_channels || !color) && !result.other_channels.empty()) {
-        result.mismatch = fmt::format("the images differ in channels: {} only in one of them or of another type", fmt::join(result.other_channels, ", "));
+        result.mismatch =
+            fmt::format("the images differ in channels: {} only in one of them or of another type",
+                        fmt::join(result.other_channels, ", "));
         return result;
     }
     if (color) {
@@ -177,7 +196,8 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
         if (!result.mismatch.empty()) return result;
         result.notes = unknownConditions(of_a, "A", of_b, "B");
     }
-    const std::vector<std::string> metric_channels = color ? std::vector<std::string>{"R", "G", "B"} : a.channels;
+    const std::vector<std::string> metric_channels =
+        color ? std::vector<std::string>{"R", "G", "B"} : a.channels;
     result.channels = metric_channels;
     if (options.all_channels) {
         result.channels = a.channels;
@@ -186,15 +206,19 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
 
     const std::size_t pixels = std::size_t{a.width} * a.height;
     std::vector<std::pair<Plane, Plane>> compared;
-    for (const std::string& name : result.channels) compared.emplace_back(*findPlane(a, name), *findPlane(b, name));
+    for (const std::string& name : result.channels)
+        compared.emplace_back(*findPlane(a, name), *findPlane(b, name));
     for (std::size_t p = 0; p < pixels; ++p)
         for (std::size_t c = 0; c < compared.size(); ++c) {
             const auto& [plane_a, plane_b] = compared[c];
             if (plane_a.bits(p) == plane_b.bits(p)) continue;
             ++result.differing_pixels;
             if (!result.first_difference)
-                result.first_difference = Difference{static_cast<std::uint32_t>(p % a.width), static_cast<std::uint32_t>(p / a.width),
-                                                     result.channels[c], plane_a.value(p), plane_b.value(p),
+                result.first_difference = Difference{static_cast<std::uint32_t>(p % a.width),
+                                                     static_cast<std::uint32_t>(p / a.width),
+                                                     result.channels[c],
+                                                     plane_a.value(p),
+                                                     plane_b.value(p),
                                                      ulpsBetween(plane_a, plane_b, p)};
             break;
         }
@@ -223,7 +247,8 @@ Image differenceImage(const Image& a, const Image& b) {
     Image image = rgbImage(a);
     image.chromaticities = a.chromaticities ? a.chromaticities : b.chromaticities;
     for (std::size_t p = 0; p < pair.pixels; ++p)
-        for (std::size_t c = 0; c < 3; ++c) image.pixels.push_back(static_cast<float>(pair.a[c].value(p) - pair.b[c].value(p)));
+        for (std::size_t c = 0; c < 3; ++c)
+            image.pixels.push_back(static_cast<float>(pair.a[c].value(p) - pair.b[c].value(p)));
     return image;
 }
 
@@ -234,7 +259,8 @@ Image falseColorDifference(const Image& a, const Image& b) {
         for (const Plane& plane : pair.b)
             if (const double v = plane.value(p); std::isfinite(v)) sum += std::abs(v);
     // Against a black image every difference is large.
-    const double mean = std::max(sum / (3.0 * static_cast<double>(pair.pixels)), std::numeric_limits<double>::min());
+    const double mean =
+        std::max(sum / (3.0 * static_cast<double>(pair.pixels)), std::numeric_limits<double>::min());
 
     Image image = rgbImage(a);
     for (std::size_t p = 0; p < pair.pixels; ++p) {
@@ -251,7 +277,8 @@ Image falseColorDifference(const Image& a, const Image& b) {
         } else if (!same) {
             const double decades = std::log10(std::max(largest / mean, 1e-30));
             const auto t = static_cast<float>(std::clamp((decades + 7.0) / 6.0, 0.0, 1.0));
-            color = t < 0.5f ? std::array<float, 3>{0, 2 * t, 1 - 2 * t} : std::array<float, 3>{2 * t - 1, 2 - 2 * t, 0};
+            color = t < 0.5f ? std::array<float, 3>{0, 2 * t, 1 - 2 * t}
+                             : std::array<float, 3>{2 * t - 1, 2 - 2 * t, 0};
         }
         image.pixels.insert(image.pixels.end(), color.begin(), color.end());
     }
@@ -260,7 +287,9 @@ Image falseColorDifference(const Image& a, const Image& b) {
 
 void writeDifference(const std::string& path, const Image& a, const Image& b) {
     const std::optional<OutputFormat> format = formatOfFile(path);
-    if (!format) throw Error(ErrorKind::Usage, fmt::format("the extension of '{}' is none of .exr, .pfm, .png, .ppm", path), {path});
+    if (!format)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("the extension of '{}' is none of .exr, .pfm, .png, .ppm", path), {path});
     const bool as_values = *format == OutputFormat::Exr || *format == OutputFormat::Pfm;
     writeImage(path, *format, as_values ? differenceImage(a, b) : falseColorDifference(a, b));
 }

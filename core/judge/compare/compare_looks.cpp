@@ -14,7 +14,8 @@ std::optional<std::vector<float>> linearSrgb(const Image& image,
                                              const std::optional<std::array<double, 8>>& primaries) {
     std::array<std::size_t, 3> places{};
     for (std::size_t c = 0; c < 3; ++c) {
-        const auto found = std::find(image.channels.begin(), image.channels.end(), std::array{"R", "G", "B"}[c]);
+        const auto found =
+            std::find(image.channels.begin(), image.channels.end(), std::array{"R", "G", "B"}[c]);
         if (found == image.channels.end()) return std::nullopt;
         places[c] = static_cast<std::size_t>(found - image.channels.begin());
     }
@@ -37,7 +38,8 @@ std::optional<std::vector<float>> linearSrgb(const Image& image,
     return values;
 }
 
-Looks compareLooks(std::span<const float> test, std::span<const float> reference, std::uint32_t width, std::uint32_t height, bool display_referred) {
+Looks compareLooks(std::span<const float> test, std::span<const float> reference, std::uint32_t width,
+                   std::uint32_t height, bool display_referred) {
     const stats::RgbView a{test, width, height}, b{reference, width, height};
     const stats::ColorDifference color = stats::deltaE2000(a, b);
     const double flip = display_referred ? stats::flipLdr(a, b).mean : stats::flipHdr(a, b).mean;

@@ -11,8 +11,9 @@
 namespace crt {
 
 struct Looks {
-    double flip_mean = 0;              ///< Andersson et al. 2020 and 2021, in [0, 1]. NaN against black where exposures are chosen by the reference.
-    bool high_range = false;           ///< HDR-FLIP, over all exposures that the reference asks for; else LDR-FLIP.
+    double flip_mean = 0;  ///< Andersson et al. 2020 and 2021, in [0, 1]. NaN against black where exposures
+                           ///< are chosen by the reference.
+    bool high_range = false;  ///< HDR-FLIP, over all exposures that the reference asks for; else LDR-FLIP.
     double delta_e_mean = 0, delta_e_max = 0;  ///< CIEDE2000, 1 being white.
 };
 
@@ -21,7 +22,9 @@ struct Looks {
 std::optional<std::vector<float>> linearSrgb(const Image& image,
                                              const std::optional<std::array<double, 8>>& primaries);
 
-/// Values as linearSrgb gives them, all finite. `display_referred`: both are as a screen shows them, as PNG files are; else they are radiances.
-Looks compareLooks(std::span<const float> test, std::span<const float> reference, std::uint32_t width, std::uint32_t height, bool display_referred);
+/// Values as linearSrgb gives them, all finite. `display_referred`: both are as a screen shows them, as PNG
+/// files are; else they are radiances.
+Looks compareLooks(std::span<const float> test, std::span<const float> reference, std::uint32_t width,
+                   std::uint32_t height, bool display_referred);
 
 }  // namespace crt

@@ -18,7 +18,8 @@ namespace {
 
 using stats::Mean;
 
-/// The pair's common view: colour where both know the noise of it, else luminance, else what one of them knows and the other exact.
+/// The pair's common view: colour where both know the noise of it, else luminance, else what one of them
+/// knows and the other exact.
 struct Pair {
     std::optional<NoisyImage> a, b;
 };
@@ -37,13 +38,15 @@ NoisyImage exactly(const Image& image, const NoisyImage& like) {
     const std::array<double, 3> weights = luminanceWeights(image);
     std::array<std::size_t, 3> at{};
     for (std::size_t c = 0; c < 3; ++c) {
-        const auto found = std::find(image.channels.begin(), image.channels.end(), std::array{"R", "G", "B"}[c]);
+        const auto found =
+            std::find(image.channels.begin(), image.channels.end(), std::array{"R", "G", "B"}[c]);
         at[c] = static_cast<std::size_t>(found - image.channels.begin());
     }
     for (std::size_t p = 0; p < std::size_t{image.width} * image.height; ++p) {
         const float* pixel = &image.pixels[p * image.channels.size()];
         if (like.channels.size() == 1) {
-            exact.values.push_back(weights[0] * pixel[at[0]] + weights[1] * pixel[at[1]] + weights[2] * pixel[at[2]]);
+            exact.values.push_back(weights[0] * pixel[at[0]] + weights[1] * pixel[at[1]] +
+                                   weights[2] * pixel[at[2]]);
         } else {
             for (const std::size_t place : at) exact.values.push_back(pixel[place]);
         }
@@ -263,7 +266,8 @@ NoiseComparison compareNoise(const Image& a, const Image& b) {
         }
     std::optional<Pair> pair = commonView(a, b);
     if (!pair) {
-        result.unknown = "neither image says how large its noise is (render with output AOV 'variance' or 'error')";
+        result.unknown =
+            "neither image says how large its noise is (render with output AOV 'variance' or 'error')";
         return result;
     }
     if (!pair->a) pair->a = exactly(a, *pair->b);
@@ -288,7 +292,8 @@ NoiseComparison compareNoise(const Image& a, const Image& b) {
     return result;
 }
 
-// -------------------------------------------------------------------------------------------------------------------------- z map
+// ----------------------------------------------------------------------------------------------------------
+// z map
 
 Image zMap(const NoiseComparison& noise, std::uint32_t width, std::uint32_t height) {
     constexpr double kFull = 5;
@@ -313,10 +318,14 @@ Image zMap(const NoiseComparison& noise, std::uint32_t width, std::uint32_t heig
     return image;
 }
 
-void writeZMap(const std::string& path, const NoiseComparison& noise, std::uint32_t width, std::uint32_t height) {
+void writeZMap(const std::string& path, const NoiseComparison& noise, std::uint32_t width,
+               std::uint32_t height) {
     const std::optional<OutputFormat> format = formatOfFile(path);
-    if (!format) throw Error(ErrorKind::Usage, fmt::format("the extension of '{}' is none of .exr, .pfm, .png, .ppm", path), {path});
-    if (noise.z.empty()) throw Error(ErrorKind::Usage, fmt::format("there is no z map to write: {}", noise.unknown), {path});
+    if (!format)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("the extension of '{}' is none of .exr, .pfm, .png, .ppm", path), {path});
+    if (noise.z.empty())
+        throw Error(ErrorKind::Usage, fmt::format("there is no z map to write: {}", noise.unknown), {path});
     if (*format != OutputFormat::Exr && *format != OutputFormat::Pfm) {
         writeImage(path, *format, zMap(noise, width, height));
         return;
@@ -327,7 +336,8 @@ void writeZMap(const std::string& path, const NoiseComparison& noise, std::uint3
     image.channels = {"R", "G", "B"};
     const std::size_t channels = noise.channels.size();
     for (std::size_t p = 0; p < std::size_t{width} * height; ++p)
-        for (std::size_t c = 0; c < 3; ++c) image.pixels.push_back(static_cast<float>(noise.z[p * channels + (channels == 3 ? c : 0)]));
+        for (std::size_t c = 0; c < 3; ++c)
+            image.pixels.push_back(static_cast<float>(noise.z[p * channels + (channels == 3 ? c : 0)]));
     writeImage(path, *format, image);
 }
 

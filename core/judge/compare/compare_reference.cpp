@@ -1,11 +1,11 @@
 #include "judge/compare/compare_reference.h"
 
-#include "judge/compare/compare_looks.h"
 #include "base/error.h"
-#include "image/image_metadata.h"
-#include "judge/compare/image_noise.h"
-#include "film/luminance_error.h"
 #include "base/statistics.h"
+#include "film/luminance_error.h"
+#include "image/image_metadata.h"
+#include "judge/compare/compare_looks.h"
+#include "judge/compare/image_noise.h"
 
 #include <fmt/format.h>
 
@@ -24,13 +24,16 @@ std::vector<float> colorValues(const Image& image) {
         for (const char* name : {"R", "G", "B"}) {
             const auto found = std::find(image.channels.begin(), image.channels.end(), name);
             if (found == image.channels.end())
-                throw Error(ErrorKind::Usage, "only images with channels R, G and B have an error against a reference");
-            values.push_back(image.pixels[p * image.channels.size() + static_cast<std::size_t>(found - image.channels.begin())]);
+                throw Error(ErrorKind::Usage,
+                            "only images with channels R, G and B have an error against a reference");
+            values.push_back(image.pixels[p * image.channels.size() +
+                                          static_cast<std::size_t>(found - image.channels.begin())]);
         }
     return values;
 }
 
-/// Jackknife: √((k − 1)/k · Σ (e₋ᵢ − ē)²) over the k references that lack one fold each (Efron and Stein 1981).
+/// Jackknife: √((k − 1)/k · Σ (e₋ᵢ − ē)²) over the k references that lack one fold each (Efron and Stein
+/// 1981).
 double jackknifeError(const std::vector<double>& values) {
     const stats::Summary s = stats::summarize(values);
     const double k = static_cast<double>(values.size());
@@ -60,7 +63,8 @@ struct Colors {
     std::optional<std::vector<float>> srgb;
 };
 
-ReferenceError errorAgainst(const Colors& test, const Colors& reference, const std::vector<Colors>& without_fold, std::uint32_t width,
+ReferenceError errorAgainst(const Colors& test, const Colors& reference,
+                            const std::vector<Colors>& without_fold, std::uint32_t width,
                             std::uint32_t height, bool display_referred) {
     ReferenceError error;
     error.metrics = stats::errorMetrics(test.values, reference.values);
@@ -127,12 +131,15 @@ std::vector<Colors> colorsWithoutFolds(const Image& reference, const Image& like
 
 }  // namespace
 
-ReferenceComparison compareWithReference(const Image& a, const Image& b, const Image& reference, bool display_referred) {
+ReferenceComparison compareWithReference(const Image& a, const Image& b, const Image& reference,
+                                         bool display_referred) {
     for (const Image* image : {&a, &b})
         if (image->width != reference.width || image->height != reference.height)
-            throw Error(ErrorKind::Usage, fmt::format("the reference has {} x {} pixels and an image {} x {}; render one of them again",
-                                                      reference.width,
-                                                      reference.height, image->width, image->height));
+            throw Error(
+                ErrorKind::Usage,
+                fmt::format(
+                    "the reference has {} x {} pixels and an image {} x {}; render one of them again",
+                    reference.width, reference.height, image->width, image->height));
     ReferenceComparison result;
     const ColorConditions of_reference = colorConditions(reference);
     for (const auto& [image, name] : {std::pair{&a, "A"}, {&b, "B"}}) {

@@ -11,7 +11,8 @@
 
 namespace crt {
 
-/// A metric, and its standard error from the choice of reference: by leaving out one eighth of it at a time (jackknife).
+/// A metric, and its standard error from the choice of reference: by leaving out one eighth of it at a time
+/// (jackknife).
 struct SpreadMetric {
     double value = 0;
     std::optional<double> spread;
@@ -41,6 +42,7 @@ struct ReferenceComparison {
 
 /// The images are called A, B and R. Throws crt::Error(Usage) when sizes differ, R, G and B are missing, or
 /// R has another exposure, white balance or colour space: those are differences, and no errors.
-ReferenceComparison compareWithReference(const Image& a, const Image& b, const Image& reference, bool display_referred);
+ReferenceComparison compareWithReference(const Image& a, const Image& b, const Image& reference,
+                                         bool display_referred);
 
 }  // namespace crt

@@ -10,7 +10,8 @@
 namespace crt {
 namespace {
 
-using Json = nlohmann::ordered_json;  // The library writes infinities and NaN as null, which JSON has no numbers for.
+using Json =
+    nlohmann::ordered_json;  // The library writes infinities and NaN as null, which JSON has no numbers for.
 
 std::string number(double v) { return fmt::format("{:.6g}", v); }
 std::string percent(double fraction) { return fmt::format("{:.3g} %", 100 * fraction); }
@@ -19,7 +20,9 @@ std::string percent(double fraction) { return fmt::format("{:.3g} %", 100 * frac
 class Lines {
 public:
     explicit Lines(std::string first) : text_(std::move(first)) {}
-    void add(const char* name, const std::string& value) { text_ += fmt::format("\n  {:<18}{}", name, value); }
+    void add(const char* name, const std::string& value) {
+        text_ += fmt::format("\n  {:<18}{}", name, value);
+    }
     void heading(const std::string& sentence) { text_ += "\n" + sentence; }
     const std::string& text() const { return text_; }
 
@@ -34,35 +37,41 @@ const char* verdictOf(const CompareResult& r) {
 }
 
 std::string differenceText(const Difference& d) {
-    std::string text = fmt::format("pixel {},{} channel {}: {:.9g} and {:.9g}", d.x, d.y, d.channel, d.first, d.second);
+    std::string text =
+        fmt::format("pixel {},{} channel {}: {:.9g} and {:.9g}", d.x, d.y, d.channel, d.first, d.second);
     if (d.ulps) text += fmt::format(" ({} ulp)", *d.ulps);
     return text;
 }
 
 void addMetricLines(Lines& lines, const CompareResult& r) {
-    lines.add("largest",
-              fmt::format("{} absolute, {} ulp; 99 % of the values are within {}", number(r.max_absolute), r.max_ulp, number(r.p99_absolute)));
+    lines.add("largest", fmt::format("{} absolute, {} ulp; 99 % of the values are within {}",
+                                     number(r.max_absolute), r.max_ulp, number(r.p99_absolute)));
     if (r.relative_rmse)
         lines.add("error",
                   fmt::format("{} (RMSE of luminance, over B's mean luminance)", percent(*r.relative_rmse)));
     lines.add("RMSE", fmt::format("{} ({} of the mean{}), MSE {}", number(r.rmse), number(r.rmse_over_mean),
-                                  r.tolerance > 0 ? fmt::format(", {} allowed", number(r.tolerance)) : "", number(r.mse)));
+                                  r.tolerance > 0 ? fmt::format(", {} allowed", number(r.tolerance)) : "",
+                                  number(r.mse)));
     lines.add("relMSE", number(r.relmse));
     lines.add("MAE", number(r.mae));
     lines.add("SMAPE", number(r.smape));
-    lines.add("mean", fmt::format("{} and {}, ratio {:.9g}", number(r.mean[0]), number(r.mean[1]), r.mean_ratio));
+    lines.add("mean",
+              fmt::format("{} and {}, ratio {:.9g}", number(r.mean[0]), number(r.mean[1]), r.mean_ratio));
     if (!r.looks) return;
     const Looks& l = *r.looks;
     lines.add(l.high_range ? "HDR-FLIP" : "LDR-FLIP",
-              std::isnan(l.flip_mean) ? "undefined: B is black" : number(l.flip_mean) + " (0 looks the same, 1 is the most)");
-    lines.add("Delta E 2000", fmt::format("mean {:.3g}, largest {:.3g} (about 1 can just be seen)", l.delta_e_mean, l.delta_e_max));
+              std::isnan(l.flip_mean) ? "undefined: B is black"
+                                      : number(l.flip_mean) + " (0 looks the same, 1 is the most)");
+    lines.add("Delta E 2000", fmt::format("mean {:.3g}, largest {:.3g} (about 1 can just be seen)",
+                                          l.delta_e_mean, l.delta_e_max));
 }
 
-// ---------------------------------------------------------------------------------------------------------------------------- noise
+// ----------------------------------------------------------------------------------------------------------
+// noise
 
 std::string familyText(const stats::TestFamily& family, const char* method, const std::string& worst) {
-    return fmt::format("{} of {} tests differ beyond noise (smallest p {:.2g} {}{})", family.rejected, family.tests, family.smallest_p, method,
-                       family.rejected > 0 ? ", " + worst : "");
+    return fmt::format("{} of {} tests differ beyond noise (smallest p {:.2g} {}{})", family.rejected,
+                       family.tests, family.smallest_p, method, family.rejected > 0 ? ", " + worst : "");
 }
 
 void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t width) {
@@ -70,7 +79,9 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
         lines.heading("Noise or bias? Not known: " + noise.unknown + ".");
         return;
     }
-    const auto source = [](const std::string& from) { return from.empty() ? std::string("none known, taken as exact") : from; };
+    const auto source = [](const std::string& from) {
+        return from.empty() ? std::string("none known, taken as exact") : from;
+    };
     lines.heading("Noise or bias? By the images' own noise:");
     lines.add("noise of A", source(noise.source_a));
     lines.add("noise of B", source(noise.source_b));
@@ -88,20 +99,29 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
     const auto at = [&](std::size_t place, std::uint32_t across, std::uint32_t side) {
         return fmt::format("at {},{}", place / channels % across * side, place / channels / across * side);
     };
-    lines.add("tiles of 8x8", familyText(noise.tiles, "after Holm", at(noise.tiles.worst, noise.tiles_across, stats::kTileSide)));
+    lines.add("tiles of 8x8", familyText(noise.tiles, "after Holm",
+                                         at(noise.tiles.worst, noise.tiles_across, stats::kTileSide)));
     lines.add("pixels", noise.pixels_untested.empty()
                             ? familyText(noise.pixels, "after Sidak", at(noise.pixels.worst, width, 1))
                             : "not tested: " + noise.pixels_untested);
-    lines.add("rms z", fmt::format("{:.3g} (1: all of the difference is noise, and as large as the images say)", noise.rms_z));
+    lines.add("rms z",
+              fmt::format("{:.3g} (1: all of the difference is noise, and as large as the images say)",
+                          noise.rms_z));
 }
 
 Json familyJson(const stats::TestFamily& family) {
-    return {{"tests", family.tests}, {"rejected", family.rejected}, {"smallest_adjusted_p", family.smallest_p}, {"alpha", family.alpha}};
+    return {{"tests", family.tests},
+            {"rejected", family.rejected},
+            {"smallest_adjusted_p", family.smallest_p},
+            {"alpha", family.alpha}};
 }
 
 Json noiseJson(const NoiseComparison& noise) {
     if (!noise.unknown.empty()) return {{"unknown", noise.unknown}};
-    Json json{{"source_a", noise.source_a}, {"source_b", noise.source_b}, {"confidence", noise.confidence}, {"bias", Json::array()}};
+    Json json{{"source_a", noise.source_a},
+              {"source_b", noise.source_b},
+              {"confidence", noise.confidence},
+              {"bias", Json::array()}};
     for (const ChannelBias& c : noise.channels)
         json["bias"].push_back({{"channel", c.channel},
                                 {"mean", {c.mean_a, c.mean_b}},
@@ -116,7 +136,8 @@ Json noiseJson(const NoiseComparison& noise) {
     return json;
 }
 
-// ------------------------------------------------------------------------------------------------------------------------ reference
+// ----------------------------------------------------------------------------------------------------------
+// reference
 
 struct ReferenceRow {
     const char *name, *key;
@@ -142,7 +163,8 @@ std::string spreadText(const SpreadMetric& m) {
 
 std::string cell(const std::string& text, std::size_t columns) {
     std::size_t shown = 0;
-    for (const char c : text) shown += (static_cast<unsigned char>(c) & 0xc0) != 0x80;  // UTF-8: ± is one column and two bytes.
+    for (const char c : text)
+        shown += (static_cast<unsigned char>(c) & 0xc0) != 0x80;  // UTF-8: ± is one column and two bytes.
     return text + std::string(columns > shown ? columns - shown : 1, ' ');
 }
 
@@ -161,9 +183,10 @@ void addReferenceLines(Lines& lines, const ReferenceComparison& r) {
     for (std::size_t i = 0; i < 2; ++i) {
         const ReferenceError& e = r.errors[i];
         if (!e.metrics.valid())
-            lines.add(i == 0 ? "A" : "B", fmt::format("void: {} values are not finite, {} in the reference", e.metrics.test.total(),
-                                                      e.metrics.reference.total()));
-        for (const std::string& warning : e.warnings) lines.add(i == 0 ? "WARNING, A" : "WARNING, B", warning);
+            lines.add(i == 0 ? "A" : "B", fmt::format("void: {} values are not finite, {} in the reference",
+                                                      e.metrics.test.total(), e.metrics.reference.total()));
+        for (const std::string& warning : e.warnings)
+            lines.add(i == 0 ? "WARNING, A" : "WARNING, B", warning);
     }
     for (const std::string& note : r.notes) lines.add("note", note);
     lines.add("", cell("A", kColumn) + cell("B", kColumn) + "A / B");
@@ -179,20 +202,28 @@ void addReferenceLines(Lines& lines, const ReferenceComparison& r) {
                      ? ratioText(*r.errors[0].corrected_relative_rmse, *r.errors[1].corrected_relative_rmse)
                      : "-"));
     }
-    lines.heading("  \"error\" is the RMSE of luminance over R's mean luminance; rows below it are of R, G and B.");
+    lines.heading(
+        "  \"error\" is the RMSE of luminance over R's mean luminance; rows below it are of R, G and B.");
     if (r.reference_rms_error) {
         lines.heading(
             fmt::format("  R's own error is {} ({}); \"less R's noise\" has its variance subtracted.",
                         percent(*r.reference_rms_error), r.reference_noise_source));
     } else {
-        lines.heading("  R does not say how large its own noise is, so it is in all errors (`crt reference` makes references that do).");
+        lines.heading(
+            "  R does not say how large its own noise is, so it is in all errors (`crt reference` makes "
+            "references that do).");
     }
-    if (r.errors[0].rmse.spread) lines.heading("  ± is the standard error from the choice of reference: eight times an eighth of it was left out.");
+    if (r.errors[0].rmse.spread)
+        lines.heading(
+            "  ± is the standard error from the choice of reference: eight times an eighth of it was left "
+            "out.");
 }
 
 Json referenceJson(const ReferenceComparison& r) {
-    Json json{{"reference_relative_rms_error", r.reference_rms_error ? Json(*r.reference_rms_error) : Json(nullptr)},
-              {"reference_noise_source", r.reference_noise_source}, {"notes", r.notes}};
+    Json json{{"reference_relative_rms_error",
+               r.reference_rms_error ? Json(*r.reference_rms_error) : Json(nullptr)},
+              {"reference_noise_source", r.reference_noise_source},
+              {"notes", r.notes}};
     for (std::size_t i = 0; i < 2; ++i) {
         const ReferenceError& e = r.errors[i];
         Json& of = json[i == 0 ? "a" : "b"];
@@ -200,9 +231,11 @@ Json referenceJson(const ReferenceComparison& r) {
         of["mse"] = e.metrics.mse;
         for (const ReferenceRow& row : kRows) {
             of[row.key] = (e.*row.metric).value;
-            of[std::string(row.key) + "_spread"] = (e.*row.metric).spread ? Json(*(e.*row.metric).spread) : Json(nullptr);
+            of[std::string(row.key) + "_spread"] =
+                (e.*row.metric).spread ? Json(*(e.*row.metric).spread) : Json(nullptr);
         }
-        of["relative_rmse_less_reference_variance"] = e.corrected_relative_rmse ? Json(*e.corrected_relative_rmse) : Json(nullptr);
+        of["relative_rmse_less_reference_variance"] =
+            e.corrected_relative_rmse ? Json(*e.corrected_relative_rmse) : Json(nullptr);
         of["within_reference_noise"] = e.within_reference_noise;
         of["warnings"] = e.warnings;
     }
@@ -224,7 +257,8 @@ Json resultJson(const CompareResult& r) {
     json["first_difference"] = nullptr;
     if (r.first_difference) {
         const Difference& d = *r.first_difference;
-        json["first_difference"] = {{"x", d.x}, {"y", d.y}, {"channel", d.channel}, {"first", d.first}, {"second", d.second}};
+        json["first_difference"] = {
+            {"x", d.x}, {"y", d.y}, {"channel", d.channel}, {"first", d.first}, {"second", d.second}};
         json["first_difference"]["ulps"] = d.ulps ? Json(*d.ulps) : Json(nullptr);
     }
     json["not_finite"] = r.not_finite;
@@ -254,16 +288,19 @@ Json resultJson(const CompareResult& r) {
 Lines resultLines(const CompareResult& r) {
     if (!r.mismatch.empty()) return Lines("different: " + r.mismatch);
     const std::uint64_t pixels = std::uint64_t{r.width} * r.height;
-    Lines lines(fmt::format("{}: {} of {} pixels differ ({})", verdictOf(r), r.differing_pixels, pixels, fmt::join(r.channels, ", ")));
+    Lines lines(fmt::format("{}: {} of {} pixels differ ({})", verdictOf(r), r.differing_pixels, pixels,
+                            fmt::join(r.channels, ", ")));
     if (r.first_difference) lines.add("first difference", differenceText(*r.first_difference));
     if (!r.metrics_valid) {
-        lines.add("not finite", fmt::format("{} values in the first image, {} in the second: no metric means anything", r.not_finite[0],
-                                            r.not_finite[1]));
+        lines.add("not finite",
+                  fmt::format("{} values in the first image, {} in the second: no metric means anything",
+                              r.not_finite[0], r.not_finite[1]));
     } else if (r.differing_pixels > 0) {
         addMetricLines(lines, r);
     }
     for (const std::string& note : r.notes) lines.add("note", note);
-    if (!r.other_channels.empty()) lines.add("not compared", fmt::format("{} (in one image only)", fmt::join(r.other_channels, ", ")));
+    if (!r.other_channels.empty())
+        lines.add("not compared", fmt::format("{} (in one image only)", fmt::join(r.other_channels, ", ")));
     return lines;
 }
 
@@ -275,7 +312,8 @@ std::string compareJson(const CompareResult& result) { return resultJson(result)
 std::string comparisonText(const Comparison& comparison) {
     const CompareResult& r = *comparison.result;
     Lines lines = resultLines(r);
-    if (comparison.noise != nullptr && r.differing_pixels > 0) addNoiseLines(lines, *comparison.noise, r.width);
+    if (comparison.noise != nullptr && r.differing_pixels > 0)
+        addNoiseLines(lines, *comparison.noise, r.width);
     if (comparison.reference != nullptr) addReferenceLines(lines, *comparison.reference);
     return lines.text();
 }

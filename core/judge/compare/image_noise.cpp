@@ -1,9 +1,9 @@
 #include "judge/compare/image_noise.h"
 
+#include "base/statistics.h"
+#include "film/luminance_error.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
-#include "film/luminance_error.h"
-#include "base/statistics.h"
 
 #include <fmt/format.h>
 
@@ -59,7 +59,8 @@ struct Reduction {
 };
 
 /// Variance of the mean of eight, from their spread.
-void addFolds(NoisyImage& noisy, const Image& image, const std::vector<Places>& folds, const Reduction& reduce) {
+void addFolds(NoisyImage& noisy, const Image& image, const std::vector<Places>& folds,
+              const Reduction& reduce) {
     noisy.dof = kFolds - 1;
     noisy.source = fmt::format("{} folds", kFolds);
     noisy.fold_means.assign(reduce.channels(), std::vector<double>(kFolds, 0.0));
@@ -78,7 +79,8 @@ void addFolds(NoisyImage& noisy, const Image& image, const std::vector<Places>& 
 bool addStated(NoisyImage& noisy, const Image& image, NoiseOf what) {
     for (const char* kind : {"StdError.", "Variance."}) {
         const std::string prefix = kind;
-        const std::vector<std::string> names = what == NoiseOf::Color ? colorNames(prefix) : std::vector<std::string>{prefix + "Y"};
+        const std::vector<std::string> names =
+            what == NoiseOf::Color ? colorNames(prefix) : std::vector<std::string>{prefix + "Y"};
         const std::optional<Places> places = placesOf(image, names);
         if (!places) continue;
         for (std::size_t p = 0; p < pixelsOf(image); ++p)
@@ -106,7 +108,8 @@ std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what) {
     NoisyImage noisy;
     noisy.channels = what == NoiseOf::Color ? colorNames("") : std::vector<std::string>{"Y"};
     for (std::size_t p = 0; p < pixelsOf(image); ++p)
-        for (std::size_t c = 0; c < reduce.channels(); ++c) noisy.values.push_back(reduce(&image.pixels[p * image.channels.size()], *rgb, c));
+        for (std::size_t c = 0; c < reduce.channels(); ++c)
+            noisy.values.push_back(reduce(&image.pixels[p * image.channels.size()], *rgb, c));
     if (const auto folds = foldPlaces(image)) {
         addFolds(noisy, image, *folds, reduce);
     } else if (!addStated(noisy, image, what)) {
@@ -114,7 +117,8 @@ std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what) {
     }
     const auto known = [](double v) { return std::isfinite(v) && v >= 0; };
     if (!std::all_of(noisy.variances.begin(), noisy.variances.end(), known)) return std::nullopt;
-    if (!std::all_of(noisy.values.begin(), noisy.values.end(), [](double v) { return std::isfinite(v); })) return std::nullopt;
+    if (!std::all_of(noisy.values.begin(), noisy.values.end(), [](double v) { return std::isfinite(v); }))
+        return std::nullopt;
     return noisy;
 }
 

@@ -38,7 +38,8 @@ std::optional<NoisyImage> noisyImage(const Image& image, NoiseOf what);
 /// infinite one.
 bool statesNoise(const Image& image);
 
-/// One sentence when both images name the same seed in their metadata, so that they may share samples; else empty.
+/// One sentence when both images name the same seed in their metadata, so that they may share samples; else
+/// empty.
 std::string sameSeed(const Image& a, const Image& b);
 
 /// Are there channels of eight folds?

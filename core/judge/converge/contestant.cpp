@@ -1,15 +1,15 @@
-#include "judge/converge/contestant.h"
 #include "film/resolve.h"
+#include "judge/converge/contestant.h"
 
 #include "backend/loader.h"
 #include "compile/compile.h"
-#include "judge/converge/fits.h"
 #include "film/error_estimate.h"
-#include "render/report.h"
+#include "film/luminance_error.h"
+#include "judge/converge/fits.h"
 #include "judge/stats/color_difference.h"
 #include "judge/stats/flip.h"
-#include "film/luminance_error.h"
 #include "judge/stats/metrics.h"
+#include "render/report.h"
 
 #include <fmt/format.h>
 
@@ -24,7 +24,9 @@ namespace crt::converge {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 /// The reference's luminances, one for each pixel.
 std::vector<float> spread(const Reference& reference, std::size_t pixels) {
@@ -69,7 +71,8 @@ void Contestant::describe(const CompiledScene& compiled, double setup_seconds) {
     c.scene_hash = compiled.hash;
     c.width = compiled.width;
     c.height = compiled.height;
-    for (const std::string& feature : featureList(compiled.features)) c.kept.push_back({feature, "the scene needs it"});
+    for (const std::string& feature : featureList(compiled.features))
+        c.kept.push_back({feature, "the scene needs it"});
     for (const auto& [what, why] : compiled.left_out) c.left_out.push_back({what, why});
     c.stages.parse = scene_.parse_seconds;
     c.stages.build = compiled.compile_seconds + compiled.build_seconds + report.build_seconds;
@@ -97,18 +100,22 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
         for (std::size_t c = 0; c < 3; ++c)
             row.image_mean[c] += image.pixels[3 * p + c] / static_cast<double>(pixels);
     const bool independent = scene_.sampler.type != SamplerType::Sobol;
-    if (const std::optional<ErrorEstimate> own = estimateError(film, PixelSet::All, independent); own && own->known())
-        row.predicted_relative_rmse = {own->relative_rmse, own->relative_rmse_95.lower, own->relative_rmse_95.upper};
+    if (const std::optional<ErrorEstimate> own = estimateError(film, PixelSet::All, independent);
+        own && own->known())
+        row.predicted_relative_rmse = {own->relative_rmse, own->relative_rmse_95.lower,
+                                       own->relative_rmse_95.upper};
 
     if (reference_ != nullptr) {
         const stats::ErrorMetrics m = stats::errorMetrics(luminance, spread(*reference_, pixels));
-        row.error = ErrorMetrics{m.mse, m.rmse, m.relative_rmse, m.relmse, m.smape, m.mae, m.max_absolute, {}, {}};
+        row.error =
+            ErrorMetrics{m.mse, m.rmse, m.relative_rmse, m.relmse, m.smape, m.mae, m.max_absolute, {}, {}};
         for (const std::vector<float>& fold : reference_->fold_luminance)
             row.fold_mse.push_back(stats::meanSquaredDifference(luminance, fold));
         if (reference_->info.kind == ReferenceKind::Analytic) {
             row.image_mean.fill(row.mean_luminance);
         } else if (last && scene_.film.color_space == ColorSpace::LinearSrgb) {
-            const stats::RgbView test{image.pixels, image.width, image.height}, truth{reference_->rgb, image.width, image.height};
+            const stats::RgbView test{image.pixels, image.width, image.height},
+                truth{reference_->rgb, image.width, image.height};
             row.error->flip_mean = stats::flipHdr(test, truth).mean;
             row.error->delta_e2000_mean = stats::deltaE2000(test, truth).mean;
         }
@@ -123,13 +130,15 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
         const double exposure = std::exp2(developmentOf(scene_).forFloats().exposure_ev);
         for (std::uint32_t y = 0; y < image.height; ++y)
             for (std::uint32_t x = 0; x < image.width; ++x)
-                last_error_.values[std::size_t{y} * image.width + x] = static_cast<float>(std::sqrt(variance(x, y)) * exposure / mean);
+                last_error_.values[std::size_t{y} * image.width + x] =
+                    static_cast<float>(std::sqrt(variance(x, y)) * exposure / mean);
     }
     looks_[row.samples][replicate] = std::move(luminance);
     return row;
 }
 
-/// What only the very first sample pays, such as an OpenCL driver that makes machine code late, belongs to the start and not to a replicate.
+/// What only the very first sample pays, such as an OpenCL driver that makes machine code late, belongs to
+/// the start and not to a replicate.
 void Contestant::warmUp(const CompiledScene& compiled) {
     const Clock::time_point start = Clock::now();
     integrator_->render({.first_sample = 0, .sample_count = 1});
@@ -169,8 +178,8 @@ void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored)
     last_error_ = {configuration_.width, configuration_.height, stored.standard_error};
 }
 
-bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
-                           const std::function<bool()>& stop) {
+bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds,
+                           const std::function<void(const Row&)>& found, const std::function<bool()>& stop) {
     scene_.sampler.seed = seed_ + 1 + replicate;
     const CompiledScene compiled = compileScene(scene_, 0, integrator_->compileOptions());
     integrator_->setScene(compiled);
@@ -192,11 +201,13 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
         Film film(shape);
         integrator_->readFilm(film);
         // The next doubling takes as long as all before it, and its look some more.
-        const bool last = done * 2 > most_samples || (exploring && secondsSince(start) + 2.2 * step_seconds > seconds);
+        const bool last =
+            done * 2 > most_samples || (exploring && secondsSince(start) + 2.2 * step_seconds > seconds);
         Row row = look(film, replicate, last);
         const CrtBackendReport now = integrator_->report();
         row.render_wall_seconds = wall;
-        if (now.render_seconds > before.render_seconds) row.render_device_seconds = now.render_seconds - before.render_seconds;
+        if (now.render_seconds > before.render_seconds)
+            row.render_device_seconds = now.render_seconds - before.render_seconds;
         row.seconds_before_first_sample = before_first_sample_;
         row.paths = now.paths - (before.paths <= now.paths ? before.paths : 0);
         row.closest_rays = now.closest_rays - std::min(before.closest_rays, now.closest_rays);
@@ -226,20 +237,24 @@ void Contestant::finish() {
     c.maps.z = c.maps.error;
     for (std::size_t p = 0; p < pixels; ++p) {
         const double difference = (luminance[p] - truth[p]) / mean;
-        const double noise = std::hypot(last_error_.values[p], std::sqrt(reference_->info.mean_variance) / mean);
+        const double noise =
+            std::hypot(last_error_.values[p], std::sqrt(reference_->info.mean_variance) / mean);
         c.maps.error.values[p] = static_cast<float>(std::abs(difference));
         c.maps.z.values[p] = noise > 0 ? static_cast<float>(difference / noise) : 0.0f;
     }
     if (reference_->fold_rgb.empty()) return;
     if (scene_.film.color_space == ColorSpace::LinearSrgb)
-        c.maps.flip = {c.width, c.height,
-                       stats::flipHdr({last_image_.pixels, c.width, c.height}, {reference_->rgb, c.width, c.height}).error};
+        c.maps.flip = {
+            c.width, c.height,
+            stats::flipHdr({last_image_.pixels, c.width, c.height}, {reference_->rgb, c.width, c.height})
+                .error};
     stats::Replicates eighths(c.width, c.height, 3);
     for (const std::vector<double>& fold : reference_->fold_rgb) eighths.add(fold);
     if (tests_.count() >= 2) c.tests = imageTestsOf(stats::gate(tests_, eighths));
 }
 
-void fillBetweenReplicates(std::vector<Row>& rows, const Key& key, const std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks) {
+void fillBetweenReplicates(std::vector<Row>& rows, const Key& key,
+                           const std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks) {
     for (const auto& [samples, replicates] : looks) {
         const auto count = static_cast<double>(replicates.size());
         if (count < 2) continue;

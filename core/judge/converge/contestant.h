@@ -1,4 +1,5 @@
-/// One configuration at work: a scene variant on a backend, rendered progressively with one seed after another.
+/// One configuration at work: a scene variant on a backend, rendered progressively with one seed after
+/// another.
 #pragma once
 
 #include "backend/integrator.h"
@@ -25,10 +26,11 @@ public:
     /// replicate, and timed as the start of every one.
     void prepare();
 
-    /// Renders seed number `replicate` to N = 1, 2, 4 … and gives each look to `found`, until `most_samples`, or (on the first replicate) until the
-    /// next doubling would take the replicate beyond `seconds`. Returns false when `stop` said so.
-    bool replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds, const std::function<void(const Row&)>& found,
-                   const std::function<bool()>& stop);
+    /// Renders seed number `replicate` to N = 1, 2, 4 … and gives each look to `found`, until
+    /// `most_samples`, or (on the first replicate) until the next doubling would take the replicate beyond
+    /// `seconds`. Returns false when `stop` said so.
+    bool replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds,
+                   const std::function<void(const Row&)>& found, const std::function<bool()>& stop);
 
     const Key& key() const { return configuration_.key; }
     Configuration& configuration() { return configuration_; }
@@ -65,7 +67,9 @@ private:
     Plane last_error_;          ///< The image's own standard error, relative to its mean.
 };
 
-/// What becomes known when replicates can be compared: (R − 1)/R · mean (I_r − mean of the others)², into the rows.
-void fillBetweenReplicates(std::vector<Row>& rows, const Key& key, const std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks);
+/// What becomes known when replicates can be compared: (R − 1)/R · mean (I_r − mean of the others)², into
+/// the rows.
+void fillBetweenReplicates(std::vector<Row>& rows, const Key& key,
+                           const std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks);
 
 }  // namespace crt::converge

@@ -1,9 +1,11 @@
-#include "judge/converge/engine.h"
 #include "film/error_text.h"
+#include "judge/converge/engine.h"
 
-#include "base/unit_text.h"
-#include "base/atomic_file.h"
 #include "backend/loader.h"
+#include "base/atomic_file.h"
+#include "base/host.h"
+#include "base/log.h"
+#include "base/unit_text.h"
 #include "judge/converge/contestant.h"
 #include "judge/converge/experiment.h"
 #include "judge/converge/files.h"
@@ -13,8 +15,6 @@
 #include "judge/converge/report_html.h"
 #include "judge/converge/report_maps.h"
 #include "judge/converge/variants.h"
-#include "base/host.h"
-#include "base/log.h"
 #include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
@@ -43,7 +43,8 @@ constexpr double kWarmUpShare = 0.4;
 /// One run from start to report.
 class Engine {
 public:
-    Engine(const ConvergeRequest& request, Watch& watch) : request_(request), watch_(watch), start_(Clock::now()) {}
+    Engine(const ConvergeRequest& request, Watch& watch)
+        : request_(request), watch_(watch), start_(Clock::now()) {}
 
     int run() {
         refuseAmbiguity();
@@ -80,7 +81,11 @@ private:
         if (fs::exists(path("results.jsonl")) && fs::file_size(path("results.jsonl")) > 0) {
             holds_rows_ = true;
             if (!request_.resume)
-                throw Error(ErrorKind::Usage, fmt::format("'{}' holds an earlier run: add --resume to go on with it, or choose another folder", request_.output));
+                throw Error(
+                    ErrorKind::Usage,
+                    fmt::format(
+                        "'{}' holds an earlier run: add --resume to go on with it, or choose another folder",
+                        request_.output));
             run_.rows = readResults(path("results.jsonl"));
         }
         log_ = std::make_unique<ResultsLog>(path("results.jsonl"));
@@ -101,12 +106,15 @@ private:
         e.started = utcNow();
         e.commands = {request_.command};
         e.budget_seconds = request_.seconds;
-        e.threads = request_.integrator.threads != 0 ? request_.integrator.threads : std::thread::hardware_concurrency();
+        e.threads = request_.integrator.threads != 0 ? request_.integrator.threads
+                                                     : std::thread::hardware_concurrency();
     }
 
-    /// Scenes and the references that are of them. A reference that is of none is a mistake, not something to be silent about.
+    /// Scenes and the references that are of them. A reference that is of none is a mistake, not something
+    /// to be silent about.
     void loadReferences() {
-        for (const SceneRequest& scene : request_.scenes) scenes_.push_back(loadSmall(scene, {}, request_.resolution));
+        for (const SceneRequest& scene : request_.scenes)
+            scenes_.push_back(loadSmall(scene, {}, request_.resolution));
         references_.resize(scenes_.size());
         for (const std::string& text : request_.references) {
             std::vector<std::string> refusals;
@@ -256,7 +264,9 @@ private:
                         order_.push_back({key, nullptr, error.what()});
                     }
                 }
-        if (contestants_.empty()) throw Error(ErrorKind::Backend, fmt::format("none of the backends can run: {}", order_.front().omitted));
+        if (contestants_.empty())
+            throw Error(ErrorKind::Backend,
+                        fmt::format("none of the backends can run: {}", order_.front().omitted));
         for (const Entry& entry : order_)
             if (!entry.contestant) logInfo("left out: {}", entry.omitted);
     }
@@ -264,22 +274,29 @@ private:
     void render() {
         const WatchedRendering rendering(watch_);
         const auto stop = [this] { return stopped(); };
-        // A report takes a little, and so does reading films; the rest is shared by replicates and configurations alike.
+        // A report takes a little, and so does reading films; the rest is shared by replicates and
+        // configurations alike.
         const double for_report = 1 + 0.01 * request_.seconds;
-        const double share = std::max(0.0, request_.seconds - elapsed() - for_report) / static_cast<double>(request_.replicates * contestants_.size());
+        const double share = std::max(0.0, request_.seconds - elapsed() - for_report) /
+                             static_cast<double>(request_.replicates * contestants_.size());
         resumeReplicates();
         for (std::uint32_t replicate = 0;; ++replicate) {
             double round = 0;
             for (const auto& contestant : contestants_) round += contestant->secondsOfLastReplicate();
-            if (replicate >= 2 && replicate < request_.replicates && elapsed() + round > 1.05 * request_.seconds) {
-                run_.notes.push_back(fmt::format("the time allowed {} of {} replicates", replicate, request_.replicates));
+            if (replicate >= 2 && replicate < request_.replicates &&
+                elapsed() + round > 1.05 * request_.seconds) {
+                run_.notes.push_back(
+                    fmt::format("the time allowed {} of {} replicates", replicate, request_.replicates));
                 break;
             }
             if (replicate >= request_.replicates && elapsed() + round + for_report > request_.seconds) break;
             for (const auto& contestant : contestants_) {
-                if (contestant->looks().begin() != contestant->looks().end() && contestant->looks().begin()->second.count(replicate) > 0) continue;
+                if (contestant->looks().begin() != contestant->looks().end() &&
+                    contestant->looks().begin()->second.count(replicate) > 0)
+                    continue;
                 if (!renderOne(*contestant, replicate, share, stop)) {
-                    run_.notes.push_back(fmt::format("interrupted after {} rounds of replicates; --resume goes on", replicate));
+                    run_.notes.push_back(fmt::format(
+                        "interrupted after {} rounds of replicates; --resume goes on", replicate));
                     return;
                 }
             }
@@ -287,13 +304,15 @@ private:
         }
     }
 
-    bool renderOne(Contestant& contestant, std::uint32_t replicate, double share, const std::function<bool()>& stop) {
+    bool renderOne(Contestant& contestant, std::uint32_t replicate, double share,
+                   const std::function<bool()>& stop) {
         const std::uint64_t most = replicate == 0 ? request_.max_samples : contestant.samplesReached();
         const auto found = [&](const Row& row) {
             run_.rows.push_back(row);
             log_->append(row);
             ProgressState state;
-            state.label = fmt::format("replicate {}  {} {} {}", replicate + 1, row.key.scene, row.key.backend, row.key.variant);
+            state.label = fmt::format("replicate {}  {} {} {}", replicate + 1, row.key.scene,
+                                      row.key.backend, row.key.variant);
             state.elapsed_seconds = elapsed();
             state.time_limit_seconds = request_.seconds;
             watch_.progress(state);
@@ -387,9 +406,11 @@ private:
         for (const Row& row : run_.rows) most = std::max(most, row.samples);
         for (const ReferenceInfo& info : run_.references)
             if (info.kind == ReferenceKind::Independent && info.samples < 64 * most)
-                run_.notes.push_back(fmt::format("the reference of {} has {} samples, less than 64 times the {} measured: its variance is subtracted, and "
-                                                 "widens what is said about bias",
-                                                 info.scene, info.samples, most));
+                run_.notes.push_back(
+                    fmt::format("the reference of {} has {} samples, less than 64 times the {} measured: "
+                                "its variance is subtracted, and "
+                                "widens what is said about bias",
+                                info.scene, info.samples, most));
     }
 
     struct Entry {

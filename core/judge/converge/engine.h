@@ -1,5 +1,6 @@
-/// `crt converge`: error against run time for scenes × backends × variants, within a budget of time. Replicates of all configurations take turns, so that
-/// a machine that slows down slows all of them. This file renders; fits.h says what it means, report_html.h shows it.
+/// `crt converge`: error against run time for scenes × backends × variants, within a budget of time.
+/// Replicates of all configurations take turns, so that a machine that slows down slows all of them. This
+/// file renders; fits.h says what it means, report_html.h shows it.
 #pragma once
 
 #include "judge/converge/reference.h"
@@ -21,15 +22,16 @@ struct ConvergeRequest {
     double seconds = 60;                   ///< For everything, start-up and report included.
     std::uint32_t replicates = 16;         ///< At least; more where time is left.
     std::uint64_t max_samples = std::uint64_t{1} << 24;
-    int resolution = 128;                  ///< Longer side in pixels where no reference and no --set says otherwise; 0: as the scene has it.
+    int resolution = 128;  ///< Longer side in pixels where no reference and no --set says otherwise; 0: as
+                           ///< the scene has it.
     IntegratorOptions integrator;
     std::string output = "converge";       ///< Folder.
     bool resume = false;
     std::string command;
 };
 
-/// Renders, fits, writes the report; the exit code: 0, 7 when a configuration's verdict is FAIL, that of the StopRequest when interrupted (what there is is
-/// reported). Throws crt::Error.
+/// Renders, fits, writes the report; the exit code: 0, 7 when a configuration's verdict is FAIL, that of the
+/// StopRequest when interrupted (what there is is reported). Throws crt::Error.
 int converge(const ConvergeRequest& request, Watch& watch);
 
 }  // namespace crt::converge

@@ -5,9 +5,9 @@
 /// mean (I − F_i)(I − F_j): what the noise of the reference adds cancels, and leaving out a fold is cheap.
 #pragma once
 
+#include "base/statistics.h"
 #include "judge/converge/fits.h"
 #include "judge/converge/jackknife.h"
-#include "base/statistics.h"
 
 #include <cstdint>
 #include <map>

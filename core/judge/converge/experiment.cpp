@@ -1,11 +1,11 @@
 #include "judge/converge/experiment.h"
 
 #include "base/atomic_file.h"
+#include "base/error.h"
+#include "base/input_file.h"
+#include "film/film_record.h"
 #include "judge/converge/reference.h"
 #include "judge/converge/report_maps.h"
-#include "base/error.h"
-#include "film/film_record.h"
-#include "base/input_file.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -46,7 +46,8 @@ Experiment readExperiment(const std::string& path) {
     try {
         text = readInput(path, kMostTableBytes);
     } catch (const InputRefused& refused) {
-        throw Error(ErrorKind::Usage, fmt::format("'{}' does not say what experiment it holds (its experiment.json {}), so it cannot be resumed",
+        throw Error(ErrorKind::Usage, fmt::format("'{}' does not say what experiment it holds (its "
+                                                  "experiment.json {}), so it cannot be resumed",
                                                   fs::path(path).parent_path().string(), refused.what()));
     }
     try {
@@ -68,7 +69,8 @@ Experiment readExperiment(const std::string& path) {
     }
 }
 
-constexpr const char* kDigestMark = " #";  // Between the words of a trait and the digest of what they leave out.
+constexpr const char* kDigestMark =
+    " #";  // Between the words of a trait and the digest of what they leave out.
 
 std::string withoutDigest(const std::string& text) { return text.substr(0, text.rfind(kDigestMark)); }
 
@@ -84,9 +86,11 @@ void requireSame(const std::string& path, const Properties& then, const Properti
                                         [&](const auto& value) { return value.first == name; });
         const std::string was = found == then.values.end() ? "unknown" : found->second;
         if (was != text && withoutDigest(was) == withoutDigest(text))
-            refuse(path, fmt::format("{} of {} was another ({} in both)", name, labelOf(now.key), withoutDigest(text)));
+            refuse(path, fmt::format("{} of {} was another ({} in both)", name, labelOf(now.key),
+                                     withoutDigest(text)));
         if (was != text)
-            refuse(path, fmt::format("{} of {} was {}, and is {} now", name, labelOf(now.key), withoutDigest(was), withoutDigest(text)));
+            refuse(path, fmt::format("{} of {} was {}, and is {} now", name, labelOf(now.key),
+                                     withoutDigest(was), withoutDigest(text)));
     }
 }
 
@@ -118,9 +122,12 @@ Properties propertiesOf(const Key& key, const Scene& scene, const std::string& c
                 {"the reference", reference}};
     // What is to be seen, in words where there are any; the hash has the last word.
     for (const SceneTrait& trait : recordOf(scene).traits)
-        for (const char* name : {"the crop window", "the filter", "the camera", "the geometry", "the materials", "the light"})
+        for (const char* name :
+             {"the crop window", "the filter", "the camera", "the geometry", "the materials", "the light"})
             if (trait.name == name)
-                p.values.emplace_back(name, trait.digest.empty() ? trait.text : fmt::format("{}{}{}", trait.text, kDigestMark, trait.digest));
+                p.values.emplace_back(name, trait.digest.empty() ? trait.text
+                                                                 : fmt::format("{}{}{}", trait.text,
+                                                                               kDigestMark, trait.digest));
     p.values.emplace_back("the hash of what is to be seen", content);
     return p;
 }

@@ -2,8 +2,8 @@
 /// begins, so that --resume can refuse to mix rows of two.
 #pragma once
 
-#include "judge/converge/measurement.h"
 #include "base/host.h"
+#include "judge/converge/measurement.h"
 #include "render/job.h"
 #include "scene/scene.h"
 

@@ -1,8 +1,8 @@
 #include "judge/converge/files.h"
 
-#include "judge/converge/json_parts.h"
 #include "base/error.h"
 #include "base/input_file.h"
+#include "judge/converge/json_parts.h"
 
 #include <fmt/format.h>
 
@@ -28,15 +28,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-double numberIn(const Json& value) { return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>(); }
-std::optional<double> knownNumberIn(const Json& value) { return value.is_null() ? std::nullopt : std::optional(value.get<double>()); }
-std::array<double, 3> numbersIn(const Json& value) { return {numberIn(value.at(0)), numberIn(value.at(1)), numberIn(value.at(2))}; }
+double numberIn(const Json& value) {
+    return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
+}
+std::optional<double> knownNumberIn(const Json& value) {
+    return value.is_null() ? std::nullopt : std::optional(value.get<double>());
+}
+std::array<double, 3> numbersIn(const Json& value) {
+    return {numberIn(value.at(0)), numberIn(value.at(1)), numberIn(value.at(2))};
+}
 
-// ------------------------------------------------------------------------------------------------------------------------- rows
+// ----------------------------------------------------------------------------------------------------------
+// rows
 
 Json errorJson(const ErrorMetrics& e) {
-    return {{"mse", number(e.mse)},     {"rmse", number(e.rmse)}, {"relative_rmse", number(e.relative_rmse)}, {"relmse", number(e.relmse)},
-            {"smape", number(e.smape)}, {"mae", number(e.mae)},   {"max_absolute", number(e.max_absolute)},   {"flip_mean", number(e.flip_mean)},
+    return {{"mse", number(e.mse)},
+            {"rmse", number(e.rmse)},
+            {"relative_rmse", number(e.relative_rmse)},
+            {"relmse", number(e.relmse)},
+            {"smape", number(e.smape)},
+            {"mae", number(e.mae)},
+            {"max_absolute", number(e.max_absolute)},
+            {"flip_mean", number(e.flip_mean)},
             {"delta_e2000_mean", number(e.delta_e2000_mean)}};
 }
 
@@ -76,7 +89,8 @@ Json rowJson(const Row& row) {
     json["predicted_relative_rmse"] = interval(row.predicted_relative_rmse);
     json["mean_luminance"] = number(row.mean_luminance);
     json["image_mean"] = numbers(row.image_mean);
-    json["image_mean_standard_error"] = row.image_mean_standard_error ? numbers(*row.image_mean_standard_error) : Json(nullptr);
+    json["image_mean_standard_error"] =
+        row.image_mean_standard_error ? numbers(*row.image_mean_standard_error) : Json(nullptr);
     json["invalid_samples"] = row.invalid_samples;
     json["void"] = row.isVoid();  // For readers; what makes it so is above.
     json["cpu_clock_mhz"] = number(row.cpu_clock_mhz);
@@ -87,7 +101,8 @@ Json rowJson(const Row& row) {
 
 Row rowOf(const Json& json) {
     Row row;
-    row.key = {json.at("scene").get<std::string>(), json.at("backend").get<std::string>(), json.at("variant").get<std::string>()};
+    row.key = {json.at("scene").get<std::string>(), json.at("backend").get<std::string>(),
+               json.at("variant").get<std::string>()};
     row.seed = json.at("seed").get<std::uint64_t>();
     row.replicate = json.at("replicate").get<std::uint32_t>();
     row.samples = json.at("samples_per_pixel").get<std::uint64_t>();
@@ -102,10 +117,12 @@ Row rowOf(const Json& json) {
     row.between_replicates_mse = knownNumberIn(json.at("between_replicates_mse"));
     row.effective_pixels = knownNumberIn(json.at("effective_pixels"));
     if (const Json& predicted = json.at("predicted_relative_rmse"); !predicted.is_null())
-        row.predicted_relative_rmse = Estimate{numberIn(predicted.at("value")), numberIn(predicted.at("low")), numberIn(predicted.at("high"))};
+        row.predicted_relative_rmse = Estimate{
+            numberIn(predicted.at("value")), numberIn(predicted.at("low")), numberIn(predicted.at("high"))};
     row.mean_luminance = numberIn(json.at("mean_luminance"));
     row.image_mean = numbersIn(json.at("image_mean"));
-    if (const Json& error = json.at("image_mean_standard_error"); !error.is_null()) row.image_mean_standard_error = numbersIn(error);
+    if (const Json& error = json.at("image_mean_standard_error"); !error.is_null())
+        row.image_mean_standard_error = numbersIn(error);
     row.invalid_samples = json.at("invalid_samples").get<std::uint64_t>();
     row.cpu_clock_mhz = knownNumberIn(json.at("cpu_clock_mhz"));
     row.load_average = knownNumberIn(json.at("load_average"));
@@ -117,7 +134,8 @@ Row rowOf(const Json& json) {
     throw Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, std::strerror(errno)), {path});
 }
 
-// -------------------------------------------------------------------------------------------------------------------------- csv
+// ----------------------------------------------------------------------------------------------------------
+// csv
 
 /// A field of RFC 4180: quoted where it has to be.
 std::string csvField(const std::string& text) {
@@ -126,7 +144,9 @@ std::string csvField(const std::string& text) {
     for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
     return quoted + '"';
 }
-std::string csvField(double value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string(); }
+std::string csvField(double value) {
+    return std::isfinite(value) ? fmt::format("{}", value) : std::string();
+}
 std::string csvField(std::uint64_t value) { return std::to_string(value); }
 std::string csvField(const std::optional<double>& value) { return value ? csvField(*value) : std::string(); }
 
@@ -142,11 +162,17 @@ std::function<std::string(const Row&)> errorField(Member ErrorMetrics::*member) 
 }
 
 std::function<std::string(const Row&)> predictionField(double Estimate::*member) {
-    return [member](const Row& row) { return row.predicted_relative_rmse ? csvField((*row.predicted_relative_rmse).*member) : std::string(); };
+    return [member](const Row& row) {
+        return row.predicted_relative_rmse ? csvField((*row.predicted_relative_rmse).*member)
+                                           : std::string();
+    };
 }
 
 std::function<std::string(const Row&)> standardErrorField(std::size_t channel) {
-    return [channel](const Row& row) { return row.image_mean_standard_error ? csvField((*row.image_mean_standard_error)[channel]) : std::string(); };
+    return [channel](const Row& row) {
+        return row.image_mean_standard_error ? csvField((*row.image_mean_standard_error)[channel])
+                                             : std::string();
+    };
 }
 
 const std::vector<Column>& csvColumns() {
@@ -248,17 +274,23 @@ std::vector<Row> readResults(const std::string& path) {
         if (file.eof()) break;  // No end of line: torn.
         try {
             Row row = rowOf(Json::parse(line));
-            const auto [found, is_new] = place.try_emplace({row.key, row.replicate, row.samples}, rows.size());
+            const auto [found, is_new] =
+                place.try_emplace({row.key, row.replicate, row.samples}, rows.size());
             if (is_new)
                 rows.push_back(std::move(row));
             else
                 rows[found->second] = std::move(row);
         } catch (const nlohmann::json::exception& e) {
-            throw Error(ErrorKind::Usage, fmt::format("this line is not a row of 'crt converge' ({}); remove it, or write to a new folder", e.what()),
-                        {path, line_number});
+            throw Error(
+                ErrorKind::Usage,
+                fmt::format(
+                    "this line is not a row of 'crt converge' ({}); remove it, or write to a new folder",
+                    e.what()),
+                {path, line_number});
         }
     }
-    if (file.bad() || !file.eof()) throw Error(ErrorKind::Usage, fmt::format("cannot read '{}'", path), {path});
+    if (file.bad() || !file.eof())
+        throw Error(ErrorKind::Usage, fmt::format("cannot read '{}'", path), {path});
     return rows;
 }
 
@@ -275,13 +307,15 @@ void writeCsv(const std::string& path, const std::vector<Row>& rows) {
 
 std::string hashOfFile(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
-    const std::unique_ptr<XXH3_state_t, void (*)(XXH3_state_t*)> state(XXH3_createState(), [](XXH3_state_t* s) { XXH3_freeState(s); });
+    const std::unique_ptr<XXH3_state_t, void (*)(XXH3_state_t*)> state(
+        XXH3_createState(), [](XXH3_state_t* s) { XXH3_freeState(s); });
     if (!state) throw std::bad_alloc();
     XXH3_128bits_reset(state.get());
     std::vector<char> buffer(1 << 16);
     while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0)
         XXH3_128bits_update(state.get(), buffer.data(), static_cast<std::size_t>(file.gcount()));
-    if (file.bad() || !file.eof()) throw Error(ErrorKind::Usage, fmt::format("cannot read '{}'", path), {path});
+    if (file.bad() || !file.eof())
+        throw Error(ErrorKind::Usage, fmt::format("cannot read '{}'", path), {path});
     const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
     return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
@@ -294,9 +328,11 @@ void writeManifest(const std::string& path, const Run& run, const std::vector<st
     std::map<std::string, std::string> listed;
     for (const Configuration& c : run.configurations)
         if (c.omitted.empty() && listed.emplace(c.scene_file + c.scene_hash, c.key.scene).second)
-            json["scenes"].push_back({{"scene", c.key.scene}, {"file", c.scene_file}, {"compiled_hash", c.scene_hash}});
+            json["scenes"].push_back(
+                {{"scene", c.key.scene}, {"file", c.scene_file}, {"compiled_hash", c.scene_hash}});
     json["references"] = Json::array();
-    for (const ReferenceInfo& reference : run.references) json["references"].push_back(referenceJson(reference));
+    for (const ReferenceInfo& reference : run.references)
+        json["references"].push_back(referenceJson(reference));
     json["files"] = Json::array();
     for (const std::string& name : files) {
         const fs::path file = fs::path(path).parent_path() / name;

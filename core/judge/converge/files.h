@@ -1,5 +1,6 @@
-/// The files of `crt converge`: rows as they arrive (results.jsonl), the same as a table (results.csv), what they amount to (summary.json), and
-/// what was run to get them (manifest.json). Units are in the names of keys and columns; what is unknown is null or an empty field.
+/// The files of `crt converge`: rows as they arrive (results.jsonl), the same as a table (results.csv), what
+/// they amount to (summary.json), and what was run to get them (manifest.json). Units are in the names of
+/// keys and columns; what is unknown is null or an empty field.
 #pragma once
 
 #include "judge/converge/fits.h"
@@ -10,17 +11,19 @@
 
 namespace crt::converge {
 
-/// results.jsonl being written: one JSON object a line, appended when its row arrives, so that an interrupted run can be resumed. [one thread]
+/// results.jsonl being written: one JSON object a line, appended when its row arrives, so that an
+/// interrupted run can be resumed. [one thread]
 class ResultsLog {
 public:
-    /// Opens or creates it. A last line without an end (the run was killed while writing it) is cut off. Throws crt::Error(Output).
+    /// Opens or creates it. A last line without an end (the run was killed while writing it) is cut off.
+    /// Throws crt::Error(Output).
     explicit ResultsLog(const std::string& path);
     ~ResultsLog();
     ResultsLog(const ResultsLog&) = delete;
     ResultsLog& operator=(const ResultsLog&) = delete;
 
-    /// A row with the key, replicate and samples of an earlier one replaces it: what becomes known later (between_replicates_mse) is written by
-    /// appending the row again.
+    /// A row with the key, replicate and samples of an earlier one replaces it: what becomes known later
+    /// (between_replicates_mse) is written by appending the row again.
     void append(const Row& row);
 
 private:
@@ -28,8 +31,8 @@ private:
     int descriptor_ = -1;
 };
 
-/// The rows of results.jsonl in the order in which each first appeared. A torn last line is left out. No file means no rows; anything else that is
-/// not a row is a crt::Error(Usage) with the line.
+/// The rows of results.jsonl in the order in which each first appeared. A torn last line is left out. No
+/// file means no rows; anything else that is not a row is a crt::Error(Usage) with the line.
 std::vector<Row> readResults(const std::string& path);
 
 /// One line per row, in that order, with a header.
@@ -38,8 +41,8 @@ void writeCsv(const std::string& path, const std::vector<Row>& rows);
 /// Fits, verdicts, references, stages and environment.
 void writeSummary(const std::string& path, const Run& run, const Analysis& analysis);
 
-/// Commands, environment, scenes and references with their hashes, and size and XXH3-128 of each of `files`, which are names relative to the
-/// manifest's folder.
+/// Commands, environment, scenes and references with their hashes, and size and XXH3-128 of each of `files`,
+/// which are names relative to the manifest's folder.
 void writeManifest(const std::string& path, const Run& run, const std::vector<std::string>& files);
 
 /// 32 hex digits, XXH3-128 of a file's bytes. Throws crt::Error(Usage) when it cannot be read.

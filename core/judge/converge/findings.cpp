@@ -1,5 +1,5 @@
-#include "judge/converge/findings.h"
 #include "film/error_text.h"
+#include "judge/converge/findings.h"
 
 #include "base/unit_text.h"
 #include "judge/converge/quantity_text.h"
@@ -32,7 +32,9 @@ Estimate quotient(const Estimate& a, const Estimate& b, std::size_t comparisons,
     return {value, value * std::exp(-down), value * std::exp(up)};
 }
 
-std::string configurations(std::size_t count) { return count == 1 ? "1 configuration" : fmt::format("{} configurations", count); }
+std::string configurations(std::size_t count) {
+    return count == 1 ? "1 configuration" : fmt::format("{} configurations", count);
+}
 
 std::uint32_t fewestReplicates(const Fits& fits) {
     std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
@@ -52,8 +54,9 @@ std::string order(Fits reached, const std::function<const Target&(const Configur
         return target(*a).seconds->value < target(*b).seconds->value;
     });
     const Target& first = target(*reached[0]);
-    std::string text = fmt::format("{} reaches {} relative RMSE first: {}{}, start-up included", labelOf(reached[0]->key), goal,
-                                   first.at_first_point ? "at most " : "", secondsText(*first.seconds));
+    std::string text =
+        fmt::format("{} reaches {} relative RMSE first: {}{}, start-up included", labelOf(reached[0]->key),
+                    goal, first.at_first_point ? "at most " : "", secondsText(*first.seconds));
     if (reached.size() < 2) return text;
     const Target& next = target(*reached[1]);
     const Estimate factor =
@@ -98,7 +101,8 @@ std::vector<Finding> efficiency(const Fits& fits, double confidence) {
     for (const ConfigurationFit* fit : fits)
         if (fit->fitted && std::isfinite(fit->efficiency.value)) fitted.push_back(fit);
     if (fitted.size() < 2) return {};
-    std::sort(fitted.begin(), fitted.end(), [](const auto* a, const auto* b) { return a->efficiency.value > b->efficiency.value; });
+    std::sort(fitted.begin(), fitted.end(),
+              [](const auto* a, const auto* b) { return a->efficiency.value > b->efficiency.value; });
     const ConfigurationFit &most = *fitted.front(), &least = *fitted.back();
     const std::string error = percentText(most.common.relative_rmse, 2);
     const Estimate factor =
@@ -138,18 +142,27 @@ std::vector<Finding> bias(const Fits& fits, double margin) {
     Fits pass, unclear, blind;
     for (const ConfigurationFit* fit : fits) {
         switch (fit->judgement.verdict) {
-            case stats::Verdict::Fail: findings.push_back({Tone::Bad, fmt::format("{} FAILS: {}", labelOf(fit->key), fit->judgement.reason)}); break;
+            case stats::Verdict::Fail:
+                findings.push_back(
+                    {Tone::Bad, fmt::format("{} FAILS: {}", labelOf(fit->key), fit->judgement.reason)});
+                break;
             case stats::Verdict::Pass: pass.push_back(fit); break;
             case stats::Verdict::Inconclusive: (fit->has_reference ? unclear : blind).push_back(fit); break;
         }
     }
     if (!pass.empty())
-        findings.push_back({Tone::Good, fmt::format("No bias that matters: the image mean of {} lies within ±{} of the reference.",
-                                                    pass.size() == fits.size() ? "every configuration" : configurations(pass.size()), percentText(margin, 1))});
+        findings.push_back(
+            {Tone::Good,
+             fmt::format("No bias that matters: the image mean of {} lies within ±{} of the reference.",
+                         pass.size() == fits.size() ? "every configuration" : configurations(pass.size()),
+                         percentText(margin, 1))});
     for (const ConfigurationFit* fit : unclear)
-        findings.push_back({Tone::Warning, fmt::format("{} is undecided: {}", labelOf(fit->key), fit->judgement.reason)});
+        findings.push_back(
+            {Tone::Warning, fmt::format("{} is undecided: {}", labelOf(fit->key), fit->judgement.reason)});
     if (!blind.empty())
-        findings.push_back({Tone::Warning, "There is no reference for this scene: errors are the spread between replicates, in which a bias does not show."});
+        findings.push_back({Tone::Warning,
+                            "There is no reference for this scene: errors are the spread between "
+                            "replicates, in which a bias does not show."});
     const auto noisy = [](const ConfigurationFit* fit) {
         return fit->has_reference && fit->source == ErrorSource::BetweenReplicates;
     };
@@ -161,7 +174,8 @@ std::vector<Finding> bias(const Fits& fits, double margin) {
         if (!fit->fitted || !fit->error.flattening) continue;
         const double floor = std::sqrt(std::max(fit->error.floor().value, 0.0));
         findings.push_back({floor > margin ? Tone::Bad : Tone::Warning,
-                            fmt::format("{} flattens: its error stops falling near {}.", labelOf(fit->key), percentText(floor, 2))});
+                            fmt::format("{} flattens: its error stops falling near {}.", labelOf(fit->key),
+                                        percentText(floor, 2))});
     }
     return findings;
 }
@@ -173,8 +187,10 @@ std::vector<Finding> slopes(const Fits& fits) {
         if (fit->fitted && std::isfinite(fit->slope_samples.value)) fitted.push_back(fit);
     if (fitted.empty()) return {};
     const auto [steepest, flattest] = std::minmax_element(
-        fitted.begin(), fitted.end(), [](const auto* a, const auto* b) { return a->slope_samples.value < b->slope_samples.value; });
-    std::string text = fmt::format("Error falls with samples to the power {} ({})", numberText((*steepest)->slope_samples), labelOf((*steepest)->key));
+        fitted.begin(), fitted.end(),
+        [](const auto* a, const auto* b) { return a->slope_samples.value < b->slope_samples.value; });
+    std::string text = fmt::format("Error falls with samples to the power {} ({})",
+                                   numberText((*steepest)->slope_samples), labelOf((*steepest)->key));
     if ((*steepest)->slope_samples.value != (*flattest)->slope_samples.value)
         text +=
             fmt::format(" to {} ({})", numberText((*flattest)->slope_samples), labelOf((*flattest)->key));
@@ -230,7 +246,8 @@ std::vector<Finding> omissions(const Run& run, const std::string& scene) {
     std::vector<Finding> findings;
     for (const Configuration& configuration : run.configurations)
         if (configuration.key.scene == scene && !configuration.omitted.empty())
-            findings.push_back({Tone::Warning, fmt::format("{} was left out: {}", labelOf(configuration.key), configuration.omitted)});
+            findings.push_back({Tone::Warning, fmt::format("{} was left out: {}", labelOf(configuration.key),
+                                                           configuration.omitted)});
     return findings;
 }
 
@@ -243,7 +260,8 @@ void append(std::vector<Finding>& to, std::vector<Finding> from) {
 std::vector<Finding> findingsOfScene(const Run& run, const Analysis& analysis, const std::string& scene) {
     Fits fits;
     for (std::size_t i = 0; i < run.configurations.size(); ++i)
-        if (run.configurations[i].key.scene == scene && run.configurations[i].omitted.empty()) fits.push_back(&analysis.fits.at(i));
+        if (run.configurations[i].key.scene == scene && run.configurations[i].omitted.empty())
+            fits.push_back(&analysis.fits.at(i));
     std::vector<Finding> findings;
     if (!fits.empty())
         for (std::size_t which = 0; which < analysis.options.targets.size(); ++which)
@@ -262,7 +280,8 @@ std::vector<Finding> findingsOfScene(const Run& run, const Analysis& analysis, c
 std::vector<std::string> scenesOf(const Run& run) {
     std::vector<std::string> scenes;
     for (const Configuration& configuration : run.configurations)
-        if (std::find(scenes.begin(), scenes.end(), configuration.key.scene) == scenes.end()) scenes.push_back(configuration.key.scene);
+        if (std::find(scenes.begin(), scenes.end(), configuration.key.scene) == scenes.end())
+            scenes.push_back(configuration.key.scene);
     return scenes;
 }
 
@@ -278,6 +297,8 @@ std::string verdictLine(const ConfigurationFit& fit) {
     return text + fmt::format("{}: {}", stats::verdictName(fit.judgement.verdict), fit.judgement.reason);
 }
 
-std::string labelOf(const Key& key) { return key.variant.empty() ? key.backend : key.backend + ", " + key.variant; }
+std::string labelOf(const Key& key) {
+    return key.variant.empty() ? key.backend : key.backend + ", " + key.variant;
+}
 
 }  // namespace crt::converge

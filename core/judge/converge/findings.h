@@ -1,4 +1,5 @@
-/// What a run has shown, in sentences: who is first and by how much, whether a bias was seen, whether images judge themselves rightly, what is missing.
+/// What a run has shown, in sentences: who is first and by how much, whether a bias was seen, whether images
+/// judge themselves rightly, what is missing.
 #pragma once
 
 #include "judge/converge/fits.h"

@@ -1,4 +1,5 @@
-/// From rows to statements: how fast a configuration converges, what it costs, whether it is right, and how sure all that is.
+/// From rows to statements: how fast a configuration converges, what it costs, whether it is right, and how
+/// sure all that is.
 ///
 /// Relative to the scene. Errors are of luminance, divided by the mean luminance of the reference (of the
 /// replicates, without one; stats/luminance_error.h), so mean squared errors here are relative² and 0.01² is
@@ -13,13 +14,14 @@
 /// Configurations that render the same bits share the errors of whichever has more of them; times are their
 /// own.
 ///
-/// Without a reference the error is the variance between replicates: unbiased for the variance, blind to bias. Deviations from their common mean are not
-/// independent; for normal errors intervals come out too short by √((R − 2)/(R − 1)), and are widened by that.
+/// Without a reference the error is the variance between replicates: unbiased for the variance, blind to
+/// bias. Deviations from their common mean are not independent; for normal errors intervals come out too
+/// short by √((R − 2)/(R − 1)), and are widened by that.
 #pragma once
 
+#include "base/statistics.h"
 #include "judge/converge/measurement.h"
 #include "judge/stats/image_tests.h"
-#include "base/statistics.h"
 
 #include <array>
 #include <cstdint>
@@ -52,9 +54,11 @@ struct Point {
     /// 1/(relative MSE × seconds), start-up included. 1/s. NaN where there is no error.
     Estimate efficiency;
     std::optional<Estimate> mean_bias;      ///< Mean luminance over that of the reference, − 1.
-    std::optional<Estimate> bias_squared;   ///< mean (E I − R)², relative²; may be below 0, which is how it contains it.
+    std::optional<Estimate>
+        bias_squared;  ///< mean (E I − R)², relative²; may be below 0, which is how it contains it.
     std::optional<Estimate> calibration;    ///< Predicted over actual relative RMSE.
-    std::uint32_t covered = 0, predicted = 0;  ///< Replicates whose predicted interval holds their actual error, and those that predicted.
+    std::uint32_t covered = 0, predicted = 0;  ///< Replicates whose predicted interval holds their actual
+                                               ///< error, and those that predicted.
     std::optional<double> relmse, smape, mae, flip_mean, delta_e2000_mean;  ///< Means over replicates.
 };
 
@@ -70,8 +74,10 @@ struct TimeFit {
 /// relative MSE = v/N + b², by least squares with relative errors.
 struct ErrorFit {
     Estimate variance;     ///< v: relative MSE of one sample per pixel.
-    Estimate intercept;    ///< b² of this line. Below 0 where error falls faster than 1/N, as it does with Sobol points on smooth images.
-    /// b² without the assumption of 1/N: mean squared error minus variance between replicates, all N weighted by N². Empty without a reference.
+    Estimate intercept;    ///< b² of this line. Below 0 where error falls faster than 1/N, as it does with
+                           ///< Sobol points on smooth images.
+    /// b² without the assumption of 1/N: mean squared error minus variance between replicates, all N
+    /// weighted by N². Empty without a reference.
     std::optional<Estimate> bias_squared;
     /// The better of the two: bias_squared where there is one, else the intercept.
     const Estimate& floor() const { return bias_squared ? *bias_squared : intercept; }
@@ -83,15 +89,17 @@ struct ErrorFit {
 /// Samples and seconds to a relative RMSE.
 struct Target {
     double relative_rmse = 0;
-    bool reached = false;             ///< Measured. If not, `samples` and `seconds` extrapolate the last points; empty where a floor forbids it.
-    bool at_first_point = false;      ///< The fewest samples measured were enough: the figures are upper bounds.
+    bool reached = false;  ///< Measured. If not, `samples` and `seconds` extrapolate the last points; empty
+                           ///< where a floor forbids it.
+    bool at_first_point = false;  ///< The fewest samples measured were enough: the figures are upper bounds.
     std::optional<Estimate> samples, seconds;
 };
 
 struct Judgement {
     stats::Verdict verdict = stats::Verdict::Inconclusive;
     std::string reason;               ///< One sentence.
-    /// Relative bias of the image mean in R, G and B at the most samples, with the verdict's confidence. Empty without a reference.
+    /// Relative bias of the image mean in R, G and B at the most samples, with the verdict's confidence.
+    /// Empty without a reference.
     std::optional<std::array<Estimate, 3>> mean_bias;
 };
 

@@ -1,11 +1,14 @@
-/// What `crt converge` measures: the contract between the engine that renders and the files, fits and report made of it.
+/// What `crt converge` measures: the contract between the engine that renders and the files, fits and report
+/// made of it.
 ///
-/// A *configuration* is a scene × backend × variant. Each is rendered R times with independent seeds (*replicates*); a replicate is ONE progressive
-/// render, looked at after N = 1, 2, 4 … samples per pixel, each look being a Row. So rows of one replicate are nested, not independent, and
-/// intervals come from the spread between replicates.
+/// A *configuration* is a scene × backend × variant. Each is rendered R times with independent seeds
+/// (*replicates*); a replicate is ONE progressive render, looked at after N = 1, 2, 4 … samples per pixel,
+/// each look being a Row. So rows of one replicate are nested, not independent, and intervals come from the
+/// spread between replicates.
 ///
-/// Times are in seconds, radiances in the scene's units, errors relative to the image mean where the name says `relative`. What was not measured is
-/// an empty optional, never 0: a CPU backend has no device time, a scene without a reference has no error against one.
+/// Times are in seconds, radiances in the scene's units, errors relative to the image mean where the name
+/// says `relative`. What was not measured is an empty optional, never 0: a CPU backend has no device time, a
+/// scene without a reference has no error against one.
 #pragma once
 
 #include "film/film.h"
@@ -20,7 +23,8 @@
 
 namespace crt::converge {
 
-/// Names a configuration. `variant` is the text of what `--vary` chose, e.g. "sampler=sobol nee=true"; empty when nothing was varied.
+/// Names a configuration. `variant` is the text of what `--vary` chose, e.g. "sampler=sobol nee=true"; empty
+/// when nothing was varied.
 struct Key {
     std::string scene, backend, variant;
     bool operator==(const Key&) const = default;
@@ -54,7 +58,8 @@ struct Row {
     std::uint32_t replicate = 0;  ///< 0 … R − 1 within the configuration.
     std::uint64_t samples = 0;    ///< Per pixel, since the replicate began.
 
-    double render_wall_seconds = 0;                    ///< Since the first chunk of this replicate, reading the film for looks left out.
+    double render_wall_seconds =
+        0;  ///< Since the first chunk of this replicate, reading the film for looks left out.
     std::optional<double> render_device_seconds;       ///< The same by the device's clock.
     /// Parse, build, compile, upload and the first sample, with libraries loaded and kernels in the cache:
     /// every start was tried once before it was timed, so that it does not matter who is listed first.
@@ -66,13 +71,15 @@ struct Row {
     /// Mean squared difference from each fold of the reference alone, absolute; empty where it has none.
     /// With ReferenceInfo::fold_distance it says what the error would be against any of the folds.
     std::vector<double> fold_mse;
-    /// (R − 1)/R · mean (I_r − Ī_r)², Ī_r the mean of the configuration's other R − 1 replicates at the same N. Its mean over replicates is their
-    /// sample variance: unbiased for the variance of one image, blind to bias. It stands in for the error where there is no reference, and where
-    /// there is one, mean(error->mse − between_replicates_mse) estimates bias². Known when all replicates have reached N.
+    /// (R − 1)/R · mean (I_r − Ī_r)², Ī_r the mean of the configuration's other R − 1 replicates at the same
+    /// N. Its mean over replicates is their sample variance: unbiased for the variance of one image, blind
+    /// to bias. It stands in for the error where there is no reference, and where there is one,
+    /// mean(error->mse − between_replicates_mse) estimates bias². Known when all replicates have reached N.
     std::optional<double> between_replicates_mse;
     /// stats::effectivePixels of that variance; known with it.
     std::optional<double> effective_pixels;
-    std::optional<Estimate> predicted_relative_rmse;   ///< What the image says of itself, from its own scrambles.
+    std::optional<Estimate>
+        predicted_relative_rmse;  ///< What the image says of itself, from its own scrambles.
 
     double mean_luminance = 0;
     /// R, G, B. Against a closed form, all three are mean luminance.
@@ -80,12 +87,14 @@ struct Row {
     std::optional<std::array<double, 3>> image_mean_standard_error; ///< As the image itself predicts it.
     std::uint64_t invalid_samples = 0;                 ///< NaN or infinite. Any makes the row void.
     std::optional<double> cpu_clock_mhz, load_average; ///< At the moment of the look.
-    std::string stop_reason;                           ///< On the replicate's last row: "samples", "time", "target", "interrupted", "failed: …".
+    std::string stop_reason;  ///< On the replicate's last row: "samples", "time", "target", "interrupted",
+                              ///< "failed: …".
 
     bool isVoid() const { return invalid_samples > 0 || (error && !std::isfinite(error->mse)); }
 };
 
-/// Where the time of one configuration goes, seconds on the wall clock; medians over its replicates from `first_sample` on.
+/// Where the time of one configuration goes, seconds on the wall clock; medians over its replicates from
+/// `first_sample` on.
 struct StageSeconds {
     double parse = 0;         ///< Scene file and what it names.
     double build = 0;         ///< Scene → CompiledScene, acceleration structure.
@@ -105,9 +114,11 @@ struct Feature {
 /// Tests of the images against the reference that need pixels: what stats::gate() finds at the most samples.
 struct ImageTests {
     std::optional<double> smallest_tile_p;   ///< Welch on 8×8 tiles, smallest p after Holm's adjustment.
-    std::optional<double> tile_p_uniformity; ///< Kolmogorov–Smirnov p of the tiles' p-values being uniform (Jung et al. 2020); shown, not judged by.
+    std::optional<double> tile_p_uniformity;  ///< Kolmogorov–Smirnov p of the tiles' p-values being uniform
+                                              ///< (Jung et al. 2020); shown, not judged by.
     std::optional<double> smallest_pixel_p;  ///< Of all pixels and channels, Šidák-adjusted.
-    std::optional<double> largest_share;     ///< Part of the squared spread of all replicates that one value carries; trusted below 0.05.
+    std::optional<double> largest_share;     ///< Part of the squared spread of all replicates that one value
+                                             ///< carries; trusted below 0.05.
 };
 
 /// One float per pixel, row-major, top row first.
@@ -130,7 +141,8 @@ struct Maps {
 /// What does not change between the rows of a configuration.
 struct Configuration {
     Key key;
-    std::string device, driver, kernel;   ///< As the backend reports them; `kernel` e.g. "lean, 41 registers, from cache".
+    std::string device, driver,
+        kernel;  ///< As the backend reports them; `kernel` e.g. "lean, 41 registers, from cache".
     std::uint32_t threads = 0;            ///< 0 when the device decides.
     std::string scene_file, scene_hash;   ///< Hash: 32 hex digits of the compiled scene (compile.h).
     std::uint32_t width = 0, height = 0;  ///< Pixels.
@@ -138,7 +150,8 @@ struct Configuration {
     StageSeconds stages;
     ImageTests tests;
     Maps maps;
-    std::string omitted;  ///< Why it was not measured (backend not available …); empty when it was. Then only `key` is filled.
+    std::string omitted;  ///< Why it was not measured (backend not available …); empty when it was. Then
+                          ///< only `key` is filled.
 };
 
 enum class ReferenceKind {
@@ -179,7 +192,8 @@ struct Environment {
     std::uint32_t threads = 0;
     std::string load_start, load_end; ///< 1, 5 and 15 minutes.
     std::string working_directory;
-    std::vector<std::string> commands;     ///< As typed, quoted for a shell; more than one when the run was resumed.
+    std::vector<std::string>
+        commands;  ///< As typed, quoted for a shell; more than one when the run was resumed.
     std::string started, finished;         ///< UTC, ISO 8601.
     double budget_seconds = 0;             ///< --time; 0 when there was none.
     double spent_seconds = 0;
@@ -191,7 +205,8 @@ struct Run {
     std::vector<ReferenceInfo> references;      ///< One for each scene at most.
     std::vector<Configuration> configurations;  ///< In the order asked for.
     std::vector<Row> rows;                      ///< In the order rendered.
-    std::vector<std::string> notes;             ///< One sentence each, shown under the findings: what the engine had to leave out or cut short.
+    std::vector<std::string> notes;  ///< One sentence each, shown under the findings: what the engine had to
+                                     ///< leave out or cut short.
 };
 
 }  // namespace crt::converge

@@ -43,7 +43,8 @@ std::string estimateText(const Estimate& e, const Unit& unit, int digits) {
     if (!std::isfinite(e.low) || !std::isfinite(e.high)) return value + " (no interval)";
     // "−1.2 to 3.4" rather than "−1.2–3.4".
     const char* to = e.low < 0 ? " to " : "–";
-    return fmt::format("{} ({}{}{})", value, numberText(e.low / unit.size, digits), to, numberText(e.high / unit.size, digits));
+    return fmt::format("{} ({}{}{})", value, numberText(e.low / unit.size, digits), to,
+                       numberText(e.high / unit.size, digits));
 }
 
 }  // namespace
@@ -57,7 +58,8 @@ std::string numberText(double value, int digits) {
     const double rounded = std::round(value / unit) * unit;
     const int magnitude = static_cast<int>(std::floor(std::log10(std::abs(rounded)) + 1e-9));
     if (magnitude < -4 || magnitude >= 6)
-        return withMinus(fmt::format("{:.{}f}", rounded / std::pow(10.0, magnitude), digits - 1)) + "·10" + superscript(magnitude);
+        return withMinus(fmt::format("{:.{}f}", rounded / std::pow(10.0, magnitude), digits - 1)) + "·10" +
+               superscript(magnitude);
     return withMinus(fmt::format("{:.{}f}", rounded, std::max(0, digits - 1 - magnitude)));
 }
 
@@ -71,13 +73,20 @@ std::string secondsText(double seconds, int digits) {
 std::string countText(std::uint64_t count) {
     std::string text = std::to_string(count);
     if (text.size() < 5) return text;
-    for (std::size_t at = text.size() - 3; at > 0 && at < text.size(); at -= std::min<std::size_t>(at, 3)) text.insert(at, "\u202f");
+    for (std::size_t at = text.size() - 3; at > 0 && at < text.size(); at -= std::min<std::size_t>(at, 3))
+        text.insert(at, "\u202f");
     return text;
 }
 
-std::string secondsText(const Estimate& estimate, int digits) { return estimateText(estimate, unitOfSeconds(estimate.value), digits); }
-std::string percentText(const Estimate& estimate, int digits) { return estimateText(estimate, {0.01, " %"}, digits); }
-std::string numberText(const Estimate& estimate, int digits) { return estimateText(estimate, {1, ""}, digits); }
+std::string secondsText(const Estimate& estimate, int digits) {
+    return estimateText(estimate, unitOfSeconds(estimate.value), digits);
+}
+std::string percentText(const Estimate& estimate, int digits) {
+    return estimateText(estimate, {0.01, " %"}, digits);
+}
+std::string numberText(const Estimate& estimate, int digits) {
+    return estimateText(estimate, {1, ""}, digits);
+}
 
 std::string errorText(const Estimate& e, int digits) {
     if (!std::isfinite(e.value) || e.low > 0 || !std::isfinite(e.high)) return percentText(e, digits);

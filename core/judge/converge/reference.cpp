@@ -1,18 +1,18 @@
-#include "judge/converge/reference.h"
 #include "film/error_text.h"
 #include "film/resolve.h"
+#include "judge/converge/reference.h"
 
-#include "base/unit_text.h"
-#include "base/atomic_file.h"
 #include "backend/loader.h"
-#include "compile/compile.h"
-#include "judge/converge/files.h"
-#include "image/image_io.h"
+#include "base/atomic_file.h"
 #include "base/log.h"
+#include "base/statistics.h"
+#include "base/unit_text.h"
+#include "compile/compile.h"
+#include "film/luminance_error.h"
+#include "image/image_io.h"
+#include "judge/converge/files.h"
 #include "render/output_guard.h"
 #include "render/sampling.h"
-#include "film/luminance_error.h"
-#include "base/statistics.h"
 #include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
@@ -33,7 +33,8 @@ constexpr const char* kColourKey = "crt/referenceColour";
 constexpr const char* kEstimatorKey = "crt/referenceEstimator";
 
 std::string estimatorText(const Scene& scene) {
-    return fmt::format("independent samples, {} light sampling, no roulette, seed {}", scene.integrator.nee ? "with" : "no", scene.sampler.seed);
+    return fmt::format("independent samples, {} light sampling, no roulette, seed {}",
+                       scene.integrator.nee ? "with" : "no", scene.sampler.seed);
 }
 
 std::string metadataOf(const Image& image, const char* key) {
@@ -42,14 +43,16 @@ std::string metadataOf(const Image& image, const char* key) {
     return {};
 }
 
-/// In what the scene of a reference differs from another, in words, apart from what a reference does not depend on.
+/// In what the scene of a reference differs from another, in words, apart from what a reference does not
+/// depend on.
 std::vector<std::string> differingContent(const Image& reference, const Scene& scene) {
     const std::string text = metadataOf(reference, kRecordKey);
     if (text.empty()) return {};
     const auto withoutSampling = [](FilmRecord record) {
         std::erase_if(record.traits, [](const SceneTrait& trait) {
-            return trait.name == "the seed" || trait.name == "the sampler" || trait.name == "the replicates" ||
-                   trait.name == "roulette" || trait.name == "nee" || trait.name == "the AOVs of first hits";
+            return trait.name == "the seed" || trait.name == "the sampler" ||
+                   trait.name == "the replicates" || trait.name == "roulette" || trait.name == "nee" ||
+                   trait.name == "the AOVs of first hits";
         });
         return record;
     };
@@ -67,7 +70,8 @@ std::vector<float> channelsOf(const Image& image, const std::array<std::string, 
     const std::size_t pixels = std::size_t{image.width} * image.height;
     std::vector<float> values(pixels * 3);
     for (std::size_t p = 0; p < pixels; ++p)
-        for (std::size_t c = 0; c < 3; ++c) values[p * 3 + c] = image.pixels[p * image.channels.size() + columns[c]];
+        for (std::size_t c = 0; c < 3; ++c)
+            values[p * 3 + c] = image.pixels[p * image.channels.size() + columns[c]];
     return values;
 }
 
@@ -139,7 +143,8 @@ std::string colourText(const Scene& scene) {
     if (development.white)
         white = fmt::format("white balance from X : Y : Z = {:.6f} : 1 : {:.6f}", (*development.white)[0],
                             (*development.white)[2]);
-    return fmt::format("exposure {} EV, {}, {}", development.exposure_ev, space(development.color_space), white);
+    return fmt::format("exposure {} EV, {}, {}", development.exposure_ev, space(development.color_space),
+                       white);
 }
 
 int makeReference(const ReferenceRequest& request, Watch& watch) {
@@ -166,13 +171,16 @@ struct RenderedFolds {
 /// Each eighth has samples of its own. The first also finds out how many fit into the time. Nothing when a
 /// the Watch asked to stop.
 std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene& compiled,
-                                         Integrator& integrator, const ReferenceRequest& request, Watch& watch) {
+                                         Integrator& integrator, const ReferenceRequest& request,
+                                         Watch& watch) {
     const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
     const WatchedRendering rendering(watch);
     ProgressState state;
     state.pixels = std::uint64_t{shape.width} * shape.height;
     const auto started = std::chrono::steady_clock::now();
-    const auto elapsed = [started] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count(); };
+    const auto elapsed = [started] {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    };
     RenderedFolds folds{Film(shape), {}};
     std::uint64_t per_fold = request.samples / kFolds;
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
@@ -192,13 +200,17 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene
             if (request.samples == 0) state.time_limit_seconds = request.seconds;
             watch.progress(state);
             if (per_fold == 0 && elapsed() > 0.04 * request.seconds)
-                per_fold = std::max(done, affordable(request.seconds / kFolds, took / static_cast<double>(chunk)));
+                per_fold =
+                    std::max(done, affordable(request.seconds / kFolds, took / static_cast<double>(chunk)));
             if (took < 0.25) chunk *= 2;
         }
         Film part(shape);
         integrator.readFilm(part);
         if (part.invalidSamples() > 0)
-            throw Error(ErrorKind::Device, fmt::format("{} samples of the reference were NaN or infinite: it would be worth nothing", part.invalidSamples()));
+            throw Error(
+                ErrorKind::Device,
+                fmt::format("{} samples of the reference were NaN or infinite: it would be worth nothing",
+                            part.invalidSamples()));
         folds.images.push_back(resolveImage(part, developmentOf(scene).forFloats(), 0));
         folds.film.add(part);
     }
@@ -237,7 +249,8 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     refuseOverInputs(scene.files_read, {request.output});
     checkWritable(request.output);
     const auto started = std::chrono::steady_clock::now();
-    const std::string content = hashOfContent(scene), colour = colourText(scene), record = recordText(recordOf(scene));
+    const std::string content = hashOfContent(scene), colour = colourText(scene),
+                      record = recordText(recordOf(scene));
     scene = referenceScene(std::move(scene), request.same_estimator);
     const LoadedBackend backend = openBackend(request.backend);
     Integrator integrator(backend, request.integrator);
@@ -262,7 +275,9 @@ Reference readReference(const std::string& text, const Scene& scene) {
     Reference reference;
     reference.info.scene = scene.file;
     if (const Parsed<double> value = parseNumber(text); value.value) {
-        if (!(*value.value > 0)) throw Error(ErrorKind::Usage, fmt::format("--reference {}: a luminance above 0 is expected", text));
+        if (!(*value.value > 0))
+            throw Error(ErrorKind::Usage,
+                        fmt::format("--reference {}: a luminance above 0 is expected", text));
         reference.info.kind = ReferenceKind::Analytic;
         reference.info.estimator = fmt::format("closed form: every pixel has luminance {}", text);
         reference.luminance = {static_cast<float>(*value.value)};
@@ -273,12 +288,16 @@ Reference readReference(const std::string& text, const Scene& scene) {
     const Image image = readImage(text);
     const std::string content = metadataOf(image, kContentKey);
     if (content.empty())
-        throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: make one with 'crt reference {} -o {}'", text, scene.file, text));
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' is no reference: make one with 'crt reference {} -o {}'", text,
+                                scene.file, text));
     if (content != hashOfContent(scene)) {
         const std::vector<std::string> differences = differingContent(image, scene);
-        throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' is a reference of another scene, or of this one with other settings: {}", text,
-                                differences.empty() ? "what differs was not noted" : fmt::format("{}", fmt::join(differences, "; "))));
+        throw Error(
+            ErrorKind::Usage,
+            fmt::format("'{}' is a reference of another scene, or of this one with other settings: {}", text,
+                        differences.empty() ? "what differs was not noted"
+                                            : fmt::format("{}", fmt::join(differences, "; "))));
     }
     const std::string colour = metadataOf(image, kColourKey);
     if (colour.empty())
@@ -296,8 +315,11 @@ Reference readReference(const std::string& text, const Scene& scene) {
     const stats::Rgb weights = stats::luminanceWeights(scene.film.color_space);
     reference.luminance = stats::luminances(reference.rgb, weights);
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
-        const std::vector<float> rgb = channelsOf(image, {fmt::format("Fold.{}.R", fold), fmt::format("Fold.{}.G", fold), fmt::format("Fold.{}.B", fold)});
-        if (rgb.empty()) throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: it lacks its eighths", text));
+        const std::vector<float> rgb =
+            channelsOf(image, {fmt::format("Fold.{}.R", fold), fmt::format("Fold.{}.G", fold),
+                               fmt::format("Fold.{}.B", fold)});
+        if (rgb.empty())
+            throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: it lacks its eighths", text));
         reference.fold_luminance.push_back(stats::luminances(rgb, weights));
         reference.fold_rgb.emplace_back(rgb.begin(), rgb.end());
     }

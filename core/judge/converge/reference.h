@@ -1,16 +1,18 @@
-/// What errors are measured against: a number that is known, or a render that shares as little as possible with what it judges.
+/// What errors are measured against: a number that is known, or a render that shares as little as possible
+/// with what it judges.
 ///
-/// A reference file is an EXR with the mean in R, G, B and, in Fold.0.R … Fold.7.B, the means of eight independent eighths of its samples: its variance
-/// and the spread between eighths follow from them. Metadata say how it was made and of which scene.
+/// A reference file is an EXR with the mean in R, G, B and, in Fold.0.R … Fold.7.B, the means of eight
+/// independent eighths of its samples: its variance and the spread between eighths follow from them.
+/// Metadata say how it was made and of which scene.
 #pragma once
 
 #include "backend/integrator.h"
-#include "judge/converge/measurement.h"
 #include "film/error_estimate.h"
+#include "judge/converge/measurement.h"
+#include "judge/stats/image_tests.h"
 #include "render/job.h"
 #include "render/watch.h"
 #include "scene/scene.h"
-#include "judge/stats/image_tests.h"
 
 #include <cstdint>
 #include <optional>
@@ -29,7 +31,8 @@ struct ReferenceRequest {
     std::string output;
     std::uint64_t samples = 0;      ///< Per pixel in all; 0: as many as `seconds` allow.
     double seconds = 60;
-    bool same_estimator = false;    ///< Keep integrator.nee as the scene has it: less noise, less independence.
+    bool same_estimator =
+        false;  ///< Keep integrator.nee as the scene has it: less noise, less independence.
 };
 
 /// Renders it and returns the exit code. Throws crt::Error.
@@ -45,7 +48,8 @@ struct MadeReference {
 };
 std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request, Watch& watch);
 
-/// The scene as a reference renders it: independent samples, another seed, light sampling switched, no roulette.
+/// The scene as a reference renders it: independent samples, another seed, light sampling switched, no
+/// roulette.
 Scene referenceScene(Scene scene, bool same_estimator);
 
 /// Hash of what is to be seen, without how: two scenes with it have the same expected light on the film.
@@ -65,8 +69,8 @@ struct Reference {
     std::vector<std::vector<double>> fold_rgb;  ///< kFolds images, [height][width][3]; empty with one value.
 };
 
-/// "0.2394564705" is the luminance that every pixel has (a closed form); anything else a file of makeReference's, which must be of this scene. Throws
-/// crt::Error(Usage).
+/// "0.2394564705" is the luminance that every pixel has (a closed form); anything else a file of
+/// makeReference's, which must be of this scene. Throws crt::Error(Usage).
 Reference readReference(const std::string& text, const Scene& scene);
 
 }  // namespace crt::converge

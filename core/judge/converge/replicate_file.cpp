@@ -19,7 +19,8 @@ using Header = std::array<std::uint64_t, 3>;          // Magic, pixels, looks.
 }  // namespace
 
 void writeReplicate(const std::string& path, const StoredReplicate& replicate) {
-    if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty()) makeOutputFolder(folder.string());
+    if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty())
+        makeOutputFolder(folder.string());
     AtomicFile file(path);
     const Header header{kMagic, replicate.standard_error.size(), replicate.looks.size()};
     file.write(header.data(), sizeof header);

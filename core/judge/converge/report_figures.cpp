@@ -1,5 +1,5 @@
-#include "judge/converge/report_figures.h"
 #include "film/error_text.h"
+#include "judge/converge/report_figures.h"
 
 #include "base/unit_text.h"
 #include "judge/converge/findings.h"
@@ -35,15 +35,20 @@ std::string withoutZeros(std::string text) {
 }
 std::string percentTick(double value) { return withoutZeros(percentText(value)); }
 std::string secondsTick(double value) { return value == 0 ? "0" : withoutZeros(secondsText(value)); }
-std::string signedPercentTick(double value) { return fmt::format("{}{}", value > 0 ? "+" : "", percentTick(value)); }
+std::string signedPercentTick(double value) {
+    return fmt::format("{}{}", value > 0 ? "+" : "", percentTick(value));
+}
 std::string numberTick(double value) { return withoutZeros(numberText(value)); }
 std::string samplesTick(double value) { return countText(static_cast<std::uint64_t>(std::llround(value))); }
 
 std::string tip(const Subject& subject, const Point& point, const std::string& what) {
-    return fmt::format("{}\n{} samples per pixel, {} replicates\n{}", subject.label(), countText(point.samples), point.replicates, what);
+    return fmt::format("{}\n{} samples per pixel, {} replicates\n{}", subject.label(),
+                       countText(point.samples), point.replicates, what);
 }
 
-PlotLine lineOf(const Subject& subject) { return {subject.label(), subject.style, {}, std::nullopt, std::nullopt}; }
+PlotLine lineOf(const Subject& subject) {
+    return {subject.label(), subject.style, {}, std::nullopt, std::nullopt};
+}
 
 /// The level that the error will not fall below, where the fit found one.
 std::optional<double> floorOf(const Subject& subject) {
@@ -55,11 +60,13 @@ std::optional<double> floorOf(const Subject& subject) {
 Plot errorAgainstTime(const Subjects& subjects, const Analysis& analysis, const std::string& scene) {
     Plot plot;
     plot.title = "Error against time, " + scene;
-    plot.description = "Relative root mean square error over the seconds a user waits, both logarithmic, with 95 % bands.";
+    plot.description =
+        "Relative root mean square error over the seconds a user waits, both logarithmic, with 95 % bands.";
     plot.x = {"seconds, start-up included", AxisScale::Log, secondsTick, {}};
     plot.y = {"relative RMSE", AxisScale::Log, percentTick, {}};
     plot.slope_guide = -0.5;
-    for (const double target : analysis.options.targets) plot.rules.push_back({target, percentTick(target), true});
+    for (const double target : analysis.options.targets)
+        plot.rules.push_back({target, percentTick(target), true});
     for (const Subject& subject : subjects) {
         PlotLine line = lineOf(subject);
         for (const Point& point : subject.fit->points) {
@@ -80,13 +87,15 @@ Plot errorAgainstTime(const Subjects& subjects, const Analysis& analysis, const 
 Plot errorAgainstSamples(const Subjects& subjects, const std::string& scene) {
     Plot plot;
     plot.title = "Error against samples, " + scene;
-    plot.description = "Relative root mean square error over samples per pixel, both logarithmic, with 95 % bands.";
+    plot.description =
+        "Relative root mean square error over samples per pixel, both logarithmic, with 95 % bands.";
     plot.x = {"samples per pixel", AxisScale::Log2, samplesTick, {}};
     plot.y = {"relative RMSE", AxisScale::Log, percentTick, {}};
     plot.slope_guide = -0.5;
     for (const Subject& subject : subjects) {
         PlotLine line = lineOf(subject);
-        if (subject.fit->fitted) line.label += fmt::format(" ({})", numberText(subject.fit->slope_samples.value, 2));
+        if (subject.fit->fitted)
+            line.label += fmt::format(" ({})", numberText(subject.fit->slope_samples.value, 2));
         for (const Point& point : subject.fit->points) {
             const Estimate& e = point.relative_rmse;
             if (!(e.value > 0)) continue;
@@ -116,14 +125,17 @@ BarChart efficiencyBars(const Subjects& subjects, const std::string& scene) {
                               {e.value},
                               std::pair{e.low, e.high}});
     }
-    std::stable_sort(chart.bars.begin(), chart.bars.end(), [](const Bar& a, const Bar& b) { return a.parts[0] > b.parts[0]; });
+    std::stable_sort(chart.bars.begin(), chart.bars.end(),
+                     [](const Bar& a, const Bar& b) { return a.parts[0] > b.parts[0]; });
     return chart;
 }
 
 Plot calibration(const Subjects& subjects, const std::string& scene) {
     Plot plot;
     plot.title = "Predicted over actual error, " + scene;
-    plot.description = "What images say of their own error, divided by what it is, over samples per pixel, with 95 % intervals. 1 is right.";
+    plot.description =
+        "What images say of their own error, divided by what it is, over samples per pixel, with 95 % "
+        "intervals. 1 is right.";
     plot.bands = false;
     plot.x = {"samples per pixel", AxisScale::Log2, samplesTick, {}};
     plot.y = {"predicted / actual relative RMSE", AxisScale::Log, numberTick, {}};
@@ -135,8 +147,12 @@ Plot calibration(const Subjects& subjects, const std::string& scene) {
             if (!point.calibration || !std::isfinite(point.calibration->value)) continue;
             const Estimate& e = *point.calibration;
             line.points.push_back({static_cast<double>(point.samples), e.value, e.low, e.high,
-                                   tip(subject, point, fmt::format("{}; {} of {} intervals hold", numberText(e), point.covered, point.predicted))});
-            farthest = std::max({farthest, std::abs(std::log(e.value)), std::min(std::abs(std::log(e.low)), 1.5), std::min(std::abs(std::log(e.high)), 1.5)});
+                                   tip(subject, point,
+                                       fmt::format("{}; {} of {} intervals hold", numberText(e),
+                                                   point.covered, point.predicted))});
+            farthest =
+                std::max({farthest, std::abs(std::log(e.value)), std::min(std::abs(std::log(e.low)), 1.5),
+                          std::min(std::abs(std::log(e.high)), 1.5)});
         }
         if (!line.points.empty()) plot.lines.push_back(std::move(line));
     }
@@ -148,18 +164,23 @@ Plot biasPerSamples(const Subjects& subjects, const Analysis& analysis, const st
     const double margin = analysis.options.equivalence_margin;
     Plot plot;
     plot.title = "Bias of the image mean, " + scene;
-    plot.description = "Image mean over that of the reference, minus 1, over samples per pixel, with 95 % intervals. All intervals should hold 0.";
+    plot.description =
+        "Image mean over that of the reference, minus 1, over samples per pixel, with 95 % intervals. All "
+        "intervals should hold 0.";
     plot.bands = false;
     plot.x = {"samples per pixel", AxisScale::Log2, samplesTick, {}};
     plot.y = {"image mean / reference − 1", AxisScale::Linear, signedPercentTick, {}};
-    plot.rules = {{0, "", false}, {margin, fmt::format("margin {}", signedPercentTick(margin)), true}, {-margin, "", true}};
+    plot.rules = {{0, "", false},
+                  {margin, fmt::format("margin {}", signedPercentTick(margin)), true},
+                  {-margin, "", true}};
     double extent = 1.6 * margin;
     for (const Subject& subject : subjects) {
         PlotLine line = lineOf(subject);
         for (const Point& point : subject.fit->points) {
             if (!point.mean_bias) continue;
             const Estimate& e = *point.mean_bias;
-            line.points.push_back({static_cast<double>(point.samples), e.value, e.low, e.high, tip(subject, point, percentText(e))});
+            line.points.push_back({static_cast<double>(point.samples), e.value, e.low, e.high,
+                                   tip(subject, point, percentText(e))});
         }
         if (line.points.empty()) continue;
         // The first looks have intervals so long that nothing else would show; they are cut off.
@@ -172,11 +193,14 @@ Plot biasPerSamples(const Subjects& subjects, const Analysis& analysis, const st
 }
 
 const std::vector<std::string>& startStages() {
-    static const std::vector<std::string> names{"parse", "build", "compile", "upload", "first sample", "write"};
+    static const std::vector<std::string> names{"parse",  "build",        "compile",
+                                                "upload", "first sample", "write"};
     return names;
 }
 
-std::vector<double> startSeconds(const StageSeconds& s) { return {s.parse, s.build, s.compile, s.upload, s.first_sample, s.write}; }
+std::vector<double> startSeconds(const StageSeconds& s) {
+    return {s.parse, s.build, s.compile, s.upload, s.first_sample, s.write};
+}
 
 double sumOf(const std::vector<double>& values) {
     double sum = 0;
@@ -189,16 +213,20 @@ BarChart timeBudget(const Subjects& subjects, const std::string& scene) {
     chart.title = "Where the time goes, " + scene;
     chart.description = "Wall clock of one replicate to its last sample, stacked.";
     chart.axis = {"seconds, wall clock", AxisScale::Linear, secondsTick, {}};
-    const bool any_device =
-        std::any_of(subjects.begin(), subjects.end(), [](const Subject& subject) { return subject.configuration->stages.render_device.has_value(); });
-    chart.part_names = {"everything but rendering", any_device ? "rendering, host and waiting" : "rendering"};
+    const bool any_device = std::any_of(subjects.begin(), subjects.end(), [](const Subject& subject) {
+        return subject.configuration->stages.render_device.has_value();
+    });
+    chart.part_names = {"everything but rendering",
+                        any_device ? "rendering, host and waiting" : "rendering"};
     if (any_device) chart.part_names.push_back("rendering on the device");
     for (const Subject& subject : subjects) {
         const StageSeconds& s = subject.configuration->stages;
-        const double start = sumOf(startSeconds(s)), device = std::min(s.render_device.value_or(0), s.render_wall);
+        const double start = sumOf(startSeconds(s)),
+                     device = std::min(s.render_device.value_or(0), s.render_wall);
         std::vector<double> parts{start, s.render_wall - device};
         if (any_device) parts.push_back(device);
-        chart.bars.push_back({subject.label(), secondsText(start + s.render_wall), {}, std::move(parts), {}});
+        chart.bars.push_back(
+            {subject.label(), secondsText(start + s.render_wall), {}, std::move(parts), {}});
     }
     return chart;
 }
@@ -217,7 +245,8 @@ BarChart startBudget(const Subjects& subjects, const std::string& scene) {
 }
 
 bool hasPoints(const Plot& plot) {
-    return std::any_of(plot.lines.begin(), plot.lines.end(), [](const PlotLine& line) { return !line.points.empty(); });
+    return std::any_of(plot.lines.begin(), plot.lines.end(),
+                       [](const PlotLine& line) { return !line.points.empty(); });
 }
 
 }  // namespace
@@ -253,16 +282,19 @@ std::vector<Figure> figuresOfScene(const Run& run, const Analysis& analysis, con
     const auto add_plot = [&](const char* name, const char* title, const char* caption, const Plot& plot) {
         if (hasPoints(plot)) add(name, title, caption, svgOfPlot(plot));
     };
-    const auto add_bars = [&](const char* name, const char* title, const char* caption, const BarChart& chart) {
+    const auto add_bars = [&](const char* name, const char* title, const char* caption,
+                              const BarChart& chart) {
         if (!chart.bars.empty()) add(name, title, caption, svgOfBars(chart));
     };
 
     add_plot("work-precision", "Error against time",
-             "Lower and further left is better. Each marker is a power of two of samples; bands hold 95 %. Ticks on the time axis are start-up times; "
+             "Lower and further left is better. Each marker is a power of two of samples; bands hold 95 %. "
+             "Ticks on the time axis are start-up times; "
              "a dashed level is a floor that the error will not fall below.",
              errorAgainstTime(subjects, analysis, scene));
     add_plot("samples", "Error against samples",
-             "The cost of a sample left out. In brackets the slope; independent samples have −½.", errorAgainstSamples(subjects, scene));
+             "The cost of a sample left out. In brackets the slope; independent samples have −½.",
+             errorAgainstSamples(subjects, scene));
     add_bars("efficiency", "Efficiency",
              "Longer is better: twice the efficiency needs half the render time for the same error. e is "
              "the least error that all configurations of the scene "
@@ -272,10 +304,14 @@ std::vector<Figure> figuresOfScene(const Run& run, const Analysis& analysis, con
     add_plot("calibration", "Can the image's own error estimate be trusted?",
              "1 is right; below, images understate their error. Whiskers hold 95 %.",
              calibration(subjects, scene));
-    add_plot("bias", "Bias of the image mean",
-             "95 of 100 whiskers hold 0 when there is no bias. Those of few samples are cut off at the frame.", biasPerSamples(subjects, analysis, scene));
-    add_bars("time", "Where the time goes", "One replicate, from the scene file to its last sample.", timeBudget(subjects, scene));
-    add_bars("start-up", "Start-up and writing, enlarged", "What is paid once, however many samples are taken.", startBudget(subjects, scene));
+    add_plot(
+        "bias", "Bias of the image mean",
+        "95 of 100 whiskers hold 0 when there is no bias. Those of few samples are cut off at the frame.",
+        biasPerSamples(subjects, analysis, scene));
+    add_bars("time", "Where the time goes", "One replicate, from the scene file to its last sample.",
+             timeBudget(subjects, scene));
+    add_bars("start-up", "Start-up and writing, enlarged",
+             "What is paid once, however many samples are taken.", startBudget(subjects, scene));
     return figures;
 }
 

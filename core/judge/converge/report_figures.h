@@ -20,7 +20,8 @@ struct Figure {
 /// In the order of the report; those without data are not there.
 std::vector<Figure> figuresOfScene(const Run& run, const Analysis& analysis, const std::string& scene);
 
-/// The same for the same configuration in every figure: colour says backend, marker and dashes say variant; of one backend, both say variant.
+/// The same for the same configuration in every figure: colour says backend, marker and dashes say variant;
+/// of one backend, both say variant.
 PlotStyle styleOf(const Run& run, const Key& key);
 
 }  // namespace crt::converge

@@ -1,9 +1,9 @@
 #include "judge/converge/report_maps.h"
 
-#include "base/unit_text.h"
-#include "judge/converge/quantity_text.h"
 #include "base/error.h"
+#include "base/unit_text.h"
 #include "image/image_io.h"
+#include "judge/converge/quantity_text.h"
 
 #include <fmt/format.h>
 
@@ -26,9 +26,17 @@ constexpr double kLargestZ = 4;      ///< Beyond it the colour stays: 1 pixel in
 
 using Rgb = std::array<std::uint8_t, 3>;
 
-// Magma, nine steps of it (van der Walt and Smith 2015, CC0): even steps of lightness, readable in grey and for the colour-blind.
-constexpr std::array<Rgb, 9> kMagma{{{0x00, 0x00, 0x04}, {0x1d, 0x11, 0x47}, {0x51, 0x12, 0x7c}, {0x82, 0x26, 0x81}, {0xb6, 0x36, 0x79},
-                                     {0xe6, 0x51, 0x64}, {0xfb, 0x88, 0x61}, {0xfe, 0xc2, 0x87}, {0xfc, 0xfd, 0xbf}}};
+// Magma, nine steps of it (van der Walt and Smith 2015, CC0): even steps of lightness, readable in grey and
+// for the colour-blind.
+constexpr std::array<Rgb, 9> kMagma{{{0x00, 0x00, 0x04},
+                                     {0x1d, 0x11, 0x47},
+                                     {0x51, 0x12, 0x7c},
+                                     {0x82, 0x26, 0x81},
+                                     {0xb6, 0x36, 0x79},
+                                     {0xe6, 0x51, 0x64},
+                                     {0xfb, 0x88, 0x61},
+                                     {0xfe, 0xc2, 0x87},
+                                     {0xfc, 0xfd, 0xbf}}};
 // Too dark in blue, right in white, too bright in vermillion: Okabe and Ito's pair.
 constexpr std::array<Rgb, 3> kDiverging{{{0x00, 0x72, 0xb2}, {0xf7, 0xf7, 0xf7}, {0xd5, 0x5e, 0x00}}};
 constexpr Rgb kNotFinite{0xff, 0x00, 0xff};
@@ -39,7 +47,9 @@ Rgb colourAt(std::span<const Rgb> anchors, double position) {
     const auto left = std::min(static_cast<std::size_t>(at), anchors.size() - 2);
     Rgb colour{};
     for (std::size_t c = 0; c < 3; ++c)
-        colour[c] = static_cast<std::uint8_t>(std::lround(anchors[left][c] + (at - static_cast<double>(left)) * (anchors[left + 1][c] - anchors[left][c])));
+        colour[c] = static_cast<std::uint8_t>(
+            std::lround(anchors[left][c] +
+                        (at - static_cast<double>(left)) * (anchors[left + 1][c] - anchors[left][c])));
     return colour;
 }
 
@@ -55,7 +65,9 @@ float linearOfSrgb8(std::uint8_t byte) {
     return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
 }
 
-std::uint32_t reductionOf(std::uint32_t width, std::uint32_t height) { return (std::max(width, height) + kLongestSide - 1) / kLongestSide; }
+std::uint32_t reductionOf(std::uint32_t width, std::uint32_t height) {
+    return (std::max(width, height) + kLongestSide - 1) / kLongestSide;
+}
 
 /// Blocks of pixels become one; `pool` gets their values.
 Plane reduce(const Plane& plane, const std::function<float(std::span<const float>)>& pool) {
@@ -67,7 +79,8 @@ Plane reduce(const Plane& plane, const std::function<float(std::span<const float
         for (std::uint32_t x = 0; x < plane.width; x += factor) {
             block.clear();
             for (std::uint32_t v = y; v < std::min(y + factor, plane.height); ++v)
-                for (std::uint32_t u = x; u < std::min(x + factor, plane.width); ++u) block.push_back(plane.values[std::size_t{v} * plane.width + u]);
+                for (std::uint32_t u = x; u < std::min(x + factor, plane.width); ++u)
+                    block.push_back(plane.values[std::size_t{v} * plane.width + u]);
             small.values.push_back(pool(block));
         }
     return small;
@@ -86,7 +99,8 @@ float rootMeanSquareOf(std::span<const float> block) {
 }
 
 float largestOf(std::span<const float> block) {
-    return *std::max_element(block.begin(), block.end(), [](float a, float b) { return std::abs(a) < std::abs(b); });
+    return *std::max_element(block.begin(), block.end(),
+                             [](float a, float b) { return std::abs(a) < std::abs(b); });
 }
 
 Image emptyRgb(std::uint32_t width, std::uint32_t height) {
@@ -111,9 +125,11 @@ Image reducedImage(const Image& image) {
     for (std::size_t c = 0; c < 3; ++c) {
         const std::string name(1, "RGB"[c]);
         const auto found = std::find(image.channels.begin(), image.channels.end(), name);
-        if (found == image.channels.end()) throw Error(ErrorKind::Internal, "a map's image has no channel " + name);
+        if (found == image.channels.end())
+            throw Error(ErrorKind::Internal, "a map's image has no channel " + name);
         planes[c] = {image.width, image.height, {}};
-        for (auto i = static_cast<std::size_t>(found - image.channels.begin()); i < image.pixels.size(); i += image.channels.size())
+        for (auto i = static_cast<std::size_t>(found - image.channels.begin()); i < image.pixels.size();
+             i += image.channels.size())
             planes[c].values.push_back(image.pixels[i]);
         planes[c] = reduce(planes[c], meanOf);
     }
@@ -121,7 +137,8 @@ Image reducedImage(const Image& image) {
     small.metadata = image.metadata;  // With the colour space.
     small.chromaticities = image.chromaticities;
     for (std::size_t i = 0; i < planes[0].values.size(); ++i)
-        for (const Plane& plane : planes) small.pixels.push_back(std::clamp(plane.values[i], 0.0f, 1.0f));  // What 8 bits can show.
+        for (const Plane& plane : planes)
+            small.pixels.push_back(std::clamp(plane.values[i], 0.0f, 1.0f));  // What 8 bits can show.
     return small;
 }
 
@@ -130,13 +147,16 @@ std::string base64(const std::string& bytes) {
     std::string encoded;
     for (std::size_t i = 0; i < bytes.size(); i += 3) {
         std::uint32_t group = 0;
-        for (std::size_t j = 0; j < 3; ++j) group = group << 8 | (i + j < bytes.size() ? static_cast<unsigned char>(bytes[i + j]) : 0u);
-        for (std::size_t j = 0; j < 4; ++j) encoded += i + j <= bytes.size() ? digits[group >> (18 - 6 * j) & 63] : '=';
+        for (std::size_t j = 0; j < 3; ++j)
+            group = group << 8 | (i + j < bytes.size() ? static_cast<unsigned char>(bytes[i + j]) : 0u);
+        for (std::size_t j = 0; j < 4; ++j)
+            encoded += i + j <= bytes.size() ? digits[group >> (18 - 6 * j) & 63] : '=';
     }
     return encoded;
 }
 
-Picture writePicture(const std::string& folder, const std::string& file, const std::string& title, const Image& image) {
+Picture writePicture(const std::string& folder, const std::string& file, const std::string& title,
+                     const Image& image) {
     const std::string path = (fs::path(folder) / file).string();
     writeImage(path, OutputFormat::Png, image);
     std::ifstream stream(path, std::ios::binary);
@@ -145,7 +165,8 @@ Picture writePicture(const std::string& folder, const std::string& file, const s
     return {file, title, "data:image/png;base64," + base64(bytes), image.width, image.height};
 }
 
-/// The upper end of the error maps' scale: 99.5 % of all pixels of the scene lie below, rounded up to 1, 2 or 5.
+/// The upper end of the error maps' scale: 99.5 % of all pixels of the scene lie below, rounded up to 1, 2
+/// or 5.
 double topOfErrors(const std::vector<const Maps*>& maps) {
     std::vector<float> values;
     for (const Maps* map : maps)
@@ -153,7 +174,8 @@ double topOfErrors(const std::vector<const Maps*>& maps) {
             for (const float value : plane->values)
                 if (std::isfinite(value)) values.push_back(value);
     if (values.empty()) return 1;
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(0.995 * static_cast<double>(values.size() - 1));
+    const auto at =
+        values.begin() + static_cast<std::ptrdiff_t>(0.995 * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
     const double top = std::max(double{*at}, 1e-12), decade = std::pow(10.0, std::floor(std::log10(top)));
     for (const double digit : {1.0, 2.0, 5.0})
@@ -181,7 +203,9 @@ MapSet writeMaps(const std::string& folder, const Run& run, const std::string& s
     for (const Configuration& configuration : run.configurations)
         if (configuration.key.scene == scene) all.push_back(&configuration.maps);
     const double top = topOfErrors(all);
-    const auto error_colour = [&](double value) { return colourAt(kMagma, 1 + std::log10(value / top) / kDecades); };
+    const auto error_colour = [&](double value) {
+        return colourAt(kMagma, 1 + std::log10(value / top) / kDecades);
+    };
     const auto z_colour = [](double value) { return colourAt(kDiverging, 0.5 + value / (2 * kLargestZ)); };
     const auto flip_colour = [](double value) { return colourAt(kMagma, value); };
 
@@ -197,8 +221,11 @@ MapSet writeMaps(const std::string& folder, const Run& run, const std::string& s
             of.pictures.push_back(writePicture(folder, fmt::format("{}-{}.png", stem, what), title, image));
         };
         if (!maps.image.pixels.empty()) add("image", "image", reducedImage(maps.image));
-        if (!maps.error.empty()) add("error", "error", coloured(reduce(maps.error, rootMeanSquareOf), error_colour));
-        if (!maps.standard_error.empty()) add("standard-error", "standard error", coloured(reduce(maps.standard_error, rootMeanSquareOf), error_colour));
+        if (!maps.error.empty())
+            add("error", "error", coloured(reduce(maps.error, rootMeanSquareOf), error_colour));
+        if (!maps.standard_error.empty())
+            add("standard-error", "standard error",
+                coloured(reduce(maps.standard_error, rootMeanSquareOf), error_colour));
         if (!maps.z.empty()) add("z", "z", coloured(reduce(maps.z, largestOf), z_colour));
         if (!maps.flip.empty()) add("flip", "FLIP", coloured(reduce(maps.flip, meanOf), flip_colour));
         errors = errors || !maps.error.empty() || !maps.standard_error.empty();
@@ -207,10 +234,14 @@ MapSet writeMaps(const std::string& folder, const Run& run, const std::string& s
         if (!of.pictures.empty()) set.configurations.push_back(std::move(of));
     }
     if (errors)
-        set.keys.push_back({"error and standard error, relative to the image mean, logarithmic", percentText(top / std::pow(10.0, kDecades), 1),
-                            percentText(top, 1), cssGradient(kMagma)});
-    if (z) set.keys.push_back({"z = error / standard error", fmt::format("−{} too dark", kLargestZ), fmt::format("+{} too bright", kLargestZ), cssGradient(kDiverging)});
-    if (flip) set.keys.push_back({"FLIP, the difference as seen", "0 none", "1 largest", cssGradient(kMagma)});
+        set.keys.push_back({"error and standard error, relative to the image mean, logarithmic",
+                            percentText(top / std::pow(10.0, kDecades), 1), percentText(top, 1),
+                            cssGradient(kMagma)});
+    if (z)
+        set.keys.push_back({"z = error / standard error", fmt::format("−{} too dark", kLargestZ),
+                            fmt::format("+{} too bright", kLargestZ), cssGradient(kDiverging)});
+    if (flip)
+        set.keys.push_back({"FLIP, the difference as seen", "0 none", "1 largest", cssGradient(kMagma)});
     return set;
 }
 

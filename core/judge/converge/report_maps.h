@@ -1,4 +1,5 @@
-/// Maps of a configuration as PNG: the image, its error, what it believes its error to be, their ratio, and FLIP.
+/// Maps of a configuration as PNG: the image, its error, what it believes its error to be, their ratio, and
+/// FLIP.
 #pragma once
 
 #include "judge/converge/measurement.h"
@@ -33,8 +34,9 @@ struct MapSet {
     std::vector<ColourKey> keys;
 };
 
-/// Writes map-<scene>-<n>-<what>.png into `folder` for configuration `n` of the scene, reduced to 384 pixels a side at most: errors by their root mean
-/// square, z by its largest magnitude. Throws crt::Error(Output), also when the codec module cannot be opened.
+/// Writes map-<scene>-<n>-<what>.png into `folder` for configuration `n` of the scene, reduced to 384 pixels
+/// a side at most: errors by their root mean square, z by its largest magnitude. Throws crt::Error(Output),
+/// also when the codec module cannot be opened.
 MapSet writeMaps(const std::string& folder, const Run& run, const std::string& scene);
 
 /// Letters, digits and '-' of a name, for files and anchors.

@@ -1,5 +1,6 @@
-/// Plots as SVG: curves with bands on logarithmic axes, intervals, bars. Drawn 400 units wide with text of 12, so that they stay legible on a phone; colours
-/// are CSS custom properties (plotCss), so that they follow light, dark and print.
+/// Plots as SVG: curves with bands on logarithmic axes, intervals, bars. Drawn 400 units wide with text of
+/// 12, so that they stay legible on a phone; colours are CSS custom properties (plotCss), so that they
+/// follow light, dark and print.
 #pragma once
 
 #include <functional>
@@ -10,7 +11,8 @@
 
 namespace crt::converge {
 
-/// How a series is told from others, also without colour: 7 colours of Okabe and Ito, 4 markers and dash patterns. Taken modulo those.
+/// How a series is told from others, also without colour: 7 colours of Okabe and Ito, 4 markers and dash
+/// patterns. Taken modulo those.
 struct PlotStyle {
     unsigned colour = 0;
     unsigned marker = 0;
@@ -54,9 +56,11 @@ struct Plot {
     std::string title, description;  ///< For those who hear it, and of the file.
     Axis x, y;
     std::vector<PlotLine> lines;
-    bool bands = true;               ///< Intervals as bands along a line; otherwise as whiskers, series side by side, no line.
+    bool bands =
+        true;  ///< Intervals as bands along a line; otherwise as whiskers, series side by side, no line.
     std::vector<PlotRule> rules;     ///< Left out where they lie outside the range.
-    std::optional<double> slope_guide;  ///< On logarithmic axes: a dotted line of this slope, above the points.
+    std::optional<double>
+        slope_guide;  ///< On logarithmic axes: a dotted line of this slope, above the points.
 };
 
 /// An <svg> element without namespace, as it stands in HTML.

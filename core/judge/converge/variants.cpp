@@ -1,7 +1,7 @@
 #include "judge/converge/variants.h"
 
-#include "base/words.h"
 #include "base/error.h"
+#include "base/words.h"
 #include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>

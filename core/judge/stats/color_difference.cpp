@@ -43,7 +43,8 @@ double saturation(double chroma) {
 void requireSameSize(const RgbView& a, const RgbView& b) {
     const std::size_t values = std::size_t{3} * a.width * a.height;
     if (a.width != b.width || a.height != b.height || a.values.size() != values || b.values.size() != values)
-        throw Error(ErrorKind::Internal, "a metric of looks needs two images of one size, three values a pixel");
+        throw Error(ErrorKind::Internal,
+                    "a metric of looks needs two images of one size, three values a pixel");
 }
 
 Color linearSrgbToXyz(const Color& rgb) { return product(kRgbToXyz, rgb); }
@@ -80,10 +81,11 @@ double deltaE2000(const Lab& lab1, const Lab& lab2) {
     const double l = 0.5 * (lab1.lightness + lab2.lightness), c = 0.5 * (c1 + c2);
     double h = neutral ? h1 + h2 : 0.5 * (h1 + h2);
     if (!neutral && std::abs(h1 - h2) > 180) h += h1 + h2 < 360 ? 180 : -180;
-    const double t = 1 - 0.17 * std::cos(radians(h - 30)) + 0.24 * std::cos(radians(2 * h)) + 0.32 * std::cos(radians(3 * h + 6)) -
-                     0.20 * std::cos(radians(4 * h - 63));
+    const double t = 1 - 0.17 * std::cos(radians(h - 30)) + 0.24 * std::cos(radians(2 * h)) +
+                     0.32 * std::cos(radians(3 * h + 6)) - 0.20 * std::cos(radians(4 * h - 63));
     const double from_fifty = (l - 50) * (l - 50);
-    const double sl = 1 + 0.015 * from_fifty / std::sqrt(20 + from_fifty), sc = 1 + 0.045 * c, sh = 1 + 0.015 * c * t;
+    const double sl = 1 + 0.015 * from_fifty / std::sqrt(20 + from_fifty), sc = 1 + 0.045 * c,
+                 sh = 1 + 0.015 * c * t;
     const double turn = 30 * std::exp(-((h - 275) / 25) * ((h - 275) / 25));
     const double rt = -std::sin(radians(2 * turn)) * 2 * saturation(c);
     const double x = dl / sl, y = dc / sc, z = dbig_h / sh;
@@ -96,7 +98,8 @@ ColorDifference deltaE2000(const RgbView& test, const RgbView& reference) {
     if (!test.allFinite() || !reference.allFinite()) return {nan, nan};
     const auto shown = [](const RgbView& image, std::size_t i) {
         Color rgb;
-        for (std::size_t c = 0; c < 3; ++c) rgb[c] = std::clamp(static_cast<double>(image.values[3 * i + c]), 0.0, 1.0);
+        for (std::size_t c = 0; c < 3; ++c)
+            rgb[c] = std::clamp(static_cast<double>(image.values[3 * i + c]), 0.0, 1.0);
         return labFromLinearSrgb(rgb);
     };
     ColorDifference result;

@@ -22,7 +22,8 @@ struct Lab {
 /// CIE 1976.
 Lab labFromLinearSrgb(const Color& rgb);
 
-/// CIEDE2000 with k_L = k_C = k_H = 1, as Sharma, Wu and Dalal 2005 give it, whose 34 pairs it reproduces. About 1 can just be seen.
+/// CIEDE2000 with k_L = k_C = k_H = 1, as Sharma, Wu and Dalal 2005 give it, whose 34 pairs it reproduces.
+/// About 1 can just be seen.
 double deltaE2000(const Lab& a, const Lab& b);
 
 struct ColorDifference {

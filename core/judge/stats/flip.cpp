@@ -18,15 +18,18 @@ using std::numbers::pi;
 using Plane = std::vector<double>;
 using Planes = std::array<Plane, 3>;
 
-// Section 4.1 and table 1 of the 2020 paper: contrast sensitivity as Gaussians; 4.2: exponents and knee of the colour error; 4.3: feature width.
+// Section 4.1 and table 1 of the 2020 paper: contrast sensitivity as Gaussians; 4.2: exponents and knee of
+// the colour error; 4.3: feature width.
 struct ContrastSensitivity {
     double a1, b1, a2, b2;
 };
-constexpr ContrastSensitivity kAchromatic{1, 0.0047, 0, 1e-5}, kRedGreen{1, 0.0053, 0, 1e-5}, kBlueYellow{34.1, 0.04, 13.5, 0.025};
+constexpr ContrastSensitivity kAchromatic{1, 0.0047, 0, 1e-5}, kRedGreen{1, 0.0053, 0, 1e-5},
+    kBlueYellow{34.1, 0.04, 13.5, 0.025};
 constexpr double kColorExponent = 0.7, kKneeIn = 0.4, kKneeOut = 0.95;
 constexpr double kFeatureExponent = 0.5, kFeatureWidthDegrees = 0.082;
 
-// -------------------------------------------------------------------------------------------------------------------- colour spaces
+// ----------------------------------------------------------------------------------------------------------
+// colour spaces
 
 /// Opponent colours, linear in XYZ: what contrast sensitivities are measured in.
 Color toYcxcz(const Color& rgb) {
@@ -47,15 +50,19 @@ Lab toHuntLab(const Color& rgb) {
 }
 
 /// City block in lightness, Euclidean in chroma, which large differences ask for (Abasi et al. 2020).
-double hyab(const Lab& p, const Lab& q) { return std::abs(p.lightness - q.lightness) + std::hypot(p.a - q.a, p.b - q.b); }
+double hyab(const Lab& p, const Lab& q) {
+    return std::abs(p.lightness - q.lightness) + std::hypot(p.a - q.a, p.b - q.b);
+}
 
-// ------------------------------------------------------------------------------------------------------------------------- filters
+// ----------------------------------------------------------------------------------------------------------
+// filters
 
 /// Taps −r … r.
 using Taps = std::vector<double>;
 
 /// Row by row and then column by column; what lies beyond the border is the pixel at the border.
-Plane convolve(const Plane& in, std::size_t width, std::size_t height, const Taps& horizontal, const Taps& vertical) {
+Plane convolve(const Plane& in, std::size_t width, std::size_t height, const Taps& horizontal,
+               const Taps& vertical) {
     const std::size_t radius = horizontal.size() / 2;
     Plane rows(in.size(), 0.0), out(in.size(), 0.0), padded(width + 2 * radius);
     for (std::size_t y = 0; y < height; ++y) {
@@ -71,7 +78,8 @@ Plane convolve(const Plane& in, std::size_t width, std::size_t height, const Tap
     const auto last = static_cast<std::ptrdiff_t>(height) - 1;
     for (std::ptrdiff_t y = 0; y <= last; ++y)
         for (std::ptrdiff_t k = -reach; k <= reach; ++k) {
-            const double* from = &rows[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(y + k, 0, last)) * width];
+            const double* from =
+                &rows[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(y + k, 0, last)) * width];
             double* to = &out[static_cast<std::size_t>(y) * width];
             const double weight = vertical[static_cast<std::size_t>(k + reach)];
             for (std::size_t x = 0; x < width; ++x) to[x] += weight * from[x];
@@ -87,17 +95,22 @@ double sum(const Taps& taps) { return std::accumulate(taps.begin(), taps.end(), 
 /// exp(−π²x²/b), x in degrees: the Fourier transform of a Gaussian contrast sensitivity (2020, equation 2).
 Taps sensitivityTaps(double b, int radius, double pixels_per_degree) {
     Taps taps;
-    for (int i = -radius; i <= radius; ++i) taps.push_back(std::exp(-pi * pi * i * i / (pixels_per_degree * pixels_per_degree * b)));
+    for (int i = -radius; i <= radius; ++i)
+        taps.push_back(std::exp(-pi * pi * i * i / (pixels_per_degree * pixels_per_degree * b)));
     return taps;
 }
 
-/// One channel as the eye resolves it at this distance. The two-dimensional filter is a sum of two Gaussians, each of them separable; together they
-/// weigh 1.
-Plane blurAsSeen(const Plane& in, std::size_t width, std::size_t height, const ContrastSensitivity& csf, double pixels_per_degree) {
+/// One channel as the eye resolves it at this distance. The two-dimensional filter is a sum of two
+/// Gaussians, each of them separable; together they weigh 1.
+Plane blurAsSeen(const Plane& in, std::size_t width, std::size_t height, const ContrastSensitivity& csf,
+                 double pixels_per_degree) {
     const double widest = std::max({kAchromatic.b1, kRedGreen.b1, kBlueYellow.b1});
-    const int radius = static_cast<int>(std::ceil(3 * std::sqrt(widest / (2 * pi * pi)) * pixels_per_degree));
-    Taps first = sensitivityTaps(csf.b1, radius, pixels_per_degree), second = sensitivityTaps(csf.b2, radius, pixels_per_degree);
-    const double s1 = csf.a1 * std::sqrt(pi / csf.b1) * sum(first) * sum(first), s2 = csf.a2 * std::sqrt(pi / csf.b2) * sum(second) * sum(second);
+    const int radius =
+        static_cast<int>(std::ceil(3 * std::sqrt(widest / (2 * pi * pi)) * pixels_per_degree));
+    Taps first = sensitivityTaps(csf.b1, radius, pixels_per_degree),
+         second = sensitivityTaps(csf.b2, radius, pixels_per_degree);
+    const double s1 = csf.a1 * std::sqrt(pi / csf.b1) * sum(first) * sum(first),
+                 s2 = csf.a2 * std::sqrt(pi / csf.b2) * sum(second) * sum(second);
     const double share = s1 / (s1 + s2);
     scale(first, 1 / sum(first));
     scale(second, 1 / sum(second));
@@ -108,8 +121,8 @@ Plane blurAsSeen(const Plane& in, std::size_t width, std::size_t height, const C
     return out;
 }
 
-/// A Gaussian as wide as an edge is seen, and its first two derivatives, each with its positive taps adding to 1 and its negative ones to −1
-/// (2020, section 4.3).
+/// A Gaussian as wide as an edge is seen, and its first two derivatives, each with its positive taps adding
+/// to 1 and its negative ones to −1 (2020, section 4.3).
 struct FeatureTaps {
     Taps gaussian, edge, point;
 };
@@ -134,7 +147,8 @@ FeatureTaps featureTaps(double pixels_per_degree) {
     return taps;
 }
 
-// --------------------------------------------------------------------------------------------------------------------- comparison
+// ----------------------------------------------------------------------------------------------------------
+// comparison
 
 /// One image, ready to be compared.
 struct Seen {
@@ -165,11 +179,14 @@ Seen see(const std::vector<Color>& shown, std::size_t width, std::size_t height,
     }
     Seen seen;
     const auto& [gaussian, edge, point] = viewing.features;
-    seen.edge = magnitude(convolve(grey, width, height, edge, gaussian), convolve(grey, width, height, gaussian, edge));
-    seen.point = magnitude(convolve(grey, width, height, point, gaussian), convolve(grey, width, height, gaussian, point));
+    seen.edge = magnitude(convolve(grey, width, height, edge, gaussian),
+                          convolve(grey, width, height, gaussian, edge));
+    seen.point = magnitude(convolve(grey, width, height, point, gaussian),
+                           convolve(grey, width, height, gaussian, point));
 
     const std::array<ContrastSensitivity, 3> sensitivities{kAchromatic, kRedGreen, kBlueYellow};
-    for (std::size_t k = 0; k < 3; ++k) opponent[k] = blurAsSeen(opponent[k], width, height, sensitivities[k], viewing.pixels_per_degree);
+    for (std::size_t k = 0; k < 3; ++k)
+        opponent[k] = blurAsSeen(opponent[k], width, height, sensitivities[k], viewing.pixels_per_degree);
     seen.lab.resize(shown.size());
     for (std::size_t i = 0; i < shown.size(); ++i) {
         Color rgb = fromYcxcz({opponent[0][i], opponent[1][i], opponent[2][i]});
@@ -189,22 +206,28 @@ double redistribute(double difference, double largest) {
 /// ΔE = ΔE_color ^ (1 − ΔE_feature)
 void compareSeen(const Seen& test, const Seen& reference, std::vector<float>& largest_error) {
     // Of all pairs of screen colours, green and blue are farthest apart.
-    static const double farthest = std::pow(hyab(toHuntLab({0, 1, 0}), toHuntLab({0, 0, 1})), kColorExponent);
+    static const double farthest =
+        std::pow(hyab(toHuntLab({0, 1, 0}), toHuntLab({0, 0, 1})), kColorExponent);
     for (std::size_t i = 0; i < test.lab.size(); ++i) {
-        const double color = redistribute(std::pow(hyab(test.lab[i], reference.lab[i]), kColorExponent), farthest);
-        const double edge = std::abs(test.edge[i] - reference.edge[i]), point = std::abs(test.point[i] - reference.point[i]);
+        const double color =
+            redistribute(std::pow(hyab(test.lab[i], reference.lab[i]), kColorExponent), farthest);
+        const double edge = std::abs(test.edge[i] - reference.edge[i]),
+                     point = std::abs(test.point[i] - reference.point[i]);
         const double feature = std::pow(std::max(edge, point) / std::numbers::sqrt2, kFeatureExponent);
         largest_error[i] = std::max(largest_error[i], static_cast<float>(std::pow(color, 1 - feature)));
     }
 }
 
 void finish(FlipResult& result) {
-    result.mean = std::accumulate(result.error.begin(), result.error.end(), 0.0) / static_cast<double>(result.error.size());
+    result.mean = std::accumulate(result.error.begin(), result.error.end(), 0.0) /
+                  static_cast<double>(result.error.size());
 }
 
-// ------------------------------------------------------------------------------------------------------------------------ exposure
+// ----------------------------------------------------------------------------------------------------------
+// exposure
 
-/// (k₀x² + k₁x + k₂) / (k₃x² + k₄x + k₅): Narkowicz' fit to the ACES curve, its input scaled by 0.6 (2021, section 3).
+/// (k₀x² + k₁x + k₂) / (k₃x² + k₄x + k₅): Narkowicz' fit to the ACES curve, its input scaled by 0.6 (2021,
+/// section 3).
 struct ToneCurve {
     std::array<double, 6> k{0.6 * 0.6 * 2.51, 0.6 * 0.03, 0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14};
 
@@ -218,27 +241,32 @@ struct ToneCurve {
     }
 };
 
-/// From the exposure that shows the brightest pixel at 0.85 to the one that shows the median there, in stops. False when nothing is bright.
+/// From the exposure that shows the brightest pixel at 0.85 to the one that shows the median there, in
+/// stops. False when nothing is bright.
 bool chooseExposures(const RgbView& reference, const ToneCurve& curve, FlipResult& result) {
-    constexpr Color kLuminance{0.2126, 0.7152, 0.0722};  // To four digits, as Rec. 709 has them and the authors take them here.
+    constexpr Color kLuminance{
+        0.2126, 0.7152, 0.0722};  // To four digits, as Rec. 709 has them and the authors take them here.
     std::vector<double> luminance(reference.values.size() / 3);
     for (std::size_t i = 0; i < luminance.size(); ++i)
         for (std::size_t c = 0; c < 3; ++c) luminance[i] += kLuminance[c] * reference.values[3 * i + c];
     std::sort(luminance.begin(), luminance.end());
-    const double median = luminance[luminance.size() / 2];  // Of two in the middle, theirs is the brighter one.
+    const double median =
+        luminance[luminance.size() / 2];  // Of two in the middle, theirs is the brighter one.
     // Of a mostly black image, the authors' program takes one float rounding for the median.
     const double dark = std::max(median, 0x1p-23), bright = luminance.back(), shown = curve.inverse(0.85);
     if (bright <= 0) return false;
     result.start_exposure = std::log2(shown / bright);
     result.stop_exposure = std::max(std::log2(shown / dark), result.start_exposure);
-    result.exposures = std::max(2, static_cast<int>(std::ceil(result.stop_exposure - result.start_exposure)));
+    result.exposures =
+        std::max(2, static_cast<int>(std::ceil(result.stop_exposure - result.start_exposure)));
     return true;
 }
 
 std::vector<Color> show(const RgbView& image, double gain, const ToneCurve& curve) {
     std::vector<Color> shown(image.values.size() / 3);
     for (std::size_t i = 0; i < shown.size(); ++i)
-        for (std::size_t c = 0; c < 3; ++c) shown[i][c] = curve(gain * std::max(0.0f, image.values[3 * i + c]));
+        for (std::size_t c = 0; c < 3; ++c)
+            shown[i][c] = curve(gain * std::max(0.0f, image.values[3 * i + c]));
     return shown;
 }
 
@@ -256,7 +284,8 @@ FlipResult flipLdr(const RgbView& test, const RgbView& reference, double pixels_
     const auto seen = [&](const RgbView& image) {
         std::vector<Color> shown(image.values.size() / 3);
         for (std::size_t i = 0; i < shown.size(); ++i)
-            for (std::size_t c = 0; c < 3; ++c) shown[i][c] = std::clamp(static_cast<double>(image.values[3 * i + c]), 0.0, 1.0);
+            for (std::size_t c = 0; c < 3; ++c)
+                shown[i][c] = std::clamp(static_cast<double>(image.values[3 * i + c]), 0.0, 1.0);
         return see(shown, image.width, image.height, viewing);
     };
     compareSeen(seen(test), seen(reference), result.error);
@@ -274,18 +303,23 @@ FlipResult flipHdr(const RgbView& test, const RgbView& reference, double pixels_
         return result;
     }
     const Viewing viewing{pixels_per_degree, featureTaps(pixels_per_degree)};
-    // Exposures are independent of each other, and the largest error is that in any order. A few threads: each holds some 250 bytes a pixel.
+    // Exposures are independent of each other, and the largest error is that in any order. A few threads:
+    // each holds some 250 bytes a pixel.
     constexpr unsigned kMostThreads = 4;
-    const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1u, std::min(kMostThreads, static_cast<unsigned>(result.exposures)));
+    const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1u,
+                                        std::min(kMostThreads, static_cast<unsigned>(result.exposures)));
     std::vector<std::future<std::vector<float>>> parts;
     for (unsigned first = 0; first < threads; ++first)
         parts.push_back(std::async(std::launch::async, [&, first] {
             std::vector<float> error(result.error.size(), 0.0f);
             for (int i = static_cast<int>(first); i < result.exposures; i += static_cast<int>(threads)) {
-                const double stops = result.start_exposure + i * (result.stop_exposure - result.start_exposure) / (result.exposures - 1);
+                const double stops =
+                    result.start_exposure +
+                    i * (result.stop_exposure - result.start_exposure) / (result.exposures - 1);
                 const double gain = std::exp2(stops);
                 compareSeen(see(show(test, gain, curve), test.width, test.height, viewing),
-                            see(show(reference, gain, curve), reference.width, reference.height, viewing), error);
+                            see(show(reference, gain, curve), reference.width, reference.height, viewing),
+                            error);
             }
             return error;
         }));

@@ -19,7 +19,9 @@ TestFamily familyOf(std::span<const double> p_values, double alpha) {
     family.tests = p_values.size();
     family.alpha = alpha;
     if (p_values.empty()) return family;
-    if (const auto bad = std::find_if(p_values.begin(), p_values.end(), [](double p) { return std::isnan(p); }); bad != p_values.end()) {
+    if (const auto bad =
+            std::find_if(p_values.begin(), p_values.end(), [](double p) { return std::isnan(p); });
+        bad != p_values.end()) {
         family.smallest_p = kNan;
         family.worst = static_cast<std::size_t>(bad - p_values.begin());
         return family;
@@ -36,9 +38,13 @@ GateResult::Channel compareMeans(const Summary& a, const Summary& b, const GateO
     const double scale = std::abs(b.mean);
     const Interval& interval = channel.difference.interval;
     if (scale == 0) {  // Nothing is relative to black; only black is equal to it.
-        channel.relative = channel.difference.difference == 0 ? 0 : std::copysign(std::numeric_limits<double>::infinity(), a.mean);
+        channel.relative = channel.difference.difference == 0
+                               ? 0
+                               : std::copysign(std::numeric_limits<double>::infinity(), a.mean);
         channel.relative_interval = channel.relative == 0 ? Interval{0, 0} : Interval{kNan, kNan};
-        channel.verdict = channel.relative == 0 && a.variance == 0 ? Verdict::Pass : interval.contains(0) ? Verdict::Inconclusive : Verdict::Fail;
+        channel.verdict = channel.relative == 0 && a.variance == 0 ? Verdict::Pass
+                          : interval.contains(0)                   ? Verdict::Inconclusive
+                                                                   : Verdict::Fail;
         return channel;
     }
     channel.relative = channel.difference.difference / scale;
@@ -47,12 +53,14 @@ GateResult::Channel compareMeans(const Summary& a, const Summary& b, const GateO
     return channel;
 }
 
-/// Tiles of the middle channel (Y of XYZ, G of RGB) alone, since channels share their noise; and those with noise alone.
+/// Tiles of the middle channel (Y of XYZ, G of RGB) alone, since channels share their noise; and those with
+/// noise alone.
 double tileUniformity(const Replicates& a, const Replicates& b, const std::vector<double>& tile_p) {
     const std::uint32_t channels = a.channels(), middle = channels / 2;
     std::vector<double> p;
     for (std::size_t tile = 0; tile < a.tiles(); ++tile)
-        if (a.tileMean(tile, middle).variance + b.tileMean(tile, middle).variance > 0) p.push_back(tile_p[tile * channels + middle]);
+        if (a.tileMean(tile, middle).variance + b.tileMean(tile, middle).variance > 0)
+            p.push_back(tile_p[tile * channels + middle]);
     return p.empty() ? 1 : kolmogorovSmirnovUniform(p);
 }
 
@@ -76,18 +84,28 @@ void judge(GateResult& result, const GateOptions& options) {
         result.reasons.push_back(std::move(reason));
     };
     for (std::size_t c = 0; c < result.channels.size(); ++c) {
-        const std::string name = c < options.channel_names.size() ? options.channel_names[c] : std::to_string(c);
-        if (result.channels[c].verdict == Verdict::Fail) because(fails, fmt::format("the means of channel {} differ by more than delta", name));
+        const std::string name =
+            c < options.channel_names.size() ? options.channel_names[c] : std::to_string(c);
+        if (result.channels[c].verdict == Verdict::Fail)
+            because(fails, fmt::format("the means of channel {} differ by more than delta", name));
         if (result.channels[c].verdict == Verdict::Inconclusive)
-            because(undecided, fmt::format("the interval of channel {} reaches beyond delta: more samples are needed", name));
+            because(undecided,
+                    fmt::format("the interval of channel {} reaches beyond delta: more samples are needed",
+                                name));
     }
-    if (result.tiles.rejected > 0) because(fails, fmt::format("{} of {} tile tests differ", result.tiles.rejected, result.tiles.tests));
-    if (result.pixels.rejected > 0) because(fails, fmt::format("{} of {} pixel tests differ", result.pixels.rejected, result.pixels.tests));
-    // A few values that carry the answer make intervals too short and too long alike: neither verdict could be trusted.
+    if (result.tiles.rejected > 0)
+        because(fails, fmt::format("{} of {} tile tests differ", result.tiles.rejected, result.tiles.tests));
+    if (result.pixels.rejected > 0)
+        because(fails,
+                fmt::format("{} of {} pixel tests differ", result.pixels.rejected, result.pixels.tests));
+    // A few values that carry the answer make intervals too short and too long alike: neither verdict could
+    // be trusted.
     if (result.largest_share > options.largest_share) {
         fails = false;
-        because(undecided, fmt::format("one value carries {:.1f} % of all squared error: too few samples for its distribution",
-                                       100 * result.largest_share));
+        because(undecided,
+                fmt::format(
+                    "one value carries {:.1f} % of all squared error: too few samples for its distribution",
+                    100 * result.largest_share));
     }
     result.verdict = fails ? Verdict::Fail : undecided ? Verdict::Inconclusive : Verdict::Pass;
 }
@@ -104,8 +122,10 @@ double equalityP(const Mean& a, const Mean& b) {
     if (!std::isfinite(difference) || !std::isfinite(variance)) return kNan;
     if (std::abs(difference) <= 0x1p-20 * std::max(std::abs(a.value), std::abs(b.value))) return 1;
     if (variance == 0) return 0;
-    const double t = difference / std::sqrt(variance), share_a = a.variance / variance, share_b = b.variance / variance;
-    const double inverse_dof = share_a * share_a / a.dof + share_b * share_b / b.dof;  // Welch–Satterthwaite; 0 when both are known.
+    const double t = difference / std::sqrt(variance), share_a = a.variance / variance,
+                 share_b = b.variance / variance;
+    const double inverse_dof = share_a * share_a / a.dof +
+                               share_b * share_b / b.dof;  // Welch–Satterthwaite; 0 when both are known.
     return inverse_dof > 0 ? studentTwoSided(t, 1 / inverse_dof) : normalTwoSided(t);
 }
 
@@ -122,19 +142,29 @@ TestFamily sidakFamily(std::span<const double> p_values, double alpha) {
     TestFamily family = familyOf(p_values, alpha);
     if (family.tests == 0 || std::isnan(family.smallest_p)) return family;
     const double limit = sidak(alpha, family.tests);
-    family.rejected = static_cast<std::uint64_t>(std::count_if(p_values.begin(), p_values.end(), [&](double p) { return p < limit; }));
-    family.smallest_p = family.smallest_p >= 1 ? 1 : -std::expm1(static_cast<double>(family.tests) * std::log1p(-family.smallest_p));
+    family.rejected = static_cast<std::uint64_t>(
+        std::count_if(p_values.begin(), p_values.end(), [&](double p) { return p < limit; }));
+    family.smallest_p =
+        family.smallest_p >= 1
+            ? 1
+            : -std::expm1(static_cast<double>(family.tests) * std::log1p(-family.smallest_p));
     return family;
 }
 
-// ----------------------------------------------------------------------------------------------------------------------- replicates
+// ----------------------------------------------------------------------------------------------------------
+// replicates
 
 Replicates::Replicates(std::uint32_t width, std::uint32_t height, std::uint32_t channels)
-    : width_(width), height_(height), channels_(channels), pixels_(std::size_t{width} * height * channels), image_means_(channels),
+    : width_(width),
+      height_(height),
+      channels_(channels),
+      pixels_(std::size_t{width} * height * channels),
+      image_means_(channels),
       tile_means_(tiles() * channels) {}
 
 void Replicates::add(std::span<const double> image) {
-    if (image.size() != pixels_.size()) throw Error(ErrorKind::Internal, "a replicate has another size than those before it");
+    if (image.size() != pixels_.size())
+        throw Error(ErrorKind::Internal, "a replicate has another size than those before it");
     ++count_;
     const double n = static_cast<double>(count_);
     std::vector<double> tile_sums(tile_means_.size(), 0.0), image_sums(channels_, 0.0);
@@ -157,12 +187,16 @@ void Replicates::add(std::span<const double> image) {
                 image_sums[c] += v;
             }
         }
-    for (std::size_t i = 0; i < tile_sums.size(); ++i) tile_means_[i].push_back(tile_sums[i] / tile_pixels[i / channels_]);
-    for (std::uint32_t c = 0; c < channels_; ++c) image_means_[c].push_back(image_sums[c] / (static_cast<double>(width_) * height_));
+    for (std::size_t i = 0; i < tile_sums.size(); ++i)
+        tile_means_[i].push_back(tile_sums[i] / tile_pixels[i / channels_]);
+    for (std::uint32_t c = 0; c < channels_; ++c)
+        image_means_[c].push_back(image_sums[c] / (static_cast<double>(width_) * height_));
 }
 
 Summary Replicates::imageMean(std::uint32_t channel) const { return summarize(image_means_[channel]); }
-Summary Replicates::tileMean(std::size_t tile, std::uint32_t channel) const { return summarize(tile_means_[tile * channels_ + channel]); }
+Summary Replicates::tileMean(std::size_t tile, std::uint32_t channel) const {
+    return summarize(tile_means_[tile * channels_ + channel]);
+}
 
 Summary Replicates::pixel(std::size_t pixel, std::uint32_t channel) const {
     const Moments& m = pixels_[pixel * channels_ + channel];
@@ -180,17 +214,21 @@ double Replicates::largestShare() const {
 }
 
 GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& options) {
-    if (a.width() != b.width() || a.height() != b.height() || a.channels() != b.channels() || a.count() < 2 || b.count() < 2)
-        throw Error(ErrorKind::Internal, "the gate needs two sets of images of one size, two replicates or more in each");
+    if (a.width() != b.width() || a.height() != b.height() || a.channels() != b.channels() ||
+        a.count() < 2 || b.count() < 2)
+        throw Error(ErrorKind::Internal,
+                    "the gate needs two sets of images of one size, two replicates or more in each");
     GateResult result;
     result.not_finite = a.notFinite() + b.notFinite();
     if (result.not_finite > 0) {
-        result.reasons.push_back(fmt::format("{} values are no numbers: nothing can be said", result.not_finite));
+        result.reasons.push_back(
+            fmt::format("{} values are no numbers: nothing can be said", result.not_finite));
         return result;
     }
     const double alpha = 1 - options.confidence;
     const std::uint32_t channels = a.channels();
-    for (std::uint32_t c = 0; c < channels; ++c) result.channels.push_back(compareMeans(a.imageMean(c), b.imageMean(c), options));
+    for (std::uint32_t c = 0; c < channels; ++c)
+        result.channels.push_back(compareMeans(a.imageMean(c), b.imageMean(c), options));
 
     // A few replicates agree by chance, exactly where samples are counted: then there seems to be no noise.
     const bool few = std::min(a.count(), b.count()) < kFewestForPixels;
@@ -205,7 +243,8 @@ GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& opt
 
     p.clear();
     for (std::size_t pixel = 0; !few && pixel < std::size_t{a.width()} * a.height(); ++pixel)
-        for (std::uint32_t c = 0; c < channels; ++c) p.push_back(equalityP(meanOf(a.pixel(pixel, c)), meanOf(b.pixel(pixel, c))));
+        for (std::uint32_t c = 0; c < channels; ++c)
+            p.push_back(equalityP(meanOf(a.pixel(pixel, c)), meanOf(b.pixel(pixel, c))));
     result.pixels = sidakFamily(p, alpha);
 
     result.largest_share = std::max(a.largestShare(), b.largestShare());

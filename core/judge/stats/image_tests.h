@@ -1,5 +1,6 @@
-/// Are two estimators' images equal? Means over the image by equivalence, tiles and pixels by tests that count how many they are, and a guard that
-/// knows when too few samples carry the answer for any of it to be trusted.
+/// Are two estimators' images equal? Means over the image by equivalence, tiles and pixels by tests that
+/// count how many they are, and a guard that knows when too few samples carry the answer for any of it to be
+/// trusted.
 #pragma once
 
 #include "base/statistics.h"
@@ -19,8 +20,9 @@ struct Mean {
 };
 Mean meanOf(const Summary& summary);
 
-/// Welch's two-sided P that two means are equal. Differences of 2^-20 of the value or less are rounding, and P is 1: without noise, say in the
-/// sky, there is no other way to tell them from bias. NaN when a mean or variance is not finite.
+/// Welch's two-sided P that two means are equal. Differences of 2^-20 of the value or less are rounding, and
+/// P is 1: without noise, say in the sky, there is no other way to tell them from bias. NaN when a mean or
+/// variance is not finite.
 double equalityP(const Mean& a, const Mean& b);
 
 /// Many tests of which none should fail.
@@ -32,13 +34,15 @@ struct TestFamily {
 };
 /// Adjusted and rejected by Holm's steps: however the tests depend on each other.
 TestFamily holmFamily(std::span<const double> p_values, double alpha);
-/// By Šidák's one limit. Exact for independent tests; on the safe side where they agree with each other, as channels do.
+/// By Šidák's one limit. Exact for independent tests; on the safe side where they agree with each other, as
+/// channels do.
 TestFamily sidakFamily(std::span<const double> p_values, double alpha);
 
 /// Side of a square of pixels that are tested together.
 inline constexpr std::uint32_t kTileSide = 8;
 
-/// Independent images of one scene by one estimator (other seeds, all else the same), reduced as they come to what tests need.
+/// Independent images of one scene by one estimator (other seeds, all else the same), reduced as they come
+/// to what tests need.
 class Replicates {
 public:
     Replicates(std::uint32_t width, std::uint32_t height, std::uint32_t channels);
@@ -58,7 +62,8 @@ public:
     /// Tiles in reading order; those at the right and lower border may be smaller.
     Summary tileMean(std::size_t tile, std::uint32_t channel) const;
     Summary pixel(std::size_t pixel, std::uint32_t channel) const;
-    /// Largest part of Σ (I − Ī)², over all pixels, channels and replicates, that is one of them; 0 without any spread.
+    /// Largest part of Σ (I − Ī)², over all pixels, channels and replicates, that is one of them; 0 without
+    /// any spread.
     double largestShare() const;
 
 private:
@@ -78,7 +83,8 @@ inline constexpr std::uint64_t kFewestForPixels = 8;
 
 struct GateOptions {
     double delta = 0.01;          ///< Means that differ by less, relative to b's, are equivalent.
-    double confidence = 0.999;    ///< Of the interval of each channel's mean; 1 − confidence is alpha of tiles and of pixels.
+    double confidence =
+        0.999;  ///< Of the interval of each channel's mean; 1 − confidence is alpha of tiles and of pixels.
     double largest_share = 0.05;  ///< Of the squared error that one value may carry.
     std::vector<std::string> channel_names;  ///< For the reasons; numbers where there are too few.
 };
@@ -86,21 +92,24 @@ struct GateOptions {
 struct GateResult {
     struct Channel {
         WelchResult difference;      ///< a − b, absolute
-        double relative = 0;         ///< To b's mean, whose own error is left out: it would move the interval by parts of itself.
+        double relative =
+            0;  ///< To b's mean, whose own error is left out: it would move the interval by parts of itself.
         Interval relative_interval;
         Verdict verdict = Verdict::Inconclusive;
     };
     std::vector<Channel> channels;
     TestFamily tiles, pixels;        ///< Over channels too: `worst` is place · channels + channel.
-    /// That the tiles' p-values (of the middle channel, where there is noise) are uniform; to be read, not judged by.
+    /// That the tiles' p-values (of the middle channel, where there is noise) are uniform; to be read, not
+    /// judged by.
     double tile_uniformity_p = 1;
     double largest_share = 0;        ///< Of a or b, whichever is larger.
     std::uint64_t not_finite = 0;
     Verdict verdict = Verdict::Inconclusive;
     std::vector<std::string> reasons;  ///< Why not Pass, one sentence each.
 };
-/// Pass: all channels' means are equivalent, no tile and no pixel differs, and no single value decides. Fail: a mean, tile or pixel differs for
-/// certain. Else Inconclusive, and so is anything with a value that is no number.
+/// Pass: all channels' means are equivalent, no tile and no pixel differs, and no single value decides.
+/// Fail: a mean, tile or pixel differs for certain. Else Inconclusive, and so is anything with a value that
+/// is no number.
 GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& options = {});
 
 }  // namespace crt::stats

@@ -28,9 +28,23 @@ double meanOf(std::span<const float> values) {
 }  // namespace
 
 ErrorMetrics errorMetrics(std::span<const float> test, std::span<const float> reference) {
-    if (test.size() != reference.size()) throw Error(ErrorKind::Internal, "an error needs as many values as its reference has");
+    if (test.size() != reference.size())
+        throw Error(ErrorKind::Internal, "an error needs as many values as its reference has");
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    ErrorMetrics m{test.size(), countNotFinite(test), countNotFinite(reference), nan, nan, nan, nan, nan, nan, nan, nan, nan, nan, nan};
+    ErrorMetrics m{test.size(),
+                   countNotFinite(test),
+                   countNotFinite(reference),
+                   nan,
+                   nan,
+                   nan,
+                   nan,
+                   nan,
+                   nan,
+                   nan,
+                   nan,
+                   nan,
+                   nan,
+                   nan};
     if (!m.valid()) return m;
 
     m.test_mean = meanOf(test);

@@ -1,4 +1,5 @@
-/// Error of a test image against a reference, value by value. Nothing is dropped: one NaN or infinity voids all numbers, and is counted.
+/// Error of a test image against a reference, value by value. Nothing is dropped: one NaN or infinity voids
+/// all numbers, and is counted.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,8 @@ struct ErrorMetrics {
     std::uint64_t values = 0;
     NotFinite test, reference;
     double test_mean, reference_mean;
-    double mean_ratio;     ///< Of test to reference. NaN when both are black, infinite when only the reference is.
+    double
+        mean_ratio;  ///< Of test to reference. NaN when both are black, infinite when only the reference is.
     double mse;            ///< mean (I − R)²
     double rmse;           ///< √mse
     double relative_rmse;  ///< rmse / |mean R|; 0 when both are the same, infinite against black.

@@ -1,5 +1,5 @@
-// Group L: floating point environment and backends. A backend is asked for the bits of crt's own portable build of the kernel, which is stricter than any
-// tolerance.
+// Group L: floating point environment and backends. A backend is asked for the bits of crt's own portable
+// build of the kernel, which is stricter than any tolerance.
 #include "judge/verify/context.h"
 #include "judge/verify/shapes.h"
 #include "judge/verify/variants.h"
@@ -18,18 +18,21 @@ namespace crt::verify {
 namespace {
 
 constexpr const char* kRounds =
-    "the backend rounds otherwise: contraction, a fast-math flag, its own division or square root, flushed subnormals, or another triangle test";
+    "the backend rounds otherwise: contraction, a fast-math flag, its own division or square root, flushed "
+    "subnormals, or another triangle test";
 
 void shippedFlags(Context& context) {
     forEachVariant(context, 24, [](Context& c, const Variant& v) {
-        c.sameBits(v.name, portableFilm(v.scene, {.samples = 4, .aovs = kAllAovs}), c.render(v.scene, {.samples = 4, .aovs = kAllAovs}), kRounds);
+        c.sameBits(v.name, portableFilm(v.scene, {.samples = 4, .aovs = kAllAovs}),
+                   c.render(v.scene, {.samples = 4, .aovs = kAllAovs}), kRounds);
     });
 }
 
 void randomNumbers(Context& context) {
     // A slanted plane at the far end of the view: the distance tells the two numbers that placed the sample.
-    for (const auto& [what, type] :
-         {std::pair{"Sobol", SamplerType::Sobol}, {"independent", SamplerType::Independent}, {"xorshift", SamplerType::XorShift}}) {
+    for (const auto& [what, type] : {std::pair{"Sobol", SamplerType::Sobol},
+                                     {"independent", SamplerType::Independent},
+                                     {"xorshift", SamplerType::XorShift}}) {
         const int resolution = context.atLeast(Level::Merge) ? 1000 : 100;
         Scene scene = emptyScene(resolution, 0x123456789abcdef0, {0, 0, 0}, {0, 0, 1}, 0.5);
         scene.sampler.type = type;
@@ -38,18 +41,21 @@ void randomNumbers(Context& context) {
         addTriangle(plane, {-4, -4, 0.25}, {4, -3, 2}, {0, 5, 1});
         addObject(scene, std::move(plane), diffuse(0.5));
         const Render how{.samples = 1, .first_sample = 5, .aovs = kAovDepth};
-        context.sameBits(fmt::format("{}: {} pixels", what, resolution * resolution), portableFilm(scene, how), context.render(scene, how),
+        context.sameBits(fmt::format("{}: {} pixels", what, resolution * resolution),
+                         portableFilm(scene, how), context.render(scene, how),
                          "the sampler's integer words differ");
     }
 }
 
 void firstHits(Context& context) {
-    Scene scene = emptyScene(context.atLeast(Level::Merge) ? 1000 : 150, 1, {0.2, 0.3, -2.5}, {0, 0, 0}, 0.45);
+    Scene scene =
+        emptyScene(context.atLeast(Level::Merge) ? 1000 : 150, 1, {0.2, 0.3, -2.5}, {0, 0, 0}, 0.45);
     scene.integrator.max_depth = 0;
     addObject(scene, icosphere(4, 0.9, {0, 0, 0}), diffuse(0.5));
     addObject(scene, boxMesh({-0.95, -0.95, -0.9}, {-0.4, -0.5, 0.9}), diffuse(0.5));
     const Render how{.samples = 1, .aovs = kAovNormal | kAovDepth | kAovPrimitive};
-    context.sameBits("primitive, normal and distance", portableFilm(scene, how), context.render(scene, how), kRounds);
+    context.sameBits("primitive, normal and distance", portableFilm(scene, how), context.render(scene, how),
+                     kRounds);
 }
 
 void radiances(Context& context) {
@@ -63,7 +69,8 @@ void runToRun(Context& context) {
     const Scene scene = litRoom(64, 1);
     const Film first = context.render(scene, {.samples = 32});
     for (int i = 0; i < 4; ++i)
-        context.sameBits(fmt::format("run {}", i + 2), first, context.render(scene, {.samples = 32}), "sums depend on the order of the threads");
+        context.sameBits(fmt::format("run {}", i + 2), first, context.render(scene, {.samples = 32}),
+                         "sums depend on the order of the threads");
 }
 
 void lostDevices(Context& context) {
@@ -107,8 +114,10 @@ void lostDevices(Context& context) {
                      "what was cancelled is still in the film");
 
     context.notApplicable("a device lost, out of memory, out of time",
-                          "asked of the host with a plugin that fails on demand: 'a device that fails in the middle costs little' "
-                          "(tests/unit_running.cpp), tests/cli, and CUDA's own failures against a simulated driver (tests/unit_cuda_program.cpp)");
+                          "asked of the host with a plugin that fails on demand: 'a device that fails in "
+                          "the middle costs little' "
+                          "(tests/unit_running.cpp), tests/cli, and CUDA's own failures against a simulated "
+                          "driver (tests/unit_cuda_program.cpp)");
 }
 
 /// The calling thread's rounding mode and treatment of subnormals, put back at the end.
@@ -150,7 +159,8 @@ void hostsEnvironment(Context& context) {
             const OddEnvironment odd(rounding, flush);
             return render(threads);
         }();
-        context.sameBits(what, expected, film, "the backend computes in the rounding mode of the thread that called it");
+        context.sameBits(what, expected, film,
+                         "the backend computes in the rounding mode of the thread that called it");
     };
     ask("the host rounds upwards", FE_UPWARD, false, 0);
     ask("the host rounds to zero, on one thread", FE_TOWARDZERO, false, 1);
@@ -160,23 +170,28 @@ void hostsEnvironment(Context& context) {
 }  // namespace
 
 std::vector<Case> backendCases() {
-    const auto sameBits = [](const char* id, const char* case_name, const char* title, const char* expected, const char* source, std::uint64_t needs,
-                             void (*run)(Context&)) { return row(id, case_name, title, expected, source, "same bits", Level::Commit, needs, run); };
+    const auto sameBits = [](const char* id, const char* case_name, const char* title, const char* expected,
+                             const char* source, std::uint64_t needs, void (*run)(Context&)) {
+        return row(id, case_name, title, expected, source, "same bits", Level::Commit, needs, run);
+    };
     constexpr const char* kPortable = "crt's own portable build of the kernel";
     return {
-        sameBits("L01", "shipped-flags", "Every feature, under the flags that the backend ships with", "the portable build's image, with all AOVs",
-            kPortable, 0, shippedFlags),
-        sameBits("L02", "random-numbers", "10^6 numbers of each sampler (10^4 on commits)", "the portable build's", kPortable, CRT_FEATURE_AOV,
-            randomNumbers),
-        sameBits("L03", "first-hits", "10^6 first hits on a sphere and a box: primitive, normal, distance", "the portable build's", kPortable,
-            CRT_FEATURE_BVH | CRT_FEATURE_AOV, firstHits),
-        sameBits("L04", "radiances", "Every feature, the same seed", "the portable build's radiances", kPortable, 0, radiances),
-        sameBits("L05", "run-to-run", "The same render five times", "the same image", "docs/architecture.md, Same bits",
-            CRT_FEATURE_BVH | CRT_FEATURE_NEE, runToRun),
-        sameBits("L06", "lost-devices", "A device that is lost, or out of memory or time", "a clean error, and what there was is kept",
-            "docs/architecture.md, Exit codes", 0, lostDevices),
-        sameBits("L07", "hosts-environment", "A host that rounds upwards, to zero, or flushes subnormals", "the same image",
-            "the backend sets what it needs", CRT_FEATURE_BVH | CRT_FEATURE_NEE, hostsEnvironment),
+        sameBits("L01", "shipped-flags", "Every feature, under the flags that the backend ships with",
+                 "the portable build's image, with all AOVs", kPortable, 0, shippedFlags),
+        sameBits("L02", "random-numbers", "10^6 numbers of each sampler (10^4 on commits)",
+                 "the portable build's", kPortable, CRT_FEATURE_AOV, randomNumbers),
+        sameBits("L03", "first-hits", "10^6 first hits on a sphere and a box: primitive, normal, distance",
+                 "the portable build's", kPortable, CRT_FEATURE_BVH | CRT_FEATURE_AOV, firstHits),
+        sameBits("L04", "radiances", "Every feature, the same seed", "the portable build's radiances",
+                 kPortable, 0, radiances),
+        sameBits("L05", "run-to-run", "The same render five times", "the same image",
+                 "docs/architecture.md, Same bits", CRT_FEATURE_BVH | CRT_FEATURE_NEE, runToRun),
+        sameBits("L06", "lost-devices", "A device that is lost, or out of memory or time",
+                 "a clean error, and what there was is kept", "docs/architecture.md, Exit codes", 0,
+                 lostDevices),
+        sameBits("L07", "hosts-environment", "A host that rounds upwards, to zero, or flushes subnormals",
+                 "the same image", "the backend sets what it needs", CRT_FEATURE_BVH | CRT_FEATURE_NEE,
+                 hostsEnvironment),
     };
 }
 

@@ -91,7 +91,8 @@ std::vector<const Case*> select(const std::vector<std::string>& words, Level lev
     for (const Case& c : registry()) {
         bool wanted = words.empty() && c.level <= level;
         for (const std::string& word : words)
-            wanted = wanted || word == c.id || word == c.name || (word.size() == 1 && word.front() == c.group() && c.level <= level);
+            wanted = wanted || word == c.id || word == c.name ||
+                     (word.size() == 1 && word.front() == c.group() && c.level <= level);
         if (wanted) chosen.push_back(&c);
     }
     for (const std::string& word : words) {
@@ -100,7 +101,9 @@ std::vector<const Case*> select(const std::vector<std::string>& words, Level lev
             for (const std::string& n : {c.id, c.name, std::string(1, c.group())}) known.push_back(n);
         if (std::find(known.begin(), known.end(), word) != known.end()) continue;
         const std::string hint = didYouMean(word, known);
-        throw Error(ErrorKind::Usage, fmt::format("no case is called '{}'{}", word, hint.empty() ? "; 'crt verify --list' shows them all" : "; " + hint));
+        throw Error(ErrorKind::Usage,
+                    fmt::format("no case is called '{}'{}", word,
+                                hint.empty() ? "; 'crt verify --list' shows them all" : "; " + hint));
     }
     return chosen;
 }

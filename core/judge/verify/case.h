@@ -1,7 +1,9 @@
-/// The suite of `crt verify`: scenes whose answer is known, and the registry that holds them. A case is asked of every backend alike; what it
-/// expects comes from a closed form, from deterministic quadrature, or from a relation between images, never from an earlier render.
+/// The suite of `crt verify`: scenes whose answer is known, and the registry that holds them. A case is
+/// asked of every backend alike; what it expects comes from a closed form, from deterministic quadrature, or
+/// from a relation between images, never from an earlier render.
 ///
-/// To add a case: a function that takes a Context (context.h), and a row in its group's table. The manual (docs/stability.md), the list
+/// To add a case: a function that takes a Context (context.h), and a row in its group's table. The manual
+/// (docs/stability.md), the list
 /// (`crt verify --list`) and the reports are made from the row.
 #pragma once
 
@@ -15,13 +17,15 @@
 
 namespace crt::verify {
 
-/// When a case runs: on every commit (all together within 90 s on two cores), before a merge (15 minutes), or at night.
+/// When a case runs: on every commit (all together within 90 s on two cores), before a merge (15 minutes),
+/// or at night.
 enum class Level { Commit, Merge, Nightly };
 
-/// Best first. A statistical check whose interval is too wide to tell is Inconclusive, which counts as a failure: "could not reject" proves nothing.
+/// Best first. A statistical check whose interval is too wide to tell is Inconclusive, which counts as a
+/// failure: "could not reject" proves nothing.
 enum class Verdict {
     Pass,
-    Refused,        ///< The documented refusal: the input was turned down with the message that it should get.
+    Refused,  ///< The documented refusal: the input was turned down with the message that it should get.
     NotApplicable,  ///< Cannot be asked of this backend or of crt; the outcome's note says why.
     Inconclusive,
     Fail,
@@ -34,7 +38,8 @@ struct Outcome {
     std::optional<double> expected, measured;
     std::optional<stats::Interval> interval;  ///< 99.9 %, of `measured`, where it was estimated.
     std::string tolerance;            ///< "± 0.1 %", "same bits"
-    std::string note;                 ///< A figure worth keeping, the reason why it does not apply, or the message of a refusal.
+    std::string
+        note;  ///< A figure worth keeping, the reason why it does not apply, or the message of a refusal.
     std::string physics;              ///< Of a failure: what the numbers suggest.
 };
 
@@ -56,8 +61,9 @@ struct Case {
 };
 
 /// A row for tables that say much in little space, its members in their order.
-inline Case row(const char* id, const char* name, const char* title, const char* expected, const char* source, const char* tolerance, Level level,
-                std::uint64_t needs, void (*run)(Context&)) {
+inline Case row(const char* id, const char* name, const char* title, const char* expected,
+                const char* source, const char* tolerance, Level level, std::uint64_t needs,
+                void (*run)(Context&)) {
     return {id, name, title, expected, source, tolerance, level, needs, run};
 }
 
@@ -75,8 +81,9 @@ inline bool failed(Verdict verdict) { return verdict >= Verdict::Inconclusive; }
 /// All cases, by id.
 const std::vector<Case>& registry();
 
-/// The registry's cases that `words` name, each an id (A03), a name (furnace) or a group (A), in the registry's order; all when there are none. Cases
-/// of a higher level than `level` are left out unless named one by one. Throws crt::Error(Usage) for a word that names nothing.
+/// The registry's cases that `words` name, each an id (A03), a name (furnace) or a group (A), in the
+/// registry's order; all when there are none. Cases of a higher level than `level` are left out unless named
+/// one by one. Throws crt::Error(Usage) for a word that names nothing.
 std::vector<const Case*> select(const std::vector<std::string>& words, Level level);
 
 /// Groups, each in a file of its own.

@@ -5,8 +5,8 @@
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
 
-#include "kernel/features.h"
 #include "base/vec3d.h"
+#include "kernel/features.h"
 
 #include <fmt/format.h>
 

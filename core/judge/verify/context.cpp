@@ -1,7 +1,7 @@
 #include "judge/verify/context.h"
 
-#include "compile/compile.h"
 #include "base/error.h"
+#include "compile/compile.h"
 #include "judge/verify/physics.h"
 
 #include <fmt/format.h>
@@ -15,9 +15,13 @@ namespace {
 
 constexpr double kConfidence = 0.999;
 
-stats::Interval meanOf(const std::vector<double>& replicates) { return stats::meanInterval(stats::summarize(replicates), kConfidence); }
+stats::Interval meanOf(const std::vector<double>& replicates) {
+    return stats::meanInterval(stats::summarize(replicates), kConfidence);
+}
 
-stats::Interval relativeTo(double expected, const stats::Interval& i) { return {i.lower - expected, i.upper - expected}; }
+stats::Interval relativeTo(double expected, const stats::Interval& i) {
+    return {i.lower - expected, i.upper - expected};
+}
 
 Verdict verdictOf(stats::Verdict verdict) {
     switch (verdict) {
@@ -30,8 +34,8 @@ Verdict verdictOf(stats::Verdict verdict) {
 
 std::string tolerancePercent(double delta) { return fmt::format("± {:g} %, 99.9 % interval", 100 * delta); }
 
-Outcome equivalenceOutcome(const std::string& what, const std::vector<double>& replicates, double expected, double delta,
-                           const std::vector<Mistake>& mistakes) {
+Outcome equivalenceOutcome(const std::string& what, const std::vector<double>& replicates, double expected,
+                           double delta, const std::vector<Mistake>& mistakes) {
     const stats::Interval interval = meanOf(replicates);
     Outcome o;
     o.what = what;
@@ -40,10 +44,12 @@ Outcome equivalenceOutcome(const std::string& what, const std::vector<double>& r
     o.interval = interval;
     o.tolerance = tolerancePercent(delta);
     o.verdict = verdictOf(stats::equivalence(relativeTo(expected, interval), delta * std::abs(expected)));
-    if (o.verdict == Verdict::Fail) o.physics = diagnose(interval.center(), expected, interval.halfWidth(), mistakes);
+    if (o.verdict == Verdict::Fail)
+        o.physics = diagnose(interval.center(), expected, interval.halfWidth(), mistakes);
     if (o.verdict == Verdict::Inconclusive)
-        o.physics = fmt::format("the interval is ± {:.3g} % wide: the noise is larger than the budget of samples allows for",
-                                100 * interval.halfWidth() / std::abs(expected));
+        o.physics = fmt::format(
+            "the interval is ± {:.3g} % wide: the noise is larger than the budget of samples allows for",
+            100 * interval.halfWidth() / std::abs(expected));
     return o;
 }
 
@@ -53,7 +59,8 @@ std::uint64_t differingPixels(const Film& a, const Film& b) {
     for (std::uint32_t y = 0; y < a.shape().height; ++y)
         for (std::uint32_t x = 0; x < a.shape().width; ++x) {
             const std::size_t pixel = static_cast<std::size_t>(y) * a.shape().width + x;
-            bool same = a.counts[pixel] == b.counts[pixel] && (a.primitives.empty() || a.primitives[pixel] == b.primitives[pixel]);
+            bool same = a.counts[pixel] == b.counts[pixel] &&
+                        (a.primitives.empty() || a.primitives[pixel] == b.primitives[pixel]);
             for (std::uint32_t c = 0; c < a.shape().channels; ++c)
                 same = same && static_cast<float>(a.mean(x, y, c)) == static_cast<float>(b.mean(x, y, c));
             differing += same ? 0 : 1;
@@ -63,9 +70,12 @@ std::uint64_t differingPixels(const Film& a, const Film& b) {
 
 }  // namespace
 
-Context::Context(const LoadedBackend& backend, const IntegratorOptions& options, Level level) : backend_(backend), options_(options), level_(level) {}
+Context::Context(const LoadedBackend& backend, const IntegratorOptions& options, Level level)
+    : backend_(backend), options_(options), level_(level) {}
 
-Scene Context::scene(const std::string& yaml, const std::vector<SceneOverride>& overrides) const { return parseScene(yaml, "case.yaml", ".", overrides); }
+Scene Context::scene(const std::string& yaml, const std::vector<SceneOverride>& overrides) const {
+    return parseScene(yaml, "case.yaml", ".", overrides);
+}
 
 Integrator& Context::integratorFor(const Render& how) {
     const bool usual = how.kernel == CRT_KERNEL_LEAN && how.threads == 0 && how.tile_size == 0;
@@ -87,7 +97,8 @@ Film Context::render(const std::string& yaml, const Render& how) { return render
 Film Context::render(const Scene& what, const Render& how) {
     Film film = renderRaw(what, how);
     if (const std::uint64_t invalid = film.invalidSamples(); invalid > 0)
-        holds("every sample is finite", false, "0 samples", "a division by zero, or a square root of a negative number, on the way",
+        holds("every sample is finite", false, "0 samples",
+              "a division by zero, or a square root of a negative number, on the way",
               fmt::format("{} samples were NaN or infinite", invalid));
     return film;
 }
@@ -111,18 +122,21 @@ Film Context::renderRaw(const Scene& original, const Render& how) {
     return film;
 }
 
-void Context::relative(const std::string& what, double measured, double expected, double tolerance, const std::vector<Mistake>& mistakes) {
+void Context::relative(const std::string& what, double measured, double expected, double tolerance,
+                       const std::vector<Mistake>& mistakes) {
     Outcome o;
     o.what = what;
     o.measured = measured;
     o.expected = expected;
     o.tolerance = expected == 0 ? "exactly" : fmt::format("{:g} relative", tolerance);
-    o.verdict = std::abs(measured - expected) <= tolerance * std::abs(expected) ? Verdict::Pass : Verdict::Fail;
+    o.verdict =
+        std::abs(measured - expected) <= tolerance * std::abs(expected) ? Verdict::Pass : Verdict::Fail;
     if (o.verdict == Verdict::Fail) o.physics = diagnose(measured, expected, 0, mistakes);
     add(std::move(o));
 }
 
-void Context::absolute(const std::string& what, double measured, double expected, double tolerance, const std::vector<Mistake>& mistakes) {
+void Context::absolute(const std::string& what, double measured, double expected, double tolerance,
+                       const std::vector<Mistake>& mistakes) {
     Outcome o;
     o.what = what;
     o.measured = measured;
@@ -133,13 +147,14 @@ void Context::absolute(const std::string& what, double measured, double expected
     add(std::move(o));
 }
 
-void Context::equivalent(const std::string& what, const std::vector<double>& replicates, double expected, double delta,
-                         const std::vector<Mistake>& mistakes) {
+void Context::equivalent(const std::string& what, const std::vector<double>& replicates, double expected,
+                         double delta, const std::vector<Mistake>& mistakes) {
     add(equivalenceOutcome(what, replicates, expected, delta, mistakes));
 }
 
-void Context::equivalent(const std::string& what, const std::function<std::vector<double>(std::uint64_t)>& replicatesOf, double expected, double delta,
-                         const Effort& effort) {
+void Context::equivalent(const std::string& what,
+                         const std::function<std::vector<double>(std::uint64_t)>& replicatesOf,
+                         double expected, double delta, const Effort& effort) {
     for (std::uint64_t samples = effort.samples;; samples = std::min(4 * samples, effort.most)) {
         Outcome outcome = equivalenceOutcome(what, replicatesOf(samples), expected, delta, {});
         if (outcome.verdict == Verdict::Inconclusive && samples < effort.most) continue;
@@ -148,12 +163,14 @@ void Context::equivalent(const std::string& what, const std::function<std::vecto
     }
 }
 
-std::vector<Outcome> Context::estimated(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta, const Effort& effort,
-                                        const std::vector<Mistake>& mistakes) {
+std::vector<Outcome> Context::estimated(const std::vector<Asked>& asked,
+                                        const std::vector<std::string>& scenes, double delta,
+                                        const Effort& effort, const std::vector<Mistake>& mistakes) {
     std::vector<Scene> parsed;
     for (const std::string& text : scenes) {
         parsed.push_back(scene(text));
-        // The error comes from the spread over seeds. Replicates within the film would only cost the samples their stratification.
+        // The error comes from the spread over seeds. Replicates within the film would only cost the samples
+        // their stratification.
         if (parsed.back().sampler.replicates == 0) parsed.back().sampler.replicates = 1;
     }
     const auto seeds = static_cast<std::size_t>(effort.seeds);
@@ -161,7 +178,8 @@ std::vector<Outcome> Context::estimated(const std::vector<Asked>& asked, const s
     for (std::uint64_t there = 0, wanted = effort.samples;; wanted = std::min(4 * wanted, effort.most)) {
         for (std::size_t i = 0; i < seeds; ++i)
             for (std::size_t k = 0; k < parsed.size(); ++k) {
-                Film more = render(parsed[k], {.samples = wanted - there, .first_sample = there, .seed = 1 + i});
+                Film more =
+                    render(parsed[k], {.samples = wanted - there, .first_sample = there, .seed = 1 + i});
                 if (there == 0)
                     films[i].push_back(std::move(more));
                 else
@@ -172,30 +190,37 @@ std::vector<Outcome> Context::estimated(const std::vector<Asked>& asked, const s
         for (const Asked& question : asked) {
             std::vector<double> replicates;
             for (const std::vector<Film>& of_seed : films) replicates.push_back(question.measure(of_seed));
-            outcomes.push_back(equivalenceOutcome(question.what, replicates, question.expected, delta, mistakes));
+            outcomes.push_back(
+                equivalenceOutcome(question.what, replicates, question.expected, delta, mistakes));
             outcomes.back().note = fmt::format("{} seeds × {} samples a pixel", seeds, there);
         }
-        const bool told = std::none_of(outcomes.begin(), outcomes.end(), [](const Outcome& o) { return o.verdict == Verdict::Inconclusive; });
+        const bool told = std::none_of(outcomes.begin(), outcomes.end(),
+                                       [](const Outcome& o) { return o.verdict == Verdict::Inconclusive; });
         if (told || wanted >= effort.most) return outcomes;
     }
 }
 
-void Context::estimate(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta, const Effort& effort,
-                       const std::vector<Mistake>& mistakes) {
+void Context::estimate(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta,
+                       const Effort& effort, const std::vector<Mistake>& mistakes) {
     for (Outcome& outcome : estimated(asked, scenes, delta, effort, mistakes)) add(std::move(outcome));
 }
 
-void Context::estimate(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
-                       const Effort& effort, const std::vector<Mistake>& mistakes) {
+void Context::estimate(const std::string& what, const std::vector<std::string>& scenes,
+                       const JointMeasure& measure, double expected, double delta, const Effort& effort,
+                       const std::vector<Mistake>& mistakes) {
     estimate({{what, measure, expected}}, scenes, delta, effort, mistakes);
 }
 
-void Context::estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected, double delta, const Effort& effort,
+void Context::estimate(const std::string& what, const std::string& yaml, const Measure& measure,
+                       double expected, double delta, const Effort& effort,
                        const std::vector<Mistake>& mistakes) {
-    estimate(what, std::vector{yaml}, [&](const std::vector<Film>& films) { return measure(films.front()); }, expected, delta, effort, mistakes);
+    estimate(
+        what, std::vector{yaml}, [&](const std::vector<Film>& films) { return measure(films.front()); },
+        expected, delta, effort, mistakes);
 }
 
-void Context::rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound, const std::string& physics) {
+void Context::rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound,
+                   const std::string& physics) {
     Outcome o;
     o.what = what;
     const stats::Interval interval = stats::clopperPearson(failures, trials, kConfidence);
@@ -204,7 +229,8 @@ void Context::rate(const std::string& what, std::uint64_t failures, std::uint64_
     o.interval = interval;
     o.tolerance = fmt::format("rate ≤ {:g}, 99.9 % interval", bound);
     o.note = fmt::format("{} of {}", failures, trials);
-    o.verdict = interval.upper <= bound ? Verdict::Pass : (interval.lower > bound ? Verdict::Fail : Verdict::Inconclusive);
+    o.verdict = interval.upper <= bound ? Verdict::Pass
+                                        : (interval.lower > bound ? Verdict::Fail : Verdict::Inconclusive);
     if (failed(o.verdict)) o.physics = physics;
     add(std::move(o));
 }
@@ -213,10 +239,12 @@ void Context::sameBits(const std::string& what, const Film& a, const Film& b, co
     const bool comparable = a.shape() == b.shape();
     const std::uint64_t differing = comparable ? differingPixels(a, b) : 0;
     holds(what, comparable && differing == 0, "same bits", physics,
-          comparable ? fmt::format("{} of {} pixels differ", differing, a.counts.size()) : std::string("films of different shapes"));
+          comparable ? fmt::format("{} of {} pixels differ", differing, a.counts.size())
+                     : std::string("films of different shapes"));
 }
 
-void Context::holds(const std::string& what, bool true_, const std::string& tolerance, const std::string& physics, const std::string& note) {
+void Context::holds(const std::string& what, bool true_, const std::string& tolerance,
+                    const std::string& physics, const std::string& note) {
     Outcome o;
     o.what = what;
     o.verdict = true_ ? Verdict::Pass : Verdict::Fail;
@@ -237,7 +265,9 @@ void Context::refused(const std::string& what, const std::string& yaml, const st
     } catch (const Error& error) {
         const std::string text = error.what();
         o.note = text.substr(0, text.find('\n'));
-        o.verdict = text.find(words) != std::string::npos && error.kind() == ErrorKind::Scene ? Verdict::Refused : Verdict::Fail;
+        o.verdict = text.find(words) != std::string::npos && error.kind() == ErrorKind::Scene
+                        ? Verdict::Refused
+                        : Verdict::Fail;
         if (o.verdict == Verdict::Fail) o.physics = "refused, but with another message";
     }
     add(std::move(o));
@@ -279,18 +309,22 @@ double radiance(const Film& film) {
     return meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return radiance(film, x, y); });
 }
 
-double fartherFrom(double target, double a, double b) { return std::isnan(a) || std::abs(a - target) > std::abs(b - target) ? a : b; }
+double fartherFrom(double target, double a, double b) {
+    return std::isnan(a) || std::abs(a - target) > std::abs(b - target) ? a : b;
+}
 
 double worstRatio(const Film& film, const Film& unit, double factor) {
     double worst = 1;
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
-        for (std::uint32_t x = 0; x < film.shape().width; ++x) worst = fartherFrom(1, worst, film.mean(x, y, 1) / unit.mean(x, y, 1) / factor);
+        for (std::uint32_t x = 0; x < film.shape().width; ++x)
+            worst = fartherFrom(1, worst, film.mean(x, y, 1) / unit.mean(x, y, 1) / factor);
     return worst;
 }
 
 double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y) {
     const std::uint32_t squares = firstChannel(film.shape().aovs, kAovSquares);
-    if (squares == 0) throw Error(ErrorKind::Internal, "the variance of paths is asked of a film without squares");
+    if (squares == 0)
+        throw Error(ErrorKind::Internal, "the variance of paths is asked of a film without squares");
     const double mean = film.mean(x, y, 1);
     return film.mean(x, y, squares) - mean * mean;
 }
@@ -301,7 +335,8 @@ double pathVariance(const Film& film) {
 
 Vec3d meanXyz(const Film& film) {
     Vec3d xyz;
-    for (std::uint32_t c = 0; c < 3; ++c) xyz[c] = meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return film.mean(x, y, c); });
+    for (std::uint32_t c = 0; c < 3; ++c)
+        xyz[c] = meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return film.mean(x, y, c); });
     return xyz;
 }
 

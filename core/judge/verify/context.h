@@ -1,11 +1,12 @@
-/// What a case has in its hands: the backend under test, renders of scenes given as YAML, and the checks that turn figures into outcomes.
+/// What a case has in its hands: the backend under test, renders of scenes given as YAML, and the checks
+/// that turn figures into outcomes.
 #pragma once
 
 #include "backend/integrator.h"
 #include "backend/loader.h"
 #include "film/film.h"
-#include "scene/yaml/scene_yaml.h"
 #include "judge/verify/case.h"
+#include "scene/yaml/scene_yaml.h"
 
 #include <cstdint>
 #include <functional>
@@ -28,15 +29,19 @@ struct Render {
     bool squares = false;  ///< One sequence, whose film knows the variance of its paths (pathVariance).
 };
 
-inline Render samples(std::uint64_t count, std::uint32_t aovs = 0) { return {.samples = count, .aovs = aovs}; }
+inline Render samples(std::uint64_t count, std::uint32_t aovs = 0) {
+    return {.samples = count, .aovs = aovs};
+}
 
-/// A value that a known mistake would give instead of the right one. A failing check names the mistake whose value it found.
+/// A value that a known mistake would give instead of the right one. A failing check names the mistake whose
+/// value it found.
 struct Mistake {
     double value;
     std::string physics;
 };
 
-/// How many samples an estimate may take. It begins with `samples` a pixel and seed, and goes on with four times as many while it cannot tell.
+/// How many samples an estimate may take. It begins with `samples` a pixel and seed, and goes on with four
+/// times as many while it cannot tell.
 struct Effort {
     std::uint64_t samples = 64;
     std::uint64_t most = 4096;
@@ -80,32 +85,38 @@ public:
 
     // Checks. Each adds an outcome.
     /// |measured − expected| ≤ relative · |expected|; where 0 is expected, exactly 0.
-    void relative(const std::string& what, double measured, double expected, double tolerance, const std::vector<Mistake>& mistakes = {});
-    void absolute(const std::string& what, double measured, double expected, double tolerance, const std::vector<Mistake>& mistakes = {});
+    void relative(const std::string& what, double measured, double expected, double tolerance,
+                  const std::vector<Mistake>& mistakes = {});
+    void absolute(const std::string& what, double measured, double expected, double tolerance,
+                  const std::vector<Mistake>& mistakes = {});
     /// Equivalence: the 99.9 % Student interval of the mean of `replicates` lies within ±delta · expected.
-    void equivalent(const std::string& what, const std::vector<double>& replicates, double expected, double delta,
-                    const std::vector<Mistake>& mistakes = {});
+    void equivalent(const std::string& what, const std::vector<double>& replicates, double expected,
+                    double delta, const std::vector<Mistake>& mistakes = {});
     /// The same of what `replicatesOf` so many samples come out, with as many as it takes.
-    void equivalent(const std::string& what, const std::function<std::vector<double>(std::uint64_t samples)>& replicatesOf, double expected, double delta,
-                    const Effort& effort);
-    /// The same of `measure` over the films of several seeds, with as many samples as it takes. A scene that does not name a number of replicates gets
-    /// one sequence.
-    void estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected, double delta, const Effort& effort = {},
+    void equivalent(const std::string& what,
+                    const std::function<std::vector<double>(std::uint64_t samples)>& replicatesOf,
+                    double expected, double delta, const Effort& effort);
+    /// The same of `measure` over the films of several seeds, with as many samples as it takes. A scene that
+    /// does not name a number of replicates gets one sequence.
+    void estimate(const std::string& what, const std::string& yaml, const Measure& measure, double expected,
+                  double delta, const Effort& effort = {}, const std::vector<Mistake>& mistakes = {});
+    void estimate(const std::string& what, const std::vector<std::string>& scenes,
+                  const JointMeasure& measure, double expected, double delta, const Effort& effort = {},
                   const std::vector<Mistake>& mistakes = {});
-    void estimate(const std::string& what, const std::vector<std::string>& scenes, const JointMeasure& measure, double expected, double delta,
-                  const Effort& effort = {}, const std::vector<Mistake>& mistakes = {});
     /// Several numbers of the same films, which are rendered once. Goes on until it can tell of each.
-    void estimate(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta, const Effort& effort = {},
-                  const std::vector<Mistake>& mistakes = {});
+    void estimate(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta,
+                  const Effort& effort = {}, const std::vector<Mistake>& mistakes = {});
     /// The outcomes of an estimate, for cases that keep only the worst of many.
-    std::vector<Outcome> estimated(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta, const Effort& effort,
-                                   const std::vector<Mistake>& mistakes);
+    std::vector<Outcome> estimated(const std::vector<Asked>& asked, const std::vector<std::string>& scenes,
+                                   double delta, const Effort& effort, const std::vector<Mistake>& mistakes);
     /// The upper end of the 99.9 % Clopper–Pearson interval of the rate of failures is at most `bound`.
-    void rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound, const std::string& physics);
+    void rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound,
+              const std::string& physics);
     /// Every channel of every pixel the same, as the floats that are written.
     void sameBits(const std::string& what, const Film& a, const Film& b, const std::string& physics);
     /// A yes or no.
-    void holds(const std::string& what, bool true_, const std::string& tolerance, const std::string& physics, const std::string& note = {});
+    void holds(const std::string& what, bool true_, const std::string& tolerance, const std::string& physics,
+               const std::string& note = {});
     /// The scene is turned down before rendering, with an error that says `words`.
     void refused(const std::string& what, const std::string& yaml, const std::string& words);
     void notApplicable(const std::string& what, const std::string& reason);
@@ -125,8 +136,8 @@ private:
     std::vector<Outcome> outcomes_;
 };
 
-/// Radiance of one pixel for light without colour: (X + Y + Z) over what radiance 1 gives. Over the wavelengths of a path that sum varies less
-/// than each of X, Y and Z.
+/// Radiance of one pixel for light without colour: (X + Y + Z) over what radiance 1 gives. Over the
+/// wavelengths of a path that sum varies less than each of X, Y and Z.
 double radiance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean over all pixels.
 double radiance(const Film& film);
@@ -134,7 +145,8 @@ double radiance(const Film& film);
 inline double meanRadiance(const Film& film) { return radiance(film); }
 /// Of `a` and `b` the one that is farther from `target`; NaN when either is, which std::max would lose.
 double fartherFrom(double target, double a, double b);
-/// Y of a pixel of `film` over `factor` times that of the same pixel of `unit`, of all pixels the ratio that is farthest from 1. NaN when any pixel's is.
+/// Y of a pixel of `film` over `factor` times that of the same pixel of `unit`, of all pixels the ratio that
+/// is farthest from 1. NaN when any pixel's is.
 double worstRatio(const Film& film, const Film& unit, double factor = 1);
 /// Variance of Y of one path of a pixel, from the film's second moment: right for independent samples.
 double pathVariance(const Film& film, std::uint32_t x, std::uint32_t y);

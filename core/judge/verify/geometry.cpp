@@ -1,11 +1,11 @@
-// Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a ray that leaks, or meets what it should not,
-// shows.
+// Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a
+// ray that leaks, or meets what it should not, shows.
 #include "judge/verify/probes.h"
 #include "judge/verify/references.h"
 
+#include "base/log.h"
 #include "kernel/features.h"
 #include "kernel/layout.h"
-#include "base/log.h"
 
 #include <fmt/format.h>
 
@@ -44,15 +44,18 @@ double worstDeviation(const Film& film, const Film& unit, double factor) {
 void withoutArea(Context& context) {
     const Scene scene = litRoom(24, 1);
     const Film clean = context.render(scene, samples(4));
-    const auto with = [&](const char* what, const Vec3d& a, const Vec3d& b, const Vec3d& c, double radiance_of_it) {
+    const auto with = [&](const char* what, const Vec3d& a, const Vec3d& b, const Vec3d& c,
+                          double radiance_of_it) {
         Scene more = scene;
         Mesh mesh;
         addTriangle(mesh, a, b, c);
         addObject(more, std::move(mesh), diffuse(0.5), radiance_of_it);
         const int warnings = warningCount();
-        context.sameBits(what, clean, context.render(more, samples(4)),
-                         "a triangle without area is hit, sampled as a light, or decides where the scene's centre is");
-        context.holds(fmt::format("{}: said", what), warningCount() > warnings, "a warning", "triangles are left out silently");
+        context.sameBits(
+            what, clean, context.render(more, samples(4)),
+            "a triangle without area is hit, sampled as a light, or decides where the scene's centre is");
+        context.holds(fmt::format("{}: said", what), warningCount() > warnings, "a warning",
+                      "triangles are left out silently");
     };
     with("a point", {0.5, 0.5, 0.5}, {0.5, 0.5, 0.5}, {0.5, 0.5, 0.5}, 0);
     with("two corners alike", {0.1, 0.2, 0.3}, {0.8, 0.7, 0.1}, {0.8, 0.7, 0.1}, 0);
@@ -82,7 +85,9 @@ void slivers(Context& context) {
         const std::uint64_t films = context.byLevel(4, 60, 250);
         for (std::uint64_t film_index = 0; film_index < films; ++film_index) {
             // Between two lines of points in a plane that is no axis'.
-            const auto point = [&](double x, double z) { return roundToFloat({x, 0.25 * x - 0.125 * z, z}); };
+            const auto point = [&](double x, double z) {
+                return roundToFloat({x, 0.25 * x - 0.125 * z, z});
+            };
             Scene scene = sliverView(film_index, {0.1, 0.02 + dice.uniform(), 0.3},
                                      point(0.8, 0.47 * thickness), thickness);
             scene.integrator.max_depth = 0;
@@ -100,8 +105,10 @@ void slivers(Context& context) {
                 ++hits.rays;
                 // The hit's distance lies between those of the sphere around its triangle.
                 const Vec3d &a = corners[3 * id], &b = corners[3 * id + 1];
-                const double radius = 0.51 * length(b - a), centre = length((a + b) * 0.5 - scene.camera.position);
-                const double off = std::abs(film.mean(x, y, firstChannel(film.shape().aovs, kAovDepth)) - centre) - radius;
+                const double radius = 0.51 * length(b - a),
+                             centre = length((a + b) * 0.5 - scene.camera.position);
+                const double off =
+                    std::abs(film.mean(x, y, firstChannel(film.shape().aovs, kAovDepth)) - centre) - radius;
                 hits.failures += !(off <= 1e-5);
             });
         }
@@ -121,12 +128,14 @@ void duplicates(Context& context) {
         scene.integrator.max_depth = 1;
         scene.environment = Environment{constantSpectrum(1)};
         Mesh mesh;
-        for (std::uint64_t i = 0; i < copies; ++i) addQuad(mesh, {-0.5, -0.5, 0}, {-0.5, 0.5, 0}, {0.5, 0.5, 0.25}, {0.5, -0.5, 0.25});
+        for (std::uint64_t i = 0; i < copies; ++i)
+            addQuad(mesh, {-0.5, -0.5, 0}, {-0.5, 0.5, 0}, {0.5, 0.5, 0.25}, {0.5, -0.5, 0.25});
         addObject(scene, std::move(mesh), diffuse(0.5));
         return context.render(scene, samples(2, kFirstHit));
     };
     const Film one = stack(1);
-    for (const std::uint64_t copies : {std::uint64_t{2}, std::uint64_t{100}, context.byLevel(1000, 10000, 100000)})
+    for (const std::uint64_t copies :
+         {std::uint64_t{2}, std::uint64_t{100}, context.byLevel(1000, 10000, 100000)})
         context.sameBits(fmt::format("{} copies", copies), one, stack(copies),
                          "of equally near triangles not the first in the author's order is hit");
 }
@@ -148,12 +157,14 @@ void coplanar(Context& context) {
         for (const std::uint32_t id : film.primitives) (id < 2 ? first : nearer) += 1;
         const std::string note = fmt::format("the first: {}, the nearer: {} of 4096", first, nearer);
         if (ulps == 0)
-            context.holds("in one plane", nearer == 0, "the first in the author's order", "ties are decided by the order of testing", note);
+            context.holds("in one plane", nearer == 0, "the first in the author's order",
+                          "ties are decided by the order of testing", note);
         else if (ulps == 32)
-            context.holds("32 ulp apart", first == 0, "always the nearer one", "the error of distances is larger than that of the triangle test",
-                          note);
+            context.holds("32 ulp apart", first == 0, "always the nearer one",
+                          "the error of distances is larger than that of the triangle test", note);
         else
-            context.holds(fmt::format("{} ulp apart", ulps), first + nearer == 4096, "one of the two", "neither is hit", note);
+            context.holds(fmt::format("{} ulp apart", ulps), first + nearer == 4096, "one of the two",
+                          "neither is hit", note);
     }
 }
 
@@ -174,17 +185,21 @@ void touching(Context& context) {
             addObject(scene, mesh, diffuse(0.5), 1, true);
             Scene dark = scene;
             dark.integrator.max_depth = 0;
-            worst = fartherFrom(0, worst, worstDeviation(context.render(scene, samples(16)), context.render(dark, samples(16)), furnaceRadiance(0.5, 16)));
+            worst = fartherFrom(0, worst,
+                                worstDeviation(context.render(scene, samples(16)),
+                                               context.render(dark, samples(16)), furnaceRadiance(0.5, 16)));
         }
-        context.absolute(fmt::format("{}: the worst pixel", what), worst, 0, 2e-6,
-                         {{0.01, "light leaks where two surfaces touch: a ray's offset carries it through both"}});
+        context.absolute(
+            fmt::format("{}: the worst pixel", what), worst, 0, 2e-6,
+            {{0.01, "light leaks where two surfaces touch: a ray's offset carries it through both"}});
     };
     ask("a sphere that touches the floor", icosphere(3, 0.25, {0.5, 0.25, 0.5}));
     ask("a box that stands on the floor, in a corner", boxMesh({0.5, 0, 0.5}, {1, 0.5, 1}));
     ask("two boxes with a face in common", [] {
         Mesh both = boxMesh({0.4, 0, 0.4}, {0.6, 0.3, 0.6});
         const Mesh second = boxMesh({0.4, 0.3, 0.4}, {0.6, 0.5, 0.6});
-        for (const auto& t : second.triangles) addTriangle(both, second.positions[t[0]], second.positions[t[1]], second.positions[t[2]]);
+        for (const auto& t : second.triangles)
+            addTriangle(both, second.positions[t[0]], second.positions[t[1]], second.positions[t[2]]);
         return both;
     }());
 }
@@ -196,10 +211,14 @@ void thinWalls(Context& context) {
         scene.integrator.max_depth = 32;
         scene.environment = Environment{constantSpectrum(1)};
         addObject(scene, boxMesh({0, 0, 0}, {1, 1, 1}, true), diffuse(0.9));
-        addObject(scene, boxMesh({-thickness, -thickness, -thickness}, {1 + thickness, 1 + thickness, 1 + thickness}), diffuse(0.9));
+        addObject(
+            scene,
+            boxMesh({-thickness, -thickness, -thickness}, {1 + thickness, 1 + thickness, 1 + thickness}),
+            diffuse(0.9));
         const std::uint64_t n = context.byLevel(16, 256, 4096);
         const std::uint64_t lit = litPixels(context.render(scene, samples(n)));
-        context.holds(fmt::format("walls of {:g}", thickness), lit == 0, "inside exactly 0", "light comes through the wall, or through a corner",
+        context.holds(fmt::format("walls of {:g}", thickness), lit == 0, "inside exactly 0",
+                      "light comes through the wall, or through a corner",
                       fmt::format("{} of 1024 pixels lit, {} paths of 32 bounces", lit, 1024 * n));
     }
 }
@@ -223,11 +242,13 @@ void lightTightBox(Context& context) {
         tally.rays += 1024 * n;
         tally.failures += litPixels(context.render(scene, samples(n)));
     }
-    rareFailures(context, "paths of 16 bounces in a white box under a bright sky", tally, 7.7e-9, "a path leaves a closed room");
+    rareFailures(context, "paths of 16 bounces in a white box under a bright sky", tally, 7.7e-9,
+                 "a path leaves a closed room");
 }
 
 void cracks(Context& context) {
-    // Two squares side by side in a plane; where they meet, one has a vertex in the middle of the other's edge. Rays at a stretch of 1e-4 around it.
+    // Two squares side by side in a plane; where they meet, one has a vertex in the middle of the other's
+    // edge. Rays at a stretch of 1e-4 around it.
     const auto leaks = [&](double gap, double middle) {
         Scene scene = emptyScene(64, 1, {0.5, 0, -0.75}, {0.5, 0, 0.25}, 5e-5);
         scene.integrator.max_depth = 0;
@@ -244,25 +265,30 @@ void cracks(Context& context) {
         const Film film = context.render(scene, samples(n));
         return std::pair{radiance(film), static_cast<double>(film.counts.size() * n)};
     };
-    context.holds("a vertex exactly on the other's edge", leaks(0, 0.125).first == 0, "no leak", "rays slip through where no gap is");
+    context.holds("a vertex exactly on the other's edge", leaks(0, 0.125).first == 0, "no leak",
+                  "rays slip through where no gap is");
     // Four ulps at ½ wide at the middle vertex, as seen over a film 1e-4 · 1 wide.
     for (const double ulps : {4.0, 64.0}) {
         const double gap = ulps * 0x1p-24, expected = gap / 1e-4;
         const auto [rate, rays] = leaks(gap, 0);
-        context.absolute(fmt::format("a crack of {} ulp: share of rays that pass", ulps), rate, expected,
-                         0.25 * expected + 5 * std::sqrt(expected / rays),
-                         {{0, "a real crack is closed: are triangles enlarged, or edges tested with a tolerance?"}});
+        context.absolute(
+            fmt::format("a crack of {} ulp: share of rays that pass", ulps), rate, expected,
+            0.25 * expected + 5 * std::sqrt(expected / rays),
+            {{0, "a real crack is closed: are triangles enlarged, or edges tested with a tolerance?"}});
     }
 }
 
 void nonManifold(Context& context) {
     Mesh mesh;
     const Vec3d a{0.5, 0.2, 0.5}, b{0.5, 0.8, 0.5};
-    for (const Vec3d& c : {Vec3d{0.8, 0.5, 0.5}, Vec3d{0.35, 0.5, 0.75}, Vec3d{0.35, 0.5, 0.25}, Vec3d{0.6, 0.5, 0.8}}) addTriangle(mesh, a, b, c);
+    for (const Vec3d& c :
+         {Vec3d{0.8, 0.5, 0.5}, Vec3d{0.35, 0.5, 0.75}, Vec3d{0.35, 0.5, 0.25}, Vec3d{0.6, 0.5, 0.8}})
+        addTriangle(mesh, a, b, c);
     for (int i = 0; i < 48; ++i) {  // a Möbius strip
         const auto rim = [&](int k, double side) {
             const double phi = k * 2 * 3.14159265358979 / 48, half = phi / 2;
-            return Vec3d{0.5 + (0.2 + side * 0.08 * std::cos(half)) * std::cos(phi), 0.3 + side * 0.08 * std::sin(half),
+            return Vec3d{0.5 + (0.2 + side * 0.08 * std::cos(half)) * std::cos(phi),
+                         0.3 + side * 0.08 * std::sin(half),
                          0.5 + (0.2 + side * 0.08 * std::cos(half)) * std::sin(phi)};
         };
         addQuad(mesh, rim(i, -1), rim(i + 1, -1), rim(i + 1, 1), rim(i, 1));
@@ -272,16 +298,20 @@ void nonManifold(Context& context) {
     Scene dark = scene;
     dark.integrator.max_depth = 0;
     context.absolute("edges of four faces and a Möbius strip, Lambertian: the worst pixel",
-                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)), furnaceRadiance(0.5, 16)), 0, 2e-6,
-                     {{0.01, "a surface that is not closed loses light"}});
+                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)),
+                                    furnaceRadiance(0.5, 16)),
+                     0, 2e-6, {{0.01, "a surface that is not closed loses light"}});
     // Of glass, inside and outside have no meaning: finite, and no more than n⁴ of what the walls give.
     Scene open = evenRoom(1);
     addObject(open, std::move(mesh), glass(1.5));
     const Film film = context.render(open, samples(64));
     double brightest = 0;
-    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = fartherFrom(0, brightest, radiance(film, x, y)); });
-    context.holds("the same of glass, which is open", film.invalidSamples() == 0 && std::isfinite(brightest), "finite, to its end",
-                  "a path without end, or NaN", fmt::format("brightest pixel {:.3g}", brightest));
+    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) {
+        brightest = fartherFrom(0, brightest, radiance(film, x, y));
+    });
+    context.holds("the same of glass, which is open", film.invalidSamples() == 0 && std::isfinite(brightest),
+                  "finite, to its end", "a path without end, or NaN",
+                  fmt::format("brightest pixel {:.3g}", brightest));
 }
 
 /// A block in the lit room, its faces turned round or not.
@@ -292,7 +322,8 @@ Scene blockIn(const Material& material, bool inwards, std::uint64_t seed) {
     return scene;
 }
 
-std::vector<double> ratiosOfBlocks(Context& context, const Material& a, const Material& b, std::uint64_t count) {
+std::vector<double> ratiosOfBlocks(Context& context, const Material& a, const Material& b,
+                                   std::uint64_t count) {
     std::vector<double> all;
     for (std::uint64_t seed = 1; seed <= 8; ++seed)
         all.push_back(radiance(context.render(blockIn(b, true, seed), samples(count))) /
@@ -301,8 +332,10 @@ std::vector<double> ratiosOfBlocks(Context& context, const Material& a, const Ma
 }
 
 void flippedNormals(Context& context) {
-    context.equivalent("a diffuse block turned inside out", ratiosOfBlocks(context, diffuse(0.7), diffuse(0.7), 16), 1, 0.001);
-    context.equivalent("a glass block turned inside out, of index 1/1.5", ratiosOfBlocks(context, glass(1.5), glass(1 / 1.5), 16), 1, 0.001);
+    context.equivalent("a diffuse block turned inside out",
+                       ratiosOfBlocks(context, diffuse(0.7), diffuse(0.7), 16), 1, 0.001);
+    context.equivalent("a glass block turned inside out, of index 1/1.5",
+                       ratiosOfBlocks(context, glass(1.5), glass(1 / 1.5), 16), 1, 0.001);
 }
 
 /// A sphere of 20 faces under an even sky, with the normals `normal_of` (a vertex' unit position).
@@ -323,9 +356,11 @@ void shadingNormals(Context& context) {
     // Up to 37° off on this ball; then tilted by up to 89°.
     const auto radial = +[](const Vec3d& p) { return p; };
     const auto tilted = +[](const Vec3d& p) {
-        return unit(p * std::cos(89 * 3.14159265 / 180) + unit(cross(p, {0.3, 0.5, 0.7})) * std::sin(89 * 3.14159265 / 180));
+        return unit(p * std::cos(89 * 3.14159265 / 180) +
+                    unit(cross(p, {0.3, 0.5, 0.7})) * std::sin(89 * 3.14159265 / 180));
     };
-    for (const auto& [what, normals] : {std::pair{"20 faces, smooth", radial}, {"20 faces, normals tilted by 89 degrees", tilted}}) {
+    for (const auto& [what, normals] :
+         {std::pair{"20 faces, smooth", radial}, {"20 faces, normals tilted by 89 degrees", tilted}}) {
         const Film film = context.render(smoothBall(normals, 0.8), samples(64, kAovPrimitive)),
                    white = context.render(smoothBall(nullptr, 1), samples(64));
         double brightest = 0;
@@ -335,7 +370,8 @@ void shadingNormals(Context& context) {
         });
         // A pixel at the rim sees the sky as well.
         const double whole = radiance(film) / radiance(white);
-        context.holds(fmt::format("{}: energy", what), brightest <= 1 + 1e-6 && whole < 1 && film.invalidSamples() == 0,
+        context.holds(fmt::format("{}: energy", what),
+                      brightest <= 1 + 1e-6 && whole < 1 && film.invalidSamples() == 0,
                       "no pixel brighter than the sky", "a shading normal makes light",
                       fmt::format("brightest {:.6f}, mean {:.4f} of the sky", brightest, whole));
     }
@@ -346,19 +382,27 @@ void shadingNormals(Context& context) {
     };
     const Film film = inside(smoothBall(radial, 0.8)), sky = inside(smoothBall(nullptr, 1));
     double brightest = 0;
-    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = fartherFrom(0, brightest, radiance(film, x, y) / radiance(sky, x, y)); });
-    context.holds("20 faces, smooth: no more than the reflectance", brightest <= 0.8 * (1 + 1e-6), "≤ 0.8 in every pixel",
-                  "a shading normal makes light", fmt::format("brightest {:.6f}", brightest));
+    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) {
+        brightest = fartherFrom(0, brightest, radiance(film, x, y) / radiance(sky, x, y));
+    });
+    context.holds("20 faces, smooth: no more than the reflectance", brightest <= 0.8 * (1 + 1e-6),
+                  "≤ 0.8 in every pixel", "a shading normal makes light",
+                  fmt::format("brightest {:.6f}", brightest));
 }
 
 void oddNormals(Context& context) {
-    const auto ball = [&](Vec3d (*normal_of)(const Vec3d&)) { return context.render(smoothBall(normal_of, 0.8), samples(4)); };
+    const auto ball = [&](Vec3d (*normal_of)(const Vec3d&)) {
+        return context.render(smoothBall(normal_of, 0.8), samples(4));
+    };
     const Film flat = ball(nullptr), smooth = ball([](const Vec3d& p) { return p; });
-    const std::string physics = "a shading normal is used as it came: not normalised, not checked, or on the wrong side";
+    const std::string physics =
+        "a shading normal is used as it came: not normalised, not checked, or on the wrong side";
     context.sameBits("zero: as flat", flat, ball([](const Vec3d&) { return Vec3d{0, 0, 0}; }), physics);
     context.sameBits("NaN: as flat", flat, ball([](const Vec3d&) { return Vec3d{kNone, 0, 1}; }), physics);
-    context.sameBits("eight times as long: as of unit length", smooth, ball([](const Vec3d& p) { return p * 8; }), physics);
-    context.sameBits("on the other side: turned round", smooth, ball([](const Vec3d& p) { return p * -1; }), physics);
+    context.sameBits("eight times as long: as of unit length", smooth,
+                     ball([](const Vec3d& p) { return p * 8; }), physics);
+    context.sameBits("on the other side: turned round", smooth, ball([](const Vec3d& p) { return p * -1; }),
+                     physics);
 }
 
 void insideOut(Context& context) {
@@ -367,8 +411,9 @@ void insideOut(Context& context) {
     Scene dark = scene;
     dark.integrator.max_depth = 0;
     context.absolute("inside a box whose faces look outwards: the worst pixel",
-                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)), furnaceRadiance(0.5, 16)), 0, 2e-6,
-                     {{0.5, "a Lambertian surface reflects on its front alone"}});
+                     worstDeviation(context.render(scene, samples(8)), context.render(dark, samples(8)),
+                                    furnaceRadiance(0.5, 16)),
+                     0, 2e-6, {{0.5, "a Lambertian surface reflects on its front alone"}});
 }
 
 void mirrorFunnel(Context& context) {
@@ -377,7 +422,8 @@ void mirrorFunnel(Context& context) {
     scene.integrator.max_depth = 1000;
     scene.environment = Environment{constantSpectrum(1)};
     Mesh funnel;
-    const Vec3d tip{0, 0, 1}, r[4] = {{-1e-3, -1e-3, 0}, {1e-3, -1e-3, 0}, {1e-3, 1e-3, 0}, {-1e-3, 1e-3, 0}};
+    const Vec3d tip{0, 0, 1},
+        r[4] = {{-1e-3, -1e-3, 0}, {1e-3, -1e-3, 0}, {1e-3, 1e-3, 0}, {-1e-3, 1e-3, 0}};
     for (std::size_t i = 0; i < 4; ++i) addTriangle(funnel, r[i], r[(i + 1) % 4], tip);
     addObject(scene, std::move(funnel), mirror(1));
     Scene sky = scene;
@@ -386,9 +432,13 @@ void mirrorFunnel(Context& context) {
     sky.camera = scene.camera;
     const Film film = context.render(scene, samples(16)), all = context.render(sky, samples(16));
     double brightest = 0;
-    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) { brightest = fartherFrom(0, brightest, radiance(film, x, y) / radiance(all, x, y)); });
-    context.holds("a funnel of mirrors, 1000 bounces", brightest <= 1 + 1e-4, "ends; no pixel brighter than the sky", "reflection makes light",
-                  fmt::format("brightest {:.7f}, mean {:.4f} of the sky", brightest, radiance(film) / radiance(all)));
+    forEachPixel(film, [&](std::uint32_t x, std::uint32_t y) {
+        brightest = fartherFrom(0, brightest, radiance(film, x, y) / radiance(all, x, y));
+    });
+    context.holds(
+        "a funnel of mirrors, 1000 bounces", brightest <= 1 + 1e-4, "ends; no pixel brighter than the sky",
+        "reflection makes light",
+        fmt::format("brightest {:.7f}, mean {:.4f} of the sky", brightest, radiance(film) / radiance(all)));
 }
 
 void manyTriangles(Context& context) {
@@ -405,11 +455,12 @@ void manyTriangles(Context& context) {
     addObject(scene, std::move(mesh), diffuse(0.5));
     const CompiledScene compiled = compileScene(scene, 0);
     context.absolute(fmt::format("{} triangles: bytes of the compiled scene per triangle", count),
-                     static_cast<double>(compiled.size_bytes) / static_cast<double>(count), 130, 40, {{400, "memory grows faster than the scene"}});
+                     static_cast<double>(compiled.size_bytes) / static_cast<double>(count), 130, 40,
+                     {{400, "memory grows faster than the scene"}});
     const Film tree = context.render(scene, samples(1, kFirstHit));
     scene.integrator.accelerator = Accelerator::None;
-    context.sameBits(fmt::format("{} triangles, 1024 rays: as without a tree", count), context.render(scene, samples(1, kFirstHit)), tree,
-                     "the tree loses a triangle");
+    context.sameBits(fmt::format("{} triangles, 1024 rays: as without a tree", count),
+                     context.render(scene, samples(1, kFirstHit)), tree, "the tree loses a triangle");
 }
 
 void fewTriangles(Context& context) {
@@ -423,8 +474,8 @@ void fewTriangles(Context& context) {
         addObject(scene, std::move(mesh), diffuse(0.5));
         const Film tree = context.render(scene, samples(2, kFirstHit));
         scene.integrator.accelerator = Accelerator::None;
-        context.sameBits(fmt::format("{} triangles", count), context.render(scene, samples(2, kFirstHit)), tree,
-                         "a tree of one leaf, or of none, is no tree");
+        context.sameBits(fmt::format("{} triangles", count), context.render(scene, samples(2, kFirstHit)),
+                         tree, "a tree of one leaf, or of none, is no tree");
     }
 }
 
@@ -435,40 +486,53 @@ std::vector<Case> geometryCases() {
     constexpr std::uint64_t kSky = CRT_FEATURE_BVH | CRT_FEATURE_DIFFUSE | CRT_FEATURE_ENVIRONMENT;
     constexpr std::uint64_t kHits = CRT_FEATURE_BVH | CRT_FEATURE_AOV;
     return {
-        row("C01", "without-area", "Triangles without area: points, lines, emitting ones, far outside", "the image without them, and a warning",
-            "nobody can see them", "same bits", Level::Commit, kFurnace | CRT_FEATURE_NEE, withoutArea),
-        row("C02", "slivers", "Triangles of 1 : 1e3 … 1 : 1e8", "hits lie on their triangle", "geometry; Embree's issue 387",
-            "rate of false hits ≤ 1e-6, off by more than 1e-5", Level::Commit, kHits, slivers),
-        row("C03", "duplicates", "A quad 2, 100 and up to 100,000 times", "the image of one; the first in the author's order is hit",
-            "docs/architecture.md, Same bits", "same bits, with primitives", Level::Commit, kHits | CRT_FEATURE_DIFFUSE, duplicates),
-        row("C04", "coplanar", "Squares in one plane, and 1, 4 and 32 ulp apart", "the first; from 32 ulp on always the nearer",
-            "docs/architecture.md, Same bits", "every ray", Level::Commit, kHits | CRT_FEATURE_AREA_LIGHT, coplanar),
-        row("C05", "touching", "A sphere on the floor, a box in a corner, boxes with a face in common, in a furnace", "E (1 − ρ^(k+1)) / (1 − ρ)",
-            "geometric series", "2e-6", Level::Commit, kFurnace, touching),
-        row("C06", "thin-walls", "A bright sky around walls of 1e-3, 1e-4 and 1e-5", "inside exactly 0", "the room is closed", "exactly",
-            Level::Commit, kSky, thinWalls),
-        row("C07", "light-tight-box", "A white box in odd poses under a bright sky; 1e9 paths at night", "no light inside", "the room is closed",
-            "rate of leaks ≤ 7.7e-9", Level::Commit, kSky, lightTightBox),
-        row("C08", "cracks", "A vertex on another triangle's edge, exactly and 4 and 64 ulp off it", "no leak; as much as the crack is wide",
-            "area of the crack", "± 25 %", Level::Commit, kSky, cracks),
-        row("C09", "non-manifold", "Edges of four faces, a Möbius strip, in a furnace; the same as open glass", "E (1 − ρ^(k+1)) / (1 − ρ); finite",
-            "geometric series", "2e-6", Level::Commit, kFurnace | CRT_FEATURE_DIELECTRIC, nonManifold),
-        row("C10", "flipped-normals", "A diffuse block turned inside out; a glass one, of the inverse index", "the same image in the mean",
-            "Lambertian surfaces have two sides; n to 1/n", "± 0.1 %", Level::Commit, kFurnace | CRT_FEATURE_NEE | CRT_FEATURE_DIELECTRIC,
-            flippedNormals),
+        row("C01", "without-area", "Triangles without area: points, lines, emitting ones, far outside",
+            "the image without them, and a warning", "nobody can see them", "same bits", Level::Commit,
+            kFurnace | CRT_FEATURE_NEE, withoutArea),
+        row("C02", "slivers", "Triangles of 1 : 1e3 … 1 : 1e8", "hits lie on their triangle",
+            "geometry; Embree's issue 387", "rate of false hits ≤ 1e-6, off by more than 1e-5",
+            Level::Commit, kHits, slivers),
+        row("C03", "duplicates", "A quad 2, 100 and up to 100,000 times",
+            "the image of one; the first in the author's order is hit", "docs/architecture.md, Same bits",
+            "same bits, with primitives", Level::Commit, kHits | CRT_FEATURE_DIFFUSE, duplicates),
+        row("C04", "coplanar", "Squares in one plane, and 1, 4 and 32 ulp apart",
+            "the first; from 32 ulp on always the nearer", "docs/architecture.md, Same bits", "every ray",
+            Level::Commit, kHits | CRT_FEATURE_AREA_LIGHT, coplanar),
+        row("C05", "touching",
+            "A sphere on the floor, a box in a corner, boxes with a face in common, in a furnace",
+            "E (1 − ρ^(k+1)) / (1 − ρ)", "geometric series", "2e-6", Level::Commit, kFurnace, touching),
+        row("C06", "thin-walls", "A bright sky around walls of 1e-3, 1e-4 and 1e-5", "inside exactly 0",
+            "the room is closed", "exactly", Level::Commit, kSky, thinWalls),
+        row("C07", "light-tight-box", "A white box in odd poses under a bright sky; 1e9 paths at night",
+            "no light inside", "the room is closed", "rate of leaks ≤ 7.7e-9", Level::Commit, kSky,
+            lightTightBox),
+        row("C08", "cracks", "A vertex on another triangle's edge, exactly and 4 and 64 ulp off it",
+            "no leak; as much as the crack is wide", "area of the crack", "± 25 %", Level::Commit, kSky,
+            cracks),
+        row("C09", "non-manifold",
+            "Edges of four faces, a Möbius strip, in a furnace; the same as open glass",
+            "E (1 − ρ^(k+1)) / (1 − ρ); finite", "geometric series", "2e-6", Level::Commit,
+            kFurnace | CRT_FEATURE_DIELECTRIC, nonManifold),
+        row("C10", "flipped-normals", "A diffuse block turned inside out; a glass one, of the inverse index",
+            "the same image in the mean", "Lambertian surfaces have two sides; n to 1/n", "± 0.1 %",
+            Level::Commit, kFurnace | CRT_FEATURE_NEE | CRT_FEATURE_DIELECTRIC, flippedNormals),
         row("C11", "shading-normals", "A smooth ball of 20 faces; normals tilted by 89 degrees",
             "no more light than the sky's, or than reflectance allows", "energy", "1e-6", Level::Commit,
             kSky | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_AOV, shadingNormals),
-        row("C12", "odd-normals", "Shading normals that are zero, NaN, too long, on the other side", "flat, flat, normalised, turned round",
-            "docs/scene.md", "same bits", Level::Commit, kSky | CRT_FEATURE_SMOOTH_NORMALS, oddNormals),
-        row("C13", "inside-out", "A furnace seen through the back of its faces", "E (1 − ρ^(k+1)) / (1 − ρ)", "Lambertian surfaces have two sides",
-            "2e-6", Level::Commit, kFurnace, insideOut),
-        row("C14", "mirror-funnel", "A needle of mirrors, 1 : 1000, 1000 bounces", "ends; no pixel brighter than the sky", "energy", "1e-4",
-            Level::Commit, CRT_FEATURE_BVH | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ENVIRONMENT, mirrorFunnel),
-        row("C15", "many-triangles", "10^7 random triangles (20,000 on commits)", "some 130 bytes each; first hits as without a tree",
-            "a tree only culls", "same bits", Level::Commit, kHits | CRT_FEATURE_BRUTE_FORCE, manyTriangles),
-        row("C16", "few-triangles", "0 to 5 triangles with a tree", "the image without one", "a tree only culls", "same bits",
-            Level::Commit, kSky | CRT_FEATURE_AOV | CRT_FEATURE_BRUTE_FORCE, fewTriangles),
+        row("C12", "odd-normals", "Shading normals that are zero, NaN, too long, on the other side",
+            "flat, flat, normalised, turned round", "docs/scene.md", "same bits", Level::Commit,
+            kSky | CRT_FEATURE_SMOOTH_NORMALS, oddNormals),
+        row("C13", "inside-out", "A furnace seen through the back of its faces", "E (1 − ρ^(k+1)) / (1 − ρ)",
+            "Lambertian surfaces have two sides", "2e-6", Level::Commit, kFurnace, insideOut),
+        row("C14", "mirror-funnel", "A needle of mirrors, 1 : 1000, 1000 bounces",
+            "ends; no pixel brighter than the sky", "energy", "1e-4", Level::Commit,
+            CRT_FEATURE_BVH | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ENVIRONMENT, mirrorFunnel),
+        row("C15", "many-triangles", "10^7 random triangles (20,000 on commits)",
+            "some 130 bytes each; first hits as without a tree", "a tree only culls", "same bits",
+            Level::Commit, kHits | CRT_FEATURE_BRUTE_FORCE, manyTriangles),
+        row("C16", "few-triangles", "0 to 5 triangles with a tree", "the image without one",
+            "a tree only culls", "same bits", Level::Commit,
+            kSky | CRT_FEATURE_AOV | CRT_FEATURE_BRUTE_FORCE, fewTriangles),
     };
 }
 

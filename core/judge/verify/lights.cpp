@@ -16,29 +16,37 @@ namespace {
 
 constexpr std::uint64_t kDirectLight = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
 
-/// A sum of `film` over `factor` times that of `unit`, of all pixels' X, Y and Z the ratio that is farthest from 1. NaN when any is.
+/// A sum of `film` over `factor` times that of `unit`, of all pixels' X, Y and Z the ratio that is farthest
+/// from 1. NaN when any is.
 double worstFactor(const Film& film, const Film& unit, double factor) {
     double worst = 1;
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
         for (std::uint32_t x = 0; x < film.shape().width; ++x)
-            for (std::uint32_t c = 0; c < 3; ++c) worst = fartherFrom(1, worst, film.sum(x, y, c) / (unit.sum(x, y, c) * factor));
+            for (std::uint32_t c = 0; c < 3; ++c)
+                worst = fartherFrom(1, worst, film.sum(x, y, c) / (unit.sum(x, y, c) * factor));
     return worst;
 }
 
 void brightness(Context& context) {
     const Film unit = context.render(squareOverFloor(0, kDirect), {.samples = 64});
-    const auto with = [&](const std::string& radiance) { return context.render(squareOverFloor(0, kDirect, 0.5, radiance), {.samples = 64}); };
+    const auto with = [&](const std::string& radiance) {
+        return context.render(squareOverFloor(0, kDirect, 0.5, radiance), {.samples = 64});
+    };
     for (const int m : {-80, -30, 10, 30, 80})
-        context.relative(fmt::format("radiance 2^{}: the worst of all sums", m),
-                         worstFactor(with(fmt::format("{:.17g}", std::ldexp(1.0, m))), unit, std::ldexp(1.0, m)), 1, 0, {});
+        context.relative(
+            fmt::format("radiance 2^{}: the worst of all sums", m),
+            worstFactor(with(fmt::format("{:.17g}", std::ldexp(1.0, m))), unit, std::ldexp(1.0, m)), 1, 0,
+            {});
     for (const int m : {-24, -10, 10, 24})
-        context.relative(fmt::format("radiance 1e{}: the worst of all sums", m), worstFactor(with(fmt::format("1e{}", m)), unit, std::pow(10.0, m)), 1, 1e-6);
+        context.relative(fmt::format("radiance 1e{}: the worst of all sums", m),
+                         worstFactor(with(fmt::format("1e{}", m)), unit, std::pow(10.0, m)), 1, 1e-6);
 }
 
 /// Two floors far apart, each under its own lamp; the eye is on the one at x.
 std::string twoLamps(double x, const std::string& left, const std::string& right) {
     Stage stage(fmt::format("{{position: [{0}, 0.5, 3], target: [{0}, 0, 0], fov: 0.01}}", x), kDirect);
-    stage.material("floor", "{type: diffuse, reflectance: 1}").material("black", "{type: diffuse, reflectance: 0}");
+    stage.material("floor", "{type: diffuse, reflectance: 1}")
+        .material("black", "{type: diffuse, reflectance: 0}");
     stage.quad("floor", "[[-40,0,-40],[-40,0,40],[40,0,40],[40,0,-40]]", "floor");
     stage.quad("screen", "[[0,0,-20],[0,20,-20],[0,20,20],[0,0,20]]", "black");
     stage.quad("left", "[[-2.5,1,-0.5],[-1.5,1,-0.5],[-1.5,1,0.5],[-2.5,1,0.5]]", "black", left);
@@ -49,34 +57,44 @@ std::string twoLamps(double x, const std::string& left, const std::string& right
 void brightAndDim(Context& context) {
     // A screen keeps their light apart; both are chosen among, by power.
     const double f = squareFormFactor(0, 0.5);
-    context.estimate("under the lamp of 1e+10, beside one of 1e-10", twoLamps(2, "1e-10", "1e10"), meanRadiance, 1e10 * f, 0.001, {.samples = 1024, .most = 16384});
-    context.estimate("two equal lamps, one of them hidden", twoLamps(2, "1", "1"), meanRadiance, f, 0.003, {.samples = 1024, .most = 65536},
-                     {{2 * f, "light sampling forgets that it chose between two lamps: its pdf is not divided by their number"},
-                      {f / 2, "the probability of choosing a lamp is applied twice"}});
+    context.estimate("under the lamp of 1e+10, beside one of 1e-10", twoLamps(2, "1e-10", "1e10"),
+                     meanRadiance, 1e10 * f, 0.001, {.samples = 1024, .most = 16384});
+    context.estimate(
+        "two equal lamps, one of them hidden", twoLamps(2, "1", "1"), meanRadiance, f, 0.003,
+        {.samples = 1024, .most = 65536},
+        {{2 * f,
+          "light sampling forgets that it chose between two lamps: its pdf is not divided by their number"},
+         {f / 2, "the probability of choosing a lamp is applied twice"}});
 }
 
 void hopelesslyDim(Context& context) {
     const double f = squareFormFactor(0, 0.5);
-    // The dim lamp is chosen by light sampling once in 2³² times: the scattered rays that meet it must count in full.
-    context.estimate("under the lamp of 1e-10, beside one of 1e+10", twoLamps(-2, "1e-10", "1e10"), meanRadiance, 1e-10 * f, 0.01, {.samples = 4096, .most = 65536},
+    // The dim lamp is chosen by light sampling once in 2³² times: the scattered rays that meet it must count
+    // in full.
+    context.estimate("under the lamp of 1e-10, beside one of 1e+10", twoLamps(-2, "1e-10", "1e10"),
+                     meanRadiance, 1e-10 * f, 0.01, {.samples = 4096, .most = 65536},
                      {{0, "the dim lamp is never sampled, and scattered rays that meet it do not count"}});
 }
 
 void secondMoment(Context& context) {
     const Film unit = context.render(squareOverFloor(0, kDirect), {.samples = 64, .squares = true});
-    const Film bright = context.render(squareOverFloor(0, kDirect, 0.5, "1e20"), {.samples = 64, .squares = true});
-    context.relative("variance of a path at radiance 1e20, over 1e40 times that at 1", pathVariance(bright, 0, 0) / pathVariance(unit, 0, 0) / 1e40, 1, 1e-5,
-                     {{std::numeric_limits<double>::infinity(), "the second moment, 1e40, is kept in single precision"}});
+    const Film bright =
+        context.render(squareOverFloor(0, kDirect, 0.5, "1e20"), {.samples = 64, .squares = true});
+    context.relative(
+        "variance of a path at radiance 1e20, over 1e40 times that at 1",
+        pathVariance(bright, 0, 0) / pathVariance(unit, 0, 0) / 1e40, 1, 1e-5,
+        {{std::numeric_limits<double>::infinity(), "the second moment, 1e40, is kept in single precision"}});
 }
 
 void tinyLight(Context& context) {
     for (const double half : {5e-3, 5e-4, 5e-5, 5e-6})
-        context.estimate(fmt::format("half side {:g}", half), squareOverFloor(0, kDirect, half), meanRadiance, squareFormFactor(0, half), 0.003,
-                         {.samples = 256, .most = 16384});
+        context.estimate(fmt::format("half side {:g}", half), squareOverFloor(0, kDirect, half),
+                         meanRadiance, squareFormFactor(0, half), 0.003, {.samples = 256, .most = 16384});
 }
 
 void edgeOn(Context& context) {
-    // The receiver is not on the floor's diagonal, from which positions are drawn away by a few parts in a million (surface.h).
+    // The receiver is not on the floor's diagonal, from which positions are drawn away by a few parts in a
+    // million (surface.h).
     const auto scene = [](const char* lamp, const char* radiance) {
         return Stage("{position: [0, 0.5, 3], target: [0, 0, 0], fov: 0.000001}", kDirect)
             .material("floor", "{type: diffuse, reflectance: 1}")
@@ -89,31 +107,45 @@ void edgeOn(Context& context) {
         const Film film = context.render(yaml, {.samples = 4096});
         context.relative(what, radiance(film), 0, 0, {{radiance(film), physics}});
     };
-    dark("its plane passes through the receiver", scene("[[1,0,-1],[1,0,1],[2,0,1],[2,0,-1]]", "1, two_sided: true"),
+    dark("its plane passes through the receiver",
+         scene("[[1,0,-1],[1,0,1],[2,0,1],[2,0,-1]]", "1, two_sided: true"),
          "light arrives along a surface, where the cosine is 0");
-    dark("it looks away", scene("[[-0.5,1,-0.5],[-0.5,1,0.5],[0.5,1,0.5],[0.5,1,-0.5]]", "1"), "a one-sided lamp shines from its back");
-    dark("it is below the floor", scene("[[-0.5,-1,-0.5],[0.5,-1,-0.5],[0.5,-1,0.5],[-0.5,-1,0.5]]", "1, two_sided: true"), "light comes through the floor");
-    // Upright above the receiver, seen exactly edge-on but for the width of the eye's needle, which sees it from a little to either side.
-    context.absolute("upright, seen edge-on",
-                     radiance(context.render(scene("[[0,1,-0.5],[0,2,-0.5],[0,2,0.5],[0,1,0.5]]", "1, two_sided: true"), {.samples = 4096})), 0,
-                     1e-6);
+    dark("it looks away", scene("[[-0.5,1,-0.5],[-0.5,1,0.5],[0.5,1,0.5],[0.5,1,-0.5]]", "1"),
+         "a one-sided lamp shines from its back");
+    dark("it is below the floor",
+         scene("[[-0.5,-1,-0.5],[0.5,-1,-0.5],[0.5,-1,0.5],[-0.5,-1,0.5]]", "1, two_sided: true"),
+         "light comes through the floor");
+    // Upright above the receiver, seen exactly edge-on but for the width of the eye's needle, which sees it
+    // from a little to either side.
+    context.absolute(
+        "upright, seen edge-on",
+        radiance(context.render(scene("[[0,1,-0.5],[0,2,-0.5],[0,2,0.5],[0,1,0.5]]", "1, two_sided: true"),
+                                {.samples = 4096})),
+        0, 1e-6);
 }
 
 void nearLight(Context& context) {
-    // A floor that the lamp nearly touches: 1/r² must not spoil it, and in the limit the lamp is all there is to be seen.
+    // A floor that the lamp nearly touches: 1/r² must not spoil it, and in the limit the lamp is all there
+    // is to be seen.
     for (const double height : {1e-1, 1e-2, 1e-3, 1e-4, 2e-5}) {
-        const auto scene = Stage(fmt::format("{{position: [0.7, {0}, 0], target: [0, 0, 0], fov: 0.0001}}", height / 2), kDirect)
-                               .material("floor", "{type: diffuse, reflectance: 1}")
-                               .material("black", "{type: diffuse, reflectance: 0}")
-                               .quad("floor", "[[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]]", "floor")
-                               .quad("lamp", fmt::format("[[-0.5,{0},-0.5],[0.5,{0},-0.5],[0.5,{0},0.5],[-0.5,{0},0.5]]", height), "black", "1")
-                               .yaml();
+        const auto scene =
+            Stage(fmt::format("{{position: [0.7, {0}, 0], target: [0, 0, 0], fov: 0.0001}}", height / 2),
+                  kDirect)
+                .material("floor", "{type: diffuse, reflectance: 1}")
+                .material("black", "{type: diffuse, reflectance: 0}")
+                .quad("floor", "[[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]]", "floor")
+                .quad("lamp",
+                      fmt::format("[[-0.5,{0},-0.5],[0.5,{0},-0.5],[0.5,{0},0.5],[-0.5,{0},0.5]]", height),
+                      "black", "1")
+                .yaml();
         const double expected = squareFormFactor(0, 0.5 / height);
-        context.estimate(fmt::format("receiver {} below the lamp", height), scene, meanRadiance, expected, 0.005, {.samples = 1024, .most = 16384},
+        context.estimate(fmt::format("receiver {} below the lamp", height), scene, meanRadiance, expected,
+                         0.005, {.samples = 1024, .most = 16384},
                          {{0, "the lamp is closer than the distance that rays are moved off surfaces"}});
     }
     context.notApplicable("receiver 1e-6 below the lamp",
-                          "below the clearance by which rays leave surfaces (docs/decisions/0004): gaps down to 1e-5 of a surface's size are seen");
+                          "below the clearance by which rays leave surfaces (docs/decisions/0004): gaps "
+                          "down to 1e-5 of a surface's size are seen");
 }
 
 /// A03 with its lamp cut into n × n squares of two triangles.
@@ -123,7 +155,9 @@ Scene tiledLamp(const Context& context, int n) {
     lamp.positions.clear();
     lamp.triangles.clear();
     for (int z = 0; z <= n; ++z)
-        for (int x = 0; x <= n; ++x) lamp.positions.push_back({-0.5 + static_cast<double>(x) / n, 1, -0.5 + static_cast<double>(z) / n});
+        for (int x = 0; x <= n; ++x)
+            lamp.positions.push_back(
+                {-0.5 + static_cast<double>(x) / n, 1, -0.5 + static_cast<double>(z) / n});
     const auto at = [n](int x, int z) { return static_cast<std::uint32_t>(z * (n + 1) + x); };
     for (int z = 0; z < n; ++z)
         for (int x = 0; x < n; ++x) {
@@ -139,8 +173,10 @@ void tiledLight(Context& context) {
         if (n > 230 && !context.atLeast(Level::Nightly)) continue;
         const Scene scene = tiledLamp(context, n);
         std::vector<double> replicates;
-        for (std::uint64_t seed = 1; seed <= 16; ++seed) replicates.push_back(radiance(context.render(scene, {.samples = 4096, .seed = seed})));
-        context.equivalent(fmt::format("{} triangles", 2 * n * n), replicates, squareFormFactor(0, 0.5), 0.001);
+        for (std::uint64_t seed = 1; seed <= 16; ++seed)
+            replicates.push_back(radiance(context.render(scene, {.samples = 4096, .seed = seed})));
+        context.equivalent(fmt::format("{} triangles", 2 * n * n), replicates, squareFormFactor(0, 0.5),
+                           0.001);
     }
 }
 
@@ -150,12 +186,15 @@ void choosingAmongMany(Context& context) {
         const std::vector<std::uint64_t> first = choiceTable(std::vector<double>(lights, 0.37));
         double worst = 1;
         for (std::size_t i = 0; i < lights; ++i) {
-            const double share = static_cast<double>(first[i + 1] - first[i]) * std::ldexp(1.0, -32) * static_cast<double>(lights);
+            const double share = static_cast<double>(first[i + 1] - first[i]) * std::ldexp(1.0, -32) *
+                                 static_cast<double>(lights);
             worst = fartherFrom(1, worst, share);
         }
-        // Whole numbers of 2³²: with 1e7 lights 429.5 each. The pdf is the share as it is, so this costs noise, never truth.
+        // Whole numbers of 2³²: with 1e7 lights 429.5 each. The pdf is the share as it is, so this costs
+        // noise, never truth.
         context.relative(fmt::format("{} lights: the most unequal share", lights), worst, 1, 0.005);
-        context.relative(fmt::format("{} lights: shares add up to 2³²", lights), static_cast<double>(first.back()), std::ldexp(1.0, 32), 0);
+        context.relative(fmt::format("{} lights: shares add up to 2³²", lights),
+                         static_cast<double>(first.back()), std::ldexp(1.0, 32), 0);
     }
     const std::vector<std::uint64_t> first = choiceTable({1e20, 1});
     context.holds("powers 1e20 : 1: the weak one can be chosen", first[2] > first[1], "at least once in 2³²",
@@ -163,12 +202,14 @@ void choosingAmongMany(Context& context) {
 }
 
 void emissiveSpecular(Context& context) {
-    // The furnace of mirrors and of glass: emission belongs to the surface, whatever it does to light, and counts once each time it is met.
+    // The furnace of mirrors and of glass: emission belongs to the surface, whatever it does to light, and
+    // counts once each time it is met.
     for (const double albedo : {0.5, 0.9}) {
         Cube cube;
         cube.integrator = "{max_depth: 30, roulette: false}";
         std::string mirrors = yaml(cube);
-        mirrors.replace(mirrors.find("{type: diffuse, reflectance: 0.5}"), 33, fmt::format("{{type: mirror, reflectance: {}}}", albedo));
+        mirrors.replace(mirrors.find("{type: diffuse, reflectance: 0.5}"), 33,
+                        fmt::format("{{type: mirror, reflectance: {}}}", albedo));
         cube.integrator = "{max_depth: 0}";
         const Film unit = context.render(yaml(cube), {.samples = 16});
         const double expected = furnaceRadiance(albedo, 30);
@@ -180,14 +221,17 @@ void emissiveSpecular(Context& context) {
     }
     // A pane of index 1 that glows on both sides adds its emission to what is behind it.
     const auto pane = [](int depth, bool there) {
-        Stage stage("{position: [0, 0, 3], target: [0, 0, 0], fov: 1}", fmt::format("{{max_depth: {}, roulette: false}}", depth));
+        Stage stage("{position: [0, 0, 3], target: [0, 0, 0], fov: 1}",
+                    fmt::format("{{max_depth: {}, roulette: false}}", depth));
         stage.set("environment", "{radiance: 1}").material("air", "{type: dielectric, ior: 1}");
-        if (there) stage.quad("pane", "[[-9,-9,0],[9,-9,0],[9,9,0],[-9,9,0]]", "air", "0.5, two_sided: true");
+        if (there)
+            stage.quad("pane", "[[-9,-9,0],[9,-9,0],[9,9,0],[-9,9,0]]", "air", "0.5, two_sided: true");
         return stage.yaml();
     };
     context.relative("glowing pane of index 1",
-                     radiance(context.render(pane(4, true), {.samples = 16})) / radiance(context.render(pane(4, false), {.samples = 16})), 1.5, 2e-6,
-                     {{1, "glass that glows does not glow"}, {2, "emission is counted twice"}});
+                     radiance(context.render(pane(4, true), {.samples = 16})) /
+                         radiance(context.render(pane(4, false), {.samples = 16})),
+                     1.5, 2e-6, {{1, "glass that glows does not glow"}, {2, "emission is counted twice"}});
 }
 
 void noLight(Context& context) {
@@ -202,40 +246,52 @@ void noLight(Context& context) {
 }
 
 void techniquesAgree(Context& context) {
-    // Lamps from tiny to all-surrounding: light sampling, scattering and both must agree, and both together must not be noisier than the better one.
+    // Lamps from tiny to all-surrounding: light sampling, scattering and both must agree, and both together
+    // must not be noisier than the better one.
     for (const double half : {0.05, 0.5, 5.0}) {
-        const std::string both = squareOverFloor(0, kDirect, half), scattering = squareOverFloor(0, "{max_depth: 1, roulette: false, nee: false}", half);
+        const std::string both = squareOverFloor(0, kDirect, half),
+                          scattering =
+                              squareOverFloor(0, "{max_depth: 1, roulette: false, nee: false}", half);
         if (half > 0.1 || context.atLeast(Level::Merge))
-            context.estimate(fmt::format("half side {}: light found by chance", half), scattering, meanRadiance, squareFormFactor(0, half),
-                             half > 0.1 ? 0.005 : 0.01, {.samples = 4096, .most = 65536},
-                             {{squareFormFactor(0, half) / 2, "what is found by chance is weighted although nothing competes"}});
-        context.estimate(fmt::format("half side {}: both techniques", half), both, meanRadiance, squareFormFactor(0, half), 0.002, {.samples = 1024, .most = 16384});
+            context.estimate(fmt::format("half side {}: light found by chance", half), scattering,
+                             meanRadiance, squareFormFactor(0, half), half > 0.1 ? 0.005 : 0.01,
+                             {.samples = 4096, .most = 65536},
+                             {{squareFormFactor(0, half) / 2,
+                               "what is found by chance is weighted although nothing competes"}});
+        context.estimate(fmt::format("half side {}: both techniques", half), both, meanRadiance,
+                         squareFormFactor(0, half), 0.002, {.samples = 1024, .most = 16384});
         // Independent numbers, so that the pixel's own variance is right.
         const auto variance = [&](std::string text) {
             text += "sampler: {type: independent}\n";
             return pathVariance(context.render(text, {.samples = 16384, .squares = true}));
         };
-        // Veach's bound for two techniques of one sample each (1997, theorem 9.2): the better one's and μ²/2 more. It matters where chance alone has hardly
-        // any noise; elsewhere 1.1.
+        // Veach's bound for two techniques of one sample each (1997, theorem 9.2): the better one's and μ²/2
+        // more. It matters where chance alone has hardly any noise; elsewhere 1.1.
         const double ratio = variance(both) / variance(scattering);
         const double bound = half > 1 ? 1.5 : 1.1;
-        context.holds(fmt::format("half side {}: variance of both over that of chance alone", half), ratio <= bound, fmt::format("≤ {}", bound),
-                      "combining two techniques makes more noise than one of them: are the weights wrong?", fmt::format("{:.4g}", ratio));
+        context.holds(fmt::format("half side {}: variance of both over that of chance alone", half),
+                      ratio <= bound, fmt::format("≤ {}", bound),
+                      "combining two techniques makes more noise than one of them: are the weights wrong?",
+                      fmt::format("{:.4g}", ratio));
     }
 }
 
 void hiddenLamps(Context& context) {
-    // Light that comes round corners: a lamp behind a door that is ajar, and a lamp within glass. With and without light sampling the mean is one.
+    // Light that comes round corners: a lamp behind a door that is ajar, and a lamp within glass. With and
+    // without light sampling the mean is one.
     const auto ajar = [](bool nee) {
         Cube cube;
         cube.reflectance = "0.7";
         cube.emitting = "ceiling";
         cube.camera = kFloorQuarter;
         cube.integrator = fmt::format("{{max_depth: 8, roulette: false, nee: {}}}", nee);
-        return yaml(cube) + "  - {name: door, mesh: {positions: [[0,0.7,0],[0.85,0.7,0],[0.85,0.7,1],[0,0.7,1]], faces: [[0,1,2,3]]}, material: wall}\n";
+        return yaml(cube) +
+               "  - {name: door, mesh: {positions: [[0,0.7,0],[0.85,0.7,0],[0.85,0.7,1],[0,0.7,1]], faces: "
+               "[[0,1,2,3]]}, material: wall}\n";
     };
     const auto in_glass = [](bool nee) {
-        return Stage("{position: [0.5, 0.9, 0.1], target: [0.5, 0, 0.5], fov: 0.01}", fmt::format("{{max_depth: 8, roulette: false, nee: {}}}", nee))
+        return Stage("{position: [0.5, 0.9, 0.1], target: [0.5, 0, 0.5], fov: 0.01}",
+                     fmt::format("{{max_depth: 8, roulette: false, nee: {}}}", nee))
             .material("wall", "{type: diffuse, reflectance: 0.7}")
             .material("glass", "{type: dielectric, ior: 1.5}")
             .quad("floor", "[[-1,0,-1],[-1,0,2],[2,0,2],[2,0,-1]]", "wall")
@@ -244,15 +300,20 @@ void hiddenLamps(Context& context) {
             .yaml();
     };
     const JointMeasure ratio = [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); };
-    context.estimate("behind a door: with over without light sampling", {ajar(true), ajar(false)}, ratio, 1, 0.01, {.samples = 4096, .most = 65536});
-    context.estimate("a lamp within glass: with over without light sampling", {in_glass(true), in_glass(false)}, ratio, 1, 0.01, {.samples = 1024, .most = 65536},
-                     {{2, "a caustic is counted by light sampling, too: do shadow rays pass through glass?"}});
+    context.estimate("behind a door: with over without light sampling", {ajar(true), ajar(false)}, ratio, 1,
+                     0.01, {.samples = 4096, .most = 65536});
+    context.estimate(
+        "a lamp within glass: with over without light sampling", {in_glass(true), in_glass(false)}, ratio, 1,
+        0.01, {.samples = 1024, .most = 65536},
+        {{2, "a caustic is counted by light sampling, too: do shadow rays pass through glass?"}});
 }
 
 void enormousPdf(Context& context) {
-    // A lamp of side 2e-12 at distance 1: its pdf per steradian is 2.5e23, and the square of that is beyond single precision.
+    // A lamp of side 2e-12 at distance 1: its pdf per steradian is 2.5e23, and the square of that is beyond
+    // single precision.
     const double half = 1e-12;
-    context.estimate("half side 1e-12", squareOverFloor(0, kDirect, half), meanRadiance, squareFormFactor(0, half), 0.003, {.samples = 256, .most = 4096},
+    context.estimate("half side 1e-12", squareOverFloor(0, kDirect, half), meanRadiance,
+                     squareFormFactor(0, half), 0.003, {.samples = 256, .most = 4096},
                      {{0, "the lamp is lost: does its pdf, or the square of it, overflow?"}});
 }
 
@@ -260,36 +321,53 @@ void enormousPdf(Context& context) {
 
 std::vector<Case> lightCases() {
     return {
-        row("E01", "brightness", "A03 with a radiance of 2^±80 and 1e±24", "every sum scaled alike", "linearity of light", "exactly; 1e-6",
-            Level::Commit, kDirectLight, brightness),
-        row("E02", "bright-and-dim", "Under a lamp of 1e+10 beside one of 1e-10, a screen between them; two equal ones, one hidden",
-            "the floor as under its lamp alone", "rectangle formula", "± 0.1 %; ± 0.3 %", Level::Merge, kDirectLight, brightAndDim),
-        row("E03", "second-moment", "Radiance 1e20: a second moment of 1e40", "1e40 times the variance at radiance 1", "scaling", "1e-5",
-            Level::Commit, kDirectLight, secondMoment),
-        row("E04", "tiny-light", "Lamps of half side 5e-3 to 5e-6 at distance 1", "the form factor, e.g. 3.18309885123e-9 for 5e-5",
-            "rectangle formula", "± 0.3 %", Level::Commit, kDirectLight, tinyLight),
-        row("E05", "edge-on", "A lamp in the receiver's plane, turned away, below the floor, seen edge-on", "nothing", "cosines that are 0",
-            "exactly", Level::Commit, kDirectLight, edgeOn),
-        row("E06", "near-light", "A floor 0.1 to 2e-5 below a lamp of side 1", "the form factor, in the limit 1", "rectangle formula", "± 0.5 %",
-            Level::Commit, kDirectLight, nearLight),
-        row("E07", "tiled-light", "The lamp of A03 as 2, 8 and 1058 triangles; 105800 at merge, 1002528 at night", "0.2394564705 always",
-            "rectangle formula", "± 0.1 %", Level::Commit, kDirectLight | CRT_FEATURE_BVH, tiledLight),
-        row("E08", "many-lights", "How light sampling chooses among up to 1e7 lights of equal power, and between powers of 1e20 : 1",
-            "equal shares; the weak light at least once in 2³²", "arithmetic", "0.5 %", Level::Commit, 0, choosingAmongMany),
-        row("E09", "hopelessly-dim", "Under a lamp of 1e-10 beside one of 1e+10, chosen by power", "the floor as under its lamp alone",
-            "rectangle formula", "± 1 %", Level::Merge, kDirectLight, hopelesslyDim),
-        row("E10", "emissive-specular", "Mirrors that glow, glass that glows", "E (1 − R^(k+1)) / (1 − R); the pane's emission once",
-            "geometric series", "2e-6", Level::Commit,
-            CRT_FEATURE_CONDUCTOR | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_ENVIRONMENT, emissiveSpecular),
-        row("E11", "no-light", "No lamp; radiance 0, −1, NaN, infinite", "black; the last three are refused", "docs/scene.md", "exactly",
-            Level::Commit, kDirectLight, noLight),
-        row("E12", "techniques", "Lamps of half side 0.05, 0.5 and 5, by light sampling with scattering and by scattering alone",
+        row("E01", "brightness", "A03 with a radiance of 2^±80 and 1e±24", "every sum scaled alike",
+            "linearity of light", "exactly; 1e-6", Level::Commit, kDirectLight, brightness),
+        row("E02", "bright-and-dim",
+            "Under a lamp of 1e+10 beside one of 1e-10, a screen between them; two equal ones, one hidden",
+            "the floor as under its lamp alone", "rectangle formula", "± 0.1 %; ± 0.3 %", Level::Merge,
+            kDirectLight, brightAndDim),
+        row("E03", "second-moment", "Radiance 1e20: a second moment of 1e40",
+            "1e40 times the variance at radiance 1", "scaling", "1e-5", Level::Commit, kDirectLight,
+            secondMoment),
+        row("E04", "tiny-light", "Lamps of half side 5e-3 to 5e-6 at distance 1",
+            "the form factor, e.g. 3.18309885123e-9 for 5e-5", "rectangle formula", "± 0.3 %", Level::Commit,
+            kDirectLight, tinyLight),
+        row("E05", "edge-on", "A lamp in the receiver's plane, turned away, below the floor, seen edge-on",
+            "nothing", "cosines that are 0", "exactly", Level::Commit, kDirectLight, edgeOn),
+        row("E06", "near-light", "A floor 0.1 to 2e-5 below a lamp of side 1",
+            "the form factor, in the limit 1", "rectangle formula", "± 0.5 %", Level::Commit, kDirectLight,
+            nearLight),
+        row("E07", "tiled-light",
+            "The lamp of A03 as 2, 8 and 1058 triangles; 105800 at merge, 1002528 at night",
+            "0.2394564705 always", "rectangle formula", "± 0.1 %", Level::Commit,
+            kDirectLight | CRT_FEATURE_BVH, tiledLight),
+        row("E08", "many-lights",
+            "How light sampling chooses among up to 1e7 lights of equal power, and between powers of 1e20 : "
+            "1",
+            "equal shares; the weak light at least once in 2³²", "arithmetic", "0.5 %", Level::Commit, 0,
+            choosingAmongMany),
+        row("E09", "hopelessly-dim", "Under a lamp of 1e-10 beside one of 1e+10, chosen by power",
+            "the floor as under its lamp alone", "rectangle formula", "± 1 %", Level::Merge, kDirectLight,
+            hopelesslyDim),
+        row("E10", "emissive-specular", "Mirrors that glow, glass that glows",
+            "E (1 − R^(k+1)) / (1 − R); the pane's emission once", "geometric series", "2e-6", Level::Commit,
+            CRT_FEATURE_CONDUCTOR | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT |
+                CRT_FEATURE_ENVIRONMENT,
+            emissiveSpecular),
+        row("E11", "no-light", "No lamp; radiance 0, −1, NaN, infinite", "black; the last three are refused",
+            "docs/scene.md", "exactly", Level::Commit, kDirectLight, noLight),
+        row("E12", "techniques",
+            "Lamps of half side 0.05, 0.5 and 5, by light sampling with scattering and by scattering alone",
             "the form factor, and no more noise by both than by one", "rectangle formula; Veach's bound",
-            "± 0.2 %, by chance ± 0.5 % (± 1 %); variance ≤ 1.1", Level::Commit, kDirectLight | CRT_FEATURE_INDEPENDENT, techniquesAgree),
-        row("E13", "hidden-lamps", "A lamp behind a door that is ajar, and one within glass: with and without light sampling", "the same mean",
-            "both are unbiased", "ratio 1 ± 1 %", Level::Merge, kDirectLight | CRT_FEATURE_DIELECTRIC, hiddenLamps),
-        row("E14", "enormous-pdf", "A lamp of half side 1e-12 at distance 1", "1.2732395447e-24", "rectangle formula", "± 0.3 %", Level::Commit,
-            kDirectLight, enormousPdf),
+            "± 0.2 %, by chance ± 0.5 % (± 1 %); variance ≤ 1.1", Level::Commit,
+            kDirectLight | CRT_FEATURE_INDEPENDENT, techniquesAgree),
+        row("E13", "hidden-lamps",
+            "A lamp behind a door that is ajar, and one within glass: with and without light sampling",
+            "the same mean", "both are unbiased", "ratio 1 ± 1 %", Level::Merge,
+            kDirectLight | CRT_FEATURE_DIELECTRIC, hiddenLamps),
+        row("E14", "enormous-pdf", "A lamp of half side 1e-12 at distance 1", "1.2732395447e-24",
+            "rectangle formula", "± 0.3 %", Level::Commit, kDirectLight, enormousPdf),
     };
 }
 

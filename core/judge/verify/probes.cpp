@@ -26,7 +26,8 @@ public:
     /// Direction of sample 0 of a pixel.
     Vec3d direction(int x, int y) const {
         kernel::CrtPath path;
-        kernel::crt_path_begin(&context_, &path, static_cast<kernel::u32>(x), static_cast<kernel::u32>(y), 0);
+        kernel::crt_path_begin(&context_, &path, static_cast<kernel::u32>(x), static_cast<kernel::u32>(y),
+                               0);
         return {path.ray.d.x, path.ray.d.y, path.ray.d.z};
     }
     /// Direction through a film point, not normalised.
@@ -53,7 +54,8 @@ public:
         mesh_.positions.resize(rows * columns);
         for (std::uint32_t r = 0; r + 1 < rows; ++r)
             for (std::uint32_t c = 0; c + 1 < columns; ++c) {
-                const auto a = static_cast<std::uint32_t>(r * columns + c), b = a + static_cast<std::uint32_t>(columns);
+                const auto a = static_cast<std::uint32_t>(r * columns + c),
+                           b = a + static_cast<std::uint32_t>(columns);
                 mesh_.triangles.push_back({a, a + 1, b});
                 mesh_.triangles.push_back({a + 1, b + 1, b});
             }
@@ -66,8 +68,8 @@ private:
     std::size_t columns_;
 };
 
-/// A sheet with a vertex, or an edge between two, on every ray. However it folds, its rim lies outside the film, so by continuity it covers every
-/// film point: a ray that meets nothing has slipped through.
+/// A sheet with a vertex, or an edge between two, on every ray. However it folds, its rim lies outside the
+/// film, so by continuity it covers every film point: a ray that meets nothing has slipped through.
 Mesh sheetOnRays(const KnownRays& rays, Aim aim, const Place& place, int resolution, Dice& dice) {
     constexpr double kRim = 8;  // pixels outside the film
     const auto n = static_cast<std::size_t>(resolution);
@@ -78,15 +80,20 @@ Mesh sheetOnRays(const KnownRays& rays, Aim aim, const Place& place, int resolut
     Sheet sheet(per_ray * n + 2, n + 2);
     const auto rim = [&](std::size_t row, std::size_t column) {
         const auto film_point = [&](std::size_t i, std::size_t count) {
-            return i == 0 ? -kRim : i + 1 == count ? resolution + kRim : resolution * static_cast<double>(i) / static_cast<double>(count - 1);
+            return i == 0           ? -kRim
+                   : i + 1 == count ? resolution + kRim
+                                    : resolution * static_cast<double>(i) / static_cast<double>(count - 1);
         };
-        sheet.at(row, column) = rays.authors(o + unit(rays.through(film_point(column, n + 2), film_point(row, per_ray * n + 2))) * (0.4 * size));
+        sheet.at(row, column) = rays.authors(
+            o +
+            unit(rays.through(film_point(column, n + 2), film_point(row, per_ray * n + 2))) * (0.4 * size));
     };
     for (std::size_t c = 0; c < n + 2; ++c) rim(0, c), rim(per_ray * n + 1, c);
     for (std::size_t r = 1; r <= per_ray * n; ++r) rim(r, 0), rim(r, n + 1);
     for (std::size_t y = 0; y < n; ++y)
         for (std::size_t x = 0; x < n; ++x) {
-            // Half of the points at a power of two of the ray's length: seen from the origin, they are on the ray exactly.
+            // Half of the points at a power of two of the ray's length: seen from the origin, they are on
+            // the ray exactly.
             const double distance = size * (dice.bits() & 1 ? 0.5 : dice.uniform(0.25, 0.5));
             const Vec3d p = o + rays.direction(static_cast<int>(x), static_cast<int>(y)) * distance;
             if (aim == Aim::Edge) {
@@ -108,12 +115,14 @@ Render how(std::uint64_t samples, std::uint64_t first = 0, std::uint32_t aovs = 
     return render;
 }
 
-/// Calls `use` with every pixel's place in the film and its radiance. One sample's radiance depends a little on its wavelengths, up to a factor of two at
-/// the ends of the observer's range: only ratios of films of the same samples, and orders of magnitude, tell anything.
+/// Calls `use` with every pixel's place in the film and its radiance. One sample's radiance depends a little
+/// on its wavelengths, up to a factor of two at the ends of the observer's range: only ratios of films of
+/// the same samples, and orders of magnitude, tell anything.
 template <class Use>
 void forEachPixel(const Film& film, Use use) {
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
-        for (std::uint32_t x = 0; x < film.shape().width; ++x) use(static_cast<std::size_t>(y) * film.shape().width + x, radiance(film, x, y));
+        for (std::uint32_t x = 0; x < film.shape().width; ++x)
+            use(static_cast<std::size_t>(y) * film.shape().width + x, radiance(film, x, y));
 }
 
 /// Orthonormal and random.
@@ -129,13 +138,16 @@ struct Pose {
 
 const char* name(Aim aim) { return aim == Aim::Vertex ? "vertices" : aim == Aim::Edge ? "edges" : "faces"; }
 
-const Place kPlaces[3] = {{"at the origin", {0, 0, 0}, 1, {0, 0, 0}, 0.95},
-                          {"far from it", {148376, 1234, -223423}, 100, {148376, 1234, -223423}, 190},
-                          {"in a scene 2,000 times as large", {148376, 1234, -223423}, 100, {0, 0, 0}, 230000}};
+const Place kPlaces[3] = {
+    {"at the origin", {0, 0, 0}, 1, {0, 0, 0}, 0.95},
+    {"far from it", {148376, 1234, -223423}, 100, {148376, 1234, -223423}, 190},
+    {"in a scene 2,000 times as large", {148376, 1234, -223423}, 100, {0, 0, 0}, 230000}};
 
-Tally missesOfAimedRays(Context& context, Aim aim, const Place& place, int resolution, std::uint64_t seed, std::uint64_t samples) {
+Tally missesOfAimedRays(Context& context, Aim aim, const Place& place, int resolution, std::uint64_t seed,
+                        std::uint64_t samples) {
     Dice dice(seed);
-    Scene scene = emptyScene(resolution, seed, place.centre, place.centre + dice.direction() * place.size, 0.7);
+    Scene scene =
+        emptyScene(resolution, seed, place.centre, place.centre + dice.direction() * place.size, 0.7);
     scene.integrator.max_depth = 0;
     scene.environment = Environment{constantSpectrum(1)};
     Scene anchored = scene;
@@ -147,7 +159,8 @@ Tally missesOfAimedRays(Context& context, Aim aim, const Place& place, int resol
     const double pixels = static_cast<double>(resolution) * resolution;
     Tally tally;
     tally.rays = static_cast<std::uint64_t>(resolution) * static_cast<std::uint64_t>(resolution) * samples;
-    tally.failures = static_cast<std::uint64_t>(std::ceil(radiance(film) * pixels * static_cast<double>(samples) - 0.5));
+    tally.failures =
+        static_cast<std::uint64_t>(std::ceil(radiance(film) * pixels * static_cast<double>(samples) - 0.5));
     return tally;
 }
 
@@ -157,16 +170,21 @@ Tally selfHits(Context& context, double size, double extent, int resolution, std
     const Pose pose(dice);
     // Long or short, thin or thick.
     const double width = std::pow(10.0, dice.uniform(-2, 0));
-    const auto point = [&](double x, double y) { return centre + pose.x * (0.5 * size * x) + pose.y * (0.5 * size * y); };
+    const auto point = [&](double x, double y) {
+        return centre + pose.x * (0.5 * size * x) + pose.y * (0.5 * size * y);
+    };
     Mesh triangle;
-    addTriangle(triangle, point(-1, -width), point(1, dice.uniform(-width, 0)), point(dice.uniform(-1, 1), width));
-    const double cosine = dice.uniform(0.1, 1) * (dice.bits() & 1 ? 1 : -1), sine = std::sqrt(1 - cosine * cosine);
+    addTriangle(triangle, point(-1, -width), point(1, dice.uniform(-width, 0)),
+                point(dice.uniform(-1, 1), width));
+    const double cosine = dice.uniform(0.1, 1) * (dice.bits() & 1 ? 1 : -1),
+                 sine = std::sqrt(1 - cosine * cosine);
     const Vec3d eye = centre + (pose.z * cosine + pose.y * sine) * (2 * size);
     Scene scene = emptyScene(resolution, seed, eye, centre, 0.25);
     scene.camera.up = pose.x;
     scene.camera.tan_half_height = 0.26 * std::max(width, 1.0 / 16) * std::abs(cosine) + 0.02;
     scene.integrator.max_depth = 1;
-    // The triangle brings 1, the sky 1000: a path that sees both brings 1001, one that meets the triangle twice 2.
+    // The triangle brings 1, the sky 1000: a path that sees both brings 1001, one that meets the triangle
+    // twice 2.
     scene.environment = Environment{constantSpectrum(1000)};
     addObject(scene, std::move(triangle), diffuse(1), 1, true);
     addAnchors(scene, {0, 0, 0}, std::max(1.0, extent) * size);
@@ -179,27 +197,33 @@ Tally selfHits(Context& context, double size, double extent, int resolution, std
         if (value < 100) suspects.push_back(pixel);
     });
     if (suspects.empty()) return tally;
-    // Or did the path end, its direction rounded into the surface? Then it brings no more than what it sees first.
+    // Or did the path end, its direction rounded into the surface? Then it brings no more than what it sees
+    // first.
     scene.integrator.max_depth = 0;
     std::vector<double> first(film.counts.size()), both(film.counts.size());
-    forEachPixel(context.render(scene, how(1)), [&](std::size_t pixel, double value) { first[pixel] = value; });
+    forEachPixel(context.render(scene, how(1)),
+                 [&](std::size_t pixel, double value) { first[pixel] = value; });
     forEachPixel(film, [&](std::size_t pixel, double value) { both[pixel] = value; });
     for (const std::size_t pixel : suspects) tally.failures += both[pixel] > 1.5 * first[pixel];
     return tally;
 }
 
-Tally skippedLayers(Context& context, double size, double gap, double extent, int resolution, std::uint64_t seed) {
+Tally skippedLayers(Context& context, double size, double gap, double extent, int resolution,
+                    std::uint64_t seed) {
     Dice dice(seed);
     const Vec3d centre = dice.inBox(std::max(0.0, 0.9 * extent - 1.5) * size);
     const Pose pose(dice);
     const auto square = [&](double height, double half) {
         Mesh mesh;
-        const auto point = [&](double x, double y) { return centre + pose.x * (half * x) + pose.y * (half * y) + pose.z * height; };
+        const auto point = [&](double x, double y) {
+            return centre + pose.x * (half * x) + pose.y * (half * y) + pose.z * height;
+        };
         addQuad(mesh, point(-1, -1), point(1, -1), point(1, 1), point(-1, 1));
         return mesh;
     };
     const double cosine = dice.uniform(0.1, 1), sine = std::sqrt(1 - cosine * cosine);
-    Scene scene = emptyScene(resolution, seed, centre + (pose.y * sine - pose.z * cosine) * (2 * size), centre, 0.3);
+    Scene scene =
+        emptyScene(resolution, seed, centre + (pose.y * sine - pose.z * cosine) * (2 * size), centre, 0.3);
     scene.camera.up = pose.x;
     scene.integrator.max_depth = 1;
     scene.environment = Environment{constantSpectrum(1000)};
@@ -216,13 +240,15 @@ Tally skippedLayers(Context& context, double size, double gap, double extent, in
     return tally;
 }
 
-void rareFailures(Context& context, const std::string& what, const Tally& tally, double bound, const std::string& physics) {
+void rareFailures(Context& context, const std::string& what, const Tally& tally, double bound,
+                  const std::string& physics) {
     // −ln(0.0005): failures that none of N leaves possible, times N.
     constexpr double kNoneOf = 7.61;
     if (static_cast<double>(tally.rays) * bound >= kNoneOf)
         context.rate(what, tally.failures, tally.rays, bound, physics);
     else
-        context.holds(what, tally.failures == 0 && tally.rays > 0, fmt::format("none; a rate of {:g} needs more rays", bound), physics,
+        context.holds(what, tally.failures == 0 && tally.rays > 0,
+                      fmt::format("none; a rate of {:g} needs more rays", bound), physics,
                       fmt::format("{} of {}", tally.failures, tally.rays));
 }
 

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Of a polygon around the point, what lies on the side of the normal (Sutherland and Hodgman 1974, one plane).
+/// Of a polygon around the point, what lies on the side of the normal (Sutherland and Hodgman 1974, one
+/// plane).
 std::vector<Vec3d> aboveHorizon(const std::vector<Vec3d>& polygon, const Vec3d& normal) {
     std::vector<Vec3d> out;
     for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -66,19 +67,24 @@ double perpendicularFormFactor(double depth, double height) {
            (kPi * depth);
 }
 
-double rectangleIntegral(const std::function<double(double, double)>& f, double u0, double u1, double v0, double v1, int panels) {
+double rectangleIntegral(const std::function<double(double, double)>& f, double u0, double u1, double v0,
+                         double v1, int panels) {
     using Gauss = boost::math::quadrature::gauss<double, 30>;
     double sum = 0;
     for (int i = 0; i < panels; ++i)
         for (int j = 0; j < panels; ++j) {
             const double ua = u0 + (u1 - u0) * i / panels, ub = u0 + (u1 - u0) * (i + 1) / panels;
             const double va = v0 + (v1 - v0) * j / panels, vb = v0 + (v1 - v0) * (j + 1) / panels;
-            sum += Gauss::integrate([&](double u) { return Gauss::integrate([&](double v) { return f(u, v); }, va, vb); }, ua, ub);
+            sum += Gauss::integrate(
+                [&](double u) { return Gauss::integrate([&](double v) { return f(u, v); }, va, vb); }, ua,
+                ub);
         }
     return sum;
 }
 
-double furnaceRadiance(double albedo, int depth) { return -std::expm1((depth + 1.0) * std::log(albedo)) / (1 - albedo); }
+double furnaceRadiance(double albedo, int depth) {
+    return -std::expm1((depth + 1.0) * std::log(albedo)) / (1 - albedo);
+}
 
 double fresnelDielectric(double cos_incidence, double eta) {
     const double sin2 = (1 - cos_incidence * cos_incidence) / (eta * eta);

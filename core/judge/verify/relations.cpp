@@ -1,4 +1,5 @@
-// Group M: relations between images. Those that hold exactly, M01 to M19, ask for the same bits and cost little; they need no reference.
+// Group M: relations between images. Those that hold exactly, M01 to M19, ask for the same bits and cost
+// little; they need no reference.
 #include "judge/verify/context.h"
 #include "judge/verify/shapes.h"
 #include "judge/verify/temporary_folder.h"
@@ -17,25 +18,28 @@
 namespace crt::verify {
 namespace {
 
-constexpr std::uint64_t kLitRoom =
-    CRT_FEATURE_BVH | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_DIFFUSE | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
+constexpr std::uint64_t kLitRoom = CRT_FEATURE_BVH | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_DIFFUSE |
+                                   CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
 
 void scaling(Context& context) {
     const Scene scene = litRoom(24, 1);
     const Film here = context.render(scene, samples(4, kAovNormal | kAovPrimitive));
     for (const int m : {-40, -7, -1, 1, 13, 40})
-        context.sameBits(fmt::format("times 2^{}", m), here,
-                         context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4, kAovNormal | kAovPrimitive)),
-                         "an absolute length survives somewhere: an epsilon, a smallest distance, a clamp");
+        context.sameBits(
+            fmt::format("times 2^{}", m), here,
+            context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4, kAovNormal | kAovPrimitive)),
+            "an absolute length survives somewhere: an epsilon, a smallest distance, a clamp");
 }
 
 void translation(Context& context) {
     const Scene scene = litRoom(24, 1);
     const Film here = context.render(scene, samples(4, kAllAovs));
-    // Vertices are multiples of 2⁻⁴ up to 1: with shifts of up to 2²⁷ that are whole, sums are exact in double, and in an OBJ's decimal digits.
+    // Vertices are multiples of 2⁻⁴ up to 1: with shifts of up to 2²⁷ that are whole, sums are exact in
+    // double, and in an OBJ's decimal digits.
     for (const double t : {1.0, 1e2, 1e4, 1e6, 1e8}) {
         const Vec3d shift{t, std::round(0.7 * t), -std::round(0.3 * t)};
-        context.sameBits(fmt::format("by {:g} of its size", t), here, context.render(moved(scene, 1, shift), samples(4, kAllAovs)),
+        context.sameBits(fmt::format("by {:g} of its size", t), here,
+                         context.render(moved(scene, 1, shift), samples(4, kAllAovs)),
                          "coordinates are rounded to float before the scene is moved to its centre");
     }
 }
@@ -63,7 +67,8 @@ void triangleOrder(Context& context) {
     Scene reversed = scene;
     for (std::size_t i = 0; i + 1 < reversed.meshes.size(); ++i)
         std::reverse(reversed.meshes[i].triangles.begin(), reversed.meshes[i].triangles.end());
-    context.sameBits("triangles of every mesh but the lamp's backwards", context.render(scene, samples(4)), context.render(reversed, samples(4)),
+    context.sameBits("triangles of every mesh but the lamp's backwards", context.render(scene, samples(4)),
+                     context.render(reversed, samples(4)),
                      "what is hit depends on the order of testing, beyond ties");
 }
 
@@ -71,7 +76,8 @@ void objectOrder(Context& context) {
     const Scene scene = litRoom(24, 1);
     Scene reversed = scene;
     std::reverse(reversed.objects.begin(), reversed.objects.end());
-    context.sameBits("objects backwards", context.render(scene, samples(4)), context.render(reversed, samples(4)),
+    context.sameBits("objects backwards", context.render(scene, samples(4)),
+                     context.render(reversed, samples(4)),
                      "what is hit depends on the order of testing, beyond ties");
 }
 
@@ -84,7 +90,8 @@ void vertexOrder(Context& context) {
         for (auto& t : mesh.triangles)
             for (std::uint32_t& v : t) v = last - v;
     }
-    context.sameBits("vertices numbered backwards", context.render(scene, samples(4, kAllAovs)), context.render(renamed, samples(4, kAllAovs)),
+    context.sameBits("vertices numbered backwards", context.render(scene, samples(4, kAllAovs)),
+                     context.render(renamed, samples(4, kAllAovs)),
                      "an index of a vertex reaches the image");
 }
 
@@ -109,8 +116,8 @@ integrator: {nee: false, max_depth: 3}
 film: {resolution: [16, 16]}
 camera: {fov: 40, target: [0, 0, 0], position: [0, 1, -3]}
 )";
-    context.sameBits("every mapping in another order", context.render(a, samples(4)), context.render(b, samples(4)),
-                     "the order of keys reaches the image");
+    context.sameBits("every mapping in another order", context.render(a, samples(4)),
+                     context.render(b, samples(4)), "the order of keys reaches the image");
 }
 
 void doubledEmission(Context& context) {
@@ -130,16 +137,18 @@ void darkLight(Context& context) {
     Scene more = scene;
     more.emissions.push_back({constantSpectrum(0), false});
     more.objects[2].emission = static_cast<std::int32_t>(more.emissions.size() - 1);
-    context.sameBits("a block that emits 0", context.render(scene, samples(4)), context.render(more, samples(4)),
+    context.sameBits("a block that emits 0", context.render(scene, samples(4)),
+                     context.render(more, samples(4)),
                      "a light without power takes part in the choice of lights");
 }
 
 void hiddenObject(Context& context) {
     const Scene scene = litRoom(24, 1);
     Scene more = scene;
-    addObject(more, boxMesh({0.3125, 0.0625, 0.3125}, {0.4375, 0.3125, 0.4375}), diffuse(0));  // within the mirror block
-    context.sameBits("a black box inside the mirror block", context.render(scene, samples(4, kAllAovs)), context.render(more, samples(4, kAllAovs)),
-                     "what no path can meet reaches the image");
+    addObject(more, boxMesh({0.3125, 0.0625, 0.3125}, {0.4375, 0.3125, 0.4375}),
+              diffuse(0));  // within the mirror block
+    context.sameBits("a black box inside the mirror block", context.render(scene, samples(4, kAllAovs)),
+                     context.render(more, samples(4, kAllAovs)), "what no path can meet reaches the image");
 }
 
 void splitting(Context& context) {
@@ -150,14 +159,18 @@ void splitting(Context& context) {
                        c.render(v.scene, {.samples = 4, .threads = threads, .tile_size = tile}),
                        "pixels share state, or are summed in the order of the threads");
         Film crops = whole;
-        for (const auto& [x0, y0, x1, y1] : {std::array{0, 0, 10, 24}, std::array{10, 0, 24, 7}, std::array{10, 7, 24, 24}}) {
+        for (const auto& [x0, y0, x1, y1] :
+             {std::array{0, 0, 10, 24}, std::array{10, 0, 24, 7}, std::array{10, 7, 24, 24}}) {
             Scene cropped = v.scene;
             cropped.film.crop = {x0, y0, x1, y1};
             const Film part = c.render(cropped, samples(4));
             const std::size_t row = 2u * whole.shape().channels * static_cast<std::size_t>(x1 - x0);
             for (int y = y0; y < y1; ++y)
-                std::copy_n(part.sums.begin() + static_cast<std::ptrdiff_t>(row * static_cast<std::size_t>(y - y0)), row,
-                            crops.sums.begin() + static_cast<std::ptrdiff_t>(2u * whole.shape().channels * static_cast<std::size_t>(y * 24 + x0)));
+                std::copy_n(
+                    part.sums.begin() + static_cast<std::ptrdiff_t>(row * static_cast<std::size_t>(y - y0)),
+                    row,
+                    crops.sums.begin() + static_cast<std::ptrdiff_t>(2u * whole.shape().channels *
+                                                                     static_cast<std::size_t>(y * 24 + x0)));
         }
         c.sameBits(fmt::format("{}: from three crops", v.name), whole, crops,
                    "random numbers depend on the pixel's place in the crop instead of in the film");
@@ -179,10 +192,10 @@ void ranges(Context& context) {
 }
 
 void resuming(Context& context) {
-    context.notApplicable(
-        "killed and resumed",
-        "asked of the program from outside: 'test_kill_then_resume_gives_the_same_bits' and 'test_ctrl_c_then_resume_gives_the_same_bits', "
-        "tests/cli/test_cli.py; M12 asks the same of the film");
+    context.notApplicable("killed and resumed",
+                          "asked of the program from outside: 'test_kill_then_resume_gives_the_same_bits' "
+                          "and 'test_ctrl_c_then_resume_gives_the_same_bits', "
+                          "tests/cli/test_cli.py; M12 asks the same of the film");
 }
 
 void twice(Context& context) {
@@ -212,17 +225,22 @@ void meshForms(Context& context) {
     const std::string file = folder.write("ball.obj", obj);
     const auto scene = [&](const std::string& mesh, const std::string& more) {
         return fmt::format(
-            "crt: 1\ncamera: {{position: [{0}, 1, {1}], target: [{0}, 0, {2}], fov: 40}}\nfilm: {{resolution: [24, 24]}}\nintegrator: {{max_depth: "
+            "crt: 1\ncamera: {{position: [{0}, 1, {1}], target: [{0}, 0, {2}], fov: 40}}\nfilm: "
+            "{{resolution: [24, 24]}}\nintegrator: {{max_depth: "
             "3, nee: false}}\n"
-            "environment: {{radiance: 1}}\nmaterials: {{m: {{type: diffuse, reflectance: 0.5}}}}\nobjects:\n  - {{name: a, {3}, material: m{4}}}\n",
+            "environment: {{radiance: 1}}\nmaterials: {{m: {{type: diffuse, reflectance: "
+            "0.5}}}}\nobjects:\n  - {{name: a, {3}, material: m{4}}}\n",
             1e5 / 3, -1e5 / 7 - 3, -1e5 / 7, mesh, more);
     };
     const std::string in_scene = fmt::format("mesh: {{positions: [{}], faces: [{}]}}", positions, faces);
     const Film film = context.render(scene(in_scene, ""), samples(4, kAllAovs));
-    context.sameBits("in an OBJ with 17 digits", film, context.render(scene(fmt::format("obj: '{}'", file), ""), samples(4, kAllAovs)),
+    context.sameBits("in an OBJ with 17 digits", film,
+                     context.render(scene(fmt::format("obj: '{}'", file), ""), samples(4, kAllAovs)),
                      "an OBJ's coordinates are read as float, or rounded twice");
-    context.sameBits("placed by a transform that does nothing", film,
-                     context.render(scene(in_scene, ", transform: [{translate: [0, 0, 0]}]"), samples(4, kAllAovs)), "an identity rounds");
+    context.sameBits(
+        "placed by a transform that does nothing", film,
+        context.render(scene(in_scene, ", transform: [{translate: [0, 0, 0]}]"), samples(4, kAllAovs)),
+        "an identity rounds");
 }
 
 void unusedThings(Context& context) {
@@ -231,8 +249,9 @@ void unusedThings(Context& context) {
     more.materials.push_back(glass(1.5));
     more.meshes.push_back(icosphere(1, 5, {9, 9, 9}));
     more.emissions.push_back({constantSpectrum(7), true});
-    context.sameBits("a material, a mesh and an emission that no object has", context.render(scene, samples(4, kAllAovs)),
-                     context.render(more, samples(4, kAllAovs)), "what is not used reaches the image");
+    context.sameBits("a material, a mesh and an emission that no object has",
+                     context.render(scene, samples(4, kAllAovs)), context.render(more, samples(4, kAllAovs)),
+                     "what is not used reaches the image");
 }
 
 /// Whether the lean kernel was another than the full one.
@@ -272,7 +291,8 @@ void sideOutputs(Context& context) {
             for (std::uint32_t x = 0; x < 24; ++x)
                 for (std::uint32_t channel = 0; channel < CRT_CHANNELS_BASE; ++channel)
                     differing += plain.mean(x, y, channel) != with.mean(x, y, channel);
-        c.holds(fmt::format("{}: with and without AOVs", v.name), differing == 0, "same bits", "AOVs take random numbers, or change what is traced",
+        c.holds(fmt::format("{}: with and without AOVs", v.name), differing == 0, "same bits",
+                "AOVs take random numbers, or change what is traced",
                 fmt::format("{} values differ", differing));
     });
 }
@@ -301,35 +321,51 @@ void deeperThanPaths(Context& context) {
 }  // namespace
 
 std::vector<Case> exactRelationCases() {
-    const auto relation = [](const char* id, const char* case_name, const char* title, const char* source, std::uint64_t needs, void (*run)(Context&),
+    const auto relation = [](const char* id, const char* case_name, const char* title, const char* source,
+                             std::uint64_t needs, void (*run)(Context&),
                              const char* expected = "the same image", const char* tolerance = "same bits") {
         return row(id, case_name, title, expected, source, tolerance, Level::Commit, needs, run);
     };
     return {
-        relation("M01", "same-scaled", "A lit room times 2^m, m up to ±40", "powers of two round nothing", kLitRoom, scaling),
-        relation("M02", "same-moved", "A lit room moved by up to 1e8 of its size, representably", "sums that are exact round nothing", kLitRoom,
-            translation),
-        relation("M03", "same-permuted", "Axes permuted, with the camera", "sums of three products round by their order: equal in the mean",
-            kLitRoom, permutation, "the same mean", "± 1 %"),
-        relation("M04", "triangle-order", "Triangles in another order", "docs/architecture.md, Same bits", kLitRoom, triangleOrder),
-        relation("M05", "object-order", "Objects in another order", "docs/architecture.md, Same bits", kLitRoom, objectOrder),
-        relation("M06", "vertex-order", "Vertices numbered otherwise", "names are not geometry", kLitRoom, vertexOrder),
-        relation("M07", "key-order", "Keys of the scene file in another order", "YAML mappings have no order", 0, keyOrder),
-        relation("M08", "doubled-emission", "The lamp twice as bright", "light is linear, and powers of two round nothing", kLitRoom,
-            doubledEmission, "every pixel doubled"),
-        relation("M09", "dark-light", "A light without power added", "it brings nothing", kLitRoom, darkLight),
-        relation("M10", "hidden-object", "A black object added where no path comes", "it takes nothing", kLitRoom, hiddenObject),
-        relation("M11", "splitting", "Threads, tiles, crops", "docs/architecture.md, Same bits", 0, splitting),
-        relation("M12", "sample-ranges", "Sample ranges in pieces, out of order", "docs/architecture.md, Film", 0, ranges),
+        relation("M01", "same-scaled", "A lit room times 2^m, m up to ±40", "powers of two round nothing",
+                 kLitRoom, scaling),
+        relation("M02", "same-moved", "A lit room moved by up to 1e8 of its size, representably",
+                 "sums that are exact round nothing", kLitRoom, translation),
+        relation("M03", "same-permuted", "Axes permuted, with the camera",
+                 "sums of three products round by their order: equal in the mean", kLitRoom, permutation,
+                 "the same mean", "± 1 %"),
+        relation("M04", "triangle-order", "Triangles in another order", "docs/architecture.md, Same bits",
+                 kLitRoom, triangleOrder),
+        relation("M05", "object-order", "Objects in another order", "docs/architecture.md, Same bits",
+                 kLitRoom, objectOrder),
+        relation("M06", "vertex-order", "Vertices numbered otherwise", "names are not geometry", kLitRoom,
+                 vertexOrder),
+        relation("M07", "key-order", "Keys of the scene file in another order",
+                 "YAML mappings have no order", 0, keyOrder),
+        relation("M08", "doubled-emission", "The lamp twice as bright",
+                 "light is linear, and powers of two round nothing", kLitRoom, doubledEmission,
+                 "every pixel doubled"),
+        relation("M09", "dark-light", "A light without power added", "it brings nothing", kLitRoom,
+                 darkLight),
+        relation("M10", "hidden-object", "A black object added where no path comes", "it takes nothing",
+                 kLitRoom, hiddenObject),
+        relation("M11", "splitting", "Threads, tiles, crops", "docs/architecture.md, Same bits", 0,
+                 splitting),
+        relation("M12", "sample-ranges", "Sample ranges in pieces, out of order",
+                 "docs/architecture.md, Film", 0, ranges),
         relation("M13", "resuming", "Killed and resumed", "docs/architecture.md, Film", 0, resuming),
         relation("M14", "twice", "The same seed twice", "docs/architecture.md, Same bits", 0, twice),
-        relation("M15", "mesh-forms", "A mesh in the scene, in an OBJ, placed by the identity; far from the origin", "it is the same mesh", 0,
-            meshForms),
-        relation("M16", "unused-things", "Materials, meshes and emissions that nobody uses", "nobody uses them", kLitRoom, unusedThings),
-        relation("M17", "pruning", "The kernel made for the scene, and the one that has everything", "docs/architecture.md, Same bits", 0, pruning),
-        relation("M18", "side-outputs", "With and without AOVs", "they only look", CRT_FEATURE_AOV, sideOutputs),
-        relation("M19", "deeper-than-paths", "Depths beyond the longest path", "paths have ended", CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ENVIRONMENT,
-            deeperThanPaths),
+        relation("M15", "mesh-forms",
+                 "A mesh in the scene, in an OBJ, placed by the identity; far from the origin",
+                 "it is the same mesh", 0, meshForms),
+        relation("M16", "unused-things", "Materials, meshes and emissions that nobody uses",
+                 "nobody uses them", kLitRoom, unusedThings),
+        relation("M17", "pruning", "The kernel made for the scene, and the one that has everything",
+                 "docs/architecture.md, Same bits", 0, pruning),
+        relation("M18", "side-outputs", "With and without AOVs", "they only look", CRT_FEATURE_AOV,
+                 sideOutputs),
+        relation("M19", "deeper-than-paths", "Depths beyond the longest path", "paths have ended",
+                 CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ENVIRONMENT, deeperThanPaths),
     };
 }
 

@@ -17,7 +17,8 @@ std::string figure(double value) { return fmt::format("{:.9g}", value); }
 /// What a failed outcome says, in the two or three lines under its case.
 std::string failureText(const Outcome& o) {
     std::string text = fmt::format("       {}: {}", name(o.verdict), o.what);
-    if (o.measured && o.expected) text += fmt::format(": measured {}, expected {}", measuredText(o), figure(*o.expected));
+    if (o.measured && o.expected)
+        text += fmt::format(": measured {}, expected {}", measuredText(o), figure(*o.expected));
     text += fmt::format(" ({})\n", o.tolerance);
     if (!o.note.empty()) text += fmt::format("       {}\n", o.note);
     if (!o.physics.empty()) text += fmt::format("       → {}\n", o.physics);
@@ -25,7 +26,9 @@ std::string failureText(const Outcome& o) {
 }
 
 /// JSON has neither infinity nor NaN.
-Json number(const std::optional<double>& value) { return value && std::isfinite(*value) ? Json(*value) : Json(nullptr); }
+Json number(const std::optional<double>& value) {
+    return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
+}
 
 }  // namespace
 
@@ -38,28 +41,37 @@ std::string measuredText(const Outcome& o) {
 
 std::string caseText(const CaseResult& result, bool colored) {
     const bool bad = failed(result.verdict);
-    const char* color = !colored ? "" : (bad ? "\033[1;31m" : (result.verdict == Verdict::Pass ? "\033[32m" : "\033[33m"));
-    std::string text = fmt::format("  {:<4} {:<26} {}{:<22}{} {:>8}\n", result.which->id, result.which->name, color, name(result.verdict),
-                                   colored ? "\033[0m" : "", durationText(result.seconds));
+    const char* color =
+        !colored ? "" : (bad ? "\033[1;31m" : (result.verdict == Verdict::Pass ? "\033[32m" : "\033[33m"));
+    std::string text =
+        fmt::format("  {:<4} {:<26} {}{:<22}{} {:>8}\n", result.which->id, result.which->name, color,
+                    name(result.verdict), colored ? "\033[0m" : "", durationText(result.seconds));
     for (const Outcome& o : result.outcomes) {
         if (failed(o.verdict)) text += failureText(o);
-        if (o.verdict == Verdict::NotApplicable) text += fmt::format("       {}: not asked: {}\n", o.what, o.note);
+        if (o.verdict == Verdict::NotApplicable)
+            text += fmt::format("       {}: not asked: {}\n", o.what, o.note);
     }
     return text;
 }
 
 std::string summaryText(const SuiteResult& suite) {
     std::string text;
-    for (const Verdict v : {Verdict::Pass, Verdict::Refused, Verdict::NotApplicable, Verdict::Inconclusive, Verdict::Fail})
-        if (const std::size_t n = suite.count(v); n > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", n, name(v));
-    if (suite.cases.size() < suite.asked) text += fmt::format(", {} not run", suite.asked - suite.cases.size());
+    for (const Verdict v :
+         {Verdict::Pass, Verdict::Refused, Verdict::NotApplicable, Verdict::Inconclusive, Verdict::Fail})
+        if (const std::size_t n = suite.count(v); n > 0)
+            text += fmt::format("{}{} {}", text.empty() ? "" : ", ", n, name(v));
+    if (suite.cases.size() < suite.asked)
+        text += fmt::format(", {} not run", suite.asked - suite.cases.size());
     return fmt::format("{} in {}", text, durationText(suite.seconds));
 }
 
 std::string suiteJson(const SuiteResult& suite) {
     Json json;
     json["crt"] = {{"version", CRT_VERSION}};
-    json["backend"] = {{"name", suite.backend}, {"version", suite.version}, {"build", suite.build}, {"device", suite.device}};
+    json["backend"] = {{"name", suite.backend},
+                       {"version", suite.version},
+                       {"build", suite.build},
+                       {"device", suite.device}};
     json["level"] = name(suite.level);
     json["seconds"] = suite.seconds;
     json["passed"] = suite.passed();
@@ -69,7 +81,10 @@ std::string suiteJson(const SuiteResult& suite) {
     for (const CaseResult& c : suite.cases) {
         Json outcomes = Json::array();
         for (const Outcome& o : c.outcomes) {
-            Json item{{"what", o.what}, {"verdict", name(o.verdict)}, {"expected", number(o.expected)}, {"measured", number(o.measured)}};
+            Json item{{"what", o.what},
+                      {"verdict", name(o.verdict)},
+                      {"expected", number(o.expected)},
+                      {"measured", number(o.measured)}};
             if (o.interval) item["interval"] = {number(o.interval->lower), number(o.interval->upper)};
             item["tolerance"] = o.tolerance;
             if (!o.note.empty()) item["note"] = o.note;

@@ -1,4 +1,5 @@
-// docs/stability.md: the registry as a manual page, so that it cannot tell anything else than what is tested.
+// docs/stability.md: the registry as a manual page, so that it cannot tell anything else than what is
+// tested.
 #include "judge/verify/report.h"
 
 #include <fmt/format.h>
@@ -16,15 +17,17 @@ using Json = nlohmann::json;
 
 constexpr const char* kPreamble = R"(# Stability: what is asked of every backend
 
-<!-- Generated from the registry in core/verify/. Change it there, then run
+<!-- Generated from the registry in core/judge/verify/. Change it there, then run
      crt verify --markdown --figures embree/verify.json --figures opencl/verify.json > docs/stability.md -->
 
-`crt verify` renders scenes whose answer is known and says whether the backend finds it. It takes any backend, also one that crt has never seen:
+`crt verify` renders scenes whose answer is known and says whether the backend finds it. It takes any
+backend, also one that crt has never seen:
 
     crt verify --backend mine --plugin-path build --level merge -o report
 
-A figure that is estimated from samples passes when its 99.9 % interval lies within the tolerance, fails when it lies outside, and is inconclusive, which
-counts as failing, when it is too wide to tell. Exit code 7 says that something failed. `commit` is the level for every commit, `merge` adds what takes minutes,
+A figure that is estimated from samples passes when its 99.9 % interval lies within the tolerance, fails
+when it lies outside, and is inconclusive, which counts as failing, when it is too wide to tell. Exit code 7
+says that something failed. `commit` is the level for every commit, `merge` adds what takes minutes,
 `nightly` what takes longer.
 )";
 
@@ -52,7 +55,8 @@ std::string figureOf(const Json& result) {
 }  // namespace
 
 std::string markdownRow(const Case& c) {
-    return fmt::format("| {} `{}` | {} | {} | {} | {} | {} |", c.id, c.name, cell(c.title), cell(c.expected), cell(c.source), cell(c.tolerance), name(c.level));
+    return fmt::format("| {} `{}` | {} | {} | {} | {} | {} |", c.id, c.name, cell(c.title), cell(c.expected),
+                       cell(c.source), cell(c.tolerance), name(c.level));
 }
 
 std::string registryMarkdown(const std::vector<std::string>& suites) {
@@ -63,23 +67,27 @@ std::string registryMarkdown(const std::vector<std::string>& suites) {
         const Json json = Json::parse(suite);
         const std::string backend = json.at("backend").at("name");
         backends.push_back(backend);
-        text += fmt::format("\nFigures of {}: level {}, {}, crt {}; the largest deviation of a case's answers from what is expected.\n", backend,
-                            json.at("level").get<std::string>(), json.at("backend").at("device").get<std::string>(),
-                            json.at("crt").at("version").get<std::string>());
+        text += fmt::format(
+            "\nFigures of {}: level {}, {}, crt {}; the largest deviation of a case's answers from what is "
+            "expected.\n",
+            backend, json.at("level").get<std::string>(), json.at("backend").at("device").get<std::string>(),
+            json.at("crt").at("version").get<std::string>());
         for (const Json& c : json.at("cases")) figures[{backend, c.at("id")}] = figureOf(c);
     }
     char group = 0;
     for (const Case& c : registry()) {
         if (c.group() != group) {
             group = c.group();
-            text += fmt::format("\n## {}: {}\n\n| | asked | expected | source | tolerance | level |", group, groupTitle(group));
+            text += fmt::format("\n## {}: {}\n\n| | asked | expected | source | tolerance | level |", group,
+                                groupTitle(group));
             for (const std::string& b : backends) text += fmt::format(" {} |", b);
             text += "\n|---|---|---|---|---|---|";
             for (std::size_t i = 0; i < backends.size(); ++i) text += "---|";
             text += "\n";
         }
         text += markdownRow(c);
-        for (const std::string& b : backends) text += fmt::format(" {} |", figures.count({b, c.id}) != 0 ? figures[{b, c.id}] : "–");
+        for (const std::string& b : backends)
+            text += fmt::format(" {} |", figures.count({b, c.id}) != 0 ? figures[{b, c.id}] : "–");
         text += "\n";
     }
     return text;

@@ -13,7 +13,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 Outcome thrown(const std::string& message) {
     Outcome o;
@@ -30,7 +32,8 @@ CaseResult runCase(const Case& which, Context& context) {
     const Clock::time_point start = Clock::now();
     const std::uint64_t lacking = which.needs & ~context.backend().table->features;
     if (lacking != 0) {
-        context.notApplicable(which.title, fmt::format("the backend was built without {}", featureNames(lacking)));
+        context.notApplicable(which.title,
+                              fmt::format("the backend was built without {}", featureNames(lacking)));
     } else {
         try {
             which.run(context);
@@ -47,15 +50,17 @@ CaseResult runCase(const Case& which, Context& context) {
 }  // namespace
 
 std::size_t SuiteResult::count(Verdict verdict) const {
-    return static_cast<std::size_t>(std::count_if(cases.begin(), cases.end(), [&](const CaseResult& c) { return c.verdict == verdict; }));
+    return static_cast<std::size_t>(std::count_if(
+        cases.begin(), cases.end(), [&](const CaseResult& c) { return c.verdict == verdict; }));
 }
 
 bool SuiteResult::passed() const {
-    return cases.size() == asked && std::none_of(cases.begin(), cases.end(), [](const CaseResult& c) { return failed(c.verdict); });
+    return cases.size() == asked &&
+           std::none_of(cases.begin(), cases.end(), [](const CaseResult& c) { return failed(c.verdict); });
 }
 
-SuiteResult runCases(const LoadedBackend& backend, const IntegratorOptions& options, Level level, const std::vector<const Case*>& cases,
-                     const CaseShown& show, Watch& watch) {
+SuiteResult runCases(const LoadedBackend& backend, const IntegratorOptions& options, Level level,
+                     const std::vector<const Case*>& cases, const CaseShown& show, Watch& watch) {
     const Clock::time_point start = Clock::now();
     SuiteResult suite;
     suite.backend = backend.name;

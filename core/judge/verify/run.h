@@ -34,7 +34,7 @@ struct SuiteResult {
 using CaseShown = std::function<void(const Case& next, std::size_t index, const CaseResult* result)>;
 
 /// Runs the cases. A case whose backend throws fails; the others go on.
-SuiteResult runCases(const LoadedBackend& backend, const IntegratorOptions& options, Level level, const std::vector<const Case*>& cases,
-                     const CaseShown& show, Watch& watch);
+SuiteResult runCases(const LoadedBackend& backend, const IntegratorOptions& options, Level level,
+                     const std::vector<const Case*>& cases, const CaseShown& show, Watch& watch);
 
 }  // namespace crt::verify

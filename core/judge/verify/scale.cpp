@@ -1,12 +1,13 @@
-// Group B: scale and position. Lengths are normalised in double before anything is float (core/flatten.cpp), so where a scene lies and how large it is must
-// not show; what remains is the ratio of sizes within a scene.
+// Group B: scale and position. Lengths are normalised in double before anything is float (core/compile/flatten.cpp),
+// so where a scene lies and how large it is must not show; what remains is the ratio of sizes within a
+// scene.
 #include "judge/verify/probes.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
 
+#include "base/log.h"
 #include "compile/compile.h"
 #include "kernel/features.h"
-#include "base/log.h"
 
 #include <fmt/format.h>
 
@@ -18,13 +19,17 @@
 namespace crt::verify {
 namespace {
 
-constexpr std::uint32_t kNeeds = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_INDEPENDENT;
+constexpr std::uint32_t kNeeds =
+    CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_INDEPENDENT;
 
-/// Mean radiance of `changed` over that of `original`, for eight seeds: the same random numbers, so that only what differs is seen.
-std::vector<double> ratios(Context& context, const Scene& original, const Scene& changed, std::uint64_t count) {
+/// Mean radiance of `changed` over that of `original`, for eight seeds: the same random numbers, so that
+/// only what differs is seen.
+std::vector<double> ratios(Context& context, const Scene& original, const Scene& changed,
+                           std::uint64_t count) {
     std::vector<double> all;
     for (std::uint64_t seed = 1; seed <= 8; ++seed)
-        all.push_back(radiance(context.render(changed, {.samples = count, .seed = seed})) / radiance(context.render(original, {.samples = count, .seed = seed})));
+        all.push_back(radiance(context.render(changed, {.samples = count, .seed = seed})) /
+                      radiance(context.render(original, {.samples = count, .seed = seed})));
     return all;
 }
 
@@ -33,12 +38,15 @@ void powersOfTwo(Context& context) {
     cube.emitting = "ceiling";
     cube.integrator = "{max_depth: 5, roulette: false, nee: true}";
     cube.film = "{resolution: [16, 16]}";
-    const std::pair<const char*, Scene> scenes[] = {{"square light", context.scene(squareOverFloor(1))}, {"cube", context.scene(yaml(cube))}};
+    const std::pair<const char*, Scene> scenes[] = {{"square light", context.scene(squareOverFloor(1))},
+                                                    {"cube", context.scene(yaml(cube))}};
     for (const auto& [name, scene] : scenes) {
         const Film here = context.render(scene, samples(4));
         for (const int m : {-40, -20, -10, 10, 20, 40})
-            context.sameBits(fmt::format("{} times 2^{}", name, m), here, context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4)),
-                             "an absolute length survives somewhere: an epsilon, a smallest distance, a clamp");
+            context.sameBits(
+                fmt::format("{} times 2^{}", name, m), here,
+                context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4)),
+                "an absolute length survives somewhere: an epsilon, a smallest distance, a clamp");
     }
 }
 
@@ -46,7 +54,8 @@ void powersOfTen(Context& context) {
     const Scene scene = litRoom(24, 1);
     for (const int m : {-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6}) {
         if (!context.atLeast(Level::Merge) && m % 3 != 0) continue;
-        context.equivalent(fmt::format("lit room times 10^{}", m), ratios(context, scene, moved(scene, std::pow(10.0, m), {}), 16), 1, 0.001);
+        context.equivalent(fmt::format("lit room times 10^{}", m),
+                           ratios(context, scene, moved(scene, std::pow(10.0, m), {}), 16), 1, 0.001);
     }
 }
 
@@ -66,15 +75,21 @@ void embreesFarPlace(Context& context) {
     for (const Place& place : {kPlaces[1], kPlaces[2]})
         for (const Aim aim : {Aim::Vertex, Aim::Edge})
             rareFailures(context, fmt::format("rays at {}, {}", name(aim), place.name),
-                         collect(rays, [&](std::uint64_t seed) { return missesOfAimedRays(context, aim, place, 64, seed); }), 1e-6,
-                         "far from the origin edges are no longer shared: are coordinates rounded to float before the scene is moved to its centre?");
+                         collect(rays,
+                                 [&](std::uint64_t seed) {
+                                     return missesOfAimedRays(context, aim, place, 64, seed);
+                                 }),
+                         1e-6,
+                         "far from the origin edges are no longer shared: are coordinates rounded to float "
+                         "before the scene is moved to its centre?");
 }
 
 /// What single precision cannot resolve is said, not passed over in silence.
 void warned(Context& context, const std::string& what, const Scene& scene) {
     const int before = warningCount();
     compileScene(scene, 0);
-    context.holds(what, warningCount() > before, "a warning at load", "geometry that cannot be resolved is rendered without a word");
+    context.holds(what, warningCount() > before, "a warning at load",
+                  "geometry that cannot be resolved is rendered without a word");
 }
 
 /// A screw of 10⁻³ on the ground, under a lamp, in a world of 10⁶: the ground's mesh gets finer towards it.
@@ -83,7 +98,10 @@ Scene screwOnGround(bool whole_world, bool one_quad = false) {
     scene.integrator.nee = true;
     scene.integrator.max_depth = 1;
     Mesh ground;
-    const auto ring = [](double half) { return std::array<Vec3d, 4>{{{-half, 0, -half}, {-half, 0, half}, {half, 0, half}, {half, 0, -half}}}; };
+    const auto ring = [](double half) {
+        return std::array<Vec3d, 4>{
+            {{-half, 0, -half}, {-half, 0, half}, {half, 0, half}, {half, 0, -half}}};
+    };
     const auto inner = ring(one_quad ? 1e6 : 4e-3);
     addQuad(ground, inner[0], inner[1], inner[2], inner[3]);
     if (whole_world && !one_quad)
@@ -105,16 +123,21 @@ void mixedScale(Context& context) {
     std::vector<double> all;
     const Scene patch = screwOnGround(false), world = screwOnGround(true);
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-        const Film a = context.render(patch, {.samples = 64, .seed = seed}), b = context.render(world, {.samples = 64, .seed = seed});
+        const Film a = context.render(patch, {.samples = 64, .seed = seed}),
+                   b = context.render(world, {.samples = 64, .seed = seed});
         all.push_back(radiance(b) / radiance(a));
         if (seed > 1) continue;
         // A shadow that came off its screw would show in the pixels at its foot.
         double worst = 0;
         for (std::uint32_t y = 0; y < 24; ++y)
             for (std::uint32_t x = 0; x < 24; ++x)
-                worst = fartherFrom(0, worst, std::abs(radiance(b, x, y) - radiance(a, x, y)) / std::max(radiance(a, x, y), 0.01));
+                worst = fartherFrom(
+                    0, worst,
+                    std::abs(radiance(b, x, y) - radiance(a, x, y)) / std::max(radiance(a, x, y), 0.01));
         context.absolute("any pixel, with the same random numbers", worst, 0, 0.05,
-                         {{1, "the shadow is detached from the object, or lost: is the ray's offset that of the largest triangle?"}});
+                         {{1,
+                           "the shadow is detached from the object, or lost: is the ray's offset that of "
+                           "the largest triangle?"}});
     }
     context.equivalent("screw of 1e-3 on a ground of 1e6, against the screw alone", all, 1, 0.005);
     warned(context, "the ground as one quad of 2e6", screwOnGround(true, true));
@@ -122,11 +145,15 @@ void mixedScale(Context& context) {
 
 void layers(Context& context) {
     const std::uint64_t rays = context.byLevel(40000, 800000, 800000);
-    // Below 6e-6 of their size layers of a scene of that size begin to be skipped: docs/results/stability-offset-tightness.md.
+    // Below 6e-6 of their size layers of a scene of that size begin to be skipped:
+    // docs/results/stability-offset-tightness.md.
     for (const double gap : {1e-3, 1e-4, 1e-5, 8e-6})
-        rareFailures(context, fmt::format("layers {:g} of their size apart", gap),
-                     collect(rays, [&](std::uint64_t seed) { return skippedLayers(context, 1, gap, 1, 64, seed); }), 1e-5,
-                     "rays step over what is just in front: the offset by which they leave a surface is larger than its rounding asks for");
+        rareFailures(
+            context, fmt::format("layers {:g} of their size apart", gap),
+            collect(rays, [&](std::uint64_t seed) { return skippedLayers(context, 1, gap, 1, 64, seed); }),
+            1e-5,
+            "rays step over what is just in front: the offset by which they leave a surface is larger than "
+            "its rounding asks for");
     for (const double gap : {3e-6, 1.5e-6}) {
         Scene scene = emptyScene(4, 1, {0, 0, -3}, {0, 0, 0}, 0.3);
         for (const double z : {0.0, gap}) {
@@ -146,14 +173,18 @@ film: {{resolution: [4, 4]}}
 integrator: {{max_depth: 1, roulette: false}}
 materials: {{floor: {{type: diffuse, reflectance: 0.5}}, lamp: {{type: diffuse, reflectance: 0}}}}
 objects:
-  - {{name: floor, mesh: {{positions: [[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]], faces: [[0,1,2,3]]}}, material: floor}}
-  - {{name: lamp, mesh: {{positions: [[-{0},9,-{0}],[{0},9,-{0}],[0,9,{0}]], faces: [[0,1,2]]}}, material: lamp, emission: {{radiance: 1}}}}
+  - {{name: floor, mesh: {{positions: [[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]], faces: [[0,1,2,3]]}},
+      material: floor}}
+  - {{name: lamp, mesh: {{positions: [[-{0},9,-{0}],[{0},9,-{0}],[0,9,{0}]], faces: [[0,1,2]]}},
+      material: lamp, emission: {{radiance: 1}}}}
 )",
                            half);
     };
-    const double factor = polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{-1e7, 9, -1e7}, {1e7, 9, -1e7}, {0, 9, 1e7}});
+    const double factor =
+        polygonFormFactor({0, 0, 0}, {0, 1, 0}, {{-1e7, 9, -1e7}, {1e7, 9, -1e7}, {0, 9, 1e7}});
     context.estimate("irradiance 9 below a triangle of 2e7", scene("1e7"), meanRadiance, 0.5 * factor, 0.003,
-                     {.samples = 256, .most = 16384}, {{0, "the emitter is taken for an occluder of its own light, or never sampled"}});
+                     {.samples = 256, .most = 16384},
+                     {{0, "the emitter is taken for an occluder of its own light, or never sampled"}});
     // pbrt-v4's issue 249. The height of 9 is lost in the rounding of coordinates of 1e9.
     warned(context, "9 below a triangle of 2e9", context.scene(scene("1e9")));
 }
@@ -169,15 +200,18 @@ void sizesOfASquare(Context& context) {
         Scene white = scene;
         white.materials[0] = diffuse(1);
         const double sky = radiance(context.render(white, samples(4)));
-        context.relative(fmt::format("square of {:g} under an even sky", size), radiance(context.render(scene, samples(4))) / sky, 0.5, 1e-5,
-                         {{0, "no ray reaches the square: an overflow, an underflow, or a largest or smallest length"}});
+        context.relative(
+            fmt::format("square of {:g} under an even sky", size),
+            radiance(context.render(scene, samples(4))) / sky, 0.5, 1e-5,
+            {{0, "no ray reaches the square: an overflow, an underflow, or a largest or smallest length"}});
     }
 }
 
 void extremeCoordinates(Context& context) {
     const Scene scene = litRoom(16, 1);
     const Film here = context.render(scene, samples(4));
-    // Embree takes coordinates of 1.844e18 and more for invalid; squares of lengths leave float at 1e19, double at 1e154.
+    // Embree takes coordinates of 1.844e18 and more for invalid; squares of lengths leave float at 1e19,
+    // double at 1e154.
     for (const int m : {61, 100, 300, 480})
         context.sameBits(fmt::format("lit room times 2^{}, {:.3g}", m, std::ldexp(1.0, m)), here,
                          context.render(moved(scene, std::ldexp(1.0, m), {}), samples(4)),
@@ -219,14 +253,16 @@ std::vector<Case> scaleCases() {
          .name = "far-away",
          .title = "A lit room moved along (1, 0.7, −0.3) by up to 1e8 of its size",
          .expected = "the same mean radiance, with the same random numbers",
-         .source = "radiance does not depend on the origin; representable shifts, which give the same bits, are M02",
+         .source = "radiance does not depend on the origin; representable shifts, which give the same bits, "
+                   "are M02",
          .tolerance = "± 0.1 %",
          .level = Level::Commit,
          .needs = kNeeds,
          .run = farAway},
         {.id = "B04",
          .name = "embrees-far-place",
-         .title = "D01's rays at vertices and edges at (148376, 1234, −223423), alone and in a scene as large as that",
+         .title = "D01's rays at vertices and edges at (148376, 1234, −223423), alone and in a scene as "
+                  "large as that",
          .expected = "no ray slips through a closed mesh",
          .source = "topology; the place is that of Embree's own watertightness tests",
          .tolerance = "rate of misses ≤ 1e-6",

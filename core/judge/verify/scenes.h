@@ -1,4 +1,5 @@
-/// Scenes that many cases share, as YAML, so that a case can be copied out and rendered by hand (`crt verify -o DIR` keeps them).
+/// Scenes that many cases share, as YAML, so that a case can be copied out and rendered by hand (`crt verify
+/// -o DIR` keeps them).
 #pragma once
 
 #include <array>
@@ -10,7 +11,7 @@ namespace crt::verify {
 /// Unit cube seen from inside, each wall a quad facing inwards, all of one reflectance.
 struct Cube {
     std::string reflectance = "0.5";          ///< A spectrum.
-    std::string emitting = "all";             ///< Wall that emits, or all: floor, ceiling, left, right, back, front.
+    std::string emitting = "all";  ///< Wall that emits, or all: floor, ceiling, left, right, back, front.
     std::string radiance = "1";               ///< A spectrum.
     std::string camera = "{position: [0.3, 0.4, 0.2], target: [0.6, 0.5, 0.9], fov: 80}";
     std::string integrator = "{max_depth: 8, roulette: false, nee: false}";
@@ -22,7 +23,8 @@ std::string yaml(const Cube& cube);
 /// One scattering event: direct light.
 inline constexpr const char* kDirect = "{max_depth: 1, roulette: false}";
 
-/// A square light of side 1 at height 1 over a large Lambertian floor of reflectance 1, seen through a needle's eye at (x, 0, 0).
+/// A square light of side 1 at height 1 over a large Lambertian floor of reflectance 1, seen through a
+/// needle's eye at (x, 0, 0).
 std::string squareOverFloor(double x, const std::string& integrator = kDirect, double half_side = 0.5,
                             const std::string& radiance = "1");
 
@@ -36,10 +38,12 @@ public:
     Stage& set(const std::string& key, const std::string& value);
     /// As "glass", "{type: dielectric, ior: 1.5}".
     Stage& material(const std::string& name, const std::string& definition);
-    /// Four corners, counter-clockwise seen from the front. `radiance` empty: no light; "…, two_sided: true" is possible.
-    Stage& quad(const std::string& name, const std::string& corners, const std::string& material, const std::string& radiance = "");
-    Stage& mesh(const std::string& name, const std::string& positions, const std::string& faces, const std::string& material,
+    /// Four corners, counter-clockwise seen from the front. `radiance` empty: no light; "…, two_sided: true"
+    /// is possible.
+    Stage& quad(const std::string& name, const std::string& corners, const std::string& material,
                 const std::string& radiance = "");
+    Stage& mesh(const std::string& name, const std::string& positions, const std::string& faces,
+                const std::string& material, const std::string& radiance = "");
     /// Axis-parallel box with outward normals.
     Stage& box(const std::string& name, const Point& lower, const Point& upper, const std::string& material);
     std::string yaml() const;
@@ -51,8 +55,10 @@ private:
 
 /// Needle's eyes on the cube's walls, for probes at a point.
 inline constexpr const char* kFloorCentre = "{position: [0.5, 0.5, 0.1], target: [0.5, 0, 0.5], fov: 0.01}";
-inline constexpr const char* kFloorQuarter = "{position: [0.5, 0.5, 0.5], target: [0.25, 0, 0.25], fov: 0.01}";
+inline constexpr const char* kFloorQuarter =
+    "{position: [0.5, 0.5, 0.5], target: [0.25, 0, 0.25], fov: 0.01}";
 inline constexpr const char* kWallCentre = "{position: [0.5, 0.4, 0.2], target: [0, 0.5, 0.5], fov: 0.01}";
-inline constexpr const char* kCeilingCentre = "{position: [0.4, 0.2, 0.2], target: [0.5, 1, 0.5], fov: 0.01}";
+inline constexpr const char* kCeilingCentre =
+    "{position: [0.4, 0.2, 0.2], target: [0.5, 1, 0.5], fov: 0.01}";
 
 }  // namespace crt::verify

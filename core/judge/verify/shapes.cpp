@@ -11,7 +11,9 @@
 namespace crt::verify {
 
 Vec3d unit(const Vec3d& a) { return a * (1 / length(a)); }
-Vec3d roundToFloat(const Vec3d& a) { return {static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2])}; }
+Vec3d roundToFloat(const Vec3d& a) {
+    return {static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2])};
+}
 
 Vec3d Dice::direction() {
     const double z = uniform(-1, 1), phi = uniform(0, 2 * std::numbers::pi), r = std::sqrt(1 - z * z);
@@ -34,8 +36,10 @@ void addQuad(Mesh& mesh, const Vec3d& a, const Vec3d& b, const Vec3d& c, const V
 Mesh boxMesh(const Vec3d& lower, const Vec3d& upper, bool inwards) {
     Mesh mesh;
     for (unsigned corner = 0; corner < 8; ++corner)
-        mesh.positions.push_back({corner & 1 ? upper[0] : lower[0], corner & 2 ? upper[1] : lower[1], corner & 4 ? upper[2] : lower[2]});
-    constexpr std::uint32_t kFaces[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+        mesh.positions.push_back({corner & 1 ? upper[0] : lower[0], corner & 2 ? upper[1] : lower[1],
+                                  corner & 4 ? upper[2] : lower[2]});
+    constexpr std::uint32_t kFaces[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                            {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
     for (const auto& f : kFaces) {
         mesh.triangles.push_back({f[0], f[inwards ? 2 : 1], f[inwards ? 1 : 2]});
         mesh.triangles.push_back({f[0], f[inwards ? 3 : 2], f[inwards ? 2 : 3]});
@@ -47,14 +51,16 @@ Mesh icosphere(int level, double radius, const Vec3d& centre) {
     const double g = std::numbers::phi;
     std::vector<Vec3d> points{{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
                               {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
-    std::vector<std::array<std::uint32_t, 3>> faces{{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                                                    {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
-                                                    {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
+    std::vector<std::array<std::uint32_t, 3>> faces{
+        {0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+        {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+        {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
     for (Vec3d& p : points) p = unit(p);
     for (; level > 0; --level) {
         std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
         const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-            const auto [where, is_new] = middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(points.size()));
+            const auto [where, is_new] =
+                middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(points.size()));
             if (is_new) points.push_back(unit(points[a] + points[b]));
             return where->second;
         };
@@ -125,7 +131,8 @@ void addAnchors(Scene& scene, const Vec3d& centre, double half) {
     addObject(scene, std::move(mesh), diffuse(0));
 }
 
-Scene emptyScene(int resolution, std::uint64_t seed, const Vec3d& eye, const Vec3d& target, double tan_half_fov) {
+Scene emptyScene(int resolution, std::uint64_t seed, const Vec3d& eye, const Vec3d& target,
+                 double tan_half_fov) {
     Scene scene;
     scene.camera.position = eye;
     scene.camera.target = target;
@@ -151,7 +158,8 @@ Scene litRoom(int resolution, std::uint64_t seed) {
     addObject(scene, boxMesh({0.25, 0, 0.25}, {0.5, 0.375, 0.5}), mirror(0.75));
     addObject(scene, boxMesh({0.625, 0.25, 0.5}, {0.75, 0.5, 0.6875}), diffuse(0.75));
     Mesh lamp;
-    addQuad(lamp, {0.375, 0.9375, 0.375}, {0.625, 0.9375, 0.375}, {0.625, 0.9375, 0.625}, {0.375, 0.9375, 0.625});
+    addQuad(lamp, {0.375, 0.9375, 0.375}, {0.625, 0.9375, 0.375}, {0.625, 0.9375, 0.625},
+            {0.375, 0.9375, 0.625});
     addObject(scene, std::move(lamp), diffuse(0), 8);
     return scene;
 }

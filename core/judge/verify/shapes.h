@@ -1,8 +1,9 @@
-/// Geometry and scenes for the verification cases, made in memory: what they are must not depend on a file or on a reader.
+/// Geometry and scenes for the verification cases, made in memory: what they are must not depend on a file
+/// or on a reader.
 #pragma once
 
-#include "scene/scene.h"
 #include "base/vec3d.h"
+#include "scene/scene.h"
 
 #include <cstdint>
 #include <random>
@@ -45,17 +46,21 @@ Material mirror(double reflectance);
 Material glass(double index);
 
 /// Adds a mesh as an object of its own. `radiance` 0: it does not emit. Returns the object's index.
-std::size_t addObject(Scene& scene, Mesh mesh, Material material, double radiance = 0, bool two_sided = false);
+std::size_t addObject(Scene& scene, Mesh mesh, Material material, double radiance = 0,
+                      bool two_sided = false);
 
-/// Two triangles, 2⁻²⁰ of it in size, that hold the scene's bounding box at centre ± half on every axis, so that its normalisation is known whatever
-/// else is in it. Add them last: they are then the scene's last two primitives.
+/// Two triangles, 2⁻²⁰ of it in size, that hold the scene's bounding box at centre ± half on every axis, so
+/// that its normalisation is known whatever else is in it. Add them last: they are then the scene's last two
+/// primitives.
 void addAnchors(Scene& scene, const Vec3d& centre, double half);
 
-/// An empty scene: square film, independent sampler, paths without roulette or light sampling, BVH. The camera is a pinhole at `eye`.
-Scene emptyScene(int resolution, std::uint64_t seed, const Vec3d& eye, const Vec3d& target, double tan_half_fov);
+/// An empty scene: square film, independent sampler, paths without roulette or light sampling, BVH. The
+/// camera is a pinhole at `eye`.
+Scene emptyScene(int resolution, std::uint64_t seed, const Vec3d& eye, const Vec3d& target,
+                 double tan_half_fov);
 
-/// A room, open towards the camera, with a lamp, a mirror block and a diffuse one: light sampling, scattering and tracing all take part. Coordinates are
-/// multiples of 2⁻⁴, and at most 1.
+/// A room, open towards the camera, with a lamp, a mirror block and a diffuse one: light sampling,
+/// scattering and tracing all take part. Coordinates are multiples of 2⁻⁴, and at most 1.
 Scene litRoom(int resolution, std::uint64_t seed);
 
 /// The scene times `scale`, then moved by `shift`. Its objects must be placed without transforms.

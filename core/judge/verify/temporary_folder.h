@@ -20,14 +20,17 @@ class TemporaryFolder {
 public:
     /// Throws crt::Error(Output) when `parent` takes no folder.
     explicit TemporaryFolder(const std::filesystem::path& parent = std::filesystem::temp_directory_path()) {
-        std::string pattern = (parent / ("crt-" + std::string(6, 'X'))).string();  // mkdtemp puts its own six letters for the last six.
+        std::string pattern = (parent / ("crt-" + std::string(6, 'X')))
+                                  .string();  // mkdtemp puts its own six letters for the last six.
         if (::mkdtemp(pattern.data()) == nullptr)
-            throw Error(ErrorKind::Output, fmt::format("cannot make a folder in '{}': {}", parent.string(), std::strerror(errno)));
+            throw Error(ErrorKind::Output, fmt::format("cannot make a folder in '{}': {}", parent.string(),
+                                                       std::strerror(errno)));
         path_ = pattern;
     }
     ~TemporaryFolder() {
         std::error_code ignored;
-        std::filesystem::permissions(path_, std::filesystem::perms::owner_all, ignored);  // Some tests take them away.
+        std::filesystem::permissions(path_, std::filesystem::perms::owner_all,
+                                     ignored);  // Some tests take them away.
         std::filesystem::remove_all(path_, ignored);
     }
     TemporaryFolder(const TemporaryFolder&) = delete;
@@ -43,7 +46,8 @@ public:
     }
     /// Files and folders right in it.
     std::size_t fileCount() const {
-        return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), std::filesystem::directory_iterator()));
+        return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_),
+                                                      std::filesystem::directory_iterator()));
     }
 
 private:

@@ -1,7 +1,7 @@
 #include "judge/verify/variants.h"
 
-#include "kernel/path.h"
 #include "judge/verify/shapes.h"
+#include "kernel/path.h"
 
 #include <utility>
 
@@ -78,7 +78,8 @@ void forEachVariant(Context& context, int resolution, void (*ask)(Context&, cons
         if ((v.needs & ~context.backend().table->features) == 0)
             ask(context, v);
         else
-            context.notApplicable(v.name, "the backend was built without " + featureNames(v.needs & ~context.backend().table->features));
+            context.notApplicable(v.name, "the backend was built without " +
+                                              featureNames(v.needs & ~context.backend().table->features));
     }
 }
 
@@ -91,9 +92,10 @@ Film portableFilm(const Scene& scene, const Render& how) {
     for (std::uint32_t y = 0; y < compiled.height; ++y)
         for (std::uint32_t x = 0; x < compiled.width; ++x) {
             kernel::CrtRayCount rays{};
-            kernel::crt_render_pixel(&context, x, y, how.first_sample, static_cast<std::uint32_t>(how.samples), film.sums.data(),
-                                     reinterpret_cast<kernel::u64*>(film.counts.data()), film.primitives.empty() ? nullptr : film.primitives.data(),
-                                     &rays);
+            kernel::crt_render_pixel(&context, x, y, how.first_sample,
+                                     static_cast<std::uint32_t>(how.samples), film.sums.data(),
+                                     reinterpret_cast<kernel::u64*>(film.counts.data()),
+                                     film.primitives.empty() ? nullptr : film.primitives.data(), &rays);
         }
     return film;
 }

@@ -1,4 +1,5 @@
-/// Scenes that between them need everything the kernel has, for relations that hold of every scene; and the kernel as this program holds it.
+/// Scenes that between them need everything the kernel has, for relations that hold of every scene; and the
+/// kernel as this program holds it.
 #pragma once
 
 #include "compile/compile.h"
@@ -15,7 +16,8 @@ struct Variant {
     std::uint64_t needs = 0;  ///< Features.
 };
 
-/// Rooms with a lamp, a conductor, a mirror, glass, dispersive glass with smooth normals and a sky: every sampler, accelerator, filter and view once.
+/// Rooms with a lamp, a conductor, a mirror, glass, dispersive glass with smooth normals and a sky: every
+/// sampler, accelerator, filter and view once.
 std::vector<Variant> variants(int resolution);
 
 /// Asks of every variant that the backend has the features for.

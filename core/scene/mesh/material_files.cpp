@@ -121,7 +121,8 @@ private:
     /// no such file. Names with blanks are longer than they look, so the longest that is there wins.
     std::size_t wordsOfOneName(const std::vector<std::string_view>& words, std::size_t first, int line) {
         constexpr std::size_t kMostWords = 12;
-        const std::size_t most = sameLetters(fs::path(words[first]).extension().string(), ".mtl") ? 1 : kMostWords;
+        const std::size_t most =
+            sameLetters(fs::path(words[first]).extension().string(), ".mtl") ? 1 : kMostWords;
         for (std::size_t count = std::min(words.size() - first, most); count > 0; --count) {
             const char* end = words[first + count - 1].data() + words[first + count - 1].size();
             const std::string name(
@@ -139,7 +140,8 @@ private:
         if (isFile(folder_ / name)) return folder_ / name;
         std::string slashed = name;
         // As tinyobjloader and its users write a blank.
-        for (std::size_t at = 0; (at = slashed.find("\\ ", at)) != std::string::npos; ++at) slashed.erase(at, 1);
+        for (std::size_t at = 0; (at = slashed.find("\\ ", at)) != std::string::npos; ++at)
+            slashed.erase(at, 1);
         if (isFile(folder_ / slashed)) return folder_ / slashed;
         std::replace(slashed.begin(), slashed.end(), '\\', '/');
         if (isFile(folder_ / slashed)) return folder_ / slashed;

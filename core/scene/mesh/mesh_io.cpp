@@ -3,13 +3,13 @@
 #include "base/error.h"
 #include "base/input_file.h"
 #include "base/log.h"
+#include "base/stage.h"
+#include "base/vec3d.h"
 #include "scene/mesh/material_files.h"
 #include "scene/mesh/mesh_format.h"
 #include "scene/mesh/obj_reader.h"
 #include "scene/mesh/obj_text.h"
-#include "base/stage.h"
 #include "scene/mesh/triangulate.h"
-#include "base/vec3d.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -238,13 +238,14 @@ private:
             constexpr std::size_t kMostNamed = 6;
             const std::size_t more = undefined.size() > kMostNamed ? undefined.size() - kMostNamed : 0;
             undefined.resize(undefined.size() - more);
-            logWarning("{}: material{} {}{} not defined{}: {} of {} have none of their own", path_,
-                       undefined.size() + more == 1 ? "" : "s", fmt::join(undefined, ", "),
-                       more > 0                ? fmt::format(" and {} more are", more)
-                       : undefined.size() == 1 ? " is"
-                                               : " are",
-                       files_.missing.empty() ? "" : fmt::format(", and no file {} is there", missingFiles()),
-                       bare, counted(out_.mesh.triangles.size(), "triangle"));
+            logWarning(
+                "{}: material{} {}{} not defined{}: {} of {} have none of their own", path_,
+                undefined.size() + more == 1 ? "" : "s", fmt::join(undefined, ", "),
+                more > 0                ? fmt::format(" and {} more are", more)
+                : undefined.size() == 1 ? " is"
+                                        : " are",
+                files_.missing.empty() ? "" : fmt::format(", and no file {} is there", missingFiles()), bare,
+                counted(out_.mesh.triangles.size(), "triangle"));
         } else if (!files_.missing.empty()) {
             logWarning("{}: no material file {} is there", path_, missingFiles());
         }

@@ -54,7 +54,8 @@ private:
 ///
 ///  1. Ni above 1, and light passes (d < 1, or Tr > 0 without d; a Tf that is neither black nor white;
 ///     illum 4, 6, 7 or 9): Dielectric, smooth and clear.
-///  2. Pm ≥ 0.5: Mirror with reflectance Kd. illum 3 or 5 with Kd ≤ 0.1 and a Ks: Mirror with reflectance Ks.
+///  2. Pm ≥ 0.5: Mirror with reflectance Kd. illum 3 or 5 with Kd ≤ 0.1 and a Ks: Mirror with reflectance
+///  Ks.
 ///  3. Diffuse with reflectance Kd.
 ///
 /// A statement that cannot be read is as if it were left out. Adds what was decided and lost to `summary`.

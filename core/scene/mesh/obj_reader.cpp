@@ -69,10 +69,10 @@ private:
                 number = *value;
                 continue;
             }
-            loss.add(lines_.number(),
-                     field.empty() ? fmt::format("{} needs three numbers", what)
-                     : value       ? fmt::format("the numbers of {} must be finite, found {}", what, inQuotes(field))
-                                   : fmt::format("expected a number, found {}", inQuotes(field)));
+            loss.add(lines_.number(), field.empty() ? fmt::format("{} needs three numbers", what)
+                                      : value ? fmt::format("the numbers of {} must be finite, found {}",
+                                                            what, inQuotes(field))
+                                              : fmt::format("expected a number, found {}", inQuotes(field)));
             return {kNan, kNan, kNan};
         }
         return v;

@@ -2,8 +2,8 @@
 /// are checked by whoever puts the mesh together.
 #pragma once
 
-#include "spectra/spectra.h"
 #include "base/stage.h"
+#include "spectra/spectra.h"
 
 #include <cstdint>
 #include <string>

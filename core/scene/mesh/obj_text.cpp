@@ -35,7 +35,8 @@ std::string fromUtf16(std::string_view text) {
 
 }  // namespace
 
-std::string readTextFile(const std::string& path, const char* kind, std::uint64_t most_bytes, const SourcePlace& named_at) {
+std::string readTextFile(const std::string& path, const char* kind, std::uint64_t most_bytes,
+                         const SourcePlace& named_at) {
     try {
         std::string text = readInput(path, most_bytes);
         return text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF") ? fromUtf16(text) : text;
@@ -61,7 +62,8 @@ std::string_view trimmed(std::string_view text) {
 
 std::string inQuotes(std::string_view name) {
     constexpr std::size_t kLongest = 120;
-    return name.size() <= kLongest ? fmt::format("'{}'", name) : fmt::format("'{}…'", name.substr(0, kLongest));
+    return name.size() <= kLongest ? fmt::format("'{}'", name)
+                                   : fmt::format("'{}…'", name.substr(0, kLongest));
 }
 
 std::optional<double> numberOf(std::string_view field) {

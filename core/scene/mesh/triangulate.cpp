@@ -18,7 +18,8 @@ double turnOf(const PointTree::Point& a, const PointTree::Point& b, const PointT
 
 }  // namespace
 
-// ---- Points ----------------------------------------------------------------------------------------------------------
+// ---- Points
+// ----------------------------------------------------------------------------------------------------------
 
 void PointTree::build(std::span<const Point> points) {
     points_ = points;
@@ -96,14 +97,16 @@ bool PointTree::anyInside(std::uint32_t a, std::uint32_t b, std::uint32_t c) con
         for (std::uint32_t i = node.first; i < node.first + node.left; ++i) {
             const Point& p = points_[order_[i]];
             if (p == triangle[0] || p == triangle[1] || p == triangle[2]) continue;
-            if (turnOf(triangle[0], triangle[1], p) >= 0.0 && turnOf(triangle[1], triangle[2], p) >= 0.0 && turnOf(triangle[2], triangle[0], p) >= 0.0)
+            if (turnOf(triangle[0], triangle[1], p) >= 0.0 && turnOf(triangle[1], triangle[2], p) >= 0.0 &&
+                turnOf(triangle[2], triangle[0], p) >= 0.0)
                 return true;
         }
     }
     return false;
 }
 
-// ---- Polygons --------------------------------------------------------------------------------------------------------
+// ---- Polygons
+// --------------------------------------------------------------------------------------------------------
 
 const std::vector<PolygonTriangle>& Triangulator::split(std::span<const Vec3d> corners) {
     triangles_.clear();
@@ -122,15 +125,18 @@ const std::vector<PolygonTriangle>& Triangulator::split(std::span<const Vec3d> c
         cutEars();
         if (ring_.size() > 3) ++crossing_;
     }
-    for (std::size_t i = 1; i + 1 < ring_.size(); ++i) triangles_.push_back({ring_[0], ring_[i], ring_[i + 1]});
+    for (std::size_t i = 1; i + 1 < ring_.size(); ++i)
+        triangles_.push_back({ring_[0], ring_[i], ring_[i + 1]});
     return triangles_;
 }
 
 /// Into the coordinate plane the polygon faces most, counter-clockwise.
 void Triangulator::project(std::span<const Vec3d> corners) {
-    // Newell's normal, about the first corner: the same for flat and for warped polygons, and far from the origin.
+    // Newell's normal, about the first corner: the same for flat and for warped polygons, and far from the
+    // origin.
     Vec3d normal{};
-    for (std::size_t i = 1; i + 1 < corners.size(); ++i) normal = normal + cross(corners[i] - corners[0], corners[i + 1] - corners[0]);
+    for (std::size_t i = 1; i + 1 < corners.size(); ++i)
+        normal = normal + cross(corners[i] - corners[0], corners[i + 1] - corners[0]);
     int axis = 0;
     for (int k = 1; k < 3; ++k)
         if (std::abs(normal[k]) > std::abs(normal[axis])) axis = k;
@@ -143,7 +149,9 @@ void Triangulator::project(std::span<const Vec3d> corners) {
     }
 }
 
-double Triangulator::turn(std::uint32_t a, std::uint32_t b, std::uint32_t c) const { return turnOf(points_[a], points_[b], points_[c]); }
+double Triangulator::turn(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
+    return turnOf(points_[a], points_[b], points_[c]);
+}
 
 /// A corner that is turned left and whose triangle holds no other.
 bool Triangulator::isEar(std::uint32_t corner) const {
@@ -151,8 +159,8 @@ bool Triangulator::isEar(std::uint32_t corner) const {
     return turn(a, corner, c) > 0.0 && !tree_.anyInside(a, corner, c);
 }
 
-/// Cuts off what can be cut off, and leaves the rest in ring_. To cut an ear makes no ears but of its two neighbours (Meisters 1975), so each corner
-/// is asked once and then again after a cut beside it.
+/// Cuts off what can be cut off, and leaves the rest in ring_. To cut an ear makes no ears but of its two
+/// neighbours (Meisters 1975), so each corner is asked once and then again after a cut beside it.
 void Triangulator::cutEars() {
     const auto n = static_cast<std::uint32_t>(ring_.size());
     before_.resize(n);
@@ -163,7 +171,8 @@ void Triangulator::cutEars() {
     }
     tree_.build(points_);
 
-    // A neighbour of a cut goes to the end of the queue: ears are taken all around rather than one beside the other, which would make slivers.
+    // A neighbour of a cut goes to the end of the queue: ears are taken all around rather than one beside
+    // the other, which would make slivers.
     std::vector<std::uint32_t> turn_of(n, 0);  // Only the newest entry of a corner counts.
     std::deque<std::pair<std::uint32_t, std::uint32_t>> waiting;
     const auto ask = [&](std::uint32_t corner) { waiting.emplace_back(corner, ++turn_of[corner]); };

@@ -22,7 +22,8 @@ public:
     /// The points must stay where they are.
     void build(std::span<const Point> points);
     void remove(std::uint32_t point);
-    /// Whether one of those that are left lies in a triangle that is turned left, its edges included, and is none of its corners, by number or place.
+    /// Whether one of those that are left lies in a triangle that is turned left, its edges included, and is
+    /// none of its corners, by number or place.
     bool anyInside(std::uint32_t a, std::uint32_t b, std::uint32_t c) const;
 
 private:
@@ -41,12 +42,13 @@ private:
     mutable std::vector<std::uint32_t> open_;  ///< Of the walk, kept for its memory.
 };
 
-/// Splits polygons into triangles. Convex ones become a fan from their first corner, which keeps the diagonal of a quad
-/// predictable; the others lose one ear after the other, in O(n log n) for n corners unless they cross themselves. Keeps its memory from one
-/// polygon to the next.
+/// Splits polygons into triangles. Convex ones become a fan from their first corner, which keeps the
+/// diagonal of a quad predictable; the others lose one ear after the other, in O(n log n) for n corners
+/// unless they cross themselves. Keeps its memory from one polygon to the next.
 class Triangulator {
 public:
-    /// The n − 2 triangles of a polygon of n ≥ 3 corners; valid until the next call. A polygon that crosses itself is fanned and counted.
+    /// The n − 2 triangles of a polygon of n ≥ 3 corners; valid until the next call. A polygon that crosses
+    /// itself is fanned and counted.
     const std::vector<PolygonTriangle>& split(std::span<const Vec3d> corners);
 
     std::uint64_t crossingPolygons() const { return crossing_; }

@@ -1,4 +1,5 @@
-/// The schema told to people (docs/scene.md) and to editors (JSON Schema). Nothing here knows a key: it all comes from the table.
+/// The schema told to people (docs/scene.md) and to editors (JSON Schema). Nothing here knows a key: it all
+/// comes from the table.
 #include "scene/mesh/mtl_file.h"
 #include "scene/yaml/scene_schema.h"
 #include "scene/yaml/scene_yaml.h"
@@ -18,7 +19,8 @@ using Json = nlohmann::ordered_json;
 bool isFamily(std::string_view family) { return schemaVariants(family).size() > 1; }
 std::string familyOf(const SectionSchema& section) { return section.name.substr(0, section.name.find('/')); }
 
-// ---- JSON Schema -----------------------------------------------------------------------------------------------------
+// ---- JSON Schema
+// -----------------------------------------------------------------------------------------------------
 
 /// Definitions are named without '/', which JSON pointers would have to escape.
 std::string definitionName(const SectionSchema& section) {
@@ -38,13 +40,16 @@ Json jsonNumber(double value) {
 }
 
 void addRange(Json& schema, const ValueRange& range) {
-    if (std::isfinite(range.min)) schema[range.min_open ? "exclusiveMinimum" : "minimum"] = jsonNumber(range.min);
-    if (std::isfinite(range.max)) schema[range.max_open ? "exclusiveMaximum" : "maximum"] = jsonNumber(range.max);
+    if (std::isfinite(range.min))
+        schema[range.min_open ? "exclusiveMinimum" : "minimum"] = jsonNumber(range.min);
+    if (std::isfinite(range.max))
+        schema[range.max_open ? "exclusiveMaximum" : "maximum"] = jsonNumber(range.max);
 }
 
 Json familySchema(const std::string& family) {
     Json any = Json::array();
-    for (const SectionSchema* variant : schemaVariants(family)) any.push_back(reference(definitionName(*variant)));
+    for (const SectionSchema* variant : schemaVariants(family))
+        any.push_back(reference(definitionName(*variant)));
     if (any.size() == 1) return any.front();
     return {{"oneOf", std::move(any)}};
 }
@@ -62,7 +67,8 @@ Json valueSchema(const KeySchema& key) {
         case ValueKind::Text: return {{"type", "string"}, {"minLength", 1}};
         case ValueKind::Choice:
             schema["enum"] = key.choices;
-            if (!key.section.empty()) return {{"anyOf", Json::array({std::move(schema), familySchema(key.section)})}};
+            if (!key.section.empty())
+                return {{"anyOf", Json::array({std::move(schema), familySchema(key.section)})}};
             return schema;
         case ValueKind::Spectrum:
             schema["type"] = "number";
@@ -89,12 +95,16 @@ Json shapedSchema(const KeySchema& key) {
             Json list = listSchema(one, key.count_min, key.count_max);
             return {{"anyOf", Json::array({std::move(one), std::move(list)})}};
         }
-        case ValueShape::Lists: return listSchema(listSchema(std::move(one), key.count_min, key.count_max), 1, kUnbounded);
+        case ValueShape::Lists:
+            return listSchema(listSchema(std::move(one), key.count_min, key.count_max), 1, kUnbounded);
         case ValueShape::Map: {
             Json schema{{"type", "object"}, {"additionalProperties", std::move(one)}};
-            // A name that reads as a number would be one where it is used. Names in an MTL are never used that way.
+            // A name that reads as a number would be one where it is used. Names in an MTL are never used
+            // that way.
             if (key.kind != ValueKind::Text)
-                schema["propertyNames"] = {{"minLength", 1}, {"not", {{"pattern", R"(^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$)"}}}};
+                schema["propertyNames"] = {
+                    {"minLength", 1},
+                    {"not", {{"pattern", R"(^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$)"}}}};
             return schema;
         }
     }
@@ -149,12 +159,13 @@ Json sectionSchema(const SectionSchema& section) {
     return schema;
 }
 
-// ---- Markdown --------------------------------------------------------------------------------------------------------
+// ---- Markdown
+// --------------------------------------------------------------------------------------------------------
 
 /// What stands before the sections of the manual.
 constexpr std::string_view kIntroduction = R"(# Scene files
 
-<!-- Generated from the table in core/scene_schema.cpp. Change it there, then run
+<!-- Generated from the table in core/scene/yaml/scene_schema.cpp. Change it there, then run
      CRT_UPDATE_DOCS=1 unit_tests "docs/scene.md is what the schema says" -->
 
 A scene is one YAML file. The smallest says `crt: 1`; this one shows a floor under a lamp:
@@ -185,16 +196,20 @@ outputs:
 ## Rules
 
 - `crt: 1` comes first. Keys that are not in this manual are errors, and so are keys given twice.
-- Numbers are decimal: `0.5`, `1e3`, `-2`. Whole numbers may be written `1e3` or `3.0`. Leading zeros, hexadecimal, NaN and infinity
-  are refused. The only booleans are `true` and `false`. Text that looks like a number needs quotes.
-- Anchors and aliases work. Merge keys (`<<`), tags (`!!float`), cycles and several documents in one file are refused.
-- Relative file names are looked up beside the scene, then in the directories of `CRT_MESH_PATH` (separated by `:`), or, where that is not
-  set, in the meshes installed with crt. Names of outputs are relative to the working directory.
-- All errors of a file are reported at once, each with its line, and crt ends with code 3. Spectra and materials that nothing uses are warnings.
-- `--set film.resolution=[128,128]` or `--set objects.0.material=red` changes a value before the scene is checked. Lists go by
-  index, from 0.
-- Editors that know JSON Schema check scenes while you type: save `crt schema` as `crt-scene-1.schema.json` and begin the scene with
-  `# yaml-language-server: $schema=crt-scene-1.schema.json`.
+- Numbers are decimal: `0.5`, `1e3`, `-2`. Whole numbers may be written `1e3` or `3.0`. Leading zeros,
+  hexadecimal, NaN and infinity are refused. The only booleans are `true` and `false`. Text that looks like
+  a number needs quotes.
+- Anchors and aliases work. Merge keys (`<<`), tags (`!!float`), cycles and several documents in one file
+  are refused.
+- Relative file names are looked up beside the scene, then in the directories of `CRT_MESH_PATH` (separated
+  by `:`), or, where that is not set, in the meshes installed with crt. Names of outputs are relative to the
+  working directory.
+- All errors of a file are reported at once, each with its line, and crt ends with code 3. Spectra and
+  materials that nothing uses are warnings.
+- `--set film.resolution=[128,128]` or `--set objects.0.material=red` changes a value before the scene is
+  checked. Lists go by index, from 0.
+- Editors that know JSON Schema check scenes while you type: save `crt schema` as `crt-scene-1.schema.json`
+  and begin the scene with `# yaml-language-server: $schema=crt-scene-1.schema.json`.
 )";
 
 /// What stands before the variants of a family.
@@ -206,7 +221,8 @@ std::string_view familyIntroduction(std::string_view family) {
                "- a map of one of the forms below.\n";
     if (family == "material") return "What light does at a surface. `type` picks one of these.\n";
     if (family == "transform")
-        return "A placement is a list of steps, each a map with one key, applied in order: `[{scale: 2}, {rotate: {axis: [0, 1, 0], "
+        return "A placement is a list of steps, each a map with one key, applied in order: `[{scale: 2}, "
+               "{rotate: {axis: [0, 1, 0], "
                "angle_deg: 90}}, {translate: [0, 1, 0]}]`.\n";
     return {};
 }
@@ -235,13 +251,16 @@ std::string kindText(const KeySchema& key) {
 }
 
 std::string countText(const KeySchema& key) {
-    if (key.count_max == kUnbounded) return key.count_min > 0 ? fmt::format("{} or more", key.count_min) : std::string();
-    return key.count_min == key.count_max ? fmt::format("{}", key.count_min) : fmt::format("{} to {}", key.count_min, key.count_max);
+    if (key.count_max == kUnbounded)
+        return key.count_min > 0 ? fmt::format("{} or more", key.count_min) : std::string();
+    return key.count_min == key.count_max ? fmt::format("{}", key.count_min)
+                                          : fmt::format("{} to {}", key.count_min, key.count_max);
 }
 
 std::string typeText(const KeySchema& key) {
     const std::string one = kindText(key), count = countText(key);
-    const std::string list = count.empty() ? fmt::format("list of: {}", one) : fmt::format("list of {}: {}", count, one);
+    const std::string list =
+        count.empty() ? fmt::format("list of: {}", one) : fmt::format("list of {}: {}", count, one);
     switch (key.shape) {
         case ValueShape::One: return one;
         case ValueShape::List: return list;
@@ -256,9 +275,11 @@ std::string keyTable(const SectionSchema& section) {
     std::string text = "| Key | Value | Unit | Range | Default | |\n|---|---|---|---|---|---|\n";
     for (const KeySchema& key : section.keys) {
         const std::string range = key.range.text();
-        const std::string fallback = key.required ? "required" : key.fallback.empty() ? "–" : fmt::format("`{}`", key.fallback);
-        text += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", key.name, typeText(key), key.unit, range == "any" ? "" : range, fallback,
-                            key.doc);
+        const std::string fallback = key.required           ? "required"
+                                     : key.fallback.empty() ? "–"
+                                                            : fmt::format("`{}`", key.fallback);
+        text += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", key.name, typeText(key), key.unit,
+                            range == "any" ? "" : range, fallback, key.doc);
     }
     return text;
 }
@@ -290,9 +311,12 @@ std::string mtlTable() {
 
 std::string ruleText(const KeyRule& rule) {
     switch (rule.kind) {
-        case KeyRule::Kind::ExactlyOne: return fmt::format("Exactly one of `{}` is required.", fmt::join(rule.keys, "`, `"));
-        case KeyRule::Kind::AtMostOne: return fmt::format("`{}` exclude each other.", fmt::join(rule.keys, "` and `"));
-        case KeyRule::Kind::Together: return fmt::format("`{}` go together.", fmt::join(rule.keys, "` and `"));
+        case KeyRule::Kind::ExactlyOne:
+            return fmt::format("Exactly one of `{}` is required.", fmt::join(rule.keys, "`, `"));
+        case KeyRule::Kind::AtMostOne:
+            return fmt::format("`{}` exclude each other.", fmt::join(rule.keys, "` and `"));
+        case KeyRule::Kind::Together:
+            return fmt::format("`{}` go together.", fmt::join(rule.keys, "` and `"));
     }
     return {};
 }
@@ -309,7 +333,8 @@ std::string sceneJsonSchema() {
     spectrum["oneOf"].insert(spectrum["oneOf"].begin(), Json{{"type", "string"}, {"minLength", 1}});
     spectrum["description"] = "The name of an entry of spectra, or one of the forms of a spectrum.";
     definitions["spectrum"] = std::move(spectrum);
-    for (std::size_t i = 1; i < sections.size(); ++i) definitions[definitionName(sections[i])] = sectionSchema(sections[i]);
+    for (std::size_t i = 1; i < sections.size(); ++i)
+        definitions[definitionName(sections[i])] = sectionSchema(sections[i]);
     root["definitions"] = std::move(definitions);
     return root.dump(2) + "\n";
 }
@@ -320,9 +345,12 @@ std::string sceneReferenceMarkdown() {
     const SectionSchema& top = sceneSchema().front();
     for (const SectionSchema& section : sceneSchema()) {
         const std::string family = familyOf(section);
-        if (isFamily(family) && families_seen.insert(family).second) text += fmt::format("\n## {}\n\n{}", family, familyIntroduction(family));
-        const bool chapter = section.name.empty() || top.find(section.name) != nullptr || section.name == "object" || section.name == "output";
-        text += fmt::format("\n{} {}\n\n", chapter ? "##" : "###", section.name.empty() ? "Top level" : headingOf(section));
+        if (isFamily(family) && families_seen.insert(family).second)
+            text += fmt::format("\n## {}\n\n{}", family, familyIntroduction(family));
+        const bool chapter = section.name.empty() || top.find(section.name) != nullptr ||
+                             section.name == "object" || section.name == "output";
+        text += fmt::format("\n{} {}\n\n", chapter ? "##" : "###",
+                            section.name.empty() ? "Top level" : headingOf(section));
         if (!section.doc.empty()) text += section.doc + "\n\n";
         text += keyTable(section);
         for (const KeyRule& rule : section.rules) text += fmt::format("\n{}\n", ruleText(rule));

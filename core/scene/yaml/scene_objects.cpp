@@ -21,7 +21,9 @@ Matrix4d multiply(const Matrix4d& a, const Matrix4d& b) {
 }
 
 bool isZero(const Vec3d& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
-bool allFinite(const Matrix4d& m) { return std::all_of(m.begin(), m.end(), [](double v) { return std::isfinite(v); }); }
+bool allFinite(const Matrix4d& m) {
+    return std::all_of(m.begin(), m.end(), [](double v) { return std::isfinite(v); });
+}
 
 /// Sine of an angle in degrees, exact at multiples of 90°: a box turned by a quarter stays a box.
 double sineOfDegrees(double degrees) {
@@ -30,7 +32,9 @@ double sineOfDegrees(double degrees) {
     if (std::abs(turn) == 90) return std::copysign(1.0, turn);
     return std::sin(turn * (std::numbers::pi / 180));
 }
-double cosineOfDegrees(double degrees) { return sineOfDegrees(90 - std::abs(std::remainder(degrees, 360.0))); }
+double cosineOfDegrees(double degrees) {
+    return sineOfDegrees(90 - std::abs(std::remainder(degrees, 360.0)));
+}
 
 /// Rodrigues' rotation about a unit axis.
 Matrix4d rotation(const Vec3d& a, double degrees) {
@@ -61,7 +65,8 @@ double relativeVolume(const Matrix4d& m) {
 }
 
 /// Triples in a list of lists.
-std::optional<std::vector<Vec3d>> readPoints(const SectionReader& mesh, std::string_view key, const char* one) {
+std::optional<std::vector<Vec3d>> readPoints(const SectionReader& mesh, std::string_view key,
+                                             const char* one) {
     const YamlNode* list = mesh.list(key);
     if (list == nullptr) return std::nullopt;
     const KeySchema& row = *mesh.schema().find(key);
@@ -93,7 +98,8 @@ void ObjectReader::requireRoom(const YamlPlace& place) {
     out_.throwIfFailed();
 }
 
-// ---- Materials -------------------------------------------------------------------------------------------------------
+// ---- Materials
+// -------------------------------------------------------------------------------------------------------
 
 void ObjectReader::readMaterials(const YamlNode& map) {
     for (const YamlEntry& entry : map.entries) readMaterial(entry);
@@ -104,7 +110,9 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
     named.place = entry.key_place;
     material_names_.push_back(entry.key);
     if (entry.key == "from_mtl" || entry.key.empty() || looksLikeNumber(entry.key)) {
-        out_.error(entry.key_place, fmt::format("'{}' cannot name a material: where it is used it would mean something else", entry.key));
+        out_.error(entry.key_place,
+                   fmt::format("'{}' cannot name a material: where it is used it would mean something else",
+                               entry.key));
         return;
     }
     const std::optional<SectionReader> section =
@@ -124,7 +132,8 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
     } else if (kind == "conductor") {
         material.type = MaterialType::Conductor;
         std::string metal;
-        if (section->readWord("metal", metal)) std::tie(material.eta, material.k) = metalIndex(metal).value();
+        if (section->readWord("metal", metal))
+            std::tie(material.eta, material.k) = metalIndex(metal).value();
         take("eta", SpectrumUse::Index, material.eta);
         take("k", SpectrumUse::Index, material.k);
     } else {
@@ -135,29 +144,35 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
     scene_.materials.push_back(std::move(material));
 }
 
-std::optional<std::int32_t> ObjectReader::findMaterial(const std::string& name, const YamlPlace& place, bool from_mtl_possible) {
+std::optional<std::int32_t> ObjectReader::findMaterial(const std::string& name, const YamlPlace& place,
+                                                       bool from_mtl_possible) {
     const auto found = materials_.find(name);
     if (found != materials_.end()) {
         found->second.used = true;
         if (found->second.index < 0) return std::nullopt;
         return found->second.index;
     }
-    std::vector<std::string> known = out_.worthSuggesting(material_names_.size()) ? material_names_ : std::vector<std::string>();
+    std::vector<std::string> known =
+        out_.worthSuggesting(material_names_.size()) ? material_names_ : std::vector<std::string>();
     if (from_mtl_possible) known.push_back("from_mtl");
-    out_.error(place, fmt::format("there is no material '{}'", name), out_.worthSuggesting(known.size()) ? didYouMean(name, known) : std::string());
+    out_.error(place, fmt::format("there is no material '{}'", name),
+               out_.worthSuggesting(known.size()) ? didYouMean(name, known) : std::string());
     return std::nullopt;
 }
 
 void ObjectReader::finish() const {
     UnusedNames unused("material", "materials");
     for (const std::string& name : material_names_)
-        if (const NamedMaterial& material = materials_.at(name); !material.used) unused.add(name, material.place);
+        if (const NamedMaterial& material = materials_.at(name); !material.used)
+            unused.add(name, material.place);
     unused.finish();
 }
 
-// ---- Placements ------------------------------------------------------------------------------------------------------
+// ---- Placements
+// ------------------------------------------------------------------------------------------------------
 
-std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const YamlPlace& place, const std::string& subject) {
+std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const YamlPlace& place,
+                                                    const std::string& subject) {
     if (list.kind != YamlKind::List) {
         expected(out_, place, "a list of steps such as {translate: [0, 1, 0]}", subject, list);
         return std::nullopt;
@@ -167,7 +182,8 @@ std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const 
     for (std::size_t i = 0; i < list.items.size(); ++i) {
         const YamlNode& item = *list.items[i];
         const std::size_t before = out_.count();
-        const std::optional<SectionReader> step = openVariant(out_, item, item.place, "transform", fmt::format("step {} of {}", i + 1, subject));
+        const std::optional<SectionReader> step =
+            openVariant(out_, item, item.place, "transform", fmt::format("step {} of {}", i + 1, subject));
         if (!step) {
             good = false;
             continue;
@@ -185,7 +201,8 @@ std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const 
             else if (double factor = 1; step->read("scale", factor))
                 by = {factor, factor, factor};
             m[0] = by[0], m[5] = by[1], m[10] = by[2];
-            if (by[0] == 0 || by[1] == 0 || by[2] == 0) step->error("scale", "a scale of 0 flattens the object to nothing");
+            if (by[0] == 0 || by[1] == 0 || by[2] == 0)
+                step->error("scale", "a scale of 0 flattens the object to nothing");
         } else if (kind == "rotate") {
             const std::optional<SectionReader> turn = step->section("rotate", "the rotation");
             Vec3d axis{0, 0, 1};
@@ -210,7 +227,8 @@ std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const 
         total = multiply(m, total);
     }
     if (good && !allFinite(total)) {
-        out_.error(place, fmt::format("{} overflows: its steps multiply to numbers beyond a double", subject));
+        out_.error(place,
+                   fmt::format("{} overflows: its steps multiply to numbers beyond a double", subject));
         good = false;
     }
     if (!good) return std::nullopt;
@@ -219,12 +237,15 @@ std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const 
 
 std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) {
     if (const YamlEntry* one = object.find("transform")) {
-        const std::optional<Matrix4d> m = readPlacement(*one->value, one->place, fmt::format("the transform of {}", object.subject()));
+        const std::optional<Matrix4d> m =
+            readPlacement(*one->value, one->place, fmt::format("the transform of {}", object.subject()));
         return {m.value_or(kIdentity4d)};
     }
     const YamlNode* list = object.list("transforms");
     if (list == nullptr) return {kIdentity4d};
-    if (list->items.empty()) object.error("transforms", "an object with no placement is nowhere; leave 'transforms' out for one as it is");
+    if (list->items.empty())
+        object.error("transforms",
+                     "an object with no placement is nowhere; leave 'transforms' out for one as it is");
     placements_ += list->items.size();
     requireRoom(object.place("transforms"));
     std::vector<Matrix4d> placements;
@@ -232,13 +253,16 @@ std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) 
     for (std::size_t i = 0; i < list->items.size(); ++i) {
         const YamlNode& item = *list->items[i];
         const auto [known, fresh] = written_placements_.try_emplace(&item);
-        if (fresh) known->second = readPlacement(item, item.place, fmt::format("placement {} of {}", i, object.subject()));
+        if (fresh)
+            known->second =
+                readPlacement(item, item.place, fmt::format("placement {} of {}", i, object.subject()));
         placements.push_back(known->second.value_or(kIdentity4d));
     }
     return placements;
 }
 
-// ---- Geometry --------------------------------------------------------------------------------------------------------
+// ---- Geometry
+// --------------------------------------------------------------------------------------------------------
 
 std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section) {
     std::optional<std::vector<Vec3d>> positions = readPoints(section, "positions", "position");
@@ -251,9 +275,12 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
     const std::size_t errors_before = out_.count();
     if (section.has("normals") && normals) {
         if (normals->size() != mesh.positions.size())
-            section.error("normals", fmt::format("there are {} normals for {} positions", normals->size(), mesh.positions.size()));
+            section.error("normals", fmt::format("there are {} normals for {} positions", normals->size(),
+                                                 mesh.positions.size()));
         for (std::size_t i = 0; i < normals->size(); ++i)
-            if (isZero((*normals)[i])) out_.error(section.list("normals")->items[i]->place, fmt::format("normal {} has length 0", i));
+            if (isZero((*normals)[i]))
+                out_.error(section.list("normals")->items[i]->place,
+                           fmt::format("normal {} has length 0", i));
         mesh.normals = *std::move(normals);
     }
     if (faces->items.empty()) section.error("faces", "a mesh without faces cannot be seen");
@@ -271,12 +298,14 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
         polygon.clear();
         for (const YamlNodePtr& item : face.items) {
             std::int64_t index = 0;
-            if (!readScalar(out_, *item, item->place, row, fmt::format("an index of face {}", f), index)) continue;
+            if (!readScalar(out_, *item, item->place, row, fmt::format("an index of face {}", f), index))
+                continue;
             if (static_cast<std::uint64_t>(index) < mesh.positions.size())
                 polygon.push_back(static_cast<std::uint32_t>(index));
             else
-                out_.error(item->place, fmt::format("face {} names position {}, but there are only {} (counted from 0)", f, index,
-                                                    mesh.positions.size()));
+                out_.error(item->place,
+                           fmt::format("face {} names position {}, but there are only {} (counted from 0)",
+                                       f, index, mesh.positions.size()));
         }
         if (polygon.size() != face.items.size()) continue;
         triangles_ += polygon.size() - 2;
@@ -297,7 +326,8 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
                 continue;
             }
             if (dot(areas[i], sum) < -kRounding * dot(sum, sum)) {
-                out_.error(face.place, fmt::format("face {} is not convex; split it into convex polygons", f));
+                out_.error(face.place,
+                           fmt::format("face {} is not convex; split it into convex polygons", f));
                 break;
             }
             mesh.triangles.push_back({polygon[0], polygon[i + 1], polygon[i + 2]});
@@ -306,14 +336,16 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
     if (out_.count() != errors_before) return std::nullopt;
     if (dropped > 0) {
         const SourcePlace at = section.place("faces").resolved();
-        logWarning("{}:{}:{}: {} triangles of {} without area were left out", at.file, at.line, at.column, dropped, section.subject());
+        logWarning("{}:{}:{}: {} triangles of {} without area were left out", at.file, at.line, at.column,
+                   dropped, section.subject());
     }
     if (!mesh.normals.empty()) mesh.normal_index = mesh.triangles;
     scene_.meshes.push_back(std::move(mesh));
     return static_cast<std::uint32_t>(scene_.meshes.size() - 1);
 }
 
-// ---- Objects ---------------------------------------------------------------------------------------------------------
+// ---- Objects
+// ---------------------------------------------------------------------------------------------------------
 
 void ObjectReader::readObjects(const YamlNode& list) {
     for (std::size_t i = 0; i < list.items.size(); ++i) readObject(*list.items[i], list.items[i]->place, i);
@@ -322,8 +354,9 @@ void ObjectReader::readObjects(const YamlNode& list) {
 void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std::size_t number) {
     const YamlEntry* name = node.find("name");
     const SectionReader section(out_, node, place, schemaSection("object"),
-                                name != nullptr && name->value->kind == YamlKind::Scalar ? fmt::format("object '{}'", name->value->text)
-                                                                                         : fmt::format("object {}", number));
+                                name != nullptr && name->value->kind == YamlKind::Scalar
+                                    ? fmt::format("object '{}'", name->value->text)
+                                    : fmt::format("object {}", number));
     Object object;
     object.place = place.resolved();
     object.name = fmt::format("object {}", number);
@@ -340,19 +373,23 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     std::optional<std::uint32_t> mesh;
     if (section.has("obj") && !section.has("mesh")) {
         mesh = readObj(section, readObjUse(section, material_name));
-    } else if (const std::optional<SectionReader> written = section.section("mesh", fmt::format("the mesh of {}", section.subject()))) {
+    } else if (const std::optional<SectionReader> written =
+                   section.section("mesh", fmt::format("the mesh of {}", section.subject()))) {
         const auto [known, fresh] = written_meshes_.try_emplace(section.find("mesh")->value.get());
         if (fresh) known->second = readMesh(*written);
         mesh = known->second;
-        if (!section.has("material")) out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
+        if (!section.has("material"))
+            out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
         if (material_given && !named) section.error("material", "only an OBJ has materials of its own");
         refuseObjKeys(section);
     }
 
-    if (const std::optional<SectionReader> light = section.section("emission", fmt::format("the emission of {}", section.subject()))) {
+    if (const std::optional<SectionReader> light =
+            section.section("emission", fmt::format("the emission of {}", section.subject()))) {
         Emission emission;
         light->read("two_sided", emission.two_sided);
-        if (std::optional<Spectrum> radiance = spectra_.read(*light, "radiance", SpectrumUse::Emission)) emission.radiance = *std::move(radiance);
+        if (std::optional<Spectrum> radiance = spectra_.read(*light, "radiance", SpectrumUse::Emission))
+            emission.radiance = *std::move(radiance);
         object.emission = static_cast<std::int32_t>(scene_.emissions.size());
         scene_.emissions.push_back(std::move(emission));
     }

@@ -49,9 +49,11 @@ private:
     void checkMaterials(const SectionReader& object, const LoadedMesh& loaded, const Mesh& mesh,
                         const ObjUse& use) const;
     std::optional<std::uint32_t> readMesh(const SectionReader& mesh);
-    std::optional<std::int32_t> findMaterial(const std::string& name, const YamlPlace& place, bool from_mtl_possible);
+    std::optional<std::int32_t> findMaterial(const std::string& name, const YamlPlace& place,
+                                             bool from_mtl_possible);
     Overrides readOverrides(const SectionReader& object);
-    std::optional<Matrix4d> readPlacement(const YamlNode& list, const YamlPlace& place, const std::string& subject);
+    std::optional<Matrix4d> readPlacement(const YamlNode& list, const YamlPlace& place,
+                                          const std::string& subject);
     std::vector<Matrix4d> readPlacements(const SectionReader& object);
     /// Stops when what was read so far is too large to be written out.
     void requireRoom(const YamlPlace& place);

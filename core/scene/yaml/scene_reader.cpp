@@ -1,5 +1,5 @@
-#include "scene/yaml/scene_reader.h"
 #include "base/modules.h"
+#include "scene/yaml/scene_reader.h"
 
 #include "base/log.h"
 
@@ -18,8 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 
 template <class T>
-bool readNumeric(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what,
-                 const char* wanted, Parsed<T> (*parse)(const std::string&), T& value) {
+bool readNumeric(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                 const std::string& what, const char* wanted, Parsed<T> (*parse)(const std::string&),
+                 T& value) {
     if (node.kind != YamlKind::Scalar || node.quoted) {
         expected(out, place, wanted, what, node);
         return false;
@@ -31,7 +32,9 @@ bool readNumeric(Diagnostics& out, const YamlNode& node, const YamlPlace& place,
         if (real.value && !key.range.contains(*real.value))
             out.error(place, fmt::format("{} is {}; it must be {}", what, node.text, key.range.text()));
         else
-            out.error(place, fmt::format("expected {} for {}, found {}: {}", wanted, what, describeNode(node), parsed.problem),
+            out.error(place,
+                      fmt::format("expected {} for {}, found {}: {}", wanted, what, describeNode(node),
+                                  parsed.problem),
                       node.text.starts_with('$') ? "scenes have no variables; use --set" : "");
         return false;
     }
@@ -45,13 +48,14 @@ bool readNumeric(Diagnostics& out, const YamlNode& node, const YamlPlace& place,
 
 std::string countText(const KeySchema& key, std::string_view things) {
     if (key.count_min == key.count_max) return fmt::format("a list of {} {}", key.count_min, things);
-    if (key.count_max == kUnbounded) return key.count_min > 0 ? fmt::format("a list of {} or more {}", key.count_min, things)
-                                                              : fmt::format("a list of {}", things);
+    if (key.count_max == kUnbounded)
+        return key.count_min > 0 ? fmt::format("a list of {} or more {}", key.count_min, things)
+                                 : fmt::format("a list of {}", things);
     return fmt::format("a list of {} to {} {}", key.count_min, key.count_max, things);
 }
 
-bool checkList(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what,
-               std::string_view things) {
+bool checkList(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+               const std::string& what, std::string_view things) {
     const auto count = static_cast<std::int64_t>(node.items.size());
     if (node.kind == YamlKind::List && count >= key.count_min && count <= key.count_max) return true;
     expected(out, place, countText(key, things), what, node);
@@ -60,13 +64,14 @@ bool checkList(Diagnostics& out, const YamlNode& node, const YamlPlace& place, c
 
 /// Members of a list that share a row of the table. Reads all, so that each wrong one is reported.
 template <class T>
-bool readMembers(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what,
-                 std::string_view things, std::vector<T>& values) {
+bool readMembers(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                 const std::string& what, std::string_view things, std::vector<T>& values) {
     if (!checkList(out, node, place, key, what, things)) return false;
     std::vector<T> read(node.items.size());
     bool good = true;
     for (std::size_t i = 0; i < read.size(); ++i)
-        good &= readScalar(out, *node.items[i], node.items[i]->place, key, fmt::format("value {} of {}", i + 1, what), read[i]);
+        good &= readScalar(out, *node.items[i], node.items[i]->place, key,
+                           fmt::format("value {} of {}", i + 1, what), read[i]);
     if (good) values = std::move(read);
     return good;
 }
@@ -77,40 +82,46 @@ std::string quotedName(std::string_view key) { return fmt::format("'{}'", key); 
 void addFileNames(const fs::path& directory, std::vector<std::string>& names) {
     constexpr std::size_t kEnough = 1000;
     std::error_code ec;
-    for (fs::directory_iterator it(directory, ec), end; !ec && it != end && names.size() < kEnough; it.increment(ec))
+    for (fs::directory_iterator it(directory, ec), end; !ec && it != end && names.size() < kEnough;
+         it.increment(ec))
         names.push_back(it->path().filename().string());
 }
 
 }  // namespace
 
-void expected(Diagnostics& out, const YamlPlace& place, std::string_view wanted, const std::string& what, const YamlNode& node) {
+void expected(Diagnostics& out, const YamlPlace& place, std::string_view wanted, const std::string& what,
+              const YamlNode& node) {
     if (node.reported) return;
     std::string hint;
-    if (node.kind == YamlKind::Scalar && node.quoted && looksLikeNumber(node.text)) hint = "leave the quotes out";
-    out.error(place, fmt::format("expected {} for {}, found {}", wanted, what, describeNode(node)), std::move(hint));
+    if (node.kind == YamlKind::Scalar && node.quoted && looksLikeNumber(node.text))
+        hint = "leave the quotes out";
+    out.error(place, fmt::format("expected {} for {}, found {}", wanted, what, describeNode(node)),
+              std::move(hint));
 }
 
-bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what,
-                double& value) {
+bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                const std::string& what, double& value) {
     return readNumeric(out, node, place, key, what, "a number", &parseNumber, value);
 }
-bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what,
-                std::int64_t& value) {
+bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                const std::string& what, std::int64_t& value) {
     return readNumeric(out, node, place, key, what, "a whole number", &parseInteger, value);
 }
-bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what,
-                std::uint64_t& value) {
+bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                const std::string& what, std::uint64_t& value) {
     return readNumeric(out, node, place, key, what, "a whole number", &parseUnsigned, value);
 }
 
-bool readText(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const std::string& what, std::string& value) {
+bool readText(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const std::string& what,
+              std::string& value) {
     if (node.kind != YamlKind::Scalar) {
         expected(out, place, "text", what, node);
         return false;
     }
     // An editor's schema check sees a number here; agree with it rather than guess.
     if (!node.quoted && (looksLikeNumber(node.text) || node.text == "true" || node.text == "false")) {
-        out.error(place, fmt::format("expected text for {}, found {}", what, describeNode(node)), "put it in quotes");
+        out.error(place, fmt::format("expected text for {}, found {}", what, describeNode(node)),
+                  "put it in quotes");
         return false;
     }
     if (node.text.empty()) {
@@ -121,29 +132,32 @@ bool readText(Diagnostics& out, const YamlNode& node, const YamlPlace& place, co
     return true;
 }
 
-bool readChoice(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what,
-                std::size_t& value) {
-    const std::string wanted = key.choices.size() == 1 ? key.choices.front() : fmt::format("one of {}", fmt::join(key.choices, ", "));
+bool readChoice(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                const std::string& what, std::size_t& value) {
+    const std::string wanted = key.choices.size() == 1
+                                   ? key.choices.front()
+                                   : fmt::format("one of {}", fmt::join(key.choices, ", "));
     if (node.kind != YamlKind::Scalar) {
         expected(out, place, wanted, what, node);
         return false;
     }
     const auto found = std::find(key.choices.begin(), key.choices.end(), node.text);
     if (found == key.choices.end()) {
-        out.error(place, fmt::format("expected {} for {}, found {}", wanted, what, describeNode(node)), didYouMean(node.text, key.choices));
+        out.error(place, fmt::format("expected {} for {}, found {}", wanted, what, describeNode(node)),
+                  didYouMean(node.text, key.choices));
         return false;
     }
     value = static_cast<std::size_t>(found - key.choices.begin());
     return true;
 }
 
-bool readNumbers(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key, const std::string& what,
-                 std::vector<double>& values) {
+bool readNumbers(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
+                 const std::string& what, std::vector<double>& values) {
     return readMembers(out, node, place, key, what, "numbers", values);
 }
 
-SectionReader::SectionReader(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const SectionSchema& schema,
-                             std::string subject)
+SectionReader::SectionReader(Diagnostics& out, const YamlNode& node, const YamlPlace& place,
+                             const SectionSchema& schema, std::string subject)
     : out_(&out), node_(&node), place_(place), schema_(&schema), subject_(std::move(subject)) {
     if (node.kind != YamlKind::Map) {
         expected(out, place, "a map", subject_, node);
@@ -160,9 +174,11 @@ void SectionReader::checkKeys() const {
         if (schema_->find(entry.key) != nullptr) continue;
         if (const std::optional<std::string> meant = nearestWord(entry.key, names)) misspelt.insert(*meant);
         std::string suggestion = didYouMean(entry.key, names);
-        if (const auto homes = sectionsWithKey(entry.key, schema_->name); suggestion.empty() && !homes.empty())
+        if (const auto homes = sectionsWithKey(entry.key, schema_->name);
+            suggestion.empty() && !homes.empty())
             suggestion = fmt::format("'{}' is a key of {}", entry.key, homes.front());
-        out_->error(entry.key_place, fmt::format("unknown key '{}' in {}", entry.key, subject_), std::move(suggestion),
+        out_->error(entry.key_place, fmt::format("unknown key '{}' in {}", entry.key, subject_),
+                    std::move(suggestion),
                     fmt::format("keys of {}: {}", schema_->title, fmt::join(names, ", ")));
     }
     for (const KeySchema& key : schema_->keys)
@@ -173,19 +189,23 @@ void SectionReader::checkKeys() const {
 void SectionReader::checkRules() const {
     for (const KeyRule& rule : schema_->rules) {
         std::vector<std::string> given, missing;
-        for (const std::string& key : rule.keys) (node_->find(key) != nullptr ? given : missing).push_back(quotedName(key));
+        for (const std::string& key : rule.keys)
+            (node_->find(key) != nullptr ? given : missing).push_back(quotedName(key));
         switch (rule.kind) {
             case KeyRule::Kind::ExactlyOne:
-                if (given.empty()) out_->error(place_, fmt::format("{} needs {}", subject_, fmt::join(rule.keys, " or ")));
+                if (given.empty())
+                    out_->error(place_, fmt::format("{} needs {}", subject_, fmt::join(rule.keys, " or ")));
                 [[fallthrough]];
             case KeyRule::Kind::AtMostOne:
                 if (given.size() > 1)
-                    out_->error(node_->find(rule.keys.back())->key_place,
-                                fmt::format("{} in {} exclude each other", fmt::join(given, " and "), subject_));
+                    out_->error(
+                        node_->find(rule.keys.back())->key_place,
+                        fmt::format("{} in {} exclude each other", fmt::join(given, " and "), subject_));
                 break;
             case KeyRule::Kind::Together:
                 if (!given.empty() && !missing.empty())
-                    out_->error(place_, fmt::format("{} in {} needs {} too", fmt::join(given, " and "), subject_, fmt::join(missing, " and ")));
+                    out_->error(place_, fmt::format("{} in {} needs {} too", fmt::join(given, " and "),
+                                                    subject_, fmt::join(missing, " and ")));
                 break;
         }
     }
@@ -193,7 +213,8 @@ void SectionReader::checkRules() const {
 
 const KeySchema& SectionReader::row(std::string_view key) const {
     if (const KeySchema* found = schema_->find(key)) return *found;
-    throw Error(ErrorKind::Internal, fmt::format("the scene schema has no key '{}' in '{}'", key, schema_->name));
+    throw Error(ErrorKind::Internal,
+                fmt::format("the scene schema has no key '{}' in '{}'", key, schema_->name));
 }
 
 const YamlEntry* SectionReader::find(std::string_view key) const {
@@ -207,7 +228,8 @@ YamlPlace SectionReader::place(std::string_view key) const {
     return entry != nullptr ? entry->place : place_;
 }
 
-void SectionReader::error(std::string_view key, std::string message, std::string suggestion, std::string note) const {
+void SectionReader::error(std::string_view key, std::string message, std::string suggestion,
+                          std::string note) const {
     out_->error(place(key), std::move(message), std::move(suggestion), std::move(note));
 }
 
@@ -219,7 +241,8 @@ bool SectionReader::read(std::string_view key, double& value) const {
 bool SectionReader::read(std::string_view key, int& value) const {
     const YamlEntry* e = find(key);
     std::int64_t wide = 0;
-    if (e == nullptr || !readScalar(*out_, *e->value, e->place, row(key), quotedName(key), wide)) return false;
+    if (e == nullptr || !readScalar(*out_, *e->value, e->place, row(key), quotedName(key), wide))
+        return false;
     value = static_cast<int>(wide);  // The table bounds every int key well within an int.
     return true;
 }
@@ -237,15 +260,18 @@ bool SectionReader::read(std::string_view key, bool& value) const {
         value = node.text == "true";
         return true;
     }
-    static const std::vector<std::string> yes{"yes", "Yes", "YES", "on", "On", "ON", "True", "TRUE", "y", "1"};
-    static const std::vector<std::string> no{"no", "No", "NO", "off", "Off", "OFF", "False", "FALSE", "n", "0"};
+    static const std::vector<std::string> yes{"yes", "Yes",  "YES",  "on", "On",
+                                              "ON",  "True", "TRUE", "y",  "1"};
+    static const std::vector<std::string> no{"no",  "No",    "NO",    "off", "Off",
+                                             "OFF", "False", "FALSE", "n",   "0"};
     std::string suggestion;
     if (node.kind == YamlKind::Scalar) {
         if (std::find(yes.begin(), yes.end(), node.text) != yes.end()) suggestion = "write true";
         if (std::find(no.begin(), no.end(), node.text) != no.end()) suggestion = "write false";
         if (suggestion.empty()) suggestion = didYouMean(node.text, {"true", "false"});
     }
-    out_->error(e->place, fmt::format("expected true or false for '{}', found {}", key, describeNode(node)), suggestion);
+    out_->error(e->place, fmt::format("expected true or false for '{}', found {}", key, describeNode(node)),
+                suggestion);
     return false;
 }
 
@@ -269,7 +295,9 @@ bool SectionReader::read(std::string_view key, std::vector<double>& values) cons
 bool SectionReader::read(std::string_view key, std::vector<int>& values) const {
     const YamlEntry* e = find(key);
     std::vector<std::int64_t> wide;
-    if (e == nullptr || !readMembers(*out_, *e->value, e->place, row(key), quotedName(key), "whole numbers", wide)) return false;
+    if (e == nullptr ||
+        !readMembers(*out_, *e->value, e->place, row(key), quotedName(key), "whole numbers", wide))
+        return false;
     values.assign(wide.begin(), wide.end());
     return true;
 }
@@ -308,8 +336,8 @@ const YamlNode* SectionReader::map(std::string_view key) const {
     return nullptr;
 }
 
-std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node, const YamlPlace& place, std::string_view family,
-                                         const std::string& subject) {
+std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node, const YamlPlace& place,
+                                         std::string_view family, const std::string& subject) {
     const std::vector<const SectionSchema*> variants = schemaVariants(family);
     const bool by_type = variantByType(*variants.front());
     if (node.kind != YamlKind::Map) {
@@ -324,10 +352,12 @@ std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node,
         if (type == nullptr) {
             for (const YamlEntry& entry : node.entries)
                 if (nearestWord(entry.key, {"type"})) {
-                    out.error(entry.key_place, fmt::format("unknown key '{}' in {}", entry.key, subject), "did you mean 'type'?");
+                    out.error(entry.key_place, fmt::format("unknown key '{}' in {}", entry.key, subject),
+                              "did you mean 'type'?");
                     return std::nullopt;
                 }
-            out.error(place, fmt::format("'type' is missing in {}: one of {}", subject, fmt::join(words, ", ")));
+            out.error(place,
+                      fmt::format("'type' is missing in {}: one of {}", subject, fmt::join(words, ", ")));
             return std::nullopt;
         }
         KeySchema any{.name = "type", .kind = ValueKind::Choice, .choices = words};
@@ -342,7 +372,8 @@ std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node,
         if (word == words.end()) continue;
         const SectionSchema* here = variants[static_cast<std::size_t>(word - words.begin())];
         if (chosen != nullptr) {
-            out.error(entry.key_place, fmt::format("'{}' and '{}' in {} exclude each other", variantWord(*chosen), entry.key, subject));
+            out.error(entry.key_place, fmt::format("'{}' and '{}' in {} exclude each other",
+                                                   variantWord(*chosen), entry.key, subject));
             return std::nullopt;
         }
         chosen = here;
@@ -355,9 +386,11 @@ std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node,
         return std::nullopt;
     }
     const YamlEntry* odd = &node.entries.front();
-    for (const YamlEntry& entry : node.entries)  // Blame the misspelt key, not a `scale` that happens to stand before it.
+    for (const YamlEntry& entry :
+         node.entries)  // Blame the misspelt key, not a `scale` that happens to stand before it.
         if (nearestWord(entry.key, words)) odd = &entry;
-    out.error(odd->key_place, fmt::format("unknown key '{}' in {}", odd->key, subject), didYouMean(odd->key, words), note);
+    out.error(odd->key_place, fmt::format("unknown key '{}' in {}", odd->key, subject),
+              didYouMean(odd->key, words), note);
     return std::nullopt;
 }
 
@@ -373,7 +406,8 @@ void UnusedNames::finish() const {
     if (count_ > kUnusedShown) logWarning("{} more {} are not used", count_ - kUnusedShown, many_);
 }
 
-std::optional<std::string> SceneFiles::locate(const std::string& name, const YamlPlace& place, Diagnostics& out) const {
+std::optional<std::string> SceneFiles::locate(const std::string& name, const YamlPlace& place,
+                                              Diagnostics& out) const {
     const fs::path wanted(name);
     std::vector<fs::path> directories;
     if (wanted.is_absolute()) {
@@ -413,7 +447,8 @@ std::string sentenceWithPlace(const Error& error) {
     const std::string sentence = error.what();
     const SourcePlace& at = error.place();
     if (at.file.empty() || sentence.starts_with(at.file)) return sentence;
-    return at.line > 0 ? fmt::format("{}:{}: {}", at.file, at.line, sentence) : fmt::format("{}: {}", at.file, sentence);
+    return at.line > 0 ? fmt::format("{}:{}: {}", at.file, at.line, sentence)
+                       : fmt::format("{}: {}", at.file, sentence);
 }
 
 }  // namespace crt

@@ -1,11 +1,11 @@
-/// A YAML map read against its section of the schema: the ground that all parts of the scene reader stand on.
-/// Whatever is wrong goes to Diagnostics and the value keeps its default, so reading always goes on.
+/// A YAML map read against its section of the schema: the ground that all parts of the scene reader stand
+/// on. Whatever is wrong goes to Diagnostics and the value keeps its default, so reading always goes on.
 #pragma once
 
 #include "base/error.h"
 #include "scene/yaml/scene_schema.h"
-#include "spectra/spectra.h"
 #include "scene/yaml/yaml_reader.h"
+#include "spectra/spectra.h"
 
 #include <cstdint>
 #include <optional>
@@ -16,14 +16,16 @@
 
 namespace crt {
 
-/// Single values against their row of the table. `what` names the value in messages: "'fov'", "component 2 of 'up'".
+/// Single values against their row of the table. `what` names the value in messages: "'fov'", "component 2
+/// of 'up'".
 bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
                 const std::string& what, double& value);
 bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
                 const std::string& what, std::int64_t& value);
 bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
                 const std::string& what, std::uint64_t& value);
-bool readText(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const std::string& what, std::string& value);
+bool readText(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const std::string& what,
+              std::string& value);
 /// Index into key.choices.
 bool readChoice(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
                 const std::string& what, std::size_t& value);
@@ -31,11 +33,13 @@ bool readChoice(Diagnostics& out, const YamlNode& node, const YamlPlace& place, 
 bool readNumbers(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
                  const std::string& what, std::vector<double>& values);
 
-/// One map. Checks its keys when made; the read functions then leave their target alone unless the key is there and right.
+/// One map. Checks its keys when made; the read functions then leave their target alone unless the key is
+/// there and right.
 class SectionReader {
 public:
     /// `subject` is what messages call this map: "film", "material 'white'".
-    SectionReader(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const SectionSchema& schema, std::string subject);
+    SectionReader(Diagnostics& out, const YamlNode& node, const YamlPlace& place,
+                  const SectionSchema& schema, std::string subject);
 
     Diagnostics& diagnostics() const { return *out_; }
     const SectionSchema& schema() const { return *schema_; }
@@ -69,11 +73,13 @@ public:
     bool readWord(std::string_view key, std::string& value) const;
     /// The map under `key`, as the section that the table names.
     std::optional<SectionReader> section(std::string_view key, std::string subject) const;
-    /// The items under `key`; null, with an error, when it is not a list. Null without error when it is absent.
+    /// The items under `key`; null, with an error, when it is not a list. Null without error when it is
+    /// absent.
     const YamlNode* list(std::string_view key) const;
     const YamlNode* map(std::string_view key) const;
 
-    void error(std::string_view key, std::string message, std::string suggestion = {}, std::string note = {}) const;
+    void error(std::string_view key, std::string message, std::string suggestion = {},
+               std::string note = {}) const;
 
 private:
     bool readIndex(std::string_view key, std::size_t& index) const;
@@ -88,12 +94,14 @@ private:
     std::string subject_;
 };
 
-/// Reads a map as whichever of the sections "family/…" it turns out to be; nothing, with an error, when it is none.
-std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node, const YamlPlace& place, std::string_view family,
-                                         const std::string& subject);
+/// Reads a map as whichever of the sections "family/…" it turns out to be; nothing, with an error, when it
+/// is none.
+std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node, const YamlPlace& place,
+                                         std::string_view family, const std::string& subject);
 
 /// "expected …, found …" at a place.
-void expected(Diagnostics& out, const YamlPlace& place, std::string_view wanted, const std::string& what, const YamlNode& node);
+void expected(Diagnostics& out, const YamlPlace& place, std::string_view wanted, const std::string& what,
+              const YamlNode& node);
 
 /// Warns about names that nothing uses: the first by name and place, the others by their number.
 class UnusedNames {
@@ -112,8 +120,10 @@ class SceneFiles {
 public:
     explicit SceneFiles(std::string directory) : directory_(std::move(directory)) {}
 
-    /// The path of a readable file: beside the scene, then in the mesh directories. Reports an error at `place` when there is none.
-    std::optional<std::string> locate(const std::string& name, const YamlPlace& place, Diagnostics& out) const;
+    /// The path of a readable file: beside the scene, then in the mesh directories. Reports an error at
+    /// `place` when there is none.
+    std::optional<std::string> locate(const std::string& name, const YamlPlace& place,
+                                      Diagnostics& out) const;
     /// Notes that a file went into the scene; every file once.
     void note(const std::string& path);
     const std::vector<std::string>& read() const { return read_; }

@@ -1,5 +1,5 @@
-/// The one table of every key a scene file may have. The reader's checks, the did-you-mean, docs/scene.md and the JSON Schema
-/// are all made from it, so none of them can know a key that the others do not.
+/// The one table of every key a scene file may have. The reader's checks, the did-you-mean, docs/scene.md
+/// and the JSON Schema are all made from it, so none of them can know a key that the others do not.
 #pragma once
 
 #include <limits>
@@ -14,7 +14,8 @@ enum class ValueKind {
     Number,
     Boolean,
     Text,
-    Choice,    ///< One of KeySchema::choices. Where `section` is set too, a map of that section will do instead.
+    Choice,    ///< One of KeySchema::choices. Where `section` is set too, a map of that section will do
+               ///< instead.
     Spectrum,  ///< Number, name of a spectrum, or a map of one of the "spectrum/…" sections.
     Section,   ///< A map described by `section`.
 };
@@ -53,7 +54,8 @@ struct KeySchema {
     int count_max = kUnbounded;
     ValueRange range{};
     std::string unit{};
-    std::vector<std::string> choices{};  ///< In the order of the C++ enumeration they stand for, if there is one.
+    std::vector<std::string>
+        choices{};  ///< In the order of the C++ enumeration they stand for, if there is one.
     std::string section{};               ///< Name of the section, or the part before '/' of its variants.
     std::string fallback{};              ///< The default, as YAML; empty when there is none.
     bool required = false;
@@ -88,7 +90,8 @@ const SectionSchema& schemaSection(std::string_view name);
 /// The sections "family/…", or the one section called `family`.
 std::vector<const SectionSchema*> schemaVariants(std::string_view family);
 
-/// A variant is told by the value of its key `type`, or else by its first key being there. Which of the two a section uses.
+/// A variant is told by the value of its key `type`, or else by its first key being there. Which of the two
+/// a section uses.
 bool variantByType(const SectionSchema& variant);
 /// The word that picks the variant: "diffuse" of material/diffuse, "rgb" of spectrum/rgb.
 std::string variantWord(const SectionSchema& variant);

@@ -30,9 +30,11 @@ std::optional<std::size_t> worstWavelength(const Spectrum& spectrum, const Value
 }
 
 std::string outsideQuestion(double first_nm, double last_nm) {
-    return fmt::format("the data go from {} to {} nm and crt renders {} to {} nm; say what holds beyond them: 'outside: clamp' or "
-                       "'outside: zero'",
-                       first_nm, last_nm, kWavelengthMin_nm, kWavelengthMax_nm);
+    return fmt::format(
+        "the data go from {} to {} nm and crt renders {} to {} nm; say what holds beyond them: 'outside: "
+        "clamp' or "
+        "'outside: zero'",
+        first_nm, last_nm, kWavelengthMin_nm, kWavelengthMax_nm);
 }
 
 }  // namespace
@@ -43,11 +45,14 @@ SpectrumReader::SpectrumReader(Diagnostics& out, SceneFiles& files, const YamlNo
     for (const YamlEntry& entry : named_->entries) {
         entry_of_.emplace(entry.key, &entry);
         if (looksLikeNumber(entry.key) || entry.key.empty())
-            out_.error(entry.key_place, fmt::format("'{}' cannot name a spectrum: where it is used it would be a number", entry.key));
+            out_.error(entry.key_place,
+                       fmt::format("'{}' cannot name a spectrum: where it is used it would be a number",
+                                   entry.key));
     }
 }
 
-std::optional<Spectrum> SpectrumReader::read(const SectionReader& section, std::string_view key, SpectrumUse use) {
+std::optional<Spectrum> SpectrumReader::read(const SectionReader& section, std::string_view key,
+                                             SpectrumUse use) {
     const YamlEntry* entry = section.find(key);
     if (entry == nullptr) return std::nullopt;
     const std::string what = fmt::format("'{}' of {}", key, section.subject());
@@ -58,7 +63,9 @@ std::optional<Spectrum> SpectrumReader::read(const SectionReader& section, std::
     const std::optional<std::size_t> worst = worstWavelength(*spectrum, range);
     if (!worst) return spectrum;
     const double value = (*spectrum)[*worst];
-    const std::string where = spectrum->isConstant() ? std::string() : fmt::format(" at {} nm", kWavelengthMin_nm + static_cast<int>(*worst));
+    const std::string where = spectrum->isConstant()
+                                  ? std::string()
+                                  : fmt::format(" at {} nm", kWavelengthMin_nm + static_cast<int>(*worst));
     const std::string extreme = value > range.max && !spectrum->isConstant() ? "reaches" : "is";
     out_.error(entry->place, fmt::format("{} {} {}{}; it must be {}", what, extreme, value, where,
                                          std::isfinite(value) ? range.text() : "finite"));
@@ -87,7 +94,8 @@ std::map<std::string, Vec3d> SpectrumReader::whites() const {
     return whites;
 }
 
-std::optional<Spectrum> SpectrumReader::resolve(const YamlNode& node, const YamlPlace& place, const std::string& what, SpectrumUse use) {
+std::optional<Spectrum> SpectrumReader::resolve(const YamlNode& node, const YamlPlace& place,
+                                                const std::string& what, SpectrumUse use) {
     if (node.kind == YamlKind::Map) {
         const std::optional<SectionReader> form = openVariant(out_, node, place, "spectrum", what);
         if (!form) return std::nullopt;
@@ -111,7 +119,8 @@ std::optional<Spectrum> SpectrumReader::resolve(const YamlNode& node, const Yaml
     return resolveName(node.text, place, use);
 }
 
-std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, const YamlPlace& place, SpectrumUse use) {
+std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, const YamlPlace& place,
+                                                    SpectrumUse use) {
     const auto found = entry_of_.find(name);
     const YamlEntry* entry = found != entry_of_.end() ? found->second : nullptr;
     if (entry == nullptr) {
@@ -120,9 +129,12 @@ std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, con
         std::vector<std::string> known;
         if (named_ != nullptr)
             for (const YamlEntry& e : named_->entries) known.push_back(e.key);
-        if (use == SpectrumUse::White) known.insert(known.end(), illuminantNames().begin(), illuminantNames().end());
-        std::string suggestion = out_.worthSuggesting(known.size()) ? didYouMean(name, known) : std::string();
-        if (suggestion.empty() && illuminantSpectrum(name)) suggestion = fmt::format("write {{illuminant: {}}}", name);
+        if (use == SpectrumUse::White)
+            known.insert(known.end(), illuminantNames().begin(), illuminantNames().end());
+        std::string suggestion =
+            out_.worthSuggesting(known.size()) ? didYouMean(name, known) : std::string();
+        if (suggestion.empty() && illuminantSpectrum(name))
+            suggestion = fmt::format("write {{illuminant: {}}}", name);
         if (suggestion.empty() && glassIndex(name)) suggestion = fmt::format("write {{glass: {}}}", name);
         out_.error(place, fmt::format("there is no spectrum '{}'", name), suggestion);
         return std::nullopt;
@@ -135,7 +147,8 @@ std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, con
     const auto known = resolved_.find({name, use});
     if (known != resolved_.end()) return known->second;
     open_.insert(name);
-    std::optional<Spectrum> spectrum = resolve(*entry->value, entry->place, fmt::format("spectrum '{}'", name), use);
+    std::optional<Spectrum> spectrum =
+        resolve(*entry->value, entry->place, fmt::format("spectrum '{}'", name), use);
     open_.erase(name);
     return resolved_[{name, use}] = std::move(spectrum);
 }
@@ -163,7 +176,8 @@ std::optional<Spectrum> SpectrumReader::resolveForm(const SectionReader& form, S
         } else if (word == "ref") {
             if (form.read("ref", name)) return resolveName(name, form.place("ref"), use);
         }
-    } catch (const Error& e) {  // What the spectrum's maths refuses; it does not know the place in the scene.
+    } catch (
+        const Error& e) {  // What the spectrum's maths refuses; it does not know the place in the scene.
         if (e.kind() == ErrorKind::Internal) throw;
         form.error(word, sentenceWithPlace(e));
     }
@@ -179,17 +193,20 @@ std::optional<Spectrum> SpectrumReader::table(const SectionReader& form) {
     if (!have_nm || !have_value) return std::nullopt;
 
     if (nm.size() != value.size()) {
-        columns->error("value", fmt::format("the table has {} wavelengths but {} values", nm.size(), value.size()));
+        columns->error("value",
+                       fmt::format("the table has {} wavelengths but {} values", nm.size(), value.size()));
         return std::nullopt;
     }
     for (std::size_t i = 1; i < nm.size(); ++i) {
         if (nm[i] > nm[i - 1]) continue;
-        out_.error(columns->list("nm")->items[i]->place, fmt::format("wavelengths must increase, but {} nm follows {} nm", nm[i], nm[i - 1]));
+        out_.error(columns->list("nm")->items[i]->place,
+                   fmt::format("wavelengths must increase, but {} nm follows {} nm", nm[i], nm[i - 1]));
         return std::nullopt;
     }
     const bool covered = nm.front() <= kWavelengthMin_nm && nm.back() >= kWavelengthMax_nm;
     if (outside == Outside::Error && !covered) {
-        if (!form.has("outside") || said) form.error(said ? "outside" : "table", outsideQuestion(nm.front(), nm.back()));
+        if (!form.has("outside") || said)
+            form.error(said ? "outside" : "table", outsideQuestion(nm.front(), nm.back()));
         return std::nullopt;
     }
     return tableSpectrum(nm, value, outside);
@@ -204,13 +221,15 @@ std::optional<Spectrum> SpectrumReader::file(const SectionReader& form) {
     if (!path) return std::nullopt;
     files_.note(*path);
     if (outside != Outside::Error) return readSpectrumFile(*path, outside);
-    // Read as if nothing were asked beyond the data first, so that a broken file is told from one that is only too short.
+    // Read as if nothing were asked beyond the data first, so that a broken file is told from one that is
+    // only too short.
     const Spectrum clamped = readSpectrumFile(*path, Outside::Clamp);
     if (outside_wrong) return clamped;
     try {
         return readSpectrumFile(*path, Outside::Error);
     } catch (const Error& e) {
-        form.error(form.has("outside") ? "outside" : "file", sentenceWithPlace(e), "say 'outside: clamp' or 'outside: zero'");
+        form.error(form.has("outside") ? "outside" : "file", sentenceWithPlace(e),
+                   "say 'outside: clamp' or 'outside: zero'");
         return std::nullopt;
     }
 }
@@ -221,14 +240,17 @@ std::optional<Spectrum> SpectrumReader::rgb(const SectionReader& form, SpectrumU
     form.readEnum("space", linear);  // The choices are srgb and linear.
     if (!form.read("rgb", color)) return std::nullopt;
     if (use == SpectrumUse::Index) {
-        form.error("rgb", "a refractive index is not a colour; give a number, a table, a glass, or cauchy or sellmeier coefficients");
+        form.error("rgb",
+                   "a refractive index is not a colour; give a number, a table, a glass, or cauchy or "
+                   "sellmeier coefficients");
         return std::nullopt;
     }
     const double brightest = *std::max_element(color.begin(), color.end());
     if (brightest > 1 && (!linear || use == SpectrumUse::Reflectance)) {
-        form.error("rgb", fmt::format("a component of this colour is {}; {}", brightest,
-                                      use == SpectrumUse::Reflectance ? "a reflectance must be 0 to 1"
-                                                                      : "an sRGB-encoded colour must be 0 to 1"),
+        form.error("rgb",
+                   fmt::format("a component of this colour is {}; {}", brightest,
+                               use == SpectrumUse::Reflectance ? "a reflectance must be 0 to 1"
+                                                               : "an sRGB-encoded colour must be 0 to 1"),
                    use == SpectrumUse::Reflectance ? "" : "add 'space: linear', or 'scale'");
         return std::nullopt;
     }
@@ -242,7 +264,8 @@ std::optional<Spectrum> SpectrumReader::rgb(const SectionReader& form, SpectrumU
 }
 
 std::optional<Spectrum> SpectrumReader::sellmeier(const SectionReader& form) {
-    const std::optional<SectionReader> coefficients = form.section("sellmeier", "the Sellmeier coefficients");
+    const std::optional<SectionReader> coefficients =
+        form.section("sellmeier", "the Sellmeier coefficients");
     Vec3d B{}, C_um2{};
     const bool have_B = coefficients->read("B", B), have_C = coefficients->read("C", C_um2);
     if (!have_B || !have_C) return std::nullopt;

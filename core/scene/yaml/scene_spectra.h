@@ -32,7 +32,8 @@ public:
 
 private:
     /// `what` names the value in messages: "'reflectance' of material 'white'", "spectrum 'white'".
-    std::optional<Spectrum> resolve(const YamlNode& node, const YamlPlace& place, const std::string& what, SpectrumUse use);
+    std::optional<Spectrum> resolve(const YamlNode& node, const YamlPlace& place, const std::string& what,
+                                    SpectrumUse use);
     std::optional<Spectrum> resolveName(const std::string& name, const YamlPlace& place, SpectrumUse use);
     std::optional<Spectrum> resolveForm(const SectionReader& form, SpectrumUse use);
     std::optional<Spectrum> table(const SectionReader& form);
@@ -43,7 +44,8 @@ private:
     Diagnostics& out_;
     SceneFiles& files_;
     const YamlNode* named_;
-    std::unordered_map<std::string_view, const YamlEntry*> entry_of_;  ///< Of named_, which may hold a hundred thousand.
+    std::unordered_map<std::string_view, const YamlEntry*>
+        entry_of_;  ///< Of named_, which may hold a hundred thousand.
     std::map<std::pair<std::string, SpectrumUse>, std::optional<Spectrum>> resolved_;
     std::map<double, Spectrum> constants_;
     std::map<std::pair<Vec3d, bool>, Spectrum> colors_;  ///< Of linear sRGB, as reflectance or as emission.

@@ -24,7 +24,8 @@
 namespace crt {
 namespace {
 
-// ---- Overrides -------------------------------------------------------------------------------------------------------
+// ---- Overrides
+// -------------------------------------------------------------------------------------------------------
 
 /// One `--set` argument on its way down the tree.
 class OverrideWalk {
@@ -32,8 +33,9 @@ public:
     OverrideWalk(const SceneOverride& change, const YamlSource& source, Diagnostics& out)
         : path_(change.path), source_(source), out_(out) {}
 
-    /// Puts `value` where the path leads. Nodes on the way are copied first, because aliases share them. Maps that the
-    /// file leaves out are made; the check of the whole scene then finds keys that do not exist, with the place in the argument.
+    /// Puts `value` where the path leads. Nodes on the way are copied first, because aliases share them.
+    /// Maps that the file leaves out are made; the check of the whole scene then finds keys that do not
+    /// exist, with the place in the argument.
     void apply(YamlNodePtr& slot, const YamlNodePtr& value, std::size_t at = 0) {
         slot = std::make_shared<YamlNode>(*slot);
         if (slot->kind == YamlKind::Null) slot->kind = YamlKind::Map;
@@ -44,7 +46,9 @@ public:
             case YamlKind::Null: break;
         }
         const std::string_view before = std::string_view(path_).substr(0, at > 0 ? at - 1 : 0);
-        out_.error(place(at, path_.size() - at), fmt::format("'{}' is {} here, so there is nothing inside it to set", before, describeNode(*slot)),
+        out_.error(place(at, path_.size() - at),
+                   fmt::format("'{}' is {} here, so there is nothing inside it to set", before,
+                               describeNode(*slot)),
                    fmt::format("set '{}' as a whole", before));
     }
 
@@ -53,7 +57,8 @@ private:
         return {&source_, 1, static_cast<int>(at) + 1, static_cast<int>(std::max<std::size_t>(length, 1))};
     }
 
-    /// Length of the next part of the path. Names may hold dots ("Material.001"), so a key that is there wins over the first dot.
+    /// Length of the next part of the path. Names may hold dots ("Material.001"), so a key that is there
+    /// wins over the first dot.
     std::size_t partLength(const YamlNode& map, std::size_t at) const {
         const std::string_view rest = std::string_view(path_).substr(at);
         std::size_t longest = 0;
@@ -67,7 +72,8 @@ private:
         const std::size_t length = partLength(map, at);
         const std::string key = path_.substr(at, length);
         const bool last = at + length == path_.size();
-        const auto entry = std::find_if(map.entries.begin(), map.entries.end(), [&](const YamlEntry& e) { return e.key == key; });
+        const auto entry = std::find_if(map.entries.begin(), map.entries.end(),
+                                        [&](const YamlEntry& e) { return e.key == key; });
         if (entry != map.entries.end()) {
             if (!last) return apply(entry->value, value, at + length + 1);
             entry->key_place = place(at, length);
@@ -78,7 +84,9 @@ private:
         if (!last && namesAreFree(at)) {
             std::vector<std::string> names;
             for (const YamlEntry& e : map.entries) names.push_back(e.key);
-            out_.error(place(at, length), fmt::format("there is no '{}' in '{}'", key, path_.substr(0, at - 1)), didYouMean(key, names));
+            out_.error(place(at, length),
+                       fmt::format("there is no '{}' in '{}'", key, path_.substr(0, at - 1)),
+                       didYouMean(key, names));
             return;
         }
         YamlNodePtr node = value;
@@ -103,9 +111,10 @@ private:
         if (!index.value || *index.value >= list.items.size()) {
             const std::string list_name = path_.substr(0, at > 0 ? at - 1 : 0);
             out_.error(place(at, length),
-                       list.items.empty() ? fmt::format("'{}' is an empty list", list_name)
-                                          : fmt::format("'{}' is a list; expected an index from 0 to {}, found '{}'", list_name,
-                                                        list.items.size() - 1, path_.substr(at, length)));
+                       list.items.empty()
+                           ? fmt::format("'{}' is an empty list", list_name)
+                           : fmt::format("'{}' is a list; expected an index from 0 to {}, found '{}'",
+                                         list_name, list.items.size() - 1, path_.substr(at, length)));
             return;
         }
         YamlNodePtr& item = list.items[*index.value];
@@ -120,19 +129,24 @@ private:
     Diagnostics& out_;
 };
 
-void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrides, std::deque<YamlSource>& sources, Diagnostics& out) {
+void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrides,
+                    std::deque<YamlSource>& sources, Diagnostics& out) {
     for (const SceneOverride& change : overrides) {
-        const YamlSource& source = sources.emplace_back(fmt::format("--set {}", change.path), change.path + "=" + change.value, true);
+        const YamlSource& source = sources.emplace_back(fmt::format("--set {}", change.path),
+                                                        change.path + "=" + change.value, true);
         const std::size_t before = out.count();
-        const YamlNodePtr value = readYaml(source, change.value, out, static_cast<int>(change.path.size()) + 1);
+        const YamlNodePtr value =
+            readYaml(source, change.value, out, static_cast<int>(change.path.size()) + 1);
         if (value)
             OverrideWalk(change, source, out).apply(root, value);
         else if (out.count() == before)
-            out.error({&source, 1, static_cast<int>(change.path.size()) + 1, 1}, "there is no value after '='; null says none");
+            out.error({&source, 1, static_cast<int>(change.path.size()) + 1, 1},
+                      "there is no value after '='; null says none");
     }
 }
 
-// ---- Sections --------------------------------------------------------------------------------------------------------
+// ---- Sections
+// --------------------------------------------------------------------------------------------------------
 
 void readFilm(const SectionReader& section, SpectrumReader& spectra, FilmSettings& film) {
     constexpr std::int64_t kMaxPixels = std::int64_t{1} << 31;  // Pixels are numbered in 32 bits.
@@ -140,7 +154,8 @@ void readFilm(const SectionReader& section, SpectrumReader& spectra, FilmSetting
     if (section.read("resolution", size)) {
         const std::int64_t pixels = std::int64_t{size[0]} * size[1];
         if (pixels > kMaxPixels)
-            section.error("resolution", fmt::format("{} x {} are {} pixels; a film has at most 2^31", size[0], size[1], pixels));
+            section.error("resolution", fmt::format("{} x {} are {} pixels; a film has at most 2^31",
+                                                    size[0], size[1], pixels));
         film.width = size[0];
         film.height = size[1];
     }
@@ -149,23 +164,29 @@ void readFilm(const SectionReader& section, SpectrumReader& spectra, FilmSetting
         if (crop[0] >= crop[2] || crop[1] >= crop[3])
             section.error("crop", "this window is empty; crop is [x0, y0, x1, y1) with x0 < x1 and y0 < y1");
         else if (crop[2] > film.width || crop[3] > film.height)
-            section.error("crop", fmt::format("this window goes beyond the film of {} x {} pixels", film.width, film.height));
+            section.error("crop", fmt::format("this window goes beyond the film of {} x {} pixels",
+                                              film.width, film.height));
         std::copy(crop.begin(), crop.end(), film.crop.begin());
     }
 
     double radius = 0;
     bool radius_given = false;
-    if (const YamlEntry* filter = section.find("filter"); filter != nullptr && filter->value->kind == YamlKind::Map) {
+    if (const YamlEntry* filter = section.find("filter");
+        filter != nullptr && filter->value->kind == YamlKind::Map) {
         const std::optional<SectionReader> details = section.section("filter", "the filter");
         details->readEnum("type", film.filter);
         radius_given = details->read("radius", radius);
         details->read("sigma", film.filter_sigma);
-        if (details->has("sigma") && film.filter != PixelFilter::Gaussian) details->error("sigma", "only a gaussian filter has a sigma");
+        if (details->has("sigma") && film.filter != PixelFilter::Gaussian)
+            details->error("sigma", "only a gaussian filter has a sigma");
     } else {
         section.readEnum("filter", film.filter);
     }
-    constexpr double kSmoothRadius = 1.5;  // Pixels; a narrower window cuts a bell off while it is still high.
-    film.filter_radius = radius_given ? radius : film.filter == PixelFilter::Box ? FilmSettings{}.filter_radius : kSmoothRadius;
+    constexpr double kSmoothRadius =
+        1.5;  // Pixels; a narrower window cuts a bell off while it is still high.
+    film.filter_radius = radius_given                      ? radius
+                         : film.filter == PixelFilter::Box ? FilmSettings{}.filter_radius
+                                                           : kSmoothRadius;
 
     section.readEnum("color_space", film.color_space);
     film.white_balance = spectra.read(section, "white_balance", SpectrumUse::White);
@@ -180,18 +201,22 @@ double length(const Vec3d& v) { return std::hypot(v[0], v[1], v[2]); }
 /// Finds what leaves the view without a direction or the picture without an up.
 void checkView(const SectionReader& section, const Camera& camera) {
     constexpr double kParallel = 1e-9;  // Sine of the angle below which up × view is only rounding.
-    const Vec3d view{camera.target[0] - camera.position[0], camera.target[1] - camera.position[1], camera.target[2] - camera.position[2]};
+    const Vec3d view{camera.target[0] - camera.position[0], camera.target[1] - camera.position[1],
+                     camera.target[2] - camera.position[2]};
     const double view_length = length(view), up_length = length(camera.up);
     const std::string_view aim = section.has("target") ? "target" : "position";
-    if (view_length == 0) return section.error(aim, "position and target are the same point, so the camera looks nowhere");
-    if (!std::isfinite(view_length)) return section.error(aim, "position and target are too far apart for a double");
+    if (view_length == 0)
+        return section.error(aim, "position and target are the same point, so the camera looks nowhere");
+    if (!std::isfinite(view_length))
+        return section.error(aim, "position and target are too far apart for a double");
     if (up_length == 0) return section.error("up", "up has length 0");
     if (!std::isfinite(up_length)) return section.error("up", "up is too long for a double");
     Vec3d v = view, u = camera.up;
     for (std::size_t i = 0; i < 3; ++i) v[i] /= view_length, u[i] /= up_length;
     const Vec3d side{v[1] * u[2] - v[2] * u[1], v[2] * u[0] - v[0] * u[2], v[0] * u[1] - v[1] * u[0]};
     if (length(side) < kParallel)
-        section.error(section.has("up") ? "up" : aim, "up is parallel to the view, so the picture could be turned any way",
+        section.error(section.has("up") ? "up" : aim,
+                      "up is parallel to the view, so the picture could be turned any way",
                       section.has("up") ? "" : "set 'up', which is [0, 1, 0] when left out");
 }
 
@@ -202,29 +227,35 @@ void setFieldOfView(Camera& camera, const FilmSettings& film, double tan_shorter
     camera.tan_half_height = tan_shorter * std::max(1 / aspect, 1.0);
 }
 
-/// `errors_before` is the count before the section was opened: a misspelt position makes no second error of the view.
-void readCamera(const SectionReader& section, std::size_t errors_before, const FilmSettings& film, Camera& camera) {
+/// `errors_before` is the count before the section was opened: a misspelt position makes no second error of
+/// the view.
+void readCamera(const SectionReader& section, std::size_t errors_before, const FilmSettings& film,
+                Camera& camera) {
     camera.place = section.place().resolved();
-    for (const auto& [key, value] : {std::pair{"position", &camera.position}, {"target", &camera.target}, {"up", &camera.up}})
+    for (const auto& [key, value] :
+         {std::pair{"position", &camera.position}, {"target", &camera.target}, {"up", &camera.up}})
         section.read(key, *value);
     if (section.diagnostics().count() == errors_before) checkView(section, camera);
 
     double fov = 0, focal_length = 0;
     std::vector<double> sensor;
     if (section.read("fov", fov)) setFieldOfView(camera, film, std::tan(fov * (std::numbers::pi / 360)));
-    const bool have_focal_length = section.read("focal_length", focal_length), have_sensor = section.read("sensor", sensor);
+    const bool have_focal_length = section.read("focal_length", focal_length),
+               have_sensor = section.read("sensor", sensor);
     if (have_focal_length && have_sensor) {
         camera.tan_half_width = sensor[0] / (2 * focal_length);
         camera.tan_half_height = sensor[1] / (2 * focal_length);
-        if (!std::isfinite(camera.tan_half_width) || !std::isfinite(camera.tan_half_height) || camera.tan_half_width == 0 ||
-            camera.tan_half_height == 0)
+        if (!std::isfinite(camera.tan_half_width) || !std::isfinite(camera.tan_half_height) ||
+            camera.tan_half_width == 0 || camera.tan_half_height == 0)
             section.error("sensor", "sensor and focal_length give no field of view");
         constexpr double kSquareEnough = 1e-3;
         const double pixel_aspect = sensor[0] / sensor[1] * film.height / film.width;
         if (std::abs(pixel_aspect - 1) > kSquareEnough) {
             const SourcePlace at = section.place("sensor").resolved();
-            logWarning("{}:{}:{}: sensor and resolution have different proportions: pixels are {:.4g} times as wide as high", at.file,
-                       at.line, at.column, pixel_aspect);
+            logWarning(
+                "{}:{}:{}: sensor and resolution have different proportions: pixels are {:.4g} times as "
+                "wide as high",
+                at.file, at.line, at.column, pixel_aspect);
         }
     }
     section.read("aperture_radius", camera.aperture_radius);
@@ -245,15 +276,19 @@ void readSampler(const SectionReader& section, SamplerSettings& settings) {
     section.readEnum("type", settings.type);
     section.read("seed", settings.seed);
     section.read("samples", settings.samples);
-    if (section.read("replicates", settings.replicates) && !std::has_single_bit(static_cast<unsigned>(settings.replicates)))
-        section.error("replicates", fmt::format("{} replicates cannot be had: 2, 4, 8 or 16, or 1 for a single sequence", settings.replicates));
+    if (section.read("replicates", settings.replicates) &&
+        !std::has_single_bit(static_cast<unsigned>(settings.replicates)))
+        section.error("replicates",
+                      fmt::format("{} replicates cannot be had: 2, 4, 8 or 16, or 1 for a single sequence",
+                                  settings.replicates));
 }
 
 void readOutput(const SectionReader& section, std::vector<Output>& outputs) {
     Output output;
     output.place = section.place().resolved();
     const bool named = section.read("file", output.file);
-    if (named && std::any_of(outputs.begin(), outputs.end(), [&](const Output& o) { return o.file == output.file; }))
+    if (named &&
+        std::any_of(outputs.begin(), outputs.end(), [&](const Output& o) { return o.file == output.file; }))
         section.error("file", fmt::format("'{}' is written twice", output.file));
 
     bool format_known = section.readEnum("format", output.format);
@@ -268,7 +303,9 @@ void readOutput(const SectionReader& section, std::vector<Output>& outputs) {
         if (format_known)
             output.format = static_cast<OutputFormat>(found - formats.begin());
         else
-            section.error("file", fmt::format("'{}' does not end in one of .{}; add 'format'", output.file, fmt::join(formats, ", .")),
+            section.error("file",
+                          fmt::format("'{}' does not end in one of .{}; add 'format'", output.file,
+                                      fmt::join(formats, ", .")),
                           didYouMean(extension, formats));
     }
 
@@ -296,9 +333,11 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
     if (const auto section = top.section("film", "film")) readFilm(*section, spectra, scene.film);
     const std::size_t errors_before = out.count();
     const auto camera = top.section("camera", "camera");
-    setFieldOfView(scene.camera, scene.film, std::min(scene.camera.tan_half_width, scene.camera.tan_half_height));
+    setFieldOfView(scene.camera, scene.film,
+                   std::min(scene.camera.tan_half_width, scene.camera.tan_half_height));
     if (camera) readCamera(*camera, errors_before, scene.film, scene.camera);
-    if (const auto section = top.section("integrator", "integrator")) readIntegrator(*section, scene.integrator);
+    if (const auto section = top.section("integrator", "integrator"))
+        readIntegrator(*section, scene.integrator);
     if (const auto section = top.section("sampler", "sampler")) readSampler(*section, scene.sampler);
 
     ObjectReader objects(out, files, spectra, scene);
@@ -309,7 +348,8 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
             scene.environment = Environment{*std::move(radiance)};
     if (const YamlNode* list = top.list("outputs"))
         for (std::size_t i = 0; i < list->items.size(); ++i)
-            readOutput(SectionReader(out, *list->items[i], list->items[i]->place, schemaSection("output"), fmt::format("output {}", i)),
+            readOutput(SectionReader(out, *list->items[i], list->items[i]->place, schemaSection("output"),
+                                     fmt::format("output {}", i)),
                        scene.outputs);
 
     spectra.finish();
@@ -317,7 +357,8 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
     if (!out.failed()) objects.finish();
 }
 
-/// The version comes first so that a reader of another version can stop before it meets a key it does not know.
+/// The version comes first so that a reader of another version can stop before it meets a key it does not
+/// know.
 void checkFirstKey(const YamlNode& root, Diagnostics& out) {
     if (root.kind != YamlKind::Map) return;
     const YamlEntry* version = root.find("crt");
@@ -325,7 +366,8 @@ void checkFirstKey(const YamlNode& root, Diagnostics& out) {
         out.error(version->key_place, "'crt' must be the first key of a scene");
 }
 
-Scene parse(const std::string& yaml, const std::string& name, const std::vector<SceneOverride>& overrides, SceneFiles files) {
+Scene parse(const std::string& yaml, const std::string& name, const std::vector<SceneOverride>& overrides,
+            SceneFiles files) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = name;
@@ -334,7 +376,8 @@ Scene parse(const std::string& yaml, const std::string& name, const std::vector<
     std::deque<YamlSource> override_sources;  // Places point to them: they must not move.
     Diagnostics out;
     YamlNodePtr root = readYaml(source, yaml, out);
-    if (!root && !out.failed()) out.error({&source, 0, 0, 1}, "there is nothing in this file; a scene begins with 'crt: 1'");
+    if (!root && !out.failed())
+        out.error({&source, 0, 0, 1}, "there is nothing in this file; a scene begins with 'crt: 1'");
     if (root) {
         checkFirstKey(*root, out);
         applyOverrides(root, overrides, override_sources, out);
@@ -364,12 +407,18 @@ std::string nameOf(const std::string& path) { return path == kStandardInput ? "s
 /// The whole text: of a file, or of standard input for "-".
 std::string readSceneText(const std::string& path) {
     try {
-        return path == kStandardInput ? readStandardInput(kMostSceneBytes) : readInput(path, kMostSceneBytes);
+        return path == kStandardInput ? readStandardInput(kMostSceneBytes)
+                                      : readInput(path, kMostSceneBytes);
     } catch (const InputRefused& refused) {
         const std::string why = refused.what();
         const bool large = why.starts_with("has "), pipe = why.starts_with("is a pipe");
-        cannotRead(nameOf(path), (path == kStandardInput ? "standard input " : why.starts_with("cannot") ? "" : "this ") + why +
-                                     (large ? "; put large meshes into OBJ files" : pipe ? "; for standard input write '-'" : ""));
+        cannotRead(nameOf(path), (path == kStandardInput      ? "standard input "
+                                  : why.starts_with("cannot") ? ""
+                                                              : "this ") +
+                                     why +
+                                     (large  ? "; put large meshes into OBJ files"
+                                      : pipe ? "; for standard input write '-'"
+                                             : ""));
     }
 }
 
@@ -378,7 +427,9 @@ std::string readSceneText(const std::string& path) {
 SceneOverride parseOverride(const std::string& text) {
     const std::size_t equals = text.find('=');
     if (equals == std::string::npos || equals == 0)
-        throw Error(ErrorKind::Usage, fmt::format("--set {}: expected KEY.PATH=VALUE, such as film.resolution=[128,128]", text));
+        throw Error(
+            ErrorKind::Usage,
+            fmt::format("--set {}: expected KEY.PATH=VALUE, such as film.resolution=[128,128]", text));
     return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
@@ -391,7 +442,8 @@ Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overr
     return scene;
 }
 
-Scene parseScene(const std::string& yaml, const std::string& name, const std::string& directory, const std::vector<SceneOverride>& overrides) {
+Scene parseScene(const std::string& yaml, const std::string& name, const std::string& directory,
+                 const std::vector<SceneOverride>& overrides) {
     return parse(yaml, name, overrides, SceneFiles(directory));
 }
 

@@ -1,5 +1,5 @@
-/// YAML → Scene. One table (scene_schema.cpp) describes every key; the parser, the did-you-mean, docs/scene.md and the JSON
-/// Schema all come from it.
+/// YAML → Scene. One table (scene_schema.cpp) describes every key; the parser, the did-you-mean,
+/// docs/scene.md and the JSON Schema all come from it.
 #pragma once
 
 #include "scene/scene.h"
@@ -18,9 +18,10 @@ struct SceneOverride {
 /// Splits "film.resolution=[128,128]". Throws crt::Error(Usage) when there is no '='.
 SceneOverride parseOverride(const std::string& text);
 
-/// Reads and checks a scene file. Throws crt::Error(Scene) whose message holds every error of the file at once, each as
-/// "file:line:column: error: …" with the line, a caret, and the nearest key. Relative file names in the scene are looked up beside the scene
-/// file, then in the mesh directory (CRT_MESH_PATH, or share/crt/meshes beside the installed program).
+/// Reads and checks a scene file. Throws crt::Error(Scene) whose message holds every error of the file at
+/// once, each as "file:line:column: error: …" with the line, a caret, and the nearest key. Relative file
+/// names in the scene are looked up beside the scene file, then in the mesh directory (CRT_MESH_PATH, or
+/// share/crt/meshes beside the installed program).
 /// "-" is standard input, which is beside the current directory.
 Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides = {});
 

@@ -21,7 +21,7 @@
 namespace crt {
 namespace {
 
-constexpr std::size_t kMaxDepth = 64;           // A scene needs 8; the bound keeps every later recursion safe.
+constexpr std::size_t kMaxDepth = 64;  // A scene needs 8; the bound keeps every later recursion safe.
 constexpr std::size_t kMaxErrorsShown = 50;
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 
@@ -30,12 +30,15 @@ bool isContinuationByte(char c) { return (static_cast<unsigned char>(c) & 0xc0u)
 /// Number of characters (code points) in the first `bytes` bytes.
 std::size_t characters(std::string_view text, std::size_t bytes) {
     text = text.substr(0, std::min(bytes, text.size()));
-    return text.size() - static_cast<std::size_t>(std::count_if(text.begin(), text.end(), isContinuationByte));
+    return text.size() -
+           static_cast<std::size_t>(std::count_if(text.begin(), text.end(), isContinuationByte));
 }
 
-// ---- The text itself -------------------------------------------------------------------------------------------------
+// ---- The text itself
+// -------------------------------------------------------------------------------------------------
 
-/// Length of the valid UTF-8 sequence at the start of `s`, 0 when it is not one (overlong forms and surrogates included).
+/// Length of the valid UTF-8 sequence at the start of `s`, 0 when it is not one (overlong forms and
+/// surrogates included).
 std::size_t utf8Length(std::string_view s) {
     const auto byte = [&](std::size_t i) { return i < s.size() ? static_cast<unsigned char>(s[i]) : 0u; };
     const auto tail = [&](std::size_t from, std::size_t to) {
@@ -57,7 +60,8 @@ std::size_t utf8Length(std::string_view s) {
     return 0;
 }
 
-/// Reports the first byte that cannot be in a text file. A picture or a mesh given by mistake ends here, with its reason.
+/// Reports the first byte that cannot be in a text file. A picture or a mesh given by mistake ends here,
+/// with its reason.
 bool checkText(const YamlSource& source, std::string_view text, Diagnostics& out) {
     int line = 1, column = 1;
     for (std::size_t i = 0; i < text.size();) {
@@ -65,7 +69,8 @@ bool checkText(const YamlSource& source, std::string_view text, Diagnostics& out
         const std::size_t length = utf8Length(text.substr(i));
         if (c == 0x7fu || (c < 0x20u && c != '\t' && c != '\n' && c != '\r') || length == 0) {
             out.error({&source, line, column, 1},
-                      fmt::format("byte 0x{:02x} at offset {} is not text: a scene is a YAML file in UTF-8", c, i));
+                      fmt::format("byte 0x{:02x} at offset {} is not text: a scene is a YAML file in UTF-8",
+                                  c, i));
             return false;
         }
         column += static_cast<int>(length);
@@ -75,7 +80,8 @@ bool checkText(const YamlSource& source, std::string_view text, Diagnostics& out
     return true;
 }
 
-/// A stream over memory that is already there; std::istringstream would copy a scene of hundreds of megabytes.
+/// A stream over memory that is already there; std::istringstream would copy a scene of hundreds of
+/// megabytes.
 class MemoryBuffer : public std::streambuf {
 public:
     explicit MemoryBuffer(std::string_view text) {
@@ -84,14 +90,16 @@ public:
     }
 };
 
-// ---- Events → tree ---------------------------------------------------------------------------------------------------
+// ---- Events → tree
+// ---------------------------------------------------------------------------------------------------
 
 /// yaml-cpp blames what follows a tab, not the tab.
 std::string tabHint(const YamlSource& source, int line) {
     if (line < 1 || static_cast<std::size_t>(line) > source.lines.size()) return {};
     const std::string& text = source.lines[static_cast<std::size_t>(line) - 1];
     const std::size_t first = text.find_first_not_of(' ');
-    return first != std::string::npos && text[first] == '\t' ? "indent with blanks; YAML has no tabs there" : "";
+    return first != std::string::npos && text[first] == '\t' ? "indent with blanks; YAML has no tabs there"
+                                                             : "";
 }
 
 /// Thrown out of yaml-cpp's parser when going on makes no sense; the error is already recorded.
@@ -107,7 +115,8 @@ public:
     YamlPlace placeOf(const YAML::Mark& mark, std::size_t length = 1) const {
         if (mark.is_null()) return {&source_, 0, 0, 1};
         const int shift = mark.line == 0 ? first_column_ : 0;
-        return {&source_, mark.line + 1, mark.column + 1 + shift, static_cast<int>(std::max<std::size_t>(length, 1))};
+        return {&source_, mark.line + 1, mark.column + 1 + shift,
+                static_cast<int>(std::max<std::size_t>(length, 1))};
     }
 
     void OnDocumentStart(const YAML::Mark& mark) override {
@@ -125,9 +134,11 @@ public:
         attach(std::move(node), "an empty key");
     }
 
-    void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor, const std::string& value) override {
+    void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                  const std::string& value) override {
         const bool quoted = tag == "!";
-        auto node = make(YamlKind::Scalar, placeOf(mark, value.substr(0, value.find('\n')).size() + (quoted ? 2 : 0)));
+        auto node = make(YamlKind::Scalar,
+                         placeOf(mark, value.substr(0, value.find('\n')).size() + (quoted ? 2 : 0)));
         node->text = value;
         node->quoted = quoted;
         if (!quoted) refuseTag(tag, node->place);
@@ -217,7 +228,8 @@ private:
         attach(frame.node, node.kind == YamlKind::List ? "a list as a key" : "a map as a key");
     }
 
-    /// Puts a finished value where it belongs. `not_a_key` says what it would be if it stood in the place of a key.
+    /// Puts a finished value where it belongs. `not_a_key` says what it would be if it stood in the place of
+    /// a key.
     void attach(YamlNodePtr node, std::string_view not_a_key) {
         const YamlPlace place = node->place;
         attach(std::move(node), not_a_key, place);
@@ -240,7 +252,8 @@ private:
             if (frame.key == "<<" && !node->quoted) {
                 out_.error(place, "merge keys ('<<') are not part of a scene; write the keys out");
             } else if (const auto [it, fresh] = frame.line_of_key.emplace(frame.key, place.line); !fresh) {
-                out_.error(place, fmt::format("duplicate key '{}', already given in line {}", frame.key, it->second));
+                out_.error(place, fmt::format("duplicate key '{}', already given in line {}", frame.key,
+                                              it->second));
             } else {
                 frame.key_bad = false;
             }
@@ -252,7 +265,8 @@ private:
             return;
         }
         frame.key_pending = false;
-        if (!frame.key_bad) frame.node->entries.push_back({std::move(frame.key), frame.key_place, place, std::move(node)});
+        if (!frame.key_bad)
+            frame.node->entries.push_back({std::move(frame.key), frame.key_place, place, std::move(node)});
         frame.key.clear();
     }
 
@@ -260,7 +274,8 @@ private:
         // Stops "billion laughs" before anything walks them.
         parent.size += added;
         if (parent.size <= written_) return;
-        const std::string why = limit_.refusal(parent.size - written_, "values behind aliases", kBytesPerAliasedValue);
+        const std::string why =
+            limit_.refusal(parent.size - written_, "values behind aliases", kBytesPerAliasedValue);
         if (why.empty()) return;
         out_.error(place, why);
         throw StopParsing{};
@@ -277,7 +292,8 @@ private:
     std::unordered_set<YAML::anchor_t> open_anchors_;
 };
 
-// ---- Messages --------------------------------------------------------------------------------------------------------
+// ---- Messages
+// --------------------------------------------------------------------------------------------------------
 
 /// Messages quote whatever was given; what is no text in it must reach neither a terminal nor a JSON report.
 std::string printable(std::string_view text) {
@@ -310,11 +326,13 @@ std::string excerpt(const YamlPlace& place, const std::string& suggestion) {
     const char* const before = begin > 0 ? "…" : "";
     const std::size_t indent = characters(shown, at - begin) + (begin > 0 ? 1 : 0);
     const std::size_t marked_end = std::min(at + static_cast<std::size_t>(place.length), end);
-    const std::size_t marked = marked_end > at ? characters(std::string_view(line).substr(at), marked_end - at) : 1;
+    const std::size_t marked =
+        marked_end > at ? characters(std::string_view(line).substr(at), marked_end - at) : 1;
 
     const std::string number = place.source->command_line ? std::string() : std::to_string(place.line);
-    return fmt::format("\n{:>5} | {}{}{}\n      | {:{}}^{:~<{}}{}{}", number, before, shown, end < line.size() ? "…" : "", "",
-                       indent, "", marked > 0 ? marked - 1 : 0, suggestion.empty() ? "" : " ", suggestion);
+    return fmt::format("\n{:>5} | {}{}{}\n      | {:{}}^{:~<{}}{}{}", number, before, shown,
+                       end < line.size() ? "…" : "", "", indent, "", marked > 0 ? marked - 1 : 0,
+                       suggestion.empty() ? "" : " ", suggestion);
 }
 
 }  // namespace
@@ -337,7 +355,8 @@ SourcePlace YamlPlace::resolved() const {
     if (source->command_line || line <= 0) return {source->name, 0, 0};
     const auto row = static_cast<std::size_t>(line);
     if (row > source->lines.size()) return {source->name, line, column};
-    return {source->name, line, static_cast<int>(characters(source->lines[row - 1], static_cast<std::size_t>(column) - 1)) + 1};
+    return {source->name, line,
+            static_cast<int>(characters(source->lines[row - 1], static_cast<std::size_t>(column) - 1)) + 1};
 }
 
 const YamlEntry* YamlNode::find(std::string_view key) const {
@@ -346,7 +365,8 @@ const YamlEntry* YamlNode::find(std::string_view key) const {
     return nullptr;
 }
 
-void Diagnostics::error(const YamlPlace& place, std::string message, std::string suggestion, std::string note) {
+void Diagnostics::error(const YamlPlace& place, std::string message, std::string suggestion,
+                        std::string note) {
     // A named spectrum used twice is checked twice; say once what is wrong with it.
     for (const Entry& e : errors_)
         if (e.place.source == place.source && e.place.line == place.line && e.place.column == place.column &&
@@ -366,7 +386,8 @@ void Diagnostics::throwIfFailed() const {
     for (const Entry& e : errors_) order.push_back(&e);
     std::stable_sort(order.begin(), order.end(), [](const Entry* a, const Entry* b) {
         const auto key = [](const Entry* e) {
-            return std::tuple(e->place.source != nullptr && e->place.source->command_line, e->place.line, e->place.column);
+            return std::tuple(e->place.source != nullptr && e->place.source->command_line, e->place.line,
+                              e->place.column);
         };
         return key(a) < key(b);
     });
@@ -386,7 +407,8 @@ void Diagnostics::throwIfFailed() const {
             text += fmt::format(" ({})", e.suggestion);
         if (!e.note.empty()) text += fmt::format("\n      = {}", e.note);
     }
-    if (order.size() > kMaxErrorsShown) text += fmt::format("\n… and {} more errors", count() - kMaxErrorsShown);
+    if (order.size() > kMaxErrorsShown)
+        text += fmt::format("\n… and {} more errors", count() - kMaxErrorsShown);
     throw Error(ErrorKind::Scene, printable(text), order.front()->place.resolved());
 }
 

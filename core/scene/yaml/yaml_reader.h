@@ -1,8 +1,9 @@
-/// The safe walk of yaml-cpp: text → a tree of our own that keeps the place of every key and value, and the list of
-/// everything found wrong on the way.
+/// The safe walk of yaml-cpp: text → a tree of our own that keeps the place of every key and value, and the
+/// list of everything found wrong on the way.
 ///
-/// yaml-cpp 0.7's Node silently keeps duplicate keys, reads 012 as ten, refuses 1e3 as an integer, calls `no` a boolean and
-/// lets an alias close a cycle. So only its events are used here; text becomes numbers in scalar functions below and nowhere else.
+/// yaml-cpp 0.7's Node silently keeps duplicate keys, reads 012 as ten, refuses 1e3 as an integer, calls
+/// `no` a boolean and lets an alias close a cycle. So only its events are used here; text becomes numbers in
+/// scalar functions below and nowhere else.
 #pragma once
 
 #include "base/words.h"
@@ -55,7 +56,8 @@ struct YamlNode {
     YamlKind kind = YamlKind::Null;
     YamlPlace place;
     std::string text;     ///< Scalars.
-    bool reported = false;  ///< A cycle stood here: an error already, so what is missing now is no second one.
+    bool reported =
+        false;            ///< A cycle stood here: an error already, so what is missing now is no second one.
     bool quoted = false;  ///< Scalars written with quotes are text whatever they look like.
     std::vector<YamlNodePtr> items;   ///< Lists.
     std::vector<YamlEntry> entries;   ///< Maps, in the order of the file, without duplicates.
@@ -67,12 +69,14 @@ struct YamlNode {
 /// Everything wrong with one scene. Reading goes on after an error so that one run shows them all.
 class Diagnostics {
 public:
-    /// `suggestion` ends the caret line ("did you mean 'reflectance'?"), `note` stands below it ("keys of …").
-    void error(const YamlPlace& place, std::string message, std::string suggestion = {}, std::string note = {});
+    /// `suggestion` ends the caret line ("did you mean 'reflectance'?"), `note` stands below it ("keys of
+    /// …").
+    void error(const YamlPlace& place, std::string message, std::string suggestion = {},
+               std::string note = {});
     bool failed() const { return !errors_.empty(); }
     std::size_t count() const { return errors_.size() + not_kept_; }
-    /// Whether to look for the nearest of so many names: the first errors get a suggestion, however many names there are, but not a hundred thousand
-    /// errors over a hundred thousand names.
+    /// Whether to look for the nearest of so many names: the first errors get a suggestion, however many
+    /// names there are, but not a hundred thousand errors over a hundred thousand names.
     bool worthSuggesting(std::size_t names) const { return count() * names <= 1'000'000; }
     /// Throws crt::Error(Scene) with all errors in the order of the text, if there are any.
     void throwIfFailed() const;
@@ -86,9 +90,11 @@ private:
     std::size_t not_kept_ = 0;
 };
 
-/// Parses one YAML document. Syntax errors, binary data, duplicate keys, merge keys, tags, cycles and depth go to `out`. Null when
-/// nothing usable is there. `text` begins at byte `first_column` (from 0) of the source's first line.
-YamlNodePtr readYaml(const YamlSource& source, std::string_view text, Diagnostics& out, int first_column = 0);
+/// Parses one YAML document. Syntax errors, binary data, duplicate keys, merge keys, tags, cycles and depth
+/// go to `out`. Null when nothing usable is there. `text` begins at byte `first_column` (from 0) of the
+/// source's first line.
+YamlNodePtr readYaml(const YamlSource& source, std::string_view text, Diagnostics& out,
+                     int first_column = 0);
 
 /// "a number", "a list": what a node is, for "expected …, found …".
 std::string describeNode(const YamlNode& node);
