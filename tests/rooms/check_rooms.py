@@ -1,0 +1,170 @@
+#!/usr/bin/env python3
+"""The rooms of core/ and the arrows between them, as core/CMakeLists.txt says them.
+
+    tests/rooms/check_rooms.py                  exit code 1 when something goes against the arrows
+    tests/rooms/check_rooms.py --build DIR      also looks at the include roots of a build tree
+    tests/rooms/check_rooms.py --draw           the picture of docs/architecture.md
+    tests/rooms/check_rooms.py --write          puts that picture there
+
+What is checked: only CMakeLists.txt and rooms lie directly in core/; every source file of a room is in its target;
+every include of another room's header follows the arrows; no target links a room outside crt_room(); an include
+root holds the headers of its own room alone; docs/architecture.md has the picture that --draw makes.
+"""
+
+import argparse
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+CORE = ROOT / "core"
+PAGE = ROOT / "docs" / "architecture.md"
+BEGIN, END = "<!-- rooms: tests/rooms/check_rooms.py --write -->\n", "<!-- /rooms -->\n"
+KEYWORDS = ("SOURCES", "USES", "LIBRARIES", "HEADERS")
+# Files of a room's folder that other targets are made of.
+OTHER_TARGETS = {"image/image_io_oiio.cpp", "image/image_headers.cpp", "backend/sdk/kernel_cache.cpp", "cli/main.cpp"}
+
+
+class Room:
+    def __init__(self, folder, comment, words):
+        self.folder, self.comment = folder, comment
+        self.parts = {k: [] for k in KEYWORDS}
+        part = None
+        for word in words:
+            if word in KEYWORDS:
+                part = self.parts[word]
+            elif part is not None:
+                part.append(word)
+
+    @property
+    def uses(self):
+        return self.parts["USES"]
+
+
+def read_rooms(text):
+    """Rooms in the order of the file, which is that of the data."""
+    rooms = {}
+    for match in re.finditer(r"((?:^# .*\n)*)^crt_room\(([^)]*)\)", text, re.MULTILINE):
+        comment = " ".join(line[2:] for line in match.group(1).splitlines())
+        folder, *words = match.group(2).split()
+        rooms[folder] = Room(folder, comment, words)
+    return rooms
+
+
+def seen_from(rooms, folder):
+    """The rooms whose headers a room sees: those that it uses, those that these use, and so on."""
+    seen, waiting = set(), list(rooms[folder].uses)
+    while waiting:
+        room = waiting.pop()
+        if room not in seen:
+            seen.add(room)
+            waiting += rooms[room].uses
+    return seen
+
+
+def room_of(rooms, header):
+    """The room of "film/film.h", or None for a header that is not of core/."""
+    folder = str(pathlib.PurePosixPath(header).parent)
+    if not (CORE / header).is_file():
+        return None
+    for name, room in rooms.items():
+        if header in room.parts["HEADERS"]:
+            return name
+    return folder if folder in rooms else None
+
+
+def check_sources(rooms):
+    for entry in sorted(CORE.iterdir()):
+        if entry.is_file() and entry.name != "CMakeLists.txt":
+            yield f"core/{entry.name} lies outside every room"
+    for file in sorted(CORE.rglob("*.cpp")):
+        name = str(file.relative_to(CORE))
+        folder = str(pathlib.PurePosixPath(name).parent)
+        if folder not in rooms:
+            yield f"core/{name}: {folder} is no room of core/CMakeLists.txt"
+        elif file.name not in rooms[folder].parts["SOURCES"] and name not in OTHER_TARGETS:
+            yield f"core/{name} is in no target"
+
+
+def check_includes(rooms):
+    for file in sorted(CORE.rglob("*")):
+        if file.suffix not in (".h", ".cpp"):
+            continue
+        folder = str(file.parent.relative_to(CORE))
+        if folder not in rooms or str(file.relative_to(CORE)) in OTHER_TARGETS:
+            continue  # Other targets say what they see themselves.
+        seen = seen_from(rooms, folder) | {folder}
+        for number, line in enumerate(file.read_text().splitlines(), 1):
+            match = re.match(r'\s*#\s*include\s+"([^"]+)"', line)
+            target = room_of(rooms, match.group(1)) if match else None
+            if target is not None and target not in seen:
+                yield f"core/{file.relative_to(CORE)}:{number}: {folder} does not use {target}"
+
+
+def check_links(rooms, text):
+    """crt_room() is the only place where rooms are linked to rooms."""
+    targets = {"crt_" + folder.replace("/", "_"): folder for folder in rooms}
+    for match in re.finditer(r"target_link_libraries\((\w+)([^)]*)\)", text):
+        if match.group(1) not in targets:
+            continue
+        for word in match.group(2).split():
+            if word in targets:
+                yield f"core/CMakeLists.txt links {word} to {match.group(1)} outside crt_room()"
+
+
+def check_roots(rooms, build):
+    for folder in rooms:
+        root = build / "rooms" / ("crt_" + folder.replace("/", "_"))
+        wanted = {str(h.relative_to(CORE)) for h in (CORE / folder).glob("*.h")} | set(rooms[folder].parts["HEADERS"])
+        found = {str(h.relative_to(root)) for h in root.rglob("*.h")} if root.is_dir() else set()
+        for header in sorted(found ^ wanted):
+            yield f"{root.relative_to(build)}: {'has' if header in found else 'lacks'} {header}"
+
+
+def draw(rooms):
+    """Reading order from top to bottom; to the right what a room uses directly."""
+    width = max(len(folder) for folder in rooms)
+    lines = ["```text"]
+    for folder, room in rooms.items():
+        # What another of its rooms brings along is not drawn again.
+        direct = [u for u in room.uses if not any(u in seen_from(rooms, v) for v in room.uses if v != u)]
+        lines.append(f"{folder:<{width}}  →  {', '.join(direct)}".rstrip(" →"))
+    return "\n".join(lines) + "\n```\n"
+
+
+def page_with(picture):
+    text = PAGE.read_text()
+    if BEGIN not in text or END not in text:
+        return None
+    before, rest = text.split(BEGIN, 1)
+    return before + BEGIN + picture + END + rest.split(END, 1)[1]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path)
+    parser.add_argument("--draw", action="store_true")
+    parser.add_argument("--write", action="store_true")
+    arguments = parser.parse_args()
+
+    text = (CORE / "CMakeLists.txt").read_text()
+    rooms = read_rooms(text)
+    if arguments.draw:
+        print(draw(rooms), end="")
+        return 0
+    if arguments.write:
+        PAGE.write_text(page_with(draw(rooms)))
+        return 0
+    complaints = [*check_sources(rooms), *check_includes(rooms), *check_links(rooms, text)]
+    if arguments.build:
+        complaints += check_roots(rooms, arguments.build)
+    if page_with(draw(rooms)) != PAGE.read_text():
+        complaints.append("docs/architecture.md shows other rooms: run tests/rooms/check_rooms.py --write")
+    for complaint in complaints:
+        print(complaint)
+    print(f"{len(rooms)} rooms, {len(complaints)} complaints")
+    return 1 if complaints or not rooms else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
