@@ -8,38 +8,17 @@
 
 namespace crt::cuda {
 
+using plugin::divideUp;
+
 namespace {
 
 constexpr double kLaunchSeconds = 0.03;
 constexpr std::uint64_t kFirstPaths = 1u << 18;
-/// Of the device's memory that films of slices may take, of what is free of it, and of any device's.
-constexpr std::uint64_t kSliceShare = 16, kFreeShare = 2, kSliceBytes = std::uint64_t{512} << 20;
-
 double now() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-std::uint64_t divideUp(std::uint64_t a, std::uint64_t b) { return (a + b - 1) / b; }
-
 }  // namespace
-
-std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, std::uint32_t samples,
-                           std::uint64_t most) {
-    // So many times the device is filled anew that its idle end, half a filling on average, is a few
-    // percent.
-    constexpr std::uint64_t kFillings = 16;
-    // A thread's paths should outweigh its start and its share of crt_add_slices, unless that leaves the
-    // device empty.
-    const std::uint64_t least_samples = blocks < resident_blocks ? 1 : 8;
-    const std::uint64_t wanted = divideUp(kFillings * resident_blocks, std::max<std::uint64_t>(blocks, 1));
-    constexpr std::uint64_t kGridRows = 65535;
-    return static_cast<std::uint32_t>(
-        std::max<std::uint64_t>(1, std::min({wanted, samples / least_samples, most, kGridRows})));
-}
-
-std::uint64_t sliceBudget(std::uint64_t device_bytes, std::uint64_t free_bytes) {
-    return std::min({kSliceBytes, device_bytes / kSliceShare, free_bytes / kFreeShare});
-}
 
 CudaIntegrator::CudaIntegrator(const plugin::Host& host, const CrtCreateInfo& info)
     : host_(host),
@@ -111,7 +90,7 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     uploaded.upload(blob.data);
     blob_ = std::move(uploaded);
     upload_seconds_ += now() - start;
-    paths_ = 0;
+    launched_.paths = 0;
     noteMemory();
 }
 
@@ -123,7 +102,7 @@ std::uint32_t CudaIntegrator::ensureSlices(std::uint32_t slices) {
     driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "asking for free memory");
     const std::uint64_t film_bytes = std::max<std::uint64_t>(film_.bytes(), 1);
     const std::uint64_t affordable =
-        sliceBudget(device_.memory_bytes, free_bytes + slices_.bytes()) / film_bytes;
+        plugin::sliceBudget(device_.memory_bytes, free_bytes + slices_.bytes()) / film_bytes;
     slices = static_cast<std::uint32_t>(std::min<std::uint64_t>(slices, affordable));
     if (slices <= std::max(slice_count_, 1u)) return std::max(slice_count_, 1u);
     slices_ = DeviceFilm();
@@ -141,9 +120,9 @@ double CudaIntegrator::launch(const Launch& launch) {
     const std::uint64_t blocks =
         divideUp(launch.x1 - launch.x0, kBlockWidth) * divideUp(launch.y1 - launch.y0, kBlockHeight);
     const std::uint64_t most =
-        sliceBudget(device_.memory_bytes, device_.memory_bytes) / std::max<std::uint64_t>(film_.bytes(), 1);
+        plugin::sliceBudget(device_.memory_bytes, device_.memory_bytes) / std::max<std::uint64_t>(film_.bytes(), 1);
     std::uint32_t slices =
-        ensureSlices(chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors,
+        ensureSlices(plugin::chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors,
                                   launch.sample_count, most));
 
     DeviceFilm& target = slices > 1 ? slices_ : film_;
@@ -181,16 +160,8 @@ double CudaIntegrator::launch(const Launch& launch) {
 
 bool CudaIntegrator::render(const CrtRenderRange& range) {
     context_.makeCurrent();
-    pacer_.begin(range, tile_size_);
-    if (host_.cancelled(0.0)) return false;
-    for (Launch next; pacer_.next(next);) {
-        const double seconds = launch(next);
-        pacer_.finished(next, seconds);
-        render_seconds_ += seconds;
-        paths_ += next.paths();
-        if (host_.cancelled(pacer_.done())) return false;
-    }
-    return true;
+    return plugin::renderInLaunches(host_, pacer_, range, tile_size_, launched_,
+                                    [this](const Launch& next) { return launch(next); });
 }
 
 void CudaIntegrator::readFilm(const CrtFilmView& film) {
@@ -216,8 +187,8 @@ void CudaIntegrator::report(CrtBackendReport& report) {
         report.spill_bytes = module.spillBytes();
     }
     report.upload_seconds = upload_seconds_;
-    report.render_seconds = render_seconds_;
-    report.paths = paths_;
+    report.render_seconds = launched_.seconds;
+    report.paths = launched_.paths;
     report.peak_memory_bytes = peak_bytes_;
     if (rays_.bytes() != 0) {
         std::vector<std::uint64_t> counts(kRayCounters * 2);

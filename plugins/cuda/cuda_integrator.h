@@ -4,6 +4,9 @@
 #include "cuda_device.h"
 #include "cuda_program.h"
 
+#include "common/film_slices.h"
+#include "common/launch_loop.h"
+
 #include "backend/crt_backend.h"
 #include "backend/sdk/launch_pacer.h"
 #include "backend/sdk/plugin_guard.h"
@@ -13,15 +16,6 @@
 #include <memory>
 
 namespace crt::cuda {
-
-/// In how many parts, each with a film of its own, a launch of `blocks` blocks should divide its samples so
-/// that a device that holds `resident_blocks` at once is full, and does not end on a few last blocks. At
-/// most `most`.
-std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, std::uint32_t samples,
-                           std::uint64_t most);
-
-/// Bytes that films of slices may take on a device of so many bytes, so many of them free.
-std::uint64_t sliceBudget(std::uint64_t device_bytes, std::uint64_t free_bytes);
 
 /// One GPU with one scene. Film and scene live on the device between calls. Failures are thrown as
 /// PluginError.
@@ -64,8 +58,9 @@ private:
     std::uint32_t slice_count_ = 0;  ///< Films in slices_.
 
     double compile_seconds_ = 0, cache_seconds_ = 0;  ///< Of programs that are no longer in use.
-    double upload_seconds_ = 0, render_seconds_ = 0;
-    std::uint64_t paths_ = 0, peak_bytes_ = 0;
+    double upload_seconds_ = 0;
+    plugin::LaunchTotals launched_;
+    std::uint64_t peak_bytes_ = 0;
 };
 
 }  // namespace crt::cuda

@@ -110,7 +110,7 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     setArgument(program_.render.get(), 2, counts_.get());
     setArgument(program_.render.get(), 3, primitives_.get());
     setArgument(program_.render.get(), 4, rays_.get());
-    paths_ = 0;
+    launched_.paths = 0;
 }
 
 double OpenClIntegrator::launch(const Launch& launch) {
@@ -144,16 +144,8 @@ double OpenClIntegrator::launch(const Launch& launch) {
 }
 
 bool OpenClIntegrator::render(const CrtRenderRange& range) {
-    pacer_.begin(range, tile_size_);
-    if (host_.cancelled(0.0)) return false;
-    for (Launch next; pacer_.next(next);) {
-        const double seconds = launch(next);
-        pacer_.finished(next, seconds);
-        render_seconds_ += seconds;
-        paths_ += next.paths();
-        if (host_.cancelled(pacer_.done())) return false;
-    }
-    return true;
+    return plugin::renderInLaunches(host_, pacer_, range, tile_size_, launched_,
+                                    [this](const Launch& next) { return launch(next); });
 }
 
 void OpenClIntegrator::readFilm(const CrtFilmView& film) {
@@ -178,8 +170,8 @@ void OpenClIntegrator::report(CrtBackendReport& report) {
     report.compile_seconds = program_.compile_seconds;
     report.cache_seconds = program_.cache_seconds;
     report.upload_seconds = upload_seconds_;
-    report.render_seconds = render_seconds_;
-    report.paths = paths_;
+    report.render_seconds = launched_.seconds;
+    report.paths = launched_.paths;
     report.peak_memory_bytes = device_.is_cpu ? 0 : peak_bytes_;
     if (rays_) {
         cl_uint counts[4] = {};

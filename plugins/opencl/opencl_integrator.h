@@ -6,6 +6,7 @@
 
 #include "backend/crt_backend.h"
 #include "backend/sdk/launch_pacer.h"
+#include "common/launch_loop.h"
 #include "backend/sdk/plugin_guard.h"
 
 #include <cstdint>
@@ -39,8 +40,8 @@ private:
     Program program_;
     Buffer scene_, sums_, counts_, primitives_, rays_;
     std::uint64_t allocated_bytes_ = 0, peak_bytes_ = 0;
-    double upload_seconds_ = 0, render_seconds_ = 0;
-    std::uint64_t paths_ = 0;
+    double upload_seconds_ = 0;
+    plugin::LaunchTotals launched_;
 };
 
 }  // namespace crt::opencl
