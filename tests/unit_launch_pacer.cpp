@@ -1,5 +1,6 @@
 // Launch pacing: whatever the budget does, every sample of every pixel is launched exactly once.
 #include "backend/sdk/launch_pacer.h"
+#include "common/film_slices.h"
 #include "catch.h"
 
 #include <cmath>
@@ -129,4 +130,23 @@ TEST_CASE("a huge range neither overflows nor is cut into nothing", "[launch_pac
     CHECK(launch.x1 == 65535);
     CHECK(launch.paths() <= (1u << 20));
     CHECK(launch.sample_count >= 1);
+}
+
+TEST_CASE("slices fill a device with few pixels, and cost no more memory than allowed", "[launch_pacer]") {
+    using crt::plugin::chooseSlices;
+    // 1000 blocks at once, filled 16 times.
+    CHECK(chooseSlices(16'000, 1000, 1 << 20, 1000) == 1);
+    CHECK(chooseSlices(1000, 1000, 1 << 20, 1000) == 16);
+    CHECK(chooseSlices(10, 1000, 1 << 20, 1000) == 1000);  // as many as memory allows, of 1600
+    CHECK(chooseSlices(10, 1000, 64, 1000) == 64);         // a sample each, or the device stays empty
+    CHECK(chooseSlices(1000, 1000, 64, 1000) == 8);        // eight samples each, where it is full anyway
+    CHECK(chooseSlices(1, 1 << 20, 1u << 31, ~std::uint64_t{0}) == 65535);  // rows of a grid
+    CHECK(chooseSlices(10, 1000, 1, 0) == 1);
+
+    using crt::plugin::sliceBudget;
+    constexpr std::uint64_t GiB = std::uint64_t{1} << 30;
+    CHECK(sliceBudget(80 * GiB, 80 * GiB) == GiB / 2);
+    CHECK(sliceBudget(4 * GiB, 4 * GiB) == GiB / 4);
+    CHECK(sliceBudget(80 * GiB, GiB / 2) == GiB / 4);
+    CHECK(sliceBudget(80 * GiB, 0) == 0);
 }
