@@ -29,8 +29,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// --- vectors
-// ---------------------------------------------------------------------------------------------------------
+// --- vectors ---------------------------------------------------------------------------------------------
 
 struct Vec {
     double x = 0, y = 0, z = 0;
@@ -46,8 +45,7 @@ Vec mix(Vec a, Vec b, double t) { return (1.0 - t) * a + t * b; }
 Vec mirrorX(Vec a) { return {-a.x, a.y, a.z}; }
 Vec mirrorZ(Vec a) { return {a.x, a.y, -a.z}; }
 
-// --- meshes
-// ----------------------------------------------------------------------------------------------------------
+// --- meshes ----------------------------------------------------------------------------------------------
 
 struct Mesh {
     std::vector<Vec> positions;
@@ -104,8 +102,7 @@ void writeObj(const Mesh& mesh, const std::filesystem::path& path, const char* t
     if (std::fclose(file) != 0 || failed) throw std::runtime_error("cannot write " + path.string());
 }
 
-// --- distance fields
-// -------------------------------------------------------------------------------------------------
+// --- distance fields -------------------------------------------------------------------------------------
 
 /// Minimum with a fillet of about width k where the two are equal.
 double smoothMin(double a, double b, double k) {
@@ -203,8 +200,7 @@ private:
     std::vector<Part> parts_;
 };
 
-// --- polygonisation
-// --------------------------------------------------------------------------------------------------
+// --- polygonisation --------------------------------------------------------------------------------------
 
 /// The surface where `field` is zero inside the box, by marching tetrahedra on a grid of `step`. Each cube
 /// is cut into six tetrahedra around one diagonal; neighbours agree on the cut of their common face, so the
@@ -342,8 +338,7 @@ Mesh withoutCrumbs(Mesh mesh) {
     return mesh;
 }
 
-// --- simplification
-// --------------------------------------------------------------------------------------------------
+// --- simplification --------------------------------------------------------------------------------------
 
 /// Sum of squared distances to a set of planes (Garland and Heckbert 1997).
 struct Quadric {
@@ -557,8 +552,7 @@ private:
     std::priority_queue<Edge> heap_;
 };
 
-// --- sphere and prism
-// ------------------------------------------------------------------------------------------------
+// --- sphere and prism ------------------------------------------------------------------------------------
 
 Mesh sphere() {
     constexpr std::uint32_t kSegments = 32, kRings = 16;
@@ -605,8 +599,7 @@ Mesh prism() {
     return mesh;
 }
 
-// --- figure
-// ----------------------------------------------------------------------------------------------------------
+// --- figure ----------------------------------------------------------------------------------------------
 
 /// An ape sitting on a block of stone and thinking, chin on hand, after the bronze that Hugo Rheinhold made
 /// in 1892.
@@ -714,8 +707,7 @@ Mesh figure() {
     return mesh;
 }
 
-// --- dragon
-// ----------------------------------------------------------------------------------------------------------
+// --- dragon ----------------------------------------------------------------------------------------------
 
 /// A curve through points with a radius at each: Catmull and Rom's spline, cut into short straight pieces.
 struct Spine {

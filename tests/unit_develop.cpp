@@ -111,6 +111,11 @@ TEST_CASE("a text that is no record is refused, whatever of it is missing or wro
     CHECK_THROWS_AS(readRecord(with("\"color_space\":\"srgb\"", "\"color_space\":\"cmyk\"")), Error);
     CHECK_THROWS_AS(readRecord(with("\"window\":[8,4,40,36]", "\"window\":[8,4,80,36]")), Error);
     CHECK_THROWS_AS(readRecord(with("\"window\":[8,4,40,36]", "\"window\":[8,4,8,36]")), Error);
+    // A scene of that size is refused with the exit code of scenes, and this is a film.
+    const std::size_t resolution = whole.find("\"resolution\":[");
+    const std::string whole_film = whole.substr(resolution, whole.find(']', resolution) + 1 - resolution);
+    CHECK_THROWS_AS(readRecord(with(whole_film, "\"resolution\":[65536,64]")), Error);
+    CHECK_NOTHROW(readRecord(with(whole_film, "\"resolution\":[65535,64]")));
     CHECK_THROWS_AS(readRecord(""), Error);
     CHECK_THROWS_AS(readRecord(std::string(100000, '[')), Error);
 }

@@ -309,8 +309,7 @@ TEST_CASE("the power heuristic shares out 1, for any densities", "[kernel][bsdf]
     CHECK(crt_power_heuristic(1 / CRT_INFINITY) == 1);
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// lights
+// --------------------------------------------------------------------------------------------------- lights
 
 namespace {
 
@@ -590,8 +589,7 @@ TEST_CASE("lights are chosen by power, counted by choice, and seen from their fr
     }
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// wavelengths
+// ---------------------------------------------------------------------------------------------- wavelengths
 
 TEST_CASE("four wavelengths integrate any spectrum, together or the hero alone", "[kernel][spectrum]") {
     crt::Scene scene;

@@ -580,8 +580,7 @@ TEST_CASE("a tree holds every triangle once, inside all boxes above it, within t
     check(clusters);
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// leaving a surface
+// ---------------------------------------------------------------------------------------- leaving a surface
 
 namespace {
 

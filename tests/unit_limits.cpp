@@ -68,8 +68,7 @@ const FilmIdentity kIdentity{"0123456789abcdef0123456789abcdef", "1.0"};
 
 }  // namespace
 
-// ---- Input files
-// -----------------------------------------------------------------------------------------------------
+// ---- Input files ----------------------------------------------------------------------------------------
 
 TEST_CASE("only regular files are read, and nobody waits for a pipe", "[limits][input]") {
     const TemporaryFolder folder;
@@ -106,8 +105,7 @@ TEST_CASE("a file that is too large is refused by its size before it is read", "
     CHECK_THROWS_WITH(readInput("/proc/self/status", 100), Contains("more than 100 bytes"));
 }
 
-// ---- Outputs
-// ---------------------------------------------------------------------------------------------------------
+// ---- Outputs --------------------------------------------------------------------------------------------
 
 TEST_CASE("no output replaces an input or another output", "[limits][output]") {
     const TemporaryFolder folder;
@@ -171,8 +169,7 @@ TEST_CASE("an output link that leads to nothing yet stays a link", "[limits][out
     CHECK_THROWS_WITH(AtomicFile(folder / "loop"), Contains("leads to itself"));
 }
 
-// ---- Code
-// ----------------------------------------------------------------------------------------------------------
+// ---- Code -----------------------------------------------------------------------------------------------
 
 TEST_CASE("a kernel that others could have written is not loaded", "[limits][trust]") {
     const TemporaryFolder folder;
@@ -242,8 +239,7 @@ TEST_CASE("a plugin that others could have written is not opened", "[limits][tru
     CHECK_THAT(refusal([&] { loadBackend(folder / "link.so"); }), !Contains("refused"));
 }
 
-// ---- Geometry and light
-// ----------------------------------------------------------------------------------------------
+// ---- Geometry and light ---------------------------------------------------------------------------------
 
 TEST_CASE("forty thousand triangles on one spot are compiled in a second", "[limits][near_surfaces]") {
     Scene scene;

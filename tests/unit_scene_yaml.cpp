@@ -87,8 +87,7 @@ std::string meshScene(const std::string& object) {
 
 }  // namespace
 
-// ---- Good scenes
-// -----------------------------------------------------------------------------------------------------
+// ---- Good scenes ----------------------------------------------------------------------------------------
 
 TEST_CASE("the smallest scene is legal and has the defaults of core/scene/scene.h", "[scene_yaml]") {
     const Scene scene = parse("");
@@ -535,8 +534,7 @@ TEST_CASE("aliases are welcome, a byte order mark and CRLF are borne", "[scene_y
                Contains("scene.yaml:1:1: error: unknown key 'ctr' in the scene"));
 }
 
-// ---- Bad files
-// -------------------------------------------------------------------------------------------------------
+// ---- Bad files ------------------------------------------------------------------------------------------
 
 TEST_CASE("files that are not there or not text", "[scene_yaml][refused]") {
     const TemporaryFolder folder;
@@ -862,8 +860,7 @@ TEST_CASE("all errors of a file come at once, in its order", "[scene_yaml][refus
     CHECK_THAT(refused(many), Contains("… and 950 more errors"));
 }
 
-// ---- Overrides
-// -------------------------------------------------------------------------------------------------------
+// ---- Overrides ------------------------------------------------------------------------------------------
 
 TEST_CASE("overrides change the scene before it is checked", "[scene_yaml][override]") {
     CHECK(parseOverride("film.resolution=[128,128]").path == "film.resolution");
@@ -933,8 +930,7 @@ TEST_CASE("errors in overrides name the argument", "[scene_yaml][override][refus
     CHECK(refusal("crt: 1\n", {{"camera.fov", "0"}}).place().file == "--set camera.fov");
 }
 
-// ---- Generated documents
-// ---------------------------------------------------------------------------------------------
+// ---- Generated documents --------------------------------------------------------------------------------
 
 TEST_CASE("docs/scene.md is what the schema says", "[scene_yaml][docs]") {
     const std::string path = CRT_SOURCE_DIR "/docs/scene.md";

@@ -10,6 +10,7 @@ one backend, which a quarter of the samples shows as well, have fewer. Times not
 machine.
 """
 
+import ctypes
 import math
 import signal
 import struct
@@ -52,16 +53,51 @@ class Film:
     """A .crtfilm (core/film/checkpoint.h): what is compared is sums, counts and primitives of every pixel,
     not the header."""
 
+    FORMAT = 3
+    BLOCK_PIXELS = 16384
+
     def __init__(self, path):
         data = path.read_bytes()
-        header_bytes, = struct.unpack_from("<I", data, 12)
+        version, header_bytes = struct.unpack_from("<2I", data, 8)
+        if version != self.FORMAT:
+            raise Failure(
+                f"{path} is a film of format {version}, and format {self.FORMAT} is what this can read"
+            )
         width, height, self.channels, aovs = struct.unpack_from("<4I", data, 32)
         self.pixels = width * height
-        self.body = memoryview(data)[header_bytes:]
         # Two doubles for each channel, a count of 64 bits, and the primitive's number where the scene asks
         # for it.
         self.strides = [self.channels * 16, 8] + ([4] if aovs & 8 else [])
+        self.body = memoryview(self.unpacked(data, header_bytes))
         self.sums = self.body[:self.pixels * self.strides[0]].cast("d")
+
+    def unpacked(self, data, at):
+        """The planes of bytes of core/film/film_pack.h, put together."""
+        zstd = ctypes.CDLL("libzstd.so.1")
+        zstd.ZSTD_decompress.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_size_t]
+        zstd.ZSTD_decompress.restype = ctypes.c_size_t
+        body = bytearray(self.pixels * sum(self.strides))
+        begin = 0
+        for stride in self.strides:
+            for first in range(0, self.pixels, self.BLOCK_PIXELS):
+                count = min(self.BLOCK_PIXELS, self.pixels - first)
+                plane = ctypes.create_string_buffer(count)
+                for byte in range(stride):
+                    size, = struct.unpack_from("<I", data, at)
+                    packed = data[at + 4:at + 4 + size]
+                    at += 4 + size
+                    if size == 1:
+                        packed *= count
+                    elif size != count:
+                        if zstd.ZSTD_decompress(plane, count, packed, size) != count:
+                            raise Failure("a film cannot be unpacked")
+                        packed = plane.raw
+                    block = begin + first * stride
+                    body[block + byte:block + count * stride:stride] = packed
+            begin += self.pixels * stride
+        if at != len(data):
+            raise Failure("a film has more in it than its pixels")
+        return body
 
     def difference(self, other):
         if len(self.body) != len(other.body) or self.strides != other.strides:

@@ -61,8 +61,7 @@ double satterthwaite(double variance_of_mean_a, std::uint64_t count_a, double va
 
 }  // namespace
 
-// ----------------------------------------------------------------------------------------------------------
-// distributions
+// -------------------------------------------------------------------------------------------- distributions
 
 double normalQuantile(double p) {
     requireProbability(p, "a quantile is asked for a probability between 0 and 1");
@@ -103,8 +102,7 @@ double studentTwoSided(double t, double dof) {
     return 2 * boost::math::cdf(boost::math::complement(boost::math::students_t{dof}, std::abs(t)));
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// means
+// ---------------------------------------------------------------------------------------------------- means
 
 double Summary::standardError() const { return std::sqrt(variance / static_cast<double>(count)); }
 
@@ -150,8 +148,7 @@ WelchResult welch(const Summary& a, const Summary& b, double confidence) {
     return result;
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// verdicts
+// ------------------------------------------------------------------------------------------------- verdicts
 
 const char* verdictName(Verdict verdict) {
     switch (verdict) {
@@ -231,8 +228,7 @@ Interval clopperPearson(std::uint64_t successes, std::uint64_t trials, double co
     return interval;
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// bootstrap and fits
+// --------------------------------------------------------------------------------------- bootstrap and fits
 
 namespace {
 

@@ -23,8 +23,7 @@ struct Interval {
     double halfWidth() const { return 0.5 * (upper - lower); }
 };
 
-// ----------------------------------------------------------------------------------------------------------
-// distributions
+// -------------------------------------------------------------------------------------------- distributions
 
 /// z with P(Z ≤ z) = p, Z standard normal; 0 < p < 1.
 double normalQuantile(double p);
@@ -39,8 +38,7 @@ double normalTwoSided(double z);
 /// P(|T| ≥ |t|).
 double studentTwoSided(double t, double dof);
 
-// ----------------------------------------------------------------------------------------------------------
-// means
+// ---------------------------------------------------------------------------------------------------- means
 
 /// Mean and spread of independent, equally distributed values: of replicates, never of the pixels of one
 /// image.
@@ -68,8 +66,7 @@ struct WelchResult {
 /// Difference of two means whose variances may differ. Two values or more in each.
 WelchResult welch(const Summary& a, const Summary& b, double confidence);
 
-// ----------------------------------------------------------------------------------------------------------
-// verdicts
+// ------------------------------------------------------------------------------------------------- verdicts
 
 enum class Verdict { Pass, Fail, Inconclusive };
 /// "PASS", "FAIL", "INCONCLUSIVE"
@@ -98,8 +95,7 @@ double kolmogorovSmirnovUniform(std::span<const double> p_values);
 /// 1934).
 Interval clopperPearson(std::uint64_t successes, std::uint64_t trials, double confidence);
 
-// ----------------------------------------------------------------------------------------------------------
-// bootstrap and fits
+// --------------------------------------------------------------------------------------- bootstrap and fits
 
 /// A number from a sample of `count` items, given as indices into them, some of them repeated.
 using ResampledStatistic = std::function<double(std::span<const std::size_t>)>;

@@ -7,6 +7,7 @@
 #include "film/error_estimate.h"
 #include "film/error_text.h"
 #include "render/light_checks.h"
+#include "render/output_guard.h"
 #include "render/outputs.h"
 #include "scene/yaml/scene_schema.h"
 #include "scene/yaml/yaml_reader.h"
@@ -155,7 +156,10 @@ OutputPlan planDevelopment(const DevelopArguments& arguments) {
     const std::uint32_t aovs = aovsNamed(arguments.aovs);
     for (Output& image : plan.images)
         if (image.format == OutputFormat::Exr) image.aovs = aovs;
-    for (const Output& image : plan.images) checkWritable(image.file);
+    std::vector<std::string> images;
+    for (const Output& image : plan.images) images.push_back(image.file);
+    refuseOverInputs(arguments.films, images);
+    for (const std::string& image : images) checkWritable(image);
     return plan;
 }
 

@@ -197,11 +197,11 @@ Film cropped(const Film& film, const std::array<int, 4>& window) {
     shape.height = static_cast<std::uint32_t>(y1 - y0);
     Film part(shape);
     part.samples = film.samples;
+    const std::size_t left = static_cast<std::size_t>(x0), top = static_cast<std::size_t>(y0);
     const auto copyRows = [&](const auto& from, auto& to, std::size_t values_a_pixel) {
         if (from.empty()) return;
         for (std::size_t y = 0; y < shape.height; ++y) {
-            const std::size_t first =
-                (static_cast<std::size_t>(y0) + y) * whole.width + static_cast<std::size_t>(x0);
+            const std::size_t first = (top + y) * whole.width + left;
             std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first * values_a_pixel),
                         shape.width * values_a_pixel,
                         to.begin() + static_cast<std::ptrdiff_t>(y * shape.width * values_a_pixel));

@@ -27,9 +27,9 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr int kRecordVersion = 1;
+constexpr int kSideMax = 65535;  // Of a film, as scene files have it.
 
-// ---- Camera
-// ----------------------------------------------------------------------------------------------------------
+// ---- Camera ---------------------------------------------------------------------------------------------
 
 Vec3d normalised(const Vec3d& v) { return v * (1 / length(v)); }
 
@@ -59,8 +59,7 @@ void addCamera(FilmRecord& record, const Camera& camera) {
     record.world_to_ndc = matrixOf({{{x}, {y}, {{}, 1}, {view}}}, camera.position);
 }
 
-// ---- Traits
-// ----------------------------------------------------------------------------------------------------------
+// ---- Traits ---------------------------------------------------------------------------------------------
 
 class Digest {
 public:
@@ -206,8 +205,7 @@ std::vector<SceneTrait> traitsOf(const Scene& scene, std::uint32_t aovs) {
             {"the AOVs of first hits", planesText(aovs), {}}};
 }
 
-// ---- JSON
-// ----------------------------------------------------------------------------------------------------------
+// ---- JSON -----------------------------------------------------------------------------------------------
 
 constexpr std::array<const char*, 3> kSpaceNames{"srgb", "acescg", "xyz"};  // In the order of ColorSpace.
 
@@ -291,6 +289,10 @@ FilmRecord recordFrom(const Json& json) {
     record.date_utc = json.at("date_utc").get<std::string>();
     if (json.contains("complete")) record.complete = json.at("complete").get<bool>();
 
+    if (std::max(record.width, record.height) > kSideMax)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("has a film of {} × {} pixels, and films have up to {} a side", record.width,
+                                record.height, kSideMax));
     const auto& [x0, y0, x1, y1] = record.window;
     if (x0 < 0 || y0 < 0 || x0 >= x1 || y0 >= y1 || x1 > record.width || y1 > record.height)
         throw Error(ErrorKind::Usage, "has a window that is none of its film");

@@ -61,8 +61,7 @@ Matrix3d inverse(const Matrix3d& m) {
     return r;
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// PFM, PPM
+// ------------------------------------------------------------------------------------------------- PFM, PPM
 
 /// "PF", size, −1 for little-endian, then rows from the bottom up (Debevec's Portable FloatMap).
 void writePfm(const std::string& path, const Image& image) {
@@ -196,8 +195,7 @@ Image readPpm(const std::string& path, std::string_view bytes) {
     return image;
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// EXR, PNG, …
+// ---------------------------------------------------------------------------------------------- EXR, PNG, …
 
 /// Opens the codec module on first use and keeps it: OpenImageIO's threads outlive any one image.
 const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {

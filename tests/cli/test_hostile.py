@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What must not be able to harm crt: some 430 inputs and 60 faults, each with what happens. Always the same
+"""What must not be able to harm crt: some 490 inputs and 70 faults, each with what happens. Always the same
 demand: an exit code of the documented ones and the
 right one, a message that says why, no crash, no hang, no memory that the input does not account for, and
 every file that was there still there.
@@ -720,15 +720,19 @@ def film_cases(samples):
     film = samples["crtfilm"]
 
     def check(asked, data, codes=2, words=(), **options):
-        case(
-            "film",
-            asked,
-            ["info", "a.crtfilm"],
-            codes,
-            words,
-            lambda folder: folder.write("a.crtfilm", data),
-            **options,
-        )
+        for command, arguments in (
+            ("", ["info", "a.crtfilm"]),
+            (", developed", ["develop", "a.crtfilm", "-o", "a.exr"]),
+        ):
+            case(
+                "film",
+                asked + command,
+                arguments,
+                codes,
+                words,
+                lambda folder: folder.write("a.crtfilm", data),
+                **options,
+            )
 
     check("an empty film", b"", words="is empty")
     check("a film of text", "film\n" * 100, words="mark")
@@ -759,6 +763,7 @@ def film_cases(samples):
             (),
             odd_files("crtfilm"),
         )
+        case("film", f"{what} to develop", ["develop", name, "-o", "a.png"], 2, (), odd_files("crtfilm"))
     case(
         "film",
         "a film merged with itself",
@@ -807,7 +812,7 @@ def good(folder):
     folder.write("scene.yaml", GOOD)
 
 
-def argument_cases():
+def argument_cases(samples):
     def words_of(asked, arguments, codes=2, words=(), **options):
         case("arguments", asked, arguments, codes, words, good, **options)
 
@@ -857,14 +862,49 @@ def argument_cases():
         "x" * 300 + ".pfm",
         "folder.pfm",
     ):
-        case(
-            "arguments",
-            f"an output '{name[:30]}'",
-            ["scene.yaml", "-b", "fake", "--report", "none", "-o", name],
-            (2, 6),
-            (),
-            lambda folder: (good(folder), os.mkdir(folder / "folder.pfm")),
-        )
+        for command, arguments in (
+            ("", ["scene.yaml", "-b", "fake", "--report", "none"]),
+            (" of develop", ["develop", "a.crtfilm"]),
+        ):
+            case(
+                "arguments",
+                f"an output{command} '{name[:30]}'",
+                [*arguments, "-o", name],
+                (2, 6),
+                (),
+                lambda folder: (
+                    good(folder),
+                    folder.write("a.crtfilm", samples["crtfilm"]),
+                    os.mkdir(folder / "folder.pfm"),
+                ),
+            )
+    for option, values in (
+        ("--crop", ("0,0,9,9", "1,2,3", "4,4,2,2")),
+        ("--aovs", ("nonsense", "")),
+        (
+            "--set",
+            (
+                "film",
+                "=1",
+                "film.exposure_ev=1e999",
+                "film.exposure_ev=",
+                "film.white_balance=[",
+                "film.color_space=nonsense",
+                "film.resolution=[9,9]",
+                "film.crop=[0,0,9,9]",
+                "a.b.c.d=1",
+            ),
+        ),
+    ):
+        for value in values:
+            case(
+                "arguments",
+                f"develop {option} '{value}'",
+                ["develop", "a.crtfilm", "-o", "a.exr", f"{option}={value}"],
+                (2, 3),
+                (),
+                lambda folder: folder.write("a.crtfilm", samples["crtfilm"]),
+            )
     for backend in ("nonsense", "/etc/passwd", "../fake", "", "x" * 5000, "/dev/zero", "/dev/null", "."):
         words_of(
             f"the backend '{backend[:20]}'", ["scene.yaml", "-o", "a.pfm", f"--backend={backend}"], (2, 4)
@@ -879,6 +919,8 @@ def argument_cases():
     words_of("info of nothing", ["info"])
     words_of("merge of nothing", ["merge", "-o", "a.crtfilm"])
     words_of("merge to nowhere", ["merge", "a.crtfilm"])
+    words_of("develop of nothing", ["develop", "-o", "a.png"])
+    words_of("develop to nowhere", ["develop", "a.crtfilm"])
     words_of("compare of one", ["compare", "a.pfm"])
     words_of("a level that is none", ["verify", "--level", "hourly"])
     words_of("a case that is none", ["verify", "--case", "Z99"])
@@ -1079,6 +1121,27 @@ def fault_cases(samples):
         lambda folder: (files(folder), folder.write("b.png", png(3, 3))),
         stdout="broken",
     )
+    case(
+        "fault",
+        "develop --help on a full disk",
+        ["develop", "--help"],
+        6,
+        "cannot write to standard output: No space left",
+        files,
+        stdout="/dev/full",
+    )
+    for place in ("/dev/full", "closed", "broken"):
+        case(
+            "fault",
+            f"develop whose messages go to {place}",
+            ["develop", "a.crtfilm", "-o", "d.exr", "-o", "d.png"],
+            0,
+            (),
+            files,
+            stdout=place,
+            stderr=place,
+            made=("d.exr", "d.png"),
+        )
     for place in ("/dev/full", "closed", "broken"):
         case(
             "fault",
@@ -1152,6 +1215,14 @@ def fault_cases(samples):
         {resource.RLIMIT_CPU: 1},
         "SIGXCPU",
         made=("a.pfm", "a.crtfilm"),
+    )
+    limited(
+        "develop with a limit of 100 bytes on files",
+        ["develop", "a.crtfilm", "-o", "d.pfm"],
+        6,
+        {resource.RLIMIT_FSIZE: 100},
+        "File too large",
+        prepare=files,
     )
     limited("eight open files", RENDER, (0, 1, 4, 5, 6), {resource.RLIMIT_NOFILE: 8})
     limited(
@@ -1272,6 +1343,34 @@ def fault_cases(samples):
     )
     case(
         "fault", "a merge over a part", ["merge", "a.crtfilm", "-o", "a.crtfilm"], 2, "would replace", files
+    )
+    def film_by_other_names(folder):
+        files(folder)
+        os.link(folder / "a.crtfilm", folder / "hard.exr")
+        os.symlink("a.crtfilm", folder / "soft.png")
+        os.symlink(folder.path, folder / "here")
+        folder.write("film.pfm", samples["crtfilm"])
+    for film, image in (
+        ("film.pfm", "film.pfm"),
+        ("a.crtfilm", "hard.exr"),
+        ("a.crtfilm", "soft.png"),
+        ("film.pfm", "here/film.pfm"),
+    ):
+        case(
+            "fault",
+            f"develop: {film} to {image}, the same file",
+            ["develop", film, "-o", image],
+            2,
+            "would replace",
+            film_by_other_names,
+        )
+    case(
+        "fault",
+        "develop to two names of one file",
+        ["develop", "a.crtfilm", "-o", "d.png", "-o", "here/d.png"],
+        2,
+        "are one file",
+        film_by_other_names,
     )
     case(
         "fault",
@@ -1626,7 +1725,7 @@ def main():
         spectrum_cases()
         image_cases(samples)
         film_cases(samples)
-        argument_cases()
+        argument_cases(samples)
         environment_cases()
         fault_cases(samples)
         chosen = [c for c in CASES if options.only in f"{c.group}: {c.asked}"]

@@ -1,15 +1,18 @@
-// Checkpoint files → Film → checkpoint file. A random file never has the right checksum, so the first byte
-// of the input chooses: 0 takes the rest as it is; 1 puts in the checksum that belongs to it; anything else
-// the size of the file as well.
+// Checkpoint files → Film → checkpoint file and images. A random file never has the right checksum, so the
+// first byte of the input chooses: 0 takes the rest as it is; 1 puts in the checksum that belongs to it;
+// anything else the size of the file as well.
 #include "fuzz_target.h"
 
 #include "film/checkpoint.h"
 #include "film/error_estimate.h"
+#include "image/image_io.h"
+#include "render/outputs.h"
 #include "scene/scene.h"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include <cstring>
 #include <vector>
 
 namespace {
@@ -27,6 +30,28 @@ void putChecksum(std::vector<std::uint8_t>& file, bool size_too) {
     const std::uint64_t sum = XXH3_64bits_digest(state);
     XXH3_freeState(state);
     std::memcpy(&file[kChecksumAt], &sum, sizeof sum);
+}
+
+/// A NaN is like itself.
+bool sameBits(const std::vector<double>& a, const std::vector<double>& b) {
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof a[0]) == 0;
+}
+
+/// What `crt develop` does with a film that has a record.
+void develop(const crt::Film& film, crt::FilmIdentity identity, const crt::fuzz::Directory& directory) {
+    using namespace crt;
+    FilmRecord& record = *identity.record;
+    const std::string text = recordText(record);
+    if (recordText(readRecord(text)) != text)
+        fuzz::finding("film", "a record changes on its way through JSON");
+    for (const OutputFormat format : {OutputFormat::Ppm, OutputFormat::Pfm})
+        writeOutput({.file = directory.file("a"), .format = format, .aovs = 0, .place = {}}, film, identity);
+    // The lower right pixel.
+    const auto right = static_cast<int>(film.shape().width), bottom = static_cast<int>(film.shape().height);
+    const Film part = cropped(film, {right - 1, bottom - 1, right, bottom});
+    record.window = {record.window[2] - 1, record.window[3] - 1, record.window[2], record.window[3]};
+    (void)developedImage({.file = "a", .format = OutputFormat::Exr, .aovs = record.aovs, .place = {}}, part,
+                         identity);
 }
 
 }  // namespace
@@ -54,6 +79,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             fuzz::finding("film", "resolves to another size");
         if (mergeCheckpoints({path}).first.samples.ranges() != film.samples.ranges())
             fuzz::finding("film", "a merge of one is not that one");
+        writeCheckpoint(directory.file("b.crtfilm"), film, identity);
+        const auto [again, same] = readCheckpoint(directory.file("b.crtfilm"));
+        if (!sameBits(again.sums, film.sums) || again.counts != film.counts ||
+            again.primitives != film.primitives)
+            fuzz::finding("film", "is another one after it was written and read");
+        if (identity.record) develop(film, identity, directory);
     });
     return 0;
 }

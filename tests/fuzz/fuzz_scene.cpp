@@ -1,9 +1,13 @@
-// Scene YAML → Scene → CompiledScene. The text is a whole scene file; beside it lie a mesh and a spectrum
-// that it may name.
+// Scene YAML → Scene → CompiledScene, with a BVH and without, and what its films say of it. The text is a
+// whole scene file; beside it lie a mesh and a spectrum that it may name.
 #include "fuzz_target.h"
 
 #include "compile/compile.h"
+#include "film/film_record.h"
+#include "render/light_checks.h"
 #include "scene/yaml/scene_yaml.h"
+
+#include <limits>
 
 namespace {
 
@@ -28,6 +32,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         if (compiled.hash.size() != 32 ||
             compiled.size_bytes > compiled.blob.size() * sizeof(CompiledScene::Line))
             fuzz::finding("compiled scene", "is not what its sizes say");
+        // As for a backend that brings its own acceleration structure.
+        if (compileScene(scene, kAovsOfFirstHits,
+                         {.accelerator_reach = std::numeric_limits<double>::infinity()})
+                .hash != compiled.hash)
+            fuzz::finding("compiled scene", "is another one without a BVH");
+        (void)idleLamps(scene);
+        const FilmRecord record = recordOf(scene);
+        if (!differingTraits(readRecord(recordText(record)), record).empty())
+            fuzz::finding("record", "is not read as it was written");
     });
     return 0;
 }

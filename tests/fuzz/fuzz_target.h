@@ -25,6 +25,10 @@ namespace crt::fuzz {
     std::abort();
 }
 
+/// How often a body came to its end: seeds must (replay.cpp), or nothing behind the first refusal is ever
+/// fuzzed.
+inline int accepted = 0;
+
 /// Runs `body`. Hostile input may be refused, by an error that says whose fault it is; it may not find a bug
 /// in crt (Internal), and nothing but crt::Error may come out: std::bad_alloc or std::out_of_range would
 /// reach the user as an internal error.
@@ -32,6 +36,7 @@ template <class Body>
 void expectRefusalOrSuccess(ErrorKind refusal, Body&& body) {
     try {
         body();
+        ++accepted;
     } catch (const Error& error) {
         if (error.kind() != refusal) finding("refused as the wrong kind of error", error.what());
         if (error.what()[0] == '\0') finding("refused", "without a word");

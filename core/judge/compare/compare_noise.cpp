@@ -292,8 +292,7 @@ NoiseComparison compareNoise(const Image& a, const Image& b) {
     return result;
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// z map
+// ---------------------------------------------------------------------------------------------------- z map
 
 Image zMap(const NoiseComparison& noise, std::uint32_t width, std::uint32_t height) {
     constexpr double kFull = 5;

@@ -66,8 +66,7 @@ void addMetricLines(Lines& lines, const CompareResult& r) {
                                           l.delta_e_mean, l.delta_e_max));
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// noise
+// ---------------------------------------------------------------------------------------------------- noise
 
 std::string familyText(const stats::TestFamily& family, const char* method, const std::string& worst) {
     return fmt::format("{} of {} tests differ beyond noise (smallest p {:.2g} {}{})", family.rejected,
@@ -136,8 +135,7 @@ Json noiseJson(const NoiseComparison& noise) {
     return json;
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// reference
+// ------------------------------------------------------------------------------------------------ reference
 
 struct ReferenceRow {
     const char *name, *key;

@@ -83,7 +83,7 @@ const Properties* find(const Experiment& experiment, const Key& key) {
 void requireSame(const std::string& path, const Properties& then, const Properties& now) {
     for (const auto& [name, text] : now.values) {
         const auto found = std::find_if(then.values.begin(), then.values.end(),
-                                        [&](const auto& value) { return value.first == name; });
+                                        [&key = name](const auto& value) { return value.first == key; });
         const std::string was = found == then.values.end() ? "unknown" : found->second;
         if (was != text && withoutDigest(was) == withoutDigest(text))
             refuse(path, fmt::format("{} of {} was another ({} in both)", name, labelOf(now.key),

@@ -38,8 +38,7 @@ std::array<double, 3> numbersIn(const Json& value) {
     return {numberIn(value.at(0)), numberIn(value.at(1)), numberIn(value.at(2))};
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// rows
+// ----------------------------------------------------------------------------------------------------- rows
 
 Json errorJson(const ErrorMetrics& e) {
     return {{"mse", number(e.mse)},
@@ -134,8 +133,7 @@ Row rowOf(const Json& json) {
     throw Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, std::strerror(errno)), {path});
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// csv
+// ------------------------------------------------------------------------------------------------------ csv
 
 /// A field of RFC 4180: quoted where it has to be.
 std::string csvField(const std::string& text) {

@@ -47,8 +47,7 @@ const char* toneClass(Tone tone) {
     return "neutral";
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// tables
+// --------------------------------------------------------------------------------------------------- tables
 
 /// The value, and under it its interval.
 std::string withInterval(const std::string& text) {
@@ -292,8 +291,7 @@ std::string stageTable(const Run& run, const std::string& scene) {
     return tableOf(columns, rows);
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// sections
+// ------------------------------------------------------------------------------------------------- sections
 
 std::string findingsList(const std::vector<Finding>& findings) {
     std::string html = "<ul class=\"findings\">\n";

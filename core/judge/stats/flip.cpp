@@ -28,8 +28,7 @@ constexpr ContrastSensitivity kAchromatic{1, 0.0047, 0, 1e-5}, kRedGreen{1, 0.00
 constexpr double kColorExponent = 0.7, kKneeIn = 0.4, kKneeOut = 0.95;
 constexpr double kFeatureExponent = 0.5, kFeatureWidthDegrees = 0.082;
 
-// ----------------------------------------------------------------------------------------------------------
-// colour spaces
+// -------------------------------------------------------------------------------------------- colour spaces
 
 /// Opponent colours, linear in XYZ: what contrast sensitivities are measured in.
 Color toYcxcz(const Color& rgb) {
@@ -54,8 +53,7 @@ double hyab(const Lab& p, const Lab& q) {
     return std::abs(p.lightness - q.lightness) + std::hypot(p.a - q.a, p.b - q.b);
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// filters
+// -------------------------------------------------------------------------------------------------- filters
 
 /// Taps −r … r.
 using Taps = std::vector<double>;
@@ -147,8 +145,7 @@ FeatureTaps featureTaps(double pixels_per_degree) {
     return taps;
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// comparison
+// ----------------------------------------------------------------------------------------------- comparison
 
 /// One image, ready to be compared.
 struct Seen {
@@ -223,8 +220,7 @@ void finish(FlipResult& result) {
                   static_cast<double>(result.error.size());
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// exposure
+// ------------------------------------------------------------------------------------------------- exposure
 
 /// (k₀x² + k₁x + k₂) / (k₃x² + k₄x + k₅): Narkowicz' fit to the ACES curve, its input scaled by 0.6 (2021,
 /// section 3).

@@ -151,8 +151,7 @@ TestFamily sidakFamily(std::span<const double> p_values, double alpha) {
     return family;
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// replicates
+// ----------------------------------------------------------------------------------------------- replicates
 
 Replicates::Replicates(std::uint32_t width, std::uint32_t height, std::uint32_t channels)
     : width_(width),

@@ -18,8 +18,7 @@ double turnOf(const PointTree::Point& a, const PointTree::Point& b, const PointT
 
 }  // namespace
 
-// ---- Points
-// ----------------------------------------------------------------------------------------------------------
+// ---- Points ---------------------------------------------------------------------------------------------
 
 void PointTree::build(std::span<const Point> points) {
     points_ = points;
@@ -105,8 +104,7 @@ bool PointTree::anyInside(std::uint32_t a, std::uint32_t b, std::uint32_t c) con
     return false;
 }
 
-// ---- Polygons
-// --------------------------------------------------------------------------------------------------------
+// ---- Polygons -------------------------------------------------------------------------------------------
 
 const std::vector<PolygonTriangle>& Triangulator::split(std::span<const Vec3d> corners) {
     triangles_.clear();

@@ -19,8 +19,7 @@ using Json = nlohmann::ordered_json;
 bool isFamily(std::string_view family) { return schemaVariants(family).size() > 1; }
 std::string familyOf(const SectionSchema& section) { return section.name.substr(0, section.name.find('/')); }
 
-// ---- JSON Schema
-// -----------------------------------------------------------------------------------------------------
+// ---- JSON Schema ----------------------------------------------------------------------------------------
 
 /// Definitions are named without '/', which JSON pointers would have to escape.
 std::string definitionName(const SectionSchema& section) {
@@ -159,8 +158,7 @@ Json sectionSchema(const SectionSchema& section) {
     return schema;
 }
 
-// ---- Markdown
-// --------------------------------------------------------------------------------------------------------
+// ---- Markdown -------------------------------------------------------------------------------------------
 
 /// What stands before the sections of the manual.
 constexpr std::string_view kIntroduction = R"(# Scene files

@@ -98,8 +98,7 @@ void ObjectReader::requireRoom(const YamlPlace& place) {
     out_.throwIfFailed();
 }
 
-// ---- Materials
-// -------------------------------------------------------------------------------------------------------
+// ---- Materials ------------------------------------------------------------------------------------------
 
 void ObjectReader::readMaterials(const YamlNode& map) {
     for (const YamlEntry& entry : map.entries) readMaterial(entry);
@@ -168,8 +167,7 @@ void ObjectReader::finish() const {
     unused.finish();
 }
 
-// ---- Placements
-// ------------------------------------------------------------------------------------------------------
+// ---- Placements -----------------------------------------------------------------------------------------
 
 std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const YamlPlace& place,
                                                     const std::string& subject) {
@@ -261,8 +259,7 @@ std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) 
     return placements;
 }
 
-// ---- Geometry
-// --------------------------------------------------------------------------------------------------------
+// ---- Geometry -------------------------------------------------------------------------------------------
 
 std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section) {
     std::optional<std::vector<Vec3d>> positions = readPoints(section, "positions", "position");
@@ -344,8 +341,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
     return static_cast<std::uint32_t>(scene_.meshes.size() - 1);
 }
 
-// ---- Objects
-// ---------------------------------------------------------------------------------------------------------
+// ---- Objects --------------------------------------------------------------------------------------------
 
 void ObjectReader::readObjects(const YamlNode& list) {
     for (std::size_t i = 0; i < list.items.size(); ++i) readObject(*list.items[i], list.items[i]->place, i);

@@ -24,8 +24,7 @@
 namespace crt {
 namespace {
 
-// ---- Overrides
-// -------------------------------------------------------------------------------------------------------
+// ---- Overrides ------------------------------------------------------------------------------------------
 
 /// One `--set` argument on its way down the tree.
 class OverrideWalk {
@@ -145,8 +144,7 @@ void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrid
     }
 }
 
-// ---- Sections
-// --------------------------------------------------------------------------------------------------------
+// ---- Sections -------------------------------------------------------------------------------------------
 
 void readFilm(const SectionReader& section, SpectrumReader& spectra, FilmSettings& film) {
     constexpr std::int64_t kMaxPixels = std::int64_t{1} << 31;  // Pixels are numbered in 32 bits.

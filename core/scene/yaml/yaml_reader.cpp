@@ -34,8 +34,7 @@ std::size_t characters(std::string_view text, std::size_t bytes) {
            static_cast<std::size_t>(std::count_if(text.begin(), text.end(), isContinuationByte));
 }
 
-// ---- The text itself
-// -------------------------------------------------------------------------------------------------
+// ---- The text itself ------------------------------------------------------------------------------------
 
 /// Length of the valid UTF-8 sequence at the start of `s`, 0 when it is not one (overlong forms and
 /// surrogates included).
@@ -90,8 +89,7 @@ public:
     }
 };
 
-// ---- Events → tree
-// ---------------------------------------------------------------------------------------------------
+// ---- Events → tree --------------------------------------------------------------------------------------
 
 /// yaml-cpp blames what follows a tab, not the tab.
 std::string tabHint(const YamlSource& source, int line) {
@@ -292,8 +290,7 @@ private:
     std::unordered_set<YAML::anchor_t> open_anchors_;
 };
 
-// ---- Messages
-// --------------------------------------------------------------------------------------------------------
+// ---- Messages -------------------------------------------------------------------------------------------
 
 /// Messages quote whatever was given; what is no text in it must reach neither a terminal nor a JSON report.
 std::string printable(std::string_view text) {
