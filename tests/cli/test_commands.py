@@ -166,11 +166,20 @@ class Plugins(CliTest):
         self.assertIsNone(fake["reason"])
         self.assertGreaterEqual(len(fake["devices"]), 1)
         self.assertEqual(fake["devices"][0]["index"], 0)
-        broken = [b for b in backends if b["refused"]]
-        self.assertTrue(broken)
+        broken = [b for b in backends if not b["usable"]]
+        self.assertGreater(len(broken), 5)
         for backend in broken:
-            self.assertFalse(backend["usable"])
             self.assertTrue(backend["reason"])
+            self.assertFalse(backend["refused"], backend)
+
+    def test_json_names_what_was_not_opened(self):
+        plugin = shutil.copy(os.path.join(test_cli.FAKE_DIR, "crt_backend_fake.so"), self.directory)
+        os.chmod(plugin, 0o777)  # Others could have written it.
+        run = self.crt("plugins", "--json", CRT_BACKEND_PATH=self.directory)
+        (fake,) = (b for b in json.loads(run.stdout)["backends"] if b["name"] == "fake")
+        self.assertTrue(fake["refused"])
+        self.assertFalse(fake["usable"])
+        self.assertEqual(fake["devices"], [])
 
 
 class Data(CliTest):
@@ -243,6 +252,24 @@ class Include(CliTest):
         self.write("s.yaml", "crt: 1\ninclude: room.yaml\n")
         run = self.crt("s.yaml", expect=3)
         self.assertIn("room.yaml:2:8: error: unknown key 'resolutoin' in film", run.stderr)
+
+    def test_what_cannot_be_included_is_refused_at_once(self):
+        os.mkfifo(self.path("pipe.yaml"))
+        os.mkdir(self.path("folder.yaml"))
+        self.write("picture.yaml", "")
+        with open(self.path("picture.yaml"), "wb") as file:
+            file.write(b"\x89PNG\r\n\x1a\n")
+        for name, words in (
+            ("pipe.yaml", "is a pipe"),
+            ("folder.yaml", "is a directory"),
+            ("/dev/zero", "'/dev/zero' "),
+            ("picture.yaml", "is not text"),
+            ("s.yaml", "is included by itself"),
+            ("none/room.yaml", "cannot find 'none/room.yaml'"),
+        ):
+            self.write("s.yaml", f"crt: 1\ninclude: {name}\n")
+            run = self.crt("info", "s.yaml", expect=3)
+            self.assertIn(words, run.stderr)
 
     def test_scenes_that_share_a_room_are_what_they_were_in_one_file(self):
         self.write("room.yaml", test_cli.SCENE)
