@@ -1,6 +1,9 @@
 # The installed tree, which runs from any folder it is moved to:
 #   bin/crt                      the program; looks for backends in ../lib/crt (installed by core/CMakeLists.txt)
 #   lib/crt/                     backends (each installs itself, see CrtBackend.cmake)
+#   share/crt/                   meshes and scenes (configs/), named data (data/)
+#   share/doc/crt/               the manual, decisions, and the example of a backend
+#   share/man, share/bash-completion, share/zsh, share/fish: what the table of commands says (core/CMakeLists.txt)
 #   lib/cmake/crt/, include/crt/ what find_package(crt) and crt_add_backend need to build further ones: installed here
 
 include(CMakePackageConfigHelpers)
@@ -30,3 +33,8 @@ install(FILES
   ${PROJECT_SOURCE_DIR}/cmake/CrtBackend.cmake
   ${PROJECT_SOURCE_DIR}/cmake/crt_backend.map
   DESTINATION ${CRT_INSTALL_CMAKE_DIR})
+
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION share/doc/crt)
+install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${PROJECT_SOURCE_DIR}/CONTRIBUTING.md
+              ${PROJECT_SOURCE_DIR}/CITATION.cff
+  DESTINATION share/doc/crt)

@@ -73,7 +73,7 @@ add_custom_target(portable
   COMMENT "Packing crt-portable.tar.gz"
   VERBATIM)
 # What is installed, and what is taken from the build tree.
-foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_kernel_cache crt_meshes crt-meshgen
+foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_kernel_cache crt_meshes crt_shell_files crt-meshgen
         conformance crt_backend_example)
   if(TARGET ${part})
     add_dependencies(portable ${part})

@@ -65,7 +65,7 @@ def ratio(a, b, function):
 
 def observer_of_crt(repository):
     """x̄, ȳ, z̄ as crt has them, every nm from 360 to 830."""
-    text = (repository / "core" / "spectra_data.cpp").read_text()
+    text = (repository / "core" / "spectra" / "spectra_data.cpp").read_text()
     columns = [re.search(rf"kCie{axis} = \{{(.*?)\}}", text, re.S)[1] for axis in "XYZ"]
     return np.array([[float(v) for v in c.replace("\n", " ").split(",") if v.strip()] for c in columns]).T
 

@@ -7,8 +7,8 @@ refuses the rest.
 import math
 
 import numpy as np
-import yaml
 
+from . import scene_file
 from .program import Failure
 
 GRID_NM = np.arange(
@@ -65,7 +65,7 @@ def write_ply(path, corners):
 
 def describe(file, folder, size, max_depth):
     """The scene as Mitsuba's process wants it; meshes go to `folder`."""
-    scene = yaml.safe_load(file.read_text())
+    scene = scene_file.load(file)
     camera, spectra = scene["camera"], scene["spectra"]
     parts = {}
     for thing in scene["objects"]:

@@ -6,12 +6,15 @@
 #include <fmt/format.h>
 
 #include <cerrno>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
 #include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 namespace crt {
@@ -63,10 +66,18 @@ std::string targetOf(const std::string& path) {
     return at.string();
 }
 
+constexpr const char* kStandardOutput = "standard output";
+
 }  // namespace
+
+bool isStandardOutput(const std::string& path) { return path == "-" || path.rfind("-.", 0) == 0; }
 
 AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
     if (path.empty()) throw Error(ErrorKind::Output, "cannot write an output without a file name");
+    if (isStandardOutput(path)) {
+        openStreamed();
+        return;
+    }
     std::error_code ignored;
     final_ = targetOf(path);
     // Renaming over these would replace a device node or fail at the very end of a render.
@@ -113,7 +124,45 @@ void AtomicFile::write(const void* bytes, std::size_t size) {
     }
 }
 
+void AtomicFile::openStreamed() {
+    path_ = kStandardOutput;
+    std::error_code none;
+    const fs::path folder = fs::temp_directory_path(none);
+    temporary_ = ((none ? fs::path("/tmp") : folder) / "crt-output-XXXXXX").string();
+    descriptor_ = ::mkstemp(temporary_.data());
+    if (descriptor_ >= 0) return;
+    const int error_number = errno;
+    const std::string wanted = std::exchange(temporary_, {});
+    throw Error(ErrorKind::Output,
+                fmt::format("cannot write '{}', which is to go to standard output: {}", wanted,
+                            std::strerror(error_number)));
+}
+
+/// What was written under the temporary name, by write() or by a library, to standard output.
+void AtomicFile::stream() {
+    std::fflush(stdout);
+    const int source = ::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);
+    if (source < 0) fail("cannot read what is meant for", errno);
+    std::vector<char> buffer(1 << 20);
+    int error_number = 0;
+    while (error_number == 0) {
+        const ssize_t read = ::read(source, buffer.data(), buffer.size());
+        if (read < 0 && errno == EINTR) continue;
+        if (read < 0) error_number = errno;
+        if (read <= 0) break;
+        for (ssize_t sent = 0; sent < read && error_number == 0;) {
+            const ssize_t now =
+                ::write(STDOUT_FILENO, buffer.data() + sent, static_cast<std::size_t>(read - sent));
+            if (now >= 0) sent += now;
+            if (now < 0 && errno != EINTR) error_number = errno;
+        }
+    }
+    ::close(source);
+    if (error_number != 0) fail("cannot write to", error_number);
+}
+
 void AtomicFile::commit() {
+    if (path_ == kStandardOutput) return stream();
     // Without the sync a power cut after the rename can leave the final name on an empty file.
     while (::fsync(descriptor_) != 0)
         if (errno != EINTR) fail("cannot finish", errno);
@@ -131,6 +180,14 @@ void AtomicFile::commit() {
 }
 
 void checkWritable(const std::string& path) {
+    if (isStandardOutput(path)) {
+        if (::isatty(STDOUT_FILENO) != 0)
+            throw Error(ErrorKind::Output,
+                        fmt::format("'{}' is standard output, which is a terminal here; redirect it to a file "
+                                    "or a pipe",
+                                    path));
+        return;
+    }
     const std::string directory = directoryOf(path);
     std::error_code error;
     if (!fs::exists(directory, error)) refuse(path, missingFolder(directory));

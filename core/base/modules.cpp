@@ -59,4 +59,11 @@ std::vector<std::string> meshDirectories() {
     return {(tree / "share" / "crt" / "meshes").string()};
 }
 
+std::vector<std::string> dataDirectories() {
+    std::vector<std::string> folders = foldersOf("CRT_DATA_PATH");
+    if (const fs::path tree = installedTree(); !tree.empty())
+        folders.push_back((tree / "share" / "crt" / "data").string());
+    return folders;
+}
+
 }  // namespace crt

@@ -1,4 +1,4 @@
-/// Where crt finds what is installed with it: plugins and meshes, relative to the file that holds this code
+/// Where crt finds what is installed with it: plugins, meshes and named data, relative to the file that holds this code
 /// (the program, libcrt.so, a Python module), so that an installed tree can be moved.
 #pragma once
 
@@ -14,5 +14,9 @@ std::vector<std::string> pluginDirectories();
 /// Folders searched for meshes that are not beside the scene: those of CRT_MESH_PATH (separated by ':'),
 /// else share/crt/meshes of the tree.
 std::vector<std::string> meshDirectories();
+
+/// Folders searched for named data, in order: those of CRT_DATA_PATH (separated by ':'), then share/crt/data
+/// of the tree.
+std::vector<std::string> dataDirectories();
 
 }  // namespace crt

@@ -1,9 +1,13 @@
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/standard_output.h"
+#include "base/words.h"
+#include "cli/arguments.h"
 #include "cli/commands.h"
+#include "cli/shared_options.h"
 #include "cli/terminal_watch.h"
 #include "image/image_io.h"
+#include "judge/compare/compare.h"
 #include "judge/compare/compare_backends.h"
 #include "judge/compare/compare_text.h"
 #include "render/output_guard.h"
@@ -13,14 +17,51 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
+#include <memory>
 #include <optional>
+#include <string>
 #include <tuple>
+#include <vector>
 
 namespace crt {
 namespace {
 
 constexpr int kDifferent = 7;
+
+constexpr const char* kCompareHelp = R"(
+What is printed: whether the bits are the same; where the first difference is, with both values and how many
+floats lie between them (ulp); errors over all values of R, G and B; what it looks like (FLIP, Delta E).
+Where an image says how large its noise is (output AOV 'variance' or 'error', or a reference of 'crt
+reference'), also whether the difference is noise or bias: the bias of each channel with its 99.9 %
+interval, and how many tiles and pixels differ by more than noise would let any of them (alpha 0.1 %). One
+NaN or infinity voids all of it: nothing is dropped.
+
+With --backends, the scene is rendered with one seed by all, which crt's own backends do to the same bits,
+and with other seeds for a verdict: PASS when the 99.9 % interval of the means' difference lies within
++-delta and no tile and no pixel differs by more than noise, FAIL when one does for certain, INCONCLUSIVE
+when more samples are needed or one value carries too much of the error. The exit code is 7 unless all PASS.
+
+Examples:
+  crt compare cuda.exr embree.exr                        are they the same bits?
+  crt compare --tolerance 0.01 --diff d.png a.exr b.exr  is the RMS difference below 1 % of b's mean?
+  crt compare a.exr b.exr --map z.png                    where is the difference more than noise?
+  crt compare a.exr b.exr --reference r.exr              which is nearer to r, and by how much?
+  crt compare --backends cuda,embree scene.yaml          do both render the same?
+)";
+
+/// Exit code 7 when the images differ (compare.h says what that means), or, with backends, when the verdict is
+/// not PASS.
+struct CompareArguments {
+    std::string first, second;    ///< With backends, the first is the scene and there is no second.
+    CompareOptions options;
+    std::string reference;        ///< An image that both are measured against; empty: none.
+    std::string json_file;        ///< "-" for stdout, then instead of the text; empty: none.
+    std::string difference_file;  ///< Empty: none.
+    std::string map_file;         ///< Of z; empty: none.
+    SceneRequest scene;           ///< How to change the scene; its name is in `first`.
+    BackendComparisonOptions backends;
+    ProgressMode progress = ProgressMode::Auto;
+};
 
 /// Do files of this name hold what a screen shows, and not radiance?
 bool isDisplayReferred(const std::string& file) {
@@ -122,12 +163,106 @@ int compareBackends(const CompareArguments& arguments) {
     return comparison.passes() ? 0 : kDifferent;
 }
 
-}  // namespace
-
 int compare(const CompareArguments& arguments) {
+    for (const std::string& file : {arguments.difference_file, arguments.map_file})
+        if (isStandardOutput(file))
+            throw Error(ErrorKind::Usage,
+                        fmt::format("'{}': the figures of the comparison go to standard output", file));
     for (const std::string& file : {arguments.difference_file, arguments.map_file, arguments.json_file})
         if (!file.empty() && file != "-") checkWritable(file);
     return arguments.backends.backends.empty() ? compareFiles(arguments) : compareBackends(arguments);
+}
+
+OptionGroup sameOrNot(CompareArguments& to) {
+    return {"Same or not (exit code)",
+            {{.names = "--tolerance",
+              .placeholder = "X",
+              .help = "RMS difference, as a share of B's mean, that counts as equal (0: same bits)",
+              .read = [&to](const std::string& text) {
+                  to.options.tolerance = parseTolerance(text, "--tolerance");
+              }},
+             {.names = "--all-channels",
+              .placeholder = {},
+              .help = "compare every channel, not only R, G and B",
+              .read = [&to](const std::string&) { to.options.all_channels = true; }}}};
+}
+
+OptionGroup moreToSee(CompareArguments& to) {
+    return {"More to see",
+            {{.names = "--reference",
+              .placeholder = "FILE",
+              .help = "errors of A and of B against this image, side by side",
+              .read = [&to](const std::string& text) { to.reference = text; },
+              .completion = completeImage()},
+             {.names = "--diff",
+              .placeholder = "FILE",
+              .help = "write the difference: values to .exr or .pfm, colours to .png or .ppm",
+              .read = [&to](const std::string& text) { to.difference_file = text; },
+              .completion = completeImage()},
+             {.names = "--map",
+              .placeholder = "FILE",
+              .help = "write z, the difference in standard errors: values to .exr or .pfm, else colours",
+              .read = [&to](const std::string& text) { to.map_file = text; },
+              .completion = completeImage()},
+             {.names = "--json",
+              .placeholder = "[FILE]",
+              .help = "all numbers as JSON: into FILE.json too, or instead of the text",
+              .read = [&to](const std::string& text) { to.json_file = text; },
+              .completion = completeFile({"json"})}}};
+}
+
+OptionGroup backendsInstead(CompareArguments& to) {
+    BackendComparisonOptions& options = to.backends;
+    OptionGroup group{"Backends instead of images"};
+    group.options = {
+        {.names = "--backends",
+         .placeholder = "X,Y",
+         .help = "render scene A with each; the last is what the others are compared with",
+         .read = [&options](const std::string& text) { options.backends = parseList(text, "--backends"); },
+         .completion = {Completion::Kind::Backend}},
+        {.names = "--spp",
+         .placeholder = "N",
+         .help = "samples per pixel of each render (so many that all replicates have the scene's)",
+         .read = [&options](const std::string& text) { options.samples = parseCount(text, "--spp", 1); },
+         .needs = {"--backends"}},
+        {.names = "--replicates",
+         .placeholder = "R",
+         .help = "renders of each backend, every one with its own seed (16)",
+         .read = [&options](const std::string& text) {
+             options.replicates = smallCount(text, "--replicates", 2);
+         },
+         .needs = {"--backends"}},
+        {.names = "--delta",
+         .placeholder = "PERCENT",
+         .help = "means that differ by less are equivalent (1%)",
+         .read = [&options](const std::string& text) {
+             options.gate.delta = parseFraction(text, "--delta");
+         },
+         .needs = {"--backends"}},
+    };
+    addSceneChanges(group, to.scene);
+    group.options.push_back(noProgressOption(to.progress));
+    return group;
+}
+
+}  // namespace
+
+Command compareCommand() {
+    const auto to = std::make_shared<CompareArguments>();
+    return {.name = "compare",
+            .summary = "compare two images, or backends; exit code 7 when they differ",
+            .arguments = {{.name = "A",
+                           .help = "image; with --backends a scene",
+                           .read = [to](const std::string& text) { to->first = text; },
+                           .completion = completeFile({"exr", "png", "ppm", "pfm", "yaml"})},
+                          {.name = "B",
+                           .help = "image; relative numbers are relative to it",
+                           .read = [to](const std::string& text) { to->second = text; },
+                           .completion = completeImage(),
+                           .required = false}},
+            .groups = {sameOrNot(*to), moreToSee(*to), backendsInstead(*to)},
+            .notes = kCompareHelp,
+            .run = [to](const std::string&) { return compare(*to); }};
 }
 
 }  // namespace crt

@@ -1,8 +1,9 @@
 #include "base/atomic_file.h"
 #include "base/log.h"
 #include "base/unit_text.h"
+#include "cli/arguments.h"
 #include "cli/commands.h"
-#include "cli/progress.h"
+#include "cli/shared_options.h"
 #include "film/checkpoint.h"
 #include "film/error_estimate.h"
 #include "film/error_text.h"
@@ -16,11 +17,25 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
+#include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace crt {
 namespace {
+
+/// Images of films, with other exposure, white balance, colour space or crop window than the scene's, and
+/// without a backend or the scene. Films of disjoint samples are added up first.
+struct DevelopArguments {
+    std::vector<std::string> films;
+    std::vector<std::string> outputs;
+    std::vector<SceneOverride> changes;  ///< Keys of `film` that no sample depends on; others are refused.
+    std::optional<std::array<int, 4>> crop;  ///< Of the whole film; x0, y0, x1, y1, half open.
+    std::vector<std::string> aovs;           ///< Of EXR files; empty: those of the scene. "none": none.
+};
 
 constexpr std::array<const char*, 5> kDevelopmentKeys{
     "film.exposure_ev", "film.white_balance", "film.color_space", "film.crop", "film.apply_to_float"};
@@ -163,8 +178,6 @@ OutputPlan planDevelopment(const DevelopArguments& arguments) {
     return plan;
 }
 
-}  // namespace
-
 int develop(const DevelopArguments& arguments) {
     OutputPlan plan = planDevelopment(arguments);
     auto [film, identity] = mergeCheckpoints(arguments.films);
@@ -188,6 +201,68 @@ int develop(const DevelopArguments& arguments) {
             film.samples.count(), error ? ", " + errorText(*error) : "");
     logInfo("wrote {}", fmt::join(arguments.outputs, ", "));
     return 0;
+}
+
+constexpr const char* kNotes =
+            "\nA film (.crtfilm, from -o or --checkpoint) holds every sample's sum, so exposure, white "
+            "balance, colour space and crop can be\n"
+            "chosen after the render. No backend is opened and no scene is read. PNG and PPM get exposure "
+            "and white balance; EXR and PFM\n"
+            "hold the radiance of the scene unless film.apply_to_float is true. Several films of disjoint "
+            "samples are added up, as by merge.\n"
+            "\nKeys of --set:\n"
+            "  film.exposure_ev=1.5                 stops\n"
+            "  film.white_balance=lamp              a named light of the scene, an illuminant (A, D50, D65, "
+            "F2, F7, F11),\n"
+            "                                       a spectrum such as {blackbody: 3200}, or null for none\n"
+            "  film.color_space=acescg              srgb, acescg or xyz\n"
+            "  film.crop=[0,0,256,256]              the same as --crop 0,0,256,256\n"
+            "  film.apply_to_float=true             exposure and white balance in EXR and PFM too\n"
+            "\nExamples:\n"
+            "  crt scene.yaml -o scene.crtfilm                                       render once\n"
+            "  crt develop scene.crtfilm -o a.png --set film.exposure_ev=1           one stop brighter\n"
+            "  crt develop scene.crtfilm -o b.png --set film.white_balance=D50\n"
+            "  crt develop scene.crtfilm -o c.exr -o c.png --crop 100,50,300,250\n"
+            "  crt develop scene.crtfilm -o d.exr --aovs albedo,normal,error,samples\n"
+            "  crt develop a.crtfilm b.crtfilm -o both.exr                           two halves of the "
+            "samples\n";
+
+}  // namespace
+
+Command developCommand() {
+    const auto to = std::make_shared<DevelopArguments>();
+    return {
+        .name = "develop",
+        .summary = "make images of a film again, with other exposure, white balance, colours or crop",
+        .arguments = {{.name = "FILM",
+                       .help = "films (.crtfilm) of one scene",
+                       .read = [to](const std::string& text) { to->films.push_back(text); },
+                       .completion = completeFilm(),
+                       .repeatable = true}},
+        .groups = {{"Options",
+                    {{.names = "-o,--output",
+                      .placeholder = "FILE",
+                      .help = ".exr .png .ppm or .pfm; -.png for a pipe; repeatable",
+                      .read = [to](const std::string& text) { to->outputs.push_back(text); },
+                      .completion = completeImage(),
+                      .repeatable = true,
+                      .required = true},
+                     {.names = "--set",
+                      .placeholder = "KEY=VALUE",
+                      .help = "change how it is developed, e.g. film.exposure_ev=1; repeatable",
+                      .read = [to](const std::string& text) { to->changes.push_back(parseOverride(text)); },
+                      .repeatable = true},
+                     {.names = "--crop",
+                      .placeholder = "X0,Y0,X1,Y1",
+                      .help = "only these pixels of the film, X1 and Y1 excluded",
+                      .read = [to](const std::string& text) { to->crop = parseRectangle(text, "--crop"); }},
+                     {.names = "--aovs",
+                      .placeholder = "A,B",
+                      .help = "what .exr files hold beside the image (what the scene asks for), or none",
+                      .read = [to](const std::string& text) { to->aovs = parseList(text, "--aovs"); }},
+                     quietOption("only warnings and errors")}}},
+        .notes = kNotes,
+        .run = [to](const std::string&) { return develop(*to); }};
 }
 
 }  // namespace crt

@@ -1,12 +1,13 @@
-#include "cli/verify_command.h"
-
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/input_file.h"
 #include "base/log.h"
 #include "base/standard_output.h"
 #include "base/unit_text.h"
+#include "cli/commands.h"
+#include "cli/shared_options.h"
 #include "cli/terminal_watch.h"
+#include "judge/verify/case.h"
 #include "judge/verify/report.h"
 #include "judge/verify/run.h"
 
@@ -16,10 +17,28 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <sstream>
+#include <string>
+#include <vector>
 
-namespace crt::verify {
+namespace crt {
+namespace verify {
 namespace {
+
+struct Arguments {
+    std::string backend = "auto";          ///< A name, a path of a plugin, or "auto".
+    std::string plugin_path;               ///< A directory to look for it first; empty: none.
+    IntegratorOptions integrator;
+    std::vector<std::string>
+        cases;  ///< Ids, names or groups, also several with commas; empty: all of the level.
+    Level level = Level::Commit;
+    std::string output;                    ///< Directory for verify.json and verify.html; empty: none.
+    bool list = false;
+    bool markdown = false;                 ///< Print docs/stability.md with the figures of `suites` instead.
+    std::vector<std::string> suites;       ///< verify.json files.
+    bool quiet = false;
+};
 
 constexpr int kFailed = 7;
 
@@ -90,8 +109,8 @@ void writeReports(const std::string& directory, const SuiteResult& suite) {
     writeWhole(folder / "verify.html", suiteHtml(suite));
 }
 
-}  // namespace
-
+/// Exit code: 0 when every case passes, is refused as documented or does not apply; 7 when one fails or is
+/// inconclusive; 128 + signal when interrupted. Throws crt::Error.
 int verify(const Arguments& arguments) {
     if (arguments.markdown) {
         std::vector<std::string> suites;
@@ -134,4 +153,86 @@ int verify(const Arguments& arguments) {
     return suite.passed() ? 0 : kFailed;
 }
 
-}  // namespace crt::verify
+OptionGroup asked(Arguments& to) {
+    const std::vector<std::string> levels{"commit", "merge", "nightly"};
+    return {"What is asked",
+            {{.names = "--case",
+              .placeholder = "NAME",
+              .help = "only these: ids (A03), names (furnace), groups (H), with commas or repeated",
+              .read = [&to](const std::string& text) { to.cases.push_back(text); },
+              .repeatable = true},
+             {.names = "--level",
+              .placeholder = "LEVEL",
+              .help = "commit (a minute or so), merge (a quarter of an hour) or nightly",
+              .read = [&to](const std::string& text) { to.level = *levelNamed(text); },
+              .completion = completeWord(levels),
+              .choices = levels},
+             {.names = "--list",
+              .placeholder = {},
+              .help = "show the cases and run nothing",
+              .read = [&to](const std::string&) { to.list = true; }}}};
+}
+
+OptionGroup ofWhom(Arguments& to) {
+    return {"Of whom",
+            {backendOption(to.backend),
+             {.names = "--plugin-path",
+              .placeholder = "DIR",
+              .help = "look for the backend here first",
+              .read = [&to](const std::string& text) { to.plugin_path = text; },
+              .completion = {Completion::Kind::Folder}},
+             deviceOption(to.integrator), threadsOption(to.integrator)}};
+}
+
+OptionGroup output(Arguments& to) {
+    return {"Output",
+            {{.names = "-o,--output",
+              .placeholder = "DIR",
+              .help = "write verify.json and verify.html there",
+              .read = [&to](const std::string& text) { to.output = text; },
+              .completion = {Completion::Kind::Folder}},
+             {.names = "-q,--quiet",
+              .placeholder = {},
+              .help = "only what fails, and the summary",
+              .read = [&to](const std::string&) { to.quiet = true; }},
+             {.names = "--markdown",
+              .placeholder = {},
+              .help = "print docs/stability.md instead",
+              .read = [&to](const std::string&) { to.markdown = true; }},
+             {.names = "--figures",
+              .placeholder = "FILE",
+              .help = "with --markdown: a verify.json whose figures go into it; repeatable",
+              .read = [&to](const std::string& text) { to.suites.push_back(text); },
+              .completion = completeFile({"json"}),
+              .repeatable = true}}};
+}
+
+constexpr const char* kNotes =
+            "\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, "
+            "deterministic quadrature, relations between\n"
+            "images. A case passes, is refused as documented, does not apply (and says why), is "
+            "INCONCLUSIVE (the noise hides the answer) or\n"
+            "FAILS; the last two make the exit code 7, and the line below says what the figures suggest. "
+            "docs/stability.md describes every case.\n"
+            "\nExamples:\n"
+            "  crt verify                                          the level for every commit, on the best "
+            "backend\n"
+            "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.html and "
+            "out/verify.json\n"
+            "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
+            "  crt verify --backend mine --plugin-path build       a backend of your own\n"
+            "  crt verify --list --level nightly                   everything there is\n";
+
+}  // namespace
+}  // namespace verify
+
+Command verifyCommand() {
+    const auto to = std::make_shared<verify::Arguments>();
+    return {.name = "verify",
+            .summary = "render scenes whose answer is known; exit code 7 when a backend does not find it",
+            .groups = {verify::asked(*to), verify::ofWhom(*to), verify::output(*to)},
+            .notes = verify::kNotes,
+            .run = [to](const std::string&) { return verify::verify(*to); }};
+}
+
+}  // namespace crt

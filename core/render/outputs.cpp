@@ -1,12 +1,14 @@
 #include "film/resolve.h"
 #include "render/outputs.h"
 
+#include "base/atomic_file.h"
 #include "film/checkpoint.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
 #include <utility>
@@ -33,7 +35,7 @@ OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene
         for (const std::string& file : names) {
             if (std::filesystem::path(file).extension() == kCheckpointExtension) {
                 plan.films.push_back(file);
-            } else if (const auto format = formatOfFile(file)) {
+            } else if (const auto format = file == "-" ? OutputFormat::Ppm : formatOfFile(file)) {
                 const std::uint32_t aovs = *format == OutputFormat::Exr ? requestedAovs(scene) : 0;
                 plan.images.push_back({.file = file, .format = *format, .aovs = aovs, .place = {}});
             } else {
@@ -46,6 +48,12 @@ OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene
         }
     }
     plan.first = names.front();
+    for (const std::string& film : plan.films)
+        if (isStandardOutput(film))
+            throw Error(ErrorKind::Usage,
+                        fmt::format("'{}': films are written to files, which crt reads again", film));
+    if (std::count_if(names.begin(), names.end(), isStandardOutput) > 1)
+        throw Error(ErrorKind::Usage, "two outputs would go to standard output, one after the other");
     std::set<std::string> seen;
     for (const std::string& name : names)
         if (!seen.insert(std::filesystem::path(name).lexically_normal().string()).second)
@@ -54,6 +62,7 @@ OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene
 }
 
 std::string besideOutput(const std::string& output, const char* suffix) {
+    if (isStandardOutput(output)) return std::string("stdout") + suffix;
     return std::filesystem::path(output).replace_extension().string() + suffix;
 }
 

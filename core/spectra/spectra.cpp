@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/input_file.h"
 #include "spectra/spectra_data.h"
+#include "spectra/spectrum_file.h"
 
 #include <fmt/format.h>
 
@@ -209,7 +210,7 @@ Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vect
     return s;
 }
 
-Spectrum readSpectrumFile(const std::string& path, Outside outside) {
+SpectrumTable readSpectrumTable(const std::string& path) {
     std::string text;
     try {
         text = readInput(path, kMostSpectrumBytes);
@@ -217,7 +218,8 @@ Spectrum readSpectrumFile(const std::string& path, Outside outside) {
         fail(fmt::format("this spectrum file {}", refused.what()), {path});
     }
 
-    std::vector<double> wavelength, value;
+    SpectrumTable table;
+    auto& [wavelength, value] = table;
     std::string_view rest = text;
     if (rest.starts_with("\xEF\xBB\xBF"))
         rest.remove_prefix(3);  // Spreadsheets like to write a byte-order mark.
@@ -249,6 +251,11 @@ Spectrum readSpectrumFile(const std::string& path, Outside outside) {
         value.push_back(v);
     }
     if (wavelength.empty()) fail("this spectrum file holds no numbers", {path});
+    return table;
+}
+
+Spectrum readSpectrumFile(const std::string& path, Outside outside) {
+    const auto [wavelength, value] = readSpectrumTable(path);
     // What is left to find concerns the table as a whole; the message gains the file it is about.
     try {
         return tableSpectrum(wavelength, value, outside);
@@ -350,13 +357,10 @@ Spectrum cauchyIndex(const std::vector<double>& coefficients_um) {
 }
 
 std::optional<std::pair<Spectrum, Spectrum>> metalIndex(std::string_view name) {
-    constexpr double kElectronVoltNanometre = 1239.841984;  // h c / e, CODATA 2018.
     for (const data::Metal& metal : data::kMetals) {
         if (metal.symbol != name && metal.name != name) continue;
         std::vector<double> wavelength(data::kMetalSize);
-        for (std::size_t i = 0; i < wavelength.size(); ++i)
-            wavelength[i] = kElectronVoltNanometre /
-                            (data::kMetalFirst_eV - data::kMetalStep_eV * static_cast<double>(i));
+        for (std::size_t i = 0; i < wavelength.size(); ++i) wavelength[i] = data::metalWavelength_nm(i);
         return std::pair{resample(wavelength, {metal.n.begin(), metal.n.end()}, Outside::Clamp),
                          resample(wavelength, {metal.k.begin(), metal.k.end()}, Outside::Clamp)};
     }

@@ -193,10 +193,11 @@ constexpr std::array<double, kObserverSize> kCieZ = {
     0,           0,           0,           0,           0,           0,           0,
 };
 
-// CIE illuminants, relative spectral power in steps of 5 nm, to the six digits published.
-// Source: CIE 015:2018 "Colorimetry", tables of illuminants A, D65 and D50 and of the fluorescent lamps FL2,
-// FL7, FL11. A table some renderers carry as D50 (49.664 at 400 nm) is another daylight: its white is x =
-// .337, not .3457.
+// CIE illuminants, relative spectral power in steps of 5 nm, to the six digits published. A table some
+// renderers carry as D50 (49.664 at 400 nm) is another daylight: its white is x = .337, not .3457.
+constexpr std::string_view kIlluminantSource =
+    "CIE 015:2018, Colorimetry: tables of illuminants A, D65 and D50 and of the fluorescent lamps FL2, FL7 and "
+    "FL11";
 
 // A, 360-830 nm.
 static constexpr double kIlluminantA[] = {
@@ -275,22 +276,25 @@ constexpr std::array<Illuminant, 6> kIlluminants = {{
 }};
 
 // Optical glasses and diamond: n^2 - 1 = sum B L^2 / (L^2 - C), L in micrometres, C in square micrometres.
-// Sources: SCHOTT catalogue (N-BK7; the lead flints SF10, SF11 and their successors N-SF10, N-SF11, which
-// are often mistaken for them and differ in dispersion); Malitson, J. Opt. Soc. Am. 55, 1205 (1965) (fused
-// silica); Peter, Z. Phys. 15, 358 (1923) (diamond).
+// The lead flints SF10 and SF11 are often mistaken for their successors N-SF10 and N-SF11, which differ in
+// dispersion.
+static constexpr std::string_view kSchott = "SCHOTT AG, catalogue of optical glass";
 constexpr std::array<Glass, 7> kGlasses = {{
-    {"N-BK7", {1.03961212, .231792344, 1.01046945}, {.00600069867, .0200179144, 103.560653}},
-    {"SF10", {1.61625977, .259229334, 1.07762317}, {.0127534559, .0581983954, 116.60768}},
-    {"SF11", {1.73848403, .311168974, 1.17490871}, {.0136068604, .0615960463, 121.922711}},
-    {"N-SF10", {1.62153902, .256287842, 1.64447552}, {.0122241457, .0595736775, 147.468793}},
-    {"N-SF11", {1.73759695, .313747346, 1.89878101}, {.013188707, .0623068142, 155.23629}},
-    {"fused_silica", {.6961663, .4079426, .8974794}, {.0046791482, .0135120631, 97.9340025}},
-    {"diamond", {.3306, 4.3356, 0}, {.030625, .011236, 0}},
+    {"N-BK7", {1.03961212, .231792344, 1.01046945}, {.00600069867, .0200179144, 103.560653}, kSchott},
+    {"SF10", {1.61625977, .259229334, 1.07762317}, {.0127534559, .0581983954, 116.60768}, kSchott},
+    {"SF11", {1.73848403, .311168974, 1.17490871}, {.0136068604, .0615960463, 121.922711}, kSchott},
+    {"N-SF10", {1.62153902, .256287842, 1.64447552}, {.0122241457, .0595736775, 147.468793}, kSchott},
+    {"N-SF11", {1.73759695, .313747346, 1.89878101}, {.013188707, .0623068142, 155.23629}, kSchott},
+    {"fused_silica",
+     {.6961663, .4079426, .8974794},
+     {.0046791482, .0135120631, 97.9340025},
+     "I. H. Malitson, J. Opt. Soc. Am. 55, 1205 (1965)"},
+    {"diamond", {.3306, 4.3356, 0}, {.030625, .011236, 0}, "F. Peter, Z. Phys. 15, 358 (1923)"},
 }};
 
 // Metals: complex refractive index n + ik at photon energies 4.15, 4.10, ... 1.40 eV, which is the grid of
-// the SOPRA optical data base, where these figures come from; pbrt and Mitsuba carry the same numbers
-// against wavelength.
+// their source; pbrt and Mitsuba carry the same numbers against wavelength.
+constexpr std::string_view kMetalSource = "SOPRA optical data base, at photon energies 4.15 to 1.40 eV";
 
 static constexpr double kAgN[kMetalSize] = {
     1.519,   1.496, 1.4325,  1.323, 1.142062, .932, .719062, .526, .388125, .294, .253313, .238,

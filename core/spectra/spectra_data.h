@@ -1,7 +1,9 @@
-/// Declarations of the measured tables in spectra_data.cpp. Only spectra.cpp and rgb_spectrum.cpp read them.
+/// Declarations of the measured tables in spectra_data.cpp. Only spectra.cpp, rgb_spectrum.cpp and
+/// data_catalogue.cpp read them.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
 #include <string_view>
 
@@ -20,6 +22,7 @@ struct Illuminant {
     double step_nm;
     std::span<const double> power;
 };
+extern const std::string_view kIlluminantSource;
 extern const std::array<Illuminant, 6> kIlluminants;
 
 /// Sellmeier coefficients, L in micrometres, C in square micrometres.
@@ -27,6 +30,7 @@ struct Glass {
     std::string_view name;
     std::array<double, 3> B;
     std::array<double, 3> C_um2;
+    std::string_view source;
 };
 extern const std::array<Glass, 7> kGlasses;
 
@@ -35,6 +39,12 @@ inline constexpr double kMetalFirst_eV =
     4.15;  ///< Photon energy of the first sample; the rest follow downwards.
 inline constexpr double kMetalStep_eV = 0.05;
 
+/// Where the sample `i` of a metal lies.
+constexpr double metalWavelength_nm(std::size_t i) {
+    constexpr double kElectronVoltNanometre = 1239.841984;  // h c / e, CODATA 2018.
+    return kElectronVoltNanometre / (kMetalFirst_eV - kMetalStep_eV * static_cast<double>(i));
+}
+
 /// Complex refractive index n + ik at kMetalFirst_eV, kMetalFirst_eV − kMetalStep_eV, …
 struct Metal {
     std::string_view symbol;
@@ -42,6 +52,7 @@ struct Metal {
     std::span<const double, kMetalSize> n;
     std::span<const double, kMetalSize> k;
 };
+extern const std::string_view kMetalSource;
 extern const std::array<Metal, 4> kMetals;
 
 }  // namespace crt::data

@@ -397,6 +397,7 @@ std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node,
 constexpr std::size_t kUnusedShown = 20;
 
 void UnusedNames::add(const std::string& name, const YamlPlace& place) {
+    if (place.source != nullptr && place.source->included) return;
     if (++count_ > kUnusedShown) return;
     const SourcePlace at = place.resolved();
     logWarning("{}:{}:{}: {} '{}' is not used", at.file, at.line, at.column, one_, name);
@@ -406,16 +407,11 @@ void UnusedNames::finish() const {
     if (count_ > kUnusedShown) logWarning("{} more {} are not used", count_ - kUnusedShown, many_);
 }
 
-std::optional<std::string> SceneFiles::locate(const std::string& name, const YamlPlace& place,
-                                              Diagnostics& out) const {
-    const fs::path wanted(name);
-    std::vector<fs::path> directories;
-    if (wanted.is_absolute()) {
-        directories.push_back(wanted.root_path());
-    } else {
-        directories.emplace_back(directory_.empty() ? "." : directory_);
-        for (std::string& d : meshDirectories()) directories.emplace_back(std::move(d));
-    }
+namespace {
+
+/// `name` in the first of the folders that has it.
+std::optional<std::string> locateIn(const std::vector<fs::path>& directories, const fs::path& wanted,
+                                    const YamlPlace& place, Diagnostics& out) {
     std::error_code ec;
     for (const fs::path& directory : directories) {
         const fs::path path = directory / wanted;  // An absolute name replaces the directory.
@@ -426,7 +422,7 @@ std::optional<std::string> SceneFiles::locate(const std::string& name, const Yam
         if (fs::exists(path, ec)) return path.lexically_normal().string();
     }
     if (wanted.is_absolute()) {
-        out.error(place, fmt::format("there is no file '{}'", name));
+        out.error(place, fmt::format("there is no file '{}'", wanted.string()));
         return std::nullopt;
     }
     std::vector<std::string> tried, near;
@@ -434,9 +430,31 @@ std::optional<std::string> SceneFiles::locate(const std::string& name, const Yam
         tried.push_back(directory.string());
         addFileNames((directory / wanted).parent_path(), near);
     }
-    out.error(place, fmt::format("cannot find '{}'; searched in {}", name, fmt::join(tried, ", ")),
+    out.error(place, fmt::format("cannot find '{}'; searched in {}", wanted.string(), fmt::join(tried, ", ")),
               didYouMean(wanted.filename().string(), near));
     return std::nullopt;
+}
+
+}  // namespace
+
+std::string SceneFiles::directoryOf(const YamlPlace& place) const {
+    const std::string& own =
+        place.source != nullptr && !place.source->directory.empty() ? place.source->directory : directory_;
+    return own.empty() ? "." : own;
+}
+
+std::optional<std::string> SceneFiles::locate(const std::string& name, const YamlPlace& place,
+                                              Diagnostics& out) const {
+    const fs::path wanted(name);
+    if (wanted.is_absolute()) return locateIn({wanted.root_path()}, wanted, place, out);
+    std::vector<fs::path> directories{directoryOf(place)};
+    for (std::string& d : meshDirectories()) directories.emplace_back(std::move(d));
+    return locateIn(directories, wanted, place, out);
+}
+
+std::optional<std::string> SceneFiles::locateBeside(const std::string& name, const YamlPlace& place,
+                                                    Diagnostics& out) const {
+    return locateIn({directoryOf(place)}, name, place, out);
 }
 
 void SceneFiles::note(const std::string& path) {

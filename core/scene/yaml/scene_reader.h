@@ -103,7 +103,8 @@ std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node,
 void expected(Diagnostics& out, const YamlPlace& place, std::string_view wanted, const std::string& what,
               const YamlNode& node);
 
-/// Warns about names that nothing uses: the first by name and place, the others by their number.
+/// Warns about names that nothing uses: the first by name and place, the others by their number. Not about
+/// those of included files, which are made to be chosen from.
 class UnusedNames {
 public:
     UnusedNames(std::string one, std::string many) : one_(std::move(one)), many_(std::move(many)) {}
@@ -120,15 +121,20 @@ class SceneFiles {
 public:
     explicit SceneFiles(std::string directory) : directory_(std::move(directory)) {}
 
-    /// The path of a readable file: beside the scene, then in the mesh directories. Reports an error at
-    /// `place` when there is none.
+    /// The path of a readable file: beside the file that names it, then in the mesh directories. Reports an
+    /// error at `place` when there is none.
     std::optional<std::string> locate(const std::string& name, const YamlPlace& place,
                                       Diagnostics& out) const;
+    /// The same of a file that can only be beside the one that names it.
+    std::optional<std::string> locateBeside(const std::string& name, const YamlPlace& place,
+                                            Diagnostics& out) const;
     /// Notes that a file went into the scene; every file once.
     void note(const std::string& path);
     const std::vector<std::string>& read() const { return read_; }
 
 private:
+    std::string directoryOf(const YamlPlace& place) const;
+
     std::string directory_;
     std::vector<std::string> read_;
 };

@@ -67,6 +67,11 @@ SectionSchema topLevel() {
                  .range = {1, 1, false, false},
                  .required = true,
                  .doc = "Version of the scene format, 1. Must be the first key."},
+                {.name = "include",
+                 .shape = Shape::OneOrList,
+                 .count_min = 1,
+                 .doc = "Scene files whose contents count as if they stood here; see [Shared "
+                        "parts](#shared-parts)."},
                 {.name = "title", .doc = "What the scene shows; goes into image metadata and the report."},
                 {.name = "camera",
                  .kind = Kind::Section,
@@ -478,6 +483,12 @@ void addSpectra(std::vector<SectionSchema>& all) {
                      .required = true,
                      .doc = "Its name."},
                     scaleKey()}});
+    all.push_back({"spectrum/data",
+                   "named data",
+                   "Measured data that come with crt, by name: `cornell/white`, `paints/foliage`, `metals/Au/n`, "
+                   "`glasses/SF10`, `illuminants/D65`. `crt data` lists them with their sources; see [Named "
+                   "data](#named-data).",
+                   {{.name = "data", .required = true, .doc = "Its name."}, scaleKey()}});
     all.push_back({"spectrum/ref",
                    "a reference",
                    "A named spectrum; the form to use when it should be scaled.",

@@ -1,8 +1,11 @@
 #include "scene/yaml/scene_spectra.h"
 
 #include "base/log.h"
+#include "base/modules.h"
+#include "spectra/data_catalogue.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -161,6 +164,7 @@ std::optional<Spectrum> SpectrumReader::resolveForm(const SectionReader& form, S
         if (word == "file") return file(form);
         if (word == "rgb") return rgb(form, use);
         if (word == "sellmeier") return sellmeier(form);
+        if (word == "data") return data(form);
         if (word == "blackbody") {
             double temperature_K = 0;
             bool normalise = true;
@@ -270,6 +274,24 @@ std::optional<Spectrum> SpectrumReader::sellmeier(const SectionReader& form) {
     const bool have_B = coefficients->read("B", B), have_C = coefficients->read("C", C_um2);
     if (!have_B || !have_C) return std::nullopt;
     return sellmeierIndex(B, C_um2);
+}
+
+std::optional<Spectrum> SpectrumReader::data(const SectionReader& form) {
+    std::string name;
+    if (!form.read("data", name)) return std::nullopt;
+    if (std::optional<NamedSpectrum> found = dataSpectrum(name)) {
+        if (!found->file.empty()) files_.note(found->file);
+        return std::move(found->spectrum);
+    }
+    const std::vector<std::string> known = dataSpectrumNames();
+    const bool has_columns = std::find(known.begin(), known.end(), name + "/n") != known.end();
+    form.error("data", fmt::format("there are no data '{}'", name),
+               has_columns                             ? fmt::format("write {0}/n or {0}/k", name)
+               : out_.worthSuggesting(known.size()) ? didYouMean(name, known)
+                                                       : "",
+               fmt::format("'crt data' lists what there is, here and in {}",
+                           fmt::join(dataDirectories(), ", ")));
+    return std::nullopt;
 }
 
 }  // namespace crt

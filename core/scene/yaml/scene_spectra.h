@@ -40,6 +40,7 @@ private:
     std::optional<Spectrum> file(const SectionReader& form);
     std::optional<Spectrum> rgb(const SectionReader& form, SpectrumUse use);
     std::optional<Spectrum> sellmeier(const SectionReader& form);
+    std::optional<Spectrum> data(const SectionReader& form);
 
     Diagnostics& out_;
     SceneFiles& files_;

@@ -3,6 +3,7 @@
 #include "base/input_file.h"
 #include "base/log.h"
 #include "scene/scene_limits.h"
+#include "scene/yaml/scene_include.h"
 #include "scene/yaml/scene_objects.h"
 #include "scene/yaml/scene_reader.h"
 #include "scene/yaml/scene_schema.h"
@@ -134,6 +135,11 @@ void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrid
         const YamlSource& source = sources.emplace_back(fmt::format("--set {}", change.path),
                                                         change.path + "=" + change.value, true);
         const std::size_t before = out.count();
+        if (change.path == "include" || change.path.starts_with("include.")) {
+            out.error({&source, 1, 1, static_cast<int>(change.path.size())},
+                      "'include' cannot be set: --set changes what the files say together");
+            continue;
+        }
         const YamlNodePtr value =
             readYaml(source, change.value, out, static_cast<int>(change.path.size()) + 1);
         if (value)
@@ -355,29 +361,17 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
     if (!out.failed()) objects.finish();
 }
 
-/// The version comes first so that a reader of another version can stop before it meets a key it does not
-/// know.
-void checkFirstKey(const YamlNode& root, Diagnostics& out) {
-    if (root.kind != YamlKind::Map) return;
-    const YamlEntry* version = root.find("crt");
-    if (version != nullptr && version != &root.entries.front())
-        out.error(version->key_place, "'crt' must be the first key of a scene");
-}
-
-Scene parse(const std::string& yaml, const std::string& name, const std::vector<SceneOverride>& overrides,
-            SceneFiles files) {
+/// `path` is the file of the scene; empty for text of another origin.
+Scene parse(const std::string& yaml, const std::string& name, const std::string& path,
+            const std::vector<SceneOverride>& overrides, SceneFiles files) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = name;
     scene.input_bytes = yaml.size();
-    const YamlSource source(name, yaml);
     std::deque<YamlSource> override_sources;  // Places point to them: they must not move.
     Diagnostics out;
-    YamlNodePtr root = readYaml(source, yaml, out);
-    if (!root && !out.failed())
-        out.error({&source, 0, 0, 1}, "there is nothing in this file; a scene begins with 'crt: 1'");
-    if (root) {
-        checkFirstKey(*root, out);
+    SceneIncludes includes(out, files);
+    if (YamlNodePtr root = includes.read(name, yaml, path)) {
         applyOverrides(root, overrides, override_sources, out);
         readScene(*root, out, files, scene);
     }
@@ -435,14 +429,15 @@ Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overr
     const std::string text = readSceneText(path);
     SceneFiles files(std::filesystem::path(path).parent_path().string());
     if (path != kStandardInput) files.note(path);
-    Scene scene = parse(text, nameOf(path), overrides, std::move(files));
+    const std::string file = path == kStandardInput ? std::string() : path;
+    Scene scene = parse(text, nameOf(path), file, overrides, std::move(files));
     if (scene.files_read.empty()) scene.input_bytes = text.size();
     return scene;
 }
 
 Scene parseScene(const std::string& yaml, const std::string& name, const std::string& directory,
                  const std::vector<SceneOverride>& overrides) {
-    return parse(yaml, name, overrides, SceneFiles(directory));
+    return parse(yaml, name, {}, overrides, SceneFiles(directory));
 }
 
 }  // namespace crt

@@ -383,8 +383,9 @@ void Diagnostics::throwIfFailed() const {
     for (const Entry& e : errors_) order.push_back(&e);
     std::stable_sort(order.begin(), order.end(), [](const Entry* a, const Entry* b) {
         const auto key = [](const Entry* e) {
-            return std::tuple(e->place.source != nullptr && e->place.source->command_line, e->place.line,
-                              e->place.column);
+            const YamlSource* source = e->place.source;
+            return std::tuple(source != nullptr && source->command_line,
+                              source != nullptr ? source->rank : 0, e->place.line, e->place.column);
         };
         return key(a) < key(b);
     });

@@ -26,6 +26,9 @@ struct YamlSource {
     std::string name;  ///< Path of the file, or "--set film.resolution".
     std::vector<std::string> lines;
     bool command_line = false;  ///< One line, so messages leave line and column out.
+    bool included = false;      ///< By a scene, in which not all of it need be used.
+    int rank = 0;               ///< Messages come in this order: the scene itself, then what it includes.
+    std::string directory{};    ///< Where relative names in it are looked up; empty: beside the scene.
 };
 
 /// A stretch of a source. Counts from 1, columns in bytes; line 0 means the source as a whole.

@@ -1,46 +1,32 @@
-#include "cli/commands.h"
-#include "film/error_text.h"
-
-#include "backend/loader.h"
-#include "base/atomic_file.h"
-#include "base/log.h"
 #include "base/stage.h"
 #include "base/standard_output.h"
 #include "base/unit_text.h"
+#include "cli/commands.h"
+#include "cli/row.h"
+#include "cli/shared_options.h"
 #include "cli/stage_progress.h"
 #include "compile/compile.h"
 #include "film/checkpoint.h"
+#include "film/error_text.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
 #include "kernel/features.h"
-#include "render/output_guard.h"
+#include "render/job.h"
 #include "render/outputs.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <optional>
-#include <utility>
+#include <string>
+#include <vector>
 
 namespace crt {
 namespace {
-
-/// "name      value", one per line; further lines of a value stand under the first.
-void row(const char* name, const std::string& value) {
-    constexpr int kColumn = 14;
-    std::string indented;
-    for (const char c : value) {
-        indented += c;
-        if (c == '\n') indented.append(kColumn + 2, ' ');
-    }
-    printOut("  {:<{}} {}\n", name, kColumn - 1, indented);
-}
-
-std::string counted(std::uint64_t n, const char* one, const char* many) {
-    return fmt::format("{} {}", n, n == 1 ? one : many);
-}
 
 const char* name(MaterialType type) {
     switch (type) {
@@ -123,23 +109,23 @@ void showScene(const SceneRequest& what) {
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
     progress.reset();
     printOut("{}{}\n", what.file, scene.title.empty() ? "" : ": " + scene.title);
-    row("film", filmText(scene));
-    row("camera", cameraText(scene.camera));
-    row("geometry", counted(compiled.objects, "object", "objects") + ", " +
+    printRow("film", filmText(scene));
+    printRow("camera", cameraText(scene.camera));
+    printRow("geometry", counted(compiled.objects, "object", "objects") + ", " +
                         counted(compiled.triangles, "triangle", "triangles"));
-    row("materials", materialsText(scene));
-    row("lights", lightsText(scene, compiled));
-    row("sampler", fmt::format("{}, seed {}, {} samples per pixel", name(scene.sampler.type),
+    printRow("materials", materialsText(scene));
+    printRow("lights", lightsText(scene, compiled));
+    printRow("sampler", fmt::format("{}, seed {}, {} samples per pixel", name(scene.sampler.type),
                                scene.sampler.seed, scene.sampler.samples));
-    row("accelerator", acceleratorText(compiled));
-    row("needs", featureNames(compiled.features));
+    printRow("accelerator", acceleratorText(compiled));
+    printRow("needs", featureNames(compiled.features));
     std::string left_out;
     for (const auto& [thing, why] : compiled.left_out)
         left_out += fmt::format("{}{}: {}", left_out.empty() ? "" : "\n", thing, why);
-    row("left out", left_out.empty() ? "nothing" : left_out);
-    row("scene blob", bytesText(static_cast<double>(compiled.size_bytes)));
-    row("scene hash", compiled.hash);
-    row("times", fmt::format("{} to read, {} to compile, {} of it for the accelerator",
+    printRow("left out", left_out.empty() ? "nothing" : left_out);
+    printRow("scene blob", bytesText(static_cast<double>(compiled.size_bytes)));
+    printRow("scene hash", compiled.hash);
+    printRow("times", fmt::format("{} to read, {} to compile, {} of it for the accelerator",
                              durationText(scene.parse_seconds), durationText(compiled.compile_seconds),
                              durationText(compiled.build_seconds)));
 }
@@ -163,18 +149,18 @@ std::string developmentText(const Development& development) {
 
 void showRecord(const FilmRecord& record) {
     const auto optional_row = [](const char* name, const std::string& value) {
-        if (!value.empty()) row(name, value);
+        if (!value.empty()) printRow(name, value);
     };
     optional_row("title", record.title);
     if (record.isCropped())
-        row("window",
+        printRow("window",
             fmt::format("[{}, {}) x [{}, {}) of {} x {} pixels", record.window[0], record.window[2],
                         record.window[1], record.window[3], record.width, record.height));
-    row("developed in", developmentText(record.development));
+    printRow("developed in", developmentText(record.development));
     std::vector<std::string> lights;
     for (const auto& [name, white] : record.whites) lights.push_back(name);
     optional_row("lights", fmt::format("{}", fmt::join(lights, ", ")));
-    row("seed", std::to_string(record.seed));
+    printRow("seed", std::to_string(record.seed));
     optional_row("rendered by", record.backend);
     optional_row("on", record.device);
     optional_row("at", record.date_utc.empty() ? "" : record.date_utc + " UTC");
@@ -186,28 +172,27 @@ void showFilm(const std::string& file) {
     const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, independent);
     printOut("{}: {}\n", file,
              identity.record && identity.record->complete == true ? "film" : "partial render");
-    row("film", fmt::format("{} x {} pixels", film.shape().width, film.shape().height));
-    row("aovs", aovText(film.shape().aovs));
-    row("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
-    row("invalid", counted(film.invalidSamples(), "sample", "samples"));
-    row("error", error ? errorText(*error).substr(6) : "unknown");
+    printRow("film", fmt::format("{} x {} pixels", film.shape().width, film.shape().height));
+    printRow("aovs", aovText(film.shape().aovs));
+    printRow("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
+    printRow("invalid", counted(film.invalidSamples(), "sample", "samples"));
+    printRow("error", error ? errorText(*error).substr(6) : "unknown");
     if (identity.record) showRecord(*identity.record);
-    row("scene hash", identity.scene_hash);
-    row("written by", fmt::format("crt {}, bits version {}", identity.version, identity.bits_version));
+    printRow("scene hash", identity.scene_hash);
+    printRow("written by", fmt::format("crt {}, bits version {}", identity.version, identity.bits_version));
 }
 
 void showImage(const std::string& file) {
     const Image image = readImage(file);
     printOut("{}: image\n", file);
-    row("size", fmt::format("{} x {} pixels", image.width, image.height));
-    row("channels", fmt::format("{}", fmt::join(image.channels, ", ")));
+    printRow("size", fmt::format("{} x {} pixels", image.width, image.height));
+    printRow("channels", fmt::format("{}", fmt::join(image.channels, ", ")));
     if (!image.integer_channels.empty())
-        row("integers", fmt::format("{}", fmt::join(image.integer_channels, ", ")));
-    for (const auto& [key, value] : image.metadata) row(key.c_str(), value);
+        printRow("integers", fmt::format("{}", fmt::join(image.integer_channels, ", ")));
+    for (const auto& [key, value] : image.metadata) printRow(key.c_str(), value);
 }
 
-}  // namespace
-
+/// What a scene needs, or what a film or an image holds, by the name's extension.
 int showInfo(const SceneRequest& what) {
     if (std::filesystem::path(what.file).extension() == kCheckpointExtension) {
         showFilm(what.file);
@@ -219,64 +204,21 @@ int showInfo(const SceneRequest& what) {
     return 0;
 }
 
-int mergeFilms(const MergeArguments& arguments) {
-    // Everything that can be refused is refused before the parts, which may be large, are read.
-    const bool has_scene = !arguments.scene.file.empty();
-    Scene scene;
-    if (has_scene) scene = loadScene(arguments.scene);
-    OutputPlan plan = planOutputs(arguments.outputs, scene);
-    std::vector<std::string> inputs = arguments.parts, images;
-    inputs.insert(inputs.end(), scene.files_read.begin(), scene.files_read.end());
-    for (const Output& image : plan.images) images.push_back(image.file);
-    refuseOverInputs(inputs, images, plan.films);
-    FilmGuard films;
-    for (const std::string& film : plan.films) films.look(film, true, arguments.overwrite);
-    for (const Output& image : plan.images) checkWritable(image.file);
-    for (const std::string& film : plan.films) checkWritable(film);
+}  // namespace
 
-    auto [film, identity] = mergeCheckpoints(arguments.parts);
-    films.requireRoom(film.samples.count());
-    if (has_scene) {
-        FilmRecord record = recordOf(scene);
-        requireSameScene(arguments.parts.front(), identity,
-                         {.scene_hash = compileScene(scene, requestedAovs(scene)).hash,
-                          .version = CRT_VERSION,
-                          .record = record});
-        if (identity.record) record.addRun(*identity.record);
-        identity.record = std::move(record);
-    }
-    if (!plan.images.empty()) requireRecord(arguments.parts.front(), identity);
-
-    for (const std::string& name : plan.films) writeCheckpoint(name, film, identity);
-    for (Output& output : plan.images) {
-        if (output.format == OutputFormat::Exr) output.aovs = identity.record->aovs;
-        writeOutput(output, film, identity);
-    }
-    logInfo("{} samples per pixel from {} to {}", film.samples.count(),
-            counted(arguments.parts.size(), "part", "parts"), fmt::join(arguments.outputs, ", "));
-    return 0;
-}
-
-int listPlugins() {
-    for (const BackendStatus& status : listBackends()) {
-        printOut("{}{}\n", status.name, status.version.empty() ? "" : " " + status.version);
-        if (!status.path.empty()) row("file", status.path);
-        if (!status.build.empty()) row("built with", status.build);
-        for (const CrtDevice& device : status.devices) {
-            std::string text = fmt::format("{}: {}", device.index, device.name);
-            if (device.memory_bytes > 0) text += ", " + bytesText(static_cast<double>(device.memory_bytes));
-            if (*device.driver != '\0') text += fmt::format(", {}", device.driver);
-            row("device", text);
-        }
-        if (!status.reason.empty()) row(status.refused ? "refused" : "cannot run", status.reason);
-    }
-    return 0;
-}
-
-int printSchema(bool markdown) {
-    const std::string text = markdown ? sceneReferenceMarkdown() : sceneJsonSchema();
-    printOut("{}{}", text, !text.empty() && text.back() == '\n' ? "" : "\n");
-    return 0;
+Command infoCommand() {
+    const auto request = std::make_shared<SceneRequest>();
+    OptionGroup options{"Options"};
+    addSceneChanges(options, *request);
+    return {.name = "info",
+            .summary = "say what a scene needs, or what a .crtfilm or an image holds",
+            .arguments = {{.name = "FILE",
+                           .help = "scene (- for standard input), film or image",
+                           .read = [request](const std::string& text) { request->file = text; },
+                           .completion =
+                               completeFile({"yaml", "yml", "crtfilm", "exr", "png", "ppm", "pfm"})}},
+            .groups = {std::move(options)},
+            .run = [request](const std::string&) { return showInfo(*request); }};
 }
 
 }  // namespace crt

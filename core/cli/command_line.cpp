@@ -1,0 +1,266 @@
+#include "cli/command_line.h"
+
+#include "base/error.h"
+#include "base/standard_output.h"
+#include "base/words.h"
+#include "cli/arguments.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <utility>
+
+namespace crt {
+namespace {
+
+constexpr const char* kSummary =
+    "crt, a spectral path tracer. The same scene and seed give the same bits on every backend.";
+
+constexpr const char* kExamples = R"(
+Examples:
+  crt configs/cornell_box.yaml                        with the best backend there is
+  crt --backend cuda configs/cornell_box.yaml         with this one; all give the same bits
+  crt scene.yaml --spp 1024 -o a.exr -o a.png         more samples, into these files
+  crt scene.yaml --time 30m                           as many samples as 30 minutes allow
+  crt scene.yaml --target-error 1%                    as many as it takes for an error of 1 % of the mean
+  crt scene.yaml --resume --spp 4096                  go on where Ctrl-C or a power cut stopped it
+  crt scene.yaml --set film.resolution=[256,256] --set integrator.max_depth=4
+  crt info scene.yaml                                 what a scene needs, and what is left out
+
+Half of the samples here and half on another machine, then both together:
+  crt scene.yaml --samples 0:512 -o a.crtfilm
+  crt scene.yaml --samples 512:1024 -o b.crtfilm
+  crt merge -o scene.exr a.crtfilm b.crtfilm
+
+Another exposure without another render:
+  crt develop a.crtfilm -o a.png --set film.exposure_ev=1
+
+In a pipe, with the scene on standard input and the image on standard output ('-o -' is a PPM):
+  generate_scene | crt - -o -.png | display
+)";
+
+constexpr const char* kExitCodes = R"(
+Exit codes: 0 done, 1 internal error, 2 command line, 3 scene, 4 backend or device not available,
+5 device failed (what there was is saved), 6 output not written, 7 images differ or a case of verify fails,
+128 + n stopped by signal n, such as 130 by Ctrl-C and 143 by kill (image and checkpoint are saved).
+)";
+
+/// Usage lines as people write them, and on the top page the options of the command that needs no name.
+class HelpFormatter : public CLI::Formatter {
+public:
+    explicit HelpFormatter(const CLI::App* render) : render_(render) { column_width(28); }
+
+    std::string make_usage(const CLI::App* app, std::string) const override {
+        if (app->get_parent() == nullptr)
+            return "Usage: crt [render] SCENE [options]\n       crt COMMAND --help\n";
+        std::string words;
+        for (const CLI::Option* option :
+             app->get_options([](const CLI::Option* o) { return o->get_positional(); })) {
+            const std::string name = option->get_name(true) + (option->get_expected_max() > 1 ? "..." : "");
+            words += option->get_required() ? " " + name : fmt::format(" [{}]", name);
+        }
+        return fmt::format("Usage: crt {}{} [options]\n",
+                           app->get_name() == "render" ? "[render]" : app->get_name(), words);
+    }
+
+    std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
+        if (app->get_parent() != nullptr) {
+            return make_usage(app, name) + "\n" + make_description(app) + options(app, mode) +
+                   app->get_footer();
+        }
+        return make_description(app) + "\n" + make_usage(app, name) + make_subcommands(app, mode) +
+               options(render_, mode) + app->get_footer();
+    }
+
+private:
+    /// CLI11 puts two empty lines between groups.
+    std::string options(const CLI::App* app, CLI::AppFormatMode mode) const {
+        return CLI::detail::find_and_replace(make_groups(app, mode), "\n\n\n", "\n\n");
+    }
+
+    const CLI::App* render_;
+};
+
+CLI::Validator oneOf(std::vector<std::string> choices) {
+    return CLI::Validator(
+        [words = std::move(choices)](std::string& text) {
+            if (std::find(words.begin(), words.end(), text) != words.end()) return std::string();
+            const std::string hint = didYouMean(text, words);
+            return fmt::format("takes one of {}, not '{}'{}", fmt::join(words, ", "), text,
+                               hint.empty() ? "" : "; " + hint);
+        },
+        "");
+}
+
+/// CLI11's parser of the table.
+class Parser {
+public:
+    explicit Parser(const std::vector<Command>& commands) : app_(kSummary) {
+        app_.set_version_flag("--version", "crt " CRT_VERSION);
+        app_.require_subcommand(1);
+        for (const Command& command : commands) addCommand(command);
+        app_.footer(std::string(kExamples) +
+                    kExitCodes);  // Now: commands inherit what is there when they are added.
+        const auto formatter = std::make_shared<HelpFormatter>(app_.get_subcommand(commands.front().name));
+        app_.formatter(formatter);
+        for (CLI::App* command : app_.get_subcommands({})) command->formatter(formatter);
+    }
+
+    std::string help(const std::string& command) {
+        return (command.empty() ? &app_ : app_.get_subcommand(command))->help();
+    }
+
+    /// The command that is asked for, whose values have been read; nothing when --help or --version has been
+    /// printed instead. Throws crt::Error(Usage).
+    const Command* parse(const std::vector<std::string>& arguments) {
+        try {
+            app_.parse(std::vector<std::string>(arguments.rbegin(),
+                                                arguments.rend()));  // CLI11 takes them from the back.
+        } catch (const CLI::CallForHelp&) {
+            printOut("{}", chosenApp()->help());
+            return nullptr;
+        } catch (const CLI::CallForVersion& version) {
+            printOut("{}\n", version.what());
+            return nullptr;
+        } catch (const CLI::ParseError& error) {
+            refuse(error);
+        }
+        for (const auto& [option, read] : pending_) {
+            if (option->get_items_expected_max() == 0) {
+                if (option->count() > 0) read("");
+                continue;
+            }
+            for (const std::string& value : option->results()) read(value);
+        }
+        return chosen_;
+    }
+
+private:
+    void addCommand(const Command& command) {
+        CLI::App* app = app_.add_subcommand(command.name, command.summary);
+        app->set_help_flag();  // Taken away here and added below, so that it comes last.
+        for (const Argument& argument : command.arguments) {
+            CLI::Option* option;
+            if (argument.repeatable) {
+                option = app->add_option(argument.name, lists_.emplace_back(), argument.help);
+            } else {
+                option = app->add_option(argument.name, words_.emplace_back(), argument.help);
+            }
+            option->required(argument.required);
+            pending_.emplace_back(option, argument.read);
+        }
+        for (const OptionGroup& group : command.groups)
+            for (const Option& option : group.options) addOption(*app, group.title, option);
+        for (const OptionGroup& group : command.groups)
+            for (const Option& option : group.options) {
+                CLI::Option* added = app->get_option(option.names.substr(0, option.names.find(',')));
+                for (const std::string& other : option.excludes) added->excludes(app->get_option(other));
+                for (const std::string& other : option.needs) added->needs(app->get_option(other));
+            }
+        CLI::Option* help = app->set_help_flag("-h,--help", "this page");
+        if (!command.groups.empty()) help->group(command.groups.back().title);
+        app->footer(command.notes);
+        app->callback([this, &command] { chosen_ = &command; });
+    }
+
+    void addOption(CLI::App& app, const std::string& group, const Option& option) {
+        CLI::Option* added;
+        if (option.placeholder.empty()) {
+            added = app.add_flag(option.names, option.help);
+        } else {
+            added = app.add_option_function<std::vector<std::string>>(
+                           option.names, [](const std::vector<std::string>&) {}, option.help)
+                        ->option_text(option.placeholder)
+                        ->expected(1)
+                        ->allow_extra_args(false)
+                        ->multi_option_policy(option.repeatable ? CLI::MultiOptionPolicy::TakeAll
+                                                                : CLI::MultiOptionPolicy::TakeLast);
+            added->required(option.required);
+            if (!option.choices.empty()) added->check(oneOf(option.choices));
+            if (!option.environment.empty()) added->envname(option.environment);
+        }
+        added->group(group);
+        pending_.emplace_back(added, option.read);
+    }
+
+    const CLI::App* chosenApp() const {
+        return app_.get_subcommands().empty() ? &app_ : app_.get_subcommands().front();
+    }
+
+    /// CLI11 knows what is wrong, but not what was meant. Options come first: with one misspelt, the words
+    /// after it are misread too.
+    [[noreturn]] void refuse(const CLI::ParseError& error) {
+        const CLI::App* command = chosenApp();
+        const std::string place = command == &app_ ? "crt" : "crt " + command->get_name();
+        const std::vector<std::string> left = app_.remaining(true);
+        for (const std::string& word : left) {
+            if (word.size() < 2 || word[0] != '-') continue;
+            const std::string flag = word.substr(0, word.find('='));
+            std::vector<std::string> names;
+            for (const CLI::Option* option : command->get_options()) {
+                for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+                for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+            }
+            const std::string hint = didYouMean(flag, names);
+            throw Error(ErrorKind::Usage,
+                        fmt::format("{} has no option '{}'{}", place, flag,
+                                    hint.empty() ? "; see '" + place + " --help'" : "; " + hint));
+        }
+        if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr && !left.empty())
+            throw Error(ErrorKind::Usage,
+                        command->get_name() == "render"
+                            ? fmt::format("one scene at a time: '{}' is one too many", left.front())
+                            : fmt::format("{} does not know what to do with '{}'", place, left.front()));
+        if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+            const std::string text = error.what();  // "--spp: 1 required TEXT missing"
+            throw Error(ErrorKind::Usage, fmt::format("{} needs a value; see '{} --help'",
+                                                      text.substr(0, text.find(':')), place));
+        }
+        throw Error(ErrorKind::Usage, fmt::format("{}; see '{} --help'", error.what(), place));
+    }
+
+    CLI::App app_;
+    std::vector<std::pair<CLI::Option*, std::function<void(const std::string&)>>> pending_;
+    std::deque<std::string> words_;  ///< Of arguments; CLI11 keeps references.
+    std::deque<std::vector<std::string>> lists_;
+    const Command* chosen_ = nullptr;
+};
+
+std::vector<std::string> namesOf(const std::vector<Command>& commands) {
+    std::vector<std::string> names;
+    for (const Command& command : commands) names.push_back(command.name);
+    return names;
+}
+
+}  // namespace
+
+std::string programSummary() { return kSummary; }
+std::string programExamples() { return kExamples; }
+std::string programExitCodes() { return kExitCodes; }
+
+std::string CommandLine::help(const std::string& command) const {
+    const std::vector<std::string> names = namesOf(commands_);
+    if (!command.empty() && std::find(names.begin(), names.end(), command) == names.end()) {
+        const std::string hint = didYouMean(command, names);
+        throw Error(ErrorKind::Usage,
+                    fmt::format("there is no command '{}'; {}", command,
+                                hint.empty() ? fmt::format("there are {}", fmt::join(names, ", ")) : hint));
+    }
+    return Parser(commands_).help(command);
+}
+
+int CommandLine::run(const std::vector<std::string>& words) const {
+    const std::vector<std::string> arguments =
+        writtenOut({words.begin() + 1, words.end()}, namesOf(commands_));
+    if (arguments.empty())
+        throw Error(ErrorKind::Usage,
+                    "there is no scene to render; try 'crt configs/cornell_box.yaml', or 'crt --help'");
+    const Command* command = Parser(commands_).parse(arguments);
+    return command != nullptr ? command->run(shellLine(words)) : 0;
+}
+
+}  // namespace crt

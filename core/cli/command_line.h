@@ -1,0 +1,34 @@
+/// The command line as a whole: words → a command of the table that has read its values, and --help.
+#pragma once
+
+#include "cli/command.h"
+
+#include <string>
+#include <vector>
+
+namespace crt {
+
+class CommandLine {
+public:
+    /// The first one is what a command line without a command's name means.
+    void add(Command command) { commands_.push_back(std::move(command)); }
+
+    const std::vector<Command>& commands() const { return commands_; }
+
+    /// What `crt COMMAND --help` prints; of no command what `crt --help` prints. Throws crt::Error(Usage) for
+    /// a command that there is not.
+    std::string help(const std::string& command = {}) const;
+
+    /// Runs what argv asks for and returns the exit code. Throws crt::Error.
+    int run(const std::vector<std::string>& words) const;
+
+private:
+    std::vector<Command> commands_;
+};
+
+/// The description of the program, the examples and the exit codes of `crt --help`.
+std::string programSummary();
+std::string programExamples();
+std::string programExitCodes();
+
+}  // namespace crt

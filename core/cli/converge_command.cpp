@@ -1,0 +1,131 @@
+#include "base/words.h"
+#include "cli/arguments.h"
+#include "cli/commands.h"
+#include "cli/shared_options.h"
+#include "cli/terminal_watch.h"
+#include "judge/converge/engine.h"
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace crt {
+namespace {
+
+struct State {
+    converge::ConvergeRequest request;
+    SceneRequest changes;            ///< Of every scene.
+    std::vector<std::string> files;
+    ProgressMode progress = ProgressMode::Auto;
+};
+
+OptionGroup what(State& state) {
+    converge::ConvergeRequest& request = state.request;
+    OptionGroup group{"What is measured"};
+    group.options = {
+        {.names = "--backends",
+         .placeholder = "X,Y",
+         .help = "of these; one that cannot run is left out and named (embree,opencl,cuda)",
+         .read = [&request](const std::string& text) { request.backends = parseList(text, "--backends"); },
+         .completion = {Completion::Kind::Backend}},
+        {.names = "--vary",
+         .placeholder = "KEY=A,B",
+         .help = "each value, and each combination: sampler, replicates, nee, roulette, depth, accelerator, "
+                 "filter,\n"
+                 "or any key of the scene; repeatable",
+         .read = [&request](const std::string& text) { request.vary.push_back(converge::parseVary(text)); },
+         .repeatable = true},
+        {.names = "--reference",
+         .placeholder = "FILE",
+         .help = "of 'crt reference', for the scene it is of; or a number, the luminance of every "
+                 "pixel; repeatable",
+         .read = [&request](const std::string& text) { request.references.push_back(text); },
+         .completion = completeFile({"exr"}),
+         .repeatable = true},
+        {.names = "--time",
+         .placeholder = "DURATION",
+         .help = "for everything (60s)",
+         .read = [&request](const std::string& text) { request.seconds = parseDuration(text, "--time"); }},
+        {.names = "--replicates",
+         .placeholder = "R",
+         .help = "seeds of each, at least (16); more where there is time",
+         .read = [&request](const std::string& text) {
+             request.replicates = smallCount(text, "--replicates", 2);
+         }},
+        {.names = "--max-spp",
+         .placeholder = "N",
+         .help = "no more samples per pixel than this",
+         .read = [&request](const std::string& text) {
+             request.max_samples = parseCount(text, "--max-spp", 1);
+         }},
+        {.names = "--resolution",
+         .placeholder = "N",
+         .help = "longer side in pixels, where --set film.resolution does not say (128); 0: the scene's",
+         .read = [&request](const std::string& text) {
+             request.resolution = static_cast<int>(smallCount(text, "--resolution", 0));
+         }},
+    };
+    addSceneChanges(group, state.changes);
+    return group;
+}
+
+OptionGroup where(State& state) {
+    converge::ConvergeRequest& request = state.request;
+    return {"Where",
+            {deviceOption(request.integrator), threadsOption(request.integrator),
+             {.names = "-o,--output",
+              .placeholder = "DIR",
+              .help = "folder for report.html, results and figures (converge)",
+              .read = [&request](const std::string& text) { request.output = text; },
+              .completion = {Completion::Kind::Folder}},
+             {.names = "--resume",
+              .placeholder = {},
+              .help = "go on with the run in that folder, of the same experiment",
+              .read = [&request](const std::string&) { request.resume = true; }},
+             noProgressOption(state.progress)}};
+}
+
+constexpr const char* kNotes =
+            "\nRenders every scene with every backend and variant, again and again with other seeds, looks "
+            "at 1, 2, 4 ... samples, and writes one\n"
+            "page: error against seconds with its interval, efficiency, bias, whether the images' own error "
+            "estimates hold, where the time goes.\n"
+            "Where no --reference is given, a quarter of --time makes one.\n"
+            "docs/error.md explains the terms.\n"
+            "\nExamples:\n"
+            "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60 -o converge_box\n"
+            "  crt converge scene.yaml --vary sampler=sobol,independent --vary nee=true,false --reference "
+            "ref.exr\n"
+            "  crt converge configs/analytic/direct_light.yaml --reference 0.2394564705\n"
+            "  crt converge a.yaml b.yaml c.yaml --time 10m -o night       then, cut short: the same with "
+            "--resume\n";
+
+int run(State& state, const std::string& typed) {
+    for (const std::string& file : state.files) {
+        SceneRequest scene = state.changes;
+        scene.file = file;
+        state.request.scenes.push_back(std::move(scene));
+    }
+    state.request.command = typed;
+    TerminalWatch watch(state.progress, TerminalWatch::Signals::Always);
+    return converge::converge(state.request, watch);
+}
+
+}  // namespace
+
+Command convergeCommand() {
+    const auto state = std::make_shared<State>();
+    return {.name = "converge",
+            .summary = "measure error against run time; exit code 7 when a backend is wrong",
+            .arguments = {{.name = "SCENE",
+                           .help = "scene files (YAML)",
+                           .read = [state](const std::string& text) { state->files.push_back(text); },
+                           .completion = completeScene(),
+                           .repeatable = true}},
+            .groups = {what(*state), where(*state)},
+            .notes = kNotes,
+            .run = [state](const std::string& typed) { return run(*state, typed); }};
+}
+
+}  // namespace crt

@@ -1,0 +1,75 @@
+#include "cli/arguments.h"
+#include "cli/commands.h"
+#include "cli/shared_options.h"
+#include "cli/terminal_watch.h"
+#include "judge/converge/reference.h"
+
+#include <memory>
+#include <string>
+
+namespace crt {
+namespace {
+
+struct State {
+    converge::ReferenceRequest request;
+    ProgressMode progress = ProgressMode::Auto;
+};
+
+OptionGroup options(State& state) {
+    converge::ReferenceRequest& request = state.request;
+    OptionGroup group{"Options"};
+    group.options = {
+        {.names = "-o,--output",
+         .placeholder = "FILE",
+         .help = ".exr",
+         .read = [&request](const std::string& text) { request.output = text; },
+         .completion = completeFile({"exr"}),
+         .required = true},
+        {.names = "--spp",
+         .placeholder = "N",
+         .help = "samples per pixel, instead of --time",
+         .read = [&request](const std::string& text) { request.samples = parseCount(text, "--spp", 8); }},
+        {.names = "--time",
+         .placeholder = "DURATION",
+         .help = "about this long (60s)",
+         .read = [&request](const std::string& text) { request.seconds = parseDuration(text, "--time"); }},
+        {.names = "--same-estimator",
+         .placeholder = {},
+         .help = "keep integrator.nee: much less noise in scenes with small lamps",
+         .read = [&request](const std::string&) { request.same_estimator = true; }},
+        backendOption(request.backend),
+    };
+    addSceneChanges(group, request.scene);
+    group.options.push_back(noProgressOption(state.progress));
+    return group;
+}
+
+constexpr const char* kNotes =
+            "\nAnother seed, independent samples, no roulette, and light sampling switched: as little as "
+            "possible in common with what it will judge.\n"
+            "The file holds the mean and eight independent eighths of it, from which its own error "
+            "follows.\n"
+            "\nExamples:\n"
+            "  crt reference scene.yaml -o ref.exr --time 10m\n"
+            "  crt reference scene.yaml -o ref.exr --spp 65536 --same-estimator --set "
+            "film.resolution=[128,128]\n";
+
+}  // namespace
+
+Command referenceCommand() {
+    const auto state = std::make_shared<State>();
+    return {.name = "reference",
+            .summary = "render an independent reference for 'crt converge' and 'crt compare'",
+            .arguments = {{.name = "SCENE",
+                           .help = "scene file (YAML)",
+                           .read = [state](const std::string& text) { state->request.scene.file = text; },
+                           .completion = completeScene()}},
+            .groups = {options(*state)},
+            .notes = kNotes,
+            .run = [state](const std::string&) {
+                TerminalWatch watch(state->progress, TerminalWatch::Signals::Always);
+                return converge::makeReference(state->request, watch);
+            }};
+}
+
+}  // namespace crt

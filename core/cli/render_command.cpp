@@ -1,0 +1,153 @@
+#include "base/atomic_file.h"
+#include "base/log.h"
+#include "cli/arguments.h"
+#include "cli/command_line.h"
+#include "cli/commands.h"
+#include "cli/shared_options.h"
+#include "cli/terminal_watch.h"
+#include "render/job.h"
+
+#include <memory>
+
+namespace crt {
+namespace {
+
+OptionGroup what(Job& job) {
+    OptionGroup group{"What is rendered"};
+    group.options = {
+        {.names = "--spp",
+         .placeholder = "N",
+         .help = "samples per pixel, instead of the scene's",
+         .read = [&job](const std::string& text) { job.spp = parseCount(text, "--spp", 1); }},
+        {.names = "--time",
+         .placeholder = "DURATION",
+         .help = "stop after 90s, 30m, 2h, 1h30m; with --spp, whichever comes first",
+         .read = [&job](const std::string& text) { job.time_limit_seconds = parseDuration(text, "--time"); }},
+        {.names = "--target-error",
+         .placeholder = "PERCENT",
+         .help = "stop when the image's error is below, e.g. 1%, with 95 % confidence",
+         .read = [&job](const std::string& text) {
+             job.target_error = parseFraction(text, "--target-error");
+         }},
+        {.names = "--samples",
+         .placeholder = "A:B",
+         .help = "exactly the samples A to B-1: a part to merge with others",
+         .read = [&job](const std::string& text) { job.samples = parseSampleRange(text, "--samples"); },
+         .excludes = {"--spp"}},
+    };
+    addSceneChanges(group, job.scene);
+    return group;
+}
+
+OptionGroup where(Job& job) {
+    const std::vector<std::string> kernels{"lean", "full", "lean-only"};
+    return {
+        "Where",
+        {backendOption(job.backend), deviceOption(job.integrator), threadsOption(job.integrator),
+         {.names = "--kernel",
+          .placeholder = "KIND",
+          .help = "lean: only what the scene needs; full; lean-only: waits for the compiler; same bits",
+          .read = [&job](const std::string& text) {
+              job.integrator.kernel = text == "full"        ? CRT_KERNEL_FULL
+                                      : text == "lean-only" ? CRT_KERNEL_LEAN_ONLY
+                                                            : CRT_KERNEL_LEAN;
+          },
+          .completion = completeWord(kernels),
+          .choices = kernels},
+         {.names = "--tile",
+          .placeholder = "N",
+          .help = "pixels along the side of a tile; never changes the image",
+          .read = [&job](const std::string& text) {
+              job.integrator.tile_size = smallCount(text, "--tile", 1);
+          }},
+         {.names = "--chunk",
+          .placeholder = "N",
+          .help = "samples per pixel between two looks at clock and signals",
+          .read = [&job](const std::string& text) { job.chunk = parseCount(text, "--chunk", 1); }},
+         {.names = "--no-cache",
+          .placeholder = {},
+          .help = "keep no compiled kernels on disk",
+          .read = [&job](const std::string&) { job.integrator.use_cache = false; }}}};
+}
+
+OptionGroup files(Job& job) {
+    return {"Files",
+            {{.names = "-o,--output",
+              .placeholder = "FILE",
+              .help = ".exr .png .ppm .pfm .crtfilm, instead of the scene's; -.png for a pipe; repeatable",
+              .read = [&job](const std::string& text) { job.outputs.push_back(text); },
+              .completion = completeOutput(),
+              .repeatable = true},
+             {.names = "--checkpoint",
+              .placeholder = "FILE",
+              .help = "save the samples at the end and now and then, for --resume; or off",
+              .read = [&job](const std::string& text) { job.checkpoint_file = text == "off" ? "" : text; },
+              .completion = completeFilm()},
+             {.names = "--checkpoint-every",
+              .placeholder = "DURATION",
+              .help = "how often (10m)",
+              .read = [&job](const std::string& text) {
+                  job.checkpoint_interval_seconds = parseDuration(text, "--checkpoint-every");
+              }},
+             {.names = "--resume",
+              .placeholder = "[FILE]",
+              .help = "go on from a checkpoint (FILE.crtfilm, or the first output's), and keep it",
+              .read = [&job](const std::string& text) {
+                  job.resume = true;
+                  job.resume_file = text == "auto" ? "" : text;
+              },
+              .completion = completeFilm()},
+             {.names = "--overwrite",
+              .placeholder = {},
+              .help = "replace a film even where it holds more samples than this run makes",
+              .read = [&job](const std::string&) { job.overwrite = true; }},
+             {.names = "--report",
+              .placeholder = "FILE",
+              .help = "what the run did, as JSON (first output with .report.json); or none",
+              .read = [&job](const std::string& text) { job.report_file = text == "none" ? "" : text; },
+              .completion = completeFile({"json"})}}};
+}
+
+}  // namespace
+
+Command renderCommand() {
+    struct State {
+        Job job;
+        ProgressMode progress = ProgressMode::Auto;
+    };
+    const auto state = std::make_shared<State>();
+    Job& job = state->job;
+    return {.name = "render",
+            .summary = "render a scene; the word may be left out",
+            .arguments = {{.name = "SCENE",
+                           .help = "scene file (YAML), or - for standard input",
+                           .read = [&job](const std::string& text) { job.scene.file = text; },
+                           .completion = completeScene()}},
+            .groups = {what(job),
+                       where(job),
+                       files(job),
+                       {"Messages",
+                        {{.names = "-v,--verbose",
+                          .placeholder = {},
+                          .help = "say more",
+                          .read = [](const std::string&) { setLogLevel(LogLevel::Debug); }},
+                         {.names = "-q,--quiet",
+                          .placeholder = {},
+                          .help = "only warnings and errors, no progress",
+                          .read = [state](const std::string&) {
+                              setLogLevel(LogLevel::Warning);
+                              state->progress = ProgressMode::None;
+                          }}}}},
+            .notes = programExamples(),
+            .run = [state](const std::string& typed) {
+                state->job.command = typed;
+                // In a pipe nobody looks for a report that was not asked for.
+                const bool streamed =
+                    !state->job.outputs.empty() && isStandardOutput(state->job.outputs.front());
+                if (streamed && !state->job.report_file) state->job.report_file = "";
+                TerminalWatch watch(state->progress);
+                return runJob(state->job, watch);
+            }};
+}
+
+}  // namespace crt

@@ -1,0 +1,77 @@
+#include "cli/shared_options.h"
+
+#include "base/error.h"
+#include "base/log.h"
+#include "cli/arguments.h"
+
+#include <fmt/format.h>
+
+namespace crt {
+
+unsigned smallCount(const std::string& text, const char* option, std::uint64_t least) {
+    const std::uint64_t n = parseCount(text, option, least);
+    if (n > 65536) throw Error(ErrorKind::Usage, fmt::format("{} {} is beyond any use", option, text));
+    return static_cast<unsigned>(n);
+}
+
+void addSceneChanges(OptionGroup& group, SceneRequest& scene) {
+    group.options.push_back(
+        {.names = "--set",
+         .placeholder = "KEY=VALUE",
+         .help = "change the scene, e.g. film.resolution=[256,256]; repeatable",
+         .read = [&scene](const std::string& text) { scene.overrides.push_back(parseOverride(text)); },
+         .repeatable = true});
+    group.options.push_back(
+        {.names = "--seed",
+         .placeholder = "N",
+         .help = "another seed: other, equally good, noise",
+         .read = [&scene](const std::string& text) { scene.seed = parseCount(text, "--seed", 0); }});
+    group.options.push_back(
+        {.names = "--crop",
+         .placeholder = "X0,Y0,X1,Y1",
+         .help = "only these pixels of the film, X1 and Y1 excluded",
+         .read = [&scene](const std::string& text) { scene.crop = parseRectangle(text, "--crop"); }});
+}
+
+Option backendOption(std::string& backend) {
+    return {.names = "-b,--backend",
+            .placeholder = "NAME",
+            .help = "cuda, embree, opencl, another, a path of one, or auto (CRT_BACKEND)",
+            .read = [&backend](const std::string& text) { backend = text; },
+            .completion = {Completion::Kind::Backend},
+            .environment = "CRT_BACKEND"};
+}
+
+Option deviceOption(IntegratorOptions& integrator) {
+    return {.names = "-d,--device",
+            .placeholder = "NAME",
+            .help = "number or part of the name, as 'crt plugins' lists them (CRT_DEVICE)",
+            .read = [&integrator](const std::string& text) { integrator.device = text; },
+            .environment = "CRT_DEVICE"};
+}
+
+Option threadsOption(IntegratorOptions& integrator) {
+    return {.names = "-t,--threads",
+            .placeholder = "N",
+            .help = "threads of the processor; 0 for all",
+            .read = [&integrator](const std::string& text) {
+                integrator.threads = smallCount(text, "--threads", 0);
+            }};
+}
+
+Option noProgressOption(ProgressMode& progress) {
+    return {.names = "-q,--quiet", .placeholder = {}, .help = "no progress",
+            .read = [&progress](const std::string&) { progress = ProgressMode::None; }};
+}
+
+Option quietOption(const char* help) {
+    return {.names = "-q,--quiet", .placeholder = {}, .help = help,
+            .read = [](const std::string&) { setLogLevel(LogLevel::Warning); }};
+}
+
+Completion completeScene() { return completeFile({"yaml", "yml"}); }
+Completion completeImage() { return completeFile({"exr", "png", "ppm", "pfm"}); }
+Completion completeFilm() { return completeFile({"crtfilm"}); }
+Completion completeOutput() { return completeFile({"exr", "png", "ppm", "pfm", "crtfilm"}); }
+
+}  // namespace crt
