@@ -1,0 +1,32 @@
+/// The spectra of a compiled scene, by value: equal ones share a table of the blob.
+#pragma once
+
+#include "scene/scene.h"
+
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+namespace crt {
+
+class SpectrumTable {
+public:
+    /// Those that the scene needs, in their order in the blob.
+    explicit SpectrumTable(std::span<const Spectrum* const> spectra);
+
+    /// Of a spectrum that the table was made of, or one equal to it.
+    std::uint32_t indexOf(const Spectrum& spectrum) const;
+    std::uint32_t count() const { return static_cast<std::uint32_t>(index_.size()); }
+    /// CRT_SPECTRUM_STRIDE floats each.
+    const std::vector<float>& floats() const { return floats_; }
+
+private:
+    struct Hash {
+        std::size_t operator()(const SpectrumValues& values) const;
+    };
+    std::unordered_map<SpectrumValues, std::uint32_t, Hash> index_;
+    std::vector<float> floats_;
+};
+
+}  // namespace crt
