@@ -43,13 +43,9 @@ std::string counted(std::uint64_t n, const char* one, const char* many) {
 }
 
 const char* name(MaterialType type) {
-    switch (type) {
-        case MaterialType::Diffuse: return "diffuse";
-        case MaterialType::Mirror: return "mirror";
-        case MaterialType::Conductor: return "conductor";
-        case MaterialType::Dielectric: break;
-    }
-    return "dielectric";
+    for (const auto& [known, word] : kMaterialNames)
+        if (known == type) return word;
+    return "";
 }
 
 const char* name(PixelFilter filter) {

@@ -74,16 +74,16 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     const SpectrumTable spectra(spectraOf(scene, flat, emitting, used));
 
     const LightPart lights = compileLights(scene, flat, emitting, accelerator, spectra);
-    header.emitters = blob.append(lights.emitters);
-    if (lights.emitters.empty() && !scene.environment && scene.integrator.type == IntegratorType::Path)
+    header.lights = blob.append(lights.lights);
+    if (lights.lights.empty() && !scene.environment && scene.integrator.type == IntegratorType::Path)
         logWarning(
             "the scene has no light: the image will be black (add emission to an object, or an "
             "environment)");
     const Spectrum* environment = spectrumOfEnvironment(scene);
-    header.environment = environment ? spectra.indexOf(*environment) : CRT_NONE;
+    header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
 
     const MaterialPart materials = compileMaterials(used, spectra);
-    header.primitives = blob.append(compilePrimitives(flat, scene.materials.size(), lights.emitter_of));
+    header.primitives = blob.append(compilePrimitives(flat, scene.materials.size(), lights.light_of));
     header.normals = blob.append(compileNormals(flat));
     header.materials = blob.append(materials.records);
 
@@ -104,7 +104,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.channels = header.channels;
     out.aovs = header.aovs;
     out.triangles = header.triangle_count;
-    out.emitters = header.emitters.count;
+    out.emitters = header.lights.count;
     out.objects = flat.placements;
     out.nodes = header.nodes.count;
     out.scale_exponent = flat.scale_exponent;

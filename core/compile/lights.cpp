@@ -73,38 +73,38 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
                         const SpectrumTable& spectra) {
     LightPart part;
-    part.emitter_of.assign(flat.triangles.size(), CRT_NONE);
+    part.light_of.assign(flat.triangles.size(), CRT_NONE);
     struct Shared {
-        std::uint32_t spectrum = 0;
+        kernel::CrtValue radiance = 0;
         double brightness = 0;
     };
     std::vector<std::optional<Shared>> shared(scene.emissions.size());  // made once an emission
     std::vector<double> power;
     for (const std::uint32_t i : emitting) {
-        if (part.emitter_of[i] != CRT_NONE) continue;  // the other half of a parallelogram
+        if (part.light_of[i] != CRT_NONE) continue;  // the other half of a parallelogram
         const Emission& emission = emissionOf(scene, flat.triangles[i]);
         std::optional<Shared>& own = shared[static_cast<std::size_t>(flat.triangles[i].emission)];
-        if (!own) own = {spectra.indexOf(emission.radiance), brightness(emission)};
+        if (!own) own = {spectra.valueOf(emission.radiance), brightness(emission)};
         double area = areaOf(flat, i);
-        kernel::CrtEmitter emitter{};
-        emitter.slot = accelerator.slot_of_id[i];
-        emitter.spectrum = own->spectrum;
-        emitter.flags = emission.two_sided ? CRT_EMITTER_TWO_SIDED : 0;
-        part.emitter_of[i] = static_cast<std::uint32_t>(part.emitters.size());
+        kernel::CrtLight light{};
+        light.slot = accelerator.slot_of_id[i];
+        light.radiance = own->radiance;
+        light.flags = emission.two_sided ? CRT_LIGHT_TWO_SIDED : 0;
+        part.light_of[i] = static_cast<std::uint32_t>(part.lights.size());
         if (const auto corner = parallelogramCorner(flat, i)) {
-            emitter.flags |= CRT_EMITTER_PARALLELOGRAM;
-            emitter.corner = *corner;
-            part.emitter_of[i + 1] = part.emitter_of[i];
+            light.kind = CRT_LIGHT_PARALLELOGRAM;
+            light.corner = *corner;
+            part.light_of[i + 1] = part.light_of[i];
             area += areaOf(flat, i + 1);
         }
-        emitter.area = static_cast<float>(area);
-        part.emitters.push_back(emitter);
+        light.area = static_cast<float>(area);
+        part.lights.push_back(light);
         power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
     }
     const std::vector<std::uint64_t> first = choiceTable(power);
-    for (std::size_t i = 0; i < part.emitters.size(); ++i) {
-        part.emitters[i].choice = static_cast<std::uint32_t>(first[i]);
-        part.emitters[i].choice_probability =
+    for (std::size_t i = 0; i < part.lights.size(); ++i) {
+        part.lights[i].choice = static_cast<std::uint32_t>(first[i]);
+        part.lights[i].choice_probability =
             static_cast<float>(std::ldexp(static_cast<double>(first[i + 1] - first[i]), -32));
     }
     return part;

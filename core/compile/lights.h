@@ -22,8 +22,8 @@ std::vector<const Spectrum*> spectraOfLights(const Scene& scene, const FlatScene
                                              const std::vector<std::uint32_t>& emitting);
 
 struct LightPart {
-    std::vector<kernel::CrtEmitter> emitters;
-    std::vector<std::uint32_t> emitter_of;  ///< By primitive id: index of its emitter, or CRT_NONE.
+    std::vector<kernel::CrtLight> lights;
+    std::vector<std::uint32_t> light_of;  ///< By primitive id: index of its light, or CRT_NONE.
 };
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,

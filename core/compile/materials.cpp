@@ -1,5 +1,7 @@
 #include "compile/materials.h"
 
+#include "kernel/features.h"
+
 #include <algorithm>
 
 namespace crt {
@@ -20,7 +22,6 @@ bool isKnown(const FlatTriangle& triangle, std::size_t scene_materials) {
     return triangle.material >= 0 && static_cast<std::size_t>(triangle.material) < scene_materials;
 }
 
-/// In the order of CrtMaterial: a, b.
 std::vector<const Spectrum*> spectraOf(const Material& material) {
     switch (material.type) {
         case MaterialType::Diffuse:
@@ -33,15 +34,16 @@ std::vector<const Spectrum*> spectraOf(const Material& material) {
 
 kernel::CrtMaterial recordOf(const Material& material, const SpectrumTable& spectra) {
     kernel::CrtMaterial record{};
-    const std::vector<const Spectrum*> own = spectraOf(material);
-    if (!own.empty()) record.a = spectra.indexOf(*own[0]);
-    if (own.size() > 1) record.b = spectra.indexOf(*own[1]);
+    record.type = static_cast<std::uint32_t>(material.type);
     switch (material.type) {
-        case MaterialType::Diffuse: record.type = CRT_MATERIAL_DIFFUSE; break;
-        case MaterialType::Mirror: record.type = CRT_MATERIAL_MIRROR; break;
-        case MaterialType::Conductor: record.type = CRT_MATERIAL_CONDUCTOR; break;
+        case MaterialType::Diffuse:
+        case MaterialType::Mirror: record.reflectance = spectra.valueOf(material.reflectance); break;
+        case MaterialType::Conductor:
+            record.eta = spectra.valueOf(material.eta);
+            record.k = spectra.valueOf(material.k);
+            break;
         case MaterialType::Dielectric:
-            record.type = CRT_MATERIAL_DIELECTRIC;
+            record.eta = spectra.valueOf(material.eta);
             if (!material.eta.isConstant()) record.flags = CRT_MATERIAL_DISPERSIVE;
     }
     return record;
@@ -76,23 +78,21 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         part.records.push_back(material ? recordOf(*material, spectra) : kernel::CrtMaterial{});
         if (!material) continue;
         const kernel::CrtMaterial& record = part.records.back();
-        part.diffuse |= record.type == CRT_MATERIAL_DIFFUSE;
-        part.conductor |= record.type == CRT_MATERIAL_MIRROR || record.type == CRT_MATERIAL_CONDUCTOR;
-        part.dielectric |= record.type == CRT_MATERIAL_DIELECTRIC;
-        part.dispersion |= (record.flags & CRT_MATERIAL_DISPERSIVE) != 0;
+        part.features |= 1u << record.type;
+        if ((record.flags & CRT_MATERIAL_DISPERSIVE) != 0) part.features |= CRT_FEATURE_DISPERSION;
     }
     return part;
 }
 
 std::vector<kernel::CrtPrimitive> compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
-                                                    const std::vector<std::uint32_t>& emitter_of) {
+                                                    const std::vector<std::uint32_t>& light_of) {
     std::vector<kernel::CrtPrimitive> primitives(flat.triangles.size());
     std::uint32_t normals = 0;
     for (std::size_t i = 0; i < primitives.size(); ++i) {
         const FlatTriangle& t = flat.triangles[i];
         primitives[i].material =
             static_cast<std::uint32_t>(isKnown(t, scene_materials) ? t.material : scene_materials);
-        primitives[i].emitter = emitter_of[i];
+        primitives[i].light = light_of[i];
         primitives[i].object = t.object;
         primitives[i].normals = t.smooth ? normals++ : CRT_NONE;
     }

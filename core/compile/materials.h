@@ -21,13 +21,13 @@ std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material
 
 struct MaterialPart {
     std::vector<kernel::CrtMaterial> records;
-    bool diffuse = false, conductor = false, dielectric = false, dispersion = false;  ///< Whether any is.
+    std::uint32_t features = 0;  ///< Of the materials that are used.
 };
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const SpectrumTable& spectra);
 
-/// By primitive id. `emitter_of` as of LightPart.
+/// By primitive id. `light_of` as of LightPart.
 std::vector<kernel::CrtPrimitive> compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
-                                                    const std::vector<std::uint32_t>& emitter_of);
+                                                    const std::vector<std::uint32_t>& light_of);
 
 /// Of the smooth triangles, in the order of their ids.
 std::vector<kernel::CrtNormals> compileNormals(const FlatScene& flat);

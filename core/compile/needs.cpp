@@ -29,14 +29,15 @@ std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(traces && header.accelerator == CRT_ACCELERATOR_BVH, CRT_FEATURE_BVH);
     need(traces && header.accelerator == CRT_ACCELERATOR_BRUTE_FORCE, CRT_FEATURE_BRUTE_FORCE);
     need(traces && header.accelerator == CRT_ACCELERATOR_AABB, CRT_FEATURE_AABB);
-    need(scatters(scene) && materials.diffuse, CRT_FEATURE_DIFFUSE);
-    need(scatters(scene) && materials.conductor, CRT_FEATURE_CONDUCTOR);
-    need(scatters(scene) && materials.dielectric, CRT_FEATURE_DIELECTRIC);
-    need(scatters(scene) && materials.dispersion, CRT_FEATURE_DISPERSION);
+    // The albedo of first hits is a material's, even where nothing is scattered.
+    if (scatters(scene) || (header.aovs & kAovAlbedo) != 0) f |= materials.features;
     need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
-    need(header.emitters.count > 0, CRT_FEATURE_AREA_LIGHT);
-    need(scatters(scene) && header.emitters.count > 0 && header.nee && materials.diffuse, CRT_FEATURE_NEE);
+    need(header.lights.count > 0, CRT_FEATURE_AREA_LIGHT);
+    need(scatters(scene) && header.lights.count > 0 && header.nee &&
+             (materials.features & CRT_FEATURES_LOBE) != 0,
+         CRT_FEATURE_NEE);
     need(header.environment != CRT_NONE, CRT_FEATURE_ENVIRONMENT);
+    need(header.spectra.count > 0, CRT_FEATURE_TABLE);
     need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
     need(header.filter.count > 0, CRT_FEATURE_FILTER);
     need(!isPath(scene), CRT_FEATURE_VIEW);
@@ -60,15 +61,18 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
         left_out("shadow tests",
                  fmt::format("{} of {} triangles have the whole scene on one side and cannot come between",
                              header.triangle_count - occluders, header.triangle_count));
-    if (!has(CRT_FEATURE_CONDUCTOR)) left_out("mirror and conductor", "no surface uses them");
-    if (!has(CRT_FEATURE_DIELECTRIC)) left_out("dielectric", "no surface uses it");
+#define CRT_LEFT_OUT_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
+    if (!has(CRT_FEATURE_##NAME)) left_out(text, "no surface uses it");
+    CRT_MATERIAL_LIST(CRT_LEFT_OUT_MATERIAL, )
+#undef CRT_LEFT_OUT_MATERIAL
+    if (!has(CRT_FEATURE_TABLE)) left_out("tables of spectra", "all values are the same at all wavelengths");
     if (!has(CRT_FEATURE_DISPERSION))
         left_out("hero wavelength selection", "no index of refraction depends on wavelength");
     if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
     if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
     if (!has(CRT_FEATURE_NEE))
         left_out("light sampling and shadow rays",
-                 !header.nee ? "integrator.nee is false" : "no diffuse surface can be lit by an emitter");
+                 !header.nee ? "integrator.nee is false" : "no surface that scatters in all directions can be lit by an emitter");
     if (!has(CRT_FEATURE_ENVIRONMENT)) left_out("environment", "there is none");
     if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
     if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");

@@ -1,11 +1,11 @@
 #include "compile/spectrum_table.h"
 
-#include "kernel/layout.h"
-
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include <algorithm>
 #include <array>
+#include <bit>
 
 namespace crt {
 
@@ -21,6 +21,7 @@ std::size_t SpectrumTable::Hash::operator()(const SpectrumValues& values) const 
 
 SpectrumTable::SpectrumTable(std::span<const Spectrum* const> spectra) {
     for (const Spectrum* spectrum : spectra) {
+        if (spectrum->isConstant()) continue;
         const SpectrumValues& values = spectrum->values;
         if (!index_.try_emplace(values, static_cast<std::uint32_t>(index_.size())).second) continue;
         for (const double v : values) floats_.push_back(static_cast<float>(v));
@@ -28,6 +29,14 @@ SpectrumTable::SpectrumTable(std::span<const Spectrum* const> spectra) {
     }
 }
 
-std::uint32_t SpectrumTable::indexOf(const Spectrum& spectrum) const { return index_.at(spectrum.values); }
+kernel::CrtValue valueOf(double number) {
+    // -0 has the bit of a reference.
+    return std::bit_cast<kernel::CrtValue>(std::max(static_cast<float>(number), 0.0f) + 0.0f);
+}
+
+kernel::CrtValue SpectrumTable::valueOf(const Spectrum& spectrum) const {
+    return spectrum.isConstant() ? crt::valueOf(spectrum[0])
+                                 : CRT_VALUE_TABLE | index_.at(spectrum.values);
+}
 
 }  // namespace crt

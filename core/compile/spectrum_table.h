@@ -1,6 +1,8 @@
-/// The spectra of a compiled scene, by value: equal ones share a table of the blob.
+/// The values of a compiled scene: spectra, of which equal ones share a table of the blob, and constants,
+/// which need none.
 #pragma once
 
+#include "kernel/layout.h"
 #include "scene/scene.h"
 
 #include <cstdint>
@@ -10,13 +12,16 @@
 
 namespace crt {
 
+/// Of a number, at least 0.
+kernel::CrtValue valueOf(double number);
+
 class SpectrumTable {
 public:
     /// Those that the scene needs, in their order in the blob.
     explicit SpectrumTable(std::span<const Spectrum* const> spectra);
 
     /// Of a spectrum that the table was made of, or one equal to it.
-    std::uint32_t indexOf(const Spectrum& spectrum) const;
+    kernel::CrtValue valueOf(const Spectrum& spectrum) const;
     std::uint32_t count() const { return static_cast<std::uint32_t>(index_.size()); }
     /// CRT_SPECTRUM_STRIDE floats each.
     const std::vector<float>& floats() const { return floats_; }

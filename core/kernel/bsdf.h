@@ -160,12 +160,20 @@ CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec
     return s;
 }
 
+/* A material's type; known without looking where the kernel has only one. */
+#define CRT_ONLY_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
+    if (CRT_KERNEL_MATERIALS == 1 << bit) return bit;
+CRT_FN u32 crt_material_type(u32 type) {
+    CRT_MATERIAL_LIST(CRT_ONLY_MATERIAL, )
+    return type;
+}
+
 /* What the material of `surface` does to light that leaves along wo. The first vertex asks for the albedo. */
 CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface *surface, vec3 wo,
                              vec4 position, int albedo) {
     const CrtMaterial material = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[surface->material];
     const int outside = dot3(wo, surface->ng) > 0.0f;
-    b->type = material.type;
+    b->type = crt_material_type(material.type);
     b->flags = 0u;
     b->wo = wo;
     b->ng = outside ? surface->ng : -surface->ng;
@@ -173,7 +181,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
     /* A shading normal that turns away from the viewer would reflect light from behind the surface. */
     if (CRT_HAS(SMOOTH_NORMALS) && !(dot3(wo, b->ns) > 0.0f)) b->ns = b->ng;
     if (albedo) b->albedo = splat4(1.0f);
-    switch (material.type) {
+    switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
             if (CRT_HAS(DIFFUSE)) {
                 b->flags = CRT_BSDF_REFLECTS;

@@ -107,15 +107,11 @@ typedef u32 CrtValue;
 #define CRT_VALUE_INDEX 0x0fffffffu
 #define CRT_VALUE_TABLE 0x80000000u /* kind 0: a spectrum of the scene's table */
 
-/* Kinds of materials: their bits in features.h. */
-#define CRT_MATERIAL_ENUM(F, bit, NAME, scatter, text) CRT_MATERIAL_##NAME = bit,
-enum CrtMaterialType { CRT_MATERIAL_LIST(CRT_MATERIAL_ENUM, ) CRT_MATERIAL_END };
-
 #define CRT_MATERIAL_DISPERSIVE 1u
 
 /* What a kind does not have is 0. */
 typedef struct CrtMaterial {
-    u32 type; /* CRT_MATERIAL_… */
+    u32 type; /* CRT_MATERIAL_… of features.h */
     u32 flags;
     CrtValue reflectance;
     CrtValue eta; /* conductors: real part of the index; dielectric: index inside / outside */
@@ -126,7 +122,6 @@ CRT_ASSERT_SIZE(CrtMaterial, 32);
 
 #define CRT_LIGHT_TRIANGLE 0u
 #define CRT_LIGHT_PARALLELOGRAM 1u /* two triangles */
-#define CRT_LIGHT_ENVIRONMENT 2u   /* from all directions, infinitely far */
 
 #define CRT_LIGHT_TWO_SIDED 1u
 
@@ -136,7 +131,6 @@ typedef struct CrtLight {
     CrtValue radiance;
     u32 choice;             /* a 32-bit number u chooses the last light with choice ≤ u */
     f32 choice_probability; /* exactly the share of 2³² that chooses it */
-    /* Of emitters, 0 for the environment: */
     u32 slot;   /* in the triangle array */
     u32 corner; /* which vertex of the triangle the parallelogram's two edges leave from */
     f32 area;
@@ -214,7 +208,7 @@ typedef struct CrtScene {
     u32 max_depth;               /* scattering events */
     u32 roulette_depth;          /* CRT_NONE: never */
     u32 nee;
-    u32 environment;             /* index of its CrtLight, or CRT_NONE */
+    CrtValue environment;        /* its radiance, or CRT_NONE */
 
     CrtSeed seed;
 

@@ -1,10 +1,9 @@
 /*
  * light.h: sampling the lights: crt_light_choose, crt_light_sample and crt_light_pdf. One emissive triangle,
- * two that make a parallelogram, or the environment is one light, chosen by power. How a point on an emitter
- * is found is decided by the shaded point and the emitter alone, in crt_light_view, which sampling and the pdf
- * both ask: uniformly in solid angle where the emitter is seen large, else uniformly on its area; where
- * neither works, scattered rays alone find it. Directions to the environment follow the cosine with the
- * shading normal.
+ * or two that make a parallelogram, is one light, chosen by power. How a point on it is found is decided by
+ * the shaded point and the light alone, in crt_light_view, which sampling and the pdf both ask: uniformly in
+ * solid angle where it is seen large, else uniformly on its area; where neither works, scattered rays alone
+ * find it.
  */
 #ifndef CRT_LIGHT_H
 #define CRT_LIGHT_H
@@ -33,7 +32,6 @@ CRT_KERNEL_BEGIN
 typedef struct CrtLightSample {
     vec3 wi;      /* unit, from the shaded point */
     f32 pdf;      /* per steradian, with the probability of choosing this light; 0: no light from here */
-    int distant;  /* the environment, of which what follows is not set */
     vec3 point;   /* on the emitter */
     vec3 normal;  /* of the emitter */
     f32 cosine;   /* of wi with the emitter's plane; above 0 */
@@ -223,32 +221,18 @@ CRT_FN u32 crt_light_choose(const CrtContext *ctx, CrtSampler *sampler, u32 dime
     return index;
 }
 
-CRT_FN int crt_is_environment(CRT_GLOBAL const CrtLight *light) {
-    if (!CRT_HAS(ENVIRONMENT)) return 0;
-    if (!CRT_HAS(AREA_LIGHT)) return 1;
-    return light->kind == CRT_LIGHT_ENVIRONMENT;
-}
-
-/* A direction from p, with the shading normal ns there, to a point of the light. */
+/* A direction from p to a point of the light. */
 CRT_FN CrtLightSample crt_light_sample(const CrtContext *ctx, u32 index, CrtSampler *sampler, u32 dimension,
-                                       vec3 p, vec3 ns) {
+                                       vec3 p) {
     CRT_GLOBAL const CrtLight *light = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + index;
     CrtLightSample s;
-    s.distant = crt_is_environment(light);
+    const CrtLightShape shape = crt_light_shape(ctx, light);
+    const CrtLightView view = crt_light_view(&shape, p);
     s.pdf = 0.0f;
     s.reach = 0.0f;
     s.point = p;
-    s.wi = s.normal = ns;
+    s.wi = s.normal = shape.normal;
     s.cosine = s.distance = 0.0f;
-    if (s.distant) {
-        s.wi = crt_cosine_direction(ns, crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT));
-        s.pdf = light->choice_probability * crt_lambert(dot3(s.wi, ns));
-        return s;
-    }
-    if (!CRT_HAS(AREA_LIGHT)) return s;
-    const CrtLightShape shape = crt_light_shape(ctx, light);
-    const CrtLightView view = crt_light_view(&shape, p);
-    s.normal = shape.normal;
     const int two_sided = (light->flags & CRT_LIGHT_TWO_SIDED) != 0u;
     /* Nothing to sample where the emitter's dark side is seen, or its plane. */
     if (view.technique == CRT_LIGHT_BY_CHANCE || !(view.height < 0.0f || (two_sided && view.height > 0.0f)))
@@ -296,21 +280,13 @@ typedef struct CrtLightSeen {
     f32 cosine; /* with the emitter's plane, of the direction from p */
 } CrtLightSeen;
 
-/* Of an emitter at `distance` from p; of the environment in a direction at cos_s from the shading normal at
-   p. */
-CRT_FN CrtLightSeen crt_light_pdf(const CrtContext *ctx, u32 index, vec3 p, f32 distance, f32 cos_s) {
+CRT_FN CrtLightSeen crt_light_pdf(const CrtContext *ctx, u32 index, vec3 p, f32 distance) {
     CRT_GLOBAL const CrtLight *light = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + index;
+    const CrtLightShape shape = crt_light_shape(ctx, light);
+    const CrtLightView view = crt_light_view(&shape, p);
     CrtLightSeen seen;
-    seen.pdf = 0.0f;
-    seen.cosine = 0.0f;
-    if (crt_is_environment(light)) {
-        seen.pdf = light->choice_probability * crt_lambert(cos_s);
-    } else if (CRT_HAS(AREA_LIGHT)) {
-        const CrtLightShape shape = crt_light_shape(ctx, light);
-        const CrtLightView view = crt_light_view(&shape, p);
-        seen.cosine = crt_abs(view.height) / distance;
-        seen.pdf = light->choice_probability * crt_light_density(view, shape.area, seen.cosine, distance);
-    }
+    seen.cosine = crt_abs(view.height) / distance;
+    seen.pdf = light->choice_probability * crt_light_density(view, shape.area, seen.cosine, distance);
     return seen;
 }
 

@@ -78,8 +78,7 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
     f32 weight = 1.0f;
     if (CRT_HAS(NEE) && ctx->scene->nee != CRT_NEE_NONE && path->scatter_pdf > 0.0f) {
         const f32 distance = length3(crt_fma3(path->ray.d, t, path->ray.o) - path->p);
-        const CrtLightSeen light =
-            crt_light_pdf(ctx, surface->light, path->p, distance, path->scatter_cosine);
+        const CrtLightSeen light = crt_light_pdf(ctx, surface->light, path->p, distance);
         if (light.pdf > 0.0f) {
             /* The ray starts a clearance off p, from which lights are sampled. Close to a light that is
                another direction: both techniques estimate what arrives at p, and are weighed by the area of
@@ -99,28 +98,11 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
                          crt_value(ctx, emitter->radiance, surface, path->wavelengths.position) * weight;
 }
 
-/* The environment, met by a ray that leaves the scene. */
-CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path) {
-    const u32 index = ctx->scene->environment;
-    f32 weight = 1.0f;
-    if (CRT_HAS(NEE) && ctx->scene->nee != CRT_NEE_NONE && path->scatter_pdf > 0.0f) {
-        const CrtLightSeen light = crt_light_pdf(ctx, index, path->p, CRT_INFINITY, path->scatter_cosine);
-        if (light.pdf > 0.0f) {
-            if (ctx->scene->nee == CRT_NEE_ONLY) return;
-            weight = crt_power_heuristic(light.pdf / path->scatter_pdf);
-        }
-    }
-    const CrtValue radiance = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[index].radiance;
-    path->radiance =
-        path->radiance +
-        path->throughput * crt_value(ctx, radiance, 0, path->wavelengths.position) * weight;
-}
-
 /* A question that a vertex asks, and what it adds to the path's radiance if nothing is met. It is answered
    before the path's next vertex. */
 typedef struct CrtShadow {
     int asked;
-    CrtRay ray; /* of reach 0: nothing fits in between */
+    CrtRay ray; /* its reach is 0 or less where nothing fits in between */
     vec4 radiance;
 } CrtShadow;
 
@@ -128,8 +110,7 @@ typedef struct CrtShadow {
 CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface, const CrtBsdf *bsdf,
                           u32 dimension, CrtShadow *shadow) {
     const u32 index = crt_light_choose(ctx, &path->sampler, dimension);
-    const CrtLightSample light =
-        crt_light_sample(ctx, index, &path->sampler, dimension, surface->p, bsdf->ns);
+    const CrtLightSample light = crt_light_sample(ctx, index, &path->sampler, dimension, surface->p);
     if (!(light.pdf > 0.0f)) return;
     const int before = dot3(light.wi, bsdf->ng) > 0.0f;
     if ((bsdf->flags & (before ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS)) == 0u) return;
@@ -137,24 +118,18 @@ CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface
     if (max4(scattered) == 0.0f) return;
     shadow->asked = 1;
     shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, bsdf->ng, light.wi);
-    shadow->ray.d = light.wi;
-    shadow->ray.reach = CRT_INFINITY;
-    f32 ratio;
-    if (light.distant) {
-        ratio = crt_bsdf_pdf(bsdf, light.wi) / light.pdf;
-    } else {
-        shadow->ray.d = light.point - shadow->ray.o;
-        shadow->ray.reach = crt_max(light.reach, 0.0f);
+    shadow->ray.d = light.point - shadow->ray.o;
+    shadow->ray.reach = light.reach;
+    f32 weight = 1.0f / light.pdf;
+    if (ctx->scene->nee == CRT_NEE_MIS) {
         /* By probabilities per area of the light (crt_add_emission): of a ray scattered at the shadow ray's
            origin pdf·|n·d|/|d|³, of light sampling pdf·cos/distance². */
         const f32 squared = dot3(shadow->ray.d, shadow->ray.d);
-        const f32 inverse = 1.0f / crt_sqrt(squared);
-        const vec3 towards = shadow->ray.d * inverse;
-        ratio = crt_bsdf_pdf(bsdf, towards) * crt_abs(dot3(light.normal, towards)) * light.distance *
-                light.distance / (light.pdf * light.cosine * squared);
+        const vec3 towards = shadow->ray.d * (1.0f / crt_sqrt(squared));
+        const f32 ratio = crt_bsdf_pdf(bsdf, towards) * crt_abs(dot3(light.normal, towards)) *
+                          light.distance * light.distance / (light.pdf * light.cosine * squared);
+        weight = weight * crt_power_heuristic(ratio);
     }
-    f32 weight = 1.0f / light.pdf;
-    if (ctx->scene->nee == CRT_NEE_MIS) weight = weight * crt_power_heuristic(ratio);
     const CrtValue radiance = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[index].radiance;
     shadow->radiance = path->throughput * scattered *
                        crt_value(ctx, radiance, 0, path->wavelengths.position) * weight;
@@ -167,7 +142,10 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     shadow->asked = 0;
     if (hit.slot == CRT_NONE) {
-        if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE) crt_add_environment(ctx, path);
+        if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE)
+            path->radiance = path->radiance +
+                             path->throughput * crt_value(ctx, scene->environment, 0,
+                                                          path->wavelengths.position);
         return 0;
     }
     const CrtSurface surface = crt_surface(ctx, hit);
