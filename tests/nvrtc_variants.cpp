@@ -29,7 +29,8 @@ constexpr int kSkipped = 77;
 
 /// Masks as compileScene derives them, by name. One is compiled once however many names lead to it.
 std::map<std::uint32_t, std::string> representativeMasks() {
-    constexpr std::uint32_t lit = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE;
+    constexpr std::uint32_t lit =
+        CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_TABLE;
     constexpr std::uint32_t sobol = CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES;
     constexpr std::uint32_t box = lit | sobol | CRT_FEATURE_BRUTE_FORCE;
     constexpr std::uint32_t mesh = lit | sobol | CRT_FEATURE_BVH;
@@ -43,13 +44,14 @@ std::map<std::uint32_t, std::string> representativeMasks() {
         {box & ~CRT_FEATURE_NEE, "a box, no light sampling"},
         {mesh, "a mesh, BVH"},
         {mesh | CRT_FEATURE_SMOOTH_NORMALS, "a smooth mesh"},
+        {box & ~CRT_FEATURE_TABLE, "a box of constants"},
         {mesh | CRT_FEATURE_CONDUCTOR, "a mesh of metal"},
         {mesh | CRT_FEATURE_DIELECTRIC, "a mesh of glass"},
         {mesh | glass, "a mesh of dispersive glass"},
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "a mesh, environment, lens and filter"},
         {mesh | CRT_FEATURE_AOV, "a mesh with AOVs"},
-        {mesh | glass | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_ENVIRONMENT |
+        {mesh | glass | CRT_FEATURE_MIRROR | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_ENVIRONMENT |
              CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "all materials, BVH"},
         {CRT_FEATURE_SOBOL | CRT_FEATURE_BVH | CRT_FEATURE_VIEW, "a view of normals"},

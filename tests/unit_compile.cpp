@@ -148,10 +148,10 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
             s.objects[1].material = 1;
         };
     };
-    seen |= differs(CRT_FEATURE_CONDUCTOR, 0, other(crt::MaterialType::Mirror));
+    seen |= differs(CRT_FEATURE_MIRROR, 0, other(crt::MaterialType::Mirror));
     seen |= differs(CRT_FEATURE_CONDUCTOR, 0, other(crt::MaterialType::Conductor));
     seen |= differs(CRT_FEATURE_DIELECTRIC, 0, other(crt::MaterialType::Dielectric));
-    seen |= differs(CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION, 0, [&](Scene& s) {
+    seen |= differs(CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
         other(crt::MaterialType::Dielectric)(s);
         s.materials[1].eta = dispersiveIndex();
     });
@@ -174,6 +174,7 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     CHECK(compiled(litFloor(), crt::kAovDepth).features == (base | CRT_FEATURE_AOV));
     // The film keeps these itself; the kernel need not know.
     CHECK(compiled(litFloor(), crt::kAovVariance | crt::kAovSamples).features == base);
+    seen |= differs(CRT_FEATURE_TABLE, 0, [](Scene& s) { s.emissions[0].radiance[5] *= 2; });
     CHECK(seen == CRT_FEATURES_ALL);
 
     differs(0, CRT_FEATURE_NEE, [](Scene& s) { s.integrator.nee = false; });
@@ -183,7 +184,13 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
             [](Scene& s) { s.emissions[0].radiance = crt::constantSpectrum(0); });
     // Nothing is scattered at depth 0.
     differs(0, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, [](Scene& s) { s.integrator.max_depth = 0; });
-    differs(CRT_FEATURE_ENVIRONMENT, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, [](Scene& s) {
+    // But the albedo is asked for.
+    Scene flat = litFloor();
+    flat.integrator.max_depth = 0;
+    CHECK(compiled(flat, crt::kAovAlbedo).features == ((base | CRT_FEATURE_AOV) & ~CRT_FEATURE_NEE));
+    CHECK(compiled(flat, crt::kAovNormal).features ==
+          ((base | CRT_FEATURE_AOV) & ~(CRT_FEATURE_NEE | CRT_FEATURE_DIFFUSE)));
+    differs(CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_TABLE, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, [](Scene& s) {
         s.integrator.max_depth = 0;
         makeGlass(s);
         s.materials[0].eta = dispersiveIndex();
@@ -511,10 +518,21 @@ TEST_CASE("materials: the face's own, the object's, or grey, and equal spectra o
     CHECK(primitives[3].object == 1);
     REQUIRE(materials.size() == 5);
     CHECK(materials[4].type == CRT_MATERIAL_DIFFUSE);
-    CHECK(V4X(crt_spectrum(&ctx, materials[4].a, splat4(100))) == 0.5f);
-    CHECK(V4X(crt_spectrum(&ctx, materials[1].a, splat4(100))) == 0.1f);
-    CHECK(materials[3].a == materials[4].a);
-    CHECK(ctx.scene->spectra.count == 2);  // .1 and .5; .2 is nobody's
+    CHECK(V4X(crt_value(&ctx, materials[4].reflectance, nullptr, splat4(100))) == 0.5f);
+    CHECK(V4X(crt_value(&ctx, materials[1].reflectance, nullptr, splat4(100))) == 0.1f);
+    CHECK(ctx.scene->spectra.count == 0);  // constants need no table
+    scene.materials[1].reflectance[7] = scene.materials[3].reflectance[7] = 0.25;
+    scene.materials[2].reflectance[9] = 0.75;
+    scene.materials[0] = scene.materials[1];
+    scene.meshes[0].material = {1, 0};
+    const CompiledScene tables = compiled(scene);
+    const auto of_tables = listOf<CrtMaterial>(tables, headerOf(tables).materials);
+    CHECK(of_tables[0].reflectance == of_tables[1].reflectance);
+    CHECK(of_tables[0].reflectance != of_tables[4].reflectance);
+    CHECK(headerOf(tables).spectra.count == 1);  // nothing has materials 2 and 3
+    const CrtContext tables_ctx = contextOf(tables);
+    CHECK(V4X(crt_value(&tables_ctx, of_tables[1].reflectance, nullptr, splat4(7))) == 0.25f);
+    CHECK(V4X(crt_value(&tables_ctx, of_tables[1].reflectance, nullptr, splat4(8))) == 0.1f);
 
     const CompiledScene kinds = changed([](Scene& s) {
         s.materials.resize(5);
@@ -534,30 +552,31 @@ TEST_CASE("materials: the face's own, the object's, or grey, and equal spectra o
     CHECK(m[3].flags == 0);
     CHECK(m[4].flags == CRT_MATERIAL_DISPERSIVE);
     const CrtContext kinds_ctx = contextOf(kinds);
-    CHECK(V4X(crt_spectrum(&kinds_ctx, m[2].a, splat4(7))) == 0.2f);
-    CHECK(V4X(crt_spectrum(&kinds_ctx, m[2].b, splat4(7))) == 3);
-    CHECK(V4X(crt_spectrum(&kinds_ctx, m[4].a, splat4(0))) == 1.6f);
+    CHECK(V4X(crt_value(&kinds_ctx, m[2].eta, nullptr, splat4(7))) == 0.2f);
+    CHECK(V4X(crt_value(&kinds_ctx, m[2].k, nullptr, splat4(7))) == 3);
+    CHECK(V4X(crt_value(&kinds_ctx, m[4].eta, nullptr, splat4(0))) == 1.6f);
 }
 
 TEST_CASE("emitters: one a triangle, or one a parallelogram, with its area and side", "[compile]") {
     const CompiledScene c = compiled(litFloor());
-    auto emitters = listOf<CrtEmitter>(c, headerOf(c).emitters);
+    auto emitters = listOf<CrtLight>(c, headerOf(c).lights);
     REQUIRE(emitters.size() == 1);
-    CHECK(emitters[0].flags == CRT_EMITTER_PARALLELOGRAM);
+    CHECK(emitters[0].kind == CRT_LIGHT_PARALLELOGRAM);
+    CHECK(emitters[0].flags == 0);
     CHECK(emitters[0].area == 4.0f / 64);
     CHECK(emitters[0].choice_probability == 1);
     const auto primitives = listOf<CrtPrimitive>(c, headerOf(c).primitives);
-    CHECK(primitives[0].emitter == CRT_NONE);
-    CHECK(primitives[2].emitter == 0);
-    CHECK(primitives[3].emitter == 0);
+    CHECK(primitives[0].light == CRT_NONE);
+    CHECK(primitives[2].light == 0);
+    CHECK(primitives[3].light == 0);
     // A trapezium is two triangles, and so is a quad of which the halves differ.
     const auto of = [](const std::function<void(Scene&)>& change) {
         const CompiledScene changed_scene = changed(change);
-        return listOf<CrtEmitter>(changed_scene, headerOf(changed_scene).emitters);
+        return listOf<CrtLight>(changed_scene, headerOf(changed_scene).lights);
     };
     emitters = of([](Scene& s) { s.meshes[1].positions[2][0] = 1.5; });
     REQUIRE(emitters.size() == 2);
-    CHECK(emitters[0].flags == 0);
+    CHECK(emitters[0].kind == CRT_LIGHT_TRIANGLE);
     CHECK(emitters[0].choice_probability + emitters[1].choice_probability == Approx(1));
     CHECK(emitters[0].choice_probability / emitters[1].choice_probability ==
           Approx(emitters[0].area / emitters[1].area));
@@ -566,7 +585,7 @@ TEST_CASE("emitters: one a triangle, or one a parallelogram, with its area and s
         s.meshes[1].emission = {0, 1};
     });
     REQUIRE(emitters.size() == 2);
-    CHECK(emitters[1].flags == CRT_EMITTER_TWO_SIDED);
+    CHECK(emitters[1].flags == CRT_LIGHT_TWO_SIDED);
     CHECK(emitters[1].choice_probability / emitters[0].choice_probability ==
           Approx(6));  // three times as bright, on both sides
     CHECK(of([](Scene& s) { s.meshes[1].positions[3] = s.meshes[1].positions[2]; }).size() ==
@@ -621,7 +640,8 @@ TEST_CASE("what is left out is listed with a reason, and what is needed is not",
     };
     const CompiledScene plain = compiled(litFloor());
     for (const char* what :
-         {"BVH", "mirror and conductor", "dielectric", "hero wavelength selection", "shading normals",
+         {"BVH", "mirror", "smooth conductor", "smooth dielectric, total internal reflection",
+          "tables of spectra", "hero wavelength selection", "shading normals",
           "environment", "thin lens", "pixel filter table", "AOV buffers", "normals and bounding-box views",
           "independent sampler", "xorshift sampler"}) {
         INFO(what);
@@ -639,7 +659,8 @@ TEST_CASE("what is left out is listed with a reason, and what is needed is not",
     rich.film.filter = crt::PixelFilter::BlackmanHarris;
     rich.environment = crt::Environment{crt::constantSpectrum(1)};
     const CompiledScene full = compiled(rich, crt::kAovAlbedo);
-    for (const char* what : {"BVH", "dielectric", "hero wavelength selection", "environment", "thin lens",
+    for (const char* what : {"BVH", "smooth dielectric, total internal reflection", "tables of spectra",
+                             "hero wavelength selection", "environment", "thin lens",
                              "pixel filter table", "AOV buffers"}) {
         INFO(what);
         CHECK_FALSE(listed(full, what));
@@ -813,7 +834,7 @@ TEST_CASE("the hash is not that of what only finds hits sooner", "[compile]") {
     std::vector<std::uint32_t> order;
     for (const CrtTriangle& t : listOf<CrtTriangle>(tree, headerOf(tree).triangles)) order.push_back(t.id);
     REQUIRE_FALSE(std::is_sorted(order.begin(), order.end()));
-    REQUIRE(headerOf(tree).emitters.count > 2);
+    REQUIRE(headerOf(tree).lights.count > 2);
     for (const crt::Accelerator accelerator :
          {crt::Accelerator::None, crt::Accelerator::Aabb, crt::Accelerator::Auto}) {
         const CompiledScene other = withTree(accelerator);
@@ -840,8 +861,8 @@ TEST_CASE("a better tree and a smaller kernel leave the hash alone", "[compile]"
 
     // Two leaves change places, as another builder might put them; emitters follow their triangles.
     std::swap(triangles[0], triangles[header.triangle_count - 1]);
-    auto* emitters = const_cast<CrtEmitter*>(arrayOf<CrtEmitter>(c, header.emitters));
-    for (std::uint32_t i = 0; i < header.emitters.count; ++i) {
+    auto* emitters = const_cast<CrtLight*>(arrayOf<CrtLight>(c, header.lights));
+    for (std::uint32_t i = 0; i < header.lights.count; ++i) {
         if (emitters[i].slot == 0)
             emitters[i].slot = header.triangle_count - 1;
         else if (emitters[i].slot == header.triangle_count - 1)
@@ -879,7 +900,7 @@ TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]")
                                                           {h.nodes, sizeof(CrtNode4)},
                                                           {h.objects, sizeof(CrtObject)},
                                                           {h.materials, sizeof(CrtMaterial)},
-                                                          {h.emitters, sizeof(CrtEmitter)},
+                                                          {h.lights, sizeof(CrtLight)},
                                                           {h.spectra, CRT_SPECTRUM_STRIDE * sizeof(f32)},
                                                           {h.observer, sizeof(f32)},
                                                           {h.wavelengths, sizeof(f32)},

@@ -452,12 +452,13 @@ struct LitScene {
     }
     /// In the kernel's units.
     Vec3d place(const Vec3d& p) const { return times(minus(p, compiled.centre), scale); }
-    const CrtEmitter& emitter(u32 i) const { return arrayOf<CrtEmitter>(compiled, ctx.scene->emitters)[i]; }
+    const CrtLight& emitter(u32 i) const { return arrayOf<CrtLight>(compiled, ctx.scene->lights)[i]; }
 };
 
 CrtLightSample sampleLight(const LitScene& scene, const Vec3d& p, u32 i) {
     CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, crt_seed(3, 4), i, 0);
-    return crt_sample_light(&scene.ctx, &sampler, 8, toFloat(p));
+    const u32 light = crt_light_choose(&scene.ctx, &sampler, 8);
+    return crt_light_sample(&scene.ctx, light, &sampler, 8, toFloat(p));
 }
 
 /// Triangle and parallelogram, at z = 1, facing down.
@@ -493,7 +494,7 @@ TEST_CASE("light sampling integrates: solid angles and form factors in closed fo
                 const Vec3d wi = toDouble(s.wi), to = minus(toDouble(s.point), toDouble(toFloat(p)));
                 solid_angle.add(1.0 / s.pdf);
                 form_factor.add(std::max(0.0, dot(wi, up)) / kPi / s.pdf);
-                const f32 pdf = crt_light_seen(&scene.ctx, 0, toFloat(p), static_cast<f32>(length(to))).pdf;
+                const f32 pdf = crt_light_pdf(&scene.ctx, 0, toFloat(p), static_cast<f32>(length(to))).pdf;
                 inconsistent = std::max(inconsistent, std::abs(pdf / static_cast<double>(s.pdf) - 1));
                 off_plane = std::max(off_plane, std::abs(s.point.z - scene.place(corners[0])[2]));
                 beside = std::max(beside, length(minus(times(unit(to), 1.0), wi)));
@@ -532,7 +533,7 @@ TEST_CASE("a light's density integrates to 1 over the light", "[kernel][light]")
                             p);
                         const Vec3d wi = unit(d);
                         const f32 pdf =
-                            crt_light_seen(&scene.ctx, 0, toFloat(p), static_cast<f32>(length(d))).pdf;
+                            crt_light_pdf(&scene.ctx, 0, toFloat(p), static_cast<f32>(length(d))).pdf;
                         integral += pdf * std::abs(wi[2]) / dot(d, d) * area / (kCut * kCut);
                     }
             }
@@ -608,7 +609,7 @@ TEST_CASE("four wavelengths integrate any spectrum, together or the hero alone",
         constexpr u32 kSteps = 1u << 18;
         for (u32 i = 0; i < kSteps; ++i) {
             const CrtWavelengths w = crt_sample_wavelengths(&ctx, static_cast<f32>((i + 0.5) / kSteps));
-            const vec4 radiance = crt_spectrum(&ctx, ctx.scene->environment, w.position);
+            const vec4 radiance = crt_value(&ctx, ctx.scene->environment, nullptr, w.position);
             const vec4 xyz = crt_to_xyz(&ctx, w, radiance),
                        hero = crt_to_xyz(&ctx, w, radiance * heroOf(i % 4) * 4.0f);
             for (u32 k = 0; k < 3; ++k) {
@@ -688,11 +689,11 @@ TEST_CASE("spectra and observer are exact at whole nanometres and linear between
     const CrtContext ctx = contextOf(compiled);
     for (u32 nm = 0; nm <= 470; ++nm) {
         const f32 at = static_cast<f32>(nm);
-        CHECK(lane(crt_spectrum(&ctx, ctx.scene->environment, make_vec4(0, 0, at, 0)), 2) == s[nm]);
+        CHECK(lane(crt_value(&ctx, ctx.scene->environment, nullptr, make_vec4(0, 0, at, 0)), 2) == s[nm]);
         CHECK(lane(crt_observer(&ctx, at), 1) ==
               static_cast<f32>(crt::cieObserver()[1][nm] / crt::cieYIntegral()));
         if (nm < 470)
-            CHECK(lane(crt_spectrum(&ctx, ctx.scene->environment, splat4(at + 0.25f)), 0) ==
+            CHECK(lane(crt_value(&ctx, ctx.scene->environment, nullptr, splat4(at + 0.25f)), 0) ==
                   Approx(0.75 * s[nm] + 0.25 * s[nm + 1]).margin(1e-5));
     }
 }

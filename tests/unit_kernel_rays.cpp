@@ -664,7 +664,8 @@ Walk walkIn(const crt::CompiledScene& compiled, std::uint64_t vertices, Random& 
         const vec3 ng = dot3(wo, surface.ng) > 0 ? surface.ng : -surface.ng;
         CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0,
                                                crt_seed(1, static_cast<u32>(random.bits())), 2, 3);
-        const CrtLightSample light = crt_sample_light(&ctx, &sampler, 0, surface.p);
+        const CrtLightSample light =
+            crt_light_sample(&ctx, crt_light_choose(&ctx, &sampler, 0), &sampler, 0, surface.p);
         if (light.pdf > 0 && dot3(light.wi, ng) > 0) {
             const vec3 o = crt_offset_origin(surface.p, clearance, ng, light.wi);
             const CrtRay shadow = rayOf(o, light.point - o, light.reach);

@@ -267,7 +267,7 @@ class Program:
 def feature_bits(repository):
     """[(bit, NAME, text)] of core/kernel/features.h."""
     text = (repository / "core" / "kernel" / "features.h").read_text()
-    found = re.findall(r'F\((\d+), (\w+),\s*"([^"]*)"\)', text)
+    found = re.findall(r'(?:F\(|M\(F, )(\d+), (\w+),[\w,\s\\]*"([^"]*)"\)', text)
     if not found:
         raise Failure("core/kernel/features.h lists no features in the form F(bit, NAME, \"text\")")
     return [(int(bit), name, what) for bit, name, what in found]

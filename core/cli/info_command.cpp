@@ -29,13 +29,9 @@ namespace crt {
 namespace {
 
 const char* name(MaterialType type) {
-    switch (type) {
-        case MaterialType::Diffuse: return "diffuse";
-        case MaterialType::Mirror: return "mirror";
-        case MaterialType::Conductor: return "conductor";
-        case MaterialType::Dielectric: break;
-    }
-    return "dielectric";
+    for (const auto& [known, word] : kMaterialNames)
+        if (known == type) return word;
+    return "";
 }
 
 const char* name(PixelFilter filter) {

@@ -63,6 +63,17 @@ std::vector<float> wavelengthTable(std::size_t cells) {
         inverseDistribution(density, kWavelengthMin_nm, kWavelengthMax_nm, 4 * (kSpectrumSize - 1), cells));
 }
 
+std::vector<float> observerTable(std::size_t stride) {
+    const auto& cie = cieObserver();
+    std::vector<float> table;
+    for (std::size_t i = 0; i < stride; ++i) {
+        const std::size_t nm = std::min<std::size_t>(i, kSpectrumSize - 1);
+        for (const Spectrum& s : cie) table.push_back(static_cast<float>(s[nm] / cieYIntegral()));
+        table.push_back(0.0f);
+    }
+    return table;
+}
+
 std::vector<float> filterTable(const FilmSettings& film, std::size_t cells) {
     const double radius = film.filter_radius;
     switch (film.filter) {

@@ -13,6 +13,9 @@ namespace crt {
 /// density 1/(cells·Δλ) exactly.
 std::vector<float> wavelengthTable(std::size_t cells);
 
+/// `stride` times (x̄, ȳ, z̄, 0) / ∫ȳ dλ, at 360, 361, … nm; the last repeats 830 nm.
+std::vector<float> observerTable(std::size_t stride);
+
 /// cells + 1 offsets from the pixel centre, in pixels: the inverse of the distribution proportional to the
 /// film's filter along one axis. Empty for the box of radius ½, which is uniform in the pixel.
 std::vector<float> filterTable(const FilmSettings& film, std::size_t cells);

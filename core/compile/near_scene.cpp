@@ -119,7 +119,7 @@ std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kern
     const std::uint64_t step = askedEmitterStep(scene.emitters);
     bool all = false;
     for (std::uint32_t slot = 0; slot < count && scene.emitters > 0 && !all; ++slot) {
-        const std::uint32_t emitter = primitives[triangles[slot].id].emitter;
+        const std::uint32_t emitter = primitives[triangles[slot].id].light;
         if (emitter != CRT_NONE && emitter % step == 0) all = !cells.mark(boundsOf(triangles[slot], reach));
     }
     for (const std::uint32_t id : askedTriangles(scene.triangles)) {

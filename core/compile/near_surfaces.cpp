@@ -204,7 +204,7 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     if (scene.emitters > 0)
         for (const std::uint32_t slot : slotsOf(scene, context)) {
             const std::uint32_t emitter =
-                slot != CRT_NONE ? primitives[triangles[slot].id].emitter : CRT_NONE;
+                slot != CRT_NONE ? primitives[triangles[slot].id].light : CRT_NONE;
             if (emitter != CRT_NONE && emitter % step == 0) lights.push_back(slot);
         }
     std::uint64_t tests = kTriangleTests;
@@ -219,7 +219,7 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
         visitNeighbours(context, box, tests, [&](std::uint32_t other) {
             // Of one lamp's halves, and of two lamps that shine alike, it does not matter which is seen.
             const CrtPrimitive& surface = primitives[triangles[other].id];
-            if (other == slot || surface.emitter == light.emitter) return false;
+            if (other == slot || surface.light == light.light) return false;
             const Corners corners = cornersOf(context, other);
             if (!inOnePlane(own, corners) || !overlap(own, corners)) return false;
             const double gap = 2 * std::max(own.clearance, corners.clearance);

@@ -45,7 +45,7 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
     header.accelerator = 0;
     for (kernel::CrtSpan* span :
          {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
-          &header.normals, &header.nodes, &header.objects, &header.materials, &header.emitters,
+          &header.normals, &header.nodes, &header.objects, &header.materials, &header.lights,
           &header.spectra, &header.observer, &header.wavelengths, &header.filter})
         *span = {};
     return header;
@@ -71,12 +71,12 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
     hash.add(CRT_ARRAY(f32, blob, header.wavelengths), header.wavelengths.count, sizeof(f32));
     hash.add(CRT_ARRAY(f32, blob, header.filter), header.filter.count, sizeof(f32));
 
-    // An emitter names its triangle by the place that the tree gave it.
-    const CrtEmitter* emitters = CRT_ARRAY(CrtEmitter, blob, header.emitters);
+    // A light names its triangle by the place that the tree gave it.
+    const CrtLight* lights = CRT_ARRAY(CrtLight, blob, header.lights);
     const CrtTriangle* triangles = CRT_ARRAY(CrtTriangle, blob, header.triangles);
-    std::vector<CrtEmitter> by_id(emitters, emitters + header.emitters.count);
-    for (CrtEmitter& emitter : by_id) emitter.slot = triangles[emitter.slot].id;
-    hash.add(by_id.data(), by_id.size(), sizeof(CrtEmitter));
+    std::vector<CrtLight> by_id(lights, lights + header.lights.count);
+    for (CrtLight& light : by_id) light.slot = triangles[light.slot].id;
+    hash.add(by_id.data(), by_id.size(), sizeof(CrtLight));
     return hash.digits();
 }
 

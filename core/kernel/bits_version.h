@@ -9,10 +9,11 @@
  *
  *   1   what carries no version
  *   2   the first version that plugins and films carry
+ *   3   materials as BSDFs, eight dimensions a vertex
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 2u
+#define CRT_BITS_VERSION 3u
 
 #endif

@@ -1,7 +1,8 @@
 /*
- * bsdf.h: how surfaces scatter. A function a kind of material samples a direction; crt_path_vertex (path.h)
- * has the switch between them. Only the Lambertian can be evaluated for a given pair of directions; mirror,
- * conductor and dielectric are smooth: their pdf is a delta.
+ * bsdf.h: how surfaces scatter. crt_bsdf_prepare reads what a material is made of, once a vertex; then
+ * crt_bsdf_sample, crt_bsdf_eval and crt_bsdf_pdf and the flags are all that path.h knows. A material is a row
+ * of CRT_MATERIAL_LIST (features.h) and a case in each of the four; deltas, which can only be sampled, need
+ * none in eval and pdf.
  *
  * w_o and w_i point away from the surface. Radiance is transported: crossing into an index η times the other
  * scales it by 1/η².
@@ -9,9 +10,25 @@
 #ifndef CRT_BSDF_H
 #define CRT_BSDF_H
 
-#include "surface.h"
+#include "value.h"
 
 CRT_KERNEL_BEGIN
+
+#define CRT_BSDF_DELTA 1u      /* scatters into single directions: light sampling finds none of them */
+#define CRT_BSDF_REFLECTS 2u   /* to the side of w_o */
+#define CRT_BSDF_TRANSMITS 4u  /* to the other side */
+#define CRT_BSDF_DISPERSIVE 8u /* directions depend on the wavelength */
+
+/* A material at one vertex. What its kind does not have is not set. */
+typedef struct CrtBsdf {
+    u32 type;         /* CRT_MATERIAL_… */
+    u32 flags;        /* CRT_BSDF_…; 0: everything is absorbed */
+    vec3 wo;          /* unit */
+    vec3 ns, ng;      /* on the side of w_o, the shading normal nearly so */
+    vec4 reflectance; /* diffuse, and what mirrors as a whole */
+    vec4 eta;         /* dielectric: index beyond the surface / index on w_o's side */
+    vec4 albedo;      /* for the first-hit output; only where it is asked for */
+} CrtBsdf;
 
 typedef struct CrtScatter {
     vec3 wi;        /* unit */
@@ -58,17 +75,34 @@ CRT_FN vec4 crt_fresnel_conductor(f32 cos_i, vec4 n, vec4 k) {
 
 CRT_FN vec3 crt_reflect(vec3 wo, vec3 n) { return n * (2.0f * dot3(wo, n)) - wo; }
 
-/* Lambertian f·cos per unit reflectance for a direction at cos_s from the shading normal, and its pdf: both
- * cos/π. */
-CRT_FN f32 crt_lambert(f32 cos_s) { return cos_s * CRT_INV_PI; }
+/* Lambertian f·|cos| per unit reflectance for a direction at cos_s from the shading normal, and its pdf: both
+   cos/π; 0 below the horizon. */
+CRT_FN f32 crt_lambert(f32 cos_s) { return crt_max(cos_s, 0.0f) * CRT_INV_PI; }
+
+/* Nothing is scattered. */
+CRT_FN CrtScatter crt_no_scatter(void) {
+    CrtScatter s;
+    s.wi = make_vec3(0.0f, 0.0f, 0.0f);
+    s.weight = splat4(0.0f);
+    s.pdf = 0.0f;
+    s.eta_square = 1.0f;
+    s.hero_only = 0;
+    s.valid = 0;
+    return s;
+}
+
+/* Distributed as the cosine with n, over π; unit to 4 ulp. */
+CRT_FN vec3 crt_cosine_direction(vec3 n, CrtRandom2 u) {
+    const CrtRandom2 disk = crt_concentric_disk(u);
+    const f32 z = crt_sqrt(crt_max(0.0f, crt_fma(-disk.x, disk.x, crt_fma(-disk.y, disk.y, 1.0f))));
+    return crt_to_world(crt_frame(n), make_vec3(disk.x, disk.y, z));
+}
 
 CRT_FN CrtScatter crt_sample_diffuse(vec4 reflectance, vec3 ns, vec3 ng, CrtRandom2 u) {
     CrtScatter s;
-    const CrtRandom2 disk = crt_concentric_disk(u);
-    const f32 z = crt_sqrt(crt_max(0.0f, crt_fma(-disk.x, disk.x, crt_fma(-disk.y, disk.y, 1.0f))));
-    s.wi = crt_to_world(crt_frame(ns), make_vec3(disk.x, disk.y, z)); /* unit to 4 ulp */
+    s.wi = crt_cosine_direction(ns, u);
     s.weight = reflectance;
-    s.pdf = crt_lambert(crt_max(dot3(s.wi, ns), 0.0f));
+    s.pdf = crt_lambert(dot3(s.wi, ns));
     s.eta_square = 1.0f;
     s.hero_only = 0;
     /* Light that the shading normal would send through the surface is lost, not leaked. */
@@ -124,6 +158,107 @@ CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec
                                          ns * (cos_i - crt_sqrt(crt_max(refraction, 0.0f))) * inverse_eta);
     s.valid = refraction > 0.0f && dot3(s.wi, ng) < 0.0f;
     return s;
+}
+
+/* A material's type; known without looking where the kernel has only one. */
+#define CRT_ONLY_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
+    if (CRT_KERNEL_MATERIALS == 1 << bit) return bit;
+CRT_FN u32 crt_material_type(u32 type) {
+    CRT_MATERIAL_LIST(CRT_ONLY_MATERIAL, )
+    return type;
+}
+
+/* What the material of `surface` does to light that leaves along wo. The first vertex asks for the albedo. */
+CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface *surface, vec3 wo,
+                             vec4 position, int albedo) {
+    const CrtMaterial material = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[surface->material];
+    const int outside = dot3(wo, surface->ng) > 0.0f;
+    b->type = crt_material_type(material.type);
+    b->flags = 0u;
+    b->wo = wo;
+    b->ng = outside ? surface->ng : -surface->ng;
+    b->ns = outside ? surface->ns : -surface->ns;
+    /* A shading normal that turns away from the viewer would reflect light from behind the surface. */
+    if (CRT_HAS(SMOOTH_NORMALS) && !(dot3(wo, b->ns) > 0.0f)) b->ns = b->ng;
+    if (albedo) b->albedo = splat4(1.0f);
+    switch (b->type) {
+        case CRT_MATERIAL_DIFFUSE:
+            if (CRT_HAS(DIFFUSE)) {
+                b->flags = CRT_BSDF_REFLECTS;
+                b->reflectance = crt_value(ctx, material.reflectance, surface, position);
+                if (albedo) b->albedo = b->reflectance;
+            }
+            break;
+        case CRT_MATERIAL_MIRROR:
+            if (CRT_HAS(MIRROR)) {
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
+                b->reflectance = crt_value(ctx, material.reflectance, surface, position);
+                if (albedo) b->albedo = b->reflectance;
+            }
+            break;
+        case CRT_MATERIAL_CONDUCTOR:
+            if (CRT_HAS(CONDUCTOR)) {
+                const vec4 n = crt_value(ctx, material.eta, surface, position);
+                const vec4 k = crt_value(ctx, material.k, surface, position);
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
+                b->reflectance = crt_fresnel_conductor(crt_min(dot3(wo, b->ns), 1.0f), n, k);
+                if (albedo) b->albedo = crt_fresnel_conductor(1.0f, n, k);
+            }
+            break;
+        case CRT_MATERIAL_DIELECTRIC:
+            if (CRT_HAS(DIELECTRIC)) {
+                const vec4 eta = crt_value(ctx, material.eta, surface, position);
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA;
+                if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
+                b->eta = outside ? eta : splat4(1.0f) / eta;
+            }
+            break;
+        default: break;
+    }
+}
+
+/* A direction w_i, distributed as crt_bsdf_pdf or a delta. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`:
+   only the hero is alive. */
+CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, vec4 hero, int alone) {
+    switch (b->type) {
+        case CRT_MATERIAL_DIFFUSE:
+            if (CRT_HAS(DIFFUSE)) return crt_sample_diffuse(b->reflectance, b->ns, b->ng, u);
+            break;
+        case CRT_MATERIAL_MIRROR:
+        case CRT_MATERIAL_CONDUCTOR:
+            if (CRT_HAS(MIRROR) || CRT_HAS(CONDUCTOR))
+                return crt_sample_mirror(b->reflectance, b->wo, b->ns, b->ng);
+            break;
+        case CRT_MATERIAL_DIELECTRIC:
+            if (CRT_HAS(DIELECTRIC))
+                return crt_sample_dielectric(b->eta, b->wo, b->ns, b->ng, hero,
+                                             (b->flags & CRT_BSDF_DISPERSIVE) != 0u, alone, u.x);
+            break;
+        default: break;
+    }
+    return crt_no_scatter();
+}
+
+/* f(w_o, w_i)·|cos w_i|; 0 for deltas. */
+CRT_FN vec4 crt_bsdf_eval(const CrtBsdf *b, vec3 wi) {
+    switch (b->type) {
+        case CRT_MATERIAL_DIFFUSE:
+            if (CRT_HAS(DIFFUSE)) return b->reflectance * crt_lambert(dot3(wi, b->ns));
+            break;
+        default: break;
+    }
+    return splat4(0.0f);
+}
+
+/* Density per steradian with which crt_bsdf_sample finds w_i; 0 for deltas. */
+CRT_FN f32 crt_bsdf_pdf(const CrtBsdf *b, vec3 wi) {
+    switch (b->type) {
+        case CRT_MATERIAL_DIFFUSE:
+            if (CRT_HAS(DIFFUSE)) return crt_lambert(dot3(wi, b->ns));
+            break;
+        default: break;
+    }
+    return 0.0f;
 }
 
 CRT_KERNEL_END

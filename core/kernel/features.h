@@ -5,10 +5,23 @@
  * with more bits than the scene needs gives the same bits in the image, only slower.
  *
  * CRT_FEATURE_LIST(F) calls F(bit, NAME, "what leaves the kernel without it").
+ *
+ * CRT_MATERIAL_LIST(M, F) calls M(F, bit, NAME, Name, word, SCATTER, "what leaves…") for each kind of
+ * material. Its bit is its number in the scene, too; `word` is its type in scene files. SCATTER is LOBE where
+ * light that arrives from any direction may be scattered, so that it is worth sampling lights, and DELTA
+ * where only that of single directions is.
  */
 #ifndef CRT_FEATURES_H
 #define CRT_FEATURES_H
 
+#define CRT_MATERIAL_LIST(M, F)                                                              \
+    M(F, 6, DIFFUSE, Diffuse, diffuse, LOBE, "Lambertian reflection")                        \
+    M(F, 19, MIRROR, Mirror, mirror, DELTA, "mirror")                                        \
+    M(F, 7, CONDUCTOR, Conductor, conductor, DELTA, "smooth conductor")                      \
+    M(F, 8, DIELECTRIC, Dielectric, dielectric, DELTA,                                       \
+      "smooth dielectric, total internal reflection")
+
+#define CRT_MATERIAL_FEATURE(F, bit, NAME, Name, word, scatter, text) F(bit, NAME, text)
 #define CRT_FEATURE_LIST(F)                                                                  \
     F(0, SOBOL, "Owen-scrambled Sobol sampler")                                              \
     F(1, INDEPENDENT, "counter-based independent sampler (Philox)")                          \
@@ -16,9 +29,7 @@
     F(3, BVH, "BVH traversal and its stack")                                                 \
     F(4, BRUTE_FORCE, "loop over all triangles")                                             \
     F(5, AABB, "per-object bounding box culling")                                            \
-    F(6, DIFFUSE, "Lambertian reflection")                                                   \
-    F(7, CONDUCTOR, "mirror and smooth conductor")                                           \
-    F(8, DIELECTRIC, "smooth dielectric, total internal reflection")                         \
+    CRT_MATERIAL_LIST(CRT_MATERIAL_FEATURE, F)                                               \
     F(9, DISPERSION, "wavelength-dependent refraction: hero wavelength selection")           \
     F(10, SMOOTH_NORMALS, "interpolated shading normals")                                    \
     F(11, AREA_LIGHT, "emission from surfaces")                                              \
@@ -28,7 +39,8 @@
     F(15, FILTER, "pixel filter other than the box")                                         \
     F(16, VIEW, "normals and bounding-box views")                                            \
     F(17, AOV, "albedo, normal, depth and primitive outputs")                                \
-    F(18, REPLICATES, "independent replicates, from which the image knows its error")
+    F(18, REPLICATES, "independent replicates, from which the image knows its error")        \
+    F(20, TABLE, "values tabulated by wavelength")
 
 #define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,
 enum CrtFeature { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) CRT_FEATURE_END };
@@ -37,10 +49,26 @@ enum CrtFeature { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) CRT_FEATURE_END };
 #define CRT_FEATURE_BIT(bit, name, text) | (1u << bit)
 #define CRT_FEATURES_ALL (0u CRT_FEATURE_LIST(CRT_FEATURE_BIT))
 
+/* Kinds of materials by their bits; the mask of all, and of those that scatter in more than single
+   directions. */
+#define CRT_MATERIAL_ENUM(F, bit, NAME, Name, word, scatter, text) CRT_MATERIAL_##NAME = bit,
+#define CRT_MATERIAL_BIT(F, bit, NAME, Name, word, scatter, text) | (1 << bit)
+#define CRT_SCATTERS_LOBE(bit) | (1 << bit)
+#define CRT_SCATTERS_DELTA(bit)
+#define CRT_LOBE_BIT(F, bit, NAME, Name, word, scatter, text) CRT_SCATTERS_##scatter(bit)
+enum CrtMaterialType {
+    CRT_MATERIAL_LIST(CRT_MATERIAL_ENUM, )
+    CRT_FEATURES_MATERIALS = 0 CRT_MATERIAL_LIST(CRT_MATERIAL_BIT, ),
+    CRT_FEATURES_LOBE = 0 CRT_MATERIAL_LIST(CRT_LOBE_BIT, )
+};
+
 /* The mask that this kernel is compiled for; everything when the build says nothing. */
 #ifndef CRT_FEATURES
 #define CRT_FEATURES CRT_FEATURES_ALL
 #endif
+
+/* The kinds of materials that it has. */
+enum CrtKernelMaterials { CRT_KERNEL_MATERIALS = (CRT_FEATURES) & (unsigned)CRT_FEATURES_MATERIALS };
 
 #define CRT_HAS(name) (((CRT_FEATURES) & (unsigned)CRT_FEATURE_##name) != 0u)
 

@@ -12,6 +12,7 @@
 
 #include "channels.h"
 #include "dialect.h"
+#include "features.h"
 
 CRT_KERNEL_BEGIN
 
@@ -65,7 +66,7 @@ CRT_ASSERT_SIZE(CrtFace, 32);
 /* What a triangle is made of, by primitive id. */
 typedef struct CrtPrimitive {
     u32 material;
-    u32 emitter;  /* index of its CrtEmitter, or CRT_NONE */
+    u32 light;    /* index of its CrtLight, or CRT_NONE */
     u32 normals;  /* index of its CrtNormals, or CRT_NONE: flat */
     u32 object;
 } CrtPrimitive;
@@ -98,37 +99,43 @@ typedef struct CrtObject {
 } CrtObject;
 CRT_ASSERT_SIZE(CrtObject, 32);
 
-#define CRT_MATERIAL_DIFFUSE 0u
-#define CRT_MATERIAL_MIRROR 1u
-#define CRT_MATERIAL_CONDUCTOR 2u
-#define CRT_MATERIAL_DIELECTRIC 3u
+/* A spectrum or a number that a material or a light has: a reference of 32 bits, read by crt_value (value.h)
+   alone. With the sign bit clear it is a constant, the float itself, which costs no load; set, bits 28 to 30
+   are the kind and the rest an index. Nothing that a scene says this way is below 0. */
+typedef u32 CrtValue;
+#define CRT_VALUE_REFERENCE 0x80000000u
+#define CRT_VALUE_INDEX 0x0fffffffu
+#define CRT_VALUE_TABLE 0x80000000u /* kind 0: a spectrum of the scene's table */
 
 #define CRT_MATERIAL_DISPERSIVE 1u
 
-/* Spectra by index. Diffuse and mirror: a = reflectance. Conductor: a = n, b = k. Dielectric: a = index
- * inside / outside. */
+/* What a kind does not have is 0. */
 typedef struct CrtMaterial {
-    u32 type;
-    u32 a, b;
+    u32 type; /* CRT_MATERIAL_… of features.h */
     u32 flags;
+    CrtValue reflectance;
+    CrtValue eta; /* conductors: real part of the index; dielectric: index inside / outside */
+    CrtValue k;   /* conductors: extinction */
+    u32 reserved0, reserved1, reserved2;
 } CrtMaterial;
-CRT_ASSERT_SIZE(CrtMaterial, 16);
+CRT_ASSERT_SIZE(CrtMaterial, 32);
 
-#define CRT_EMITTER_TWO_SIDED 1u
-#define CRT_EMITTER_PARALLELOGRAM 2u
+#define CRT_LIGHT_TRIANGLE 0u
+#define CRT_LIGHT_PARALLELOGRAM 1u /* two triangles */
 
-/* One emissive triangle, or two that make a parallelogram. */
-typedef struct CrtEmitter {
-    u32 slot;        /* in the triangle array */
-    u32 spectrum;    /* radiance */
+#define CRT_LIGHT_TWO_SIDED 1u
+
+typedef struct CrtLight {
+    u32 kind; /* CRT_LIGHT_… */
     u32 flags;
-    u32 choice;      /* a 32-bit number u chooses the last emitter with choice ≤ u */
+    CrtValue radiance;
+    u32 choice;             /* a 32-bit number u chooses the last light with choice ≤ u */
     f32 choice_probability; /* exactly the share of 2³² that chooses it */
+    u32 slot;   /* in the triangle array */
+    u32 corner; /* which vertex of the triangle the parallelogram's two edges leave from */
     f32 area;
-    u32 corner;      /* which vertex of the triangle the parallelogram's two edges leave from */
-    u32 reserved0;
-} CrtEmitter;
-CRT_ASSERT_SIZE(CrtEmitter, 32);
+} CrtLight;
+CRT_ASSERT_SIZE(CrtLight, 32);
 
 /* A film point (px, py), in pixels from the top left, looks along corner + px·step_x + py·step_y (not
    normalised; its component along the view axis is 1). */
@@ -201,7 +208,7 @@ typedef struct CrtScene {
     u32 max_depth;               /* scattering events */
     u32 roulette_depth;          /* CRT_NONE: never */
     u32 nee;
-    u32 environment;             /* spectrum, or CRT_NONE */
+    CrtValue environment;        /* its radiance, or CRT_NONE */
 
     CrtSeed seed;
 
@@ -217,7 +224,7 @@ typedef struct CrtScene {
     CrtSpan nodes;               /* CrtNode4, root first; only for BVH */
     CrtSpan objects;             /* CrtObject */
     CrtSpan materials;           /* CrtMaterial */
-    CrtSpan emitters;            /* CrtEmitter */
+    CrtSpan lights;              /* CrtLight */
     CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
     CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
     CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */

@@ -1,8 +1,9 @@
 /*
- * light.h: sampling the emitters. One emissive triangle, or two that make a parallelogram, is one light,
- * chosen by power. How a point on it is found is decided by the shaded point and the emitter alone, in
- * crt_light_view, which sampling and the pdf both ask: uniformly in solid angle where the emitter is seen
- * large, else uniformly on its area; where neither works, scattered rays alone find it.
+ * light.h: sampling the lights: crt_light_choose, crt_light_sample and crt_light_pdf. One emissive triangle,
+ * or two that make a parallelogram, is one light, chosen by power. How a point on it is found is decided by
+ * the shaded point and the light alone, in crt_light_view, which sampling and the pdf both ask: uniformly in
+ * solid angle where it is seen large, else uniformly on its area; where neither works, scattered rays alone
+ * find it.
  */
 #ifndef CRT_LIGHT_H
 #define CRT_LIGHT_H
@@ -29,14 +30,13 @@ CRT_KERNEL_BEGIN
 #define CRT_AREA_WEIGHT_MAX 32.0f
 
 typedef struct CrtLightSample {
-    vec3 point;   /* on the emitter */
     vec3 wi;      /* unit, from the shaded point */
+    f32 pdf;      /* per steradian, with the probability of choosing this light; 0: no light from here */
+    vec3 point;   /* on the emitter */
     vec3 normal;  /* of the emitter */
     f32 cosine;   /* of wi with the emitter's plane; above 0 */
     f32 distance; /* of `point` */
     f32 reach;    /* share of the way to `point` that is sure to end before the emitter */
-    f32 pdf;      /* per steradian, with the probability of choosing this emitter; 0: no light from here */
-    u32 spectrum;
 } CrtLightSample;
 
 /* Solid angle of the triangle of the unit vectors a, b, c, given their |a·(b×c)|: tan(Ω/2) = |a·(b×c)| / (1
@@ -53,7 +53,7 @@ typedef struct CrtLightShape {
     int parallelogram;
 } CrtLightShape;
 
-CRT_FN CrtLightShape crt_light_shape(const CrtContext *ctx, CRT_GLOBAL const CrtEmitter *emitter) {
+CRT_FN CrtLightShape crt_light_shape(const CrtContext *ctx, CRT_GLOBAL const CrtLight *emitter) {
     CRT_GLOBAL const CrtTriangle *triangle =
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + emitter->slot;
     CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
@@ -64,7 +64,7 @@ CRT_FN CrtLightShape crt_light_shape(const CrtContext *ctx, CRT_GLOBAL const Crt
     s.b = crt_triangle_vertex(triangle, corner == 0u ? 2u : corner - 1u) - s.o;
     s.normal = crt_load3(face->normal);
     s.area = emitter->area;
-    s.parallelogram = (emitter->flags & CRT_EMITTER_PARALLELOGRAM) != 0u;
+    s.parallelogram = emitter->kind == CRT_LIGHT_PARALLELOGRAM;
     return s;
 }
 
@@ -205,30 +205,35 @@ CRT_FN vec3 crt_sample_spherical_triangle(vec3 a, vec3 b, vec3 c, f32 triple, f3
     return length > 0.0f ? normalize3(q * cos_theta + towards * (sin_theta / length)) : q;
 }
 
-/* Chooses a light and a point on it for the point p. */
-CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, vec3 p) {
-    CRT_GLOBAL const CrtEmitter *emitters = CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters);
+/* Which light to sample, by power. There must be one. */
+CRT_FN u32 crt_light_choose(const CrtContext *ctx, CrtSampler *sampler, u32 dimension) {
+    CRT_GLOBAL const CrtLight *lights = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights);
     u32 index = 0u;
-    u32 end = ctx->scene->emitters.count;
+    u32 end = ctx->scene->lights.count;
     if (end > 1u) {
         const u32 choice = crt_sample_bits(sampler, dimension + CRT_DIM_LIGHT_CHOICE);
         while (end - index > 1u) {
             const u32 middle = (index + end) >> 1;
-            if (emitters[middle].choice <= choice) index = middle;
+            if (lights[middle].choice <= choice) index = middle;
             else end = middle;
         }
     }
-    CRT_GLOBAL const CrtEmitter *emitter = emitters + index;
-    const CrtLightShape shape = crt_light_shape(ctx, emitter);
-    const CrtLightView view = crt_light_view(&shape, p);
+    return index;
+}
+
+/* A direction from p to a point of the light. */
+CRT_FN CrtLightSample crt_light_sample(const CrtContext *ctx, u32 index, CrtSampler *sampler, u32 dimension,
+                                       vec3 p) {
+    CRT_GLOBAL const CrtLight *light = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + index;
     CrtLightSample s;
-    s.spectrum = emitter->spectrum;
+    const CrtLightShape shape = crt_light_shape(ctx, light);
+    const CrtLightView view = crt_light_view(&shape, p);
     s.pdf = 0.0f;
     s.reach = 0.0f;
     s.point = p;
     s.wi = s.normal = shape.normal;
     s.cosine = s.distance = 0.0f;
-    const int two_sided = (emitter->flags & CRT_EMITTER_TWO_SIDED) != 0u;
+    const int two_sided = (light->flags & CRT_LIGHT_TWO_SIDED) != 0u;
     /* Nothing to sample where the emitter's dark side is seen, or its plane. */
     if (view.technique == CRT_LIGHT_BY_CHANCE || !(view.height < 0.0f || (two_sided && view.height > 0.0f)))
         return s;
@@ -262,27 +267,26 @@ CRT_FN CrtLightSample crt_sample_light(const CrtContext *ctx, CrtSampler *sample
     }
     s.cosine = crt_abs(cosine);
     s.distance = distance;
-    s.pdf = emitter->choice_probability * crt_light_density(view, shape.area, s.cosine, distance);
+    s.pdf = light->choice_probability * crt_light_density(view, shape.area, s.cosine, distance);
     /* The shadow ray stops short of the emitter by its clearance, measured along the ray. */
-    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
+    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + light->slot;
     if (s.pdf > 0.0f) s.reach = 1.0f - face->clearance / (s.cosine * distance);
     return s;
 }
 
-/* A point of an emitter, met by a scattered ray, as crt_sample_light at p has it. */
+/* A light met by a scattered ray, as crt_light_sample has it. */
 typedef struct CrtLightSeen {
     f32 pdf;    /* per steradian at p; 0: light sampling does not find it */
     f32 cosine; /* with the emitter's plane, of the direction from p */
 } CrtLightSeen;
 
-CRT_FN CrtLightSeen crt_light_seen(const CrtContext *ctx, u32 emitter_index, vec3 p, f32 distance) {
-    CRT_GLOBAL const CrtEmitter *emitter =
-        CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + emitter_index;
-    const CrtLightShape shape = crt_light_shape(ctx, emitter);
+CRT_FN CrtLightSeen crt_light_pdf(const CrtContext *ctx, u32 index, vec3 p, f32 distance) {
+    CRT_GLOBAL const CrtLight *light = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + index;
+    const CrtLightShape shape = crt_light_shape(ctx, light);
     const CrtLightView view = crt_light_view(&shape, p);
     CrtLightSeen seen;
     seen.cosine = crt_abs(view.height) / distance;
-    seen.pdf = emitter->choice_probability * crt_light_density(view, shape.area, seen.cosine, distance);
+    seen.pdf = light->choice_probability * crt_light_density(view, shape.area, seen.cosine, distance);
     return seen;
 }
 

@@ -31,6 +31,7 @@ typedef struct CrtPath {
     vec4 throughput;
     vec4 radiance;
     f32 scatter_pdf;  /* of the direction that led here; 0: camera or delta, no light sampling competes */
+    f32 scatter_cosine; /* |cos| of that direction with the shading normal, where scatter_pdf is above 0 */
     vec3 p;           /* where it was scattered: a clearance off the ray's origin */
     f32 eta_square;   /* product of squared relative indices crossed: roulette must not see the n² of being
                          inside glass */
@@ -57,6 +58,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     path->throughput = splat4(1.0f);
     path->radiance = splat4(0.0f);
     path->scatter_pdf = 0.0f;
+    path->scatter_cosine = 0.0f;
     path->p = path->ray.o;
     path->eta_square = 1.0f;
     path->depth = 0u;
@@ -68,134 +70,105 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
 }
 
 /* Emission met by the ray, weighted against the chance that light sampling had found it. */
-CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, CrtSurface surface, f32 t) {
-    CRT_GLOBAL const CrtEmitter *emitter =
-        CRT_ARRAY(CrtEmitter, ctx->blob, ctx->scene->emitters) + surface.emitter;
-    const int front = dot3(surface.ng, path->ray.d) < 0.0f;
-    if (!front && (emitter->flags & CRT_EMITTER_TWO_SIDED) == 0u) return;
+CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface, f32 t) {
+    CRT_GLOBAL const CrtLight *emitter =
+        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + surface->light;
+    const int front = dot3(surface->ng, path->ray.d) < 0.0f;
+    if (!front && (emitter->flags & CRT_LIGHT_TWO_SIDED) == 0u) return;
     f32 weight = 1.0f;
     if (CRT_HAS(NEE) && ctx->scene->nee != CRT_NEE_NONE && path->scatter_pdf > 0.0f) {
         const f32 distance = length3(crt_fma3(path->ray.d, t, path->ray.o) - path->p);
-        const CrtLightSeen light = crt_light_seen(ctx, surface.emitter, path->p, distance);
+        const CrtLightSeen light = crt_light_pdf(ctx, surface->light, path->p, distance);
         if (light.pdf > 0.0f) {
             /* The ray starts a clearance off p, from which lights are sampled. Close to a light that is
                another direction: both techniques estimate what arrives at p, and are weighed by the area of
                the light per probability. */
             const f32 nearer = t / distance;
-            const f32 area = light.cosine / crt_abs(dot3(surface.ng, path->ray.d)) * nearer * nearer;
+            const f32 area = light.cosine / crt_abs(dot3(surface->ng, path->ray.d)) * nearer * nearer;
             const f32 ratio = light.pdf / path->scatter_pdf * area;
             if (ctx->scene->nee == CRT_NEE_ONLY || !(ratio < 1e15f)) return;
             const f32 clearance = length3(path->ray.o - path->p);
-            const f32 cosines = crt_fma(CRT_INV_PI / path->scatter_pdf, clearance, t) /
+            const f32 cosines = (t + clearance / path->scatter_cosine) /
                                 distance; /* at p over that at the ray's origin */
             weight = area * cosines * crt_power_heuristic(ratio);
         }
     }
-    path->radiance = path->radiance + path->throughput *
-                                          crt_spectrum(ctx, emitter->spectrum, path->wavelengths.position) *
-                                          weight;
+    path->radiance = path->radiance +
+                     path->throughput *
+                         crt_value(ctx, emitter->radiance, surface, path->wavelengths.position) * weight;
 }
 
-/* Next event estimation at a Lambertian vertex; ns and ng are on the side of w_o. */
-CRT_FN void crt_add_direct_light(const CrtContext *ctx, CrtPath *path, CrtSurface surface, vec3 ns, vec3 ng,
-                                 vec4 reflectance, u32 dimension, CrtRayCount *rays) {
-    const CrtLightSample light = crt_sample_light(ctx, &path->sampler, dimension, surface.p);
-    const f32 cosine = dot3(light.wi, ns);
-    if (!(light.pdf > 0.0f) || !(cosine > 0.0f) || !(dot3(light.wi, ng) > 0.0f)) return;
-    CrtRay shadow;
-    shadow.o = crt_offset_origin(surface.p, surface.clearance, ng, light.wi);
-    shadow.d = light.point - shadow.o;
-    shadow.reach = light.reach;
-    /* Nothing fits in between where the emitter is nearer than its clearance. */
-    if (shadow.reach > 0.0f) {
-        rays->shadow += 1u;
-        if (crt_trace_any(ctx, shadow)) return;
-    }
-    const f32 scatter =
-        crt_lambert(cosine); /* both f·cos / reflectance and the pdf of sampling this direction at p */
-    f32 weight = scatter / light.pdf;
+/* A question that a vertex asks, and what it adds to the path's radiance if nothing is met. It is answered
+   before the path's next vertex. */
+typedef struct CrtShadow {
+    int asked;
+    CrtRay ray; /* its reach is 0 or less where nothing fits in between */
+    vec4 radiance;
+} CrtShadow;
+
+/* Next event estimation: a light, and a ray towards it. */
+CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface, const CrtBsdf *bsdf,
+                          u32 dimension, CrtShadow *shadow) {
+    const u32 index = crt_light_choose(ctx, &path->sampler, dimension);
+    const CrtLightSample light = crt_light_sample(ctx, index, &path->sampler, dimension, surface->p);
+    if (!(light.pdf > 0.0f)) return;
+    const int before = dot3(light.wi, bsdf->ng) > 0.0f;
+    if ((bsdf->flags & (before ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS)) == 0u) return;
+    const vec4 scattered = crt_bsdf_eval(bsdf, light.wi);
+    if (max4(scattered) == 0.0f) return;
+    shadow->asked = 1;
+    shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, bsdf->ng, light.wi);
+    shadow->ray.d = light.point - shadow->ray.o;
+    shadow->ray.reach = light.reach;
+    f32 weight = 1.0f / light.pdf;
     if (ctx->scene->nee == CRT_NEE_MIS) {
-        /* By probabilities per area of the light (crt_add_emission): of the scattered ray
-         * lambert(cos)·|n·d|/|d|³, of light sampling pdf·cos/distance². */
-        const f32 squared = dot3(shadow.d, shadow.d);
-        const f32 ratio = crt_lambert(crt_max(dot3(shadow.d, ns), 0.0f)) *
-                          crt_abs(dot3(light.normal, shadow.d)) * light.distance * light.distance /
-                          (light.pdf * light.cosine * squared * squared);
+        /* By probabilities per area of the light (crt_add_emission): of a ray scattered at the shadow ray's
+           origin pdf·|n·d|/|d|³, of light sampling pdf·cos/distance². */
+        const f32 squared = dot3(shadow->ray.d, shadow->ray.d);
+        const vec3 towards = shadow->ray.d * (1.0f / crt_sqrt(squared));
+        const f32 ratio = crt_bsdf_pdf(bsdf, towards) * crt_abs(dot3(light.normal, towards)) *
+                          light.distance * light.distance / (light.pdf * light.cosine * squared);
         weight = weight * crt_power_heuristic(ratio);
     }
-    path->radiance = path->radiance + path->throughput * reflectance *
-                                          crt_spectrum(ctx, light.spectrum, path->wavelengths.position) *
-                                          weight;
+    const CrtValue radiance = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[index].radiance;
+    shadow->radiance = path->throughput * scattered *
+                       crt_value(ctx, radiance, 0, path->wavelengths.position) * weight;
 }
 
-/* Traces the path's ray to its next vertex and scatters there. Returns 0 when the path has ended. */
-CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+/* What happens to a path at `hit`, which its ray has met: it gains what is emitted there, and is scattered.
+   Returns 0 when it has ended. Traces nothing: path->ray is the next ray, and *shadow may ask for another,
+   whether or not the path goes on. */
+CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow *shadow) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
-    rays->closest += 1u;
-    const CrtHit hit = crt_trace_closest(ctx, path->ray);
+    shadow->asked = 0;
     if (hit.slot == CRT_NONE) {
         if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE)
-            path->radiance = path->radiance + path->throughput * crt_spectrum(ctx, scene->environment,
-                                                                              path->wavelengths.position);
+            path->radiance = path->radiance +
+                             path->throughput * crt_value(ctx, scene->environment, 0,
+                                                          path->wavelengths.position);
         return 0;
     }
     const CrtSurface surface = crt_surface(ctx, hit);
-    if (CRT_HAS(AREA_LIGHT) && surface.emitter != CRT_NONE) crt_add_emission(ctx, path, surface, hit.t);
+    if (CRT_HAS(AREA_LIGHT) && surface.light != CRT_NONE) crt_add_emission(ctx, path, &surface, hit.t);
 
-    const CrtMaterial material = CRT_ARRAY(CrtMaterial, ctx->blob, scene->materials)[surface.material];
-    const vec3 wo = -path->ray.d;
-    /* Normals on the viewer's side; a shading normal that turns away from the viewer would reflect light
-     * from behind the surface. */
-    const int outside = dot3(wo, surface.ng) > 0.0f;
-    const vec3 ng = outside ? surface.ng : -surface.ng;
-    vec3 ns = outside ? surface.ns : -surface.ns;
-    if (CRT_HAS(SMOOTH_NORMALS) && !(dot3(wo, ns) > 0.0f)) ns = ng;
-
-    if (CRT_HAS(AOV) && scene->aovs != 0u && path->depth == 0u) {
-        path->first.normal = ns;
+    const int first = CRT_HAS(AOV) && scene->aovs != 0u && path->depth == 0u;
+    if (!first && path->depth >= scene->max_depth) return 0;
+    CrtBsdf bsdf;
+    crt_bsdf_prepare(ctx, &bsdf, &surface, -path->ray.d, path->wavelengths.position, first);
+    if (first) {
+        path->first.normal = bsdf.ns;
         path->first.depth = hit.t * scene->depth_scale;
         path->first.primitive = hit.id;
-        path->first.albedo = splat4(1.0f);
-        if (material.type == CRT_MATERIAL_DIFFUSE || material.type == CRT_MATERIAL_MIRROR)
-            path->first.albedo = crt_spectrum(ctx, material.a, path->wavelengths.position);
-        if (material.type == CRT_MATERIAL_CONDUCTOR)
-            path->first.albedo =
-                crt_fresnel_conductor(1.0f, crt_spectrum(ctx, material.a, path->wavelengths.position),
-                                      crt_spectrum(ctx, material.b, path->wavelengths.position));
+        path->first.albedo = bsdf.albedo;
+        if (path->depth >= scene->max_depth) return 0;
     }
-    if (path->depth >= scene->max_depth) return 0;
 
     const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
-    const vec4 a = crt_spectrum(ctx, material.a, path->wavelengths.position);
-    CrtScatter scatter;
-    scatter.valid = 0;
-    switch (material.type) {
-        case CRT_MATERIAL_DIFFUSE:
-            if (CRT_HAS(DIFFUSE)) {
-                if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->emitters.count != 0u)
-                    crt_add_direct_light(ctx, path, surface, ns, ng, a, dimension, rays);
-                scatter =
-                    crt_sample_diffuse(a, ns, ng, crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF));
-            }
-            break;
-        case CRT_MATERIAL_MIRROR:
-            if (CRT_HAS(CONDUCTOR)) scatter = crt_sample_mirror(a, wo, ns, ng);
-            break;
-        case CRT_MATERIAL_CONDUCTOR:
-            if (CRT_HAS(CONDUCTOR))
-                scatter = crt_sample_mirror(
-                    crt_fresnel_conductor(crt_min(dot3(wo, ns), 1.0f), a,
-                                          crt_spectrum(ctx, material.b, path->wavelengths.position)),
-                    wo, ns, ng);
-            break;
-        default:
-            if (CRT_HAS(DIELECTRIC))
-                scatter =
-                    crt_sample_dielectric(outside ? a : splat4(1.0f) / a, wo, ns, ng, path->hero,
-                                          (material.flags & CRT_MATERIAL_DISPERSIVE) != 0u, path->alone,
-                                          crt_sample_1d(&path->sampler, dimension + CRT_DIM_BSDF));
-            break;
-    }
+    if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->lights.count != 0u &&
+        (bsdf.flags & CRT_BSDF_DELTA) == 0u)
+        crt_ask_light(ctx, path, &surface, &bsdf, dimension, shadow);
+    const CrtScatter scatter = crt_bsdf_sample(
+        &bsdf, crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF), path->hero, path->alone);
     if (!scatter.valid) return 0;
 
     path->throughput = path->throughput * scatter.weight;
@@ -205,6 +178,7 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
     }
     path->eta_square = path->eta_square * scatter.eta_square;
     path->scatter_pdf = scatter.pdf;
+    path->scatter_cosine = crt_abs(dot3(scatter.wi, bsdf.ns));
     path->p = surface.p;
     path->ray.o = crt_offset_origin(surface.p, surface.clearance, surface.ng, scatter.wi);
     path->ray.d = scatter.wi;
@@ -220,6 +194,23 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
         path->throughput = path->throughput / survive;
     }
     return 1;
+}
+
+/* Traces the path's ray to its next vertex, shades it and answers what it asks. Returns 0 when the path has
+   ended. */
+CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+    CrtShadow shadow;
+    rays->closest += 1u;
+    const int alive = crt_shade(ctx, path, crt_trace_closest(ctx, path->ray), &shadow);
+    if (CRT_HAS(NEE) && shadow.asked) {
+        int blocked = 0;
+        if (shadow.ray.reach > 0.0f) {
+            rays->shadow += 1u;
+            blocked = crt_trace_any(ctx, shadow.ray);
+        }
+        if (!blocked) path->radiance = path->radiance + shadow.radiance;
+    }
+    return alive;
 }
 
 /* XYZ of linear sRGB (IEC 61966-2-1), for views that are colours and not light. */

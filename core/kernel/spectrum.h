@@ -56,7 +56,7 @@ CRT_FN f32 crt_lookup(CRT_GLOBAL const f32 *table, f32 position) {
     return crt_fma(position - (f32)i, table[i + 1u] - a, a);
 }
 
-/* A spectrum of the scene at the path's wavelengths, linear between nanometres. */
+/* A tabulated spectrum of the scene at the path's wavelengths, linear between nanometres. */
 CRT_FN vec4 crt_spectrum(const CrtContext *ctx, u32 index, vec4 position) {
     CRT_GLOBAL const f32 *table =
         CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) + index * CRT_SPECTRUM_STRIDE;

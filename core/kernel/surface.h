@@ -15,7 +15,7 @@ typedef struct CrtSurface {
     vec3 ns;       /* unit shading normal, on the side of ng */
     f32 clearance; /* how far along ng a ray must start from p to be sure of its side */
     u32 material;
-    u32 emitter;   /* CRT_NONE: none */
+    u32 light;     /* CRT_NONE: it does not emit */
 } CrtSurface;
 
 CRT_FN vec3 crt_triangle_vertex(CRT_GLOBAL const CrtTriangle *triangle, u32 i) {
@@ -83,7 +83,7 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     s.clearance = face->clearance;
     s.ns = s.ng;
     s.material = primitive->material;
-    s.emitter = primitive->emitter;
+    s.light = primitive->light;
     if (CRT_HAS(SMOOTH_NORMALS) && primitive->normals != CRT_NONE) {
         CRT_GLOBAL const CrtNormals *n =
             CRT_ARRAY(CrtNormals, ctx->blob, ctx->scene->normals) + primitive->normals;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "base/error.h"
+#include "kernel/features.h"
 #include "scene/aov.h"
 #include "spectra/spectra.h"
 
@@ -12,6 +13,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace crt {
@@ -74,7 +76,20 @@ struct SamplerSettings {
     int replicates = 0;          ///< 1, 2, 4, 8, 16, or 0: by the size of the film (replicatesOf).
 };
 
-enum class MaterialType { Diffuse, Mirror, Conductor, Dielectric };
+/// The kernel's kinds of materials, by its numbers.
+enum class MaterialType : std::uint32_t {
+#define CRT_MATERIAL_TYPE(F, bit, NAME, Name, word, scatter, text) Name = bit,
+    CRT_MATERIAL_LIST(CRT_MATERIAL_TYPE, )
+#undef CRT_MATERIAL_TYPE
+};
+
+/// Their names in scene files.
+inline constexpr std::pair<MaterialType, const char*> kMaterialNames[] = {
+#define CRT_MATERIAL_NAME(F, bit, NAME, Name, word, scatter, text) {MaterialType::Name, #word},
+    CRT_MATERIAL_LIST(CRT_MATERIAL_NAME, )
+#undef CRT_MATERIAL_NAME
+};
+
 
 struct Material {
     std::string name;

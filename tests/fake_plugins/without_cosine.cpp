@@ -4,9 +4,12 @@
 #include "kernel/light.h"
 
 namespace crt::kernel {
-inline f32 crt_lambert_without_cosine(f32) { return CRT_INV_PI; }
+inline vec4 crt_bsdf_eval_without_cosine(const CrtBsdf* bsdf, vec3 wi) {
+    const f32 cosine = dot3(wi, bsdf->ns);
+    return cosine > 0.0f ? crt_bsdf_eval(bsdf, wi) / cosine : crt_bsdf_eval(bsdf, wi);
+}
 }  // namespace crt::kernel
 
 // From here on, in path.h: the sampling of directions, in bsdf.h, stays as it is.
-#define crt_lambert crt_lambert_without_cosine
+#define crt_bsdf_eval crt_bsdf_eval_without_cosine
 #include "../../docs/example_backend/example_backend.cpp"

@@ -125,19 +125,22 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
         if (std::optional<Spectrum> s = spectra_.read(*section, key, use)) into = *std::move(s);
     };
     const std::string kind = variantWord(section->schema());
-    if (kind == "diffuse" || kind == "mirror") {
-        material.type = kind == "diffuse" ? MaterialType::Diffuse : MaterialType::Mirror;
-        take("reflectance", SpectrumUse::Reflectance, material.reflectance);
-    } else if (kind == "conductor") {
-        material.type = MaterialType::Conductor;
-        std::string metal;
-        if (section->readWord("metal", metal))
-            std::tie(material.eta, material.k) = metalIndex(metal).value();
-        take("eta", SpectrumUse::Index, material.eta);
-        take("k", SpectrumUse::Index, material.k);
-    } else {
-        material.type = MaterialType::Dielectric;
-        take("ior", SpectrumUse::Index, material.eta);
+    for (const auto& [type, word] : kMaterialNames)
+        if (kind == word) material.type = type;
+    switch (material.type) {
+        case MaterialType::Diffuse:
+        case MaterialType::Mirror:
+            take("reflectance", SpectrumUse::Reflectance, material.reflectance);
+            break;
+        case MaterialType::Conductor: {
+            std::string metal;
+            if (section->readWord("metal", metal))
+                std::tie(material.eta, material.k) = metalIndex(metal).value();
+            take("eta", SpectrumUse::Index, material.eta);
+            take("k", SpectrumUse::Index, material.k);
+            break;
+        }
+        case MaterialType::Dielectric: take("ior", SpectrumUse::Index, material.eta); break;
     }
     named.index = static_cast<std::int32_t>(scene_.materials.size());
     scene_.materials.push_back(std::move(material));

@@ -1,0 +1,73 @@
+#include "compile/accelerator.h"
+
+#include "kernel/intersect.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+namespace crt {
+namespace {
+
+std::uint32_t acceleratorOf(const Scene& scene, std::size_t triangles) {
+    // Nothing to find; and the view of the boxes looks for no triangle.
+    if (triangles == 0 || scene.integrator.type == IntegratorType::Aabb) return CRT_ACCELERATOR_BRUTE_FORCE;
+    switch (scene.integrator.accelerator) {
+        case Accelerator::Bvh: return CRT_ACCELERATOR_BVH;
+        case Accelerator::Aabb: return CRT_ACCELERATOR_AABB;
+        case Accelerator::None: return CRT_ACCELERATOR_BRUTE_FORCE;
+        case Accelerator::Auto: break;
+    }
+    return triangles <= kBruteForceTriangles ? CRT_ACCELERATOR_BRUTE_FORCE : CRT_ACCELERATOR_BVH;
+}
+
+/// Whether the backend finds all hits itself: rays start at the camera or at a surface, and surfaces lie
+/// within 1.
+bool backendFindsHits(const Scene& scene, const FlatScene& flat, const CompileOptions& options) {
+    const double scale = std::ldexp(1.0, flat.scale_exponent);
+    double farthest = 1;
+    for (std::size_t k = 0; k < 3; ++k)
+        farthest = std::max(farthest, std::abs(scene.camera.position[k] - flat.centre[k]) * scale +
+                                          scene.camera.aperture_radius * scale);
+    // A little less, for what is rounded on the way to the ray.
+    return farthest < options.accelerator_reach * (1 - 1e-6);
+}
+
+}  // namespace
+
+TriangleBounds boundsOf(const FlatScene& flat, std::size_t id) {
+    TriangleBounds b{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        const float* p = &flat.positions[id][3 * k];
+        b.lower[k] = std::min({p[0], p[1], p[2]});
+        b.upper[k] = std::max({p[0], p[1], p[2]});
+    }
+    return b;
+}
+
+AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat,
+                                   const CompileOptions& options) {
+    const std::size_t count = flat.triangles.size();
+    AcceleratorPart part;
+    part.kind = acceleratorOf(scene, count);
+    part.without_nodes = part.kind == CRT_ACCELERATOR_BVH && backendFindsHits(scene, flat, options);
+    if (part.kind == CRT_ACCELERATOR_BVH && !part.without_nodes) {
+        const auto start = std::chrono::steady_clock::now();
+        std::vector<TriangleBounds> bounds(count);
+        for (std::size_t i = 0; i < count; ++i) bounds[i] = boundsOf(flat, i);
+        Bvh bvh = buildBvh(bounds, CRT_BOX_PADDING);
+        part.nodes = std::move(bvh.nodes);
+        part.id_of_slot = std::move(bvh.order);
+        part.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    } else {
+        part.id_of_slot.resize(count);
+        std::iota(part.id_of_slot.begin(), part.id_of_slot.end(), 0u);
+    }
+    part.slot_of_id.resize(count);
+    for (std::size_t slot = 0; slot < count; ++slot)
+        part.slot_of_id[part.id_of_slot[slot]] = static_cast<std::uint32_t>(slot);
+    return part;
+}
+
+}  // namespace crt

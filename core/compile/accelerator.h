@@ -1,0 +1,32 @@
+/// Which accelerator a scene gets, and the order in which it wants the triangles.
+#pragma once
+
+#include "compile/bvh_build.h"
+#include "compile/compile.h"
+#include "compile/flatten.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace crt {
+
+/// Up to this many triangles `auto` takes the brute-force loop. `bench/run accelerators` measures where the
+/// tree begins to pay.
+inline constexpr std::size_t kBruteForceTriangles = 64;
+
+struct AcceleratorPart {
+    std::uint32_t kind = 0;                 ///< CRT_ACCELERATOR_…
+    bool without_nodes = false;             ///< As of CompiledScene.
+    std::vector<kernel::CrtNode4> nodes;    ///< CRT_ACCELERATOR_BVH, unless `without_nodes`.
+    std::vector<std::uint32_t> id_of_slot;  ///< Primitive ids in the order of the triangle array.
+    std::vector<std::uint32_t> slot_of_id;  ///< Its inverse.
+    double build_seconds = 0;               ///< As of CompiledScene.
+};
+
+AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat, const CompileOptions& options);
+
+/// Coordinates are those of the compiled scene.
+TriangleBounds boundsOf(const FlatScene& flat, std::size_t id);
+
+}  // namespace crt

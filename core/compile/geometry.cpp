@@ -1,0 +1,162 @@
+#include "compile/geometry.h"
+
+#include "base/vec3d.h"
+#include "kernel/surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace crt {
+namespace {
+
+/// The largest coordinate of a triangle, and the largest extent of its two edges along an axis: what
+/// rounding depends on.
+struct Extent {
+    double coordinate = 0, size = 0;
+};
+
+Extent extentOf(const FlatScene& flat, std::size_t id) {
+    const Vec3d o = vertexOf(flat, id, 0), a = vertexOf(flat, id, 1) - o, b = vertexOf(flat, id, 2) - o;
+    Extent e;
+    for (std::size_t k = 0; k < 3; ++k) {
+        e.coordinate =
+            std::max({e.coordinate, std::abs(o[k]), std::abs(o[k] + a[k]), std::abs(o[k] + b[k])});
+        e.size = std::max(e.size, std::abs(a[k]) + std::abs(b[k]));
+    }
+    return e;
+}
+
+kernel::CrtFace faceOf(const FlatScene& flat, std::size_t id) {
+    kernel::CrtFace face{};
+    const Vec3d o = vertexOf(flat, id, 0), a = vertexOf(flat, id, 1) - o, b = vertexOf(flat, id, 2) - o;
+    const Vec3d n = cross(a, b);
+    const double twice_area = std::sqrt(dot(n, n));
+    const auto [coordinate, size] = extentOf(flat, id);
+    for (std::size_t k = 0; k < 3; ++k)
+        face.normal[k] = twice_area > 0 ? static_cast<float>(n[k] / twice_area) : 0.0f;
+    face.clearance = kernel::crt_clearance(static_cast<float>(coordinate), static_cast<float>(size));
+    face.margin = kernel::crt_edge_margin(static_cast<float>(coordinate), static_cast<float>(size),
+                                          static_cast<float>(twice_area));
+    return face;
+}
+
+/// Unit normal by the order of the vertices; zero for a triangle without area.
+Vec3d planeNormal(const FlatScene& flat, std::size_t id) {
+    const Vec3d o = vertexOf(flat, id, 0);
+    const Vec3d n = cross(vertexOf(flat, id, 1) - o, vertexOf(flat, id, 2) - o);
+    const double length = std::sqrt(dot(n, n));
+    return length > 0 ? n * (1 / length) : Vec3d{};
+}
+
+/// The affine function that grows along `direction` and vanishes at `origin`.
+void setRow(kernel::CrtTriangle8& block, std::size_t row, std::size_t lane, const Vec3d& direction,
+            const Vec3d& origin) {
+    for (std::size_t k = 0; k < 3; ++k) block.row[row][k][lane] = static_cast<float>(direction[k]);
+    block.row[row][3][lane] = static_cast<float>(-dot(direction, origin));
+}
+
+/// Whether a triangle can come between two points of the scene: not if the whole scene lies on one side of
+/// its plane, as it does for the walls of a convex room.
+bool canOcclude(const FlatScene& flat, std::size_t id) {
+    const Vec3d o = vertexOf(flat, id, 0);
+    const Vec3d n = cross(vertexOf(flat, id, 1) - o, vertexOf(flat, id, 2) - o);
+    bool above = false, below = false;
+    for (std::size_t j = 0; j < flat.positions.size() && !(above && below); ++j)
+        for (std::size_t v = 0; v < 3; ++v) {
+            const double d = dot(n, vertexOf(flat, j, v) - o);
+            above = above || d > 0;
+            below = below || d < 0;
+        }
+    return above && below;
+}
+
+}  // namespace
+
+Vec3d vertexOf(const FlatScene& flat, std::size_t id, std::size_t vertex) {
+    const auto& p = flat.positions[id];
+    return {p[vertex], p[3 + vertex], p[6 + vertex]};
+}
+
+double areaOf(const FlatScene& flat, std::size_t id) {
+    const Vec3d o = vertexOf(flat, id, 0);
+    const Vec3d n = cross(vertexOf(flat, id, 1) - o, vertexOf(flat, id, 2) - o);
+    return 0.5 * std::sqrt(dot(n, n));
+}
+
+std::vector<kernel::CrtTriangle> compileTriangles(const FlatScene& flat,
+                                                  const AcceleratorPart& accelerator) {
+    std::vector<kernel::CrtTriangle> triangles(accelerator.id_of_slot.size());
+    for (std::size_t slot = 0; slot < triangles.size(); ++slot) {
+        const std::uint32_t id = accelerator.id_of_slot[slot];
+        std::copy(flat.positions[id].begin(), flat.positions[id].end(), triangles[slot].p);
+        triangles[slot].id = id;
+    }
+    return triangles;
+}
+
+std::vector<kernel::CrtFace> compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator) {
+    std::vector<kernel::CrtFace> faces(accelerator.id_of_slot.size());
+    for (std::size_t slot = 0; slot < faces.size(); ++slot)
+        faces[slot] = faceOf(flat, accelerator.id_of_slot[slot]);
+    return faces;
+}
+
+std::vector<kernel::CrtTriangle8> compileTriangles8(const FlatScene& flat,
+                                                    const std::vector<std::uint32_t>& ids) {
+    std::vector<kernel::CrtTriangle8> blocks((ids.size() + 7) / 8);
+    for (kernel::CrtTriangle8& block : blocks) {
+        std::fill(std::begin(block.slot), std::end(block.slot), CRT_NONE);
+        std::fill(std::begin(block.row[0][3]), std::end(block.row[0][3]), CRT_UNUSED_HEIGHT);
+    }
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+        kernel::CrtTriangle8& block = blocks[i / 8];
+        block.slot[i % 8] = ids[i];
+        const Extent extent = extentOf(flat, ids[i]);
+        block.height_slack[i % 8] =
+            kernel::crt_height_slack(static_cast<float>(extent.coordinate), static_cast<float>(extent.size));
+        const Vec3d n = planeNormal(flat, ids[i]);
+        setRow(block, 0, i % 8, n, vertexOf(flat, ids[i], 0));
+        for (std::size_t v = 0; v < 3; ++v) {
+            const Vec3d from = vertexOf(flat, ids[i], v);
+            const Vec3d edge = vertexOf(flat, ids[i], (v + 1) % 3) - from;
+            const double length = std::sqrt(dot(edge, edge));
+            setRow(block, v + 1, i % 8, length > 0 ? cross(n, edge) * (1 / length) : Vec3d{}, from);
+        }
+    }
+    return blocks;
+}
+
+std::vector<std::uint32_t> occludersOf(const FlatScene& flat) {
+    const std::size_t count = flat.positions.size();
+    std::vector<std::uint32_t> ids;
+    for (std::uint32_t id = 0; id < count; ++id)
+        if (count > kBruteForceTriangles || canOcclude(flat, id))  // asking takes quadratic time
+            ids.push_back(id);
+    return ids;
+}
+
+std::vector<kernel::CrtObject> compileObjects(const FlatScene& flat) {
+    std::vector<kernel::CrtObject> objects;
+    for (std::size_t i = 0; i < flat.triangles.size(); ++i) {
+        const TriangleBounds b = boundsOf(flat, i);
+        if (i == 0 || flat.triangles[i].object != flat.triangles[i - 1].object) {
+            kernel::CrtObject object{};
+            for (std::size_t k = 0; k < 3; ++k) {
+                object.lower[k] = std::numeric_limits<float>::infinity();
+                object.upper[k] = -std::numeric_limits<float>::infinity();
+            }
+            object.first = static_cast<std::uint32_t>(i);
+            objects.push_back(object);
+        }
+        kernel::CrtObject& object = objects.back();
+        ++object.count;
+        for (std::size_t k = 0; k < 3; ++k) {
+            object.lower[k] = std::min(object.lower[k], b.lower[k] - CRT_BOX_PADDING);
+            object.upper[k] = std::max(object.upper[k], b.upper[k] + CRT_BOX_PADDING);
+        }
+    }
+    return objects;
+}
+
+}  // namespace crt

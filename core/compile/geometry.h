@@ -1,0 +1,33 @@
+/// Triangles as the kernels test them: flattened scene → arrays of the blob.
+#pragma once
+
+#include "compile/accelerator.h"
+#include "compile/flatten.h"
+#include "kernel/layout.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace crt {
+
+/// In the coordinates of the compiled scene, in double.
+Vec3d vertexOf(const FlatScene& flat, std::size_t id, std::size_t vertex);
+double areaOf(const FlatScene& flat, std::size_t id);
+
+/// By slot.
+std::vector<kernel::CrtTriangle> compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator);
+std::vector<kernel::CrtFace> compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator);
+
+/// Triangles side by side for the brute-force loops, which keep the author's order: slot and id are one.
+std::vector<kernel::CrtTriangle8> compileTriangles8(const FlatScene& flat,
+                                                    const std::vector<std::uint32_t>& ids);
+/// The triangles that can come between two points of the scene; all of them where there are so many that
+/// asking would take long.
+std::vector<std::uint32_t> occludersOf(const FlatScene& flat);
+
+/// Boxes of the placements, for the paper's culling and for the bounding-box view. Their triangles are
+/// adjacent unless a BVH moved them.
+std::vector<kernel::CrtObject> compileObjects(const FlatScene& flat);
+
+}  // namespace crt

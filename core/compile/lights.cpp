@@ -1,0 +1,118 @@
+#include "compile/lights.h"
+
+#include "base/vec3d.h"
+#include "compile/distributions.h"
+#include "compile/geometry.h"
+
+#include <cmath>
+#include <optional>
+
+namespace crt {
+namespace {
+
+const Emission& emissionOf(const Scene& scene, const FlatTriangle& triangle) {
+    return scene.emissions[static_cast<std::size_t>(triangle.emission)];
+}
+
+/// If triangles i and i + 1 emit alike and make a parallelogram, as the halves of a quad do: the corner of
+/// triangle i across from their common edge.
+std::optional<std::uint32_t> parallelogramCorner(const FlatScene& flat, std::size_t i) {
+    if (i + 1 >= flat.triangles.size()) return std::nullopt;
+    const FlatTriangle &one = flat.triangles[i], &next = flat.triangles[i + 1];
+    if (next.object != one.object || next.emission != one.emission) return std::nullopt;
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+        const Vec3d o = vertexOf(flat, i, corner), a = vertexOf(flat, i, (corner + 1) % 3),
+                    b = vertexOf(flat, i, (corner + 2) % 3);
+        const Vec3d across = a + b - o;
+        for (std::size_t v = 0; v < 3; ++v) {
+            // Turned the same way round: across, b, a.
+            const Vec3d gap = vertexOf(flat, i + 1, v) - across;
+            const Vec3d edge = a - o;
+            if (vertexOf(flat, i + 1, (v + 1) % 3) == b && vertexOf(flat, i + 1, (v + 2) % 3) == a &&
+                dot(gap, gap) <= 1e-12 * dot(edge, edge))
+                return static_cast<std::uint32_t>(corner);
+        }
+    }
+    return std::nullopt;
+}
+
+/// By luminance, but never zero for a lamp that the eye hardly sees: the film keeps all of XYZ.
+double brightness(const Emission& emission) {
+    const Vec3d xyz = spectrumToXyz(emission.radiance);
+    return xyz[0] + xyz[1] + xyz[2] + 1e-6 * emission.radiance.max();
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> emittingTriangles(const Scene& scene, const FlatScene& flat) {
+    std::vector<std::uint32_t> emitting;
+    if (scene.integrator.type != IntegratorType::Path) return emitting;
+    std::vector<bool> shines;
+    for (const Emission& emission : scene.emissions) shines.push_back(emission.radiance.max() > 0);
+    for (std::size_t i = 0; i < flat.triangles.size(); ++i) {
+        const std::int32_t emission = flat.triangles[i].emission;
+        if (emission >= 0 && shines[static_cast<std::size_t>(emission)] && areaOf(flat, i) > 0)
+            emitting.push_back(static_cast<std::uint32_t>(i));
+    }
+    return emitting;
+}
+
+std::vector<const Spectrum*> spectraOfLights(const Scene& scene, const FlatScene& flat,
+                                             const std::vector<std::uint32_t>& emitting) {
+    std::vector<const Spectrum*> spectra;
+    std::vector<bool> seen(scene.emissions.size(), false);
+    for (const std::uint32_t id : emitting) {
+        const auto emission = static_cast<std::size_t>(flat.triangles[id].emission);
+        if (!seen[emission]) spectra.push_back(&scene.emissions[emission].radiance);
+        seen[emission] = true;
+    }
+    return spectra;
+}
+
+LightPart compileLights(const Scene& scene, const FlatScene& flat,
+                        const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
+                        const SpectrumTable& spectra) {
+    LightPart part;
+    part.light_of.assign(flat.triangles.size(), CRT_NONE);
+    struct Shared {
+        kernel::CrtValue radiance = 0;
+        double brightness = 0;
+    };
+    std::vector<std::optional<Shared>> shared(scene.emissions.size());  // made once an emission
+    std::vector<double> power;
+    for (const std::uint32_t i : emitting) {
+        if (part.light_of[i] != CRT_NONE) continue;  // the other half of a parallelogram
+        const Emission& emission = emissionOf(scene, flat.triangles[i]);
+        std::optional<Shared>& own = shared[static_cast<std::size_t>(flat.triangles[i].emission)];
+        if (!own) own = {spectra.valueOf(emission.radiance), brightness(emission)};
+        double area = areaOf(flat, i);
+        kernel::CrtLight light{};
+        light.slot = accelerator.slot_of_id[i];
+        light.radiance = own->radiance;
+        light.flags = emission.two_sided ? CRT_LIGHT_TWO_SIDED : 0;
+        part.light_of[i] = static_cast<std::uint32_t>(part.lights.size());
+        if (const auto corner = parallelogramCorner(flat, i)) {
+            light.kind = CRT_LIGHT_PARALLELOGRAM;
+            light.corner = *corner;
+            part.light_of[i + 1] = part.light_of[i];
+            area += areaOf(flat, i + 1);
+        }
+        light.area = static_cast<float>(area);
+        part.lights.push_back(light);
+        power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
+    }
+    const std::vector<std::uint64_t> first = choiceTable(power);
+    for (std::size_t i = 0; i < part.lights.size(); ++i) {
+        part.lights[i].choice = static_cast<std::uint32_t>(first[i]);
+        part.lights[i].choice_probability =
+            static_cast<float>(std::ldexp(static_cast<double>(first[i + 1] - first[i]), -32));
+    }
+    return part;
+}
+
+const Spectrum* spectrumOfEnvironment(const Scene& scene) {
+    const bool shown = scene.environment && scene.integrator.type == IntegratorType::Path;
+    return shown ? &scene.environment->radiance : nullptr;
+}
+
+}  // namespace crt

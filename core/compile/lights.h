@@ -1,0 +1,35 @@
+/// What shines: emitters among the triangles, how one is chosen, and the environment.
+#pragma once
+
+#include "compile/accelerator.h"
+#include "compile/flatten.h"
+#include "compile/spectrum_table.h"
+#include "kernel/layout.h"
+#include "scene/scene.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace crt {
+
+/// Triangles that emit, in the order of their ids: those of an emission that is not black, with area. None
+/// in a view that shows no light.
+std::vector<std::uint32_t> emittingTriangles(const Scene& scene, const FlatScene& flat);
+
+/// The spectra that compileLights asks the table for.
+std::vector<const Spectrum*> spectraOfLights(const Scene& scene, const FlatScene& flat,
+                                             const std::vector<std::uint32_t>& emitting);
+
+struct LightPart {
+    std::vector<kernel::CrtLight> lights;
+    std::vector<std::uint32_t> light_of;  ///< By primitive id: index of its light, or CRT_NONE.
+};
+LightPart compileLights(const Scene& scene, const FlatScene& flat,
+                        const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
+                        const SpectrumTable& spectra);
+
+/// The spectrum of the environment, where there is one and the view shows it; otherwise null.
+const Spectrum* spectrumOfEnvironment(const Scene& scene);
+
+}  // namespace crt

@@ -1,0 +1,35 @@
+/// What surfaces are made of: materials, and what each triangle has of them.
+#pragma once
+
+#include "compile/flatten.h"
+#include "compile/spectrum_table.h"
+#include "kernel/layout.h"
+#include "scene/scene.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace crt {
+
+/// The materials of the blob: those of the scene, in its order, and behind them the one of faces that name
+/// none, where there are such faces. Null where no triangle has it, or nothing is scattered in this view.
+std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& flat);
+
+/// The spectra that compileMaterials asks the table for.
+std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials);
+
+struct MaterialPart {
+    std::vector<kernel::CrtMaterial> records;
+    std::uint32_t features = 0;  ///< Of the materials that are used.
+};
+MaterialPart compileMaterials(const std::vector<const Material*>& materials, const SpectrumTable& spectra);
+
+/// By primitive id. `light_of` as of LightPart.
+std::vector<kernel::CrtPrimitive> compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
+                                                    const std::vector<std::uint32_t>& light_of);
+
+/// Of the smooth triangles, in the order of their ids.
+std::vector<kernel::CrtNormals> compileNormals(const FlatScene& flat);
+
+}  // namespace crt

@@ -1,0 +1,101 @@
+#include "compile/needs.h"
+
+#include "compile/accelerator.h"
+#include "kernel/features.h"
+#include "scene/aov.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+
+namespace crt {
+namespace {
+
+bool isPath(const Scene& scene) { return scene.integrator.type == IntegratorType::Path; }
+
+/// Whether light is ever scattered; if not, materials, light sampling and roulette have nothing to do.
+bool scatters(const Scene& scene) { return isPath(scene) && scene.integrator.max_depth > 0; }
+
+}  // namespace
+
+std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials) {
+    std::uint32_t f = 0;
+    const auto need = [&](bool condition, std::uint32_t feature) { f |= condition ? feature : 0u; };
+    need(header.sampler == CRT_SAMPLER_SOBOL, CRT_FEATURE_SOBOL);
+    need(header.sampler == CRT_SAMPLER_INDEPENDENT, CRT_FEATURE_INDEPENDENT);
+    need(header.sampler == CRT_SAMPLER_XORSHIFT, CRT_FEATURE_XORSHIFT);
+    const bool traces = scene.integrator.type != IntegratorType::Aabb;
+    need(traces && header.accelerator == CRT_ACCELERATOR_BVH, CRT_FEATURE_BVH);
+    need(traces && header.accelerator == CRT_ACCELERATOR_BRUTE_FORCE, CRT_FEATURE_BRUTE_FORCE);
+    need(traces && header.accelerator == CRT_ACCELERATOR_AABB, CRT_FEATURE_AABB);
+    // The albedo of first hits is a material's, even where nothing is scattered.
+    if (scatters(scene) || (header.aovs & kAovAlbedo) != 0) f |= materials.features;
+    need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
+    need(header.lights.count > 0, CRT_FEATURE_AREA_LIGHT);
+    need(scatters(scene) && header.lights.count > 0 && header.nee &&
+             (materials.features & CRT_FEATURES_LOBE) != 0,
+         CRT_FEATURE_NEE);
+    need(header.environment != CRT_NONE, CRT_FEATURE_ENVIRONMENT);
+    need(header.spectra.count > 0, CRT_FEATURE_TABLE);
+    need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
+    need(header.filter.count > 0, CRT_FEATURE_FILTER);
+    need(!isPath(scene), CRT_FEATURE_VIEW);
+    need((header.aovs & kAovsOfFirstHits) != 0, CRT_FEATURE_AOV);
+    need((header.aovs & kAovReplicates) != 0, CRT_FEATURE_REPLICATES);
+    return f;
+}
+
+LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t occluders,
+                bool without_nodes) {
+    LeftOut all;
+    const auto left_out = [&](const char* what, const std::string& why) { all.emplace_back(what, why); };
+    const auto has = [&](std::uint32_t feature) { return (header.features & feature) != 0; };
+    if (header.accelerator != CRT_ACCELERATOR_BVH)
+        left_out("BVH", scene.integrator.accelerator == Accelerator::Auto
+                            ? fmt::format("{} triangles: testing all of them is faster (up to {})",
+                                          header.triangle_count, kBruteForceTriangles)
+                            : std::string("integrator.accelerator asks for another"));
+    if (without_nodes) left_out("BVH", "the backend builds an acceleration structure of its own");
+    if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders < header.triangle_count)
+        left_out("shadow tests",
+                 fmt::format("{} of {} triangles have the whole scene on one side and cannot come between",
+                             header.triangle_count - occluders, header.triangle_count));
+#define CRT_LEFT_OUT_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
+    if (!has(CRT_FEATURE_##NAME)) left_out(text, "no surface uses it");
+    CRT_MATERIAL_LIST(CRT_LEFT_OUT_MATERIAL, )
+#undef CRT_LEFT_OUT_MATERIAL
+    if (!has(CRT_FEATURE_TABLE)) left_out("tables of spectra", "all values are the same at all wavelengths");
+    if (!has(CRT_FEATURE_DISPERSION))
+        left_out("hero wavelength selection", "no index of refraction depends on wavelength");
+    if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
+    if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
+    if (!has(CRT_FEATURE_NEE))
+        left_out("light sampling and shadow rays",
+                 !header.nee ? "integrator.nee is false" : "no surface that scatters in all directions can be lit by an emitter");
+    if (!has(CRT_FEATURE_ENVIRONMENT)) left_out("environment", "there is none");
+    if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
+    if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
+    if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");
+    if (!has(CRT_FEATURE_REPLICATES))
+        left_out("replicates", !isPath(scene) ? "integrator.type is a view" : "sampler.replicates is 1");
+    if (!has(CRT_FEATURE_VIEW)) left_out("normals and bounding-box views", "integrator.type is path");
+    for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"},
+                                        std::pair{CRT_FEATURE_INDEPENDENT, "independent sampler"},
+                                        std::pair{CRT_FEATURE_XORSHIFT, "xorshift sampler"}})
+        if (!has(feature)) left_out(name, "sampler.type is another");
+    return all;
+}
+
+std::string featureNames(std::uint64_t mask) {
+    std::string names;
+#define CRT_FEATURE_NAME(bit, name, text) \
+    if (mask & (1u << bit)) names += (names.empty() ? "" : ", ") + std::string(#name);
+    CRT_FEATURE_LIST(CRT_FEATURE_NAME)
+#undef CRT_FEATURE_NAME
+    std::transform(names.begin(), names.end(), names.begin(),
+                   [](char c) { return c == '_' ? '-' : static_cast<char>(std::tolower(c)); });
+    return names;
+}
+
+}  // namespace crt

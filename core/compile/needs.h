@@ -1,0 +1,25 @@
+/// What a kernel needs for a scene, as bits of kernel/features.h, and what it can leave out and why.
+#pragma once
+
+#include "compile/materials.h"
+#include "kernel/layout.h"
+#include "scene/scene.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace crt {
+
+/// `header` is complete but for its features.
+std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials);
+
+/// What is left out, and why.
+using LeftOut = std::vector<std::pair<std::string, std::string>>;
+/// `header` is complete. `occluders`: triangles that shadow rays are tested against by the brute-force loop.
+LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t occluders,
+                bool without_nodes);
+
+}  // namespace crt

@@ -1,0 +1,120 @@
+#include "compile/settings.h"
+
+#include "base/error.h"
+#include "base/log.h"
+#include "base/vec3d.h"
+#include "kernel/sampler.h"
+#include "scene/aov.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+namespace crt {
+namespace {
+
+/// By a power of two first, so that no square overflows or vanishes.
+Vec3d normalise(const Vec3d& v) {
+    int exponent = 0;
+    std::frexp(std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}), &exponent);
+    const Vec3d near_one = v * std::ldexp(1.0, -exponent);
+    return near_one * (1.0 / std::sqrt(dot(near_one, near_one)));
+}
+
+/// What the film holds: the channels of first hits that outputs ask for, and those that tell its error.
+std::uint32_t filmAovs(const Scene& scene, std::uint32_t aovs) {
+    return (aovs & kAovsOfFirstHits) | (replicatesOf(scene) > 1 ? kAovReplicates : kAovSquares);
+}
+
+/// Sizes, crop window, channels and replicates.
+void setFilm(const Scene& scene, std::uint32_t aovs, kernel::CrtScene& header) {
+    const FilmSettings& film = scene.film;
+    header.film_width = static_cast<std::uint32_t>(film.width);
+    header.film_height = static_cast<std::uint32_t>(film.height);
+    const bool cropped = film.crop != std::array<int, 4>{0, 0, 0, 0};
+    header.crop_x = cropped ? static_cast<std::uint32_t>(film.crop[0]) : 0;
+    header.crop_y = cropped ? static_cast<std::uint32_t>(film.crop[1]) : 0;
+    header.width = cropped ? static_cast<std::uint32_t>(film.crop[2] - film.crop[0]) : header.film_width;
+    header.height = cropped ? static_cast<std::uint32_t>(film.crop[3] - film.crop[1]) : header.film_height;
+    header.aovs = aovs;
+    const auto replicates = static_cast<std::uint32_t>(replicatesOf(scene));
+    header.channels = channelsFor(aovs, replicates);
+    header.replicate_shift = static_cast<std::uint32_t>(std::bit_width(replicates) - 1);
+#define CRT_SET_CHANNEL(bit, NAME, Name, stem, width, SOURCE, name, exr) \
+    header.stem##_channel = firstChannel(aovs, kAov##Name);
+    CRT_CHANNEL_LIST(CRT_SET_CHANNEL)
+#undef CRT_SET_CHANNEL
+}
+
+/// Centred and scaled as `flat` is.
+kernel::CrtCamera cameraOf(const Scene& scene, const FlatScene& flat) {
+    const Camera& camera = scene.camera;
+    const Vec3d view = normalise(camera.target - camera.position);
+    const Vec3d right = normalise(cross(view, camera.up));
+    const Vec3d up = cross(right, view);
+    const double scale = std::ldexp(1.0, flat.scale_exponent);
+    kernel::CrtCamera c{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        c.origin[k] = static_cast<float>((camera.position[k] - flat.centre[k]) * scale);
+        c.corner[k] =
+            static_cast<float>(view[k] - right[k] * camera.tan_half_width + up[k] * camera.tan_half_height);
+        c.step_x[k] = static_cast<float>(right[k] * 2 * camera.tan_half_width / scene.film.width);
+        c.step_y[k] = static_cast<float>(-up[k] * 2 * camera.tan_half_height / scene.film.height);
+        c.lens_x[k] = static_cast<float>(right[k]);
+        c.lens_y[k] = static_cast<float>(up[k]);
+        if (!std::isfinite(c.origin[k] + c.corner[k] + c.step_x[k] + c.step_y[k]))
+            throw Error(ErrorKind::Scene, "the camera is too far from the scene for single precision",
+                        camera.place);
+    }
+    // Unit directions in single precision are 2^-24 apart; two of them a pixel is the least that tells
+    // pixels apart.
+    const double pixel =
+        2 * std::min(camera.tan_half_width / scene.film.width, camera.tan_half_height / scene.film.height);
+    if (pixel < std::ldexp(1.0, -23))
+        logWarning(
+            "a pixel is {:.2g} radians wide, finer than directions in single precision ({:.2g}): "
+            "neighbouring pixels will repeat each other; "
+            "use fewer pixels, a wider field of view, or a nearer camera",
+            pixel, std::ldexp(1.0, -23));
+    const Vec3d to_target = camera.target - camera.position;
+    const double focus =
+        camera.focus_distance > 0 ? camera.focus_distance : std::sqrt(dot(to_target, to_target));
+    c.lens_radius = static_cast<float>(camera.aperture_radius * scale);
+    c.focus_distance = static_cast<float>(focus * scale);
+    return c;
+}
+
+/// View, sampler, seed, depths, light sampling.
+void setIntegrator(const Scene& scene, kernel::CrtScene& header) {
+    switch (scene.integrator.type) {
+        case IntegratorType::Path: header.view = CRT_VIEW_PATH; break;
+        case IntegratorType::Normals: header.view = CRT_VIEW_NORMALS; break;
+        case IntegratorType::Aabb: header.view = CRT_VIEW_AABB; break;
+    }
+    switch (scene.sampler.type) {
+        case SamplerType::Sobol: header.sampler = CRT_SAMPLER_SOBOL; break;
+        case SamplerType::Independent: header.sampler = CRT_SAMPLER_INDEPENDENT; break;
+        case SamplerType::XorShift: header.sampler = CRT_SAMPLER_XORSHIFT; break;
+    }
+    header.seed = kernel::crt_seed(static_cast<std::uint32_t>(scene.sampler.seed),
+                                   static_cast<std::uint32_t>(scene.sampler.seed >> 32));
+    header.max_depth = static_cast<std::uint32_t>(scene.integrator.max_depth);
+    header.roulette_depth =
+        scene.integrator.roulette ? static_cast<std::uint32_t>(scene.integrator.roulette_depth) : CRT_NONE;
+    header.nee = !scene.integrator.nee ? CRT_NEE_NONE : scene.integrator.mis ? CRT_NEE_MIS : CRT_NEE_ONLY;
+}
+
+}  // namespace
+
+kernel::CrtScene compileSettings(const Scene& scene, const FlatScene& flat, std::uint32_t aovs) {
+    kernel::CrtScene header{};
+    header.magic = CRT_SCENE_MAGIC;
+    setFilm(scene, filmAovs(scene, aovs), header);
+    header.depth_scale = static_cast<float>(std::ldexp(1.0, -flat.scale_exponent));
+    header.camera = cameraOf(scene, flat);
+    setIntegrator(scene, header);
+    return header;
+}
+
+}  // namespace crt

@@ -1,0 +1,17 @@
+/// What a scene says besides surfaces and lights: film, camera, sampler and integrator.
+#pragma once
+
+#include "compile/flatten.h"
+#include "kernel/layout.h"
+#include "scene/scene.h"
+
+#include <cstdint>
+
+namespace crt {
+
+/// The header with its settings; arrays, accelerator, environment and features are still to come. `aovs`
+/// are the bits of Aov that outputs ask for. Lengths are centred and scaled as `flat` is. Warns of pixels
+/// finer than directions in single precision. Throws crt::Error(Scene) for a camera too far away.
+kernel::CrtScene compileSettings(const Scene& scene, const FlatScene& flat, std::uint32_t aovs);
+
+}  // namespace crt

@@ -1,0 +1,42 @@
+#include "compile/spectrum_table.h"
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+namespace crt {
+
+static_assert(kSpectrumSize == CRT_WAVELENGTH_COUNT && CRT_SPECTRUM_STRIDE == CRT_WAVELENGTH_COUNT + 1 &&
+                  kWavelengthMin_nm == CRT_WAVELENGTH_MIN_NM,
+              "the host's spectra are the kernel's tables");
+
+std::size_t SpectrumTable::Hash::operator()(const SpectrumValues& values) const {
+    std::array<double, kSpectrumSize> unsigned_zeros{};  // −0 equals 0
+    for (std::size_t i = 0; i < unsigned_zeros.size(); ++i) unsigned_zeros[i] = values[i] + 0.0;
+    return XXH3_64bits(unsigned_zeros.data(), sizeof unsigned_zeros);
+}
+
+SpectrumTable::SpectrumTable(std::span<const Spectrum* const> spectra) {
+    for (const Spectrum* spectrum : spectra) {
+        if (spectrum->isConstant()) continue;
+        const SpectrumValues& values = spectrum->values;
+        if (!index_.try_emplace(values, static_cast<std::uint32_t>(index_.size())).second) continue;
+        for (const double v : values) floats_.push_back(static_cast<float>(v));
+        floats_.push_back(floats_.back());
+    }
+}
+
+kernel::CrtValue valueOf(double number) {
+    // -0 has the bit of a reference.
+    return std::bit_cast<kernel::CrtValue>(std::max(static_cast<float>(number), 0.0f) + 0.0f);
+}
+
+kernel::CrtValue SpectrumTable::valueOf(const Spectrum& spectrum) const {
+    return spectrum.isConstant() ? crt::valueOf(spectrum[0])
+                                 : CRT_VALUE_TABLE | index_.at(spectrum.values);
+}
+
+}  // namespace crt

@@ -1,0 +1,37 @@
+/// The values of a compiled scene: spectra, of which equal ones share a table of the blob, and constants,
+/// which need none.
+#pragma once
+
+#include "kernel/layout.h"
+#include "scene/scene.h"
+
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+namespace crt {
+
+/// Of a number, at least 0.
+kernel::CrtValue valueOf(double number);
+
+class SpectrumTable {
+public:
+    /// Those that the scene needs, in their order in the blob.
+    explicit SpectrumTable(std::span<const Spectrum* const> spectra);
+
+    /// Of a spectrum that the table was made of, or one equal to it.
+    kernel::CrtValue valueOf(const Spectrum& spectrum) const;
+    std::uint32_t count() const { return static_cast<std::uint32_t>(index_.size()); }
+    /// CRT_SPECTRUM_STRIDE floats each.
+    const std::vector<float>& floats() const { return floats_; }
+
+private:
+    struct Hash {
+        std::size_t operator()(const SpectrumValues& values) const;
+    };
+    std::unordered_map<SpectrumValues, std::uint32_t, Hash> index_;
+    std::vector<float> floats_;
+};
+
+}  // namespace crt

@@ -1,0 +1,324 @@
+// What every material must keep, whatever it is: asked of crt_bsdf_prepare, _sample, _eval and _pdf of each kind
+// in CRT_MATERIAL_LIST. A new material is a line in kSubjects. Backends are held to the same bits elsewhere.
+#include "kernel_test.h"
+
+#include <algorithm>
+#include <array>
+#include <complex>
+#include <functional>
+#include <set>
+
+using namespace kernel_test;
+using crt::Material;
+using crt::MaterialType;
+using crt::Vec3d;
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+double lane(vec4 v, u32 i) { return i == 0 ? V4X(v) : i == 1 ? V4Y(v) : i == 2 ? V4Z(v) : V4W(v); }
+
+/// Unpolarised Fresnel reflectance for a complex index, from the field amplitudes.
+double fresnel(double cosine, std::complex<double> index) {
+    const double s2 = 1 - cosine * cosine;
+    const std::complex<double> root = std::sqrt(index * index - s2);
+    const auto rs = (cosine - root) / (cosine + root),
+               rp = (index * index * cosine - root) / (index * index * cosine + root);
+    return (std::norm(rs) + std::norm(rp)) / 2;
+}
+
+Material make(MaterialType type, const std::function<void(Material&)>& fill) {
+    Material m;
+    m.type = type;
+    m.reflectance = m.eta = m.k = crt::constantSpectrum(0);
+    fill(m);
+    return m;
+}
+
+Material reflecting(MaterialType type, double reflectance) {
+    return make(type, [&](Material& m) { m.reflectance = crt::constantSpectrum(reflectance); });
+}
+Material metal(MaterialType type, double eta, double k) {
+    return make(type, [&](Material& m) {
+        m.eta = crt::constantSpectrum(eta);
+        m.k = crt::constantSpectrum(k);
+    });
+}
+Material glass(double first, double last) {
+    return make(MaterialType::Dielectric, [&](Material& m) {
+        m.eta = crt::constantSpectrum(first);
+        for (std::size_t i = 0; i < m.eta.values.size(); ++i)
+            m.eta[i] = first + (last - first) * static_cast<double>(i) / 470;
+    });
+}
+
+struct Subject {
+    const char* name;
+    Material material;
+    /// The share of light from everywhere that is scattered, by the cosine of w_o.
+    std::function<double(double)> albedo;
+};
+
+/// All that the tests ask of, one line each.
+std::vector<Subject> subjects() {
+    const auto constant = [](double a) { return [a](double) { return a; }; };
+    const auto of_metal = [](double n, double k) {
+        return [n, k](double cosine) { return fresnel(cosine, {n, k}); };
+    };
+    return {
+        {"diffuse", reflecting(MaterialType::Diffuse, 0.7), constant(0.7)},
+        {"white diffuse", reflecting(MaterialType::Diffuse, 1), constant(1)},
+        {"mirror", reflecting(MaterialType::Mirror, 0.9), constant(0.9)},
+        {"conductor", metal(MaterialType::Conductor, 0.2, 3), of_metal(0.2, 3)},
+        {"glass", glass(1.5, 1.5), constant(1)},
+        {"dispersive glass", glass(1.7, 1.6), constant(1)},
+    };
+}
+
+/// A triangle of one material, and its BSDF at a point.
+class Bench {
+public:
+    explicit Bench(const Material& material) {
+        crt::Mesh mesh;
+        mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}};  // its normal is +z
+        mesh.triangles = {{0, 1, 2}};
+        crt::Scene scene = sceneOf(mesh);
+        scene.materials = {material};
+        scene.objects[0].material = 0;
+        compiled_ = crt::compileScene(scene, 0);
+        ctx_ = contextOf(compiled_);
+        CrtHit hit = crt_no_hit(CRT_INFINITY);
+        hit.slot = hit.id = 0;
+        hit.b1 = hit.b2 = 0.3f;
+        surface_ = crt_surface(&ctx_, hit);
+    }
+    CrtBsdf prepare(const Vec3d& wo) const {
+        CrtBsdf bsdf{};
+        crt_bsdf_prepare(&ctx_, &bsdf, &surface_, unitFloat(wo), kWavelengths, 1);
+        return bsdf;
+    }
+    static constexpr u32 kHero = 2;
+    static CrtScatter sample(const CrtBsdf& bsdf, CrtRandom2 u, int alone = 0) {
+        return crt_bsdf_sample(&bsdf, u, make_vec4(0, 0, 1, 0), alone);
+    }
+
+private:
+    const vec4 kWavelengths = make_vec4(20, 120, 230, 400);
+    crt::CompiledScene compiled_;
+    CrtContext ctx_{};
+    CrtSurface surface_{};
+};
+
+Vec3d spherical(double cosine, double phi) {
+    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+    return {sine * std::cos(phi), sine * std::sin(phi), cosine};
+}
+
+/// Directions of view, from both sides of the surface.
+std::vector<Vec3d> views() {
+    std::vector<Vec3d> all;
+    for (const double cosine : {0.98, 0.6, 0.2})
+        for (const double side : {1.0, -1.0}) all.push_back(spherical(side * cosine, 0.7));
+    return all;
+}
+
+bool isDelta(const CrtBsdf& bsdf) { return (bsdf.flags & CRT_BSDF_DELTA) != 0; }
+
+/// Integrals over cells of the sphere, equal in solid angle: cosine by azimuth.
+constexpr std::size_t kRows = 32, kColumns = 32, kCells = kRows * kColumns, kSteps = 24;
+std::array<double, kCells> overCells(const std::function<double(const Vec3d&)>& f) {
+    std::array<double, kCells> cells{};
+    constexpr std::size_t rows = kRows * kSteps, columns = kColumns * kSteps;
+    for (std::size_t i = 0; i < rows; ++i)
+        for (std::size_t j = 0; j < columns; ++j) {
+            const double cosine = -1 + 2 * (static_cast<double>(i) + 0.5) / rows;
+            const double phi = -kPi + 2 * kPi * (static_cast<double>(j) + 0.5) / columns;
+            cells[i / kSteps * kColumns + j / kSteps] +=
+                f(spherical(cosine, phi)) * 4 * kPi / (static_cast<double>(rows) * columns);
+        }
+    return cells;
+}
+std::size_t cellOf(const Vec3d& w) {
+    const auto at = [](double share, std::size_t n) {
+        return std::min(n - 1, static_cast<std::size_t>(std::max(0.0, share) * static_cast<double>(n)));
+    };
+    return at((w[2] + 1) / 2, kRows) * kColumns + at((std::atan2(w[1], w[0]) + kPi) / (2 * kPi), kColumns);
+}
+double total(const std::array<double, kCells>& cells) {
+    double sum = 0;
+    for (const double c : cells) sum += c;
+    return sum;
+}
+
+/// Over the whole square of random numbers.
+template <class F>
+void overNumbers(F&& f) {
+    constexpr u32 kSide = 512;
+    for (u32 i = 0; i < kSide; ++i)
+        for (u32 j = 0; j < kSide; ++j) {
+            CrtRandom2 u;
+            u.x = (static_cast<f32>(i) + 0.5f) / kSide;
+            u.y = (static_cast<f32>(j) + 0.5f) / kSide;
+            f(u, 1.0 / (static_cast<double>(kSide) * kSide));
+        }
+}
+
+}  // namespace
+
+TEST_CASE("BSDF: every kind of material is asked", "[kernel][bsdf][materials]") {
+    std::set<MaterialType> asked;
+    for (const Subject& s : subjects()) asked.insert(s.material.type);
+    CHECK(asked.size() == std::size(crt::kMaterialNames));
+}
+
+TEST_CASE("BSDF: directions are distributed as the pdf says", "[kernel][bsdf][materials]") {
+    Random random(71);
+    for (const Subject& s : subjects()) {
+        const Bench bench(s.material);
+        for (const Vec3d& wo : views()) {
+            const CrtBsdf bsdf = bench.prepare(wo);
+            if (isDelta(bsdf)) continue;
+            INFO(s.name << " from " << wo[2]);
+            const auto density = overCells([&](const Vec3d& w) { return crt_bsdf_pdf(&bsdf, unitFloat(w)); });
+            CHECK(total(density) < 1 + 1e-3);
+            constexpr std::uint64_t kSamples = 400000;
+            std::array<std::uint64_t, kCells> counts{};
+            std::uint64_t rejected = 0;
+            for (std::uint64_t i = 0; i < kSamples; ++i) {
+                const CrtScatter scatter = Bench::sample(bsdf, random.pair());
+                if (scatter.valid) ++counts[cellOf(toDouble(scatter.wi))];
+                else ++rejected;
+            }
+            // Cells of few samples are taken together, with what is rejected.
+            std::vector<std::uint64_t> observed{rejected};
+            std::vector<double> expected{std::max(0.0, 1 - total(density)) * kSamples};
+            for (std::size_t c = 0; c < kCells; ++c) {
+                const double e = density[c] * kSamples;
+                if (e >= 20) {
+                    observed.push_back(counts[c]);
+                    expected.push_back(e);
+                } else {
+                    observed[0] += counts[c];
+                    expected[0] += e;
+                }
+            }
+            if (expected[0] < 20) {
+                CHECK(static_cast<double>(observed[0]) < 60);
+                observed.erase(observed.begin());
+                expected.erase(expected.begin());
+            }
+            REQUIRE(observed.size() > 4);
+            CHECK(std::abs(chiSquaredDeviate(observed, expected)) < 4.4);
+        }
+    }
+}
+
+TEST_CASE("BSDF: a sample's weight is the value over the density of its direction",
+          "[kernel][bsdf][materials]") {
+    Random random(72);
+    for (const Subject& s : subjects()) {
+        const Bench bench(s.material);
+        for (const Vec3d& wo : views()) {
+            const CrtBsdf bsdf = bench.prepare(wo);
+            INFO(s.name << " from " << wo[2]);
+            double worst_weight = 0, worst_pdf = 0;
+            std::uint64_t valid = 0, wrong_side = 0, wrong_delta = 0;
+            for (int i = 0; i < 20000; ++i) {
+                const CrtScatter scatter = Bench::sample(bsdf, random.pair());
+                if (!scatter.valid) continue;
+                ++valid;
+                const u32 side =
+                    (scatter.wi.z > 0) == (wo[2] > 0) ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS;
+                wrong_side += (bsdf.flags & side) == 0 || std::abs(length(toDouble(scatter.wi)) - 1) > 1e-6;
+                const double pdf = crt_bsdf_pdf(&bsdf, scatter.wi);
+                const vec4 value = crt_bsdf_eval(&bsdf, scatter.wi);
+                if (isDelta(bsdf)) {
+                    wrong_delta += scatter.pdf != 0 || pdf != 0 || max4(value) != 0 ||
+                                   (scatter.hero_only && (bsdf.flags & CRT_BSDF_DISPERSIVE) == 0);
+                    continue;
+                }
+                worst_pdf = std::max(worst_pdf, std::abs(scatter.pdf / pdf - 1));
+                for (u32 l = 0; l < 4; ++l)
+                    worst_weight =
+                        std::max(worst_weight, std::abs(lane(scatter.weight, l) * pdf / lane(value, l) - 1));
+            }
+            CHECK(valid > 5000);
+            CHECK(wrong_side == 0);
+            CHECK(wrong_delta == 0);
+            CHECK(worst_pdf < 1e-3);
+            CHECK(worst_weight < 1e-3);
+        }
+    }
+}
+
+TEST_CASE("BSDF: the way back is as bright as the way there", "[kernel][bsdf][materials]") {
+    Random random(73);
+    for (const Subject& s : subjects()) {
+        const Bench bench(s.material);
+        INFO(s.name);
+        double worst = 0;
+        std::uint64_t compared = 0;
+        for (int i = 0; i < 20000; ++i) {
+            const Vec3d wo = random.direction();
+            if (std::abs(wo[2]) < 0.01) continue;
+            const CrtBsdf there = bench.prepare(wo);
+            if (isDelta(there)) {
+                // Of deltas the weights, for the hero alone: crossing scales radiance by 1/η², and back by η².
+                CrtRandom2 u = random.pair();
+                const CrtScatter first = Bench::sample(there, u, 1);
+                if (!first.valid) continue;
+                const CrtBsdf back = bench.prepare(toDouble(first.wi));
+                for (u.x = 0.0005f; u.x < 1; u.x += 0.001f) {
+                    const CrtScatter second = Bench::sample(back, u, 1);
+                    if (!second.valid || length(minus(toDouble(second.wi), wo)) > 1e-3) continue;
+                    const u32 l = Bench::kHero;
+                    worst = std::max(worst, std::abs(lane(first.weight, l) * first.eta_square -
+                                                     lane(second.weight, l) * second.eta_square));
+                    ++compared;
+                    break;
+                }
+                if (compared > 500) break;
+                continue;
+            }
+            const Vec3d wi = random.direction();
+            if (std::abs(wi[2]) < 0.01) continue;
+            const CrtBsdf back = bench.prepare(wi);
+            for (u32 l = 0; l < 4; ++l) {
+                const double a = lane(crt_bsdf_eval(&there, unitFloat(wi)), l) / std::abs(wi[2]),
+                             b = lane(crt_bsdf_eval(&back, unitFloat(wo)), l) / std::abs(wo[2]);
+                if (a == 0 && b == 0) continue;
+                worst = std::max(worst, std::abs(a - b) / std::max(a, b));
+                ++compared;
+            }
+        }
+        CHECK(compared > 400);
+        CHECK(worst < 2e-3);
+    }
+}
+
+TEST_CASE("BSDF: in white light everything is as bright as its albedo says, and no brighter than 1",
+          "[kernel][bsdf][materials]") {
+    for (const Subject& s : subjects()) {
+        const Bench bench(s.material);
+        for (const Vec3d& wo : views()) {
+            const CrtBsdf bsdf = bench.prepare(wo);
+            INFO(s.name << " from " << wo[2]);
+            const double expected = s.albedo(std::abs(wo[2]));
+            // By samples: of a refraction that depends on the wavelength, the hero stands for all four.
+            double sampled = 0;
+            overNumbers([&](CrtRandom2 u, double share) {
+                const CrtScatter scatter = Bench::sample(bsdf, u);
+                if (scatter.valid)
+                    sampled += lane(scatter.weight, Bench::kHero) * scatter.eta_square * share;
+            });
+            CHECK(sampled < 1 + 2e-3);
+            CHECK(sampled == Approx(expected).margin(3e-3));
+            if (isDelta(bsdf)) continue;
+            const double integral = total(overCells(
+                [&](const Vec3d& w) { return lane(crt_bsdf_eval(&bsdf, unitFloat(w)), Bench::kHero); }));
+            CHECK(integral < 1 + 1e-3);
+            CHECK(integral == Approx(expected).margin(2e-3));
+        }
+    }
+}
