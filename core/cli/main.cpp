@@ -2,6 +2,7 @@
 /// `--version` open no backend and no library.
 #include "base/error.h"
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/standard_output.h"
 #include "base/words.h"
 #include "cli/arguments.h"
@@ -249,7 +250,9 @@ private:
     CLI::App* addRender() {
         CLI::App* render = addCommand("render", "render a scene; the word may be left out", [this] {
             TerminalWatch watch(progress_);
-            return runJob(job_, watch);
+            int exit_code = 0;
+            runWithThreads(job_.integrator.threads, [&] { exit_code = runJob(job_, watch); });
+            return exit_code;
         });
         render->add_option("SCENE", job_.scene.file, "scene file (YAML), or - for standard input")
             ->required();
