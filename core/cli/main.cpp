@@ -2,6 +2,7 @@
 /// library.
 #include "base/error.h"
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/standard_output.h"
 #include "cli/command_line.h"
 #include "cli/commands.h"

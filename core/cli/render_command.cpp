@@ -1,3 +1,4 @@
+#include "base/parallel.h"
 #include "base/atomic_file.h"
 #include "base/log.h"
 #include "cli/arguments.h"
@@ -146,7 +147,10 @@ Command renderCommand() {
                     !state->job.outputs.empty() && isStandardOutput(state->job.outputs.front());
                 if (streamed && !state->job.report_file) state->job.report_file = "";
                 TerminalWatch watch(state->progress);
-                return runJob(state->job, watch);
+                int exit_code = 0;
+                runWithThreads(state->job.integrator.threads,
+                               [&] { exit_code = runJob(state->job, watch); });
+                return exit_code;
             }};
 }
 

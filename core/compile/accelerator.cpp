@@ -1,5 +1,6 @@
 #include "compile/accelerator.h"
 
+#include "base/parallel.h"
 #include "kernel/intersect.h"
 
 #include <algorithm>
@@ -9,6 +10,8 @@
 
 namespace crt {
 namespace {
+
+constexpr std::size_t kPart = std::size_t{1} << 16;  // of what a thread takes at a time
 
 std::uint32_t acceleratorOf(const Scene& scene, std::size_t triangles) {
     // Nothing to find; and the view of the boxes looks for no triangle.
@@ -55,7 +58,9 @@ AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat,
     if (part.kind == CRT_ACCELERATOR_BVH && !part.without_nodes) {
         const auto start = std::chrono::steady_clock::now();
         std::vector<TriangleBounds> bounds(count);
-        for (std::size_t i = 0; i < count; ++i) bounds[i] = boundsOf(flat, i);
+        parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
+            for (std::size_t i = first; i < end; ++i) bounds[i] = boundsOf(flat, i);
+        });
         Bvh bvh = buildBvh(bounds, CRT_BOX_PADDING);
         part.nodes = std::move(bvh.nodes);
         part.id_of_slot = std::move(bvh.order);
@@ -65,8 +70,10 @@ AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat,
         std::iota(part.id_of_slot.begin(), part.id_of_slot.end(), 0u);
     }
     part.slot_of_id.resize(count);
-    for (std::size_t slot = 0; slot < count; ++slot)
-        part.slot_of_id[part.id_of_slot[slot]] = static_cast<std::uint32_t>(slot);
+    parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t slot = first; slot < end; ++slot)
+            part.slot_of_id[part.id_of_slot[slot]] = static_cast<std::uint32_t>(slot);
+    });
     return part;
 }
 

@@ -26,11 +26,10 @@ namespace {
 /// For what grows with the number of triangles, and some tables.
 std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelerator) {
     constexpr std::size_t kTables = std::size_t{1} << 20;
-    std::size_t bytes = kTables + accelerator.nodes.size() * sizeof(kernel::CrtNode4);
-    for (const FlatTriangle& t : flat.triangles)
-        bytes += sizeof(kernel::CrtTriangle) + sizeof(kernel::CrtFace) + sizeof(kernel::CrtPrimitive) +
-                 (t.smooth ? sizeof(kernel::CrtNormals) : 0);
-    return bytes;
+    return kTables + accelerator.nodes.size() * sizeof(kernel::CrtNode4) +
+           flat.triangles.size() *
+               (sizeof(kernel::CrtTriangle) + sizeof(kernel::CrtFace) + sizeof(kernel::CrtPrimitive)) +
+           flat.normals.size() * sizeof(kernel::CrtNormals);
 }
 
 std::vector<const Spectrum*> spectraOf(const Scene& scene, const FlatScene& flat,
@@ -55,9 +54,12 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     blob.reserve(expectedBytes(flat, accelerator));
     header.accelerator = accelerator.kind;
     header.nodes = blob.append(accelerator.nodes);
-    header.triangles = blob.append(compileTriangles(flat, accelerator));
-    header.triangle_count = header.triangles.count;
-    header.faces = blob.append(compileFaces(flat, accelerator));
+    const std::size_t count = flat.triangles.size();
+    header.triangle_count = static_cast<std::uint32_t>(count);
+    header.triangles = blob.appendFilled<kernel::CrtTriangle>(
+        count, [&](auto triangles) { compileTriangles(flat, accelerator, triangles); });
+    header.faces = blob.appendFilled<kernel::CrtFace>(
+        count, [&](auto faces) { compileFaces(flat, accelerator, faces); });
     std::size_t occluders = 0;
     const bool shows_boxes = scene.integrator.type == IntegratorType::Aabb;
     if (accelerator.kind == CRT_ACCELERATOR_BRUTE_FORCE && !shows_boxes) {
@@ -83,8 +85,10 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
 
     const MaterialPart materials = compileMaterials(used, spectra);
-    header.primitives = blob.append(compilePrimitives(flat, scene.materials.size(), lights.light_of));
-    header.normals = blob.append(compileNormals(flat));
+    header.primitives = blob.appendFilled<kernel::CrtPrimitive>(count, [&](auto primitives) {
+        compilePrimitives(flat, scene.materials.size(), lights.light_of, primitives);
+    });
+    header.normals = blob.append(flat.normals);
     header.materials = blob.append(materials.records);
 
     header.spectra = blob.append(spectra.floats());

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/stage.h"
 #include "base/vec3d.h"
 #include "scene/scene_limits.h"
@@ -9,8 +10,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <optional>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -29,57 +34,84 @@ Matrix3d cofactors(const Matrix4d& m) {
     return {cross(b, c), cross(c, a), cross(a, b)};
 }
 
-/// Appends the mesh of an object as one of its transforms places it.
-void place(const Object& object, const Mesh& mesh, const Matrix4d& transform, FlatScene& flat,
-           Stage& stage) {
-    const Matrix3d normal_matrix = cofactors(transform);
-    const Vec3d first_row{transform[0], transform[1], transform[2]};
-    // A mirroring transform turns the order of vertices round; turning it back keeps the outside outside.
-    const bool mirrored = dot(first_row, normal_matrix[0]) < 0;
-    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-        FlatTriangle t;
-        t.object = flat.placements;
-        t.material = !mesh.material.empty() && mesh.material[i] >= 0 ? mesh.material[i] : object.material;
-        t.emission = !mesh.emission.empty() && mesh.emission[i] >= 0 ? mesh.emission[i] : object.emission;
-        t.smooth = !mesh.normal_index.empty() &&
-                   std::all_of(mesh.normal_index[i].begin(), mesh.normal_index[i].end(),
-                               [](std::uint32_t n) { return n != kNoNormal; });
-        for (std::size_t k = 0; k < 3; ++k) {
-            const std::size_t from = mirrored && k > 0 ? 3 - k : k;
-            t.positions[k] = transformPoint(transform, mesh.positions[mesh.triangles[i][from]]);
-            if (!std::all_of(t.positions[k].begin(), t.positions[k].end(),
-                             [](double x) { return std::isfinite(x); }))
-                throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity", object.place);
-            if (t.smooth) {
-                const Vec3d n = multiply(normal_matrix, mesh.normals[mesh.normal_index[i][from]]);
-                const double norm = length(n);
-                if (norm > 0 && std::isfinite(norm))
-                    t.normals[k] = n * ((mirrored ? -1.0 : 1.0) / norm);
-                else
-                    t.smooth = false;
-            }
-        }
-        flat.triangles.push_back(t);
-        stage.at(static_cast<double>(flat.triangles.size()));
+bool isFinite(const Vec3d& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
+
+/// An object as one of its transforms places it.
+struct Placement {
+    const Object* object;
+    const Mesh* mesh;
+    Matrix4d transform;
+    Matrix3d normal_matrix;
+    /// A mirroring transform turns the order of vertices round; turning it back keeps the outside outside.
+    bool mirrored;
+    std::size_t first;  ///< Number of its first triangle in the scene.
+
+    /// Which corner of the mesh's triangle is the k-th of the placed one.
+    std::size_t from(std::size_t k) const { return mirrored && k > 0 ? 3 - k : k; }
+
+    /// In the author's units, for a triangle of the mesh.
+    std::array<Vec3d, 3> corners(std::size_t triangle) const {
+        std::array<Vec3d, 3> p;
+        for (std::size_t k = 0; k < 3; ++k)
+            p[k] = transformPoint(transform, mesh->positions[mesh->triangles[triangle][from(k)]]);
+        return p;
     }
-    ++flat.placements;
+
+    /// Unit normals at the corners; nothing where one of them is missing or has no direction.
+    std::optional<std::array<Vec3d, 3>> normals(std::size_t triangle) const {
+        if (mesh->normal_index.empty()) return std::nullopt;
+        std::array<Vec3d, 3> normals;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint32_t index = mesh->normal_index[triangle][from(k)];
+            if (index == kNoNormal) return std::nullopt;
+            const Vec3d n = multiply(normal_matrix, mesh->normals[index]);
+            const double norm = length(n);
+            if (!(norm > 0) || !std::isfinite(norm)) return std::nullopt;
+            normals[k] = n * ((mirrored ? -1.0 : 1.0) / norm);
+        }
+        return normals;
+    }
+};
+
+std::vector<Placement> placementsOf(const Scene& scene) {
+    std::vector<Placement> placements;
+    std::size_t first = 0;
+    for (const Object& object : scene.objects)
+        for (const Matrix4d& transform : object.transforms) {
+            const Mesh& mesh = scene.meshes[object.mesh];
+            const Matrix3d normal_matrix = cofactors(transform);
+            const Vec3d first_row{transform[0], transform[1], transform[2]};
+            placements.push_back(
+                {&object, &mesh, transform, normal_matrix, dot(first_row, normal_matrix[0]) < 0, first});
+            first += mesh.triangles.size();
+        }
+    return placements;
 }
 
-/// Sets centre and scale by the bounding box of the triangles that are `seen`.
-void measure(FlatScene& flat, const std::vector<bool>& seen) {
-    constexpr double inf = std::numeric_limits<double>::infinity();
-    Vec3d lower{inf, inf, inf}, upper{-inf, -inf, -inf};
-    for (std::size_t i = 0; i < flat.triangles.size(); ++i) {
-        if (!seen[i]) continue;
-        for (const Vec3d& p : flat.triangles[i].positions)
-            for (std::size_t k = 0; k < 3; ++k) {
-                lower[k] = std::min(lower[k], p[k]);
-                upper[k] = std::max(upper[k], p[k]);
-            }
+struct Bounds {
+    static constexpr double kInf = std::numeric_limits<double>::infinity();
+    Vec3d lower{kInf, kInf, kInf}, upper{-kInf, -kInf, -kInf};
+
+    void add(const Vec3d& p) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            lower[k] = std::min(lower[k], p[k]);
+            upper[k] = std::max(upper[k], p[k]);
+        }
     }
+    void add(const Bounds& other) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            lower[k] = std::min(lower[k], other.lower[k]);
+            upper[k] = std::max(upper[k], other.upper[k]);
+        }
+    }
+};
+
+/// Sets centre and scale.
+void measure(FlatScene& flat, const Bounds& bounds) {
     flat.centre = {};
     flat.scale_exponent = 0;
     double half_extent = 0;
+    const auto& [lower, upper] = bounds;
     for (std::size_t k = 0; k < 3 && lower[k] <= upper[k]; ++k) {
         flat.centre[k] = lower[k] + (upper[k] - lower[k]) / 2;
         half_extent = std::max(half_extent, (upper[k] - lower[k]) / 2);
@@ -91,46 +123,161 @@ void measure(FlatScene& flat, const std::vector<bool>& seen) {
     }
 }
 
-/// Corners of a triangle, centred and scaled.
-std::array<Vec3d, 3> normalised(const FlatScene& flat, const FlatTriangle& triangle) {
-    const double scale = std::ldexp(1.0, flat.scale_exponent);
-    std::array<Vec3d, 3> p;
-    for (std::size_t v = 0; v < 3; ++v) p[v] = (triangle.positions[v] - flat.centre) * scale;
-    return p;
-}
-
 /// Coordinates within ±1. Higher over its edges than rounding in double makes three points of a line.
 bool hasArea(const std::array<Vec3d, 3>& p) {
     const Vec3d a = p[1] - p[0], b = p[2] - p[0], n = cross(a, b);
     return dot(n, n) > 1e-30 * std::max(dot(a, a), dot(b, b));
 }
 
-/// Centre and power-of-two scale in double, so that far-away and huge or tiny scenes lose nothing in float,
-/// and moving or scaling a scene by representable amounts gives the same bits. Triangles without area have
-/// no part in it: nobody sees them.
-void normaliseLengths(FlatScene& flat) {
-    const std::size_t count = flat.triangles.size();
-    std::vector<bool> seen(count, true);
-    measure(flat, seen);
-    std::uint64_t without_area = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        seen[i] = hasArea(normalised(flat, flat.triangles[i]));
-        without_area += seen[i] ? 0 : 1;
+/// Triangles of the scene, a part of them at a time. Corners in double are worked out anew by each pass
+/// rather than stored: they would be half of the memory that a scene takes.
+class Flattener {
+public:
+    Flattener(const Scene& scene, std::size_t count)
+        : placements_(placementsOf(scene)),
+          parts_(partsOf(count, kPart)),
+          stage_("placing triangles", 2 * static_cast<double>(count)) {
+        flat_.triangles.resize(count);
+        flat_.positions.resize(count);
+        flat_.placements = static_cast<std::uint32_t>(placements_.size());
     }
-    if (without_area > 0) {
+
+    FlatScene flatten() {
+        forEachPart([this](Part& part) { describe(part); });
+        for (const Part& part : parts_)
+            if (part.infinite)
+                throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity",
+                            part.infinite->object->place);
+        measure(flat_, boundsOfParts());
+        placeNormals();
+        forEachPart([this](Part& part) { normalise(part); });
+        std::uint64_t without_area = 0;
+        for (const Part& part : parts_) without_area += part.without_area;
+        if (without_area == 0) return std::move(flat_);
+        // Nobody sees them: they have no part in centre and scale.
         logWarning("{} triangle{} no area and will not be seen", without_area,
                    without_area == 1 ? " has" : "s have");
-        if (without_area < count) measure(flat, seen);
+        if (without_area < flat_.triangles.size()) measure(flat_, boundsOfParts());
+        forEachPart([this](Part& part) { normaliseSeen(part); });
+        return std::move(flat_);
     }
-    flat.positions.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        std::array<Vec3d, 3> p = normalised(flat, flat.triangles[i]);
-        // Rounded to float, three points of one line make a sliver that can be hit; one point cannot.
-        if (!seen[i]) p[0] = p[1] = p[2] = {};
+
+private:
+    static constexpr std::size_t kPart = std::size_t{1} << 14;
+
+    struct Part {
+        std::size_t first = 0, end = 0;
+        Bounds bounds;  ///< In the author's units, of the triangles that have area as far as is known.
+        std::size_t normals = 0;  ///< Of its smooth triangles; then where they begin in the scene's.
+        std::uint64_t without_area = 0;
+        const Placement* infinite = nullptr;  ///< The first that moves a vertex to infinity.
+        std::vector<bool> seen;               ///< Empty: all are.
+    };
+
+    void forEachPart(const std::function<void(Part&)>& work) {
+        parallelFor(flat_.triangles.size(), kPart, [&](std::size_t first, std::size_t end) {
+            Part& part = parts_[first / kPart];
+            part.first = first;
+            part.end = end;
+            work(part);
+            stage_.at(static_cast<double>(done_ += end - first));
+        });
+    }
+
+    Bounds boundsOfParts() const {
+        Bounds all;
+        for (const Part& part : parts_) all.add(part.bounds);
+        return all;
+    }
+
+    /// Calls visit(number in the scene, placement, number in its mesh).
+    template <class Visit>
+    void forEachTriangle(const Part& part, const Visit& visit) const {
+        auto placement = std::prev(
+            std::upper_bound(placements_.begin(), placements_.end(), part.first,
+                             [](std::size_t first, const Placement& p) { return first < p.first; }));
+        for (std::size_t i = part.first; i < part.end; ++i) {
+            while (i - placement->first >= placement->mesh->triangles.size()) ++placement;
+            visit(i, *placement, i - placement->first);
+        }
+    }
+
+    void describe(Part& part) {
+        forEachTriangle(part, [&](std::size_t i, const Placement& placement, std::size_t triangle) {
+            const Mesh& mesh = *placement.mesh;
+            const Object& object = *placement.object;
+            FlatTriangle& t = flat_.triangles[i];
+            t.object = static_cast<std::uint32_t>(&placement - placements_.data());
+            t.material = !mesh.material.empty() && mesh.material[triangle] >= 0 ? mesh.material[triangle]
+                                                                                : object.material;
+            t.emission = !mesh.emission.empty() && mesh.emission[triangle] >= 0 ? mesh.emission[triangle]
+                                                                                : object.emission;
+            for (const Vec3d& p : placement.corners(triangle)) {
+                if (!isFinite(p) && !part.infinite) part.infinite = &placement;
+                part.bounds.add(p);
+            }
+            t.smooth = placement.normals(triangle).has_value();
+            part.normals += t.smooth;
+        });
+    }
+
+    void placeNormals() {
+        std::size_t before = 0;
+        for (Part& part : parts_) before += std::exchange(part.normals, before);
+        flat_.normals.resize(before);
+    }
+
+    /// Corners of a triangle, centred and scaled.
+    std::array<Vec3d, 3> normalised(const std::array<Vec3d, 3>& corners) const {
+        const double scale = std::ldexp(1.0, flat_.scale_exponent);
+        std::array<Vec3d, 3> p;
+        for (std::size_t v = 0; v < 3; ++v) p[v] = (corners[v] - flat_.centre) * scale;
+        return p;
+    }
+
+    void setPositions(std::size_t i, const std::array<Vec3d, 3>& p) {
         for (std::size_t v = 0; v < 3; ++v)
-            for (std::size_t k = 0; k < 3; ++k) flat.positions[i][3 * k + v] = static_cast<float>(p[v][k]);
+            for (std::size_t k = 0; k < 3; ++k) flat_.positions[i][3 * k + v] = static_cast<float>(p[v][k]);
     }
-}
+
+    /// Positions and normals; and which triangles have area.
+    void normalise(Part& part) {
+        Bounds seen;
+        std::size_t normal = part.normals;
+        forEachTriangle(part, [&](std::size_t i, const Placement& placement, std::size_t triangle) {
+            const std::array<Vec3d, 3> corners = placement.corners(triangle);
+            const std::array<Vec3d, 3> p = normalised(corners);
+            setPositions(i, p);
+            if (hasArea(p)) {
+                for (const Vec3d& corner : corners) seen.add(corner);
+            } else {
+                if (part.seen.empty()) part.seen.assign(part.end - part.first, true);
+                part.seen[i - part.first] = false;
+                ++part.without_area;
+            }
+            if (!flat_.triangles[i].smooth) return;
+            const std::array<Vec3d, 3> normals = *placement.normals(triangle);
+            kernel::CrtNormals& n = flat_.normals[normal++];
+            for (std::size_t v = 0; v < 3; ++v)
+                for (std::size_t k = 0; k < 3; ++k) n.n[3 * k + v] = static_cast<float>(normals[v][k]);
+        });
+        part.bounds = seen;
+    }
+
+    void normaliseSeen(const Part& part) {
+        forEachTriangle(part, [&](std::size_t i, const Placement& placement, std::size_t triangle) {
+            const bool seen = part.seen.empty() || part.seen[i - part.first];
+            // Rounded to float, three points of one line make a sliver that can be hit; one point cannot.
+            setPositions(i, seen ? normalised(placement.corners(triangle)) : std::array<Vec3d, 3>{});
+        });
+    }
+
+    const std::vector<Placement> placements_;
+    std::vector<Part> parts_;
+    FlatScene flat_;
+    Stage stage_;
+    std::atomic<std::size_t> done_{0};
+};
 
 }  // namespace
 
@@ -149,14 +296,7 @@ FlatScene flattenScene(const Scene& scene) {
             !why.empty())
             throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", scene.file, why), {scene.file});
 
-    FlatScene flat;
-    flat.triangles.reserve(count);
-    Stage stage("placing triangles", static_cast<double>(count));
-    for (const Object& object : scene.objects)
-        for (const Matrix4d& transform : object.transforms)
-            place(object, scene.meshes[object.mesh], transform, flat, stage);
-    normaliseLengths(flat);
-    return flat;
+    return Flattener(scene, count).flatten();
 }
 
 }  // namespace crt

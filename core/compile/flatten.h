@@ -2,6 +2,7 @@
 /// (docs/architecture.md, "Lengths").
 #pragma once
 
+#include "kernel/layout.h"
 #include "scene/scene.h"
 
 #include <array>
@@ -10,14 +11,12 @@
 
 namespace crt {
 
-/// One placed triangle, world space, author's units.
+/// One placed triangle.
 struct FlatTriangle {
-    std::array<Vec3d, 3> positions;
-    std::array<Vec3d, 3> normals{};  ///< Of unit length; where `smooth`.
-    bool smooth = false;
     std::int32_t material = -1;
     std::int32_t emission = -1;
     std::uint32_t object = 0;  ///< Number of the placement: an object has one for each of its transforms.
+    bool smooth = false;
 };
 
 /// All triangles of a scene, in the author's order.
@@ -27,8 +26,9 @@ struct FlatScene {
     /// x of the three vertices, y, z: centred, scaled, and rounded to single precision. Those of a triangle
     /// without area are one point.
     std::vector<std::array<float, 9>> positions;
-    Vec3d centre{};                  ///< In the author's units.
-    int scale_exponent = 0;          ///< Lengths were multiplied by 2^scale_exponent after centring.
+    std::vector<kernel::CrtNormals> normals;  ///< Of the smooth triangles, in their order.
+    Vec3d centre{};                           ///< In the author's units.
+    int scale_exponent = 0;  ///< Lengths were multiplied by 2^scale_exponent after centring.
 };
 
 /// Warns about triangles without area. Throws crt::Error(Scene) when there are too many triangles, or a

@@ -1,5 +1,6 @@
 #include "compile/geometry.h"
 
+#include "base/parallel.h"
 #include "base/vec3d.h"
 #include "kernel/surface.h"
 
@@ -9,6 +10,8 @@
 
 namespace crt {
 namespace {
+
+constexpr std::size_t kPart = std::size_t{1} << 14;  // of what a thread takes at a time
 
 /// The largest coordinate of a triangle, and the largest extent of its two edges along an axis: what
 /// rounding depends on.
@@ -84,22 +87,23 @@ double areaOf(const FlatScene& flat, std::size_t id) {
     return 0.5 * std::sqrt(dot(n, n));
 }
 
-std::vector<kernel::CrtTriangle> compileTriangles(const FlatScene& flat,
-                                                  const AcceleratorPart& accelerator) {
-    std::vector<kernel::CrtTriangle> triangles(accelerator.id_of_slot.size());
-    for (std::size_t slot = 0; slot < triangles.size(); ++slot) {
-        const std::uint32_t id = accelerator.id_of_slot[slot];
-        std::copy(flat.positions[id].begin(), flat.positions[id].end(), triangles[slot].p);
-        triangles[slot].id = id;
-    }
-    return triangles;
+void compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator,
+                      std::span<kernel::CrtTriangle> triangles) {
+    parallelFor(triangles.size(), kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t slot = first; slot < end; ++slot) {
+            const std::uint32_t id = accelerator.id_of_slot[slot];
+            std::copy(flat.positions[id].begin(), flat.positions[id].end(), triangles[slot].p);
+            triangles[slot].id = id;
+        }
+    });
 }
 
-std::vector<kernel::CrtFace> compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator) {
-    std::vector<kernel::CrtFace> faces(accelerator.id_of_slot.size());
-    for (std::size_t slot = 0; slot < faces.size(); ++slot)
-        faces[slot] = faceOf(flat, accelerator.id_of_slot[slot]);
-    return faces;
+void compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator,
+                  std::span<kernel::CrtFace> faces) {
+    parallelFor(faces.size(), kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t slot = first; slot < end; ++slot)
+            faces[slot] = faceOf(flat, accelerator.id_of_slot[slot]);
+    });
 }
 
 std::vector<kernel::CrtTriangle8> compileTriangles8(const FlatScene& flat,

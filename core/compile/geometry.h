@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace crt {
@@ -15,9 +16,11 @@ namespace crt {
 Vec3d vertexOf(const FlatScene& flat, std::size_t id, std::size_t vertex);
 double areaOf(const FlatScene& flat, std::size_t id);
 
-/// By slot.
-std::vector<kernel::CrtTriangle> compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator);
-std::vector<kernel::CrtFace> compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator);
+/// Fill in one a triangle, by slot.
+void compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator,
+                      std::span<kernel::CrtTriangle> triangles);
+void compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator,
+                  std::span<kernel::CrtFace> faces);
 
 /// Triangles side by side for the brute-force loops, which keep the author's order: slot and id are one.
 std::vector<kernel::CrtTriangle8> compileTriangles8(const FlatScene& flat,

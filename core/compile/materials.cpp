@@ -1,8 +1,10 @@
 #include "compile/materials.h"
 
+#include "base/parallel.h"
 #include "kernel/features.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -84,33 +86,27 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
     return part;
 }
 
-std::vector<kernel::CrtPrimitive> compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
-                                                    const std::vector<std::uint32_t>& light_of) {
-    std::vector<kernel::CrtPrimitive> primitives(flat.triangles.size());
-    std::uint32_t normals = 0;
-    for (std::size_t i = 0; i < primitives.size(); ++i) {
-        const FlatTriangle& t = flat.triangles[i];
-        primitives[i].material =
-            static_cast<std::uint32_t>(isKnown(t, scene_materials) ? t.material : scene_materials);
-        primitives[i].light = light_of[i];
-        primitives[i].object = t.object;
-        primitives[i].normals = t.smooth ? normals++ : CRT_NONE;
-    }
-    return primitives;
-}
-
-std::vector<kernel::CrtNormals> compileNormals(const FlatScene& flat) {
-    const auto smooth = std::count_if(flat.triangles.begin(), flat.triangles.end(),
-                                      [](const FlatTriangle& t) { return t.smooth; });
-    std::vector<kernel::CrtNormals> normals;
-    normals.reserve(static_cast<std::size_t>(smooth));
-    for (const FlatTriangle& t : flat.triangles) {
-        if (!t.smooth) continue;
-        kernel::CrtNormals& n = normals.emplace_back();
-        for (std::size_t v = 0; v < 3; ++v)
-            for (std::size_t k = 0; k < 3; ++k) n.n[3 * k + v] = static_cast<float>(t.normals[v][k]);
-    }
-    return normals;
+void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
+                       const std::vector<std::uint32_t>& light_of,
+                       std::span<kernel::CrtPrimitive> primitives) {
+    constexpr std::size_t kPart = std::size_t{1} << 16;
+    std::vector<std::uint32_t> first_normal(partsOf(primitives.size(), kPart));
+    parallelFor(primitives.size(), kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) first_normal[first / kPart] += flat.triangles[i].smooth;
+    });
+    std::uint32_t before = 0;
+    for (std::uint32_t& normals : first_normal) before += std::exchange(normals, before);
+    parallelFor(primitives.size(), kPart, [&](std::size_t first, std::size_t end) {
+        std::uint32_t normal = first_normal[first / kPart];
+        for (std::size_t i = first; i < end; ++i) {
+            const FlatTriangle& t = flat.triangles[i];
+            primitives[i].material =
+                static_cast<std::uint32_t>(isKnown(t, scene_materials) ? t.material : scene_materials);
+            primitives[i].light = light_of[i];
+            primitives[i].object = t.object;
+            primitives[i].normals = t.smooth ? normal++ : CRT_NONE;
+        }
+    });
 }
 
 }  // namespace crt

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace crt {
@@ -25,11 +26,9 @@ struct MaterialPart {
 };
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const SpectrumTable& spectra);
 
-/// By primitive id. `light_of` as of LightPart.
-std::vector<kernel::CrtPrimitive> compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
-                                                    const std::vector<std::uint32_t>& light_of);
-
-/// Of the smooth triangles, in the order of their ids.
-std::vector<kernel::CrtNormals> compileNormals(const FlatScene& flat);
+/// Fills in one a triangle, by primitive id. `light_of` as of LightPart.
+void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
+                       const std::vector<std::uint32_t>& light_of,
+                       std::span<kernel::CrtPrimitive> primitives);
 
 }  // namespace crt

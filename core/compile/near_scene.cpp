@@ -1,6 +1,7 @@
 #include "compile/near_scene.h"
 
 #include "base/log.h"
+#include "base/parallel.h"
 #include "compile/blob_writer.h"
 #include "compile/bvh_build.h"
 #include "compile/near_surfaces.h"
@@ -18,6 +19,8 @@ using kernel::CrtFace;
 using kernel::CrtPrimitive;
 using kernel::CrtTriangle;
 using kernel::u64;  // CRT_ARRAY computes with it
+
+constexpr std::size_t kPart = std::size_t{1} << 16;  // of what a thread looks at, at a time
 
 TriangleBounds boundsOf(const CrtTriangle& triangle, float padding) {
     TriangleBounds b{};
@@ -109,8 +112,7 @@ std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kern
     const auto* faces = CRT_ARRAY(CrtFace, scene.data(), header.faces);
     const auto* primitives = CRT_ARRAY(CrtPrimitive, scene.data(), header.primitives);
     const std::uint32_t count = header.triangle_count;
-    float largest = 0;
-    for (std::uint32_t slot = 0; slot < count; ++slot) largest = std::max(largest, faces[slot].clearance);
+    const float largest = largestClearance(faces, count);
     // Whatever near_surfaces.h reaches for begins within this of the triangle that it asks about: rays go as
     // far as the largest clearance, and begin some epsilon off.
     const float reach = 2 * largest + 64 * CRT_EPSILON;
@@ -131,9 +133,14 @@ std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kern
         }
         all = !cells.mark(middle) || all;
     }
+    std::vector<std::vector<std::uint32_t>> parts(partsOf(count, kPart));
+    parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t slot = first; slot < end; ++slot)
+            if (all || cells.anyMarked(boundsOf(triangles[slot], reach)))
+                parts[first / kPart].push_back(static_cast<std::uint32_t>(slot));
+    });
     std::vector<std::uint32_t> near;
-    for (std::uint32_t slot = 0; slot < count; ++slot)
-        if (all || cells.anyMarked(boundsOf(triangles[slot], reach))) near.push_back(slot);
+    for (const std::vector<std::uint32_t>& part : parts) near.insert(near.end(), part.begin(), part.end());
     return near;
 }
 

@@ -2,6 +2,7 @@
 
 #include "kernel/path.h"
 
+#include "base/parallel.h"
 #include "base/vec3d.h"
 
 #include <algorithm>
@@ -190,6 +191,16 @@ std::vector<std::uint32_t> askedTriangles(std::uint64_t triangles) {
     return ids;
 }
 
+float largestClearance(const kernel::CrtFace* faces, std::size_t count) {
+    constexpr std::size_t kPart = std::size_t{1} << 18;
+    std::vector<float> largest(partsOf(count, kPart), 0.0f);
+    parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i)
+            largest[first / kPart] = std::max(largest[first / kPart], faces[i].clearance);
+    });
+    return largest.empty() ? 0.0f : *std::max_element(largest.begin(), largest.end());
+}
+
 std::uint64_t askedEmitterStep(std::uint64_t emitters) {
     return std::max<std::uint64_t>(1, emitters / kEmitters);
 }
@@ -236,8 +247,7 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
     const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
     const auto* faces = CRT_ARRAY(CrtFace, context.blob, context.scene->faces);
     const u32 count = context.scene->triangle_count;
-    float largest = 0;
-    for (u32 slot = 0; slot < count; ++slot) largest = std::max(largest, faces[slot].clearance);
+    const float largest = largestClearance(faces, count);
 
     NearSurfaces found;
     const std::vector<std::uint32_t> slots = slotsOf(scene, context);

@@ -3,7 +3,9 @@
 #pragma once
 
 #include "compile/compile.h"
+#include "kernel/layout.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -11,9 +13,9 @@
 namespace crt {
 
 struct NearSurfaces {
-    std::uint64_t asked = 0;     ///< Triangles that were looked at: all, or an even choice of them.
-    std::uint64_t near = 0;      ///< Of those: with another surface nearer than the clearance of either
-                                 ///< (kernel/surface.h), yet not touching.
+    std::uint64_t asked = 0;  ///< Triangles that were looked at: all, or an even choice of them.
+    std::uint64_t near = 0;   ///< Of those: with another surface nearer than the clearance of either
+                              ///< (kernel/surface.h), yet not touching.
     double nearest_clearance =
         0;  ///< The largest clearance that was too large for its neighbour, in the author's units.
 };
@@ -22,6 +24,9 @@ struct NearSurfaces {
 std::vector<std::uint32_t> askedTriangles(std::uint64_t triangles);
 /// findCoplanarLight asks about emitters whose numbers are multiples of this.
 std::uint64_t askedEmitterStep(std::uint64_t emitters);
+
+/// Of so many faces; 0 where there is none.
+float largestClearance(const kernel::CrtFace* faces, std::size_t count);
 
 /// A lamp in the plane of another surface, which it overlaps: rays meet both at one distance but for
 /// rounding, and see now one, now the other.

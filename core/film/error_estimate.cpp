@@ -1,5 +1,7 @@
 #include "film/error_estimate.h"
 
+#include "base/parallel.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -43,9 +45,13 @@ public:
     template <class Function>
     PixelMap(const Film& film, const Function& function)
         : width_(film.shape().width), height_(film.shape().height) {
-        values_.reserve(std::size_t{width_} * height_);
-        for (std::uint32_t y = 0; y < height_; ++y)
-            for (std::uint32_t x = 0; x < width_; ++x) values_.push_back(function(x, y));
+        constexpr std::size_t kRows = 16;
+        values_.resize(std::size_t{width_} * height_);
+        parallelFor(height_, kRows, [&](std::size_t first, std::size_t end) {
+            for (auto y = static_cast<std::uint32_t>(first); y < end; ++y)
+                for (std::uint32_t x = 0; x < width_; ++x)
+                    values_[std::size_t{y} * width_ + x] = function(x, y);
+        });
     }
     double at(std::uint32_t x, std::uint32_t y) const { return values_[std::size_t{y} * width_ + x]; }
     /// Of what is known; 0 when nothing is.
@@ -107,11 +113,17 @@ VarianceSums sumsOf(const Film& film, const PixelMap& variances, PixelSet which)
 /// distribution of samples.
 double measuredSpread(const Film& film, const LuminanceVariance& variance, const PixelMap& variances,
                       PixelSet which, const VarianceSums& sums, double largest, double luminance) {
+    // Each pixel's part by any thread, their sum in one order.
     const auto total = [&](const auto& of) {
+        const auto counts = [&](std::uint32_t x, std::uint32_t y) {
+            return belongs(x, y, which) && variances.known(x, y);
+        };
+        const PixelMap parts(
+            film, [&](std::uint32_t x, std::uint32_t y) { return counts(x, y) ? of(x, y) : 0.0; });
         double sum = 0;
         for (std::uint32_t y = 0; y < film.shape().height; ++y)
             for (std::uint32_t x = 0; x < film.shape().width; ++x)
-                if (belongs(x, y, which) && variances.known(x, y)) sum += of(x, y);
+                if (counts(x, y)) sum += parts.at(x, y);
         return sum;
     };
     if (variance.fromReplicates() && variance.degreesOfFreedom() >= 3)

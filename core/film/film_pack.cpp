@@ -1,6 +1,7 @@
 #include "film/film_pack.h"
 
 #include "base/error.h"
+#include "base/parallel.h"
 
 #include <fmt/format.h>
 #include <zstd.h>
@@ -44,24 +45,25 @@ std::array<Section<Byte>, 3> sectionsOf(AnyFilm& film) {
     return {section(film.sums, pixels), section(film.counts, pixels), section(film.primitives, pixels)};
 }
 
+/// Packs planes of a film one after the other.
 class Packer {
 public:
     Packer() : context_(ZSTD_createCCtx()), packed_(ZSTD_compressBound(kPackedPixels)) {
         if (!context_) throw std::bad_alloc();
     }
 
-    void add(const Section<const unsigned char>& section) {
-        for (std::size_t first = 0; first < section.records; first += kPackedPixels) {
-            const std::size_t count = std::min(kPackedPixels, section.records - first);
-            const unsigned char* block = section.data + first * section.bytes;
-            for (std::size_t byte = 0; byte < section.bytes; ++byte) {
-                plane_.resize(count);
-                for (std::size_t i = 0; i < count; ++i) plane_[i] = block[i * section.bytes + byte];
-                addPlane();
-            }
+    /// The planes of the records first, …, end − 1, at most kPackedPixels.
+    std::vector<unsigned char> pack(const Section<const unsigned char>& section, std::size_t first,
+                                    std::size_t end) {
+        bytes_.clear();
+        const unsigned char* block = section.data + first * section.bytes;
+        plane_.resize(end - first);
+        for (std::size_t byte = 0; byte < section.bytes; ++byte) {
+            for (std::size_t i = 0; i < plane_.size(); ++i) plane_[i] = block[i * section.bytes + byte];
+            addPlane();
         }
+        return std::move(bytes_);
     }
-    std::vector<unsigned char> take() { return std::move(bytes_); }
 
 private:
     void addPlane() {
@@ -135,10 +137,20 @@ private:
 }  // namespace
 
 std::vector<unsigned char> packFilm(const Film& film) {
-    Packer packer;
-    for (const Section<const unsigned char>& section : sectionsOf<const unsigned char>(film))
-        packer.add(section);
-    return packer.take();
+    std::vector<unsigned char> all;
+    for (const Section<const unsigned char>& section : sectionsOf<const unsigned char>(film)) {
+        // Each block is packed for itself, so that any number of threads make the same bytes.
+        std::vector<std::vector<unsigned char>> blocks(partsOf(section.records, kPackedPixels));
+        parallelFor(section.records, kPackedPixels, [&](std::size_t first, std::size_t end) {
+            blocks[first / kPackedPixels] = Packer().pack(section, first, end);
+        });
+        std::size_t bytes = all.size();
+        for (const std::vector<unsigned char>& block : blocks) bytes += block.size();
+        all.reserve(bytes);
+        for (const std::vector<unsigned char>& block : blocks)
+            all.insert(all.end(), block.begin(), block.end());
+    }
+    return all;
 }
 
 unsigned __int128 leastPackedBytes(const FilmShape& shape) {

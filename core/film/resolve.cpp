@@ -1,6 +1,7 @@
 #include "film/resolve.h"
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "film/error_estimate.h"
 #include "film/luminance_error.h"
 #include "image/image_metadata.h"
@@ -68,42 +69,50 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
 
     const LuminanceVariance variance(film);
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
-    image.pixels.reserve(pixels * image.channels.size());
-    image.integers.reserve(pixels * image.integer_channels.size());
-    const auto append = [&image](const Vec3d& v) {
-        for (const double component : v) image.pixels.push_back(static_cast<float>(component));
-    };
-    for (std::uint32_t y = 0; y < shape.height; ++y)
-        for (std::uint32_t x = 0; x < shape.width; ++x) {
-            const auto triple = [&](std::uint32_t c) {
-                return Vec3d{film.mean(x, y, c), film.mean(x, y, c + 1), film.mean(x, y, c + 2)};
-            };
-            const auto add = [&](double value) { image.pixels.push_back(static_cast<float>(value)); };
-            const std::size_t pixel = std::size_t{y} * shape.width + x;
-            append(multiply(color, triple(0)));
-            const auto error = [&](std::uint32_t i, std::uint32_t j) {
-                return std::sqrt(variance(i, j)) * luminanceGain(triple(0));
-            };
-            // In the order of the names above.
-            for (const AovRow& row : kAovRows) {
-                if ((aovs & row.aov) == 0) continue;
-                const std::uint32_t first = firstChannel(shape.aovs, row.aov);
-                switch (row.aov) {
-                    case kAovAlbedo: append(multiply(albedo_color, triple(first))); break;
-                    case kAovNormal: append(triple(first)); break;
-                    case kAovDepth: add(film.mean(x, y, first)); break;
-                    case kAovSquares:
-                    case kAovReplicates: break;
-                    case kAovPrimitive: image.integers.push_back(film.primitives[pixel]); break;
-                    case kAovVariance: add(error(x, y) * error(x, y)); break;
-                    case kAovSamples:
-                        image.integers.push_back(static_cast<std::uint32_t>(std::min<std::uint64_t>(
-                            film.counts[pixel], std::numeric_limits<std::uint32_t>::max())));
-                        break;
-                    case kAovError: add(error(x, y)); break;
-                }
+    image.pixels.resize(pixels * image.channels.size());
+    image.integers.resize(pixels * image.integer_channels.size());
+    const auto resolvePixel = [&](std::uint32_t x, std::uint32_t y, float* out, std::uint32_t* integers) {
+        const auto triple = [&](std::uint32_t c) {
+            return Vec3d{film.mean(x, y, c), film.mean(x, y, c + 1), film.mean(x, y, c + 2)};
+        };
+        const auto add = [&](double value) { *out++ = static_cast<float>(value); };
+        const auto append = [&](const Vec3d& v) {
+            for (const double component : v) add(component);
+        };
+        const std::size_t pixel = std::size_t{y} * shape.width + x;
+        append(multiply(color, triple(0)));
+        const auto error = [&](std::uint32_t i, std::uint32_t j) {
+            return std::sqrt(variance(i, j)) * luminanceGain(triple(0));
+        };
+        // In the order of the names above.
+        for (const AovRow& row : kAovRows) {
+            if ((aovs & row.aov) == 0) continue;
+            const std::uint32_t first = firstChannel(shape.aovs, row.aov);
+            switch (row.aov) {
+                case kAovAlbedo: append(multiply(albedo_color, triple(first))); break;
+                case kAovNormal: append(triple(first)); break;
+                case kAovDepth: add(film.mean(x, y, first)); break;
+                case kAovSquares:
+                case kAovReplicates: break;
+                case kAovPrimitive: *integers++ = film.primitives[pixel]; break;
+                case kAovVariance: add(error(x, y) * error(x, y)); break;
+                case kAovSamples:
+                    *integers++ = static_cast<std::uint32_t>(std::min<std::uint64_t>(
+                        film.counts[pixel], std::numeric_limits<std::uint32_t>::max()));
+                    break;
+                case kAovError: add(error(x, y)); break;
             }
         }
+    };
+    constexpr std::size_t kRows = 16;
+    parallelFor(shape.height, kRows, [&](std::size_t first, std::size_t end) {
+        for (auto y = static_cast<std::uint32_t>(first); y < end; ++y)
+            for (std::uint32_t x = 0; x < shape.width; ++x) {
+                const std::size_t pixel = std::size_t{y} * shape.width + x;
+                resolvePixel(x, y, image.pixels.data() + pixel * image.channels.size(),
+                             image.integers.data() + pixel * image.integer_channels.size());
+            }
+    });
 
     image.chromaticities = chromaticities(space);
     // Who rendered it, where and when is for the caller to add.

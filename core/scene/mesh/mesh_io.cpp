@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/input_file.h"
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/stage.h"
 #include "base/vec3d.h"
 #include "scene/mesh/material_files.h"
@@ -15,6 +16,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -64,96 +66,168 @@ public:
         normaliseNormals();
         if (options_.use_mtl) files_ = readMaterialFiles(obj_, path_);
         material_index_.assign(obj_.material_names.size(), -1);
-        Stage stage("making triangles of " + std::filesystem::path(path_).filename().string(),
-                    static_cast<double>(obj_.faces.size()));
-        double done = 0;
-        for (const ObjFace& face : obj_.faces) {
-            add(face);
-            stage.at(++done);
-        }
-        if (out_.mesh.triangles.empty()) failForWantOfFaces();
+        makeTriangles();
+        for (const Part& part : parts_) join(part);
+        if (triangles_ == 0) failForWantOfFaces();
+        joinTriangles();
         finish();
         return std::move(out_);
     }
 
 private:
+    /// The triangles of a block of faces.
+    struct Part {
+        std::vector<std::array<std::uint32_t, 3>> triangles, normals;  ///< Normals where the file has any.
+        std::vector<std::int32_t> material;  ///< As of ObjFace, where the file names any.
+        std::vector<std::int32_t> used;      ///< Materials, in the order in which faces use them.
+        ObjLoss wild_normals;
+        std::uint64_t flat_faces = 0, faces_without_position = 0, degenerate = 0, crossing = 0;
+        bool any_smooth = false;
+    };
+
     /// To unit length; those without a direction become NaN.
     void normaliseNormals() {
-        for (Vec3d& n : obj_.normals) {
-            const double scale =
-                maxAbs(n);  // First to size one: squares of very long or short normals would not fit.
-            for (double& x : n) x /= scale;
-            const double unit = length(n);
-            for (double& x : n) x /= unit;
-            if (isNumber(n) && std::isfinite(unit)) continue;
-            n.fill(std::numeric_limits<double>::quiet_NaN());
+        constexpr std::size_t kNormals = std::size_t{1} << 14;
+        parallelFor(obj_.normals.size(), kNormals, [this](std::size_t first, std::size_t end) {
+            for (std::size_t i = first; i < end; ++i) {
+                Vec3d& n = obj_.normals[i];
+                const double scale =
+                    maxAbs(n);  // First to size one: squares of very long or short normals would not fit.
+                for (double& x : n) x /= scale;
+                const double unit = length(n);
+                for (double& x : n) x /= unit;
+                if (isNumber(n) && std::isfinite(unit)) continue;
+                n.fill(std::numeric_limits<double>::quiet_NaN());
+            }
+        });
+    }
+
+    /// Frees the faces that they are made of.
+    void makeTriangles() {
+        parts_.resize(obj_.blocks.size());
+        std::size_t faces = 0;
+        for (const ObjBlock& block : obj_.blocks) faces += block.faces.size();
+        any_faces_ = faces > 0;
+        Stage stage("making triangles of " + std::filesystem::path(path_).filename().string(),
+                    static_cast<double>(faces));
+        std::atomic<std::size_t> done{0};
+        parallelFor(parts_.size(), 1, [&](std::size_t i, std::size_t) {
+            ObjBlock block = std::exchange(obj_.blocks[i], {});
+            makeTriangles(block, parts_[i]);
+            stage.at(static_cast<double>(done += block.faces.size()));
+        });
+    }
+
+    void makeTriangles(const ObjBlock& block, Part& part) const {
+        Triangulator triangulator;
+        std::vector<Vec3d> polygon;
+        std::vector<bool> known(obj_.material_names.size(), false);
+        part.triangles.reserve(block.faces.size());
+        for (const ObjFace& face : block.faces) {
+            const std::span<const ObjCorner> corners(&block.corners[face.first_corner], face.corner_count);
+            if (!takeCorners(face, corners, polygon, part)) continue;
+            if (face.material >= 0 && !known[static_cast<std::size_t>(face.material)]) {
+                known[static_cast<std::size_t>(face.material)] = true;
+                part.used.push_back(face.material);
+            }
+            for (const PolygonTriangle& triangle : triangulator.split(polygon))
+                addTriangle(triangle, face, corners, polygon, part);
         }
+        part.crossing = triangulator.crossingPolygons();
     }
 
-    bool usable(std::int64_t normal) const {
-        return normal >= 0 && normal < static_cast<std::int64_t>(obj_.normals.size()) &&
-               isNumber(obj_.normals[static_cast<std::size_t>(normal)]);
+    bool usable(std::uint32_t normal) const {
+        return normal < kBadObjNormal && isNumber(obj_.normals[normal]);
     }
 
-    void add(const ObjFace& face) {
-        const std::span<const ObjCorner> corners(&obj_.corners[face.first_corner], face.corner_count);
+    /// Into `polygon`; false for a face that cannot be seen.
+    bool takeCorners(const ObjFace& face, std::span<const ObjCorner> corners, std::vector<Vec3d>& polygon,
+                     Part& part) const {
         bool lost_position = false, lost_normal = false;
-        polygon_.clear();
+        polygon.clear();
         for (const ObjCorner& corner : corners) {
-            if (corner.position >= static_cast<std::int64_t>(obj_.positions.size()))
-                fail(fmt::format("a face names vertex {}, but the file has {}", corner.position + 1,
-                                 obj_.positions.size()),
-                     path_, face.line);
-            polygon_.push_back(obj_.positions[static_cast<std::size_t>(corner.position)]);
-            lost_position |= !isNumber(polygon_.back());
+            polygon.push_back(obj_.positions[corner.position]);
+            lost_position |= !isNumber(polygon.back());
             if (corner.normal == kNoObjNormal || usable(corner.normal)) continue;
             lost_normal = true;
-            if (corner.normal == kBadObjNormal ||
-                corner.normal >= static_cast<std::int64_t>(obj_.normals.size()))
-                wild_normals_.add(face.line, "");
+            if (corner.normal == kBadObjNormal) part.wild_normals.add(face.line, "");
         }
-        if (lost_position) {
-            ++faces_without_position_;
-            return;
-        }
-        flat_faces_ += lost_normal;
-        const std::int32_t material = materialOf(face);
-        for (const PolygonTriangle& triangle : triangulator_.split(polygon_)) {
-            std::array<std::uint32_t, 3> position, normal;
-            bool smooth = true;
-            for (std::size_t k = 0; k < 3; ++k) {
-                const ObjCorner& corner = corners[triangle[k]];
-                position[k] = static_cast<std::uint32_t>(corner.position);
-                normal[k] = static_cast<std::uint32_t>(corner.normal);
-                smooth &= usable(corner.normal);
-            }
-            if (isDegenerate(polygon_[triangle[0]], polygon_[triangle[1]], polygon_[triangle[2]])) {
-                ++out_.degenerate_faces;
-                continue;
-            }
-            if (!smooth) normal.fill(kNoNormal);
-            any_smooth_ |= smooth;
-            out_.mesh.triangles.push_back(position);
-            out_.mesh.normal_index.push_back(normal);
-            out_.mesh.material.push_back(material);
-        }
+        part.faces_without_position += lost_position;
+        part.flat_faces += !lost_position && lost_normal;
+        return !lost_position;
     }
 
-    std::int32_t materialOf(const ObjFace& face) {
-        if (!options_.use_mtl || face.material < 0) return -1;
-        const auto number = static_cast<std::size_t>(face.material);
-        if (material_index_[number] >= 0) return material_index_[number];
-        LoadedMaterial loaded{obj_.material_names[number], std::nullopt};
+    void addTriangle(const PolygonTriangle& triangle, const ObjFace& face,
+                     std::span<const ObjCorner> corners, const std::vector<Vec3d>& polygon,
+                     Part& part) const {
+        if (isDegenerate(polygon[triangle[0]], polygon[triangle[1]], polygon[triangle[2]])) {
+            ++part.degenerate;
+            return;
+        }
+        std::array<std::uint32_t, 3> position, normal;
+        bool smooth = true;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const ObjCorner& corner = corners[triangle[k]];
+            position[k] = corner.position;
+            normal[k] = corner.normal;
+            smooth &= usable(corner.normal);
+        }
+        if (!smooth) normal.fill(kNoNormal);
+        part.any_smooth |= smooth;
+        part.triangles.push_back(position);
+        if (!obj_.normals.empty()) part.normals.push_back(normal);
+        if (namesMaterials()) part.material.push_back(face.material);
+    }
+
+    bool namesMaterials() const { return options_.use_mtl && !obj_.material_names.empty(); }
+
+    /// Counts, and materials in the order in which the faces of the file use them.
+    void join(const Part& part) {
+        triangles_ += part.triangles.size();
+        wild_normals_.add(part.wild_normals);
+        flat_faces_ += part.flat_faces;
+        faces_without_position_ += part.faces_without_position;
+        out_.degenerate_faces += part.degenerate;
+        crossing_polygons_ += part.crossing;
+        any_smooth_ |= part.any_smooth;
+        if (options_.use_mtl)
+            for (const std::int32_t name : part.used) addMaterial(static_cast<std::size_t>(name));
+    }
+
+    void addMaterial(std::size_t name) {
+        if (material_index_[name] >= 0) return;
+        LoadedMaterial loaded{obj_.material_names[name], std::nullopt};
         if (const auto defined = files_.materials.find(loaded.name); defined != files_.materials.end())
             loaded.mtl = mapMtlMaterial(defined->second, options_.color, summary_);
-        material_index_[number] = static_cast<std::int32_t>(out_.materials.size());
+        material_index_[name] = static_cast<std::int32_t>(out_.materials.size());
         out_.materials.push_back(std::move(loaded));
-        return material_index_[number];
+    }
+
+    void joinTriangles() {
+        Mesh& mesh = out_.mesh;
+        mesh.triangles.resize(triangles_);
+        if (any_smooth_) mesh.normal_index.resize(triangles_);
+        if (!out_.materials.empty()) mesh.material.resize(triangles_);
+        std::vector<std::size_t> first(parts_.size());
+        for (std::size_t i = 1; i < parts_.size(); ++i)
+            first[i] = first[i - 1] + parts_[i - 1].triangles.size();
+        parallelFor(parts_.size(), 1, [&](std::size_t i, std::size_t) {
+            const Part part = std::exchange(parts_[i], {});
+            const auto at = static_cast<std::ptrdiff_t>(first[i]);
+            std::copy(part.triangles.begin(), part.triangles.end(), mesh.triangles.begin() + at);
+            if (any_smooth_)
+                std::copy(part.normals.begin(), part.normals.end(), mesh.normal_index.begin() + at);
+            if (!out_.materials.empty())
+                std::transform(part.material.begin(), part.material.end(), mesh.material.begin() + at,
+                               [this](std::int32_t name) {
+                                   return name < 0 ? -1 : material_index_[static_cast<std::size_t>(name)];
+                               });
+        });
     }
 
     [[noreturn]] void failForWantOfFaces() const {
         const ObjLoss& bad = obj_.bad_positions;
-        if (bad.count > 0 && (faces_without_position_ > 0 || obj_.faces.empty()))
+        if (bad.count > 0 && (faces_without_position_ > 0 || !any_faces_))
             fail(bad.sentence, path_, bad.line);
         if (out_.degenerate_faces > 0) fail("no face of this mesh has an area", path_);
         if (obj_.small_faces.count > 0) fail(obj_.small_faces.sentence, path_, obj_.small_faces.line);
@@ -189,11 +263,7 @@ private:
             if (!isNumber(p)) p = mesh.positions[mesh.triangles.front()[0]];
         for (Vec3d& n : obj_.normals)
             if (!isNumber(n)) n = {0, 0, 0};
-        if (any_smooth_)
-            mesh.normals = std::move(obj_.normals);
-        else
-            mesh.normal_index.clear();
-        if (out_.materials.empty()) mesh.material.clear();
+        if (any_smooth_) mesh.normals = std::move(obj_.normals);
     }
 
     void sayWhatIsLost() const {
@@ -214,9 +284,9 @@ private:
         else if (flat_faces_ > 0)
             logWarning("{}: {} shaded flat: a normal of theirs has no direction", path_,
                        counted(flat_faces_, "face"));
-        if (triangulator_.crossingPolygons() > 0)
+        if (crossing_polygons_ > 0)
             logWarning("{}: {} may be split wrongly, because their outlines cross themselves", path_,
-                       counted(triangulator_.crossingPolygons(), "polygon"));
+                       counted(crossing_polygons_, "polygon"));
     }
 
     /// "'a.mtl' or 'b.mtl'"
@@ -272,25 +342,31 @@ private:
     MtlSummary summary_;
     LoadedMesh out_;
     std::vector<std::int32_t> material_index_;  ///< By the number of the name in the OBJ; −1: not used yet.
-    Triangulator triangulator_;
-    std::vector<Vec3d> polygon_;
+    std::vector<Part> parts_;
     ObjLoss wild_normals_;
-    std::uint64_t flat_faces_ = 0, faces_without_position_ = 0;
-    bool any_smooth_ = false;
+    std::size_t triangles_ = 0;
+    std::uint64_t flat_faces_ = 0, faces_without_position_ = 0, crossing_polygons_ = 0;
+    bool any_faces_ = false, any_smooth_ = false;
 };
+
+/// What an OBJ says. Its text is gone when this returns.
+ObjContents readContents(const std::string& path) {
+    Stage stage("reading " + std::filesystem::path(path).filename().string());
+    const std::string text = readTextFile(path, "mesh", kMostMeshBytes, {path});
+    if (const std::string format = otherFormat(text); !format.empty())
+        fail(fmt::format("this is {}; crt reads OBJ", format), path);
+    ObjContents obj = readObj(text, path, stage);
+    const bool any_faces = std::any_of(obj.blocks.begin(), obj.blocks.end(),
+                                       [](const ObjBlock& block) { return !block.faces.empty(); });
+    if (!any_faces && looksLikeMtl(text))
+        fail("this is a material file (MTL); name the OBJ that uses it", path);
+    return obj;
+}
 
 }  // namespace
 
 LoadedMesh loadObj(const std::string& path, const ObjOptions& options) {
-    std::optional<Stage> stage(std::in_place, "reading " + std::filesystem::path(path).filename().string());
-    const std::string text = readTextFile(path, "mesh", kMostMeshBytes, {path});
-    if (const std::string format = otherFormat(text); !format.empty())
-        fail(fmt::format("this is {}; crt reads OBJ", format), path);
-    ObjContents obj = readObj(text, path, *stage);
-    stage.reset();
-    if (obj.faces.empty() && looksLikeMtl(text))
-        fail("this is a material file (MTL); name the OBJ that uses it", path);
-    return MeshBuilder(std::move(obj), path, options).build();
+    return MeshBuilder(readContents(path), path, options).build();
 }
 
 }  // namespace crt

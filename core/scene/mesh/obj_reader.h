@@ -1,5 +1,5 @@
-/// The text of an OBJ file → what its statements say. Faces may name vertices that follow them, so indices
-/// are checked by whoever puts the mesh together.
+/// The text of an OBJ file → what its statements say. Blocks of lines are read at the same time, and give
+/// what one reader from the first line to the last would give.
 #pragma once
 
 #include "base/stage.h"
@@ -12,20 +12,28 @@
 
 namespace crt {
 
-/// One corner of a face, counted from 0.
+/// One corner of a face, counted from 0. All positions are there.
 struct ObjCorner {
-    std::int64_t position;
-    std::int64_t normal;  ///< kNoObjNormal where it names none, kBadObjNormal where that is not to be read.
+    std::uint32_t position;
+    std::uint32_t normal;  ///< kNoObjNormal where it names none, kBadObjNormal where that is not there.
+    bool operator==(const ObjCorner&) const = default;
 };
-inline constexpr std::int64_t kNoObjNormal = -1;
-inline constexpr std::int64_t kBadObjNormal = -2;
+inline constexpr std::uint32_t kNoObjNormal = 0xffffffffu;
+inline constexpr std::uint32_t kBadObjNormal = 0xfffffffeu;
 
 /// A polygon: a run of corners, its material, and where it stands in the file.
 struct ObjFace {
-    std::size_t first_corner;
+    std::uint32_t first_corner;  ///< In its block.
     std::uint32_t corner_count;
     std::int32_t material;  ///< Index into material_names; −1 none.
     int line;
+    bool operator==(const ObjFace&) const = default;
+};
+
+/// The faces of some lines.
+struct ObjBlock {
+    std::vector<ObjCorner> corners;
+    std::vector<ObjFace> faces;
 };
 
 /// Something wrong that costs a part of the file and not the file: how often, and the first of them.
@@ -37,13 +45,17 @@ struct ObjLoss {
     void add(int at_line, const std::string& what) {
         if (count++ == 0) line = at_line, sentence = what;
     }
+    /// What was found behind it, in lines counted from `first_line`.
+    void add(const ObjLoss& behind, int first_line = 0) {
+        if (count == 0 && behind.count > 0) line = behind.line + first_line, sentence = behind.sentence;
+        count += behind.count;
+    }
 };
 
 struct ObjContents {
-    std::vector<Vec3d> positions;  ///< NaN where they cannot be read.
-    std::vector<Vec3d> normals;    ///< As they stand there; NaN where they cannot be read.
-    std::vector<ObjCorner> corners;
-    std::vector<ObjFace> faces;
+    std::vector<Vec3d> positions;             ///< NaN where they cannot be read.
+    std::vector<Vec3d> normals;               ///< As they stand there; NaN where they cannot be read.
+    std::vector<ObjBlock> blocks;             ///< In the order of the file.
     std::vector<std::string> material_names;  ///< Of usemtl, each once.
     struct Library {
         std::string arguments;
@@ -56,8 +68,12 @@ struct ObjContents {
     bool vertex_colors = false;
 };
 
+inline constexpr std::size_t kObjBlockBytes = std::size_t{1} << 20;
+
 /// Reads an OBJ and says in `stage` how far it is. Numbers are correctly rounded. Throws crt::Error(Scene)
-/// with file:line for a corner of a face that names no vertex.
-ObjContents readObj(std::string_view text, const std::string& path, Stage& stage);
+/// with file:line for a corner of a face that names no vertex. `block_bytes` changes nothing but what a
+/// thread reads at a time.
+ObjContents readObj(std::string_view text, const std::string& path, Stage& stage,
+                    std::size_t block_bytes = kObjBlockBytes);
 
 }  // namespace crt

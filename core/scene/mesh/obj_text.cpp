@@ -11,7 +11,7 @@
 namespace crt {
 namespace {
 
-constexpr std::string_view kBlank = " \t\v\f";
+bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
 /// UTF-16 with its mark of order as UTF-8. Surrogates stay apart: they stand in names at most, and the same
 /// name gives the same bytes.
@@ -46,18 +46,20 @@ std::string readTextFile(const std::string& path, const char* kind, std::uint64_
 }
 
 std::string_view nextField(std::string_view& line) {
-    line.remove_prefix(std::min(line.find_first_not_of(kBlank), line.size()));
-    if (line.starts_with('#')) line = {};
-    const std::string_view field = line.substr(0, line.find_first_of(kBlank));
-    line.remove_prefix(field.size());
-    return field;
+    const char *at = line.data(), *const end = at + line.size();
+    while (at != end && isBlank(*at)) ++at;
+    if (at != end && *at == '#') at = end;
+    const char* const first = at;
+    while (at != end && !isBlank(*at)) ++at;
+    line = {at, static_cast<std::size_t>(end - at)};
+    return {first, static_cast<std::size_t>(at - first)};
 }
 
 std::string_view trimmed(std::string_view text) {
-    constexpr std::string_view kBlankOrEnd = " \t\v\f\r";
-    const std::size_t first = text.find_first_not_of(kBlankOrEnd);
-    if (first == std::string_view::npos) return {};
-    return text.substr(first, text.find_last_not_of(kBlankOrEnd) + 1 - first);
+    const auto isEdge = [](char c) { return isBlank(c) || c == '\r'; };
+    while (!text.empty() && isEdge(text.back())) text.remove_suffix(1);
+    while (!text.empty() && isEdge(text.front())) text.remove_prefix(1);
+    return text;
 }
 
 std::string inQuotes(std::string_view name) {
@@ -77,13 +79,14 @@ std::optional<double> numberOf(std::string_view field) {
     return number;
 }
 
-TextLines::TextLines(std::string_view text) : rest_(text) {
-    if (rest_.starts_with("\xEF\xBB\xBF")) rest_.remove_prefix(3);
+TextLines::TextLines(std::string_view text, bool start_of_file) : rest_(text) {
+    if (start_of_file && rest_.starts_with("\xEF\xBB\xBF")) rest_.remove_prefix(3);
 }
 
 /// Takes one line of the file off the text.
 std::string_view TextLines::physicalLine() {
-    const std::size_t end = std::min(rest_.find_first_of("\r\n"), rest_.size());
+    std::size_t end = 0;
+    while (end < rest_.size() && rest_[end] != '\n' && rest_[end] != '\r') ++end;
     const std::string_view line = trimmed(rest_.substr(0, end));
     rest_.remove_prefix(end);
     rest_.remove_prefix(rest_.starts_with("\r\n") ? 2 : std::min<std::size_t>(1, rest_.size()));
@@ -105,7 +108,8 @@ bool TextLines::next() {
             }
             line = trimmed(joined_);
         }
-        keyword_ = line.substr(0, line.find_first_of(kBlank));
+        keyword_ = line.substr(
+            0, static_cast<std::size_t>(std::find_if(line.begin(), line.end(), isBlank) - line.begin()));
         arguments_ = trimmed(line.substr(keyword_.size()));
         if (!keyword_.empty()) return true;
     }

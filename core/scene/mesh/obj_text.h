@@ -32,14 +32,16 @@ std::optional<double> numberOf(std::string_view field);
 /// line with the next.
 class TextLines {
 public:
-    /// `text` must live as long as this.
-    explicit TextLines(std::string_view text);
+    /// `text` must live as long as this. A mark of UTF-8 is left out where it is the start of its file.
+    explicit TextLines(std::string_view text, bool start_of_file = true);
 
     /// Goes to the next line that is neither blank nor a comment; false at the end of the text.
     bool next();
 
     /// Bytes of the text that are still to come.
     std::size_t bytesLeft() const { return rest_.size(); }
+    /// Lines that were read so far, blank ones and those joined to others among them.
+    int linesTaken() const { return lines_taken_; }
     /// Of the current line, counted from 1; the first of those joined.
     int number() const { return number_; }
     /// Its first word.

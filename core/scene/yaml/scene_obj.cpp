@@ -57,8 +57,8 @@ void ObjectReader::refuseObjKeys(const SectionReader& object) const {
     if (object.has("mtl")) object.error("mtl", "only an OBJ has an MTL");
 }
 
-const LoadedMesh* ObjectReader::load(const SectionReader& object, const std::string& path,
-                                     const ObjOptions& options) {
+LoadedMesh* ObjectReader::load(const SectionReader& object, const std::string& path,
+                               const ObjOptions& options) {
     const auto [file, fresh] = loaded_.try_emplace({path, options.use_mtl, options.color});
     if (fresh) {
         try {
@@ -77,7 +77,7 @@ std::optional<std::uint32_t> ObjectReader::readObj(const SectionReader& object, 
     if (!object.read("obj", name)) return std::nullopt;
     const std::optional<std::string> path = files_.locate(name, object.place("obj"), out_);
     if (!path) return std::nullopt;
-    const LoadedMesh* loaded = load(object, *path, use.options);
+    LoadedMesh* const loaded = load(object, *path, use.options);
     if (loaded == nullptr) return std::nullopt;
     checkOverrides(object, *loaded, use.overrides);
 
@@ -88,14 +88,29 @@ std::optional<std::uint32_t> ObjectReader::readObj(const SectionReader& object, 
     const auto [known, first] = meshes_.try_emplace({file, use.overrides});
     if (first) {
         known->second = static_cast<std::uint32_t>(scene_.meshes.size());
-        scene_.meshes.push_back(withSceneMaterials(*loaded, *path, use.overrides));
+        scene_.meshes.push_back(withSceneMaterials(*loaded, known->second, *path, use.overrides));
     }
     checkMaterials(object, *loaded, scene_.meshes[known->second], use);
     return known->second;
 }
 
-/// The mesh with its materials put into the scene, or those of `overrides` in their place.
-Mesh ObjectReader::withSceneMaterials(const LoadedMesh& loaded, const std::string& path,
+/// The mesh of a file: moved out of it for the first mesh of the scene that wants it, a copy of that for
+/// others.
+Mesh ObjectReader::takeMesh(LoadedMesh& loaded, std::uint32_t number) {
+    const auto [taken, first] = taken_.try_emplace(&loaded, TakenMesh{number, {}});
+    if (first) {
+        taken->second.material = loaded.mesh.material;
+        return std::move(loaded.mesh);
+    }
+    Mesh mesh = scene_.meshes[taken->second.mesh];
+    mesh.material = taken->second.material;
+    mesh.emission.clear();
+    return mesh;
+}
+
+/// The mesh, as number `mesh_number` of the scene, with its materials put into the scene, or those of
+/// `overrides` in their place.
+Mesh ObjectReader::withSceneMaterials(LoadedMesh& loaded, std::uint32_t mesh_number, const std::string& path,
                                       const Overrides& overrides) {
     const std::string file_name = std::filesystem::path(path).filename().string();
     std::vector<std::int32_t> material(loaded.materials.size(), -1), emission(loaded.materials.size(), -1);
@@ -114,7 +129,7 @@ Mesh ObjectReader::withSceneMaterials(const LoadedMesh& loaded, const std::strin
         emission[i] = static_cast<std::int32_t>(scene_.emissions.size());
         scene_.emissions.push_back(*own.mtl->emission);
     }
-    Mesh mesh = loaded.mesh;
+    Mesh mesh = takeMesh(loaded, mesh_number);
     const bool emits = std::any_of(emission.begin(), emission.end(), [](std::int32_t e) { return e >= 0; });
     for (std::int32_t& own : mesh.material) {
         const auto number = static_cast<std::size_t>(own);

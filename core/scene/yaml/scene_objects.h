@@ -42,9 +42,11 @@ private:
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
     ObjUse readObjUse(const SectionReader& object, const std::string& material);
     void refuseObjKeys(const SectionReader& object) const;
-    const LoadedMesh* load(const SectionReader& object, const std::string& path, const ObjOptions& options);
+    LoadedMesh* load(const SectionReader& object, const std::string& path, const ObjOptions& options);
     std::optional<std::uint32_t> readObj(const SectionReader& object, const ObjUse& use);
-    Mesh withSceneMaterials(const LoadedMesh& loaded, const std::string& path, const Overrides& overrides);
+    Mesh takeMesh(LoadedMesh& loaded, std::uint32_t number);
+    Mesh withSceneMaterials(LoadedMesh& loaded, std::uint32_t number, const std::string& path,
+                            const Overrides& overrides);
     void checkOverrides(const SectionReader& object, const LoadedMesh& loaded, const Overrides& overrides);
     void checkMaterials(const SectionReader& object, const LoadedMesh& loaded, const Mesh& mesh,
                         const ObjUse& use) const;
@@ -79,6 +81,12 @@ private:
     using FileUse = std::tuple<std::string, bool, MtlColor>;
     std::map<FileUse, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.
     std::map<std::pair<FileUse, Overrides>, std::uint32_t> meshes_;
+    /// Which mesh of the scene a file's went to, and the materials that it had there.
+    struct TakenMesh {
+        std::uint32_t mesh;
+        std::vector<std::int32_t> material;
+    };
+    std::map<const LoadedMesh*, TakenMesh> taken_;
 };
 
 }  // namespace crt
