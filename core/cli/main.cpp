@@ -1,6 +1,7 @@
 /// The command line: arguments → what one of job.h and commands.h takes → exit code. `--help` and
 /// `--version` open no backend and no library.
 #include "base/error.h"
+#include "base/listener.h"
 #include "base/log.h"
 #include "base/standard_output.h"
 #include "base/words.h"
@@ -793,6 +794,8 @@ private:
 int main(int argc, char** argv) {
     crt::openClosedStreams();
     crt::ignoreWriteSignals();
+    const crt::Listener listener(crt::standardErrorSink());
+    const crt::ListenerScope scope(listener);
     // One place turns everything that can be thrown into one line and an exit code.
     try {
         CommandLine command_line;
