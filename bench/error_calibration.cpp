@@ -263,7 +263,8 @@ int main(int argc, char** argv) {
                      "stop BACKEND SCENE SIDE SAMPLER SEEDS TARGET MOST\n");
         return 2;
     }
-    setLogLevel(LogLevel::Error);
+    const Listener listener(standardErrorSink(), LogLevel::Error);
+    const ListenerScope scope(listener);
     try {
         Integrator integrator(loadBackend(argv[2]), {});
         const Setup setup{&integrator, argv[3], argv[5], std::stoi(argv[4])};

@@ -222,7 +222,8 @@ int main(int argc, char** argv) {
                      "misses|offset-safety|offset-tightness|far|scale|fov|solid-angle RAYS\n");
         return 2;
     }
-    setLogLevel(LogLevel::Error);
+    const Listener listener(standardErrorSink(), LogLevel::Error);
+    const ListenerScope scope(listener);
     try {
         const LoadedBackend backend = loadBackend(argv[1]);
         Context context(backend, {}, Level::Nightly);

@@ -5,7 +5,8 @@
 #include "conformance.h"
 
 #include "base/error.h"
-#include "base/log.h"
+#include "base/listener.h"
+#include "render/session.h"
 
 #include <cstdio>
 #include <memory>
@@ -38,16 +39,10 @@ bool oneKernel() { return one_kernel; }
 
 crt::Film render(const crt::LoadedBackend& with, const crt::Scene& scene, const Run& run,
                  CrtBackendReport* report) {
-    crt::Integrator integrator(with, run.options);
-    const crt::CompiledScene compiled = crt::compileScene(scene, run.aovs, integrator.compileOptions());
-    integrator.setScene(compiled);
-    crt::RenderRange range;
-    range.first_sample = run.first_sample;
-    range.sample_count = run.samples;
-    REQUIRE(integrator.render(range));
-    crt::Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
-    integrator.readFilm(film);
-    if (report != nullptr) *report = integrator.report();
+    crt::Session session(with, run.options);
+    crt::Film film = crt::renderFilm(
+        session, scene, {.samples = run.samples, .first_sample = run.first_sample, .aovs = run.aovs});
+    if (report != nullptr) *report = session.report();
     return film;
 }
 
@@ -86,7 +81,8 @@ int main(int argc, char** argv) {
         Catch::Clara::Opt(conformance::one_kernel)["--one-kernel"](
             "the backend has no lean kernels to compare"));
     if (const int code = session.applyCommandLine(argc, argv); code != 0) return code;
-    crt::setLogLevel(crt::LogLevel::Error);
+    const crt::Listener listener(crt::standardErrorSink(), crt::LogLevel::Error);
+    const crt::ListenerScope scope(listener);
     try {
         crt::probeDevices(conformance::backend());
     } catch (const crt::Error& error) {

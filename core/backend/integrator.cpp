@@ -1,6 +1,7 @@
 #include "backend/integrator.h"
 
 #include "base/error.h"
+#include "base/listener.h"
 #include "base/log.h"
 #include "kernel/layout.h"
 
@@ -112,7 +113,8 @@ private:
 /// Lives on the heap and never moves: the plugin keeps the address of the host table.
 struct Integrator::Impl {
     LoadedBackend backend;
-    CrtHost host{};
+    const CrtHost plain_host;  ///< Its functions report to the listener of the thread that calls them.
+    CrtHost host;
     CrtIntegrator table{};
     bool created = false;
 
@@ -127,14 +129,19 @@ struct Integrator::Impl {
     // Of the call in progress. Plugins may report from any of their threads; the caller's function sees one
     // at a time.
     std::mutex progress_mutex;
+    std::mutex caller_mutex;
+    /// That of the thread which made the last call. Plugins log from any of their threads, also between calls.
+    ListenerRef caller;
     const std::function<bool(double)>* progress = nullptr;
     bool cancelled = false;
     std::exception_ptr progress_error;
 
     Impl(const LoadedBackend& loaded, const IntegratorOptions& options)
-        : backend(loaded), host(makeHost(options.use_cache)) {
+        : backend(loaded), plain_host(makeHost(options.use_cache)), host(plain_host) {
         host.user = this;
         host.progress = onProgress;
+        host.log = onLog;
+        host.kernel_source = onKernelSource;
 
         CrtCreateInfo info{};
         info.struct_size = sizeof(info);
@@ -168,6 +175,7 @@ struct Integrator::Impl {
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
 
+    /// Not a call(): what a plugin says while it ends goes to whoever made the last one.
     void destroy() noexcept {
         if (!std::exchange(created, false) || table.destroy == nullptr) return;
         try {
@@ -185,6 +193,10 @@ struct Integrator::Impl {
     /// Calls into the plugin; what is thrown there is a bug there.
     template <class Call>
     CrtStatus call(const char* verb, Call&& body) {
+        {
+            const std::lock_guard lock(caller_mutex);
+            caller = currentListener();
+        }
         try {
             return body();
         } catch (const std::exception& error) {
@@ -271,6 +283,20 @@ struct Integrator::Impl {
         checkContents(film);
     }
 
+    ListenerRef lastCaller() {
+        const std::lock_guard lock(caller_mutex);
+        return caller;
+    }
+    static void onLog(void* user, CrtLogLevel level, const char* message) noexcept {
+        Impl& self = *static_cast<Impl*>(user);
+        const ListenerScope scope(self.lastCaller());
+        self.plain_host.log(nullptr, level, message);
+    }
+    static const char* onKernelSource(void* user, const char* name) noexcept {
+        Impl& self = *static_cast<Impl*>(user);
+        const ListenerScope scope(self.lastCaller());
+        return self.plain_host.kernel_source(nullptr, name);
+    }
     static std::int32_t onProgress(void* user, double done) noexcept {
         Impl& self = *static_cast<Impl*>(user);
         const std::lock_guard lock(self.progress_mutex);

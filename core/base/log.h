@@ -1,6 +1,8 @@
-/// Levelled log. spdlog stays inside log.cpp: nothing else in the core includes it, so that its ABI crosses
-/// no border.
+/// Levelled log. Messages go to the listener of the thread (listener.h). spdlog stays inside listener.cpp:
+/// nothing else in the core includes it, so that its ABI crosses no border.
 #pragma once
+
+#include "base/listener.h"
 
 #include <fmt/format.h>
 
@@ -10,12 +12,11 @@
 
 namespace crt {
 
-enum class LogLevel : int { Debug = 0, Info = 1, Warning = 2, Error = 3, Off = 4 };
-
-/// Sets what reaches stderr; messages below `level` are dropped. [any thread]
+/// What reaches the sink of this thread's listener; messages below `level` are dropped. Throws
+/// crt::Error(Internal) where there is no listener.
 void setLogLevel(LogLevel level);
 
-/// Writes one line to stderr, "crt: warning: …", without tearing a progress bar apart. [any thread]
+/// Gives one line to the listener of this thread. [any thread]
 void logMessage(LogLevel level, std::string_view message);
 
 template <class... Args>
@@ -31,12 +32,14 @@ void logWarning(fmt::format_string<Args...> text, Args&&... args) {
     logMessage(LogLevel::Warning, fmt::format(text, std::forward<Args>(args)...));
 }
 
-/// Number of warnings logged so far; the report repeats it so that a warning is never lost in a scroll-back.
+/// Number of warnings that this thread's listener heard so far, 0 without one; the report repeats it so that
+/// a warning is never lost in a scroll-back.
 int warningCount();
 
 /// Called around each message by whoever draws on the terminal (the progress bar): first to clear its line,
 /// then to redraw.
 using LogHook = void (*)(bool before_message, void* user);
-void setLogHook(LogHook hook, void* user);
+/// When it returns no thread is inside the old hook, and what it points to may go. Does nothing for null.
+void setLogHook(const ListenerRef& listener, LogHook hook, void* user);
 
 }  // namespace crt

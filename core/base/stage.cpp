@@ -1,41 +1,37 @@
 #include "base/stage.h"
 
+#include "base/listener_state.h"
+
 #include <algorithm>
-#include <mutex>
 #include <utility>
-#include <vector>
 
 namespace crt {
-namespace {
 
-struct Registry {
-    std::mutex mutex;
-    std::vector<const Stage*> stages;  ///< The innermost last.
-};
-
-/// Never destroyed: threads may outlive static objects.
-Registry& registry() {
-    static Registry* const instance = new Registry;
-    return *instance;
-}
-
-}  // namespace
-
-Stage::Stage(std::string what, double amount) : what_(std::move(what)), amount_(amount) {
-    const std::lock_guard lock(registry().mutex);
-    registry().stages.push_back(this);
+Stage::Stage(std::string what, double amount)
+    : listener_(currentListener()), what_(std::move(what)), amount_(amount) {
+    if (!listener_) return;
+    {
+        // First: what throws here leaves no stage behind.
+        const std::lock_guard lock(listener_->stage_sink_mutex);
+        if (listener_->stage_sink) listener_->stage_sink(what_);
+    }
+    const std::lock_guard lock(listener_->stage_mutex);
+    listener_->stages.push_back(this);
 }
 
 Stage::~Stage() {
-    const std::lock_guard lock(registry().mutex);
-    auto& stages = registry().stages;
+    if (!listener_) return;
+    const std::lock_guard lock(listener_->stage_mutex);
+    auto& stages = listener_->stages;
     stages.erase(std::find(stages.begin(), stages.end(), this));
 }
 
 std::optional<StageState> innermostStage() {
-    const std::lock_guard lock(registry().mutex);
-    if (registry().stages.empty()) return std::nullopt;
-    const Stage& stage = *registry().stages.back();
+    const ListenerRef listener = currentListener();
+    if (!listener) return std::nullopt;
+    const std::lock_guard lock(listener->stage_mutex);
+    if (listener->stages.empty()) return std::nullopt;
+    const Stage& stage = *listener->stages.back();
     return StageState{stage.what_, stage.amount_, stage.done_, stage.start_};
 }
 

@@ -1,6 +1,9 @@
 /// Long work before the first sample, and how far it is: reading meshes, building the BVH, setting up the
-/// device. Whoever works says so with a Stage; whoever owns the terminal shows it with a StageProgress.
+/// device. Whoever works says so with a Stage; the listener of the thread (listener.h) knows of it, and whoever
+/// owns the terminal shows it with a StageProgress.
 #pragma once
+
+#include "base/listener.h"
 
 #include <atomic>
 #include <chrono>
@@ -30,6 +33,7 @@ private:
     friend std::optional<StageState> innermostStage();
     using Clock = std::chrono::steady_clock;
 
+    const ListenerRef listener_;  ///< That of the thread which began it.
     const std::string what_;
     std::atomic<double> amount_, done_{0};
     const Clock::time_point start_ = Clock::now();
@@ -41,7 +45,7 @@ struct StageState {
     double amount = 0, done = 0;  ///< As of Stage.
     std::chrono::steady_clock::time_point start;
 };
-/// Nothing when no stage lives. [any thread]
+/// Of the listener of this thread. Nothing when no stage lives. [any thread]
 std::optional<StageState> innermostStage();
 
 }  // namespace crt

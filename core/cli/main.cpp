@@ -1,6 +1,7 @@
 /// The command line: arguments → one of commands.h → exit code. `--help` and `--version` open no backend and no
 /// library.
 #include "base/error.h"
+#include "base/listener.h"
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/standard_output.h"
@@ -18,6 +19,8 @@
 int main(int argc, char** argv) {
     crt::openClosedStreams();
     crt::ignoreWriteSignals();
+    const crt::Listener listener(crt::standardErrorSink());
+    const crt::ListenerScope scope(listener);
     // One place turns everything that can be thrown into one line and an exit code.
     try {
         crt::CommandLine line;

@@ -97,14 +97,15 @@ std::string progressBar(const ProgressState& state, int columns) {
     return "[" + bar + "] " + text;
 }
 
-Progress::Progress(ProgressMode mode) : mode_(mode), shown_at_(Clock::now()) {
+Progress::Progress(ProgressMode mode)
+    : mode_(mode), listener_(currentListener()), shown_at_(Clock::now()) {
     if (mode_ == ProgressMode::Auto) mode_ = terminalCanDraw() ? ProgressMode::Bar : ProgressMode::Lines;
-    if (mode_ == ProgressMode::Bar) setLogHook(aroundMessage, this);
+    if (mode_ == ProgressMode::Bar) setLogHook(listener_, aroundMessage, this);
 }
 
 Progress::~Progress() {
     if (mode_ != ProgressMode::Bar) return;
-    setLogHook(nullptr, nullptr);
+    setLogHook(listener_, nullptr, nullptr);
     clear();  // What comes next, the summary, says more than the last state of the bar.
 }
 

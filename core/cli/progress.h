@@ -1,6 +1,7 @@
 /// Tells how far a render is: a bar on a terminal, otherwise a line every ten seconds.
 #pragma once
 
+#include "base/listener.h"
 #include "film/error_text.h"
 #include "render/watch.h"
 
@@ -27,7 +28,8 @@ std::string progressLine(const ProgressState& state);
 /// The same behind a bar, fitted into `columns`.
 std::string progressBar(const ProgressState& state, int columns);
 
-/// Draws. While one with a bar lives it owns the last line of the terminal: log messages go above it.
+/// Draws. While one with a bar lives it owns the last line of the terminal: messages of the listener of the
+/// thread that made it go above.
 class Progress {
 public:
     explicit Progress(ProgressMode mode);
@@ -48,6 +50,7 @@ private:
     void clear();
 
     ProgressMode mode_;
+    const ListenerRef listener_;
     std::mutex mutex_;
     Clock::time_point shown_at_;
     std::string text_;       ///< What the bar shows; empty before the first update.

@@ -1,5 +1,6 @@
 #include "cli/stage_progress.h"
 
+#include "base/listener.h"
 #include "base/log.h"
 #include "base/stage.h"
 
@@ -41,6 +42,7 @@ struct StageProgress::Shown {
     }
 
     void run() {
+        const ListenerScope scope(listener);
         std::unique_lock lock(mutex);
         while (!wake.wait_for(lock, kLook, [this] { return ended; })) show();
     }
@@ -67,6 +69,7 @@ struct StageProgress::Shown {
         logInfo("{}", progressLine(state));
     }
 
+    const ListenerRef listener = currentListener();
     Progress progress;
     const Clock::time_point start = Clock::now();
     std::string said;

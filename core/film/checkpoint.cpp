@@ -351,41 +351,45 @@ std::uint64_t firstSample(const Film& film) {
 }
 
 /// The record of the film with the lower first sample leads, so that the order of the films does not show.
-void addRecord(std::pair<Film, FilmIdentity>& merged, const Film& film, const FilmIdentity& identity) {
-    std::optional<FilmRecord>& record = merged.second.record;
-    std::optional<FilmRecord> other = identity.record;
-    if (!record || (other && firstSample(film) < firstSample(merged.first))) std::swap(record, other);
+void addRecord(std::optional<FilmRecord>& record, std::optional<FilmRecord> other, bool other_leads) {
+    if (!record || (other && other_leads)) std::swap(record, other);
     if (record && other) record->addRun(*other);
 }
 
 }  // namespace
+
+void mergeFilm(std::pair<Film, FilmIdentity>& merged, const std::string& merged_name, const Film& film,
+               const FilmIdentity& identity, const std::string& name) {
+    auto& [sum, sum_identity] = merged;
+    if (identity.bits_version != sum_identity.bits_version)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' and '{}' hold samples of bits versions {} and {}, which do not make one "
+                                "image: render one of "
+                                "them anew",
+                                merged_name, name, sum_identity.bits_version, identity.bits_version),
+                    {name});
+    if (identity.scene_hash != sum_identity.scene_hash)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' is of another scene, seed or film than '{}': {}", name, merged_name,
+                                differenceText(identity, sum_identity)),
+                    {name});
+    requireSameScene(name, identity, sum_identity);
+    const bool leads = firstSample(film) < firstSample(sum);
+    try {
+        sum.add(film);
+    } catch (const Error& error) {
+        refuse(name, fmt::format("cannot be merged with the files before it: {}", error.what()));
+    }
+    addRecord(sum_identity.record, identity.record, leads);
+    sum_identity.version = joinVersions(sum_identity.version, identity.version);
+}
 
 std::pair<Film, FilmIdentity> mergeCheckpoints(const std::vector<std::string>& paths) {
     if (paths.empty()) throw Error(ErrorKind::Usage, "nothing to merge: name at least one .crtfilm file");
     std::pair<Film, FilmIdentity> merged = readCheckpoint(paths.front());
     for (std::size_t i = 1; i < paths.size(); ++i) {
         const auto [film, identity] = readCheckpoint(paths[i]);
-        if (identity.bits_version != merged.second.bits_version)
-            throw Error(
-                ErrorKind::Usage,
-                fmt::format("'{}' and '{}' hold samples of bits versions {} and {}, which do not make one "
-                            "image: render one of "
-                            "them anew",
-                            paths.front(), paths[i], merged.second.bits_version, identity.bits_version),
-                {paths[i]});
-        if (identity.scene_hash != merged.second.scene_hash)
-            throw Error(ErrorKind::Usage,
-                        fmt::format("'{}' is of another scene, seed or film than '{}': {}", paths[i],
-                                    paths.front(), differenceText(identity, merged.second)),
-                        {paths[i]});
-        requireSameScene(paths[i], identity, merged.second);
-        merged.second.version = joinVersions(merged.second.version, identity.version);
-        addRecord(merged, film, identity);
-        try {
-            merged.first.add(film);
-        } catch (const Error& error) {
-            refuse(paths[i], fmt::format("cannot be merged with the files before it: {}", error.what()));
-        }
+        mergeFilm(merged, paths.front(), film, identity, paths[i]);
     }
     return merged;
 }

@@ -62,6 +62,11 @@ void requireSameScene(const std::string& path, const FilmIdentity& found, const 
 /// order of films. What a checkpoint has no room for is "and more".
 std::string joinVersions(const std::string& a, const std::string& b);
 
+/// Adds the film `name` to `merged`, a film of the same scene and bits. Throws as mergeCheckpoints, and then
+/// changes nothing. The names stand in messages.
+void mergeFilm(std::pair<Film, FilmIdentity>& merged, const std::string& merged_name, const Film& film,
+               const FilmIdentity& identity, const std::string& name);
+
 /// Adds partial films of one scene; the identity names the versions of all of them. The result does not
 /// depend on the order of `paths`. Throws crt::Error(Usage) naming the files when there is none, one is
 /// damaged, bits, scenes or shapes differ, or two hold the same samples.

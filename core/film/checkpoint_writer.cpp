@@ -37,7 +37,9 @@ bool CheckpointWriter::idle() const {
 void CheckpointWriter::save(const Film& film, FilmIdentity identity) {
     finish();
     copy_ = film;
-    writing_ = std::async(std::launch::async, [this, identity = std::move(identity)] {
+    writing_ = std::async(std::launch::async, [this, identity = std::move(identity),
+                                               listener = currentListener()] {
+        const ListenerScope scope(listener);
         return tryTo(write_, *copy_, identity);
     });
 }

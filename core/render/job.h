@@ -1,8 +1,7 @@
 /// One render from scene file to images: the whole way through crt, on one page (job.cpp).
 #pragma once
 
-#include "backend/integrator.h"
-#include "film/film.h"
+#include "render/render.h"
 #include "render/watch.h"
 #include "scene/yaml/scene_yaml.h"
 
@@ -26,18 +25,8 @@ struct SceneRequest {
 Scene loadScene(const SceneRequest& request);
 
 /// What the command line asks for, checked as far as that goes without the scene.
-struct Job {
+struct Job : RenderOptions {
     SceneRequest scene;
-
-    std::string backend = "auto";            ///< A name, a path of a plugin, or "auto".
-    IntegratorOptions integrator;
-
-    std::optional<std::uint64_t> spp;        ///< Render until every pixel has the samples [0, spp).
-    std::optional<SampleRange> samples;      ///< Exactly these instead.
-    double time_limit_seconds = 0;           ///< 0: none. Alone it replaces the scene's number of samples.
-    double target_error =
-        0;  ///< Stop at this relative error; 0: none. Alone it replaces the scene's number of samples.
-    std::uint64_t chunk = 0;  ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
 
     bool resume = false;
     std::string resume_file;                 ///< Empty: the checkpoint of this job.

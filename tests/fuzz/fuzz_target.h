@@ -50,9 +50,7 @@ class Directory {
 public:
     Directory()
         : folder_(::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm")
-                                                  : std::filesystem::temp_directory_path()) {
-        setLogLevel(LogLevel::Off);
-    }
+                                                  : std::filesystem::temp_directory_path()) {}
 
     std::string file(const char* name) const { return folder_ / name; }
     std::string path() const { return folder_.path(); }
@@ -71,6 +69,8 @@ public:
     }
 
 private:
+    const Listener listener_{{}, LogLevel::Off};
+    const ListenerScope scope_{listener_};  // Warnings about odd input would be most of the output.
     verify::TemporaryFolder folder_;
 };
 

@@ -1,12 +1,12 @@
 #include "film/resolve.h"
 #include "judge/compare/compare_backends.h"
 
-#include "backend/integrator.h"
 #include "backend/loader.h"
 #include "base/error.h"
 #include "base/unit_text.h"
 #include "compile/compile.h"
 #include "film/film.h"
+#include "render/session.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -59,29 +59,24 @@ private:
 class Contestant {
 public:
     Contestant(const std::string& name, const Scene& scene, SharedProgress& progress)
-        : integrator_(loadBackend(name), IntegratorOptions{}), scene_(scene), progress_(progress) {}
+        : session_(loadBackend(name)), scene_(scene), progress_(progress) {
+        session_.openDevice();
+    }
 
     Film render(std::uint64_t seed, std::uint64_t samples) {
         scene_.sampler.seed = seed;
-        const CompiledScene compiled = compileScene(scene_, 0, integrator_.compileOptions());
-        integrator_.setScene(compiled);
-        const auto show = [this, samples](double done) {
-            progress_.show(done, samples);
-            return false;
-        };
-        integrator_.render({.first_sample = 0, .sample_count = samples}, show);
-        Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
-        integrator_.readFilm(film);
+        const Film film = renderFilm(session_, scene_, {.samples = samples},
+                                     [this, samples](double done) { progress_.show(done, samples); });
         invalid_ += film.invalidSamples();
         progress_.finish(samples);
         return film;
     }
 
     std::uint64_t invalidSamples() const { return invalid_; }
-    std::string device() { return arrayText(integrator_.report().device); }
+    std::string device() { return arrayText(session_.report().device); }
 
 private:
-    Integrator integrator_;
+    Session session_;
     Scene scene_;
     SharedProgress& progress_;
     std::uint64_t invalid_ = 0;

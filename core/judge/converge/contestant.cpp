@@ -49,19 +49,20 @@ std::optional<double> clockMhz() {
 }  // namespace
 
 Contestant::Contestant(Key key, Scene scene, const Reference* reference, const IntegratorOptions& options)
-    : scene_(std::move(scene)), seed_(scene_.sampler.seed), reference_(reference), tests_(1, 1, 3) {
+    : scene_(std::move(scene)),
+      seed_(scene_.sampler.seed),
+      reference_(reference),
+      session_(loadBackend(key.backend), options),
+      tests_(1, 1, 3) {
     configuration_.key = std::move(key);
-    const Clock::time_point start = Clock::now();
-    const LoadedBackend backend = loadBackend(configuration_.key.backend);
-    probeDevices(backend);  // Says better than a failing create() why there is none.
-    integrator_ = std::make_unique<Integrator>(backend, options);
-    before_first_sample_ = secondsSince(start) + scene_.parse_seconds;
+    session_.openDevice();
+    before_first_sample_ = opening_.seconds() + scene_.parse_seconds;
     configuration_.threads = options.threads;
 }
 
 void Contestant::describe(const CompiledScene& compiled, double setup_seconds) {
     before_first_sample_ += setup_seconds;
-    const CrtBackendReport report = integrator_->report();
+    const CrtBackendReport report = session_.report();
     Configuration& c = configuration_;
     c.device = arrayText(report.device);
     c.kernel = arrayText(report.kernel);
@@ -141,16 +142,16 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
 /// the start and not to a replicate.
 void Contestant::warmUp(const CompiledScene& compiled) {
     const Clock::time_point start = Clock::now();
-    integrator_->render({.first_sample = 0, .sample_count = 1});
+    session_.render({.first_sample = 0, .sample_count = 1});
     configuration_.stages.first_sample = secondsSince(start);
     before_first_sample_ += configuration_.stages.first_sample;
-    integrator_->setScene(compiled);  // An empty film again.
+    session_.setScene(compiled);  // An empty film again.
 }
 
 void Contestant::prepare() {
     const Clock::time_point setup = Clock::now();
-    const CompiledScene compiled = compileScene(scene_, 0, integrator_->compileOptions());
-    integrator_->setScene(compiled);
+    const CompiledScene compiled = session_.compile(scene_);
+    session_.setScene(compiled);
     describe(compiled, secondsSince(setup));
     warmUp(compiled);
 }
@@ -181,30 +182,28 @@ void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored)
 bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds,
                            const std::function<void(const Row&)>& found, const std::function<bool()>& stop) {
     scene_.sampler.seed = seed_ + 1 + replicate;
-    const CompiledScene compiled = compileScene(scene_, 0, integrator_->compileOptions());
-    integrator_->setScene(compiled);
+    const CompiledScene compiled = session_.compile(scene_);
+    session_.setScene(compiled);
     const Clock::time_point start = Clock::now();
 
-    const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
-    const CrtBackendReport before = integrator_->report();
+    const CrtBackendReport before = session_.report();
     const bool exploring = replicate == 0;
     double wall = 0;
     for (std::uint64_t done = 0, next = 1; done < most_samples; next *= 2) {
         if (stop()) return false;
         const Clock::time_point step = Clock::now();
-        integrator_->render({.first_sample = done, .sample_count = next - done});
+        session_.render({.first_sample = done, .sample_count = next - done});
         const double step_seconds = secondsSince(step);
         wall += step_seconds;
         done = next;
         if (exploring) samples_reached_ = done;
 
-        Film film(shape);
-        integrator_->readFilm(film);
+        const Film film = session_.film();
         // The next doubling takes as long as all before it, and its look some more.
         const bool last =
             done * 2 > most_samples || (exploring && secondsSince(start) + 2.2 * step_seconds > seconds);
         Row row = look(film, replicate, last);
-        const CrtBackendReport now = integrator_->report();
+        const CrtBackendReport now = session_.report();
         row.render_wall_seconds = wall;
         if (now.render_seconds > before.render_seconds)
             row.render_device_seconds = now.render_seconds - before.render_seconds;

@@ -2,10 +2,11 @@
 /// another.
 #pragma once
 
-#include "backend/integrator.h"
+#include "base/stopwatch.h"
 #include "judge/converge/measurement.h"
 #include "judge/converge/reference.h"
 #include "judge/converge/replicate_file.h"
+#include "render/session.h"
 #include "scene/scene.h"
 
 #include <cstdint>
@@ -57,7 +58,8 @@ private:
     Scene scene_;
     std::uint64_t seed_;
     const Reference* reference_;
-    std::unique_ptr<Integrator> integrator_;
+    Stopwatch opening_;         ///< Runs from before the backend is loaded.
+    Session session_;
     double before_first_sample_ = 0;
     double seconds_of_last_ = 0;
     std::uint64_t samples_reached_ = 0;

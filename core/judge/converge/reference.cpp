@@ -2,7 +2,6 @@
 #include "film/resolve.h"
 #include "judge/converge/reference.h"
 
-#include "backend/loader.h"
 #include "base/atomic_file.h"
 #include "base/log.h"
 #include "base/statistics.h"
@@ -13,6 +12,7 @@
 #include "judge/converge/files.h"
 #include "render/output_guard.h"
 #include "render/sampling.h"
+#include "render/session.h"
 #include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
@@ -170,10 +170,11 @@ struct RenderedFolds {
 
 /// Each eighth has samples of its own. The first also finds out how many fit into the time. Nothing when a
 /// the Watch asked to stop.
-std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene& compiled,
-                                         Integrator& integrator, const ReferenceRequest& request,
-                                         Watch& watch) {
-    const FilmShape shape{compiled.width, compiled.height, compiled.channels, compiled.aovs};
+std::optional<RenderedFolds> renderFolds(const Scene& scene, Session& session,
+                                         const ReferenceRequest& request, Watch& watch) {
+    const CompiledScene compiled = session.compile(scene);
+    const FilmShape shape = filmShapeOf(compiled);
+    session.openDevice();  // Not in the time that the samples have.
     const WatchedRendering rendering(watch);
     ProgressState state;
     state.pixels = std::uint64_t{shape.width} * shape.height;
@@ -184,14 +185,14 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene
     RenderedFolds folds{Film(shape), {}};
     std::uint64_t per_fold = request.samples / kFolds;
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
-        integrator.setScene(compiled);
+        session.setScene(compiled);
         const std::uint64_t first = std::uint64_t{fold} << 44;
         std::uint64_t done = 0;
         for (std::uint64_t chunk = 1; per_fold == 0 || done < per_fold;) {
             if (watch.stopRequested()) return std::nullopt;
             const double before = elapsed();
             if (per_fold > 0) chunk = std::min(chunk, per_fold - done);
-            integrator.render({.first_sample = first + done, .sample_count = chunk});
+            session.render({.first_sample = first + done, .sample_count = chunk});
             done += chunk;
             const double took = std::max(elapsed() - before, 1e-6);
             state.elapsed_seconds = elapsed();
@@ -204,8 +205,7 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, const CompiledScene
                     std::max(done, affordable(request.seconds / kFolds, took / static_cast<double>(chunk)));
             if (took < 0.25) chunk *= 2;
         }
-        Film part(shape);
-        integrator.readFilm(part);
+        const Film part = session.film();
         if (part.invalidSamples() > 0)
             throw Error(
                 ErrorKind::Device,
@@ -252,10 +252,8 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     const std::string content = hashOfContent(scene), colour = colourText(scene),
                       record = recordText(recordOf(scene));
     scene = referenceScene(std::move(scene), request.same_estimator);
-    const LoadedBackend backend = openBackend(request.backend);
-    Integrator integrator(backend, request.integrator);
-    const std::optional<RenderedFolds> folds =
-        renderFolds(scene, compileScene(scene, 0, integrator.compileOptions()), integrator, request, watch);
+    Session session(request.backend, request.integrator);
+    const std::optional<RenderedFolds> folds = renderFolds(scene, session, request, watch);
     if (!folds) return std::nullopt;
     Image file = referenceImage(*folds, scene);
     file.metadata.emplace_back("Software", "crt " CRT_VERSION);
@@ -263,7 +261,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     file.metadata.emplace_back(kRecordKey, record);
     file.metadata.emplace_back(kColourKey, colour);
     file.metadata.emplace_back(kEstimatorKey, estimatorText(scene));
-    file.metadata.emplace_back("crt/backend", backend.name);
+    file.metadata.emplace_back("crt/backend", session.backend().name);
     file.metadata.emplace_back("crt/seed", std::to_string(scene.sampler.seed));
     writeImage(request.output, OutputFormat::Exr, file);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();

@@ -77,7 +77,7 @@ Scene Context::scene(const std::string& yaml, const std::vector<SceneOverride>& 
     return parseScene(yaml, "case.yaml", ".", overrides);
 }
 
-Integrator& Context::integratorFor(const Render& how) {
+Session& Context::sessionFor(const Render& how) {
     const bool usual = how.kernel == CRT_KERNEL_LEAN && how.threads == 0 && how.tile_size == 0;
     if (usual && usual_) return *usual_;
     IntegratorOptions options = options_;
@@ -87,8 +87,8 @@ Integrator& Context::integratorFor(const Render& how) {
     // One at a time: a limit of threads holds for the process while its integrator lives.
     usual_.reset();
     unusual_.reset();
-    std::unique_ptr<Integrator>& place = usual ? usual_ : unusual_;
-    place = std::make_unique<Integrator>(backend_, options);
+    std::unique_ptr<Session>& place = usual ? usual_ : unusual_;
+    place = std::make_unique<Session>(backend_, options);
     return *place;
 }
 
@@ -112,13 +112,10 @@ Film Context::renderRaw(const Scene& original, const Render& how) {
         if (how.squares) changed.sampler.replicates = 1;
         what = &changed;
     }
-    Integrator& integrator = integratorFor(how);
-    const CompiledScene compiled = compileScene(*what, how.aovs, integrator.compileOptions());
-    integrator.setScene(compiled);
-    integrator.render({.first_sample = how.first_sample, .sample_count = how.samples});
-    Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
-    integrator.readFilm(film);
-    report_ = integrator.report();
+    Session& session = sessionFor(how);
+    Film film = renderFilm(
+        session, *what, {.samples = how.samples, .first_sample = how.first_sample, .aovs = how.aovs});
+    report_ = session.report();
     return film;
 }
 

@@ -6,6 +6,7 @@
 #include "backend/loader.h"
 #include "film/film.h"
 #include "judge/verify/case.h"
+#include "render/session.h"
 #include "scene/yaml/scene_yaml.h"
 
 #include <cstdint>
@@ -126,12 +127,12 @@ public:
     std::vector<Outcome> take();
 
 private:
-    Integrator& integratorFor(const Render& how);
+    Session& sessionFor(const Render& how);
 
     const LoadedBackend& backend_;
     IntegratorOptions options_;
     Level level_;
-    std::unique_ptr<Integrator> usual_, unusual_;  ///< With the run's options; with a case's own.
+    std::unique_ptr<Session> usual_, unusual_;  ///< With the run's options; with a case's own.
     CrtBackendReport report_{};
     std::vector<Outcome> outcomes_;
 };

@@ -1,0 +1,33 @@
+/// What log.cpp and stage.cpp keep for a listener.
+#pragma once
+
+#include "base/listener.h"
+#include "base/log.h"
+
+#include <atomic>
+#include <mutex>
+#include <vector>
+
+namespace crt {
+
+class Stage;
+
+struct ListenerState {
+    std::atomic<LogLevel> level{LogLevel::Info};
+    std::atomic<int> warnings{0};
+
+    /// Over sink and hook together: a progress bar is cleared, the message written and the bar redrawn before
+    /// another thread's message may come between.
+    std::mutex message_mutex;
+    LogSink messages;
+    LogHook hook = nullptr;
+    void* hook_user = nullptr;
+
+    std::mutex stage_mutex;
+    std::vector<const Stage*> stages;  ///< The innermost last.
+    /// Apart from stage_mutex: who hears of a stage may ask which is the innermost.
+    std::mutex stage_sink_mutex;
+    StageSink stage_sink;
+};
+
+}  // namespace crt

@@ -1,0 +1,216 @@
+#include "render/render.h"
+
+#include "backend/loader.h"
+#include "base/log.h"
+#include "base/stage.h"
+#include "base/stopwatch.h"
+#include "render/light_checks.h"
+#include "render/outputs.h"
+#include "render/session.h"
+
+#include <limits>
+#include <utility>
+
+namespace crt {
+namespace {
+
+/// An empty film, or what an earlier run of the same scene left; then `identity` names its version too.
+Film openFilm(std::optional<EarlierFilm> there, const CompiledScene& compiled, FilmIdentity& identity) {
+    Film film(filmShapeOf(compiled));
+    if (!there) return film;
+    const FilmIdentity& found = there->identity;
+    requireSameScene(there->name, found, identity);
+    film.add(there->film);
+    identity.version = joinVersions(found.version, identity.version);
+    if (found.record) identity.record->addRun(*found.record);
+    logInfo("resuming '{}' after {} samples per pixel", there->name, film.samples.count());
+    return film;
+}
+
+/// A plugin may leave out what is only for humans.
+std::string textOrEmpty(const char* text) { return text != nullptr ? text : ""; }
+
+/// The driver behind a device, which only the list of devices tells.
+std::string driverOf(const std::vector<CrtDevice>& devices, const std::string& device_name) {
+    for (const CrtDevice& device : devices)
+        if (arrayText(device.name) == device_name) return arrayText(device.driver);
+    return {};
+}
+
+/// Takes over what the backend says about itself. Being without it is a pity, but no reason to lose a
+/// render.
+void askForReport(Session& session, RunFacts& facts) {
+    try {
+        facts.backend = session.report();
+    } catch (const Error& error) {
+        logWarning("no report from the backend: {}", error.what());
+    }
+}
+
+/// The backend that is asked for, when it has something to do.
+std::optional<Session> openSession(const RenderOptions& options, const SamplingPlan& plan, RunFacts& facts) {
+    if (plan.ranges.empty()) return std::nullopt;
+    const Stage stage("opening the backend");
+    const Stopwatch opening;
+    std::optional<Session> session(std::in_place, options.backend, options.integrator);
+    facts.open_seconds = opening.seconds();
+    return session;
+}
+
+/// Nothing is built for a backend that brings it, nor where none will render.
+CompiledScene compileFor(const std::optional<Session>& session, const Scene& scene) {
+    constexpr double kNobodyTraces = std::numeric_limits<double>::infinity();
+    const std::uint32_t aovs = requestedAovs(scene);
+    return session ? session->compile(scene, aovs)
+                   : compileScene(scene, aovs, {.accelerator_reach = kNobodyTraces});
+}
+
+/// Who renders, and when. A film that was complete before this run is written without any backend.
+void describeRun(FilmIdentity& identity, const RunFacts& facts) {
+    if (facts.backend_name.empty()) return;
+    FilmRecord run;
+    run.backend = facts.backend_name + " " + facts.backend_version;
+    run.device = arrayText(facts.backend.device);
+    run.date_utc = dateUtc();
+    identity.record->addRun(run);
+}
+
+void prepare(Session& session, const CompiledScene& compiled, RunFacts& facts) {
+    const LoadedBackend& backend = session.backend();
+    std::optional<Stage> stage(std::in_place, "opening the device");
+    const Stopwatch opening;
+    session.openDevice();
+    facts.open_seconds += opening.seconds();
+    facts.backend_name = backend.name;
+    facts.backend_path = backend.path;
+    facts.backend_version = textOrEmpty(backend.table->version);
+    facts.backend_build = textOrEmpty(backend.table->build);
+
+    stage.emplace("preparing the scene for " + backend.name);
+    const Stopwatch preparing;
+    session.setScene(compiled, [&](double done) {
+        stage->setAmount(1);
+        stage->at(done);
+    });
+    facts.prepare_seconds = preparing.seconds();
+    stage.reset();
+    askForReport(session, facts);
+    facts.driver = driverOf(session.devices(), arrayText(facts.backend.device));
+    logInfo("{} on {}", backend.name, arrayText(facts.backend.device));
+}
+
+/// CompiledScene → Film, by a backend.
+void renderSamples(Session& session, const SamplingPlan& plan, Watch& watch,
+                   const CheckpointPlan& checkpoints, Rendered& run) {
+    RunFacts& facts = run.facts;
+    prepare(session, run.compiled, facts);
+    SamplingPlan sampling = plan;
+    sampling.checkpoint_interval_seconds = checkpoints.interval_seconds;
+    sampling.checkpoint_possible = checkpoints.possible;
+    SamplingResult result;
+    {
+        const WatchedRendering rendering(watch);
+        result = sampleFilm(session.integrator(), run.film, sampling, watch, [&] {
+            describeRun(run.identity, facts);
+            checkpoints.save(run.film, run.identity);
+        });
+    }
+    // A device that failed is not asked again; what it said before the first sample stands.
+    if (result.stop != StopReason::Failed) askForReport(session, facts);
+    facts.stop = result.stop;
+    facts.request = result.request;
+    facts.rendered_samples = result.rendered;
+    facts.chunks = result.chunks;
+    facts.sampling_seconds = result.seconds;
+    run.failure = result.failure;
+}
+
+/// Whether the film has all the samples that were asked for. With nothing but a time to go by, the end of the
+/// time is the end of the work.
+bool isComplete(const RunFacts& facts) {
+    return facts.stop == StopReason::Samples || facts.stop == StopReason::Target ||
+           (facts.stop == StopReason::Time && facts.target_samples == 0);
+}
+
+/// What the film says of itself.
+void judge(const Film& film, const Scene& scene, RunFacts& facts) {
+    facts.samples = film.samples;
+    facts.invalid_samples = film.invalidSamples();
+    const bool independent = scene.sampler.type != SamplerType::Sobol;
+    facts.error = estimateError(film, PixelSet::All, independent);
+    if (facts.target_error > 0) {
+        facts.deciding = estimateError(film, PixelSet::Even, independent);
+        facts.judging = estimateError(film, PixelSet::Odd, independent);
+    }
+    warnOfBlackFilm(film, scene);
+    if (facts.invalid_samples > 0)
+        logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
+}
+
+}  // namespace
+
+void requireReplicates(Scene& scene) {
+    if (replicatesOf(scene) > 1) return;
+    if (scene.integrator.type != IntegratorType::Path)
+        throw Error(ErrorKind::Usage, "--target-error is for integrator.type path: the views have no noise");
+    if (scene.sampler.type == SamplerType::Sobol)
+        throw Error(ErrorKind::Usage,
+                    "--target-error needs the replicates that sampler.replicates: 1 leaves out; add --set "
+                    "sampler.replicates=2");
+    scene.sampler.replicates = 2;
+}
+
+SamplingPlan planSamples(const RenderOptions& options, const Scene& scene, const SampleRanges& there) {
+    SamplingPlan plan;
+    plan.time_limit_seconds = options.time_limit_seconds;
+    plan.target_error = options.target_error;
+    plan.independent_samples = scene.sampler.type != SamplerType::Sobol;
+    plan.chunk = options.chunk;
+    if (options.samples) {
+        // An exact range says exactly which samples are new; those that the checkpoint has already would
+        // count twice.
+        SampleRanges together = there;
+        together.add(*options.samples);
+        plan.ranges = {*options.samples};
+        plan.target = together.count();
+        return plan;
+    }
+    const bool endless = !options.spp && (options.time_limit_seconds > 0 || options.target_error > 0);
+    plan.ranges =
+        missingSamples({0, endless ? kEndlessSamples : options.spp.value_or(scene.sampler.samples)}, there);
+    if (endless) return plan;
+    plan.target = there.count();
+    for (const auto& [first, end] : plan.ranges) plan.target += end - first;
+    return plan;
+}
+
+Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,
+                std::optional<EarlierFilm> earlier, Watch& watch, const CheckpointPlan& checkpoints) {
+    dateUtc();  // Refuses now a SOURCE_DATE_EPOCH that is none.
+    RunFacts facts;
+    facts.target_samples = plan.target;
+    facts.target_error = options.target_error;
+    std::optional<Session> session = openSession(options, plan, facts);
+
+    // What it takes to see the scene: one flat blob, and the mask of what it needs.
+    CompiledScene compiled = compileFor(session, scene);
+    FilmIdentity identity{.scene_hash = compiled.hash, .version = CRT_VERSION, .record = recordOf(scene)};
+    logDebug("scene {} needs {}", compiled.hash, featureNames(compiled.features));
+    warnOfIdleLamps(scene);
+
+    Film film = openFilm(std::move(earlier), compiled, identity);
+    facts.resumed_samples = film.samples.count();
+    Rendered run{std::move(compiled), std::move(film), std::move(identity), std::move(facts), std::nullopt};
+    if (session) {
+        renderSamples(*session, plan, watch, checkpoints, run);
+        session.reset();  // What the device held is free while files are written.
+    } else {
+        watch.renderingEnds();
+    }
+    describeRun(run.identity, run.facts);
+    run.identity.record->complete = isComplete(run.facts);
+    judge(run.film, scene, run.facts);
+    return run;
+}
+
+}  // namespace crt

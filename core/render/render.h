@@ -1,0 +1,69 @@
+/// Scene → film: the way that the command line, libcrt and whatever is built on it take together.
+#pragma once
+
+#include "base/error.h"
+#include "backend/integrator.h"
+#include "compile/compile.h"
+#include "film/checkpoint.h"
+#include "film/film.h"
+#include "render/report.h"
+#include "render/sampling.h"
+#include "render/watch.h"
+#include "scene/scene.h"
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace crt {
+
+struct RenderOptions {
+    std::string backend = "auto";            ///< A name, a path of a plugin, or "auto".
+    IntegratorOptions integrator;
+
+    std::optional<std::uint64_t> spp;        ///< Render until every pixel has the samples [0, spp).
+    std::optional<SampleRange> samples;      ///< Exactly these instead.
+    double time_limit_seconds = 0;           ///< 0: none. Alone it replaces the scene's number of samples.
+    double target_error =
+        0;  ///< Stop at this relative error; 0: none. Alone it replaces the scene's number of samples.
+    std::uint64_t chunk = 0;  ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
+};
+
+/// A target error is decided on and judged by different replicates, so there must be some: gives the scene
+/// two where it leaves that open. Throws crt::Error(Usage) where it cannot have them.
+void requireReplicates(Scene& scene);
+
+/// Which of the samples asked for are not `there`, and when to stop before they are all there.
+SamplingPlan planSamples(const RenderOptions& options, const Scene& scene, const SampleRanges& there);
+
+/// What an earlier run left, with what it was rendered from.
+struct EarlierFilm {
+    std::string name;  ///< In messages.
+    Film film;
+    FilmIdentity identity;
+};
+
+/// Saves films while the render goes on.
+struct CheckpointPlan {
+    double interval_seconds = 0;         ///< 0: never.
+    std::function<bool()> possible{};    ///< When set and false, one that is due waits for the next chunk.
+    /// Gets the film as it is by then. An exception ends the render.
+    std::function<void(const Film&, const FilmIdentity&)> save{};
+};
+
+struct Rendered {
+    CompiledScene compiled;
+    Film film;
+    FilmIdentity identity;           ///< With a record, whose run is this one.
+    RunFacts facts;                  ///< All but the files, the command and the total time.
+    std::optional<Error> failure;    ///< The device failed while rendering; the film holds what there was.
+};
+
+/// Renders what `plan` (planSamples) says, onto `earlier` where there is one, and warns of what is odd about
+/// the light. No backend is opened when no sample is missing. Throws crt::Error for everything that goes
+/// wrong before the first sample.
+Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,
+                std::optional<EarlierFilm> earlier, Watch& watch, const CheckpointPlan& checkpoints = {});
+
+}  // namespace crt

@@ -1,0 +1,62 @@
+#include "render/session.h"
+
+#include "base/error.h"
+
+#include <utility>
+
+namespace crt {
+
+Session::Session(const std::string& backend, const IntegratorOptions& options)
+    : Session(openBackend(backend), options) {}
+
+Session::Session(LoadedBackend backend, const IntegratorOptions& options)
+    : backend_(std::move(backend)), options_(options) {}
+
+void Session::openDevice() {
+    if (integrator_) return;
+    devices_ = probeDevices(backend_);  // Says better than a failing create() why there is none.
+    integrator_ = std::make_unique<Integrator>(backend_, options_);
+}
+
+Integrator& Session::integrator() {
+    if (!integrator_) throw Error(ErrorKind::Internal, "a session is asked for a device that is not open");
+    return *integrator_;
+}
+
+CompiledScene Session::compile(const Scene& scene, std::uint32_t aovs) const {
+    return compileScene(scene, aovs, compileOptionsFor(backend_));
+}
+
+void Session::setScene(const CompiledScene& compiled, const std::function<void(double)>& progress) {
+    openDevice();
+    shape_.reset();
+    integrator_->setScene(compiled, progress);
+    shape_ = filmShapeOf(compiled);
+}
+
+void Session::render(const RenderRange& range, const std::function<void(double)>& progress) {
+    integrator().render(range, [&progress](double done) {
+        if (progress) progress(done);
+        return false;  // A range is always finished: cancelling would spoil the film on the device.
+    });
+}
+
+Film Session::film() {
+    if (!shape_) throw Error(ErrorKind::Internal, "a session without a scene has no film");
+    Film film(*shape_);
+    integrator_->readFilm(film);
+    return film;
+}
+
+Film renderFilm(Session& session, const Scene& scene, const FilmRequest& request,
+                const std::function<void(double)>& progress) {
+    session.setScene(session.compile(scene, request.aovs));
+    session.render({.first_sample = request.first_sample, .sample_count = request.samples}, progress);
+    return session.film();
+}
+
+FilmShape filmShapeOf(const CompiledScene& compiled) {
+    return {compiled.width, compiled.height, compiled.channels, compiled.aovs};
+}
+
+}  // namespace crt

@@ -1,0 +1,72 @@
+/// A backend at work: everything in crt that renders does so through a Session, or through render()
+/// (render.h), which makes one.
+#pragma once
+
+#include "backend/integrator.h"
+#include "backend/loader.h"
+#include "compile/compile.h"
+#include "film/film.h"
+#include "scene/scene.h"
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// Opens a backend and its device once, renders one scene after another. Sessions share nothing: each thread
+/// may have its own. Throws crt::Error as Integrator does.
+class Session {
+public:
+    /// Loads the plugin: a name, a path, or "auto".
+    explicit Session(const std::string& backend, const IntegratorOptions& options = {});
+    explicit Session(LoadedBackend backend, const IntegratorOptions& options = {});
+
+    const LoadedBackend& backend() const { return backend_; }
+
+    /// Opens the device, which the first setScene() does otherwise.
+    void openDevice();
+    /// Of the backend, best first. Requires openDevice().
+    const std::vector<CrtDevice>& devices() const { return devices_; }
+
+    /// Without what this backend brings itself.
+    CompiledScene compile(const Scene& scene, std::uint32_t aovs = 0) const;
+
+    /// The scene from now on, with an empty film. `progress` gets [0,1] from backends that tell how far they
+    /// are.
+    void setScene(const CompiledScene& compiled, const std::function<void(double)>& progress = {});
+    /// Adds a range of samples to the backend's film. `progress` gets [0,1].
+    void render(const RenderRange& range, const std::function<void(double)>& progress = {});
+    /// Everything rendered since setScene().
+    Film film();
+
+    CrtBackendReport report() { return integrator().report(); }
+    /// Requires openDevice() or setScene().
+    Integrator& integrator();
+
+private:
+    LoadedBackend backend_;
+    IntegratorOptions options_;
+    std::vector<CrtDevice> devices_;
+    std::unique_ptr<Integrator> integrator_;
+    std::optional<FilmShape> shape_;
+};
+
+/// One range of samples of one scene.
+struct FilmRequest {
+    std::uint64_t samples = 0;       ///< Per pixel.
+    std::uint64_t first_sample = 0;
+    std::uint32_t aovs = 0;          ///< Bits of Aov.
+};
+
+/// Compiles, sets the scene, renders the range as one, reads the film.
+Film renderFilm(Session& session, const Scene& scene, const FilmRequest& request,
+                const std::function<void(double)>& progress = {});
+
+/// The shape of a film of this scene.
+FilmShape filmShapeOf(const CompiledScene& compiled);
+
+}  // namespace crt
