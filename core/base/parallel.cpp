@@ -1,5 +1,7 @@
 #include "base/parallel.h"
 
+#include "base/listener.h"
+
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -36,10 +38,12 @@ void parallelFor(std::size_t count, std::size_t part,
         return;
     }
     HandOver order;
+    const ListenerRef listener = currentListener();
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, partsOf(count, part), 1),
         [&](const tbb::blocked_range<std::size_t>& parts) {
             order.partBegins();
+            const ListenerScope scope(listener);
             for (std::size_t i = parts.begin(); i < parts.end(); ++i)
                 body(i * part, std::min(count, (i + 1) * part));
             order.partEnds();
@@ -49,8 +53,9 @@ void parallelFor(std::size_t count, std::size_t part,
 
 void parallelInvoke(const std::function<void()>& one, const std::function<void()>& other) {
     HandOver order;
-    const auto ordered = [&order](const std::function<void()>& work) {
+    const auto ordered = [&order, listener = currentListener()](const std::function<void()>& work) {
         order.partBegins();
+        const ListenerScope scope(listener);
         work();
         order.partEnds();
     };
@@ -62,7 +67,11 @@ void runWithThreads(unsigned threads, const std::function<void()>& work) {
     // The arena limits what runs in it; the control lets it have more threads than processors.
     const tbb::global_control most(tbb::global_control::max_allowed_parallelism, threads);
     tbb::task_arena arena(static_cast<int>(threads));
-    arena.execute(work);
+    // It may run on a thread of the arena.
+    arena.execute([&work, listener = currentListener()] {
+        const ListenerScope scope(listener);
+        work();
+    });
 }
 
 }  // namespace crt
