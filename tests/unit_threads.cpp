@@ -1,5 +1,7 @@
 // What the host makes does not depend on the number of its threads, nor on how a file is cut into blocks.
 #include "base/error.h"
+#include "base/listener.h"
+#include "base/log.h"
 #include "base/parallel.h"
 #include "base/stage.h"
 #include "captured_log.h"
@@ -220,4 +222,20 @@ TEST_CASE("threads are as many as are asked for", "[threads]") {
         CHECK(most <= static_cast<int>(threads));
         CHECK((most > 1) == (threads > 1));
     }
+}
+
+TEST_CASE("messages of parallel work reach the listener of whoever asked for it", "[threads]") {
+    constexpr int kMessages = 2000;
+    const Listener outer([](LogLevel, std::string_view) {});
+    const ListenerScope outer_scope(outer);
+    const Listener inner([](LogLevel, std::string_view) {});
+    {
+        const ListenerScope inner_scope(inner);
+        runWithThreads(4, [] {
+            parallelFor(kMessages, 1, [](std::size_t, std::size_t) { logWarning("from a part"); });
+            parallelInvoke([] { logWarning("from one"); }, [] { logWarning("from the other"); });
+        });
+    }
+    CHECK(inner.warnings() == kMessages + 2);
+    CHECK(outer.warnings() == 0);
 }
