@@ -115,6 +115,22 @@ TEST_CASE("of several included files the later one wins, and each counts once", 
     CHECK_THAT(refused(folder, "main.yaml", {{"include", "b.yaml"}}), Contains("'include' cannot be set"));
 }
 
+TEST_CASE("what the including file gives takes away what it excludes", "[sharing]") {
+    TemporaryFolder folder;
+    write(folder, "lens.yaml", "crt: 1\ncamera: {position: [0, 0, -5], focal_length: 1, sensor: [1, 1]}\n");
+    write(folder, "angle.yaml", "crt: 1\ncamera: {position: [0, 0, -5], fov: 90}\n");
+    write(folder, "a.yaml", "crt: 1\ninclude: lens.yaml\nfilm: {resolution: [8, 8]}\ncamera: {fov: 90}\n");
+    const Scene wide = load(folder, "a.yaml");
+    CHECK(wide.camera.tan_half_width == Approx(1));
+    CHECK(wide.camera.position[2] == -5);
+    write(folder, "b.yaml", "crt: 1\ninclude: angle.yaml\nfilm: {resolution: [8, 8]}\n"
+                            "camera: {focal_length: 1, sensor: [1, 1]}\n");
+    CHECK(load(folder, "b.yaml").camera.tan_half_width == Approx(0.5));
+    // Given by one file, they still exclude each other.
+    write(folder, "c.yaml", "crt: 1\ninclude: lens.yaml\ncamera: {fov: 90, focal_length: 1, sensor: [1, 1]}\n");
+    CHECK_THAT(refused(folder, "c.yaml"), Contains("exclude each other"));
+}
+
 TEST_CASE("names in an included file are looked up beside it", "[sharing]") {
     TemporaryFolder folder;
     write(folder, "lib/paint.csv", "360,0.5\n830,0.5\n");

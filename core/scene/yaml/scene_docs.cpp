@@ -217,6 +217,7 @@ outputs:
 - `camera`, `film`, `integrator`, `sampler`, `environment`, `spectra` and `materials` are merged key by key.
   Where two files give the same key, the including file wins over what it includes, and of a list of files the
   later one wins over the earlier. A value is replaced as a whole: a material is never made of two halves.
+  What excludes it gives way too: an included `focal_length` with its `sensor` to a `fov`.
 - `objects` are joined: those of the included files come first, in the order of the list.
 - `title` and `outputs` are those of the file that wins.
 - `key: null` takes an included value away where `null` is a value of the key, such as `environment: null`.

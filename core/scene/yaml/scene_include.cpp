@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 #include <utility>
 
 namespace crt {
@@ -58,10 +59,31 @@ YamlNodePtr joined(const YamlNode& below, const YamlNode& above) {
     return list;
 }
 
+/// Keys that an included section loses because of what `above` gives: those that exclude it, and what goes
+/// together with them. An included focal_length and its sensor give way to a fov.
+std::set<std::string> givingWay(const SectionSchema& section, const YamlNode& above) {
+    std::set<std::string> gone;
+    const auto given = [&above](const std::string& key) { return above.find(key) != nullptr; };
+    const auto drop = [&](const KeyRule& rule) {
+        for (const std::string& key : rule.keys)
+            if (!given(key)) gone.insert(key);
+    };
+    for (const KeyRule& rule : section.rules)
+        if (rule.kind != KeyRule::Kind::Together && std::any_of(rule.keys.begin(), rule.keys.end(), given))
+            drop(rule);
+    for (const KeyRule& rule : section.rules)
+        if (rule.kind == KeyRule::Kind::Together &&
+            std::any_of(rule.keys.begin(), rule.keys.end(),
+                        [&gone](const std::string& key) { return gone.contains(key); }))
+            drop(rule);
+    return gone;
+}
+
 /// Keys of both; where both have one, that of `above`.
-YamlNodePtr keyByKey(const YamlNode& below, const YamlNode& above) {
+YamlNodePtr keyByKey(const YamlNode& below, const YamlNode& above, const std::set<std::string>& gone = {}) {
     auto map = std::make_shared<YamlNode>(above);
     map->entries = below.entries;
+    std::erase_if(map->entries, [&gone](const YamlEntry& entry) { return gone.contains(entry.key); });
     map->size = below.size + above.size;
     for (const YamlEntry& entry : above.entries) {
         const auto known = std::find_if(map->entries.begin(), map->entries.end(),
@@ -74,6 +96,14 @@ YamlNodePtr keyByKey(const YamlNode& below, const YamlNode& above) {
     return map;
 }
 
+/// Of a key of the scene that holds one section; nothing is excluded in the others.
+std::set<std::string> givingWay(const std::string& key, const YamlNode& above) {
+    const KeySchema* schema = schemaSection("").find(key);
+    const bool section = schema != nullptr && schema->kind == ValueKind::Section &&
+                         schema->shape == ValueShape::One;
+    return section ? givingWay(schemaSection(schema->section), above) : std::set<std::string>();
+}
+
 /// Two scenes as one. Sections, `spectra` and `materials` key by key, `objects` one after the other;
 /// everything else is that of `above` where it has it.
 YamlNodePtr merged(const YamlNode& below, const YamlNode& above) {
@@ -82,7 +112,7 @@ YamlNodePtr merged(const YamlNode& below, const YamlNode& above) {
         const YamlEntry *lower = below.find(entry.key), *upper = above.find(entry.key);
         if (lower == nullptr || upper == nullptr) continue;
         if (lower->value->kind == YamlKind::Map && upper->value->kind == YamlKind::Map)
-            entry.value = keyByKey(*lower->value, *upper->value);
+            entry.value = keyByKey(*lower->value, *upper->value, givingWay(entry.key, *upper->value));
         else if (isJoined(entry.key) && lower->value->kind == YamlKind::List &&
                  upper->value->kind == YamlKind::List)
             entry.value = joined(*lower->value, *upper->value);
