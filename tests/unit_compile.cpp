@@ -997,6 +997,33 @@ Scene twoSheets(std::size_t side, double gap) {
     return scene;
 }
 
+/// 40,000 small triangles: those that are asked about just below the plane y = 0, above each one that is not
+/// asked about, and the others far off, so that the plane goes through the scene's middle.
+Scene pairsAboutThePlane(double gap) {
+    constexpr std::size_t kCount = 40000, kSide = 100;
+    Scene scene = litFloor();
+    crt::Mesh& mesh = scene.meshes[0];
+    mesh = {};
+    const std::vector<std::uint32_t> ids = crt::askedTriangles(kCount + 2);  // with the lamp
+    const std::set<std::uint32_t> asked(ids.begin(), ids.end());
+    std::array<std::size_t, 3> next{};  // Of those that are asked, their neighbours, and the others.
+    for (std::uint32_t id = 0; id < kCount; ++id) {
+        const std::size_t kind = asked.count(id) != 0 ? 0 : next[1] < kSide * kSide ? 1 : 2;
+        const std::size_t place = next[kind]++;
+        const double x = (static_cast<double>(place % kSide) - 49.5) * 0.1,
+                     z = (static_cast<double>(place / kSide % kSide) - 49.5) * 0.1;
+        const double y = kind == 0                                     ? -0.5 * gap
+                         : kind == 1                                   ? 0.5 * gap
+                         : place % (2 * kSide * kSide) < kSide * kSide ? -6
+                                                                       : 6;
+        const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+        for (const auto& [dx, dz] : {std::pair{-0.02, -0.02}, {0.02, -0.02}, {0.0, 0.02}})
+            mesh.positions.push_back({x + dx, y, z + dz});
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    return scene;
+}
+
 constexpr double kEverywhere = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -1059,6 +1086,19 @@ TEST_CASE("surfaces too near and lamps in a plane are found without a BVH as wit
         CHECK(found.nearest_clearance == expected.nearest_clearance);
         if (gap == 1.0) CHECK(expected.near == 0);
         // So near that some are found, or the comparison was of nothing.
+        if (gap == 1e-6) CHECK(expected.near > 0);
+    }
+
+    // Neighbours that nobody asks about, beyond the plane through the middle where cells end.
+    for (const double gap : {3e-7, 1e-6, 3e-6, 1e-5}) {
+        const Scene scene = pairsAboutThePlane(gap);
+        const CompiledScene with = compiled(scene),
+                            without = crt::compileScene(scene, 0, {.accelerator_reach = kEverywhere});
+        REQUIRE(without.without_nodes);
+        const crt::NearSurfaces expected = crt::findNearSurfaces(with),
+                                found = crt::findNearSurfaces(crt::nearScene(without));
+        INFO("gap " << gap << ", near " << expected.near << " of " << expected.asked);
+        CHECK(found.near == expected.near);
         if (gap == 1e-6) CHECK(expected.near > 0);
     }
 

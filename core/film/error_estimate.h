@@ -73,8 +73,9 @@ struct ErrorEstimate {
     stats::Interval samplesFor(double target, double samples_now) const;
 };
 
-/// Nothing where nothing is known: too few samples, or no light found yet. With `independent_samples` the
-/// spread between samples is no mere bound.
+/// Nothing where nothing is known: too few samples, replicates that are not about equally full (nor squares
+/// in the film), or no light found yet. With `independent_samples` the spread between samples is no mere
+/// bound.
 std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which = PixelSet::All,
                                            bool independent_samples = false);
 

@@ -8,6 +8,7 @@ test_converge.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 import json
 import os
 import sys
+import time
 import unittest
 
 import test_cli
@@ -32,6 +33,7 @@ class Converging(CliTest):
             return [json.loads(line) for line in file]
 
     def test_a_run_writes_its_files_and_keeps_to_its_time(self):
+        start = time.monotonic()
         self.crt(
             "converge",
             "scene.yaml",
@@ -45,10 +47,15 @@ class Converging(CliTest):
             "out",
             *SMALL,
         )
+        seconds = time.monotonic() - start
         for name in ("report.html", "results.jsonl", "results.csv", "summary.json", "manifest.json"):
             self.assertTrue(os.path.getsize(self.path(f"out/{name}")) > 0, name)
         rows = self.rows("out")
-        self.assertEqual({row["samples_per_pixel"] for row in rows}, {1, 2, 4, 8, 16, 32, 64})
+        # A slow machine, or a sanitizer, may not reach all in that time.
+        reached = sorted({row["samples_per_pixel"] for row in rows})
+        self.assertEqual(reached, [1, 2, 4, 8, 16, 32, 64][:len(reached)])
+        if len(reached) < 7:
+            self.assertGreater(seconds, 3)
         self.assertGreaterEqual(len({row["replicate"] for row in rows}), 16)
         self.assertEqual(len({row["seed"] for row in rows}), len({row["replicate"] for row in rows}))
         with open(self.path("out/report.html"), encoding="utf-8") as file:

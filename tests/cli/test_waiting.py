@@ -213,9 +213,7 @@ class Waiting(unittest.TestCase):
             seconds = self.report()["seconds"]
             stages = ["parse", "build", "compile", "open", "prepare", "sampling", "write", "other"]
             for stage in stages:
-                self.assertGreaterEqual(
-                    seconds[stage], 0, stage
-                )  # What is counted twice makes 'other' negative.
+                self.assertGreaterEqual(seconds[stage], 0, stage)
             self.assertAlmostEqual(sum(seconds[stage] for stage in stages), seconds["total"], places=6)
             self.assertGreater(seconds["build"], 0)
 
@@ -224,6 +222,9 @@ class Waiting(unittest.TestCase):
         seconds = self.report()["seconds"]
         self.assertGreater(seconds["prepare"], 0.5)
         self.assertLess(seconds["other"], 0.4)
+        self.assertGreaterEqual(
+            seconds["other"], 0
+        )  # Counted twice, it would be half a second less than nothing.
 
     def test_no_bvh_for_a_backend_that_brings_its_own(self):
         if not self.has_embree():
@@ -282,7 +283,12 @@ class Waiting(unittest.TestCase):
                     "film.resolution=[128,128]",
                     CRT_BACKEND_PATH="",
                 )
-                self.assertLessEqual(os.path.getsize(self.path("a.crtfilm")) / 128**2, 150)
+                size = os.path.getsize(self.path("a.crtfilm")) / 128**2
+                self.assertLessEqual(size, 150)
+                # Much of a film are bytes that are the same everywhere, and most of the others are alike.
+                with open(self.path("a.crtfilm"), "rb") as file:
+                    channels = int.from_bytes(file.read(44)[40:44], "little")
+                self.assertLess(size, 16 * channels / 4)
                 os.remove(self.path("a.crtfilm"))
 
     def test_a_checkpoint_is_written_while_the_render_goes_on(self):
