@@ -12,7 +12,7 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "pocl-opencl-icd, libcuda1, libnvrtc12, bash-completion")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "pocl-opencl-icd, libcuda1, bash-completion")
 set(CPACK_DEBIAN_COMPRESSION_TYPE zstd)  # xz takes twenty times as long for a tenth of the size of the meshes
 set(CPACK_GENERATOR DEB)
 include(CPack)
