@@ -5,13 +5,21 @@
 #   share/doc/crt/               the manual, decisions, and the example of a backend
 #   share/man, share/bash-completion, share/zsh, share/fish: what the table of commands says (core/CMakeLists.txt)
 #   lib/cmake/crt/, include/crt/ what find_package(crt) and crt_add_backend need to build further ones: installed here
+#   lib/libcrt.so.0, include/crt/*.h, lib/pkgconfig/crt.pc
+#                                crt in other programs (docs/embedding.md): installed here
 
 include(CMakePackageConfigHelpers)
 
 set(CRT_INSTALL_CMAKE_DIR lib/cmake/crt)
 
-install(TARGETS crt_backend_headers crt_kernel_cache EXPORT crtTargets ARCHIVE DESTINATION lib)
+install(TARGETS crt_backend_headers crt_kernel_cache libcrt EXPORT crtTargets ARCHIVE DESTINATION lib LIBRARY DESTINATION lib)
 install(EXPORT crtTargets NAMESPACE crt:: DESTINATION ${CRT_INSTALL_CMAKE_DIR})
+
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/include/crt DESTINATION include FILES_MATCHING PATTERN "*.h")
+install(FILES ${PROJECT_SOURCE_DIR}/docs/embedding.md DESTINATION share/doc/crt)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/example_program DESTINATION share/doc/crt)
+configure_file(${PROJECT_SOURCE_DIR}/cmake/crt.pc.in ${PROJECT_BINARY_DIR}/generated/crt.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/generated/crt.pc DESTINATION lib/pkgconfig)
 
 install(FILES
   ${PROJECT_SOURCE_DIR}/core/backend/crt_backend.h

@@ -41,8 +41,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
 
   set(tree ${staging}/crt-portable/crt)
   run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${tree})
-  file(REMOVE_RECURSE ${tree}/include ${tree}/lib/cmake)
-  file(GLOB archives ${tree}/lib/*.a)
+  file(REMOVE_RECURSE ${tree}/include ${tree}/lib/cmake ${tree}/lib/pkgconfig)
+  file(GLOB archives ${tree}/lib/*.a ${tree}/lib/libcrt.so*)
   file(REMOVE ${archives} ${tree}/lib/crt/crt_image_oiio.so)
   file(COPY ${BUILD_DIR}/bin/crt-meshgen DESTINATION ${tree}/bin)
 
@@ -74,7 +74,7 @@ add_custom_target(portable
   VERBATIM)
 # What is installed, and what is taken from the build tree.
 foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_kernel_cache crt_meshes crt_shell_files crt-meshgen
-        conformance crt_backend_example)
+        conformance crt_backend_example libcrt)
   if(TARGET ${part})
     add_dependencies(portable ${part})
   endif()

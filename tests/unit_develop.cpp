@@ -46,13 +46,15 @@ Vec3d transformed(const Vec3d& p, const RowMatrix4d& m) {
     return {r[0] / r[3], r[1] / r[3], r[2] / r[3]};
 }
 
-Film oneColor(std::uint32_t width, std::uint32_t height, const Vec3d& xyz, std::uint32_t aovs = 0) {
-    Film film({width, height, channelsFor(aovs), aovs});
+Film oneColor(std::uint32_t width, std::uint32_t height, const Vec3d& xyz) {
+    constexpr std::uint32_t kAovs = kAovSquares;
+    Film film({width, height, channelsFor(kAovs), kAovs});
     for (std::size_t p = 0; p < film.counts.size(); ++p) {
         film.counts[p] = 2;
         double* sums = &film.sums[p * film.shape().channels * 2];
         for (std::size_t c = 0; c < 3; ++c) sums[2 * c] = 2 * xyz[c];
-        sums[6] = 2.5 * xyz[1] * xyz[1];  // Y²: one sample of 1.5 times and one of half the mean.
+        sums[2 * firstChannel(kAovs, kAovSquares)] =
+            2.5 * xyz[1] * xyz[1];  // Y²: one sample of 1.5 times and one of half the mean.
     }
     film.samples.add({0, 2});
     return film;

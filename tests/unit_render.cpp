@@ -31,8 +31,8 @@ std::string quad(const std::string& name, double x, double y, double z, double s
         name, x, y, z, x + side, *more != '\0' ? y : y + side, *more != '\0' ? z + side : z, more);
 }
 
-/// A lamp above a wall of `side`² quads, so that the scene has a BVH; and one lamp that lights nothing, named
-/// so that its warning can be told from that of another scene.
+/// A lamp above a wall of `side`² quads, so that the scene has a BVH; and one lamp that lights nothing,
+/// named so that its warning can be told from that of another scene.
 std::string roomYaml(const std::string& idle, int side, int width, const std::string& seed) {
     std::string text = fmt::format(
         "crt: 1\nfilm: {{resolution: [{}, 32]}}\nsampler: {{seed: {}}}\n"
@@ -83,7 +83,8 @@ Film renderHeard(const std::string& yaml, const std::string& name, Heard& heard)
 }
 
 bool sameFilm(const Film& a, const Film& b) {
-    return a.shape() == b.shape() && a.sums == b.sums && a.counts == b.counts && a.primitives == b.primitives;
+    return a.shape() == b.shape() && a.sums == b.sums && a.counts == b.counts &&
+           a.primitives == b.primitives;
 }
 
 }  // namespace
@@ -179,14 +180,16 @@ TEST_CASE("a session renders one scene after another", "[render]") {
     session.setScene(session.compile(first));
     session.render({.first_sample = 4, .sample_count = 2});
     double done = 0;
-    session.render({.first_sample = 0, .sample_count = 4}, [&](double part) { done = std::max(done, part); });
+    session.render({.first_sample = 0, .sample_count = 4},
+                   [&](double part) { done = std::max(done, part); });
     const Film parts = session.film();
     CHECK(parts.samples.text() == "0-6");
     CHECK(done == 1);
     for (std::uint32_t x = 0; x < 24; ++x) CHECK(parts.mean(x, 16, 1) == whole.mean(x, 16, 1));
 }
 
-TEST_CASE("a render goes on from an earlier film, and opens no backend where nothing is missing", "[render]") {
+TEST_CASE("a render goes on from an earlier film, and opens no backend where nothing is missing",
+          "[render]") {
     const Scene scene = parseScene(roomYaml("idle", 4, 24, "1"), "scene.yaml", ".");
     const auto upTo = [&](std::uint64_t spp, std::optional<EarlierFilm> earlier, const char* backend) {
         const RenderOptions options{.backend = backend, .spp = spp};
@@ -202,8 +205,9 @@ TEST_CASE("a render goes on from an earlier film, and opens no backend where not
     CHECK(finished.facts.resumed_samples == 5);
     CHECK(finished.facts.rendered_samples == 7);
     for (std::uint32_t x = 0; x < 24; ++x) CHECK(finished.film.mean(x, 16, 1) == whole.film.mean(x, 16, 1));
-    CHECK(upTo(12, EarlierFilm{"whole", whole.film, whole.identity}, "no such backend").film.samples.text() ==
-          "0-12");
+    CHECK(
+        upTo(12, EarlierFilm{"whole", whole.film, whole.identity}, "no such backend").film.samples.text() ==
+        "0-12");
 
     const Scene other = parseScene(roomYaml("idle", 3, 24, "1"), "other.yaml", ".");
     const RenderOptions options{.backend = CRT_TEST_BACKEND, .spp = 12};

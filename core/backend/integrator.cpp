@@ -6,8 +6,8 @@
 #include "kernel/layout.h"
 
 #include <algorithm>
-#include <cmath>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <exception>
 #include <limits>
@@ -130,7 +130,8 @@ struct Integrator::Impl {
     // at a time.
     std::mutex progress_mutex;
     std::mutex caller_mutex;
-    /// That of the thread which made the last call. Plugins log from any of their threads, also between calls.
+    /// That of the thread which made the last call. Plugins log from any of their threads, also between
+    /// calls.
     ListenerRef caller;
     const std::function<bool(double)>* progress = nullptr;
     bool cancelled = false;

@@ -65,8 +65,8 @@ std::string arrayText(const char (&text)[N]) {
 }
 
 /// The host table given to every plugin: log, kernel sources, cache directory ($CRT_CACHE_DIR,
-/// $XDG_CACHE_HOME/crt, ~/.cache/crt). `use_cache` false leaves cache_directory null. Its functions report to
-/// the listener of the thread that calls them.
+/// $XDG_CACHE_HOME/crt, ~/.cache/crt). `use_cache` false leaves cache_directory null. Its functions report
+/// to the listener of the thread that calls them.
 CrtHost makeHost(bool use_cache);
 
 }  // namespace crt

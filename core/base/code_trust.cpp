@@ -1,7 +1,9 @@
 #include "base/code_trust.h"
 
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <grp.h>
+#include <link.h>
 #include <pwd.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -22,13 +24,20 @@ struct Program {
     bool known = false;
 };
 
+/// The file that holds this code: the program crt, libcrt.so in another program, a plugin.
 const Program& program() {
     static const Program found = [] {
+        Dl_info info{};
+        link_map* map = nullptr;
+        const bool told = ::dladdr1(reinterpret_cast<void*>(&program), &info, reinterpret_cast<void**>(&map),
+                                    RTLD_DL_LINKMAP) != 0;
+        // The program has no name in the list of libraries.
+        const bool library = told && map != nullptr && map->l_name != nullptr && *map->l_name != '\0';
         Program p;
         char path[PATH_MAX] = {};
-        const ssize_t size = ::readlink("/proc/self/exe", path, sizeof path - 1);
-        p.known = size > 0 && ::stat("/proc/self/exe", &p.status) == 0;
-        if (p.known) p.path.assign(path, static_cast<std::size_t>(size));
+        p.known = ::realpath(library ? map->l_name : "/proc/self/exe", path) != nullptr &&
+                  ::stat(path, &p.status) == 0;
+        if (p.known) p.path = path;
         return p;
     }();
     return found;
@@ -43,7 +52,8 @@ std::vector<char> room() { return std::vector<char>(std::size_t{1} << 16); }
 
 std::string nameOfUser(uid_t user) {
     std::vector<char> texts = room();
-    struct passwd entry {}, *found = nullptr;
+    struct passwd entry {
+    }, *found = nullptr;
     if (::getpwuid_r(user, &entry, texts.data(), texts.size(), &found) == 0 && found != nullptr)
         return found->pw_name;
     return std::to_string(user);
@@ -51,7 +61,8 @@ std::string nameOfUser(uid_t user) {
 
 std::string homeOfUser() {
     std::vector<char> texts = room();
-    struct passwd entry {}, *found = nullptr;
+    struct passwd entry {
+    }, *found = nullptr;
     if (::getpwuid_r(::geteuid(), &entry, texts.data(), texts.size(), &found) != 0 || found == nullptr)
         return {};
     char path[PATH_MAX];
@@ -60,7 +71,8 @@ std::string homeOfUser() {
 
 std::string nameOfGroup(gid_t group) {
     std::vector<char> texts = room();
-    struct group entry {}, *found = nullptr;
+    struct group entry {
+    }, *found = nullptr;
     if (::getgrgid_r(group, &entry, texts.data(), texts.size(), &found) == 0 && found != nullptr)
         return found->gr_name;
     return std::to_string(group);
@@ -70,11 +82,13 @@ std::string nameOfGroup(gid_t group) {
 /// private groups" make, under which a umask of 002 is harmless.
 bool privateGroup(gid_t group) {
     std::vector<char> group_texts = room(), user_texts = room();
-    struct group group_entry {}, *found_group = nullptr;
+    struct group group_entry {
+    }, *found_group = nullptr;
     if (::getgrgid_r(group, &group_entry, group_texts.data(), group_texts.size(), &found_group) != 0 ||
         found_group == nullptr)
         return false;
-    struct passwd user_entry {}, *found_user = nullptr;
+    struct passwd user_entry {
+    }, *found_user = nullptr;
     if (::getpwnam_r(found_group->gr_name, &user_entry, user_texts.data(), user_texts.size(), &found_user) !=
             0 ||
         found_user == nullptr)

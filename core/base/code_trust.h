@@ -1,7 +1,8 @@
 /// Whether a file may be run as code (plugins, compiled kernels, kernel texts): not if somebody could have
 /// written it who may not decide what this program does. The rules are OpenSSH's for its configuration, with
 /// one addition (docs/decisions/0014): the owner and the writers of the program itself are trusted, because
-/// who can change the program needs no plugin.
+/// who can change the program needs no plugin. The program is the file that holds this code: crt, or
+/// libcrt.so in a program of another owner.
 ///
 /// Uses nothing of the core: it is part of crt::kernel_cache too.
 #pragma once

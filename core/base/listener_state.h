@@ -16,8 +16,8 @@ struct ListenerState {
     std::atomic<LogLevel> level{LogLevel::Info};
     std::atomic<int> warnings{0};
 
-    /// Over sink and hook together: a progress bar is cleared, the message written and the bar redrawn before
-    /// another thread's message may come between.
+    /// Over sink and hook together: a progress bar is cleared, the message written and the bar redrawn
+    /// before another thread's message may come between.
     std::mutex message_mutex;
     LogSink messages;
     LogHook hook = nullptr;

@@ -1,6 +1,6 @@
 /// Long work before the first sample, and how far it is: reading meshes, building the BVH, setting up the
-/// device. Whoever works says so with a Stage; the listener of the thread (listener.h) knows of it, and whoever
-/// owns the terminal shows it with a StageProgress.
+/// device. Whoever works says so with a Stage; the listener of the thread (listener.h) knows of it, and
+/// whoever owns the terminal shows it with a StageProgress.
 #pragma once
 
 #include "base/listener.h"

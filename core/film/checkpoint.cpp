@@ -11,6 +11,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include <sys/stat.h>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -21,7 +22,6 @@
 #include <new>
 #include <set>
 #include <string_view>
-#include <sys/stat.h>
 
 namespace crt {
 namespace {
@@ -362,12 +362,13 @@ void mergeFilm(std::pair<Film, FilmIdentity>& merged, const std::string& merged_
                const FilmIdentity& identity, const std::string& name) {
     auto& [sum, sum_identity] = merged;
     if (identity.bits_version != sum_identity.bits_version)
-        throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' and '{}' hold samples of bits versions {} and {}, which do not make one "
-                                "image: render one of "
-                                "them anew",
-                                merged_name, name, sum_identity.bits_version, identity.bits_version),
-                    {name});
+        throw Error(
+            ErrorKind::Usage,
+            fmt::format("'{}' and '{}' hold samples of bits versions {} and {}, which do not make one "
+                        "image: render one of "
+                        "them anew",
+                        merged_name, name, sum_identity.bits_version, identity.bits_version),
+            {name});
     if (identity.scene_hash != sum_identity.scene_hash)
         throw Error(ErrorKind::Usage,
                     fmt::format("'{}' is of another scene, seed or film than '{}': {}", name, merged_name,

@@ -125,8 +125,8 @@ void renderSamples(Session& session, const SamplingPlan& plan, Watch& watch,
     run.failure = result.failure;
 }
 
-/// Whether the film has all the samples that were asked for. With nothing but a time to go by, the end of the
-/// time is the end of the work.
+/// Whether the film has all the samples that were asked for. With nothing but a time to go by, the end of
+/// the time is the end of the work.
 bool isComplete(const RunFacts& facts) {
     return facts.stop == StopReason::Samples || facts.stop == StopReason::Target ||
            (facts.stop == StopReason::Time && facts.target_samples == 0);
