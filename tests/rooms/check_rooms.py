@@ -25,6 +25,10 @@ KEYWORDS = ("SOURCES", "USES", "LIBRARIES", "HEADERS")
 OTHER_TARGETS = {"image/image_io_oiio.cpp", "image/image_headers.cpp", "backend/sdk/kernel_cache.cpp", "cli/main.cpp"}
 
 
+# Folders that are no room of their own, and the room that they are linked to (libcrt).
+BESIDE = {"api": "render"}
+
+
 class Room:
     def __init__(self, folder, comment, words):
         self.folder, self.comment = folder, comment
@@ -80,6 +84,8 @@ def check_sources(rooms):
     for file in sorted(CORE.rglob("*.cpp")):
         name = str(file.relative_to(CORE))
         folder = str(pathlib.PurePosixPath(name).parent)
+        if folder in BESIDE:
+            continue
         if folder not in rooms:
             yield f"core/{name}: {folder} is no room of core/CMakeLists.txt"
         elif file.name not in rooms[folder].parts["SOURCES"] and name not in OTHER_TARGETS:
@@ -91,9 +97,14 @@ def check_includes(rooms):
         if file.suffix not in (".h", ".cpp"):
             continue
         folder = str(file.parent.relative_to(CORE))
-        if folder not in rooms or str(file.relative_to(CORE)) in OTHER_TARGETS:
+        if str(file.relative_to(CORE)) in OTHER_TARGETS:
             continue  # Other targets say what they see themselves.
-        seen = seen_from(rooms, folder) | {folder}
+        if folder in BESIDE:
+            seen = seen_from(rooms, BESIDE[folder]) | {BESIDE[folder]}
+        elif folder in rooms:
+            seen = seen_from(rooms, folder) | {folder}
+        else:
+            continue
         for number, line in enumerate(file.read_text().splitlines(), 1):
             match = re.match(r'\s*#\s*include\s+"([^"]+)"', line)
             target = room_of(rooms, match.group(1)) if match else None
@@ -129,6 +140,7 @@ def draw(rooms):
         # What another of its rooms brings along is not drawn again.
         direct = [u for u in room.uses if not any(u in seen_from(rooms, v) for v in room.uses if v != u)]
         lines.append(f"{folder:<{width}}  →  {', '.join(direct)}".rstrip(" →"))
+        lines += [f"{beside:<{width}}  →  {room}" for beside, room in BESIDE.items() if room == folder]
     return "\n".join(lines) + "\n```\n"
 
 
