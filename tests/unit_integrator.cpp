@@ -2,6 +2,7 @@
 // goes wrong in a plugin arrives as an error of the right kind.
 #include "backend/integrator.h"
 #include "base/error.h"
+#include "base/listener.h"
 #include "catch.h"
 #include "fake_plugins/fake_pattern.h"
 #include "kernel/layout.h"
@@ -13,6 +14,7 @@
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 using namespace crt;
@@ -313,6 +315,21 @@ TEST_CASE("a plugin that throws at its host is named", "[integrator]") {
     // A plugin that fails without a word.
     CHECK(kindOfFailure([&] { integrator.report(); }, "backend 'throws_in_render': internal error") ==
           ErrorKind::Internal);
+}
+
+TEST_CASE("what a plugin's own threads say goes to who made the call", "[integrator]") {
+    Integrator integrator(openFake("fake"), {});
+    integrator.setScene(makeScene(4, 4));
+    ::setenv("CRT_FAKE_FAULT", "talk", 1);
+    for (std::uint64_t sample = 0; sample < 2; ++sample) {
+        std::vector<std::string> heard;
+        const Listener listener([&](LogLevel, std::string_view text) { heard.emplace_back(text); });
+        const ListenerScope scope(listener);
+        CHECK(integrator.render({{}, sample, 1}));
+        CHECK(heard == std::vector<std::string>{"a thread of the fake"});
+        CHECK(listener.warnings() == 1);
+    }
+    ::unsetenv("CRT_FAKE_FAULT");
 }
 
 TEST_CASE("integrators move", "[integrator]") {

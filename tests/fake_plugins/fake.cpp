@@ -7,6 +7,7 @@
 //   nan     every seventh sample is not a number
 //   slow    2 ms a row, with a look at cancel after each
 //   hang    never comes back
+//   talk    a thread of the plugin warns
 //   nan_film, count_film   the film that is handed over holds a NaN, or more samples than were asked for
 // CRT_FAKE_SCENE_SECONDS: so long takes set_scene, which says how far it is.
 // CRT_FAKE_FIRST_START_MS: so long takes the first integrator of a process, as a driver does that is not
@@ -67,6 +68,8 @@ public:
     bool render(const CrtRenderRange& range) {
         const std::string fault = wantedFault();
         while (fault == "hang") std::this_thread::sleep_for(std::chrono::seconds(1));
+        if (fault == "talk")
+            std::thread([this] { host_.log(CRT_LOG_WARNING, "a thread of the fake"); }).join();
         const auto start = std::chrono::steady_clock::now();
         const std::uint64_t seed = (std::uint64_t{scene_.seed.high} << 32) | scene_.seed.low;
         for (std::uint32_t y = range.y0; y < range.y1; ++y) {
