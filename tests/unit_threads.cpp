@@ -58,11 +58,11 @@ std::string sceneOf(const TemporaryFolder& folder) {
     folder.write("sheet.mtl", "newmtl blue\nKd 0.1 0.2 0.9\nnewmtl red\nKd 0.9 0.1 0.1\n");
     return folder.write("scene.yaml",
                         "crt: 1\ncamera: {position: [1, 3, 5], target: [1, 0, 1], fov: 40}\n"
-                        "objects:\n"
+                        "materials: {grey: {type: diffuse, reflectance: 0.5}}\nobjects:\n"
                         "  - {obj: sheet.obj}\n"
-                        "  - {obj: sheet.obj, place: [{translate: [0, 0.5, 0]}, {rotate: {y: 30}}]}\n"
+                        "  - {obj: sheet.obj, transform: [{translate: [0, 0.5, 0]}, {scale: [-1, 1, 1]}]}\n"
                         "  - {mesh: {positions: [[0,2,0],[1,2,0],[1,2,1],[0,2,1]], faces: [[0,1,2,3]]}, "
-                        "emission: {radiance: 5}}\n");
+                        "material: grey, emission: {radiance: 5}}\n");
 }
 
 struct Made {

@@ -50,10 +50,11 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     kernel::CrtScene header = compileSettings(scene, flat, aovs);
     BlobWriter blob;
 
-    const AcceleratorPart accelerator = compileAccelerator(scene, flat, options);
+    AcceleratorPart accelerator = compileAccelerator(scene, flat, options);
     blob.reserve(expectedBytes(flat, accelerator));
     header.accelerator = accelerator.kind;
     header.nodes = blob.append(accelerator.nodes);
+    accelerator.nodes = {};  // nobody asks for them again, and they may be hundreds of megabytes
     const std::size_t count = flat.triangles.size();
     header.triangle_count = static_cast<std::uint32_t>(count);
     header.triangles = blob.appendFilled<kernel::CrtTriangle>(

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <istream>
 #include <iterator>
 #include <streambuf>
@@ -170,6 +171,31 @@ public:
     void OnMapEnd() override { close(); }
 
 private:
+    /// Finds a key among the entries of a map: in a few by looking, in many by hash.
+    class KeyIndex {
+    public:
+        const YamlEntry* find(const std::vector<YamlEntry>& entries, std::string_view key) {
+            constexpr std::size_t kFew = 16;
+            if (entries.size() <= kFew) {
+                const auto found = std::find_if(entries.begin(), entries.end(),
+                                                [&](const YamlEntry& entry) { return entry.key == key; });
+                return found != entries.end() ? &*found : nullptr;
+            }
+            for (; indexed_ < entries.size(); ++indexed_)
+                by_hash_.emplace(hash(entries[indexed_].key), static_cast<std::uint32_t>(indexed_));
+            const auto [first, end] = by_hash_.equal_range(hash(key));
+            for (auto it = first; it != end; ++it)
+                if (entries[it->second].key == key) return &entries[it->second];
+            return nullptr;
+        }
+
+    private:
+        static std::size_t hash(std::string_view key) { return std::hash<std::string_view>()(key); }
+
+        std::size_t indexed_ = 0;
+        std::unordered_multimap<std::size_t, std::uint32_t> by_hash_;
+    };
+
     struct Frame {
         YamlNodePtr node;
         YAML::anchor_t anchor = 0;
@@ -178,7 +204,7 @@ private:
         std::string key;
         YamlPlace key_place;
         bool key_bad = false;
-        std::unordered_map<std::string, int> line_of_key;
+        KeyIndex keys;
     };
 
     YamlNodePtr make(YamlKind kind, const YamlPlace& place) {
@@ -219,11 +245,11 @@ private:
     }
 
     void close() {
-        Frame frame = std::move(stack_.back());
+        if (stack_.back().anchor != 0) open_anchors_.erase(stack_.back().anchor);
+        YamlNodePtr node = std::move(stack_.back().node);
         stack_.pop_back();
-        if (frame.anchor != 0) open_anchors_.erase(frame.anchor);
-        const YamlNode& node = *frame.node;
-        attach(frame.node, node.kind == YamlKind::List ? "a list as a key" : "a map as a key");
+        const bool list = node->kind == YamlKind::List;
+        attach(std::move(node), list ? "a list as a key" : "a map as a key");
     }
 
     /// Puts a finished value where it belongs. `not_a_key` says what it would be if it stood in the place of
@@ -249,9 +275,9 @@ private:
             frame.key = node->text;
             if (frame.key == "<<" && !node->quoted) {
                 out_.error(place, "merge keys ('<<') are not part of a scene; write the keys out");
-            } else if (const auto [it, fresh] = frame.line_of_key.emplace(frame.key, place.line); !fresh) {
+            } else if (const YamlEntry* same = frame.keys.find(frame.node->entries, frame.key)) {
                 out_.error(place, fmt::format("duplicate key '{}', already given in line {}", frame.key,
-                                              it->second));
+                                              same->key_place.line));
             } else {
                 frame.key_bad = false;
             }
