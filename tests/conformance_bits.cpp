@@ -39,12 +39,15 @@ materials:
   red: {{type: diffuse, reflectance: red}}
   mirror: {{type: mirror, reflectance: 0.9}}
   gold: {{type: conductor, metal: Au}}
+  copper: {{type: rough_conductor, metal: Cu, roughness: 0.4}}
   glass: {{type: dielectric, ior: 1.5}}
   flint: {{type: dielectric, ior: {{glass: SF10}}}}
 objects:
   - {{name: floor, mesh: {{positions: [[0,0,0],[0,0,1],[1,0,1],[1,0,0]], faces: [[0,1,2,3]]}},
       material: white}}
   - {{name: back, mesh: {{positions: [[0,0,1],[0,1,1],[1,1,1],[1,0,1]], faces: [[0,1,2,3]]}}, material: red}}
+  - {{name: shield, mesh: {{positions: [[0.75,0.5,0.9],[0.75,0.9,0.8],[0.95,0.9,0.7],[0.95,0.5,0.8]],
+      faces: [[0,1,2,3]]}}, material: copper}}
   - {{name: left, mesh: {{positions: [[0,0,0],[0,1,0],[0,1,1],[0,0,1]], faces: [[0,1,2,3]]}},
       material: gold}}
   - {{name: right, mesh: {{positions: [[1,0,0],[1,0,1],[1,1,1],[1,1,0]], faces: [[0,1,2,3]]}},

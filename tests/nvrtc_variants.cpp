@@ -46,6 +46,7 @@ std::map<std::uint32_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_SMOOTH_NORMALS, "a smooth mesh"},
         {box & ~CRT_FEATURE_TABLE, "a box of constants"},
         {mesh | CRT_FEATURE_CONDUCTOR, "a mesh of metal"},
+        {mesh | CRT_FEATURE_ROUGH_CONDUCTOR, "a mesh of rough metal"},
         {mesh | CRT_FEATURE_DIELECTRIC, "a mesh of glass"},
         {mesh | glass, "a mesh of dispersive glass"},
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,

@@ -2,6 +2,8 @@
 // in CRT_MATERIAL_LIST. A new material is a line in kSubjects. Backends are held to the same bits elsewhere.
 #include "kernel_test.h"
 
+#include "judge/verify/references.h"
+
 #include <algorithm>
 #include <array>
 #include <complex>
@@ -45,6 +47,11 @@ Material metal(MaterialType type, double eta, double k) {
         m.k = crt::constantSpectrum(k);
     });
 }
+Material roughMetal(double eta, double k, double roughness) {
+    Material m = metal(MaterialType::RoughConductor, eta, k);
+    m.roughness = roughness;
+    return m;
+}
 Material glass(double first, double last) {
     return make(MaterialType::Dielectric, [&](Material& m) {
         m.eta = crt::constantSpectrum(first);
@@ -66,11 +73,19 @@ std::vector<Subject> subjects() {
     const auto of_metal = [](double n, double k) {
         return [n, k](double cosine) { return fresnel(cosine, {n, k}); };
     };
+    const auto rough = [](double n, double k, double roughness) {
+        return [=](double cosine) { return crt::verify::roughConductorAlbedo(cosine, n, k, roughness); };
+    };
     return {
         {"diffuse", reflecting(MaterialType::Diffuse, 0.7), constant(0.7)},
         {"white diffuse", reflecting(MaterialType::Diffuse, 1), constant(1)},
         {"mirror", reflecting(MaterialType::Mirror, 0.9), constant(0.9)},
         {"conductor", metal(MaterialType::Conductor, 0.2, 3), of_metal(0.2, 3)},
+        {"rough conductor of roughness 0", roughMetal(0.2, 3, 0), of_metal(0.2, 3)},
+        // Narrower lobes fall between the directions of overCells; `crt verify` has them (G12).
+        {"rough conductor of roughness 0.2", roughMetal(0.2, 3, 0.2), rough(0.2, 3, 0.2)},
+        {"rough conductor of roughness 0.5", roughMetal(0.2, 3, 0.5), rough(0.2, 3, 0.5)},
+        {"rough conductor of roughness 1", roughMetal(1, 1e3, 1), rough(1, 1e3, 1)},
         {"glass", glass(1.5, 1.5), constant(1)},
         {"dispersive glass", glass(1.7, 1.6), constant(1)},
     };

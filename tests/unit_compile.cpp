@@ -150,6 +150,7 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     };
     seen |= differs(CRT_FEATURE_MIRROR, 0, other(crt::MaterialType::Mirror));
     seen |= differs(CRT_FEATURE_CONDUCTOR, 0, other(crt::MaterialType::Conductor));
+    seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR, 0, other(crt::MaterialType::RoughConductor));
     seen |= differs(CRT_FEATURE_DIELECTRIC, 0, other(crt::MaterialType::Dielectric));
     seen |= differs(CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
         other(crt::MaterialType::Dielectric)(s);

@@ -28,7 +28,8 @@ std::vector<const Spectrum*> spectraOf(const Material& material) {
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror: return {&material.reflectance};
-        case MaterialType::Conductor: return {&material.eta, &material.k};
+        case MaterialType::Conductor:
+        case MaterialType::RoughConductor: return {&material.eta, &material.k};
         case MaterialType::Dielectric: return {&material.eta};
     }
     return {};
@@ -40,6 +41,7 @@ kernel::CrtMaterial recordOf(const Material& material, const SpectrumTable& spec
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror: record.reflectance = spectra.valueOf(material.reflectance); break;
+        case MaterialType::RoughConductor: record.roughness = valueOf(material.roughness); [[fallthrough]];
         case MaterialType::Conductor:
             record.eta = spectra.valueOf(material.eta);
             record.k = spectra.valueOf(material.k);

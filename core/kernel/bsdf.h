@@ -26,7 +26,10 @@ typedef struct CrtBsdf {
     vec3 wo;          /* unit */
     vec3 ns, ng;      /* on the side of w_o, the shading normal nearly so */
     vec4 reflectance; /* diffuse, and what mirrors as a whole */
-    vec4 eta;         /* dielectric: index beyond the surface / index on w_o's side */
+    vec4 eta;         /* dielectric: index beyond the surface / index on w_o's side; rough conductor: real
+                         part of the index */
+    vec4 k;           /* rough conductor: extinction */
+    f32 alpha;        /* rough conductor: width of GGX */
     vec4 albedo;      /* for the first-hit output; only where it is asked for */
 } CrtBsdf;
 
@@ -160,6 +163,80 @@ CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec
     return s;
 }
 
+/* Narrower than this GGX is taken for a mirror: its value and density would lose their digits in single
+   precision, and the image cannot tell. */
+#define CRT_ALPHA_MIN 1e-3f
+
+/* Two directions in the shading frame, each with the root of Smith's shadowing, a = √(cos² + α² sin²), of
+   which Λ = (a/cos − 1)/2 (Heitz 2014); and GGX's density of the normal halfway. */
+typedef struct CrtMicrofacet {
+    f32 cos_o, cos_i; /* 0 or below: the microfacets do not mirror between them */
+    f32 cos_m;        /* of both with the normal halfway */
+    f32 root_o, root_i;
+    f32 density;
+} CrtMicrofacet;
+
+CRT_FN f32 crt_smith_root(f32 cosine, f32 alpha) {
+    const f32 cos2 = cosine * cosine;
+    return crt_sqrt(crt_max(cos2 + alpha * alpha * (1.0f - cos2), 0.0f));
+}
+
+CRT_FN CrtMicrofacet crt_microfacet(const CrtBsdf *b, vec3 wi) {
+    const CrtFrame frame = crt_frame(b->ns);
+    const vec3 h = b->wo + wi;
+    const f32 x = dot3(frame.s, h), y = dot3(frame.t, h), z = dot3(frame.n, h);
+    const f32 hh = x * x + y * y + z * z;
+    CrtMicrofacet m;
+    m.cos_o = dot3(b->wo, b->ns);
+    m.cos_i = dot3(wi, b->ns);
+    m.cos_m = crt_min(dot3(b->wo, h) / crt_sqrt(hh), 1.0f);
+    m.root_o = crt_smith_root(m.cos_o, b->alpha);
+    m.root_i = crt_smith_root(m.cos_i, b->alpha);
+    /* D = α²/π / (sin² + α² cos²)², with the sines and cosines of h, which is not of unit length. */
+    const f32 spread = (x * x + y * y + b->alpha * b->alpha * (z * z)) / hh;
+    m.density = CRT_INV_PI * (b->alpha / spread) * (b->alpha / spread);
+    return m;
+}
+
+/* f·cos = F D G₂ / (4 cos_o), G₂ = 1 / (1 + Λ_o + Λ_i): shadowing and masking correlated by height. */
+CRT_FN vec4 crt_rough_conductor(const CrtBsdf *b, vec3 wi) {
+    const CrtMicrofacet m = crt_microfacet(b, wi);
+    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return splat4(0.0f);
+    return crt_fresnel_conductor(m.cos_m, b->eta, b->k) *
+           (m.density * m.cos_i / (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
+}
+
+/* The visible normals' density G₁ D cos_m / cos_o, turned into that of directions by 1 / (4 cos_m). */
+CRT_FN f32 crt_rough_conductor_pdf(const CrtBsdf *b, vec3 wi) {
+    const CrtMicrofacet m = crt_microfacet(b, wi);
+    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return 0.0f;
+    return m.density / (2.0f * (m.cos_o + m.root_o));
+}
+
+/* Mirrors w_o in one of the normals that it sees (Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with
+   Spherical Caps"): stretched by α, the visible normals are those halfway to a cap of the sphere. */
+CRT_FN CrtScatter crt_sample_rough_conductor(const CrtBsdf *b, CrtRandom2 u) {
+    const CrtFrame frame = crt_frame(b->ns);
+    const vec3 stretched = normalize3(make_vec3(b->alpha * dot3(b->wo, frame.s),
+                                                b->alpha * dot3(b->wo, frame.t), dot3(b->wo, frame.n)));
+    f32 cos_phi;
+    const f32 sin_phi = crt_sincos(2.0f * CRT_PI * u.x, &cos_phi);
+    const f32 z = crt_fma(1.0f - u.y, 1.0f + V3Z(stretched), -V3Z(stretched));
+    const f32 sine = crt_sqrt(crt_max(0.0f, 1.0f - z * z));
+    const vec3 cap = make_vec3(sine * cos_phi, sine * sin_phi, z) + stretched;
+    const vec3 normal = crt_to_world(
+        frame, normalize3(make_vec3(b->alpha * V3X(cap), b->alpha * V3Y(cap), crt_max(V3Z(cap), 0.0f))));
+    CrtScatter s = crt_no_scatter();
+    s.wi = normalize3(crt_reflect(b->wo, normal));
+    const CrtMicrofacet m = crt_microfacet(b, s.wi);
+    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return s;
+    s.pdf = m.density / (2.0f * (m.cos_o + m.root_o));
+    s.weight = crt_fresnel_conductor(m.cos_m, b->eta, b->k) *
+               (m.cos_i * (m.cos_o + m.root_o) / (m.root_o * m.cos_i + m.root_i * m.cos_o));
+    s.valid = dot3(s.wi, b->ng) > 0.0f && s.pdf > 0.0f;
+    return s;
+}
+
 /* A material's type; known without looking where the kernel has only one. */
 #define CRT_ONLY_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
     if (CRT_KERNEL_MATERIALS == 1 << bit) return bit;
@@ -180,7 +257,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
     b->ns = outside ? surface->ns : -surface->ns;
     /* A shading normal that turns away from the viewer would reflect light from behind the surface. */
     if (CRT_HAS(SMOOTH_NORMALS) && !(dot3(wo, b->ns) > 0.0f)) b->ns = b->ng;
-    if (albedo) b->albedo = splat4(1.0f);
+    b->albedo = splat4(1.0f);
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
             if (CRT_HAS(DIFFUSE)) {
@@ -203,6 +280,20 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
                 b->reflectance = crt_fresnel_conductor(crt_min(dot3(wo, b->ns), 1.0f), n, k);
                 if (albedo) b->albedo = crt_fresnel_conductor(1.0f, n, k);
+            }
+            break;
+        case CRT_MATERIAL_ROUGH_CONDUCTOR:
+            if (CRT_HAS(ROUGH_CONDUCTOR)) {
+                const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
+                b->flags = CRT_BSDF_REFLECTS;
+                b->eta = crt_value(ctx, material.eta, surface, position);
+                b->k = crt_value(ctx, material.k, surface, position);
+                b->alpha = roughness * roughness;
+                if (!(b->alpha >= CRT_ALPHA_MIN)) {
+                    b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
+                    b->reflectance = crt_fresnel_conductor(crt_min(dot3(wo, b->ns), 1.0f), b->eta, b->k);
+                }
+                if (albedo) b->albedo = crt_fresnel_conductor(1.0f, b->eta, b->k);
             }
             break;
         case CRT_MATERIAL_DIELECTRIC:
@@ -229,6 +320,13 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, vec4 hero, int
             if (CRT_HAS(MIRROR) || CRT_HAS(CONDUCTOR))
                 return crt_sample_mirror(b->reflectance, b->wo, b->ns, b->ng);
             break;
+        case CRT_MATERIAL_ROUGH_CONDUCTOR:
+            if (CRT_HAS(ROUGH_CONDUCTOR)) {
+                if ((b->flags & CRT_BSDF_DELTA) != 0u)
+                    return crt_sample_mirror(b->reflectance, b->wo, b->ns, b->ng);
+                return crt_sample_rough_conductor(b, u);
+            }
+            break;
         case CRT_MATERIAL_DIELECTRIC:
             if (CRT_HAS(DIELECTRIC))
                 return crt_sample_dielectric(b->eta, b->wo, b->ns, b->ng, hero,
@@ -245,6 +343,10 @@ CRT_FN vec4 crt_bsdf_eval(const CrtBsdf *b, vec3 wi) {
         case CRT_MATERIAL_DIFFUSE:
             if (CRT_HAS(DIFFUSE)) return b->reflectance * crt_lambert(dot3(wi, b->ns));
             break;
+        case CRT_MATERIAL_ROUGH_CONDUCTOR:
+            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u)
+                return crt_rough_conductor(b, wi);
+            break;
         default: break;
     }
     return splat4(0.0f);
@@ -255,6 +357,10 @@ CRT_FN f32 crt_bsdf_pdf(const CrtBsdf *b, vec3 wi) {
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
             if (CRT_HAS(DIFFUSE)) return crt_lambert(dot3(wi, b->ns));
+            break;
+        case CRT_MATERIAL_ROUGH_CONDUCTOR:
+            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u)
+                return crt_rough_conductor_pdf(b, wi);
             break;
         default: break;
     }

@@ -18,6 +18,7 @@
     M(F, 6, DIFFUSE, Diffuse, diffuse, LOBE, "Lambertian reflection")                        \
     M(F, 19, MIRROR, Mirror, mirror, DELTA, "mirror")                                        \
     M(F, 7, CONDUCTOR, Conductor, conductor, DELTA, "smooth conductor")                      \
+    M(F, 21, ROUGH_CONDUCTOR, RoughConductor, rough_conductor, LOBE, "rough conductor (GGX)") \
     M(F, 8, DIELECTRIC, Dielectric, dielectric, DELTA,                                       \
       "smooth dielectric, total internal reflection")
 

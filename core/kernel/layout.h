@@ -116,7 +116,8 @@ typedef struct CrtMaterial {
     CrtValue reflectance;
     CrtValue eta; /* conductors: real part of the index; dielectric: index inside / outside */
     CrtValue k;   /* conductors: extinction */
-    u32 reserved0, reserved1, reserved2;
+    CrtValue roughness; /* square root of the width α of GGX */
+    u32 reserved0, reserved1;
 } CrtMaterial;
 CRT_ASSERT_SIZE(CrtMaterial, 32);
 

@@ -95,8 +95,9 @@ struct Material {
     std::string name;
     MaterialType type = MaterialType::Diffuse;
     Spectrum reflectance;  ///< Diffuse and Mirror. In [0,1].
-    Spectrum eta;  ///< Conductor: real index n. Dielectric: index of the inside relative to the outside.
-    Spectrum k;            ///< Conductor: extinction.
+    Spectrum eta;  ///< Conductors: real index n. Dielectric: index of the inside relative to the outside.
+    Spectrum k;            ///< Conductors: extinction.
+    double roughness = 0;  ///< RoughConductor. In [0,1].
     SourcePlace place;
 };
 

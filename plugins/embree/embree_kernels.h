@@ -2,8 +2,6 @@
 /// per mask, and embree_program.cpp chooses between the results: both take the masks from here.
 #pragma once
 
-#include "kernel/features.h"
-
 #define CRT_EMBREE_LIT_FEATURES                                                                 \
     (CRT_FEATURE_SOBOL | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_XORSHIFT | CRT_FEATURE_DIFFUSE | \
      CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_FILTER | CRT_FEATURE_AOV |          \
@@ -16,3 +14,6 @@
     ((unsigned)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BVH | CRT_FEATURE_SMOOTH_NORMALS))
 /// Every scene.
 #define CRT_EMBREE_ALL_FEATURES CRT_FEATURES_ALL
+
+// Behind the masks: CRT_FEATURES, which it evaluates, is one of them.
+#include "kernel/features.h"

@@ -4,7 +4,9 @@
 
 #include <boost/math/quadrature/gauss.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 namespace crt::verify {
@@ -99,6 +101,40 @@ double planck_W_m3_sr(double wavelength_nm, double temperature_K) {
     constexpr double h = 6.62607015e-34, c = 299792458.0, k = 1.380649e-23;
     const double metres = wavelength_nm * 1e-9;
     return 2 * h * c * c / (std::pow(metres, 5) * std::expm1(h * c / (metres * k * temperature_K)));
+}
+
+namespace {
+
+double fresnelConductor(double cosine, double n, double k) {
+    const std::complex<double> eta(n, k), root = std::sqrt(eta * eta - (1 - cosine * cosine));
+    return (std::norm((cosine - root) / (cosine + root)) +
+            std::norm((eta * eta * cosine - root) / (eta * eta * cosine + root))) /
+           2;
+}
+
+/// Smith's Λ for GGX.
+double smithLambda(double cosine, double alpha) {
+    const double tan2 = (1 - cosine * cosine) / (cosine * cosine);
+    return (std::sqrt(1 + alpha * alpha * tan2) - 1) / 2;
+}
+
+}  // namespace
+
+double roughConductorAlbedo(double cosine, double n, double k, double roughness) {
+    const double alpha = roughness * roughness;
+    if (alpha < 1e-3) return fresnelConductor(cosine, n, k);  // the kernel's limit of the smooth metal
+    const double sine = std::sqrt(1 - cosine * cosine);
+    // With tan²(m) = α² x / (1 − x) the normals' density D cos(m) dm is dx dφ / 2π; half of φ is enough.
+    const auto integrand = [&](double x, double phi) {
+        const double cos_m = 1 / std::sqrt(1 + alpha * alpha * x / (1 - x));
+        const double sin_m = std::sqrt(std::max(0.0, 1 - cos_m * cos_m));
+        const double between = sine * sin_m * std::cos(phi) + cosine * cos_m;
+        const double cos_i = 2 * between * cos_m - cosine;
+        if (!(between > 0) || !(cos_i > 0)) return 0.0;
+        const double shadowing = 1 / (1 + smithLambda(cosine, alpha) + smithLambda(cos_i, alpha));
+        return fresnelConductor(between, n, k) * shadowing * between / (cosine * cos_m);
+    };
+    return rectangleIntegral(integrand, 0, 1, 0, kPi, 24) / kPi;
 }
 
 }  // namespace crt::verify

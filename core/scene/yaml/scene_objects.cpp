@@ -132,6 +132,7 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
         case MaterialType::Mirror:
             take("reflectance", SpectrumUse::Reflectance, material.reflectance);
             break;
+        case MaterialType::RoughConductor: section->read("roughness", material.roughness); [[fallthrough]];
         case MaterialType::Conductor: {
             std::string metal;
             if (section->readWord("metal", metal))

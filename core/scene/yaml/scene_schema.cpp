@@ -505,22 +505,37 @@ void addMaterials(std::vector<SectionSchema>& all) {
         {"material/diffuse", "a diffuse material", "Lambert's law.", {typeKey("diffuse"), reflectance}});
     all.push_back(
         {"material/mirror", "a mirror material", "Perfect reflection.", {typeKey("mirror"), reflectance}});
-    all.push_back(
-        {"material/conductor",
-         "a conductor material",
-         "A smooth metal: Fresnel's equations with a complex index. Give "
-         "`metal`, or `eta` with `k`.",
-         {typeKey("conductor"),
-          {.name = "metal", .kind = Kind::Choice, .choices = metalNames(), .doc = "A measured metal."},
-          {.name = "eta",
-           .kind = Kind::Spectrum,
-           .range = kPositive,
-           .doc = "Real part n of the refractive index."},
-          {.name = "k",
-           .kind = Kind::Spectrum,
-           .range = kNotNegative,
-           .doc = "Its imaginary part, the extinction."}},
-         {{KeyRule::Kind::ExactlyOne, {"metal", "eta"}}, {KeyRule::Kind::Together, {"eta", "k"}}}});
+    const KeySchema metal{
+        .name = "metal", .kind = Kind::Choice, .choices = metalNames(), .doc = "A measured metal."};
+    const KeySchema eta{.name = "eta",
+                        .kind = Kind::Spectrum,
+                        .range = kPositive,
+                        .doc = "Real part n of the refractive index."};
+    const KeySchema k{.name = "k",
+                      .kind = Kind::Spectrum,
+                      .range = kNotNegative,
+                      .doc = "Its imaginary part, the extinction."};
+    const std::vector<KeyRule> metal_or_index{{KeyRule::Kind::ExactlyOne, {"metal", "eta"}},
+                                              {KeyRule::Kind::Together, {"eta", "k"}}};
+    all.push_back({"material/conductor",
+                   "a conductor material",
+                   "A smooth metal: Fresnel's equations with a complex index. Give "
+                   "`metal`, or `eta` with `k`.",
+                   {typeKey("conductor"), metal, eta, k},
+                   metal_or_index});
+    all.push_back({"material/rough_conductor",
+                   "a rough_conductor material",
+                   "A rough metal: microfacets of GGX's distribution, shadowed as Smith's heights "
+                   "are. Light that meets it twice is left out, up to two thirds of it where it is "
+                   "roughest. Give `metal`, or `eta` with `k`.",
+                   {typeKey("rough_conductor"), metal, eta, k,
+                    {.name = "roughness",
+                     .kind = Kind::Number,
+                     .range = {.min = 0, .max = 1},
+                     .required = true,
+                     .doc = "0 is a mirror, 1 the roughest. The square root of GGX's width α; below "
+                            "0.03 it is taken for 0."}},
+                   metal_or_index});
     all.push_back({"material/dielectric",
                    "a dielectric material",
                    "Smooth glass or water: reflects and refracts.",
