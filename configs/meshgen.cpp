@@ -86,7 +86,7 @@ void writeObj(const Mesh& mesh, const std::filesystem::path& path, const char* t
     std::FILE* file = std::fopen(path.c_str(), "wb");
     if (file == nullptr) throw std::runtime_error("cannot write " + path.string());
     std::fprintf(file, "# %s, %zu triangles. Written by crt-meshgen.\n", title, mesh.triangles.size());
-    // Adding zero turns −0 into 0: which of the two a sum gives is nobody's business.
+    // Adding zero turns −0 into 0: which of the two a sum gives is unspecified.
     for (const Vec& p : mesh.positions)
         std::fprintf(file, "v %.9g %.9g %.9g\n", p.x + 0.0, p.y + 0.0, p.z + 0.0);
     for (const Vec& n : mesh.normals)
@@ -693,7 +693,7 @@ Mesh figure() {
         Simplifier(withoutCrumbs(polygonise(field, {-0.45, -0.03, -0.56}, {0.47, 1.14, 0.45}, 0.010)))
             .reduce(4746);
     // A closed surface has an even number of triangles. The 4,745th is the last one: the lowest face of the
-    // slab, on which everything stands, is left open by the one triangle nobody can see.
+    // slab, on which everything stands, is left open by the one triangle that no camera here sees.
     const auto lowest =
         std::min_element(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& a, const auto& b) {
             const auto height = [&](const auto& t) {

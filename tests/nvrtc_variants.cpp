@@ -52,8 +52,8 @@ std::map<std::uint32_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "a mesh, environment, lens and filter"},
         {mesh | CRT_FEATURE_AOV, "a mesh with AOVs"},
-        {mesh | glass | CRT_FEATURE_MIRROR | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_ENVIRONMENT |
-             CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
+        {mesh | glass | CRT_FEATURE_MIRROR | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_SMOOTH_NORMALS |
+             CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "all materials, BVH"},
         {CRT_FEATURE_SOBOL | CRT_FEATURE_BVH | CRT_FEATURE_VIEW, "a view of normals"},
     };

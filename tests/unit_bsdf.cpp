@@ -1,5 +1,6 @@
-// What every material must keep, whatever it is: asked of crt_bsdf_prepare, _sample, _eval and _pdf of each kind
-// in CRT_MATERIAL_LIST. A new material is a line in kSubjects. Backends are held to the same bits elsewhere.
+// What every material must keep, whatever it is: asked of crt_bsdf_prepare, _sample, _eval and _pdf of each
+// kind in CRT_MATERIAL_LIST. A new material is a line in kSubjects. Backends are held to the same bits
+// elsewhere.
 #include "kernel_test.h"
 
 #include "judge/verify/references.h"
@@ -195,7 +196,8 @@ TEST_CASE("BSDF: directions are distributed as the pdf says", "[kernel][bsdf][ma
             const CrtBsdf bsdf = bench.prepare(wo);
             if (isDelta(bsdf)) continue;
             INFO(s.name << " from " << wo[2]);
-            const auto density = overCells([&](const Vec3d& w) { return crt_bsdf_pdf(&bsdf, unitFloat(w)); });
+            const auto density =
+                overCells([&](const Vec3d& w) { return crt_bsdf_pdf(&bsdf, unitFloat(w)); });
             CHECK(total(density) < 1 + 1e-3);
             constexpr std::uint64_t kSamples = 400000;
             std::array<std::uint64_t, kCells> counts{};
@@ -279,7 +281,8 @@ TEST_CASE("BSDF: the way back is as bright as the way there", "[kernel][bsdf][ma
             if (std::abs(wo[2]) < 0.01) continue;
             const CrtBsdf there = bench.prepare(wo);
             if (isDelta(there)) {
-                // Of deltas the weights, for the hero alone: crossing scales radiance by 1/η², and back by η².
+                // Of deltas the weights, for the hero alone: crossing scales radiance by 1/η², and back by
+                // η².
                 CrtRandom2 u = random.pair();
                 const CrtScatter first = Bench::sample(there, u, 1);
                 if (!first.valid) continue;

@@ -191,12 +191,13 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     CHECK(compiled(flat, crt::kAovAlbedo).features == ((base | CRT_FEATURE_AOV) & ~CRT_FEATURE_NEE));
     CHECK(compiled(flat, crt::kAovNormal).features ==
           ((base | CRT_FEATURE_AOV) & ~(CRT_FEATURE_NEE | CRT_FEATURE_DIFFUSE)));
-    differs(CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_TABLE, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, [](Scene& s) {
-        s.integrator.max_depth = 0;
-        makeGlass(s);
-        s.materials[0].eta = dispersiveIndex();
-        s.environment = crt::Environment{crt::constantSpectrum(1)};
-    });
+    differs(CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_TABLE, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE,
+            [](Scene& s) {
+                s.integrator.max_depth = 0;
+                makeGlass(s);
+                s.materials[0].eta = dispersiveIndex();
+                s.environment = crt::Environment{crt::constantSpectrum(1)};
+            });
     // More triangles than brute force is good for.
     differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE,
             [](Scene& s) { s.objects[0].transforms.resize(40, crt::kIdentity4d); });

@@ -202,7 +202,8 @@ TEST_CASE("the matrices of the camera put points where its pixels see them", "[d
     CHECK(centre[0] == Approx(0.5));
     CHECK(centre[1] == Approx(0.5));
 
-    // The ray of a film position is what core/compile/settings.cpp makes of it: corner + x · step_x + y · step_y.
+    // The ray of a film position is what core/compile/settings.cpp makes of it: corner + x · step_x + y ·
+    // step_y.
     const CompiledScene compiled = compileScene(scene, 0);
     const kernel::CrtCamera& rays = reinterpret_cast<const kernel::CrtScene*>(compiled.data())->camera;
     for (const auto& [x, y] : {std::pair{0.0, 0.0}, {64.0, 0.0}, {0.0, 48.0}, {20.5, 40.25}}) {

@@ -70,7 +70,7 @@ const FilmIdentity kIdentity{"0123456789abcdef0123456789abcdef", "1.0"};
 
 // ---- Input files ----------------------------------------------------------------------------------------
 
-TEST_CASE("only regular files are read, and nobody waits for a pipe", "[limits][input]") {
+TEST_CASE("only regular files are read, and a pipe is not waited for", "[limits][input]") {
     const TemporaryFolder folder;
     const std::string pipe = folder / "pipe";
     REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
@@ -226,7 +226,7 @@ TEST_CASE("a plugin that others could have written is not opened", "[limits][tru
                Contains("is refused: everyone can write to '" + plugins.string() + "'"));
     CHECK_THAT(refusedWith(folder.path(), 0777),
                Contains("is refused: everyone can write to '" + folder.path() + "'"));  // further up
-    CHECK(refusedWith(plugins, 01777).empty());  // sticky, as /tmp: nobody can replace what is another's
+    CHECK(refusedWith(plugins, 01777).empty());  // sticky, as /tmp: users cannot replace what is another's
     if (::geteuid() == 0) {
         REQUIRE(::chown(plugin.c_str(), 65534, 65534) == 0);
         CHECK_THAT(refusal([&] { loadBackend(plugin); }), Contains("belongs to another user"));

@@ -96,7 +96,7 @@ TEST_CASE("a library that is no plugin of this version", "[loader]") {
                                          Contains("undefined symbol: crt_backend_v1"));
     CHECK_THAT(
         refusal("wrong_abi"),
-        Contains("speaks version 2.2 of the plugin interface and this crt speaks 1.2: rebuild the plugin"));
+        Contains("has version 2.2 of the plugin interface and this crt has 1.2: rebuild the plugin"));
     CHECK_THAT(refusal("no_table"), Contains("crt_backend_v1 returned no table"));
     CHECK_THAT(refusal("small_table"), Contains("its table has 32 bytes where version 1 needs " +
                                                 std::to_string(offsetof(CrtBackend, bits_version))));
@@ -198,7 +198,7 @@ TEST_CASE("the kernel cache directory", "[loader]") {
     CHECK(makeHost(false).cache_directory == nullptr);
     REQUIRE(makeHost(true).cache_directory != nullptr);
     CHECK(makeHost(true).cache_directory == base / "xdg/crt");
-    // What is cached is run: nobody else may write there.
+    // What is cached is run: no other user may write there.
     CHECK((fs::status(base / "xdg/crt").permissions() & fs::perms::all) == fs::perms::owner_all);
     {
         const ScopedVariable relative("XDG_CACHE_HOME", "relative");

@@ -127,7 +127,8 @@ TEST_CASE("what the including file gives takes away what it excludes", "[sharing
                             "camera: {focal_length: 1, sensor: [1, 1]}\n");
     CHECK(load(folder, "b.yaml").camera.tan_half_width == Approx(0.5));
     // Given by one file, they still exclude each other.
-    write(folder, "c.yaml", "crt: 1\ninclude: lens.yaml\ncamera: {fov: 90, focal_length: 1, sensor: [1, 1]}\n");
+    write(folder, "c.yaml",
+          "crt: 1\ninclude: lens.yaml\ncamera: {fov: 90, focal_length: 1, sensor: [1, 1]}\n");
     CHECK_THAT(refused(folder, "c.yaml"), Contains("exclude each other"));
 }
 
@@ -153,8 +154,8 @@ TEST_CASE("errors of included files have their file, line and column", "[sharing
     CHECK(text.find("main.yaml:3:15: error: 'fov' is 200") < text.find("room.yaml:3:3"));
 
     write(folder, "main.yaml", "crt: 1\ninclude: rom.yaml\n");
-    CHECK_THAT(refused(folder, "main.yaml"),
-               Contains("main.yaml:2:10: error: cannot find 'rom.yaml'") && Contains("did you mean 'room.yaml'?"));
+    CHECK_THAT(refused(folder, "main.yaml"), Contains("main.yaml:2:10: error: cannot find 'rom.yaml'") &&
+                                                 Contains("did you mean 'room.yaml'?"));
     write(folder, "main.yaml", "crt: 1\ninclude: [room.yaml, 3]\n");
     CHECK_THAT(refused(folder, "main.yaml"), Contains("main.yaml:2:22: error: expected text for 'include'"));
     write(folder, "room.yaml", "title: no version\n");
@@ -208,8 +209,9 @@ TEST_CASE("named data are the tables that they say they are", "[sharing]") {
 }
 
 TEST_CASE("the paints have the colours of their chart", "[sharing]") {
-    // Published sRGB of the patches (X-Rite, ColorChecker Classic, for D50), in linear light. The tables were
-    // measured on another chart: a few per cent of difference are those of the charts, a wrong row is not.
+    // Published sRGB of the patches (X-Rite, ColorChecker Classic, for D50), in linear light. The tables
+    // were measured on another chart: a few per cent of difference are those of the charts, a wrong row is
+    // not.
     struct Patch {
         const char* name;
         std::array<int, 3> srgb;
@@ -273,7 +275,8 @@ TEST_CASE("data that there are not are refused with the nearest name", "[sharing
 TEST_CASE("folders of CRT_DATA_PATH add families, with the header that data must have", "[sharing]") {
     TemporaryFolder folder;
     write(folder, "mine/grey.csv",
-          "# Grey\n# source: measured on Monday\n# quantity: reflectance\n# outside: clamp\n400,0.5\n700,0.5\n");
+          "# Grey\n# source: measured on Monday\n# quantity: reflectance\n# outside: "
+          "clamp\n400,0.5\n700,0.5\n");
     write(folder, "mine/nameless.csv", "400,0.5\n700,0.5\n");
     write(folder, "mine/open.csv", "# x\n# source: y\n# quantity: z\n400,0.5\n700,0.5\n");
     setenv("CRT_DATA_PATH", folder.path().c_str(), 1);

@@ -938,7 +938,7 @@ TEST_CASE("docs/scene.md is what the schema says", "[scene_yaml][docs]") {
     if (std::getenv("CRT_UPDATE_DOCS") != nullptr) std::ofstream(path, std::ios::binary) << text;
     std::ifstream in(path, std::ios::binary);
     const std::string committed{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-    // Not CHECK(a == b): two whole manuals on the terminal help nobody.
+    // Not CHECK(a == b): two whole manuals on the terminal help no reader.
     INFO("run this test with CRT_UPDATE_DOCS=1 to write the file");
     CHECK((committed == text));
 }

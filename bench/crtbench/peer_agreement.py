@@ -44,7 +44,7 @@ class Pool:
 
     def of(self, function):
         """Mean and variance of that mean of a linear function of the image: renders are unbiased and
-        independent, so they speak for each other."""
+        independent, so each is evidence for the other."""
         w = np.array(self.weights) / sum(self.weights)
         values = np.array([function(i) for i in self.images], dtype=np.float64)
         mean = np.tensordot(w, values, 1)

@@ -149,7 +149,7 @@ class Program:
 
     def render(self, scene, backend, arguments=(), outputs=(), settings=(), codes=(0,), environment=None):
         """Renders a scene of the repository (by name) or a file, and reads the report. Without outputs, a
-        PFM that nobody looks at."""
+        PFM that is not read."""
         report = self.scratch / "report.json"
         report.unlink(missing_ok=True)
         command = [
@@ -239,7 +239,7 @@ class Program:
     def kernels_with(self, extra, masks):
         """A copy of the kernel texts, for CRT_KERNEL_DIR, in which a kernel with one of the masks has the
         feature `extra` as well. Kernels with other
-        masks, which nobody asked for, have nothing at all, so that they compile fast."""
+        masks, which were not asked for, have nothing at all, so that they compile fast."""
         directory = self.scratch / f"kernel-{extra:05x}"
         if directory.exists():
             return directory

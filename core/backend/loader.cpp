@@ -114,7 +114,7 @@ bool hasBrings(const CrtBackend& table) {
            offsetof(CrtBackend, accelerator_reach) + sizeof(CrtBackend::accelerator_reach);
 }
 
-/// Whether a driver for a GPU runs here: then a backend without a device is worth a word.
+/// Whether a driver for a GPU runs here: then a backend without a device is worth a message.
 bool hasGpuDriver() {
     std::error_code unreadable;
     return fs::exists("/dev/nvidiactl", unreadable) || fs::exists("/dev/dxg", unreadable) ||
@@ -133,7 +133,7 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
     constexpr std::size_t first_size = offsetof(CrtBackend, create) + sizeof(CrtBackend::create);
     if (table->struct_size >= version_size && table->abi_major != CRT_ABI_MAJOR) {
         refuse(
-            fmt::format("backend '{}' ({}) speaks version {}.{} of the plugin interface and this crt speaks "
+            fmt::format("backend '{}' ({}) has version {}.{} of the plugin interface and this crt has "
                         "{}.{}: rebuild the plugin",
                         name, path, table->abi_major, table->abi_minor, CRT_ABI_MAJOR, CRT_ABI_MINOR));
     }
@@ -223,7 +223,7 @@ std::string cacheDirectory() {
     }
     std::error_code failed;
     if (fs::create_directories(directory, failed)) {
-        // What is cached is run, so nobody else may write there.
+        // What is cached is run, so no other user may write there.
         fs::permissions(directory, fs::perms::owner_all, failed);
     }
     if (::access(directory.c_str(), R_OK | W_OK | X_OK) != 0 || !fs::is_directory(directory, failed)) {

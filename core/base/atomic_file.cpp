@@ -182,10 +182,11 @@ void AtomicFile::commit() {
 void checkWritable(const std::string& path) {
     if (isStandardOutput(path)) {
         if (::isatty(STDOUT_FILENO) != 0)
-            throw Error(ErrorKind::Output,
-                        fmt::format("'{}' is standard output, which is a terminal here; redirect it to a file "
-                                    "or a pipe",
-                                    path));
+            throw Error(
+                ErrorKind::Output,
+                fmt::format("'{}' is standard output, which is a terminal here; redirect it to a file "
+                            "or a pipe",
+                            path));
         return;
     }
     const std::string directory = directoryOf(path);

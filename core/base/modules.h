@@ -1,5 +1,5 @@
-/// Where crt finds what is installed with it: plugins, meshes and named data, relative to the file that holds this code
-/// (the program, libcrt.so, a Python module), so that an installed tree can be moved.
+/// Where crt finds what is installed with it: plugins, meshes and named data, relative to the file that
+/// holds this code (the program, libcrt.so, a Python module), so that an installed tree can be moved.
 #pragma once
 
 #include <string>

@@ -49,8 +49,8 @@ Examples:
   crt compare --backends cuda,embree scene.yaml          do both render the same?
 )";
 
-/// Exit code 7 when the images differ (compare.h says what that means), or, with backends, when the verdict is
-/// not PASS.
+/// Exit code 7 when the images differ (compare.h says what that means), or, with backends, when the verdict
+/// is not PASS.
 struct CompareArguments {
     std::string first, second;    ///< With backends, the first is the scene and there is no second.
     CompareOptions options;

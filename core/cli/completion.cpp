@@ -184,7 +184,8 @@ std::string fishValue(const Completion& completion, const std::vector<Command>& 
     switch (completion.kind) {
         case Completion::Kind::None: return {};
         case Completion::Kind::Folder: return " -a '(__fish_complete_directories)'";
-        case Completion::Kind::Data: return fmt::format(" -a {}", fishQuoted(fmt::format("({})", kListData)));
+        case Completion::Kind::Data:
+            return fmt::format(" -a {}", fishQuoted(fmt::format("({})", kListData)));
         case Completion::Kind::File: {
             std::string calls;
             for (const std::string& extension : completion.words)
@@ -220,15 +221,17 @@ std::string fishCommand(const Command& command, const std::vector<Command>& comm
 std::string bashCompletion(const std::vector<Command>& commands) {
     const std::string names = fmt::format("{}", fmt::join(commandNames(commands), " "));
     std::string text(kBashHead);
-    text += "_crt() {\n"
-            "    local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]} command=render\n"
-            "    COMPREPLY=()\n"
-            "    # bash takes --option=value apart.\n"
-            "    if [[ $current == = ]]; then current=\n"
-            "    elif [[ $previous == = ]]; then previous=${COMP_WORDS[COMP_CWORD-2]}; fi\n"
-            "    if ((COMP_CWORD > 1)); then\n"
-            "        case ${COMP_WORDS[1]} in\n";
-    text += fmt::format("            {}) command=${{COMP_WORDS[1]}} ;;\n", fmt::join(commandNames(commands), "|"));
+    text +=
+        "_crt() {\n"
+        "    local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]} command=render\n"
+        "    COMPREPLY=()\n"
+        "    # bash takes --option=value apart.\n"
+        "    if [[ $current == = ]]; then current=\n"
+        "    elif [[ $previous == = ]]; then previous=${COMP_WORDS[COMP_CWORD-2]}; fi\n"
+        "    if ((COMP_CWORD > 1)); then\n"
+        "        case ${COMP_WORDS[1]} in\n";
+    text += fmt::format("            {}) command=${{COMP_WORDS[1]}} ;;\n",
+                        fmt::join(commandNames(commands), "|"));
     text += "        esac\n"
             "    elif [[ $current == -* ]]; then\n"
             "        _crt_words --version\n"

@@ -43,10 +43,15 @@ std::string rangeText(const NamedData& row) {
 }
 
 Json jsonOf(const NamedData& row, bool with_table) {
-    Json json{{"name", row.name},       {"title", row.title},     {"quantity", row.quantity},
-              {"source", row.source},   {"outside", row.outside},
-              {"formula", row.formula.empty() ? Json() : Json(row.formula)}, {"file", row.file.empty() ? Json() : Json(row.file)},
-              {"columns", row.columns}, {"first_nm", row.wavelength_nm.front()},
+    Json json{{"name", row.name},
+              {"title", row.title},
+              {"quantity", row.quantity},
+              {"source", row.source},
+              {"outside", row.outside},
+              {"formula", row.formula.empty() ? Json() : Json(row.formula)},
+              {"file", row.file.empty() ? Json() : Json(row.file)},
+              {"columns", row.columns},
+              {"first_nm", row.wavelength_nm.front()},
               {"last_nm", row.wavelength_nm.back()}};
     if (!with_table) return json;
     json["wavelength_nm"] = row.wavelength_nm;

@@ -1,5 +1,5 @@
-/// Ctrl-C, kill and a closing terminal, made gentle: the first signal asks the render to stop after the
-/// chunk it is working on, so that image and checkpoint are written; the second leaves at once.
+/// Ctrl-C, kill and a closing terminal, handled in two steps: the first signal asks the render to stop after
+/// the chunk it is working on, so that image and checkpoint are written; the second leaves at once.
 #pragma once
 
 #include <csignal>
@@ -30,7 +30,7 @@ private:
     std::vector<Saved> saved_;
 };
 
-/// From now on, writing to a pipe that nobody reads (`crt … -v 2>&1 | head -1`) or beyond the limit on file
+/// From now on, writing to a pipe without a reader (`crt … -v 2>&1 | head -1`) or beyond the limit on file
 /// sizes (ulimit -f) fails as writing to a full disk does, and no longer ends the process before its image
 /// is written.
 void ignoreWriteSignals();

@@ -57,7 +57,8 @@ std::string optionTerm(const Option& option) {
 std::string usage(const Command& command) {
     std::string words;
     for (const Argument& argument : command.arguments) {
-        const std::string name = fmt::format("\\fI{}\\fR{}", argument.name, argument.repeatable ? "..." : "");
+        const std::string name =
+            fmt::format("\\fI{}\\fR{}", argument.name, argument.repeatable ? "..." : "");
         words += argument.required ? " " + name : fmt::format(" [{}]", name);
     }
     return fmt::format("\\fBcrt {}\\fR{} [\\fIoptions\\fR]", command.name, words);
@@ -87,11 +88,13 @@ constexpr std::array kVariables{
     Variable{"CRT_BACKEND_PATH", "Folders searched for backends first, separated by colons."},
     Variable{"CRT_MESH_PATH", "Folders searched for meshes and spectra that are not beside the scene."},
     Variable{"CRT_DATA_PATH", "Folders searched for named data before those of crt."},
-    Variable{"CRT_CACHE_DIR", "Where compiled kernels are kept, instead of crt in $XDG_CACHE_HOME or ~/.cache."},
+    Variable{"CRT_CACHE_DIR",
+             "Where compiled kernels are kept, instead of crt in $XDG_CACHE_HOME or ~/.cache."},
     Variable{"CRT_KERNEL_DIR", "Kernel headers to be compiled instead of those in the program."},
     Variable{"CUDA_HOME", "Where NVRTC is, when the system does not find it."},
-    Variable{"CRT_SCENE_MEMORY",
-             "The memory that a scene may take when its placements and aliases are written out, such as 20GB."},
+    Variable{
+        "CRT_SCENE_MEMORY",
+        "The memory that a scene may take when its placements and aliases are written out, such as 20GB."},
     Variable{"SOURCE_DATE_EPOCH", "Seconds since 1970 that images and films carry as their date."},
     Variable{"NO_COLOR", "Set to anything: crt verify prints without colours."},
 };

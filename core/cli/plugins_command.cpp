@@ -37,10 +37,11 @@ int printPluginsJson() {
     for (const BackendStatus& status : listBackends()) {
         Json devices = Json::array();
         for (const CrtDevice& device : status.devices)
-            devices.push_back({{"index", device.index},
-                               {"name", arrayText(device.name)},
-                               {"memory_bytes", device.memory_bytes > 0 ? Json(device.memory_bytes) : Json()},
-                               {"driver", text(arrayText(device.driver))}});
+            devices.push_back(
+                {{"index", device.index},
+                 {"name", arrayText(device.name)},
+                 {"memory_bytes", device.memory_bytes > 0 ? Json(device.memory_bytes) : Json()},
+                 {"driver", text(arrayText(device.driver))}});
         backends.push_back({{"name", status.name},
                             {"version", text(status.version)},
                             {"file", text(status.path)},
@@ -51,7 +52,8 @@ int printPluginsJson() {
                             {"devices", std::move(devices)}});
     }
     // Names come from drivers, in whatever encoding.
-    printOut("{}\n", Json{{"backends", std::move(backends)}}.dump(2, ' ', false, Json::error_handler_t::replace));
+    printOut("{}\n",
+             Json{{"backends", std::move(backends)}}.dump(2, ' ', false, Json::error_handler_t::replace));
     return 0;
 }
 

@@ -23,13 +23,13 @@ OptionGroup what(Job& job) {
         {.names = "--time",
          .placeholder = "DURATION",
          .help = "stop after 90s, 30m, 2h, 1h30m; with --spp, whichever comes first",
-         .read = [&job](const std::string& text) { job.time_limit_seconds = parseDuration(text, "--time"); }},
+         .read =
+             [&job](const std::string& text) { job.time_limit_seconds = parseDuration(text, "--time"); }},
         {.names = "--target-error",
          .placeholder = "PERCENT",
          .help = "stop when the image's error is below, e.g. 1%, with 95 % confidence",
-         .read = [&job](const std::string& text) {
-             job.target_error = parseFraction(text, "--target-error");
-         }},
+         .read =
+             [&job](const std::string& text) { job.target_error = parseFraction(text, "--target-error"); }},
         {.names = "--samples",
          .placeholder = "A:B",
          .help = "exactly the samples A to B-1: a part to merge with others",

@@ -1,4 +1,5 @@
-/// Options that several commands have: one definition, so that they are called and behave the same everywhere.
+/// Options that several commands have: one definition, so that they are called and behave the same
+/// everywhere.
 #pragma once
 
 #include "backend/integrator.h"

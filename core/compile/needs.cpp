@@ -72,7 +72,8 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
     if (!has(CRT_FEATURE_NEE))
         left_out("light sampling and shadow rays",
-                 !header.nee ? "integrator.nee is false" : "no surface that scatters in all directions can be lit by an emitter");
+                 !header.nee ? "integrator.nee is false"
+                             : "no surface that scatters in all directions can be lit by an emitter");
     if (!has(CRT_FEATURE_ENVIRONMENT)) left_out("environment", "there is none");
     if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
     if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");

@@ -55,7 +55,7 @@ inline constexpr const char* kCheckpointExtension = ".crtfilm";
 
 /// Refuses to go on from `path` when it holds other bits or another scene than `expected`: crt::Error(Usage)
 /// naming both versions of the bits or both hashes. Warns when another version of crt wrote it: a change of
-/// bits that nobody noticed would not show otherwise.
+/// bits that went unnoticed would not show otherwise.
 void requireSameScene(const std::string& path, const FilmIdentity& found, const FilmIdentity& expected);
 
 /// "1.0.0 and 1.1.0": every version that is in `a` or in `b`, once, in the order of their text, whatever the

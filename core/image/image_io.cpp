@@ -158,7 +158,7 @@ Image readPfm(const std::string& path, std::string_view bytes) {
     HeaderReader header(path, bytes);
     const std::uint32_t width = header.size("width");
     const std::uint32_t height = header.size("height");
-    // Its sign is the byte order; its size a unit that nobody agrees on, and that readers leave alone.
+    // Its sign is the byte order; its size a unit without an agreed meaning, which readers ignore.
     const bool little_endian = header.number("scale") < 0;
     const std::string_view pixels = header.pixels(pixelBytes(width, height, channels * 4, path));
     Image image = emptyRgb(width, height);
@@ -419,7 +419,7 @@ EncodedImage encodeSrgb8(const Image& image) {
             // Written so that NaN is outside.
             const bool inside = rgb[c] >= 0.0 && rgb[c] <= 1.0;
             const double value = inside ? rgb[c] : rgb[c] > 1.0 ? 1.0 : 0.0;
-            // One rounding of float in the conversion from another space is no clipping worth a word.
+            // One rounding of float in the conversion from another space is no clipping worth a warning.
             const bool worth_counting = !(rgb[c] >= -1e-6 && rgb[c] <= 1.0 + 1e-6);
             encoded.clipped_values += worth_counting;
             encoded.rgb[3 * p + c] =

@@ -91,8 +91,8 @@ std::string conflictOf(const ColorConditions& of_a, const std::string& a, const 
     const auto say = [&](const char* what, const std::string& is_a, const std::string& is_b) {
         return fmt::format("{} and {} differ in {}: {} and {}", a, b, what, is_a, is_b);
     };
-    // Exposures of one image differ by rounding of text at most; what is worth a word is what can be seen in
-    // floats.
+    // Exposures of one image differ by rounding of text at most; what deserves a warning is what can be seen
+    // in floats.
     if (of_a.exposure_ev && of_b.exposure_ev && std::abs(*of_a.exposure_ev - *of_b.exposure_ev) > 1e-7)
         return say("exposure", exposureText(*of_a.exposure_ev), exposureText(*of_b.exposure_ev));
     if (of_a.white_balance && of_b.white_balance && !sameBalance(*of_a.white_balance, *of_b.white_balance))

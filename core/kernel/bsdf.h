@@ -1,8 +1,8 @@
 /*
  * bsdf.h: how surfaces scatter. crt_bsdf_prepare reads what a material is made of, once a vertex; then
- * crt_bsdf_sample, crt_bsdf_eval and crt_bsdf_pdf and the flags are all that path.h knows. A material is a row
- * of CRT_MATERIAL_LIST (features.h) and a case in each of the four; deltas, which can only be sampled, need
- * none in eval and pdf.
+ * crt_bsdf_sample, crt_bsdf_eval and crt_bsdf_pdf and the flags are all that path.h knows. A material is a
+ * row of CRT_MATERIAL_LIST (features.h) and a case in each of the four; deltas, which can only be sampled,
+ * need none in eval and pdf.
  *
  * w_o and w_i point away from the surface. Radiance is transported: crossing into an index η times the other
  * scales it by 1/η².
@@ -78,8 +78,8 @@ CRT_FN vec4 crt_fresnel_conductor(f32 cos_i, vec4 n, vec4 k) {
 
 CRT_FN vec3 crt_reflect(vec3 wo, vec3 n) { return n * (2.0f * dot3(wo, n)) - wo; }
 
-/* Lambertian f·|cos| per unit reflectance for a direction at cos_s from the shading normal, and its pdf: both
-   cos/π; 0 below the horizon. */
+/* Lambertian f·|cos| per unit reflectance for a direction at cos_s from the shading normal, and its pdf:
+   both cos/π; 0 below the horizon. */
 CRT_FN f32 crt_lambert(f32 cos_s) { return crt_max(cos_s, 0.0f) * CRT_INV_PI; }
 
 /* Nothing is scattered. */
@@ -245,7 +245,8 @@ CRT_FN u32 crt_material_type(u32 type) {
     return type;
 }
 
-/* What the material of `surface` does to light that leaves along wo. The first vertex asks for the albedo. */
+/* What the material of `surface` does to light that leaves along wo. The first vertex asks for the albedo.
+ */
 CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface *surface, vec3 wo,
                              vec4 position, int albedo) {
     const CrtMaterial material = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[surface->material];
@@ -308,8 +309,8 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
     }
 }
 
-/* A direction w_i, distributed as crt_bsdf_pdf or a delta. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`:
-   only the hero is alive. */
+/* A direction w_i, distributed as crt_bsdf_pdf or a delta. `hero`: 1 in the hero's lane, 0 elsewhere.
+   `alone`: only the hero is alive. */
 CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, vec4 hero, int alone) {
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:

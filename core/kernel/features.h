@@ -7,9 +7,9 @@
  * CRT_FEATURE_LIST(F) calls F(bit, NAME, "what leaves the kernel without it").
  *
  * CRT_MATERIAL_LIST(M, F) calls M(F, bit, NAME, Name, word, SCATTER, "what leaves…") for each kind of
- * material. Its bit is its number in the scene, too; `word` is its type in scene files. SCATTER is LOBE where
- * light that arrives from any direction may be scattered, so that it is worth sampling lights, and DELTA
- * where only that of single directions is.
+ * material. Its bit is its number in the scene, too; `word` is its type in scene files. SCATTER is LOBE
+ * where light that arrives from any direction may be scattered, so that it is worth sampling lights, and
+ * DELTA where only that of single directions is.
  */
 #ifndef CRT_FEATURES_H
 #define CRT_FEATURES_H

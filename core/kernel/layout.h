@@ -1,8 +1,8 @@
 /*
  * layout.h: the compiled scene as bytes. One pointer-free blob: a CrtScene header, then arrays that its
- * spans point to. Written by core/compile/compile.cpp, read as it lies by every kernel. Fixed-width members, every
- * struct a multiple of 16 bytes, sizes asserted. A change here changes CRT_LAYOUT_HASH, and plugins built
- * with another hash are refused.
+ * spans point to. Written by core/compile/compile.cpp, read as it lies by every kernel. Fixed-width members,
+ * every struct a multiple of 16 bytes, sizes asserted. A change here changes CRT_LAYOUT_HASH, and plugins
+ * built with another hash are refused.
  *
  * Units: the scene is moved to its centre and scaled by a power of two at load (lengths here are in these
  * units); radiance in W·m⁻²·sr⁻¹·nm⁻¹; wavelengths in nm.

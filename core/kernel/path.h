@@ -107,8 +107,8 @@ typedef struct CrtShadow {
 } CrtShadow;
 
 /* Next event estimation: a light, and a ray towards it. */
-CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface, const CrtBsdf *bsdf,
-                          u32 dimension, CrtShadow *shadow) {
+CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface,
+                          const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
     const u32 index = crt_light_choose(ctx, &path->sampler, dimension);
     const CrtLightSample light = crt_light_sample(ctx, index, &path->sampler, dimension, surface->p);
     if (!(light.pdf > 0.0f)) return;

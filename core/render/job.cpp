@@ -38,7 +38,7 @@ std::vector<std::string> imageNames(const OutputPlan& plan) {
     return names;
 }
 
-/// Names them, and finds out now what cannot be written: nobody should learn after an hour that a directory
+/// Names them, and finds out now what cannot be written: it must not take an hour to learn that a directory
 /// is missing.
 Files planFiles(const Job& job, const Scene& scene) {
     Files files;
@@ -185,7 +185,7 @@ void tellTarget(const RunFacts& facts) {
     const stats::Interval needed = facts.error->samplesFor(target, samples);
     const stats::Interval more{needed.lower - samples, needed.upper - samples};
     const double each = facts.sampling_seconds / static_cast<double>(facts.rendered_samples);
-    logInfo("{:.3g} % would take {} samples per pixel more, {} to {}", target * 100, sampleCountText(more),
+    logInfo("{:.3g} % would take {} more samples per pixel, {} to {}", target * 100, sampleCountText(more),
             durationText(more.lower * each), durationText(more.upper * each));
 }
 

@@ -37,7 +37,7 @@ std::string driverOf(const std::vector<CrtDevice>& devices, const std::string& d
     return {};
 }
 
-/// Takes over what the backend says about itself. Being without it is a pity, but no reason to lose a
+/// Takes over what the backend says about itself. Its absence is no reason to lose a
 /// render.
 void askForReport(Session& session, RunFacts& facts) {
     try {

@@ -20,7 +20,7 @@
 namespace crt {
 namespace {
 
-/// A light, and how to speak of it.
+/// A light, and its name in messages.
 struct Light {
     double radiance;  ///< At its brightest wavelength.
     std::string name;

@@ -17,8 +17,8 @@ inline constexpr double kMostRadiance = 1e25;
 inline constexpr double kLeastRadiance = 1e-25;
 
 /// Throws crt::Error(Scene), with the place, when a light of the scene is above kMostRadiance or the
-/// brightest is below kLeastRadiance: the image would be wrong or black without a word. Warns of a lamp that
-/// is too dim beside others to shine at all.
+/// brightest is below kLeastRadiance: the image would be wrong or black without a warning. Warns of a lamp
+/// that is too dim beside others to shine at all.
 void checkRadiance(const Scene& scene);
 
 /// How much memory a scene may take that its files do not show: placements, aliases and polygons written

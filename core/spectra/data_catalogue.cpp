@@ -126,7 +126,8 @@ std::string fileOf(const std::string& family, const std::string& name) {
 }
 
 std::vector<std::string> namesInFiles() {
-    constexpr std::size_t kMost = 100'000;  // A folder that is no folder of data must not be walked for ever.
+    constexpr std::size_t kMost =
+        100'000;  // A folder that is no folder of data must not be walked for ever.
     std::vector<std::string> names;
     std::error_code unknown;
     for (const std::string& folder : dataDirectories())
@@ -180,11 +181,12 @@ NamedData readData(const std::string& name, const std::string& file) {
                         fmt::format("the data file '{}' has no line '# {}: …' at its beginning", file, key),
                         {file});
     if (row.outside != "clamp" && row.outside != "zero")
-        throw Error(ErrorKind::Scene,
-                    fmt::format("the data file '{}' has no line '# outside: clamp' or '# outside: zero' at its "
-                                "beginning",
-                                file),
-                    {file});
+        throw Error(
+            ErrorKind::Scene,
+            fmt::format("the data file '{}' has no line '# outside: clamp' or '# outside: zero' at its "
+                        "beginning",
+                        file),
+            {file});
     SpectrumTable table = readSpectrumTable(file);
     row.wavelength_nm = std::move(table.wavelength_nm);
     row.columns = {row.quantity};

@@ -1,8 +1,9 @@
 /// Named data that come with crt: `{data: cornell/white}` in a scene, `crt data` on the command line.
 ///
-/// Names are FAMILY/NAME. The tables that keys of the scene format name already (illuminants, glasses, metals)
-/// are those of spectra_data.cpp; all others are files FAMILY/NAME.csv in dataDirectories() (base/modules.h):
-/// two columns as readSpectrumFile() reads them, after lines "# title", "# source: …", "# quantity: …" and
+/// Names are FAMILY/NAME. The tables that keys of the scene format name already (illuminants, glasses,
+/// metals) are those of spectra_data.cpp; all others are files FAMILY/NAME.csv in dataDirectories()
+/// (base/modules.h): two columns as readSpectrumFile() reads them, after lines "# title", "# source: …", "#
+/// quantity: …" and
 /// "# outside: clamp" or "zero". So everybody can add a family, in a folder of CRT_DATA_PATH.
 #pragma once
 
@@ -22,7 +23,8 @@ struct NamedData {
     std::string title{};
     std::string quantity{};  ///< "reflectance", "radiance", "refractive index".
     std::string source{};
-    std::string outside{};   ///< What holds beyond the table: "clamp", "zero"; "formula" where nothing is beyond.
+    std::string
+        outside{};  ///< What holds beyond the table: "clamp", "zero"; "formula" where nothing is beyond.
     std::string formula{};  ///< Of which the table is a sampling; empty: the table is what was published.
     std::string file{};      ///< Empty: built in.
     std::vector<double> wavelength_nm{};

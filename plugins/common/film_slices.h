@@ -1,6 +1,6 @@
-/// How many films a launch should add to. A launch of few pixels and many samples leaves a GPU partly idle; with
-/// its samples divided between slices, each with a film of its own, it fills the device. The sums of all slices
-/// give the same film (core/film/film.h).
+/// How many films a launch should add to. A launch of few pixels and many samples leaves a GPU partly idle;
+/// with its samples divided between slices, each with a film of its own, it fills the device. The sums of
+/// all slices give the same film (core/film/film.h).
 #pragma once
 
 #include <algorithm>

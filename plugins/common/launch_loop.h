@@ -14,8 +14,8 @@ struct LaunchTotals {
     std::uint64_t paths = 0;
 };
 
-/// Renders `range` in launches of about the pacer's wanted time; `launch(const Launch&)` does one and returns
-/// its seconds. The host hears of every one and may cancel between them: then false is returned.
+/// Renders `range` in launches of about the pacer's wanted time; `launch(const Launch&)` does one and
+/// returns its seconds. The host hears of every one and may cancel between them: then false is returned.
 template <class LaunchFunction>
 bool renderInLaunches(const Host& host, LaunchPacer& pacer, const CrtRenderRange& range,
                       std::uint32_t tile_size, LaunchTotals& totals, LaunchFunction&& launch) {

@@ -26,7 +26,7 @@ struct CompileJob {
     int arch = 0;
     std::uint32_t features = 0;
     std::string
-        cache_directory;  ///< Empty: none; then nobody could use the kernel but the one who waits for it.
+        cache_directory;  ///< Empty: none; then only the process that waits could use the kernel.
     plugin::KernelCache::Key key{};
 };
 

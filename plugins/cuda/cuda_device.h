@@ -1,5 +1,5 @@
 /// The CUDA driver, found at run time, and its devices: listing, judging and choosing them, and what every
-/// other file here speaks of it.
+/// other file here names it.
 ///
 /// Nothing is linked: libcuda.so.1 belongs to the display driver, and a plugin that needs it to load could
 /// not say that it is missing (docs/decisions/0006-cuda-driver-api.md).

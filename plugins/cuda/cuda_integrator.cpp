@@ -119,11 +119,11 @@ double CudaIntegrator::launch(const Launch& launch) {
 
     const std::uint64_t blocks =
         divideUp(launch.x1 - launch.x0, kBlockWidth) * divideUp(launch.y1 - launch.y0, kBlockHeight);
-    const std::uint64_t most =
-        plugin::sliceBudget(device_.memory_bytes, device_.memory_bytes) / std::max<std::uint64_t>(film_.bytes(), 1);
-    std::uint32_t slices =
-        ensureSlices(plugin::chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors,
-                                  launch.sample_count, most));
+    const std::uint64_t most = plugin::sliceBudget(device_.memory_bytes, device_.memory_bytes) /
+                               std::max<std::uint64_t>(film_.bytes(), 1);
+    std::uint32_t slices = ensureSlices(
+        plugin::chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors,
+                             launch.sample_count, most));
 
     DeviceFilm& target = slices > 1 ? slices_ : film_;
     CUdeviceptr blob = blob_.address(), rays = rays_.address();

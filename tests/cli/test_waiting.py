@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What people wait for: loading and building say how far they are and can be stopped, times add up, nothing
 is built that
-nobody reads, and checkpoints are small and written beside the render.
+is never read, and checkpoints are small and written beside the render.
 
     test_waiting.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 
@@ -202,7 +202,7 @@ class Waiting(unittest.TestCase):
         )
         self.assertEqual(os.listdir(self.directory), ["empty.yaml"])
 
-    # --- E12: nothing is built that nobody reads, and seconds add up
+    # --- E12: nothing is built that is not read, and seconds add up
     # ------------------------------------------------------
 
     def test_seconds_add_up(self):

@@ -22,7 +22,12 @@ PAGE = ROOT / "docs" / "architecture.md"
 BEGIN, END = "<!-- rooms: tests/rooms/check_rooms.py --write -->\n", "<!-- /rooms -->\n"
 KEYWORDS = ("SOURCES", "USES", "LIBRARIES", "HEADERS")
 # Files of a room's folder that other targets are made of.
-OTHER_TARGETS = {"image/image_io_oiio.cpp", "image/image_headers.cpp", "backend/sdk/kernel_cache.cpp", "cli/main.cpp"}
+OTHER_TARGETS = {
+    "image/image_io_oiio.cpp",
+    "image/image_headers.cpp",
+    "backend/sdk/kernel_cache.cpp",
+    "cli/main.cpp",
+}
 
 
 # Folders that are no room of their own, and the room that they are linked to (libcrt).
@@ -126,7 +131,9 @@ def check_links(rooms, text):
 def check_roots(rooms, build):
     for folder in rooms:
         root = build / "rooms" / ("crt_" + folder.replace("/", "_"))
-        wanted = {str(h.relative_to(CORE)) for h in (CORE / folder).glob("*.h")} | set(rooms[folder].parts["HEADERS"])
+        wanted = {str(h.relative_to(CORE)) for h in (CORE / folder).glob("*.h")} | set(
+            rooms[folder].parts["HEADERS"]
+        )
         found = {str(h.relative_to(root)) for h in root.rglob("*.h")} if root.is_dir() else set()
         for header in sorted(found ^ wanted):
             yield f"{root.relative_to(build)}: {'has' if header in found else 'lacks'} {header}"
@@ -153,7 +160,9 @@ def page_with(picture):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--build", type=pathlib.Path)
     parser.add_argument("--draw", action="store_true")
     parser.add_argument("--write", action="store_true")

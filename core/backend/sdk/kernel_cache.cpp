@@ -202,7 +202,7 @@ void KernelCache::evict() const {
             const std::uint64_t size = gone ? 0 : file.file_size(gone);
             if (gone) continue;
             if (file.path().extension() == kTemporarySuffix) {
-                // Of a process that died while writing; nobody writes for an hour.
+                // Of a process that died while writing; no write takes an hour.
                 if (now - used > std::chrono::hours(1)) fs::remove(file.path(), gone);
             } else if (file.path().extension() == kEntrySuffix) {
                 entries.push_back({used, size, file.path()});

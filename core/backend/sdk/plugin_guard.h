@@ -327,7 +327,7 @@ private:
         return state != nullptr ? from(state).error_ : "no integrator";
     }
     static void destroy(CrtIntegratorState* state) noexcept {
-        // A destructor that throws ends the process (noexcept): there is nobody left to tell.
+        // A destructor that throws ends the process (noexcept): no caller is left to receive it.
         if (state != nullptr) delete &from(state);
     }
 

@@ -146,7 +146,7 @@ void judge(BackendAgainst& against, const Renders& a, const Renders& b, const st
     against.invalid_samples = a.invalid_samples + b.invalid_samples;
     against.verdict = against.other_seeds.verdict;
     if (against.invalid_samples >
-        0) {  // They were left out of the film, and what they would have been nobody knows.
+        0) {  // They were left out of the film, and their values are unknown.
         against.verdict = Verdict::Inconclusive;
         against.other_seeds.reasons.push_back(
             fmt::format("{} samples were no numbers: nothing can be said", against.invalid_samples));
@@ -187,7 +187,7 @@ BackendComparison compareBackends(const Scene& scene, const BackendComparisonOpt
     const std::uint64_t renders = options.backends.size() * (1 + std::uint64_t{options.replicates});
     SharedProgress progress(watch, renders * result.samples, std::uint64_t{result.width} * result.height);
 
-    // All are opened first: nobody should learn after a minute that one is missing.
+    // All are opened first: a missing one must be reported at once, not after a minute.
     std::vector<Contestant> contestants;
     contestants.reserve(options.backends.size());
     for (const std::string& name : options.backends) contestants.emplace_back(name, scene, progress);

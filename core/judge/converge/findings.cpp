@@ -68,7 +68,7 @@ std::string order(Fits reached, const std::function<const Target&(const Configur
     return text + fmt::format("; the next, {}, is not distinguishable from it", labelOf(reached[1]->key));
 }
 
-/// Who reaches the target first, among those that did; where nobody did, nothing is said about who would.
+/// Who reaches the target first, among those that did; where none did, no forecast is made.
 Finding race(const Fits& fits, std::size_t which, double relative_rmse, double confidence) {
     Fits reached;
     for (const ConfigurationFit* fit : fits)
@@ -226,7 +226,7 @@ Finding trustIn(const ConfigurationFit& fit) {
             fmt::format("{} {} its own error: predicted over actual is {}.", name, how, text)};
 }
 
-/// At the most samples. Of the same bits one speaks for all.
+/// At the most samples. Of equal bits one stands for all.
 std::vector<Finding> trust(const Fits& fits) {
     std::vector<Finding> findings;
     std::vector<Key> told;

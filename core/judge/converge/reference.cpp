@@ -130,7 +130,7 @@ std::string hashOfContent(const Scene& scene) {
     canonical.integrator.roulette = false;
     canonical.integrator.nee = true;
     canonical.integrator.accelerator = Accelerator::Bvh;
-    // The hash alone: nobody will trace through it.
+    // The hash alone: no ray is traced through it.
     return compileScene(canonical, 0, {.accelerator_reach = std::numeric_limits<double>::infinity()}).hash;
 }
 
@@ -209,8 +209,9 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, Session& session,
         if (part.invalidSamples() > 0)
             throw Error(
                 ErrorKind::Device,
-                fmt::format("{} samples of the reference were NaN or infinite: it would be worth nothing",
-                            part.invalidSamples()));
+                fmt::format(
+                    "{} samples of the reference were NaN or infinite: it would have no use as a reference",
+                    part.invalidSamples()));
         folds.images.push_back(resolveImage(part, developmentOf(scene).forFloats(), 0));
         folds.film.add(part);
     }

@@ -1,4 +1,4 @@
-/// Maps of a configuration as PNG: the image, its error, what it believes its error to be, their ratio, and
+/// Maps of a configuration as PNG: the image, its error, the error that it states, their ratio, and
 /// FLIP.
 #pragma once
 

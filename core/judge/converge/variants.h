@@ -25,7 +25,7 @@ struct Variant {
 };
 std::vector<Variant> variantsOf(const std::vector<Vary>& vary);
 
-/// The scene, its longer side of `resolution` pixels where nobody asked for a size (0: as it is): error
+/// The scene, its longer side of `resolution` pixels where no size was asked for (0: as it is): error
 /// against time does not need 2 million pixels.
 Scene loadSmall(SceneRequest request, const std::vector<SceneOverride>& changes, int resolution);
 

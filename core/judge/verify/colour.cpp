@@ -127,7 +127,7 @@ void sodium(Context& context) {
     for (float& v : bright.pixels) v *= 100;
     const std::uint64_t clipped = encodeSrgb8(bright).clipped_values;
     context.holds("PNG clips and counts what is out of gamut", clipped >= 2 * film.counts.size(),
-                  "2 values a pixel", "values out of gamut are clipped without a word",
+                  "2 values a pixel", "values out of gamut are clipped without a warning",
                   fmt::format("{} clipped values", clipped));
 }
 

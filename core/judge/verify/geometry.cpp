@@ -487,7 +487,7 @@ std::vector<Case> geometryCases() {
     constexpr std::uint64_t kHits = CRT_FEATURE_BVH | CRT_FEATURE_AOV;
     return {
         row("C01", "without-area", "Triangles without area: points, lines, emitting ones, far outside",
-            "the image without them, and a warning", "nobody can see them", "same bits", Level::Commit,
+            "the image without them, and a warning", "they cannot be seen", "same bits", Level::Commit,
             kFurnace | CRT_FEATURE_NEE, withoutArea),
         row("C02", "slivers", "Triangles of 1 : 1e3 … 1 : 1e8", "hits lie on their triangle",
             "geometry; Embree's issue 387", "rate of false hits ≤ 1e-6, off by more than 1e-5",

@@ -128,7 +128,7 @@ void narrowView(Context& context) {
                                     "{resolution: [256, 256]}")),
                  0);
     context.holds("0.001° over 256 pixels: a warning", warningCount() > before, "warned",
-                  "pixels finer than directions in single precision are rendered without a word",
+                  "pixels finer than directions in single precision are rendered without a warning",
                   fmt::format("{:.0f} % of the pixels see the right stripe", 100 * beyond));
 }
 

@@ -269,7 +269,7 @@ void overflowIsCounted(Context& context) {
         "radiance 3e38 times the width of the spectrum is beyond a float: every sample is dropped and "
         "counted",
         film.invalidSamples() == 16 * 16, "256 samples",
-        "samples that are no numbers are taken for black, or for bright, without a word",
+        "samples that are no numbers are taken for black, or for bright, without a warning",
         fmt::format("{} of 256 samples counted as invalid", film.invalidSamples()));
     double largest = 0;
     for (const double sum : film.sums) largest = fartherFrom(0, largest, sum);

@@ -35,9 +35,9 @@ double furnaceRadiance(double albedo, int depth);
 double fresnelDielectric(double cos_incidence, double eta);
 
 /// The share of light from everywhere that a metal of index n + ik and GGX microfacets of width
-/// α = roughness² scatters towards a view at `cosine`, each ray mirrored once: quadrature over the normals of
-/// Fresnel's reflectance times Smith's height-correlated shadowing (Heitz 2014), in double. 1 bounce loses
-/// light: even of a perfect metal it is below 1.
+/// α = roughness² scatters towards a view at `cosine`, each ray mirrored once: quadrature over the normals
+/// of Fresnel's reflectance times Smith's height-correlated shadowing (Heitz 2014), in double. 1 bounce
+/// loses light: even of a perfect metal it is below 1.
 double roughConductorAlbedo(double cosine, double n, double k, double roughness);
 
 /// Planck's law in W·m⁻³·sr⁻¹ (CODATA 2018, exact constants).

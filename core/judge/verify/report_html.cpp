@@ -1,5 +1,5 @@
 // verify.html: the table of cases with what each asked and measured. One file, no script, readable on a
-// telephone and at night.
+// phone and in dark mode.
 #include "base/unit_text.h"
 #include "judge/verify/report.h"
 

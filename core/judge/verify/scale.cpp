@@ -1,6 +1,6 @@
-// Group B: scale and position. Lengths are normalised in double before anything is float (core/compile/flatten.cpp),
-// so where a scene lies and how large it is must not show; what remains is the ratio of sizes within a
-// scene.
+// Group B: scale and position. Lengths are normalised in double before anything is float
+// (core/compile/flatten.cpp), so where a scene lies and how large it is must not show; what remains is the
+// ratio of sizes within a scene.
 #include "judge/verify/probes.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
@@ -89,7 +89,7 @@ void warned(Context& context, const std::string& what, const Scene& scene) {
     const int before = warningCount();
     compileScene(scene, 0);
     context.holds(what, warningCount() > before, "a warning at load",
-                  "geometry that cannot be resolved is rendered without a word");
+                  "geometry that cannot be resolved is rendered without a warning");
 }
 
 /// A screw of 10⁻³ on the ground, under a lamp, in a world of 10⁶: the ground's mesh gets finer towards it.

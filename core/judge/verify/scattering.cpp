@@ -168,8 +168,8 @@ void roughFurnace(Context& context) {
     const auto floor = [&](double degrees, double distance, const char* integrator, double n, double k,
                            double roughness) {
         return Stage(camera(degrees, distance), integrator)
-            .material("it", fmt::format("{{type: rough_conductor, eta: {:g}, k: {:g}, roughness: {:g}}}", n, k,
-                                        roughness))
+            .material("it", fmt::format("{{type: rough_conductor, eta: {:g}, k: {:g}, roughness: {:g}}}", n,
+                                        k, roughness))
             .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it");
     };
     const auto mistakes = [](double lossless, double squared) {
@@ -187,9 +187,10 @@ void roughFurnace(Context& context) {
                                             roughConductorAlbedo(cosine, n, k, std::sqrt(roughness)));
                 context.relative(
                     fmt::format("roughness {}, n = {:g}, k = {:g}, seen from {}°", roughness, n, k, degrees),
-                    radiance(context.render(
-                        floor(degrees, 1, kDirect, n, k, roughness).set("environment", "{radiance: 1}").yaml(),
-                        how)),
+                    radiance(context.render(floor(degrees, 1, kDirect, n, k, roughness)
+                                                .set("environment", "{radiance: 1}")
+                                                .yaml(),
+                                            how)),
                     expected, 2e-3, wrong);
             }
     // In a glowing room, light sampling and scattered rays share the work, or one does it alone.
@@ -201,8 +202,9 @@ void roughFurnace(Context& context) {
                 fmt::format("in a glowing room, roughness {}, {}", roughness, integrator),
                 floor(30, 0.5, integrator, 0.2, 3, roughness)
                     .material("black", "{type: diffuse, reflectance: 0}")
-                    .mesh("room", "[[-2,0,-2],[2,0,-2],[-2,1,-2],[2,1,-2],[-2,0,2],[2,0,2],[-2,1,2],[2,1,2]]",
-                          "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,2,6,4],[1,5,7,3]]", "black", "1, two_sided: true")
+                    .mesh(
+                        "room", "[[-2,0,-2],[2,0,-2],[-2,1,-2],[2,1,-2],[-2,0,2],[2,0,2],[-2,1,2],[2,1,2]]",
+                        "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,2,6,4],[1,5,7,3]]", "black", "1, two_sided: true")
                     .yaml(),
                 meanRadiance, expected, 0.002, {.samples = 1024, .most = 16384},
                 mistakes(roughConductorAlbedo(std::cos(30 * kDegree), 0.2, 3, 0),

@@ -212,17 +212,18 @@ outputs:
 ## Shared parts
 
 `include` names scene files, one or a list, relative to the file that it stands in. Each of them begins with
-`crt: 1` and may leave out whatever a scene may leave out. They are read as if they stood where `include` does:
+`crt: 1` and may leave out whatever a scene may leave out. They are read as if they stood where `include`
+does:
 
 - `camera`, `film`, `integrator`, `sampler`, `environment`, `spectra` and `materials` are merged key by key.
-  Where two files give the same key, the including file wins over what it includes, and of a list of files the
-  later one wins over the earlier. A value is replaced as a whole: a material is never made of two halves.
-  What excludes it gives way too: an included `focal_length` with its `sensor` to a `fov`.
+  Where two files give the same key, the including file wins over what it includes, and of a list of files
+  the later one wins over the earlier. A value is replaced as a whole: a material is never made of two
+  halves. What excludes it gives way too: an included `focal_length` with its `sensor` to a `fov`.
 - `objects` are joined: those of the included files come first, in the order of the list.
 - `title` and `outputs` are those of the file that wins.
 - `key: null` takes an included value away where `null` is a value of the key, such as `environment: null`.
-- A file that several files include counts once. A file that includes itself, directly or through others, is an
-  error. Files may be included 16 deep.
+- A file that several files include counts once. A file that includes itself, directly or through others, is
+  an error. Files may be included 16 deep.
 - Relative names of meshes and spectra are looked up beside the file that names them.
 - `--set` changes the result, so it reaches what was included too.
 - Spectra and materials of included files that nothing uses are no warning.
@@ -237,16 +238,16 @@ objects:
 
 ## Named data
 
-`{data: NAME}` is a measured spectrum that comes with crt, wherever a spectrum can stand. `crt data` lists them
-with their sources, `crt data NAME` prints one. The families are
+`{data: NAME}` is a measured spectrum that comes with crt, wherever a spectrum can stand. `crt data` lists
+them with their sources, `crt data NAME` prints one. The families are
 
 - `cornell/…`: paints and lamp of the Cornell box;
 - `paints/…`: the 24 paints of the ColorChecker chart;
-- `illuminants/…`, `glasses/…`, `metals/…`: what `illuminant`, `glass` and `metal` name. The parts of a metal's
-  index are two spectra, `metals/Au/n` and `metals/Au/k`.
+- `illuminants/…`, `glasses/…`, `metals/…`: what `illuminant`, `glass` and `metal` name. The parts of a
+  metal's index are two spectra, `metals/Au/n` and `metals/Au/k`.
 
-Further families are folders of CSV files (`FAMILY/NAME.csv`, with the header that `crt data NAME` prints) in a
-folder of `CRT_DATA_PATH`, whose folders, separated by `:`, are searched before those of crt.
+Further families are folders of CSV files (`FAMILY/NAME.csv`, with the header that `crt data NAME` prints)
+in a folder of `CRT_DATA_PATH`, whose folders, separated by `:`, are searched before those of crt.
 )";
 
 /// What stands before the variants of a family.

@@ -197,7 +197,8 @@ YamlNodePtr SceneIncludes::readIncluded(const std::string& name, const YamlPlace
     open_.pop_back();
     complete_.insert(identity);
     if (!root && out_.count() == errors)
-        out_.error({&source, 0, 0, 1}, "there is nothing in this file; an included scene begins with 'crt: 1'");
+        out_.error({&source, 0, 0, 1},
+                   "there is nothing in this file; an included scene begins with 'crt: 1'");
     if (root) checkIncluded(*root, out_);
     return root;
 }

@@ -430,7 +430,8 @@ std::optional<std::string> locateIn(const std::vector<fs::path>& directories, co
         tried.push_back(directory.string());
         addFileNames((directory / wanted).parent_path(), near);
     }
-    out.error(place, fmt::format("cannot find '{}'; searched in {}", wanted.string(), fmt::join(tried, ", ")),
+    out.error(place,
+              fmt::format("cannot find '{}'; searched in {}", wanted.string(), fmt::join(tried, ", ")),
               didYouMean(wanted.filename().string(), near));
     return std::nullopt;
 }

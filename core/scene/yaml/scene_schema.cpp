@@ -483,12 +483,13 @@ void addSpectra(std::vector<SectionSchema>& all) {
                      .required = true,
                      .doc = "Its name."},
                     scaleKey()}});
-    all.push_back({"spectrum/data",
-                   "named data",
-                   "Measured data that come with crt, by name: `cornell/white`, `paints/foliage`, `metals/Au/n`, "
-                   "`glasses/SF10`, `illuminants/D65`. `crt data` lists them with their sources; see [Named "
-                   "data](#named-data).",
-                   {{.name = "data", .required = true, .doc = "Its name."}, scaleKey()}});
+    all.push_back(
+        {"spectrum/data",
+         "named data",
+         "Measured data that come with crt, by name: `cornell/white`, `paints/foliage`, `metals/Au/n`, "
+         "`glasses/SF10`, `illuminants/D65`. `crt data` lists them with their sources; see [Named "
+         "data](#named-data).",
+         {{.name = "data", .required = true, .doc = "Its name."}, scaleKey()}});
     all.push_back({"spectrum/ref",
                    "a reference",
                    "A named spectrum; the form to use when it should be scaled.",
