@@ -274,12 +274,15 @@ TEST_CASE("data that there are not are refused with the nearest name", "[sharing
 
 TEST_CASE("folders of CRT_DATA_PATH add families, with the header that data must have", "[sharing]") {
     TemporaryFolder folder;
-    write(folder, "mine/grey.csv",
-          "# Grey\n# source: measured on Monday\n# quantity: reflectance\n# outside: "
-          "clamp\n400,0.5\n700,0.5\n");
-    write(folder, "mine/nameless.csv", "400,0.5\n700,0.5\n");
-    write(folder, "mine/open.csv", "# x\n# source: y\n# quantity: z\n400,0.5\n700,0.5\n");
-    setenv("CRT_DATA_PATH", folder.path().c_str(), 1);
+    const std::string header =
+        "# Grey\n# source: measured on Monday\n# quantity: reflectance\n# outside: clamp\n";
+    write(folder, "root/mine/grey.csv", header + "400,0.5\n700,0.5\n");
+    write(folder, "root/mine/nameless.csv", "400,0.5\n700,0.5\n");
+    write(folder, "root/mine/open.csv", "# x\n# source: y\n# quantity: z\n400,0.5\n700,0.5\n");
+    write(folder, "beside.csv", header + "400,0.5\n700,0.5\n");
+    setenv("CRT_DATA_PATH", (folder / "root").c_str(), 1);
+    CHECK_FALSE(findData("../beside"));
+    CHECK_FALSE(dataSpectrum("../beside"));
     const std::vector<std::string> names = dataNames();
     CHECK(std::count(names.begin(), names.end(), "mine/grey") == 1);
     CHECK(std::count(names.begin(), names.end(), "cornell/white") == 1);

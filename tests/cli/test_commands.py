@@ -319,6 +319,11 @@ class StandardStreams(CliTest):
             self.assertEqual(run.stdout, read_bytes(self.path(name)))
             os.remove(self.path(name))
 
+    def test_an_image_larger_than_any_buffer_arrives_whole(self):
+        large = ("scene.yaml", "--backend", "fake", "--spp", "1", "--set", "film.resolution=[640,480]")
+        self.crt(*large, "--report", "none", "-o", "a.pfm")
+        self.assertEqual(self.stream(*large, "-o", "-.pfm").stdout, read_bytes(self.path("a.pfm")))
+
     def test_png_and_exr(self):
         for output, mark in (("-.png", b"\x89PNG"), ("-.exr", b"\x76\x2f\x31\x01")):
             self.assertEqual(
