@@ -219,8 +219,8 @@ TEST_CASE("errors have a kind and a place") {
         CHECK(error.place().line == 2);
         CHECK(error.place().column == 8);
     }
-    CHECK(kindOf([] { crt::Scene::fromFile("/nowhere/scene.yaml"); }) == 3);
-    CHECK(kindOf([] { crt::Film::load("/nowhere/film.crtfilm"); }) == 2);
+    CHECK(kindOf([] { crt::Scene::fromFile("/no_such_folder/scene.yaml"); }) == 3);
+    CHECK(kindOf([] { crt::Film::load("/no_such_folder/film.crtfilm"); }) == 2);
     const crt::Scene scene = crt::Scene::fromText(lampYaml("idle"));
     Heard quiet;
     crt::RenderOptions options = withSamples(4);
@@ -238,9 +238,9 @@ TEST_CASE("errors have a kind and a place") {
         CHECK(kindOf([&] { crt::render(scene, options, &quiet); }) == 2);
     }
     const crt::Film film = crt::render(scene, withSamples(2), &quiet).film;
-    CHECK(kindOf([&] { film.saveImage("/nowhere/image.png"); }) == 6);
+    CHECK(kindOf([&] { film.saveImage("/no_such_folder/image.png"); }) == 6);
     CHECK(kindOf([&] { film.saveImage("image.gif"); }) == 2);
-    CHECK(kindOf([&] { film.save("/nowhere/film.crtfilm"); }) == 6);
+    CHECK(kindOf([&] { film.save("/no_such_folder/film.crtfilm"); }) == 6);
 }
 
 TEST_CASE("a device that fails leaves the film of what was rendered") {

@@ -16,7 +16,7 @@ endfunction()
 
 # Renders, and looks whether all of the image came out: not black, and through the installed codec module.
 function(expect_image program image)
-  run(env -i HOME=/nowhere SOURCE_DATE_EPOCH=0 ASAN_OPTIONS=detect_leaks=0 ${program} ${image})
+  run(env -i HOME=${WORK_DIR}/home SOURCE_DATE_EPOCH=0 ASAN_OPTIONS=detect_leaks=0 ${program} ${image})
   if(NOT output MATCHES "error of the image: [0-9.]+ %")
     message(FATAL_ERROR "${program} did not render as it should:\n${output}")
   endif()
