@@ -4,6 +4,7 @@
 #include "fuzz_target.h"
 
 #include "film/checkpoint.h"
+#include "film/resolve.h"
 #include "film/error_estimate.h"
 #include "image/image_io.h"
 #include "render/outputs.h"
