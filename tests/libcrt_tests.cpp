@@ -5,6 +5,8 @@
 #include <crt/crt.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -14,6 +16,7 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -47,7 +50,18 @@ crt::RenderOptions withSamples(std::uint64_t samples) {
     return options;
 }
 
+/// Lets two threads go on when both have come, or after two seconds.
+struct Together {
+    std::atomic<int> arrived{0};
+    void wait() {
+        ++arrived;
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+        while (arrived < 2 && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    }
+};
+
 struct Heard : crt::Watch {
+    Together* together = nullptr;  ///< Waited for at the first stage.
     std::vector<std::string> warnings, stages;
     double most_samples = 0, samples_wanted = 0;
     int stop_after = std::numeric_limits<int>::max();
@@ -57,7 +71,10 @@ struct Heard : crt::Watch {
         samples_wanted = static_cast<double>(now.samples_wanted);
     }
     bool stop() override { return --stop_after < 0; }
-    void stage(std::string_view what) override { stages.emplace_back(what); }
+    void stage(std::string_view what) override {
+        stages.emplace_back(what);
+        if (together != nullptr) std::exchange(together, nullptr)->wait();
+    }
     void message(crt::MessageLevel level, std::string_view text) override {
         if (level == crt::MessageLevel::Warning) warnings.emplace_back(text);
     }
@@ -192,7 +209,9 @@ TEST_CASE("two renders at once hear their own watch and give their own bits") {
                     right_film = crt::render(right, withSamples(150), &right_alone).film;
     CHECK(!sameMeans(left_film, right_film));
     for (int round = 0; round < 5; ++round) {
+        Together together;
         Heard left_heard, right_heard;
+        left_heard.together = right_heard.together = &together;
         auto other = std::async(std::launch::async,
                                 [&] { return crt::render(right, withSamples(150), &right_heard).film; });
         const crt::Film left_again = crt::render(left, withSamples(100), &left_heard).film;
