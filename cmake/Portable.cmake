@@ -41,7 +41,7 @@ if(CMAKE_SCRIPT_MODE_FILE)
 
   set(tree ${staging}/crt-portable/crt)
   run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${tree})
-  file(REMOVE_RECURSE ${tree}/include ${tree}/lib/cmake ${tree}/lib/pkgconfig)
+  file(REMOVE_RECURSE ${tree}/include ${tree}/lib/cmake ${tree}/lib/pkgconfig ${tree}/share/doc)
   file(GLOB archives ${tree}/lib/*.a ${tree}/lib/libcrt.so*)
   file(REMOVE ${archives} ${tree}/lib/crt/crt_image_oiio.so)
   file(COPY ${BUILD_DIR}/bin/crt-meshgen DESTINATION ${tree}/bin)

@@ -608,11 +608,10 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
     CHECK_THAT(refused("path: {nee: false}\n"), Contains("unknown key 'path' in the scene"));
     CHECK_THAT(refused("title: a\ntitle: b\n"),
                Contains("scene.yaml:3:1: error: duplicate key 'title', already given in line 2"));
-    CHECK_THAT(
-        refused("materials: {a: {type: difuse}}\n"),
-        Contains(
-            "scene.yaml:2:23: error: expected one of diffuse, mirror, conductor, dielectric for 'type'") &&
-            Contains("did you mean 'diffuse'?"));
+    CHECK_THAT(refused("materials: {a: {type: difuse}}\n"),
+               Contains("scene.yaml:2:23: error: expected one of diffuse, mirror, conductor, "
+                        "rough_conductor, dielectric for 'type'") &&
+                   Contains("did you mean 'diffuse'?"));
     CHECK_THAT(refused("materials: {a: {typ: diffuse}}\n"),
                Contains("scene.yaml:2:17: error: unknown key 'typ' in material 'a'") &&
                    Contains("did you mean 'type'?"));
@@ -629,7 +628,7 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
 TEST_CASE("columns count characters, not bytes", "[scene_yaml][refused]") {
     const Error e = refusal("crt: 1\nmaterials: {grün: {refl: 1}}\n");
     CHECK_THAT(e.what(), Contains("scene.yaml:2:19: error: 'type' is missing in material 'grün': one of "
-                                  "diffuse, mirror, conductor, dielectric\n"
+                                  "diffuse, mirror, conductor, rough_conductor, dielectric\n"
                                   "    2 | materials: {grün: {refl: 1}}\n"
                                   "      |                   ^"));
     CHECK(e.place().file == "scene.yaml");

@@ -50,10 +50,15 @@ std::vector<Variant> variants(int resolution) {
         all.push_back({name, std::move(scene), needs});
     };
     add("Sobol", [](Scene& s) { s.sampler.type = SamplerType::Sobol; });
-    add("tree, lens, gaussian filter", [](Scene& s) {
+    add("tree, lens, gaussian filter, rough metal", [](Scene& s) {
         s.camera.aperture_radius = 0.03125;
         s.camera.focus_distance = 1.5;
         s.film.filter = PixelFilter::Gaussian;
+        for (Material& material : s.materials)
+            if (material.type == MaterialType::Conductor) {
+                material.type = MaterialType::RoughConductor;
+                material.roughness = 0.3;
+            }
         s.film.filter_radius = 1.5;
     });
     add("boxes of objects, xorshift, Blackman-Harris filter, no light sampling", [](Scene& s) {
