@@ -610,6 +610,8 @@ TEST_CASE("four wavelengths integrate any spectrum, together or the hero alone",
         for (u32 i = 0; i < kSteps; ++i) {
             const CrtWavelengths w = crt_sample_wavelengths(&ctx, static_cast<f32>((i + 0.5) / kSteps));
             const vec4 radiance = crt_value(&ctx, ctx.scene->environment, nullptr, w.position);
+            vec4 inverse_pdf;
+            (void)crt_four_wavelengths(&ctx, w.u, &inverse_pdf);
             const vec4 xyz = crt_to_xyz(&ctx, w, radiance),
                        hero = crt_to_xyz(&ctx, w, radiance * heroOf(i % 4) * 4.0f);
             for (u32 k = 0; k < 3; ++k) {
@@ -617,8 +619,8 @@ TEST_CASE("four wavelengths integrate any spectrum, together or the hero alone",
                 alone[k] += lane(hero, k) / kSteps;
             }
             for (u32 k = 0; k < 4; ++k) {
-                nanometres += lane(w.weight, k) / kSteps;
-                area += lane(w.weight, k) * lane(radiance, k) / kSteps;
+                nanometres += lane(inverse_pdf, k) / kSteps;
+                area += lane(inverse_pdf, k) * lane(radiance, k) / kSteps;
                 lowest = std::min(lowest, lane(w.position, k));
                 highest = std::max(highest, lane(w.position, k));
             }
@@ -671,10 +673,12 @@ TEST_CASE("the density of a wavelength is what its weight says", "[kernel][spect
     // The ends: no table is left.
     for (const u32 bits : {0u, 0xffffffffu}) {
         const CrtWavelengths w = crt_sample_wavelengths(&ctx, crt_unit(bits));
+        vec4 inverse_pdf;
+        (void)crt_four_wavelengths(&ctx, w.u, &inverse_pdf);
         for (u32 k = 0; k < 4; ++k) {
             CHECK(lane(w.position, k) >= 0);
             CHECK(lane(w.position, k) <= 470);
-            CHECK(lane(w.weight, k) > 0);
+            CHECK(lane(inverse_pdf, k) > 0);
         }
     }
 }

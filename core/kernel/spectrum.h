@@ -22,7 +22,7 @@ typedef struct CrtContext {
 
 typedef struct CrtWavelengths {
     vec4 position; /* λ − 360 nm, in [0, 470] */
-    vec4 weight;   /* 1 / (4 pdf(λ)), nm; zero for wavelengths that have been given up */
+    f32 u;         /* that placed them; their densities are found again from it: one register for four */
 } CrtWavelengths;
 
 /* Wavelength and 1/pdf at u ∈ [0,1): the tabulated inverse distribution, linear between nodes, so the
@@ -37,16 +37,23 @@ CRT_FN f32 crt_wavelength(const CrtContext *ctx, f32 u, f32 *inverse_pdf) {
     return crt_fma(x - (f32)cell, step, lower) - CRT_WAVELENGTH_MIN_NM;
 }
 
-/* One stratified number places all four, (u + i)/4: each in its own quarter of the distribution. */
-CRT_FN CrtWavelengths crt_sample_wavelengths(const CrtContext *ctx, f32 u) {
-    CrtWavelengths w;
+/* One stratified number places all four, (u + i)/4: each in its own quarter of the distribution. The inverse
+   density is that of the four together, 1 / (4 pdf(λ)), nm. */
+CRT_FN vec4 crt_four_wavelengths(const CrtContext *ctx, f32 u, vec4 *inverse_pdf) {
     f32 w0, w1, w2, w3;
     const f32 l0 = crt_wavelength(ctx, u * 0.25f, &w0);
     const f32 l1 = crt_wavelength(ctx, u * 0.25f + 0.25f, &w1);
     const f32 l2 = crt_wavelength(ctx, u * 0.25f + 0.5f, &w2);
     const f32 l3 = crt_wavelength(ctx, crt_min(u * 0.25f + 0.75f, 1.0f - CRT_EPSILON), &w3);
-    w.position = make_vec4(l0, l1, l2, l3);
-    w.weight = make_vec4(w0, w1, w2, w3) * 0.25f;
+    *inverse_pdf = make_vec4(w0, w1, w2, w3) * 0.25f;
+    return make_vec4(l0, l1, l2, l3);
+}
+
+CRT_FN CrtWavelengths crt_sample_wavelengths(const CrtContext *ctx, f32 u) {
+    CrtWavelengths w;
+    vec4 unused;
+    w.position = crt_four_wavelengths(ctx, u, &unused);
+    w.u = u;
     return w;
 }
 
@@ -75,7 +82,9 @@ CRT_FN vec4 crt_observer(const CrtContext *ctx, f32 position) {
 
 /* XYZ (and 0) of the radiance carried by the four wavelengths. */
 CRT_FN vec4 crt_to_xyz(const CrtContext *ctx, CrtWavelengths w, vec4 radiance) {
-    const vec4 r = radiance * w.weight;
+    vec4 inverse_pdf;
+    (void)crt_four_wavelengths(ctx, w.u, &inverse_pdf);
+    const vec4 r = radiance * inverse_pdf;
     return (crt_observer(ctx, V4X(w.position)) * V4X(r) + crt_observer(ctx, V4Y(w.position)) * V4Y(r)) +
            (crt_observer(ctx, V4Z(w.position)) * V4Z(r) + crt_observer(ctx, V4W(w.position)) * V4W(r));
 }
