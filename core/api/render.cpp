@@ -1,6 +1,7 @@
 #include "render/render.h"
 #include "api/border.h"
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "render/report.h"
 #include "render/watch.h"
@@ -91,7 +92,9 @@ Rendered renderOnto(const Scene& scene, std::optional<EarlierFilm> earlier, cons
         const SamplingPlan plan =
             planSamples(inner, *what, earlier ? earlier->film.samples : SampleRanges());
         Relay relay(watch);
-        crt::Rendered run = render(*what, inner, plan, std::move(earlier), relay);
+        crt::Rendered run = resultWithThreads(inner.integrator.threads, [&] {
+            return render(*what, inner, plan, std::move(earlier), relay);
+        });
         if (run.failure) {
             const v0::Error error(static_cast<ErrorKind>(run.failure->kind()), run.failure->what(), {});
             throw RenderFailed(error, filmOf(run));

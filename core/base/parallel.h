@@ -4,6 +4,9 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
+#include <type_traits>
+#include <utility>
 
 namespace crt {
 
@@ -22,5 +25,13 @@ void parallelInvoke(const std::function<void()>& one, const std::function<void()
 /// Runs `work` so that it, and what it calls of the above, takes at most so many threads; 0: one a
 /// processor. More than there are processors are allowed.
 void runWithThreads(unsigned threads, const std::function<void()>& work);
+
+/// The same for work that returns something.
+template <typename Work>
+std::invoke_result_t<Work&> resultWithThreads(unsigned threads, Work&& work) {
+    std::optional<std::invoke_result_t<Work&>> result;
+    runWithThreads(threads, [&] { result.emplace(work()); });
+    return *std::move(result);
+}
 
 }  // namespace crt

@@ -1,3 +1,4 @@
+#include "base/parallel.h"
 #include "base/words.h"
 #include "cli/arguments.h"
 #include "cli/commands.h"
@@ -98,8 +99,8 @@ constexpr const char* kNotes =
             "  crt converge scene.yaml --vary sampler=sobol,independent --vary nee=true,false --reference "
             "ref.exr\n"
             "  crt converge configs/analytic/direct_light.yaml --reference 0.2394564705\n"
-            "  crt converge a.yaml b.yaml c.yaml --time 10m -o night       then, cut short: the same with "
-            "--resume\n";
+            "  crt converge a.yaml b.yaml c.yaml --time 10m -o night       "
+            "then, cut short: the same with --resume\n";
 
 int run(State& state, const std::string& typed) {
     for (const std::string& file : state.files) {
@@ -125,7 +126,10 @@ Command convergeCommand() {
                            .repeatable = true}},
             .groups = {what(*state), where(*state)},
             .notes = kNotes,
-            .run = [state](const std::string& typed) { return run(*state, typed); }};
+            .run = [state](const std::string& typed) {
+                return resultWithThreads(state->request.integrator.threads,
+                                         [&] { return run(*state, typed); });
+            }};
 }
 
 }  // namespace crt

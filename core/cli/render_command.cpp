@@ -147,10 +147,8 @@ Command renderCommand() {
                     !state->job.outputs.empty() && isStandardOutput(state->job.outputs.front());
                 if (streamed && !state->job.report_file) state->job.report_file = "";
                 TerminalWatch watch(state->progress);
-                int exit_code = 0;
-                runWithThreads(state->job.integrator.threads,
-                               [&] { exit_code = runJob(state->job, watch); });
-                return exit_code;
+                return resultWithThreads(state->job.integrator.threads,
+                                         [&] { return runJob(state->job, watch); });
             }};
 }
 

@@ -2,6 +2,7 @@
 #include "base/error.h"
 #include "base/input_file.h"
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/standard_output.h"
 #include "base/unit_text.h"
 #include "cli/commands.h"
@@ -232,7 +233,9 @@ Command verifyCommand() {
             .summary = "render scenes whose answer is known; exit code 7 when a backend does not find it",
             .groups = {verify::asked(*to), verify::ofWhom(*to), verify::output(*to)},
             .notes = verify::kNotes,
-            .run = [to](const std::string&) { return verify::verify(*to); }};
+            .run = [to](const std::string&) {
+                return resultWithThreads(to->integrator.threads, [&] { return verify::verify(*to); });
+            }};
 }
 
 }  // namespace crt
