@@ -3,7 +3,7 @@
 
 #include "base/log.h"
 #include "catch.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -37,7 +37,7 @@ public:
     }
 
 private:
-    verify::TemporaryFolder folder_;
+    TemporaryFolder folder_;
     std::string file_;
     int warnings_before_, stderr_;
 };

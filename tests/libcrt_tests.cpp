@@ -33,12 +33,11 @@ std::string lampYaml(const std::string& idle, const char* more = "") {
            "-5]], "
            "faces: [[0, 1, 2, 3]]}}\n"
            "  - {name: lamp, material: grey, emission: {radiance: 5}, mesh: {positions: [[-1, 2, 0], [-1, "
-           "2, 1], "
-           "[1, 2, 1], [1, 2, 0]], faces: [[3, 2, 1, 0]]}}\n"
+           "2, 1], [1, 2, 1], [1, 2, 0]], faces: [[3, 2, 1, 0]]}}\n"
            "  - {name: " +
            idle +
-           ", material: grey, emission: {radiance: 5}, mesh: {positions: [[-1, -9, 0], [-1, -9, 1], [1, -9, "
-           "1], "
+           ", material: grey, emission: {radiance: 5}, mesh: {positions: "
+           "[[-1, -9, 0], [-1, -9, 1], [1, -9, 1], "
            "[1, -9, 0]], faces: [[3, 2, 1, 0]]}}\n" +
            more;
 }
@@ -104,7 +103,9 @@ int kindOf(Body&& body) {
 struct Folder {
     std::filesystem::path path;
     Folder() {
-        std::string name = (std::filesystem::temp_directory_path() / "libcrt-XXXXXX").string();
+        // mkdtemp puts letters of its own for the last six.
+        std::string name =
+            (std::filesystem::temp_directory_path() / ("libcrt-" + std::string(6, 'X'))).string();
         REQUIRE(mkdtemp(name.data()) != nullptr);
         path = name;
     }

@@ -29,9 +29,10 @@ foreach(library libc6 libyaml-cpp libfmt libspdlog libzstd libopenimageio)
   endif()
 endforeach()
 
-run(dpkg-deb --extract ${packages} ${WORK_DIR}/root)
-set(usr ${WORK_DIR}/root/usr)
-foreach(file bin/crt lib/crt/crt_image_oiio.so share/crt/data/cornell/white.csv share/crt/configs/shared/cornell_room.yaml
+run(dpkg-deb --extract ${packages} ${WORK_DIR}/unpacked)
+set(usr ${WORK_DIR}/unpacked/usr)
+foreach(file bin/crt lib/crt/crt_image_oiio.so share/crt/data/cornell/white.csv
+  share/crt/configs/shared/cornell_room.yaml
         share/crt/meshes/sphere.obj share/man/man1/crt.1 share/bash-completion/completions/crt
         share/zsh/vendor-completions/_crt share/fish/vendor_completions.d/crt.fish share/doc/crt/README.md
         share/doc/crt/scene.md share/doc/crt/example_backend/example_backend.cpp)
@@ -42,7 +43,8 @@ endforeach()
 
 # Without a trace of this build: an empty environment, and a scene that includes, names data and has a mesh.
 set(clean env -i ASAN_OPTIONS=detect_leaks=0)
-run(${clean} ${usr}/bin/crt render ${usr}/share/crt/configs/cornell_sphere.yaml --set film.resolution=[32,32] --spp 2
+run(${clean} ${usr}/bin/crt render ${usr}/share/crt/configs/cornell_sphere.yaml --set
+  film.resolution=[32,32] --spp 2
     --report none -o a.exr -o a.png)
 foreach(image a.exr a.png)
   if(NOT EXISTS ${WORK_DIR}/${image})

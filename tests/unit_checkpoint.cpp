@@ -4,7 +4,7 @@
 #include "film/checkpoint.h"
 #include "film/checkpoint_writer.h"
 #include "film/film_pack.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "scene/yaml/scene_schema.h"
 
 #include <algorithm>
@@ -19,7 +19,7 @@
 #include <xxhash.h>
 
 using namespace crt;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {

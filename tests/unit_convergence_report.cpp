@@ -8,7 +8,7 @@
 #include "judge/converge/quantity_text.h"
 #include "judge/converge/report_html.h"
 #include "judge/converge/svg_plot.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "synthetic_run.h"
 
 #include <fmt/format.h>
@@ -24,7 +24,7 @@
 
 using namespace crt;
 using namespace crt::converge;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {

@@ -123,8 +123,8 @@ TEST_CASE("a text that is no record is refused, whatever of it is missing or wro
 }
 
 TEST_CASE(
-    "files of floats hold the radiance of the scene, display formats what exposure and white balance make "
-    "of it",
+    "files of floats hold the radiance of the scene, display "
+    "formats what exposure and white balance make of it",
     "[develop]") {
     const Scene scene = parsed();
     const Vec3d color{0.4, 0.5, 0.2};

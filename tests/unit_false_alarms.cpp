@@ -77,8 +77,8 @@ double noiseOf(Noise noise) {
 }  // namespace
 
 TEST_CASE(
-    "what is only noise raises no more alarms than is stated, whatever the noise and however little is "
-    "known of it",
+    "what is only noise raises no more alarms than is stated, "
+    "whatever the noise and however little is known of it",
     "[false-alarms]") {
     constexpr int kRepeats = 60;
     for (const Noise noise :
@@ -141,8 +141,8 @@ TEST_CASE("planted errors are found: 2 % of the image, 20 % of a tile", "[false-
 TEST_CASE("(a table) false alarms of compare", "[.][false-alarm-table]") {
     constexpr int kRepeats = 300;
     std::printf(
-        "Alarms in %% of %d pairs of 64 x 64 pixels where nothing is wrong, at the stated levels 5 %% and "
-        "0.1 %%.\n\n",
+        "Alarms in %% of %d pairs of 64 x 64 pixels where nothing "
+        "is wrong, at the stated levels 5 %% and 0.1 %%.\n\n",
         kRepeats);
     std::printf(
         "| B | noise | pixels | dof | mean 5 %% | tiles 5 %% | pixels 5 %% | mean .1 %% | tiles .1 %% | "

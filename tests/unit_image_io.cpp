@@ -3,7 +3,7 @@
 #include "base/log.h"
 #include "catch.h"
 #include "image/image_io.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 using namespace crt;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {

@@ -2,7 +2,7 @@
 // lie.
 #include "backend/sdk/kernel_cache.h"
 #include "catch.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -15,7 +15,7 @@
 #include <thread>
 
 using crt::plugin::KernelCache;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {

@@ -12,7 +12,7 @@
 #include "compile/near_surfaces.h"
 #include "film/checkpoint.h"
 #include "image/image_io.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "render/output_guard.h"
 #include "scene/mesh/mesh_io.h"
 #include "scene/mesh/triangulate.h"
@@ -30,7 +30,7 @@
 #include <numbers>
 
 using namespace crt;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {

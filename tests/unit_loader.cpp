@@ -5,7 +5,7 @@
 #include "backend/loader.h"
 #include "base/error.h"
 #include "catch.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "kernel/bits_version.h"
 
 #include <unistd.h>
@@ -17,7 +17,7 @@
 #include <optional>
 
 using namespace crt;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
@@ -147,8 +147,8 @@ TEST_CASE("an exception that crosses the border is named and survived", "[loader
           "backend 'throws_in_entry' broke the contract: an exception crossed the border from "
           "crt_backend_v1 (the entry fell over)");
     CHECK(refusal("throws_in_probe") ==
-          "backend 'throws_in_probe' broke the contract: an exception crossed the border from probe (probe "
-          "fell over)");
+          "backend 'throws_in_probe' broke the contract: an exception "
+          "crossed the border from probe (probe fell over)");
 }
 
 TEST_CASE("a good plugin loads by name and by path", "[loader]") {

@@ -2,7 +2,7 @@
 #include "base/error.h"
 #include "captured_log.h"
 #include "catch.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "scene/mesh/mesh_io.h"
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 using namespace crt;
 using crt::test::CapturedLog;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 
 namespace {
 

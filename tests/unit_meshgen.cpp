@@ -1,7 +1,7 @@
 // The generated meshes: exactly the promised triangles, closed, right side out, and the same bytes from
 // every run.
 #include "catch.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "scene/mesh/mesh_io.h"
 
 #include <algorithm>
@@ -140,7 +140,7 @@ TEST_CASE("the dragon is an uneven load", "[meshgen]") {
 }
 
 TEST_CASE("every run writes the same bytes", "[meshgen]") {
-    const crt::verify::TemporaryFolder folder;
+    const crt::TemporaryFolder folder;
     REQUIRE(std::system((kMeshgen + "'" + folder.path() + "'").c_str()) == 0);
     for (const Expected& e : kExpected) {
         CAPTURE(e.file);
@@ -149,7 +149,7 @@ TEST_CASE("every run writes the same bytes", "[meshgen]") {
 }
 
 TEST_CASE("options are not taken for the name of a folder", "[meshgen]") {
-    const crt::verify::TemporaryFolder folder;
+    const crt::TemporaryFolder folder;
     const std::string there = "cd '" + folder.path() + "' && ";
     CHECK(std::system((there + kMeshgen + "--help > help.txt").c_str()) == 0);
     CHECK_THAT(slurp(folder / "help.txt"), Contains("usage: crt-meshgen OUTDIR"));

@@ -2,7 +2,7 @@
 #include "base/error.h"
 #include "captured_log.h"
 #include "catch.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "scene/mesh/mesh_io.h"
 #include "scene/yaml/scene_yaml.h"
 
@@ -10,7 +10,7 @@
 
 using namespace crt;
 using crt::test::CapturedLog;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 
 namespace {
 
@@ -285,11 +285,10 @@ TEST_CASE("one line says what the materials of a file became and lost", "[mesh_i
     loadObj(folder.write("mesh.obj", "mtllib m.mtl\n" + kSquare + faces));
     CHECK(log.warnings() == 1);
     CHECK_THAT(log.text(),
-               Contains("mesh.obj: 27 materials: 23 diffuse, 1 mirror, 3 glass, 1 of them emitting; "
-                        "d below 1 without Ni above 1 read as opaque (crt has no opacity) (22), d between 0 "
-                        "and 1 with Ni above 1 read as clear glass (3), "
-                        "Pm from 0.5 to 1 read as 1 (1); dropped: Ks (22), Ns (22), map_Kd (22), Tf (3), Pc "
-                        "(1), Pr (1)\n"));
+               Contains("mesh.obj: 27 materials: 23 diffuse, 1 mirror, 3 glass, 1 of them emitting; d below "
+                        "1 without Ni above 1 read as opaque (crt has no opacity) (22), d between 0 and 1 "
+                        "with Ni above 1 read as clear glass (3), Pm from 0.5 to 1 read as 1 (1); dropped: "
+                        "Ks (22), Ns (22), map_Kd (22), Tf (3), Pc (1), Pr (1)\n"));
 }
 
 TEST_CASE("every documented keyword of an MTL is known and every other is said to be unknown",

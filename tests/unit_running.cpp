@@ -108,8 +108,8 @@ TEST_CASE("progress: numbers and texts") {
     // A fourth of the samples that 1 % takes at 1/sqrt N are there, one a second, and half of those that it
     // takes at 1/N.
     CHECK(progressText(state) ==
-          " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error 2.00 % (1.96-2.04)  1 % at 59-130 spp, in "
-          "0:29-1:35");
+          " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error 2.00 "
+          "% (1.96-2.04)  1 % at 59-130 spp, in 0:29-1:35");
     // A bound forecasts nothing.
     state.error->knowledge = ErrorKnowledge::Bound;
     CHECK(progressText(state) == " 60 %  30/50 spp  1.00 Mpaths/s  0:20 left  error below 2.0 %");

@@ -1,7 +1,7 @@
 // What scenes share: files that they include, and named data.
 #include "captured_log.h"
 #include "catch.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "scene/yaml/scene_yaml.h"
 #include "spectra/data_catalogue.h"
 #include "spectra/spectra_data.h"
@@ -14,7 +14,7 @@
 
 using namespace crt;
 using crt::test::CapturedLog;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 
 namespace {
 

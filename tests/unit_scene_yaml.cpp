@@ -5,7 +5,7 @@
 #include "catch.h"
 #include "film/film.h"
 #include "film/resolve.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "scene/aov.h"
 #include "scene/yaml/scene_schema.h"
 #include "scene/yaml/scene_yaml.h"
@@ -20,7 +20,7 @@
 
 using namespace crt;
 using crt::test::CapturedLog;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 
 namespace {
 
@@ -902,8 +902,8 @@ TEST_CASE("errors in overrides name the argument", "[scene_yaml][override][refus
           "--set film.resolutoin: error: unknown key 'resolutoin' in film\n"
           "      | film.resolutoin=[1,1]\n"
           "      |      ^~~~~~~~~~ did you mean 'resolution'?\n"
-          "      = keys of film: resolution, crop, filter, color_space, white_balance, exposure_ev, "
-          "apply_to_float");
+          "      = keys of film: resolution, crop, filter, color_space, "
+          "white_balance, exposure_ev, apply_to_float");
     CHECK_THAT(refusedOverride(body, "flim.resolution=[1,1]"),
                Contains("--set flim.resolution: error: unknown key 'flim' in the scene") &&
                    Contains("did you mean 'film'?"));

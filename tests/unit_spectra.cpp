@@ -2,7 +2,7 @@
 // RGB fit.
 #include "base/error.h"
 #include "catch.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "spectra/spectra.h"
 #include "spectra/spectra_data.h"
 
@@ -14,7 +14,7 @@
 #include <tuple>
 
 using namespace crt;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 
 namespace {
 

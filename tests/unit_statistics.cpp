@@ -152,8 +152,8 @@ TEST_CASE("equivalence decides by the whole interval", "[statistics]") {
 }
 
 TEST_CASE(
-    "equivalence passes what is just not equivalent no more often than it may, and what is equal nearly "
-    "always",
+    "equivalence passes what is just not equivalent no more "
+    "often than it may, and what is equal nearly always",
     "[statistics]") {
     constexpr int repeats = 4000;
     Random random(13);

@@ -9,7 +9,7 @@
 #include "compile/compile.h"
 #include "film/film_pack.h"
 #include "film/resolve.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "scene/mesh/obj_reader.h"
 #include "scene/yaml/scene_yaml.h"
 
@@ -25,7 +25,7 @@
 
 using namespace crt;
 using crt::test::CapturedLog;
-using crt::verify::TemporaryFolder;
+using crt::TemporaryFolder;
 
 namespace {
 
@@ -170,8 +170,8 @@ TEST_CASE("an OBJ says the same in blocks of any size", "[threads]") {
         vertices + "usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl a\nf 1 2 3\n" + vertices +
             "f 5 6 7 8\nf -1 -2 -4\n",
         vertices +
-            "\xEF\xBB\xBFv 3 3 3\nmtllib a.mtl\nmtllib b.mtl\nmtllib a.mtl\nv nan 1 2\nvn x 1 2\nv 1\nf 1 2 "
-            "5\n",
+            "\xEF\xBB\xBFv 3 3 3\nmtllib a.mtl\nmtllib b.mtl\nmtllib a.mtl\n"
+            "v nan 1 2\nvn x 1 2\nv 1\nf 1 2 5\n",
         vertices + "f 1 2 3\nf 1 2 9\nf 1 2 x\n",     // what cannot be read goes before what is missing
         vertices + "f 1 2 3\nf -1 -2 -9\nf 1 2 x\n",  // in the order of lines
         vertices + "f 1 2 3\nf 1 2 99999999999\nf 1 2 9\n",

@@ -126,8 +126,8 @@ TEST_CASE("a wrong figure is traced to the mistake that gives it", "[verify]") {
 }
 
 TEST_CASE(
-    "the worst pixel is the one farthest from what is expected, and a pixel that is no number is worse than "
-    "any",
+    "the worst pixel is the one farthest from what is expected, "
+    "and a pixel that is no number is worse than any",
     "[verify]") {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     const Film unit = rowOf({1, 1, 1});

@@ -1,6 +1,7 @@
 #include "base/atomic_file.h"
 
 #include "base/error.h"
+#include "base/temporary_folder.h"
 #include "base/words.h"
 
 #include <fmt/format.h>
@@ -128,7 +129,12 @@ void AtomicFile::openStreamed() {
     path_ = kStandardOutput;
     std::error_code none;
     const fs::path folder = fs::temp_directory_path(none);
-    temporary_ = ((none ? fs::path("/tmp") : folder) / "crt-output-XXXXXX").string();
+    if (none)
+        throw Error(ErrorKind::Output,
+                    fmt::format("cannot write to standard output without a "
+                                "folder for temporary files (TMPDIR): {}",
+                                none.message()));
+    temporary_ = temporaryPattern(folder);
     descriptor_ = ::mkstemp(temporary_.data());
     if (descriptor_ >= 0) return;
     const int error_number = errno;
@@ -184,8 +190,8 @@ void checkWritable(const std::string& path) {
         if (::isatty(STDOUT_FILENO) != 0)
             throw Error(
                 ErrorKind::Output,
-                fmt::format("'{}' is standard output, which is a terminal here; redirect it to a file "
-                            "or a pipe",
+                fmt::format("'{}' is standard output, which is a terminal "
+                            "here; redirect it to a file or a pipe",
                             path));
         return;
     }

@@ -3,7 +3,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -71,7 +71,7 @@ public:
 private:
     const Listener listener_{{}, LogLevel::Off};
     const ListenerScope scope_{listener_};  // Warnings about odd input would be most of the output.
-    verify::TemporaryFolder folder_;
+    TemporaryFolder folder_;
 };
 
 }  // namespace crt::fuzz

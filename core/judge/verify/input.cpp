@@ -2,7 +2,7 @@
 // and the same image. One of each kind: every refusal has a test of its own (tests/unit_scene_yaml.cpp,
 // tests/unit_mesh_io.cpp), and every reader a fuzz target (tests/fuzz).
 #include "judge/verify/context.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 
 #include "base/error.h"
 
@@ -134,8 +134,8 @@ void sizes(Context& context) {
         "4294967296");
     context.notApplicable("more than 2^28 triangles, more than 64 GiB",
                           "refused by counts that are made in 64 bits before memory is asked for "
-                          "(core/compile/flatten.cpp, core/compile/blob_writer.h); a scene that large "
-                          "fits no test");
+                          "(core/compile/flatten.cpp, core/compile/blob_writer.h); "
+                          "a scene that large fits no test");
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 // little; they need no reference.
 #include "judge/verify/context.h"
 #include "judge/verify/shapes.h"
-#include "judge/verify/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "judge/verify/variants.h"
 
 #include "kernel/features.h"

@@ -1,4 +1,4 @@
-/// An empty folder for the files of a case or a test, gone with the object.
+/// Temporary files and folders.
 #pragma once
 
 #include "base/error.h"
@@ -14,14 +14,19 @@
 #include <string>
 #include <system_error>
 
-namespace crt::verify {
+namespace crt {
 
+/// A pattern for mkstemp and mkdtemp, which put six letters of their own for the last six.
+inline std::string temporaryPattern(const std::filesystem::path& parent) {
+    return (parent / ("crt-" + std::string(6, 'X'))).string();
+}
+
+/// An empty folder, gone with the object.
 class TemporaryFolder {
 public:
     /// Throws crt::Error(Output) when `parent` takes no folder.
     explicit TemporaryFolder(const std::filesystem::path& parent = std::filesystem::temp_directory_path()) {
-        std::string pattern = (parent / ("crt-" + std::string(6, 'X')))
-                                  .string();  // mkdtemp puts its own six letters for the last six.
+        std::string pattern = temporaryPattern(parent);
         if (::mkdtemp(pattern.data()) == nullptr)
             throw Error(ErrorKind::Output, fmt::format("cannot make a folder in '{}': {}", parent.string(),
                                                        std::strerror(errno)));
@@ -54,4 +59,4 @@ private:
     std::filesystem::path path_;
 };
 
-}  // namespace crt::verify
+}  // namespace crt
