@@ -1,4 +1,5 @@
-# crt on Debian 12, with its CUDA, Embree and OpenCL backends. NVIDIA's driver comes from the host, by the NVIDIA
+# crt on Debian 12, with its CUDA, Embree and OpenCL backends. NVIDIA's driver comes from the host, by the
+# NVIDIA
 # Container Toolkit; without a GPU crt runs on the processor.
 #
 #   docker build -t crt .
@@ -10,7 +11,8 @@ COPY . .
 RUN apt-get update && apt-get install -y --no-install-recommends ca-certificates dpkg-dev
 RUN scripts/build -DCRT_TESTS=OFF -DCRT_CUDA_ARCHITECTURES=all-major
 RUN cd build/release && cpack -G DEB -B /package
-# The run-time compiler of lean kernels: with it they are made for the scene, without it a precompiled one serves.
+# The run-time compiler of lean kernels: with it they are made for the scene, without it a precompiled one
+# serves.
 RUN mkdir /nvrtc && cp -L .cache/cuda/toolkit/lib64/libnvrtc*.so* /nvrtc/
 
 FROM debian:12-slim

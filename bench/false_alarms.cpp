@@ -47,8 +47,8 @@ public:
     void print(const std::string& situation) const {
         for (const auto& [statement, tally] : tallies_)
             fmt::print(
-                "{{\"situation\": \"{}\", \"statement\": \"{}\", \"stated\": {}, \"asked\": {}, \"wrong\": "
-                "{}}}\n",
+                "{{\"situation\": \"{}\", \"statement\": \"{}\", "
+                "\"stated\": {}, \"asked\": {}, \"wrong\": {}}}\n",
                 situation, statement, tally.stated, tally.asked, tally.wrong);
         std::fflush(stdout);
     }

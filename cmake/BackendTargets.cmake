@@ -16,7 +16,8 @@ target_include_directories(crt_backend_headers INTERFACE
 set_target_properties(crt_backend_headers PROPERTIES EXPORT_NAME backend_headers)
 
 # Uses nothing of the core, and XXH3 by its header alone, so that it can be compiled into any plugin.
-add_library(crt_kernel_cache STATIC ${PROJECT_SOURCE_DIR}/core/backend/sdk/kernel_cache.cpp ${PROJECT_SOURCE_DIR}/core/base/code_trust.cpp)
+add_library(crt_kernel_cache STATIC ${PROJECT_SOURCE_DIR}/core/backend/sdk/kernel_cache.cpp
+  ${PROJECT_SOURCE_DIR}/core/base/code_trust.cpp)
 add_library(crt::kernel_cache ALIAS crt_kernel_cache)
 target_include_directories(crt_kernel_cache PRIVATE ${PROJECT_BINARY_DIR}/rooms/crt_base)
 target_link_libraries(crt_kernel_cache PUBLIC crt_backend_headers PRIVATE $<BUILD_INTERFACE:crt_flags>)

@@ -1,4 +1,5 @@
-# crt_add_backend: one function for the plugins of this tree and, through find_package(crt), for everybody else's.
+# crt_add_backend: one function for the plugins of this tree and, through find_package(crt), for everybody
+# else's.
 #
 #   crt_add_backend(<name> SOURCES <file>… [OUTPUT_DIRECTORY <dir>] [NO_INSTALL])
 #
@@ -7,7 +8,8 @@
 #   - links nothing of crt but the headers (an undefined symbol is an error now, not when somebody loads it),
 #   - is compiled without contraction, so that it rounds as every other backend does,
 #   - finds libraries shipped beside it or one folder up, wherever the tree is moved to.
-# It is built into OUTPUT_DIRECTORY (default: ${CRT_BACKEND_OUTPUT_DIRECTORY} where set) and installed to lib/crt.
+# It is built into OUTPUT_DIRECTORY (default: ${CRT_BACKEND_OUTPUT_DIRECTORY} where set) and installed to
+# lib/crt.
 # Link further libraries to the target as usual; crt::kernel_cache is a disk cache for compiled kernels.
 
 set(_CRT_BACKEND_MAP ${CMAKE_CURRENT_LIST_DIR}/crt_backend.map)
@@ -15,7 +17,8 @@ set(_CRT_BACKEND_MAP ${CMAKE_CURRENT_LIST_DIR}/crt_backend.map)
 function(crt_add_backend name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "NO_INSTALL" "OUTPUT_DIRECTORY" "SOURCES")
   if(NOT name MATCHES "^[a-z][a-z0-9_]*$")
-    message(FATAL_ERROR "crt_add_backend: '${name}' is not a backend name: lower-case letters, digits and '_' only")
+    message(FATAL_ERROR
+      "crt_add_backend: '${name}' is not a backend name: lower-case letters, digits and '_' only")
   endif()
   if(NOT arg_SOURCES)
     message(FATAL_ERROR "crt_add_backend(${name}): no SOURCES given")

@@ -1,6 +1,8 @@
-# crt_embed_text(<target> <file> <header> <namespace> <variable>): a text file as a C++ string, in a header of the target's own.
+# crt_embed_text(<target> <file> <header> <namespace> <variable>): a text file as a C++ string, in a header
+# of the target's own.
 #
-# For a plugin's entry points that are compiled while the program runs: whatever folder it is moved to, the text is with it.
+# For a plugin's entry points that are compiled while the program runs: whatever folder it is moved to, the
+# text is with it.
 # Run as a script (cmake -P) it writes the header; the build does so whenever the file changes.
 
 if(CMAKE_SCRIPT_MODE_FILE)
@@ -26,8 +28,8 @@ function(crt_embed_text target file header namespace variable)
   set(output ${CMAKE_CURRENT_BINARY_DIR}/embedded/${header})
   add_custom_command(
     OUTPUT ${output}
-    COMMAND ${CMAKE_COMMAND} -DINPUT=${input} -DOUTPUT=${output} -DNAMESPACE=${namespace} -DVARIABLE=${variable}
-            -P ${_CRT_EMBED_TEXT_SCRIPT}
+    COMMAND ${CMAKE_COMMAND} -DINPUT=${input} -DOUTPUT=${output} -DNAMESPACE=${namespace}
+            -DVARIABLE=${variable} -P ${_CRT_EMBED_TEXT_SCRIPT}
     DEPENDS ${input} ${_CRT_EMBED_TEXT_SCRIPT}
     COMMENT "Embedding ${file}"
     VERBATIM)

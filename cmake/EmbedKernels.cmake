@@ -1,4 +1,5 @@
-# crt_embed_kernels(<target>): the texts of core/kernel/*.h, compiled into the program for backends that compile kernels while it runs.
+# crt_embed_kernels(<target>): the texts of core/kernel/*.h, compiled into the program for backends that
+# compile kernels while it runs.
 #
 # Run as a script (cmake -P) it writes the source file; the build does so whenever a kernel header changes.
 

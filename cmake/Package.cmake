@@ -4,15 +4,17 @@ set(CPACK_PACKAGE_NAME crt)
 set(CPACK_PACKAGE_VENDOR "crt")
 set(CPACK_PACKAGE_CONTACT "crt maintainers <crt@localhost>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
-set(CPACK_PACKAGE_DESCRIPTION "crt renders scenes wavelength by wavelength, so that dispersion, measured materials and measured lamps come out of
-the light transport itself. It runs on NVIDIA GPUs (CUDA), on processors (Embree) and on OpenCL devices, and gives the same
-image, bit for bit, on each of them.")
+set(CPACK_PACKAGE_DESCRIPTION
+  "crt renders scenes wavelength by wavelength, so that dispersion, measured materials and measured lamps
+come out of the light transport itself. It runs on NVIDIA GPUs (CUDA), on processors (Embree) and on OpenCL
+devices, and gives the same image, bit for bit, on each of them.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "pocl-opencl-icd, libcuda1, bash-completion")
-set(CPACK_DEBIAN_COMPRESSION_TYPE zstd)  # xz takes twenty times as long for a tenth of the size of the meshes
+set(CPACK_DEBIAN_COMPRESSION_TYPE
+  zstd)  # xz takes twenty times as long for a tenth of the size of the meshes
 set(CPACK_GENERATOR DEB)
 include(CPack)

@@ -1,13 +1,18 @@
-# The target `portable`: crt in two archives for machines on which nothing can be installed, a cluster's nodes say.
+# The target `portable`: crt in two archives for machines on which nothing can be installed, a cluster's
+# nodes say.
 #
-#   crt-portable.tar.gz        the program, its backends, scenes, meshes, and the libraries they need but glibc's and the compiler's
+#   crt-portable.tar.gz        the program, its backends, scenes, meshes, and the libraries they need but
+#   glibc's and the compiler's
 #   crt-portable-tests.tar.gz  the conformance suite and its reference backend, to be unpacked over the first
 #
-# Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's. OpenImageIO and the 250 libraries it brings
-# stay behind, being larger than all the rest: images are written as .pfm and .ppm, not .exr and .png. The GPU's driver and NVRTC are the
+# Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's.
+# OpenImageIO and the 250 libraries it brings
+# stay behind, being larger than all the rest: images are written as .pfm and .ppm, not .exr and .png. The
+# GPU's driver and NVRTC are the
 # machine's own.
 #
-# Run as a script (cmake -P) it makes the archives from a build tree; the target does so with everything built.
+# Run as a script (cmake -P) it makes the archives from a build tree; the target does so with everything
+# built.
 
 if(CMAKE_SCRIPT_MODE_FILE)
   set(staging ${BUILD_DIR}/portable)
@@ -26,7 +31,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
     set(tree ${staging}/${name}/crt)
     file(GLOB_RECURSE binaries ${tree}/bin/* ${tree}/lib/*.so ${tree}/lib/*.so.*)
     run(${STRIP} --strip-unneeded ${binaries})
-    run(${CMAKE_COMMAND} -E chdir ${staging}/${name} ${CMAKE_COMMAND} -E tar czf ${BUILD_DIR}/${name}.tar.gz crt)
+    run(${CMAKE_COMMAND} -E chdir ${staging}/${name} ${CMAKE_COMMAND} -E tar czf ${BUILD_DIR}/${name}.tar.gz
+      crt)
     file(GLOB_RECURSE files ${tree}/*)
     set(bytes 0)
     foreach(file IN LISTS files)
@@ -46,7 +52,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
   file(REMOVE ${archives} ${tree}/lib/crt/crt_image_oiio.so)
   file(COPY ${BUILD_DIR}/bin/crt-meshgen DESTINATION ${tree}/bin)
 
-  # glibc must fit the kernel and the dynamic loader of the machine, and its drivers may need a newer libstdc++ than ours: those are its own.
+  # glibc must fit the kernel and the dynamic loader of the machine, and its drivers may need a newer
+  # libstdc++ than ours: those are its own.
   file(GLOB backends ${tree}/lib/crt/*.so)
   file(GET_RUNTIME_DEPENDENCIES
     EXECUTABLES ${tree}/bin/crt MODULES ${backends}
@@ -68,12 +75,14 @@ if(CMAKE_SCRIPT_MODE_FILE)
 endif()
 
 add_custom_target(portable
-  COMMAND ${CMAKE_COMMAND} -DBUILD_DIR=${PROJECT_BINARY_DIR} -DSTRIP=${CMAKE_STRIP} -DREFERENCE_BACKEND=$<TARGET_FILE:crt_backend_example>
+  COMMAND ${CMAKE_COMMAND} -DBUILD_DIR=${PROJECT_BINARY_DIR} -DSTRIP=${CMAKE_STRIP}
+  -DREFERENCE_BACKEND=$<TARGET_FILE:crt_backend_example>
           -P ${CMAKE_CURRENT_LIST_FILE}
   COMMENT "Packing crt-portable.tar.gz"
   VERBATIM)
 # What is installed, and what is taken from the build tree.
-foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_kernel_cache crt_meshes crt_shell_files crt-meshgen
+foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_kernel_cache
+  crt_meshes crt_shell_files crt-meshgen
         conformance crt_backend_example libcrt)
   if(TARGET ${part})
     add_dependencies(portable ${part})

@@ -2,9 +2,12 @@
 #
 #   crt_room(<folder> [SOURCES <file>…] [USES <folder>…] [LIBRARIES <target>…] [HEADERS <file of core/>…])
 #
-# makes the static library crt_<folder> (a '/' becomes '_') of core/<folder>, or an interface library where it has
-# headers alone. HEADERS are further ones that it shows. Its headers are included as "<folder>/<name>.h". Each room has an include root of its own,
-# build/rooms/<target>, which holds links to its headers and to nothing else: a file sees the headers of the rooms
+# makes the static library crt_<folder> (a '/' becomes '_') of core/<folder>, or an interface library where
+# it has
+# headers alone. HEADERS are further ones that it shows. Its headers are included as "<folder>/<name>.h".
+# Each room has an include root of its own,
+# build/rooms/<target>, which holds links to its headers and to nothing else: a file sees the headers of the
+# rooms
 # that its own room USES, and of those that these use. So an include against the arrows does not compile.
 # tests/rooms/check_rooms.py draws the arrows, and fails when there is a cycle.
 
@@ -13,7 +16,8 @@ set_property(GLOBAL PROPERTY CRT_ROOMS "")
 # build/rooms/<target>/<folder>/<name>.h → core/<folder>/<name>.h, for every header of the room.
 function(_crt_link_headers target folder)
   set(root ${PROJECT_BINARY_DIR}/rooms/${target})
-  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/core ${PROJECT_SOURCE_DIR}/core/${folder}/*.h)
+  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/core
+    ${PROJECT_SOURCE_DIR}/core/${folder}/*.h)
   list(APPEND headers ${ARGN})
   foreach(header IN LISTS headers)
     if(NOT EXISTS ${root}/${header})

@@ -1,4 +1,5 @@
-# Sourced by the scripts beside it: where things are, how to say things, and which CUDA toolkit to build with.
+# Sourced by the scripts beside it: where things are, how to say things, and which CUDA toolkit to build
+# with.
 
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -18,13 +19,15 @@ cuda_is_usable() {
     [ "${major:-0}" -ge 12 ]
 }
 
-# Prints the root of the CUDA toolkit to build with: the system's, or the one that scripts/setup fetched. Fails when there is none.
+# Prints the root of the CUDA toolkit to build with: the system's, or the one that scripts/setup fetched.
+# Fails when there is none.
 # CRT_IGNORE_SYSTEM_CUDA=1 leaves the system's aside, to try the other way on a machine that has one.
 find_cuda() {
     local root nvcc
     if [ "${CRT_IGNORE_SYSTEM_CUDA:-0}" != 1 ]; then
         nvcc=$(command -v nvcc || true)
-        for root in "${CUDA_HOME:-}" "${CUDA_PATH:-}" "${nvcc:+$(dirname "$(dirname "$(readlink -f "$nvcc")")")}" /usr/local/cuda; do
+        for root in "${CUDA_HOME:-}" "${CUDA_PATH:-}" \
+            "${nvcc:+$(dirname "$(dirname "$(readlink -f "$nvcc")")")}" /usr/local/cuda; do
             if [ -n "$root" ] && cuda_is_usable "$root"; then
                 echo "$root"
                 return 0

@@ -56,7 +56,8 @@ BROKEN = {
 }
 FINE = {
     "smallest": "{crt: 1}",
-    "spectra": "{crt: 1, spectra: {a: 1e3, b: a, c: {table: {nm: [360, 830], value: [1, 2]}, outside: zero, scale: 2}}}",
+    "spectra": "{crt: 1, spectra: {a: 1e3, b: a, c: {table: {nm: [360, 830], value: [1, 2]}, outside: zero, "
+               "scale: 2}}}",
     "nulls": "{crt: 1, environment: null, film: {crop: null, white_balance: null}}",
     "filter": "{crt: 1, film: {filter: {type: gaussian, sigma: 0.5}, white_balance: D65}}",
     "placements": "{crt: 1, objects: [{obj: a.obj, transforms: [[], [{scale: 2}, {scale: [1, 2, 3]}]]}]}",

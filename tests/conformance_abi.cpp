@@ -18,8 +18,8 @@ const char* kScene =
     "crt: 1\ncamera: {position: [0, 0, -3], target: [0, 0, 0], fov: 60}\nfilm: {resolution: [16, "
     "12]}\nenvironment: {radiance: 1}\n"
     "materials: {white: {type: diffuse, reflectance: 0.5}}\n"
-    "objects: [{name: t, mesh: {positions: [[-1,-1,0],[1,-1,0],[0,1,0]], faces: [[0,1,2]]}, material: "
-    "white}]\n";
+    "objects: [{name: t, mesh: {positions: [[-1,-1,0],[1,-1,0],[0,1,0]], "
+    "faces: [[0,1,2]]}, material: white}]\n";
 
 /// An integrator through the C table alone, with a host that counts calls and can cancel.
 struct Raw {

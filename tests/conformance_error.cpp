@@ -26,8 +26,8 @@ objects:
 }  // namespace
 
 TEST_CASE(
-    "the error that an image states of itself is its error: 60 seeds of the square light, Sobol and "
-    "independent",
+    "the error that an image states of itself is its error: "
+    "60 seeds of the square light, Sobol and independent",
     "[error]") {
     constexpr double kTruth = 0.2394564705;
     constexpr int kSeeds = 60;

@@ -1,7 +1,9 @@
-# What leaves the build tree runs without it: crt as `cmake --install` puts it, moved, and crt as the target `portable` packs it, unpacked. Both
+# What leaves the build tree runs without it: crt as `cmake --install` puts it, moved, and crt as the target
+# `portable` packs it, unpacked. Both
 # render with an empty environment from a folder that has nothing to do with them.
 #
-#   cmake -DMODE=install|portable -DBUILD_DIR=… -DWORK_DIR=… [-DSTRIP=… -DREFERENCE_BACKEND=… -DPORTABLE_SCRIPT=…] -P installed_tree.cmake
+#   cmake -DMODE=install|portable -DBUILD_DIR=… -DWORK_DIR=… [-DSTRIP=… -DREFERENCE_BACKEND=…
+#   -DPORTABLE_SCRIPT=…] -P installed_tree.cmake
 
 function(run)
   execute_process(COMMAND ${ARGV} WORKING_DIRECTORY ${WORK_DIR}/elsewhere
@@ -13,13 +15,15 @@ function(run)
   set(output "${output}" PARENT_SCOPE)
 endfunction()
 
-# Renders a scene of the tree into `outputs`, small and with any backend, and looks whether the files are there.
+# Renders a scene of the tree into `outputs`, small and with any backend, and looks whether the files are
+# there.
 function(render tree scene)
   set(options "")
   foreach(image IN LISTS ARGN)
     list(APPEND options -o ${image})
   endforeach()
-  run(${CLEAN} ${tree}/bin/crt render ${tree}/share/crt/configs/${scene}.yaml --set film.resolution=[32,32] --spp 2 --report none ${options})
+  run(${CLEAN} ${tree}/bin/crt render ${tree}/share/crt/configs/${scene}.yaml --set film.resolution=[32,32]
+    --spp 2 --report none ${options})
   foreach(image IN LISTS ARGN)
     if(NOT EXISTS ${WORK_DIR}/elsewhere/${image})
       message(FATAL_ERROR "crt ended well, but there is no ${image}:\n${output}")
@@ -27,7 +31,8 @@ function(render tree scene)
   endforeach()
 endfunction()
 
-# An empty environment; in a sanitizer's build without the search for leaks, for which the suppressions would be missing. Nobody else reads the variable.
+# An empty environment; in a sanitizer's build without the search for leaks, for which the suppressions would
+# be missing. Nobody else reads the variable.
 set(CLEAN env -i ASAN_OPTIONS=detect_leaks=0)
 
 file(REMOVE_RECURSE ${WORK_DIR})
@@ -39,8 +44,10 @@ if(MODE STREQUAL "install")
   render(${WORK_DIR}/moved cornell_box a.pfm a.exr a.png)
   render(${WORK_DIR}/moved cornell_figure b.pfm)  # reads a mesh
 else()
-  run(${CMAKE_COMMAND} -DBUILD_DIR=${BUILD_DIR} -DSTRIP=${STRIP} -DREFERENCE_BACKEND=${REFERENCE_BACKEND} -P ${PORTABLE_SCRIPT})
-  # Small enough to be sent anywhere. The archive, too, is what it claims to be: only what it holds is used from here on.
+  run(${CMAKE_COMMAND} -DBUILD_DIR=${BUILD_DIR} -DSTRIP=${STRIP} -DREFERENCE_BACKEND=${REFERENCE_BACKEND} -P
+    ${PORTABLE_SCRIPT})
+  # Small enough to be sent anywhere. The archive, too, is what it claims to be: only what it holds is used
+  # from here on.
   set(limit 50331648)  # 48 MiB
   foreach(archive crt-portable crt-portable-tests)
     run(${CMAKE_COMMAND} -E chdir ${WORK_DIR} ${CMAKE_COMMAND} -E tar xzf ${BUILD_DIR}/${archive}.tar.gz)
@@ -61,7 +68,8 @@ else()
   endforeach()
   set(limit 12582912)  # 12 MiB
   if(bytes GREATER limit)
-    message(FATAL_ERROR "crt-portable has ${bytes} bytes unpacked, meshes and Embree aside: more than ${limit}")
+    message(FATAL_ERROR
+      "crt-portable has ${bytes} bytes unpacked, meshes and Embree aside: more than ${limit}")
   endif()
 
   render(${WORK_DIR}/crt cornell_box a.pfm a.ppm)
@@ -77,7 +85,8 @@ else()
     message(FATAL_ERROR "crt-meshgen made nothing:\n${output}")
   endif()
   foreach(mesh IN LISTS meshes)
-    run(${CMAKE_COMMAND} -E compare_files ${WORK_DIR}/elsewhere/meshes/${mesh} ${WORK_DIR}/crt/share/crt/meshes/${mesh})
+    run(${CMAKE_COMMAND} -E compare_files ${WORK_DIR}/elsewhere/meshes/${mesh}
+      ${WORK_DIR}/crt/share/crt/meshes/${mesh})
   endforeach()
 
   # Nothing but glibc and the compiler's library comes from this machine.
@@ -86,7 +95,8 @@ else()
     run(${CLEAN} ldd ${file})
     string(REGEX MATCHALL "lib[^ /]* => /[^ ]*" libraries "${output}")
     foreach(library IN LISTS libraries)
-      if(NOT library MATCHES "=> ${WORK_DIR}/" AND NOT library MATCHES "^lib(c|m|dl|rt|pthread|gcc_s|stdc\\+\\+)\\.so")
+      if(NOT library MATCHES "=> ${WORK_DIR}/" AND NOT library MATCHES
+        "^lib(c|m|dl|rt|pthread|gcc_s|stdc\\+\\+)\\.so")
         message(FATAL_ERROR "${file} needs a library that is not packed: ${library}")
       endif()
     endforeach()

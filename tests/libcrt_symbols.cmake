@@ -1,7 +1,9 @@
-# libcrt exports its interface and nothing else: no symbol of the rooms, whose names a program or another library may have too.
+# libcrt exports its interface and nothing else: no symbol of the rooms, whose names a program or another
+# library may have too.
 #
 #   cmake -DNM=… -DLIBRARY=… -P libcrt_symbols.cmake
-execute_process(COMMAND ${NM} -D --defined-only --demangle ${LIBRARY} OUTPUT_VARIABLE output RESULT_VARIABLE result)
+execute_process(COMMAND ${NM} -D --defined-only --demangle ${LIBRARY} OUTPUT_VARIABLE output RESULT_VARIABLE
+  result)
 if(NOT result EQUAL 0)
   message(FATAL_ERROR "${NM} cannot read ${LIBRARY}")
 endif()

@@ -1,7 +1,10 @@
-# The road of somebody who writes a backend: install crt, move the tree to where he wants it, build docs/example_backend against it, and see
-# that it is usable and passes the ABI part of the conformance suite. Nothing of the source or build tree of crt is used after the install but that suite.
+# The road of somebody who writes a backend: install crt, move the tree to where he wants it, build
+# docs/example_backend against it, and see
+# that it is usable and passes the ABI part of the conformance suite. Nothing of the source or build tree of
+# crt is used after the install but that suite.
 #
-#   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=… [-DCXX_FLAGS=…] -P out_of_tree.cmake
+#   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=… [-DCXX_FLAGS=…] -P
+#   out_of_tree.cmake
 
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
@@ -29,19 +32,22 @@ file(RENAME ${WORK_DIR}/installed ${WORK_DIR}/moved)
 file(COPY ${SOURCE_DIR}/docs/example_backend DESTINATION ${WORK_DIR})
 
 run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${WORK_DIR}/example_backend -B ${WORK_DIR}/build
-    -DCMAKE_PREFIX_PATH=${WORK_DIR}/moved -DCMAKE_CXX_COMPILER=${CXX_COMPILER} "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}")
+    -DCMAKE_PREFIX_PATH=${WORK_DIR}/moved -DCMAKE_CXX_COMPILER=${CXX_COMPILER}
+    "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}")
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
 run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${WORK_DIR}/moved/bin/crt plugins)
 expect_usable("${output}" "by CRT_BACKEND_PATH")
 
 # The border's part of the conformance suite, on the backend that crt has never seen.
-run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${BUILD_DIR}/bin/crt_conformance --backend example --against example "[abi]")
+run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${BUILD_DIR}/bin/crt_conformance --backend
+  example --against example "[abi]")
 if(NOT output MATCHES "All tests passed")
   message(FATAL_ERROR "the out-of-tree backend was not tested:\n${output}")
 endif()
 
 # And physics, by the crt that was installed.
-run(${WORK_DIR}/moved/bin/crt verify --backend example --plugin-path ${WORK_DIR}/build --case furnace,square-light,reflectance,out-of-glass,prism,crops)
+run(${WORK_DIR}/moved/bin/crt verify --backend example --plugin-path ${WORK_DIR}/build --case
+  furnace,square-light,reflectance,out-of-glass,prism,crops)
 if(NOT output MATCHES "6 pass")
   message(FATAL_ERROR "crt verify did not pass the out-of-tree backend:\n${output}")
 endif()

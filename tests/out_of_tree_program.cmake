@@ -1,8 +1,11 @@
-# The road of somebody whose program renders with libcrt: install crt, move the tree to where he wants it, build docs/example_program against it
-# by find_package and by pkg-config, run it from elsewhere with an empty environment, and look at the image. Nothing of the source or build tree
+# The road of somebody whose program renders with libcrt: install crt, move the tree to where he wants it,
+# build docs/example_program against it
+# by find_package and by pkg-config, run it from elsewhere with an empty environment, and look at the image.
+# Nothing of the source or build tree
 # of crt is used after the install.
 #
-#   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=… [-DCXX_FLAGS=…] [-DPKG_CONFIG=…] -P out_of_tree_program.cmake
+#   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=… [-DCXX_FLAGS=…]
+#   [-DPKG_CONFIG=…] -P out_of_tree_program.cmake
 
 function(run)
   execute_process(COMMAND ${ARGV} WORKING_DIRECTORY ${WORK_DIR}/elsewhere
@@ -37,11 +40,13 @@ file(RENAME ${WORK_DIR}/installed ${WORK_DIR}/moved)
 file(COPY ${SOURCE_DIR}/docs/example_program DESTINATION ${WORK_DIR})
 
 run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${WORK_DIR}/example_program -B ${WORK_DIR}/build
-    -DCMAKE_PREFIX_PATH=${WORK_DIR}/moved -DCMAKE_CXX_COMPILER=${CXX_COMPILER} "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}")
+    -DCMAKE_PREFIX_PATH=${WORK_DIR}/moved -DCMAKE_CXX_COMPILER=${CXX_COMPILER}
+    "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}")
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
 expect_image(${WORK_DIR}/build/example_program package.png)
 
-# Installed by an account of its own, and used by a program of another: libcrt's owner may also have written its plugins.
+# Installed by an account of its own, and used by a program of another: libcrt's owner may also have written
+# its plugins.
 execute_process(COMMAND id -u OUTPUT_VARIABLE user OUTPUT_STRIP_TRAILING_WHITESPACE)
 if(user STREQUAL "0")
   run(chown -R 65534:65534 ${WORK_DIR}/moved)
@@ -50,14 +55,17 @@ endif()
 
 # The interface needs nothing but C++17, and no header of the rooms.
 if(PKG_CONFIG)
-  run(${CMAKE_COMMAND} -E env PKG_CONFIG_PATH=${WORK_DIR}/moved/lib/pkgconfig ${PKG_CONFIG} --cflags --libs crt)
+  run(${CMAKE_COMMAND} -E env PKG_CONFIG_PATH=${WORK_DIR}/moved/lib/pkgconfig ${PKG_CONFIG} --cflags --libs
+    crt)
   string(STRIP "${output}" flags)
   separate_arguments(flags UNIX_COMMAND "${flags} ${CXX_FLAGS}")
-  run(${CXX_COMPILER} -std=c++17 -Wall -Wextra -Werror ${WORK_DIR}/example_program/example_program.cpp -o ${WORK_DIR}/by_pkg_config
+  run(${CXX_COMPILER} -std=c++17 -Wall -Wextra -Werror ${WORK_DIR}/example_program/example_program.cpp -o
+    ${WORK_DIR}/by_pkg_config
       ${flags} -Wl,-rpath,${WORK_DIR}/moved/lib)
   expect_image(${WORK_DIR}/by_pkg_config pkg_config.png)
   # The same scene, seed and samples: the same picture.
-  run(${CMAKE_COMMAND} -E compare_files ${WORK_DIR}/elsewhere/package.png ${WORK_DIR}/elsewhere/pkg_config.png)
+  run(${CMAKE_COMMAND} -E compare_files ${WORK_DIR}/elsewhere/package.png
+    ${WORK_DIR}/elsewhere/pkg_config.png)
 endif()
 
 file(REMOVE_RECURSE ${WORK_DIR})

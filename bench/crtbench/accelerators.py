@@ -54,7 +54,8 @@ materials:
 objects:
   - mesh: {{positions: {points(corners)}, faces: {[list(f) for f in faces]}}}
     material: grey
-  - mesh: {{positions: [[-0.3, 0.99, -0.3], [0.3, 0.99, -0.3], [0.3, 0.99, 0.3], [-0.3, 0.99, 0.3]], faces: [[0, 1, 2, 3]]}}
+  - mesh: {{positions: [[-0.3, 0.99, -0.3], [0.3, 0.99, -0.3], [0.3, 0.99, 0.3], [-0.3, 0.99, 0.3]],
+           faces: [[0, 1, 2, 3]]}}
     material: grey
     emission: {{radiance: 5}}
 """
@@ -129,8 +130,10 @@ def measure(program, arguments):
             print(rows[-1], flush=True)
     results.heading("By scene")
     results.paragraph(
-        f"Mpaths/s, median of {runs} interleaved runs, in brackets the slowest and the fastest; then Mrays/s. 400 × 400 pixels and up to 8 samples, where the loop "
-        "would take minutes fewer, of 64 × 64 or 32 × 32 pixels; depth and roulette as in the scene. Same image whatever is chosen."
+        f"Mpaths/s, median of {runs} interleaved runs, in brackets the slowest and the fastest; then "
+        f"Mrays/s. 400 × 400 pixels and up to 8 samples, where the loop "
+        "would take minutes fewer, of 64 × 64 or 32 × 32 pixels; depth and roulette as in the scene. Same "
+        "image whatever is chosen."
     )
     results.table(
         [
@@ -185,7 +188,9 @@ def measure(program, arguments):
         print(row, flush=True)
     results.heading("From how many triangles on the BVH wins")
     results.paragraph(
-        f"A closed room of 10 triangles with a lamp of 2, and small quads in random places. Mpaths/s, median of {runs} interleaved runs, in brackets the slowest and the "
+        f"A closed room of 10 triangles with a lamp of 2, and small quads in random places. Mpaths/s, "
+        f"median "
+        f"of {runs} interleaved runs, in brackets the slowest and the "
         "fastest; 256 × 256 pixels, 16 samples, 5 scattering events, no roulette."
     )
     results.table(
@@ -205,7 +210,8 @@ def measure(program, arguments):
     results.lines.append("")
     results.not_measured(absent)
     results.command(
-        "crt render configs/SCENE.yaml --backend BACKEND --spp N --set 'film.resolution=[400,400]' --set 'outputs.0.aovs=[]' "
+        "crt render configs/SCENE.yaml --backend BACKEND --spp N --set 'film.resolution=[400,400]' --set "
+        "'outputs.0.aovs=[]' "
         "--set integrator.accelerator=none|aabb|bvh -o unseen.pfm"
     )
     results.data = data

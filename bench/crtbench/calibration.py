@@ -91,8 +91,10 @@ def summary(results, rows):
     covered = sum(r["covered"] for r in asked) / sum(r["known"] for r in asked)
     low = [r for r in asked if r["covered"] / r["known"] < 0.89]
     text = (
-        f"Of {len(asked)} rows in which half of the images or more know their error, {len(outside)} have a mean ratio outside 0.9 to "
-        f"1.1; their intervals cover the real error {covered:.1%} of the time. With 100 seeds 95 % appears as 89 % or less in one row "
+        f"Of {len(asked)} rows in which half of the images or more know their error, {len(outside)} have a "
+        f"mean ratio outside 0.9 to "
+        f"1.1; their intervals cover the real error {covered:.1%} of the time. With 100 seeds 95 % appears "
+        f"as 89 % or less in one row "
         f"of a hundred; here in {len(low)}"
     )
     results.paragraph(
@@ -100,7 +102,8 @@ def summary(results, rows):
         + (
             ": "
             + "; ".join(
-                f"{r['scene']}, {r['side']}², {r['sampler']}, {r['samples']} ({share(r['covered'], r['known'])})"
+                f"{r['scene']}, {r['side']}², {r['sampler']}, {r['samples']} "
+                f"({share(r['covered'], r['known'])})"
                 for r in low
             )
             if low
@@ -185,10 +188,15 @@ def measure(program, arguments):
     results.paragraph("Rendered by " + "; ".join(sorted({r["machine"] for r in rows})) + ".")
     results.heading("The stated error")
     results.paragraph(
-        "*Real error*: relative RMSE of luminance over the pixels. *Stated : real, all*: root mean square of what all images "
-        "estimate, over the real error: 1 where the estimate is unbiased. *Known*: images that state an error; the others say "
-        "“not yet known”. Of these the mean of stated over real error, how often the 95 % interval covers the real error, and "
-        "how often the root mean square error that the image has is within its 95 % half-width. *Degrees of freedom*: mean."
+        "*Real error*: relative RMSE of luminance over the pixels. *Stated : real, all*: root mean square "
+        "of "
+        "what all images "
+        "estimate, over the real error: 1 where the estimate is unbiased. *Known*: images that state an "
+        "error; the others say "
+        "“not yet known”. Of these the mean of stated over real error, how often the 95 % interval covers "
+        "the real error, and "
+        "how often the root mean square error that the image has is within its 95 % half-width. *Degrees of "
+        "freedom*: mean."
     )
     summary(results, of("stated"))
     for side, sampler in sorted({(r["side"], r["sampler"]) for r in of("stated")}, reverse=True):
@@ -196,13 +204,17 @@ def measure(program, arguments):
         stated_table(results, of("stated", side, sampler))
     results.heading("What two replicates cost")
     results.paragraph(
-        "RMSE of images with two replicates over that of images with one sequence, by samples per pixel, 64 × 64 pixels, "
-        f"{PRICE_SEEDS} seeds each, ± one standard error. Decision 0007 says why it is what it is at 64 samples."
+        "RMSE of images with two replicates over that of images with one sequence, by samples per pixel, 64 "
+        "× 64 pixels, "
+        f"{PRICE_SEEDS} seeds each, ± one standard error. Decision 0007 says why it is what it is at 64 "
+        f"samples."
     )
     price_table(results, of("price"))
     results.heading(f"`--target-error {TARGET:.0%}`")
     results.paragraph(
-        f"64 × 64 pixels, {SEEDS} seeds; after {MOST} samples per pixel a render gives up. *Right*: its root mean square error "
+        f"64 × 64 pixels, {SEEDS} seeds; after {MOST} samples per pixel a render gives up. *Right*: its "
+        f"root "
+        f"mean square error "
         f"against independent renders of {16 * MOST} samples is at most {TARGET:.0%}."
     )
     stop_table(results, of("stop"))
@@ -210,10 +222,12 @@ def measure(program, arguments):
         f"{program.build}/bin/error_calibration stated BACKEND configs/cornell_box.yaml 64 sobol {SEEDS}"
     )
     results.command(
-        f"{program.build}/bin/error_calibration price BACKEND configs/cornell_box.yaml 64 sobol {PRICE_SEEDS}"
+        f"{program.build}/bin/error_calibration price BACKEND configs/cornell_box.yaml 64 sobol "
+        f"{PRICE_SEEDS}"
     )
     results.command(
-        f"{program.build}/bin/error_calibration stop BACKEND configs/cornell_box.yaml 64 sobol {SEEDS} {TARGET} {MOST}"
+        f"{program.build}/bin/error_calibration stop BACKEND configs/cornell_box.yaml 64 sobol {SEEDS} "
+        f"{TARGET} {MOST}"
     )
     results.data = {"rows": [{k: v for k, v in r.items() if k != "rows"} for r in rows]}
     results.write()

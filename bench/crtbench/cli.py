@@ -36,7 +36,8 @@ COMMANDS = {
     "robustness": (robustness, "what the watertight triangle test and the offsets cost, and what they buy"),
     "calibration": (
         calibration,
-        "does the error that an image states of itself hold? 100 seeds of five scenes, many numbers of samples",
+        "does the error that an image states of itself hold? 100 seeds of five scenes, many numbers of "
+        "samples",
     ),
     "false-alarms": (
         false_alarms,
@@ -80,7 +81,8 @@ def main():
         if name == "mtl-agreement":
             command.add_argument(
                 "--python",
-                help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in out/peers-venv",
+                help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in "
+                     "out/peers-venv",
             )
             command.add_argument(
                 "--samples", type=int, default=1024, help="per pixel, in both programs (1024)"

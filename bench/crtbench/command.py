@@ -26,7 +26,8 @@ def add_options(parser, busy):
     parser.add_argument(
         "--tiny",
         action="store_true",
-        help="small images, few samples and runs: does the tool work? The numbers mean nothing and go to out/tiny",
+        help="small images, few samples and runs: does the tool work? The numbers mean nothing and go to "
+             "out/tiny",
     )
     parser.add_argument(
         "--busy",

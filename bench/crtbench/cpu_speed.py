@@ -100,8 +100,10 @@ def measure(program, arguments):
                 verdicts.append(f"{scene}, OpenCL against Embree: {share:.0%}, target {OPENCL_SHARE:.0%}: "
                                 + ("reached" if share >= OPENCL_SHARE else "**missed**"))
     results.paragraph(
-        f"Median of {runs} interleaved runs, in brackets the slowest and the fastest of them. A path is one sample of one pixel; rays are "
-        "those of the path and those to the light. The whole process includes starting, reading and compiling the scene, taking the "
+        f"Median of {runs} interleaved runs, in brackets the slowest and the fastest of them. A path is one "
+        f"sample of one pixel; rays are "
+        "those of the path and those to the light. The whole process includes starting, reading and "
+        "compiling the scene, taking the "
         "kernel from the cache and writing a PFM."
     )
     results.table(
@@ -117,8 +119,10 @@ def measure(program, arguments):
         rows,
     )
     results.paragraph(
-        "Path tracing with light sampling and MIS, at most 5 scattering events, box filter, no AOVs, all threads. "
-        f"`{BOX}`: 1440 × 1440, 8 samples per pixel, independent sampler, no roulette. `{MESH}`: 400 × 400, 64 samples per pixel, Sobol "
+        "Path tracing with light sampling and MIS, at most 5 scattering events, box filter, no AOVs, all "
+        "threads. "
+        f"`{BOX}`: 1440 × 1440, 8 samples per pixel, independent sampler, no roulette. `{MESH}`: 400 × 400, "
+        f"64 samples per pixel, Sobol "
         "sampler, roulette as in the scene."
     )
     results.heading("Against the targets")
@@ -127,8 +131,11 @@ def measure(program, arguments):
     results.lines.append("")
     results.heading("For orientation: pbrt-v4")
     results.paragraph(
-        "Not run here: measured with pbrt-v4 on another virtual machine with 2 cores (EPYC with AVX-512, g++ 12 -O3 -march=native, 2 threads). "
-        "The same box and the same number of scattering events; other code for everything else, and another processor, so that the ratio "
+        "Not run here: measured with pbrt-v4 on another virtual machine with 2 cores (EPYC with AVX-512, "
+        "g++ "
+        "12 -O3 -march=native, 2 threads). "
+        "The same box and the same number of scattering events; other code for everything else, and another "
+        "processor, so that the ratio "
         "says what class of speed this is and no more."
     )
     results.table(

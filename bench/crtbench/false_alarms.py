@@ -24,11 +24,17 @@ def measure(program, arguments):
     results = Results(program, arguments, "false-alarms", "How often crt converge is wrong")
     results.paragraph(__doc__.replace("\n", " "))
     results.paragraph(
-        f"{repeats} repeats of each situation, 64 pixels, 16 replicates of 1 to 256 samples (relative RMSE 0.9 % at the "
-        "end) unless it says otherwise. *Stated*: the part that may be wrong. A part above what is stated by more than "
-        "three standard errors of the counting is **bold**. Intervals of *b²* are wide on purpose: around 0 the "
-        "jackknife is too careful, and what it misses is covered by Fisher's F. *FAIL of what is right*, *a floor where "
-        "there is none* and *PASS of what is wrong* are claimed at 99.9 %. Intervals that have no bounds, because an "
+        f"{repeats} repeats of each situation, 64 pixels, 16 replicates of 1 to 256 samples (relative RMSE "
+        f"0.9 % at the "
+        "end) unless it says otherwise. *Stated*: the part that may be wrong. A part above what is stated "
+        "by "
+        "more than "
+        "three standard errors of the counting is **bold**. Intervals of *b²* are wide on purpose: around 0 "
+        "the "
+        "jackknife is too careful, and what it misses is covered by Fisher's F. *FAIL of what is right*, *a "
+        "floor where "
+        "there is none* and *PASS of what is wrong* are claimed at 99.9 %. Intervals that have no bounds, "
+        "because an "
         "error hides in the reference's noise, are not asked."
     )
     for situation in dict.fromkeys(row["situation"] for row in rows):

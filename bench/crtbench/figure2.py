@@ -101,7 +101,8 @@ def write(program, arguments, rows, absent):
     results = Results(program, arguments, "figure2", "Time against samples: the paper's Figure 2")
     lines = medians(rows)
     results.paragraph(
-        "Render seconds by the backend's report, median of repeats. A render that would take over 16 s on a processor was left out."
+        "Render seconds by the backend's report, median of repeats. A render that would take over 16 s on a "
+        "processor was left out."
     )
     results.paragraph("![Seconds against samples per pixel](figure2.svg)")
     table, data = [], {}
@@ -156,7 +157,9 @@ def write(program, arguments, rows, absent):
             ratio = large["seconds_per_sample"] / small["seconds_per_sample"]
             data[f"{backend} doubling"] = ratio
             doubling.append(
-                f"- {backend}: twice the width and height costs {significant(ratio)} times as much a sample; 4 is linear in the number of pixels"
+                f"- {backend}: twice the width and height costs {significant(ratio)} times as much a "
+                f"sample; "
+                f"4 is linear in the number of pixels"
             )
     results.heading("The doubling")
     results.lines += [*doubling, ""]
@@ -164,7 +167,8 @@ def write(program, arguments, rows, absent):
         {name: reason for name, reason in absent.items() if not any(b == name for b, _ in lines)}
     )
     results.command(
-        f"crt render configs/{SCENE}.yaml --backend BACKEND --spp N --set 'film.resolution=[1440,1440]' --set 'outputs.0.aovs=[]' -o unseen.pfm"
+        f"crt render configs/{SCENE}.yaml --backend BACKEND --spp N --set 'film.resolution=[1440,1440]' "
+        f"--set 'outputs.0.aovs=[]' -o unseen.pfm"
     )
     results.data = {"rows": rows, "fits": data}
     results.write()

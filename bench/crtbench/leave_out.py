@@ -80,8 +80,10 @@ def measure(program, arguments):
             print(rows[-1], flush=True)
     results.heading("Lean and full kernel")
     results.paragraph(
-        f"{size} × {size} pixels; {', '.join(f'{s} {spp[s]}' for s in scenes)} samples per pixel. Render seconds without start, median of {runs} "
-        "interleaved runs, in brackets the least and the most; the ratio is taken run by run. Memory is the process's peak. Embree's lean kernel is the "
+        f"{size} × {size} pixels; {', '.join(f'{s} {spp[s]}' for s in scenes)} samples per pixel. Render "
+        f"seconds without start, median of {runs} "
+        "interleaved runs, in brackets the least and the most; the ratio is taken run by run. Memory is the "
+        "process's peak. Embree's lean kernel is the "
         "smallest of those it has compiled ahead that covers the scene."
     )
     results.table(
@@ -117,8 +119,11 @@ def measure(program, arguments):
     # Bit by bit.
     results.heading("Each feature alone")
     results.paragraph(
-        "The scene's own kernel with one feature more that the scene does not use: what every feature would cost those who do not need it. OpenCL: render "
-        f"seconds with the feature : without, median of {runs} interleaved runs, run by run, in brackets the least and the most. CUDA with "
+        "The scene's own kernel with one feature more that the scene does not use: what every feature would "
+        "cost those who do not need it. OpenCL: render "
+        f"seconds with the feature : without, median of {runs} interleaved runs, run by run, in brackets "
+        f"the "
+        f"least and the most. CUDA with "
         "NVRTC: registers, kB of the CUBIN and ms of one compilation more than without."
     )
     bits = feature_bits(program.repository)

@@ -4,8 +4,14 @@ its own, with colours for light and for dark."""
 import math
 import statistics
 
-INK = ".ink{fill:#1a1a1a}.soft{fill:#555}.grid{stroke:#e2e2e2}.frame{stroke:#999;fill:none}.ground{fill:#fff}.guide{stroke:#888;stroke-dasharray:2 5}"
-INK_ON_DARK = ".ink{fill:#eee}.soft{fill:#b0b0b0}.grid{stroke:#343434}.frame{stroke:#777}.ground{fill:#161616}.guide{stroke:#888}"
+INK = (
+    ".ink{fill:#1a1a1a}.soft{fill:#555}.grid{stroke:#e2e2e2}.frame{stroke:#999;fill:none}"
+    ".ground{fill:#fff}.guide{stroke:#888;stroke-dasharray:2 5}"
+)
+INK_ON_DARK = (
+    ".ink{fill:#eee}.soft{fill:#b0b0b0}.grid{stroke:#343434}.frame{stroke:#777}"
+    ".ground{fill:#161616}.guide{stroke:#888}"
+)
 
 
 class PowerLaw:
@@ -29,7 +35,8 @@ def ticks(low, high, mantissas=(1,)):
 
 
 class Chart:
-    """`size`: width and height; `margins`: left, right, top, bottom; ranges: least and most; `colours`: {kind of line: (on light, on dark)}."""
+    """`size`: width and height; `margins`: left, right, top, bottom; ranges: least and most; `colours`:
+        {kind of line: (on light, on dark)}."""
 
     def __init__(self, size, margins, x_range, y_range, colours):
         self.width, self.height = size
@@ -51,19 +58,24 @@ class Chart:
 
     def x_tick(self, value, text):
         self.draw(
-            f'<line class="grid" x1="{self.x(value):.1f}" x2="{self.x(value):.1f}" y1="{self.top}" y2="{self.bottom}"/>'
-            f'<text class="soft" x="{self.x(value):.1f}" y="{self.bottom + 18}" text-anchor="middle">{text}</text>'
+            f'<line class="grid" x1="{self.x(value):.1f}" x2="{self.x(value):.1f}" y1="{self.top}" '
+            f'y2="{self.bottom}"/>'
+            f'<text class="soft" x="{self.x(value):.1f}" y="{self.bottom + 18}" '
+            f'text-anchor="middle">{text}</text>'
         )
 
     def y_tick(self, value, text):
         self.draw(
-            f'<line class="grid" x1="{self.left}" x2="{self.right}" y1="{self.y(value):.1f}" y2="{self.y(value):.1f}"/>'
-            f'<text class="soft" x="{self.left - 8}" y="{self.y(value) + 4:.1f}" text-anchor="end">{text}</text>'
+            f'<line class="grid" x1="{self.left}" x2="{self.right}" y1="{self.y(value):.1f}" '
+            f'y2="{self.y(value):.1f}"/>'
+            f'<text class="soft" x="{self.left - 8}" y="{self.y(value) + 4:.1f}" '
+            f'text-anchor="end">{text}</text>'
         )
 
     def x_title(self, text):
         self.draw(
-            f'<text class="soft" x="{(self.left + self.right) / 2}" y="{self.height - 15}" text-anchor="middle">{text}</text>'
+            f'<text class="soft" x="{(self.left + self.right) / 2}" y="{self.height - 15}" '
+            f'text-anchor="middle">{text}</text>'
         )
 
     def curve(self, kind, points, width, radius, dashed):
@@ -78,7 +90,8 @@ class Chart:
     def label(self, kind, x, y, text, size=13):
         """Text in the colour of its line, at a place in the picture's own units."""
         self.draw(
-            f'<text class="t{list(self.colours).index(kind)}" x="{x:.1f}" y="{y:.1f}" font-size="{size}">{text}</text>'
+            f'<text class="t{list(self.colours).index(kind)}" x="{x:.1f}" y="{y:.1f}" '
+            f'font-size="{size}">{text}</text>'
         )
 
     def svg(self, title):
@@ -87,7 +100,8 @@ class Chart:
             style.append(f".l{number}{{stroke:{light};fill:none}}.t{number}{{fill:{light}}}")
             dark.append(f".l{number}{{stroke:{night}}}.t{number}{{fill:{night}}}")
         head = [
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" font-family="system-ui, sans-serif" font-size="13" role="img">',
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" '
+            f'font-family="system-ui, sans-serif" font-size="13" role="img">',
             f"<title>{title}</title>",
             f"<style>{''.join(style)}@media (prefers-color-scheme: dark){{{''.join(dark)}}}</style>",
             f'<rect class="ground" width="{self.width}" height="{self.height}"/>',

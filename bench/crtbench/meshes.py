@@ -155,9 +155,13 @@ def measure(program, arguments):
     backend = program.backends(BACKENDS)[0][0]
     results = Results(program, arguments, "meshes", "OBJ files of other people")
     results.paragraph(
-        f"Every OBJ below each folder, {RESOLUTION} × {RESOLUTION} pixels, 4 samples, on `{backend}`, with `material: grey` for faces that have no "
-        "material of their own, a camera fitted to the bounds and light from everywhere. A file renders when crt ends with code 0, all "
-        "pixels are finite, and the mesh is seen in a second picture of its normals. Nothing of these files is part of crt."
+        f"Every OBJ below each folder, {RESOLUTION} × {RESOLUTION} pixels, 4 samples, on `{backend}`, with "
+        f"`material: grey` for faces that have no "
+        "material of their own, a camera fitted to the bounds and light from everywhere. A file renders "
+        "when "
+        "crt ends with code 0, all "
+        "pixels are finite, and the mesh is seen in a second picture of its normals. Nothing of these files "
+        "is part of crt."
     )
     if arguments.note:
         results.paragraph(arguments.note)

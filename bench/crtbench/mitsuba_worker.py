@@ -2,8 +2,9 @@
 Python that has mitsuba and numpy; nothing of crt
 is imported here.
 
-    {"do": "describe"}                                              → versions, constants, CIE tables as Mitsuba evaluates them
-    {"do": "render", "sampler": …, "spp": …, "seed": …, "roulette": …, "image": path.npy} → seconds, cpu_seconds, spp, mean
+    {"do": "describe"} → versions, constants, CIE tables as Mitsuba evaluates them
+    {"do": "render", "sampler": …, "spp": …, "seed": …, "roulette": …, "image": path.npy}
+        → seconds, cpu_seconds, spp, mean
 
 Seconds are those of mi.render with its evaluation and synchronisation, on a scene that is loaded; every
 setting is rendered once, untimed, with another seed

@@ -152,10 +152,15 @@ def measure(program, arguments):
     table.append(["Mitsuba in RGB", "Mitsuba in wavelengths", *cells])
     version = mitsuba.version
     results.paragraph(
-        f"McGuire's Cornell box (public domain, Cardenas and McGuire 2011; `{FOLDER}`), {SIZE} × {SIZE} pixels, {samples} samples, in crt on `{backend}` and in Mitsuba "
-        f"{version}, whose scene is made from the same OBJ and MTL by a reader of its own: every face diffuse with Kd, an area light with Ke, linear "
-        "sRGB. Luminance (CIE Y) of one over that of the other, less one: of the whole image, of patches that show one material, and the largest of all "
-        f"{(SIZE // BLOCK) ** 2} blocks of {BLOCK} × {BLOCK} pixels. Mitsuba in RGB multiplies three numbers at each reflection, where crt and Mitsuba in wavelengths multiply "
+        f"McGuire's Cornell box (public domain, Cardenas and McGuire 2011; `{FOLDER}`), {SIZE} × {SIZE} "
+        f"pixels, {samples} samples, in crt on `{backend}` and in Mitsuba "
+        f"{version}, whose scene is made from the same OBJ and MTL by a reader of its own: every face "
+        f"diffuse with Kd, an area light with Ke, linear "
+        "sRGB. Luminance (CIE Y) of one over that of the other, less one: of the whole image, of patches "
+        "that show one material, and the largest of all "
+        f"{(SIZE // BLOCK) ** 2} blocks of {BLOCK} × {BLOCK} pixels. Mitsuba in RGB multiplies three "
+        f"numbers "
+        f"at each reflection, where crt and Mitsuba in wavelengths multiply "
         "spectra that are made from them: the last line is how much that is."
     )
     results.table(["this", "over that", "whole image", *PATCHES, "worst block"], table)

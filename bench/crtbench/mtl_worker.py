@@ -2,7 +2,8 @@
 diffuse with Kd, an area light where Ke is not
 black, numbers taken as linear sRGB, nothing else read. Runs under a Python that has mitsuba and numpy.
 
-    mtl_worker.py VARIANT OBJ MTL SAMPLES SEED IMAGE.npy '{"position": …, "target": …, "fov": …, "size": …, "max_depth": …}'
+    mtl_worker.py VARIANT OBJ MTL SAMPLES SEED IMAGE.npy \
+        '{"position": …, "target": …, "fov": …, "size": …, "max_depth": …}'
 
 The image is CIE Y."""
 

@@ -30,7 +30,8 @@ def python_with_mitsuba(wanted):
     if wanted:
         if not has_packages(wanted):
             raise Failure(
-                f"'{wanted}' cannot import mitsuba, numpy and yaml: {wanted} -m pip install {' '.join(PACKAGES)}"
+                f"'{wanted}' cannot import mitsuba, numpy and yaml: {wanted} -m pip install "
+                f"{' '.join(PACKAGES)}"
             )
         return wanted
     if has_packages(sys.executable):
@@ -80,7 +81,8 @@ def llvm_library():
         )
         if done.returncode != 0 or newest() is None:
             raise Failure(
-                f"Mitsuba's llvm variants need LLVM {OLDEST_LLVM} or newer; install {LLVM_PACKAGE} or name one in DRJIT_LIBLLVM_PATH"
+                f"Mitsuba's llvm variants need LLVM {OLDEST_LLVM} or newer; install {LLVM_PACKAGE} or name "
+                f"one in DRJIT_LIBLLVM_PATH"
             )
     return newest()
 
@@ -92,7 +94,8 @@ def main():
     add_options(parser, busy="a wall time is marked")
     parser.add_argument(
         "--python",
-        help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in out/peers-venv",
+        help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in "
+             "out/peers-venv",
     )
     parser.add_argument(
         "--seconds",

@@ -33,9 +33,9 @@ class Reference:
 
 
 def relative_error(images, unit, reference):
-    """Relative RMSE of one render from R of them, and its standard error by the jackknife over renders: {metric: (error, se)}. `unit`: what their pixels are
-    divided by. `error`: luminance of all pixels; `error_xyz`: X, Y and Z of all pixels; `error_room`:
-    luminance of the pixels that see no lamp, over
+    """Relative RMSE of one render from R of them, and its standard error by the jackknife over renders:
+    {metric: (error, se)}. `unit`: what their pixels are divided by. `error`: luminance of all pixels;
+    `error_xyz`: X, Y and Z of all pixels; `error_room`: luminance of the pixels that see no lamp, over
     their mean; `spread`: luminance of all pixels, about the renders' own mean."""
     stack, room = np.array(images) / unit, reference.room
 

@@ -77,18 +77,24 @@ def write_agreement(results, found, described):
     p, tiles = found["predicted"], found["tiles"]
     results.heading("Do they agree?")
     results.paragraph(
-        "Same triangles (quads as fans from their first corner), one-sided lamp, reflectances and lamp as the tables of the scene, written out to "
+        "Same triangles (quads as fans from their first corner), one-sided lamp, reflectances and lamp as "
+        "the tables of the scene, written out to "
         "360 and 832 nm where they "
-        f"are clamped, the camera's focal length and sensor as a field of view of {{:.4f}}°, box filter, film in XYZ as 32-bit floats, at most "
+        f"are clamped, the camera's focal length and sensor as a field of view of {{:.4f}}°, box filter, "
+        f"film in XYZ as 32-bit floats, at most "
         f"{found['max_depth']} scattering events "
         f"(Mitsuba's `max_depth` counts the emitter too: {found['max_depth'] + 1}).".format(found["fov"])
     )
     results.paragraph(
         "**Units.** crt: pixel = ∫L·(x̄, ȳ, z̄)dλ / ∫ȳdλ with L in W·m⁻²·sr⁻¹·nm⁻¹, the observer every nm, "
-        f"∫ȳdλ = {p['crt_y_integral_nm']:.6f} nm. Mitsuba: pixel = k·∫L·(x̄, ȳ, z̄)dλ with the observer every 5 nm, linear between, and "
-        f"k = 1/{1 / p['mitsuba_y_normalization']:.6f} nm, which is not quite the inverse of its own table's integral, "
+        f"∫ȳdλ = {p['crt_y_integral_nm']:.6f} nm. Mitsuba: pixel = k·∫L·(x̄, ȳ, z̄)dλ with the observer "
+        f"every 5 nm, linear between, and "
+        f"k = 1/{1 / p['mitsuba_y_normalization']:.6f} nm, which is not quite the inverse of its own "
+        f"table's "
+        f"integral, "
         f"{p['mitsuba_y_integral_nm']:.6f} nm. So the "
-        "conversion is 1, up to the tables. No white point enters: XYZ is written as it is, without a matrix."
+        "conversion is 1, up to the tables. No white point enters: XYZ is written as it is, without a "
+        "matrix."
     )
     reflections = p["mitsuba_over_crt_xyz_by_reflections"]
     rows = [
@@ -99,7 +105,8 @@ def write_agreement(results, found, described):
         [
             f"{found['lamp_pixels']} pixels within the lamp, measured, ± 95 %",
             *(
-                f"{percent(found['lamp_ratio_xyz'][c] - 1, 3)} ± {100 * t * found['lamp_ratio_xyz_se'][c]:.3f}"
+                f"{percent(found['lamp_ratio_xyz'][c] - 1, 3)} ± "
+                f"{100 * t * found['lamp_ratio_xyz_se'][c]:.3f}"
                 for c in range(3)
             ),
         ],
@@ -115,26 +122,38 @@ def write_agreement(results, found, described):
     results.table(["Mitsuba against crt", "X", "Y", "Z"], rows)
     agree = abs(found["unexplained_y"]) <= t * se[1] / r[1]
     results.paragraph(
-        f"From {found['renders']['crt']} renders by crt ({found['samples']['crt']} samples per pixel together) and {found['renders']['Mitsuba']} "
+        f"From {found['renders']['crt']} renders by crt ({found['samples']['crt']} samples per pixel "
+        f"together) and {found['renders']['Mitsuba']} "
         "by Mitsuba "
-        f"({found['samples']['Mitsuba']}), all with seeds of their own. Over light that white has reflected once, which is most of what is seen, "
+        f"({found['samples']['Mitsuba']}), all with seeds of their own. Over light that white has reflected "
+        f"once, which is most of what is seen, "
         "the tables of the observer account for "
-        f"{percent(reflections[1][1] - 1, 3)} of Y; what remains of the mean is {percent(found['unexplained_y'], 3)}, which is "
-        f"{'within' if agree else '**beyond**'} the interval of ± {100 * t * se[1] / r[1]:.3f} %. In {tiles['count']} tiles of luminance, after "
+        f"{percent(reflections[1][1] - 1, 3)} of Y; what remains of the mean is "
+        f"{percent(found['unexplained_y'], 3)}, which is "
+        f"{'within' if agree else '**beyond**'} the interval of ± {100 * t * se[1] / r[1]:.3f} %. In "
+        f"{tiles['count']} tiles of luminance, after "
         "the common factor, the "
-        f"largest difference is {100 * tiles['worst_deviation']:.2f} % and the largest in units of its standard error {tiles['worst_z']:.2f}; "
+        f"largest difference is {100 * tiles['worst_deviation']:.2f} % and the largest in units of its "
+        f"standard error {tiles['worst_z']:.2f}; "
         f"{tiles['beyond_2_se']} are beyond two "
-        f"standard errors, where chance gives about {0.05 * tiles['count']:.0f}; Šidák's bound on the largest is {tiles['sidak']:.2f} at 95 %, so "
+        f"standard errors, where chance gives about {0.05 * tiles['count']:.0f}; Šidák's bound on the "
+        f"largest is {tiles['sidak']:.2f} at 95 %, so "
         f"{'no tile differs' if tiles['worst_z'] <= tiles['sidak'] else '**some tile differs**'}."
     )
     results.paragraph(
-        "Left as differences: the observer's tables (5 nm against 1 nm) and the constant k, both above. Hero wavelengths: both place four by one "
+        "Left as differences: the observer's tables (5 nm against 1 nm) and the constant k, both above. "
+        "Hero "
+        "wavelengths: both place four by one "
         "stratified "
-        "number, crt distributed as (x̄ + ȳ + z̄)^0.4, Mitsuba as sech² around 538 nm (Radziszewski et al.); that changes noise and no mean. Roulette: "
+        "number, crt distributed as (x̄ + ȳ + z̄)^0.4, Mitsuba as sech² around 538 nm (Radziszewski et "
+        "al.); "
+        "that changes noise and no mean. Roulette: "
         "crt survives with "
-        "the largest of four throughputs, at least 0.05; Mitsuba with the same, at most 0.95; again noise alone. Rays leave surfaces by a fixed "
+        "the largest of four throughputs, at least 0.05; Mitsuba with the same, at most 0.95; again noise "
+        "alone. Rays leave surfaces by a fixed "
         "relative offset in "
-        "Mitsuba and by a clearance proven for each triangle in crt; that could show only where surfaces meet, which the tiles would tell."
+        "Mitsuba and by a clearance proven for each triangle in crt; that could show only where surfaces "
+        "meet, which the tiles would tell."
     )
 
 
@@ -220,11 +239,14 @@ def write_race(results, race, lines, arguments, roulette_from, reference):
 
     results.heading("Which is done first?")
     results.paragraph(
-        f"On the processor, to {100 * race.target:g} %: {race.ours} takes {seconds(race.ours)} processor seconds, {race.theirs} "
+        f"On the processor, to {100 * race.target:g} %: {race.ours} takes {seconds(race.ours)} processor "
+        f"seconds, {race.theirs} "
         f"{seconds(race.theirs)}: a factor of "
-        f"**{race.factor:.2f} ± {1.96 * race.factor_se:.2f}**. With start-up, kernels from the cache: {race.factor_with_start('warm'):.2f}; "
+        f"**{race.factor:.2f} ± {1.96 * race.factor_se:.2f}**. With start-up, kernels from the cache: "
+        f"{race.factor_with_start('warm'):.2f}; "
         f"nothing cached: "
-        f"{race.factor_with_start('cold'):.2f}. At most half of Mitsuba's best was the aim: {'reached' if race.factor <= 0.5 else '**missed**'}."
+        f"{race.factor_with_start('cold'):.2f}. At most half of Mitsuba's best was the aim: "
+        f"{'reached' if race.factor <= 0.5 else '**missed**'}."
     )
     table = []
     for name, row in sorted(race.rows.items(), key=lambda item: item[1]["cpu_to_target"]):
@@ -257,21 +279,31 @@ def write_race(results, race, lines, arguments, roulette_from, reference):
     )
     others = float(np.median([p["others"] for line in lines for p in line.points]))
     results.paragraph(
-        "Medians. Processor seconds are those of all threads of the render alone (Mitsuba: around `mi.render` with evaluation and synchronisation, "
+        "Medians. Processor seconds are those of all threads of the render alone (Mitsuba: around "
+        "`mi.render` with evaluation and synchronisation, "
         "its kernel "
-        "compiled by a render before; crt: the process less its start-up); others on the machine change them little. Wall seconds are those of the "
+        "compiled by a render before; crt: the process less its start-up); others on the machine change "
+        "them "
+        "little. Wall seconds are those of the "
         "render; other "
         f"processes took {others:.1%} of the processor in the median run"
         + (", so they mean little here. " if others > arguments.busy else ". ")
-        + "Start-up is a whole process less its render: importing, reading the scene, compiling or loading kernels; cold is with empty caches, one "
+        + "Start-up is a whole process less its render: importing, reading the scene, compiling or loading "
+          "kernels; cold is with empty caches, one "
         "run; warm the "
-        "median of three. * = beyond what was measured, along the last three points. ± is 95 %, from the jackknife over replicates."
+        "median of three. * = beyond what was measured, along the last three points. ± is 95 %, from the "
+        "jackknife over replicates."
     )
     results.paragraph(
-        f"The error is √(mean of (Y − Y of the reference)² over all pixels and {arguments.replicates} renders with different seeds, less the reference's variance) / "
-        f"mean Y; the reference has {reference.samples} samples per pixel by crt with other seeds, and is itself within {100 * reference.error:.2f} %. Mitsuba's pixels "
-        "are divided by what the tables of the observer account for (last section but one). All pixels count, the lamp's edge too. "
-        f"Roulette, where named, may end a path after its scattering event {roulette_from} in both programs; otherwise there is none. “1 sequence” "
+        f"The error is √(mean of (Y − Y of the reference)² over all pixels and {arguments.replicates} "
+        f"renders with different seeds, less the reference's variance) / "
+        f"mean Y; the reference has {reference.samples} samples per pixel by crt with other seeds, and is "
+        f"itself within {100 * reference.error:.2f} %. Mitsuba's pixels "
+        "are divided by what the tables of the observer account for (last section but one). All pixels "
+        "count, the lamp's edge too. "
+        f"Roulette, where named, may end a path after its scattering event {roulette_from} in both "
+        f"programs; "
+        f"otherwise there is none. “1 sequence” "
         f"is "
         "`sampler.replicates: 1`, “16 sequences” the default, from which an image knows its own error."
     )
@@ -280,8 +312,11 @@ def write_race(results, race, lines, arguments, roulette_from, reference):
 def write_samplers(results, scores, roulette_from):
     results.heading("Mitsuba's samplers")
     results.paragraph(
-        f"`llvm_ad_spectral`, 3 renders each, roulette from event {roulette_from}; the least error² × time goes into the race, in all variants, with and without "
-        "roulette. Spectra are tables on a regular grid, which Mitsuba evaluates faster than irregular ones, and each material is one mesh."
+        f"`llvm_ad_spectral`, 3 renders each, roulette from event {roulette_from}; the least error² × time "
+        f"goes into the race, in all variants, with and without "
+        "roulette. Spectra are tables on a regular grid, which Mitsuba evaluates faster than irregular "
+        "ones, "
+        "and each material is one mesh."
     )
     results.table(
         [
@@ -305,7 +340,8 @@ def write_samplers(results, scores, roulette_from):
         ],
     )
     results.paragraph(
-        "Where the error is larger than the spread between seeds, all seeds have an error in common, which averaging renders does not remove: who measures noise by repeating "
+        "Where the error is larger than the spread between seeds, all seeds have an error in common, which "
+        "averaging renders does not remove: who measures noise by repeating "
         "renders does not see it."
     )
 
@@ -335,9 +371,11 @@ def write(program, results, arguments, run):
     found = agreement(program, run["pools"], version, run["scene"])
     found["max_depth"], found["fov"] = run["setup"]["max_depth"], run["scene"]["fov_degrees"]
     results.paragraph(
-        f"`{SCENE}` at {size} × {size} in crt and in Mitsuba {version['mitsuba']} (Dr.Jit {version['drjit']}): whether their converged images "
+        f"`{SCENE}` at {size} × {size} in crt and in Mitsuba {version['mitsuba']} (Dr.Jit "
+        f"{version['drjit']}): whether their converged images "
         f"agree, and how long each "
-        "takes to a relative RMSE of 1 % in luminance. Same machine, same run, all threads, everything interleaved."
+        "takes to a relative RMSE of 1 % in luminance. Same machine, same run, all threads, everything "
+        "interleaved."
     )
     results.lines += ["![Error against processor seconds](peers.svg)", ""]
     write_race(results, race, lines, arguments, run["roulette_from"], run["reference"])
@@ -422,19 +460,28 @@ def where_time_goes(results, rows, factor, room):
                 ]
             )
     results.paragraph(
-        f"Time to an error = processor seconds per path × paths. crt over Mitsuba, so that less than 1 is to crt's advantage; * as above. “Without the lamp” are the {room} pixels that do "
+        f"Time to an error = processor seconds per path × paths. crt over Mitsuba, so that less than 1 is "
+        f"to "
+        f"crt's advantage; * as above. “Without the lamp” are the {room} pixels that do "
         "not see it and have no neighbour that does."
     )
     results.table(["", "error of", "time per path", "paths to 1 %", "time to 1 %"], table)
     if factor > 0.5:
         results.paragraph(
-            f"So a path costs crt {min(per_paths):.2f} to {max(per_paths):.2f} of what it costs Mitsuba, and the rest is noise per path. *Per "
+            f"So a path costs crt {min(per_paths):.2f} to {max(per_paths):.2f} of what it costs Mitsuba, "
+            f"and "
+            f"the rest is noise per path. *Per "
             "path*: Mitsuba's `llvm_ad_spectral` compiles the path "
-            "tracer into one kernel of vectors as wide as the processor has (16 lanes with AVX-512), a path in each lane, with tracing by Embree; "
+            "tracer into one kernel of vectors as wide as the processor has (16 lanes with AVX-512), a path "
+            "in each lane, with tracing by Embree; "
             "crt follows one path a "
-            "thread, with eight triangles a test and four wavelengths as its vectors. This scene, of 38 triangles and one kind of material, where "
+            "thread, with eight triangles a test and four wavelengths as its vectors. This scene, of 38 "
+            "triangles and one kind of material, where "
             "lanes hardly part, is the best case for wide "
-            "kernels. The scalar variant, a path at a time, is in the table above. *Noise*: the lamp and its edges, seen directly and a hundred times brighter than "
-            "the walls, weigh most in luminance over all pixels; what counts there is how evenly the points of one pixel lie over the pixel, and over wavelengths. The "
+            "kernels. The scalar variant, a path at a time, is in the table above. *Noise*: the lamp and "
+            "its "
+            "edges, seen directly and a hundred times brighter than "
+            "the walls, weigh most in luminance over all pixels; what counts there is how evenly the points "
+            "of one pixel lie over the pixel, and over wavelengths. The "
             "rows without the lamp, and for X, Y and Z, show how much of it that is."
         )

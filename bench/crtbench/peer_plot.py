@@ -48,11 +48,13 @@ def draw(curves, target, title, x_title):
     for tick in ticks(*chart.y_range, MANTISSAS):
         chart.y_tick(tick, f"{100 * tick:g} %")
     chart.draw(
-        f'<rect class="frame" x="{chart.left}" y="{chart.top}" width="{chart.right - chart.left}" height="{chart.bottom - chart.top}"/>'
+        f'<rect class="frame" x="{chart.left}" y="{chart.top}" width="{chart.right - chart.left}" '
+        f'height="{chart.bottom - chart.top}"/>'
     )
     draw_guide(chart)
     chart.draw(
-        f'<line class="frame" x1="{chart.left}" x2="{chart.right}" y1="{chart.y(target):.1f}" y2="{chart.y(target):.1f}" stroke-width="1.5"/>'
+        f'<line class="frame" x1="{chart.left}" x2="{chart.right}" y1="{chart.y(target):.1f}" '
+        f'y2="{chart.y(target):.1f}" stroke-width="1.5"/>'
     )
     heights = spread([chart.y(points[-1][1]) for _, points in curves], LABEL_GAP)
     for (contestant, points), height in zip(curves, heights):
@@ -61,12 +63,14 @@ def draw(curves, target, title, x_title):
         chart.curve(kind, points, 1.3 if thin else 2.4, 2.2 if thin else 3.4, dashed=contestant.roulette)
         x, y = chart.x(points[-1][0]), chart.y(points[-1][1])
         chart.draw(
-            f'<line class="l{list(COLOURS).index(kind)}" stroke-width="0.6" opacity="0.6" x1="{x + 5:.1f}" y1="{y:.1f}" x2="{chart.right + 6}" y2="{height:.1f}"/>'
+            f'<line class="l{list(COLOURS).index(kind)}" stroke-width="0.6" opacity="0.6" x1="{x + 5:.1f}" '
+            f'y1="{y:.1f}" x2="{chart.right + 6}" y2="{height:.1f}"/>'
         )
         chart.label(kind, chart.right + 10, height + 4, contestant.name, 12)
     chart.x_title(x_title)
     chart.draw(
-        f'<text class="soft" transform="translate(18 {(chart.top + chart.bottom) / 2}) rotate(-90)" text-anchor="middle">relative RMSE of luminance</text>'
+        f'<text class="soft" transform="translate(18 {(chart.top + chart.bottom) / 2}) rotate(-90)" '
+        f'text-anchor="middle">relative RMSE of luminance</text>'
     )
     return chart.svg(title)
 
@@ -78,6 +82,9 @@ def draw_guide(chart):
     upper = y_low * (y_high / y_low) ** 0.4
     lower = upper * (begin / end) ** 0.5
     chart.draw(
-        f'<line class="guide" x1="{chart.x(begin):.1f}" y1="{chart.y(upper):.1f}" x2="{chart.x(end):.1f}" y2="{chart.y(lower):.1f}"/>'
-        f'<text class="soft" x="{chart.x(begin):.1f}" y="{chart.y(lower) + 16:.1f}" font-size="12">slope −½: independent samples</text>'
+        f'<line class="guide" x1="{chart.x(begin):.1f}" y1="{chart.y(upper):.1f}" x2="{chart.x(end):.1f}" '
+        f'y2="{chart.y(lower):.1f}"/>'
+        f'<text class="soft" x="{chart.x(begin):.1f}" y="{chart.y(lower) + 16:.1f}" font-size="12">slope '
+        f'−½: '
+        f'independent samples</text>'
     )

@@ -17,13 +17,15 @@ GRID_NM = np.arange(
 
 
 def table(spectra, name):
-    """A spectrum as {nm, value}, or a number. What lies outside its table is clamped, and written out, since other renderers take zero there."""
+    """A spectrum as {nm, value}, or a number. What lies outside its table is clamped, and written out,
+    since other renderers take zero there."""
     given = spectra.get(name, name) if isinstance(name, str) else name
     if isinstance(given, (int, float)):
         return float(given)
     if set(given) - {"table", "outside"} or given.get("outside") != "clamp":
         raise Failure(
-            f"the spectrum '{name}' is not a table that is clamped outside, and nothing else is translated for other renderers"
+            f"the spectrum '{name}' is not a table that is clamped outside, and nothing else is translated "
+            f"for other renderers"
         )
     nm, value = (np.array(given["table"][key], dtype=np.float64) for key in ("nm", "value"))
     if not np.isin(nm, GRID_NM).all():
@@ -72,7 +74,8 @@ def describe(file, folder, size, max_depth):
         material = scene["materials"][thing["material"]]
         if material["type"] != "diffuse" or set(thing) - {"name", "mesh", "material", "emission"}:
             raise Failure(
-                f"the object '{thing['name']}' is more than a diffuse mesh, and nothing else is translated for other renderers"
+                f"the object '{thing['name']}' is more than a diffuse mesh, and nothing else is translated "
+                f"for other renderers"
             )
         part = parts.setdefault(
             thing["material"], {"corners": [], "reflectance": table(spectra, material["reflectance"])}

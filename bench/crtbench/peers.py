@@ -78,13 +78,16 @@ def measure_round(lines, spp, replicates, seed_base, reference, pool_of):
         line.spent += data["elapsed"]
         p = line.points[-1]
         print(
-            f"{line.name:42} {p['spp']:5} spp  {100 * p['error']:6.2f} %  spread {100 * p['spread']:6.2f} %  {p['cpu_seconds']:7.3f} cpu s  {p['render_seconds']:7.3f} s  others {p['others']:.0%}",
+            f"{line.name:42} {p['spp']:5} spp  {100 * p['error']:6.2f} %  spread {100 * p['spread']:6.2f} % "
+            f" "
+            f"{p['cpu_seconds']:7.3f} cpu s  {p['render_seconds']:7.3f} s  others {p['others']:.0%}",
             flush=True,
         )
 
 
 def tournament(worker, unit, samplers, spp, replicates, reference):
-    """Samplers of Mitsuba: {sampler: error² × CPU seconds, …}, least is best. With roulette, the cheaper way."""
+    """Samplers of Mitsuba: {sampler: error² × CPU seconds, …}, least is best. With roulette, the
+    cheaper way."""
     scores = {}
     for sampler in samplers:
         contestant = Mitsuba(worker, sampler, True, unit)
@@ -100,7 +103,9 @@ def tournament(worker, unit, samplers, spp, replicates, reference):
             "error2_seconds": error**2 * cpu,
         }
         print(
-            f"{contestant.name:42} {costs[0].spp:5} spp  {100 * error:6.2f} %  spread {100 * spread:6.2f} %  {cpu:7.3f} cpu s  error² × s {error**2 * cpu:.3g}",
+            f"{contestant.name:42} {costs[0].spp:5} spp  {100 * error:6.2f} %  spread {100 * spread:6.2f} % "
+            f" "
+            f"{cpu:7.3f} cpu s  error² × s {error**2 * cpu:.3g}",
             flush=True,
         )
     return scores
@@ -137,7 +142,8 @@ def run(program, arguments, results, scene, setup, crt_backends, workers, begin)
     ][1][1]
     reference = Reference(Crt(program, "embree", 1, False, setup), REFERENCE_SAMPLES)
     print(
-        f"reference of {reference.samples} samples: {100 * reference.error:.2f} % itself, which is taken off",
+        f"reference of {reference.samples} samples: {100 * reference.error:.2f} % itself, which is taken "
+        f"off",
         flush=True,
     )
     scores = tournament(llvm, unit, arguments.samplers, 64 if arguments.tiny else 256, 3, reference)

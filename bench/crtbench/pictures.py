@@ -11,6 +11,7 @@ def measure(program, arguments):
             scene, backend, ["--spp", 4] if arguments.tiny else [], [folder / f"{scene}.png"], settings
         )
         print(
-            f"{folder / scene}.png  {run.value('samples', 'per_pixel')} samples, {run.value('seconds', 'render'):.1f} s with {backend}",
+            f"{folder / scene}.png  {run.value('samples', 'per_pixel')} samples, "
+            f"{run.value('seconds', 'render'):.1f} s with {backend}",
             flush=True,
         )

@@ -177,7 +177,9 @@ def measure(program, arguments):
     worst = max(c["seconds"] for d in data for c in [*d["found"], d["verify"]])
     results.paragraph(__doc__.replace("\n", " "))
     results.paragraph(
-        f"**{len(FAULTS) - failures} of {len(FAULTS)} faults are found by both commands, for all {len(SEEDS)} seeds of `compare`, and nothing is found where there is none. The slowest of all took "
+        f"**{len(FAULTS) - failures} of {len(FAULTS)} faults are found by both commands, for all "
+        f"{len(SEEDS)} seeds of `compare`, and nothing is found where there is none. The slowest of all "
+        f"took "
         f"{worst:.1f} s; {LIMIT_SECONDS} s are allowed.**"
     )
     results.table(
@@ -196,12 +198,15 @@ def measure(program, arguments):
     results.paragraph(
         "Where each fault matters: "
         + "; ".join(f"*{f.what}*: `{f.scene}`, {f.why}" for f in FAULTS)
-        + f". `compare` has 16 renders by each backend; the interval is 99.9 % confident. `compare` ran with seeds {', '.join(map(str, SEEDS))}; words are those of the first, seconds "
+        + f". `compare` has 16 renders by each backend; the interval is 99.9 % confident. `compare` ran "
+          f"with "
+          f"seeds {', '.join(map(str, SEEDS))}; words are those of the first, seconds "
         "the median. The faults are patches in `tests/mutations/`."
     )
     for fault in FAULTS:
         results.command(
-            f"CRT_KERNEL_DIR=FAULTY crt compare --backends opencl,embree configs/{fault.scene}.yaml --delta {fault.delta} --spp {fault.samples} "
+            f"CRT_KERNEL_DIR=FAULTY crt compare --backends opencl,embree configs/{fault.scene}.yaml --delta "
+            f"{fault.delta} --spp {fault.samples} "
             + " ".join(f"--set '{s}'" for s in fault.settings)
         )
         results.command(f"CRT_KERNEL_DIR=FAULTY crt verify --backend opencl --case {fault.case}")

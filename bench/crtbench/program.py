@@ -143,7 +143,8 @@ class Program:
         )
         if done.returncode not in codes:
             raise Failure(
-                f"{self.plain(' '.join(command))} ended with code {done.returncode}: {done.stderr.strip()[-1500:]}"
+                f"{self.plain(' '.join(command))} ended with code {done.returncode}: "
+                f"{done.stderr.strip()[-1500:]}"
             )
         return Run(done.returncode, seconds, done.stdout, others)
 
@@ -178,9 +179,9 @@ class Program:
         return result
 
     def interleaved(self, cases, runs, attempts=6):
-        """{name: function → Run} → {name: [Run]}: first all once, untimed, to warm caches; then all in turn, `runs` times. A run during which
-        other processes used the processor is repeated; when that does not help, the measurement is given up.
-        """
+        """{name: function → Run} → {name: [Run]}: first all once, untimed, to warm caches; then all in
+        turn, `runs` times. A run during which other processes used the processor is repeated; when that
+        does not help, the measurement is given up. """
         for case in cases.values():
             case()
         self.await_compilers()
@@ -195,7 +196,8 @@ class Program:
                     self.disturbed += 1
                     if attempt + 1 == attempts:
                         raise Failure(
-                            f"other processes take {run.others:.0%} of the processor: no timing of '{name}' means anything now"
+                            f"other processes take {run.others:.0%} of the processor: no timing of '{name}' "
+                            f"means anything now"
                         )
                     time.sleep(2 * attempt)
                 kept[name].append(run)
@@ -248,7 +250,8 @@ class Program:
         # CRT_KERNEL_DIR wants features.h itself untouched.
         more = (
             f'#include "features.h"\n#undef CRT_HAS\n#if {asked}\n'
-            f"#define CRT_HAS(name) ((((CRT_FEATURES) | {extra:#x}u) & (unsigned)CRT_FEATURE_##name) != 0u)\n"
+            f"#define CRT_HAS(name) ((((CRT_FEATURES) | {extra:#x}u) & (unsigned)CRT_FEATURE_##name) != "
+            f"0u)\n"
             "#else\n#define CRT_HAS(name) (0)\n#endif\n"
         )
         changed = 0

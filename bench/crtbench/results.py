@@ -86,8 +86,10 @@ class Results:
             rows.append(
                 (
                     "Disturbance",
-                    f"load {self.load:.1f} at the start; {facts['timed_runs']} timed runs, {facts['repeated_because_disturbed']} of "
-                    f"them repeated because other processes took over {self.program.busy_share:.0%} of the processor",
+                    f"load {self.load:.1f} at the start; {facts['timed_runs']} timed runs, "
+                    f"{facts['repeated_because_disturbed']} of "
+                    f"them repeated because other processes took over {self.program.busy_share:.0%} of the "
+                    f"processor",
                 )
             )
         self.table(("", ""), rows)

@@ -30,7 +30,8 @@ def measure(program, arguments):
 
     results.heading("Time")
     results.paragraph(
-        f"OpenCL, {size} × {size} pixels, {', '.join(f'{s} {n}' for s, n in SCENES.items())} samples per pixel, the tree of both scenes the same. Render seconds, median of {runs} interleaved "
+        f"OpenCL, {size} × {size} pixels, {', '.join(f'{s} {n}' for s, n in SCENES.items())} samples per "
+        f"pixel, the tree of both scenes the same. Render seconds, median of {runs} interleaved "
         "runs, in brackets the least and the most; ratios are taken run by run."
     )
     rows = []
@@ -65,8 +66,10 @@ def measure(program, arguments):
 
     results.heading("What each gets wrong")
     results.paragraph(
-        "Rays of the sweeps of [stability-misses](stability-misses.md), [stability-offset-safety](stability-offset-safety.md) and [stability-offset-tightness]"
-        "(stability-offset-tightness.md): how many slip through a closed mesh, meet the triangle that they leave, or step over a layer."
+        "Rays of the sweeps of [stability-misses](stability-misses.md), "
+        "[stability-offset-safety](stability-offset-safety.md) and [stability-offset-tightness]"
+        "(stability-offset-tightness.md): how many slip through a closed mesh, meet the triangle that they "
+        "leave, or step over a layer."
     )
     for sweep, rays in (("misses", 2e4), ("offset-safety", 4e4), ("offset-tightness", 4e3)):
         points = {
@@ -76,7 +79,8 @@ def measure(program, arguments):
         data["wrong"][sweep] = points
         stability.TABLES[sweep](results, {ALTERNATIVES.get(name, name): p for name, p in points.items()})
     results.command(
-        "CRT_KERNEL_DIR=SCRATCH/moeller_trumbore/core/kernel crt render configs/cornell_dragon.yaml --backend opencl --spp 8 -o unseen.pfm"
+        "CRT_KERNEL_DIR=SCRATCH/moeller_trumbore/core/kernel crt render configs/cornell_dragon.yaml "
+        "--backend opencl --spp 8 -o unseen.pfm"
     )
     results.data = data
     results.write()

@@ -350,12 +350,23 @@ def measure(program, arguments):
     comparisons = sum(len(column) for column in data.values())
     equal = sum(r["differing_pixels"] == 0 for column in data.values() for r in column.values())
     results.paragraph(
-        f"Every scene at {size} × {size} pixels, rendered in every way there is here, and the images compared bit by "
-        f"bit in all their channels, AOVs included. **{equal} of {comparisons} comparisons: the same bits in every pixel.** A cell is the number "
-        f"of pixels, of {size * size}, in which any bit of any channel differs; in brackets, where there are any, the pixels of the film in which any bit differs, and "
-        "the largest difference over the sum. The film holds each sum as a pair of doubles, which is rounded once, for the image: added up in another order, a sum may be "
-        "split elsewhere ('same sums') or differ in its last words (docs/decisions/0002-film-sums.md), and no image shows either. There, in what was merged or resumed, more "
-        f"than 2^{math.log2(FILM_BOUND):.0f} of the sum is a failure; in all other rows any bit of the film is, and everywhere a pixel's count of samples or its primitive. `a : b` compares two backends; the other "
+        f"Every scene at {size} × {size} pixels, rendered in every way there is here, and the images "
+        f"compared bit by "
+        f"bit in all their channels, AOVs included. **{equal} of {comparisons} comparisons: the same bits "
+        f"in "
+        f"every pixel.** A cell is the number "
+        f"of pixels, of {size * size}, in which any bit of any channel differs; in brackets, where there "
+        f"are "
+        f"any, the pixels of the film in which any bit differs, and "
+        "the largest difference over the sum. The film holds each sum as a pair of doubles, which is "
+        "rounded "
+        "once, for the image: added up in another order, a sum may be "
+        "split elsewhere ('same sums') or differ in its last words (docs/decisions/0002-film-sums.md), and "
+        "no image shows either. There, in what was merged or resumed, more "
+        f"than 2^{math.log2(FILM_BOUND):.0f} of the sum is a failure; in all other rows any bit of the film "
+        f"is, and everywhere a pixel's count of samples or its primitive. `a : b` compares two backends; "
+        f"the "
+        f"other "
         "rows compare one backend with itself."
     )
     rows = []
@@ -386,13 +397,15 @@ def measure(program, arguments):
         f"Stopped by SIGINT after so many of {fewer} samples per pixel, then resumed: {stopped}."
     )
     results.paragraph(
-        "`example` is the kernel as portable C++, `cuda_on_host` the CUDA backend's entry points compiled for the host; both run "
+        "`example` is the kernel as portable C++, `cuda_on_host` the CUDA backend's entry points compiled "
+        "for the host; both run "
         "on one thread."
     )
     for name, reason in absent.items():
         results.paragraph(f"Not compared: `{name}` ({reason}).")
     results.command(
-        f"crt render configs/SCENE.yaml --set 'film.resolution=[{size},{size}]' --spp {spp} --backend BACKEND -o a.exr -o a.crtfilm"
+        f"crt render configs/SCENE.yaml --set 'film.resolution=[{size},{size}]' --spp {spp} --backend "
+        f"BACKEND -o a.exr -o a.crtfilm"
     )
     results.command("crt compare --all-channels --json a.exr b.exr")
     results.data = {"size": size, "reference": REFERENCE, "absent": absent, "scenes": data}

@@ -1,5 +1,5 @@
-"""A scene of crt as one map: what it includes merged in, named data that are files as tables. The rules are those of
-docs/scene.md, "Shared parts" and "Named data"."""
+"""A scene of crt as one map: what it includes merged in, named data that are files as tables. The rules are
+those of docs/scene.md, "Shared parts" and "Named data"."""
 
 import csv
 import pathlib
@@ -10,7 +10,8 @@ from .program import Failure
 
 
 def merged(below, above):
-    """Sections, spectra and materials key by key, objects one after the other, everything else that of `above`."""
+    """Sections, spectra and materials key by key, objects one after the other, everything else that of
+    `above`."""
     scene = {**below, **above}
     for key in below.keys() & above.keys():
         if isinstance(below[key], dict) and isinstance(above[key], dict):

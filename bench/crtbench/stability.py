@@ -152,7 +152,8 @@ def by_point(results, points, keys, heads, cell):
 
 def misses(results, points):
     results.paragraph(
-        "A crumpled sheet covers the whole film, a vertex or an edge on every pixel's first ray: by continuity no ray can pass it. Failures are rays that do. "
+        "A crumpled sheet covers the whole film, a vertex or an edge on every pixel's first ray: by "
+        "continuity no ray can pass it. Failures are rays that do. "
         "Faces are aimed at by further, random samples of the same pixels."
     )
     by_point(results, points, ("place", "aim"), ("place", "rays at"), count)
@@ -160,7 +161,8 @@ def misses(results, points):
 
 def offset_safety(results, points):
     results.paragraph(
-        "One triangle in a random place and pose, of random shape, in a scene that is 1 to 10⁶ times as large, so that its coordinates become coarse; rays scatter off it "
+        "One triangle in a random place and pose, of random shape, in a scene that is 1 to 10⁶ times as "
+        "large, so that its coordinates become coarse; rays scatter off it "
         "by the cosine. Failures meet the triangle that they have just left. Lengths in the author's units."
     )
     by_point(results, points, ("size", "extent"), ("triangle's size", "scene's half extent : size"), count)
@@ -171,8 +173,11 @@ def offset_safety(results, points):
 
 def offset_tightness(results, points):
     results.paragraph(
-        "Two parallel squares of edge 1 and 2 in a random place and pose, `gap` apart, in a scene whose half extent is 1 (1.5 for the first rows) to 10⁴; rays pass through the first, "
-        "whose index is 1. Failures do not meet the second. The last gap with hardly any failure is the limit that the manual gives."
+        "Two parallel squares of edge 1 and 2 in a random place and pose, `gap` apart, in a scene whose "
+        "half "
+        "extent is 1 (1.5 for the first rows) to 10⁴; rays pass through the first, "
+        "whose index is 1. Failures do not meet the second. The last gap with hardly any failure is the "
+        "limit that the manual gives."
     )
     by_point(results, points, ("extent", "gap"), ("scene's half extent : size", "gap : size"), count)
 
@@ -186,8 +191,10 @@ def relation(point):
 
 def far(results, points):
     results.paragraph(
-        "A lit room moved along (1, 0.7, −0.3) by many times its size: once with vertices that the sum in double holds exactly, once a third of it, which rounds. "
-        "Against the same room at the origin, with the same random numbers: pixels that differ in any bit, and the relative difference of the mean."
+        "A lit room moved along (1, 0.7, −0.3) by many times its size: once with vertices that the sum in "
+        "double holds exactly, once a third of it, which rounds. "
+        "Against the same room at the origin, with the same random numbers: pixels that differ in any bit, "
+        "and the relative difference of the mean."
     )
     for same in points.values():
         for p in same:
@@ -197,7 +204,8 @@ def far(results, points):
 
 def scale(results, points):
     results.paragraph(
-        "A lit room times 2^m and 10^m, against itself: pixels that differ in any bit, and the relative difference of the mean, with the same random numbers."
+        "A lit room times 2^m and 10^m, against itself: pixels that differ in any bit, and the relative "
+        "difference of the mean, with the same random numbers."
     )
     for same in points.values():
         for p in same:
@@ -207,7 +215,8 @@ def scale(results, points):
 
 def fov(results, points):
     results.paragraph(
-        "Stripes two pixels wide exactly where the film's columns are, 128 × 128 pixels, the view along (1, 1, 1). Failures are rays that see the stripe of another column: what the rounding "
+        "Stripes two pixels wide exactly where the film's columns are, 128 × 128 pixels, the view along (1, "
+        "1, 1). Failures are rays that see the stripe of another column: what the rounding "
         "of directions to float costs, in rays."
     )
     by_point(results, points, ("degrees",), ("field of view, degrees",), count)
@@ -215,7 +224,8 @@ def fov(results, points):
 
 def solid_angle(results, points):
     results.paragraph(
-        "A square light at height 1 over a floor, from 2 rad across to nothing: the irradiance below its centre against the closed form (Howell, B-4). Relative error, and its standard error "
+        "A square light at height 1 over a floor, from 2 rad across to nothing: the irradiance below its "
+        "centre against the closed form (Howell, B-4). Relative error, and its standard error "
         "from 16 seeds."
     )
     by_point(

@@ -91,16 +91,21 @@ def measure(program, arguments):
             )
     results.heading("Libraries")
     results.paragraph(
-        "Shared objects in `/proc/PID/maps` of a small render, looked at every millisecond until it ends. Image codecs are opened when an image "
-        "needs them, and of the backends only the one that was asked for; OpenImageIO brings libOpenCL along."
+        "Shared objects in `/proc/PID/maps` of a small render, looked at every millisecond until it ends. "
+        "Image codecs are opened when an image "
+        "needs them, and of the backends only the one that was asked for; OpenImageIO brings libOpenCL "
+        "along."
     )
     results.table(["backend", "output", "shared objects", "OpenImageIO", "Embree", "OpenCL"], rows)
 
     # OpenCL kernels.
     results.heading("OpenCL kernels")
     results.paragraph(
-        "A render of 64 × 64 pixels with 1 sample. Cold: neither crt's cache nor PoCL's has anything. Cached by crt: PoCL's cache is empty. Cached: "
-        f"both are as the run before left them. Median of {kernel_runs} interleaved runs, in brackets the least and the most."
+        "A render of 64 × 64 pixels with 1 sample. Cold: neither crt's cache nor PoCL's has anything. "
+        "Cached "
+        "by crt: PoCL's cache is empty. Cached: "
+        f"both are as the run before left them. Median of {kernel_runs} interleaved runs, in brackets the "
+        f"least and the most."
     )
     rows, kernels = [], {}
     for scene in (
@@ -174,7 +179,8 @@ def measure(program, arguments):
                 ]
             )
         results.paragraph(
-            f"{compiler}: each variant compiled from the text to a CUBIN, nothing cached. Needs no GPU. Median of {len(kept)} runs, in brackets the "
+            f"{compiler}: each variant compiled from the text to a CUBIN, nothing cached. Needs no GPU. "
+            f"Median of {len(kept)} runs, in brackets the "
             "least and the most."
         )
         results.table(
@@ -182,7 +188,8 @@ def measure(program, arguments):
         )
     results.not_measured(absent)
     results.command(
-        "crt render configs/SCENE.yaml --backend opencl --set 'film.resolution=[64,64]' --spp 1 -o unseen.pfm   # CRT_CACHE_DIR, POCL_CACHE_DIR fresh"
+        "crt render configs/SCENE.yaml --backend opencl --set 'film.resolution=[64,64]' --spp 1 -o "
+        "unseen.pfm   # CRT_CACHE_DIR, POCL_CACHE_DIR fresh"
     )
     results.command("nvrtc_variants configs/*.yaml")
     results.data = {

@@ -152,8 +152,7 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
     if (bitsVersionOf(*table) != CRT_BITS_VERSION) {
         refuse(fmt::format(
             "backend '{}' ({}) renders bits version {} ({}), and this crt has bits version {} ({}): its "
-            "samples would be "
-            "others; rebuild the plugin",
+            "samples would be others; rebuild the plugin",
             name, path, bitsVersionOf(*table), orUnknown(table->build), CRT_BITS_VERSION, kHostBuild));
     }
     // Not a number is no reach either.

@@ -224,8 +224,8 @@ constexpr const char* kNotes =
             "  crt develop scene.crtfilm -o b.png --set film.white_balance=D50\n"
             "  crt develop scene.crtfilm -o c.exr -o c.png --crop 100,50,300,250\n"
             "  crt develop scene.crtfilm -o d.exr --aovs albedo,normal,error,samples\n"
-            "  crt develop a.crtfilm b.crtfilm -o both.exr                           two halves of the "
-            "samples\n";
+            "  crt develop a.crtfilm b.crtfilm -o both.exr                           "
+            "two halves of the samples\n";
 
 }  // namespace
 

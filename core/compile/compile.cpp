@@ -80,8 +80,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.lights = blob.append(lights.lights);
     if (lights.lights.empty() && !scene.environment && scene.integrator.type == IntegratorType::Path)
         logWarning(
-            "the scene has no light: the image will be black (add emission to an object, or an "
-            "environment)");
+            "the scene has no light: the image will be black "
+            "(add emission to an object, or an environment)");
     const Spectrum* environment = spectrumOfEnvironment(scene);
     header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
 

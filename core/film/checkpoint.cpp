@@ -319,8 +319,7 @@ void requireSameScene(const std::string& path, const FilmIdentity& found, const 
     // Before the hash, which covers the version too and could not say what differs.
     if (found.bits_version != expected.bits_version)
         refuse(path, fmt::format("holds samples of bits version {}, rendered by crt {}, and version {} is "
-                                 "expected: samples of two "
-                                 "versions do not make one image; render it anew",
+                                 "expected: samples of two versions do not make one image; render it anew",
                                  found.bits_version, found.version, expected.bits_version));
     if (found.scene_hash != expected.scene_hash)
         refuse(path, fmt::format("is of another scene, seed or film: {}", differenceText(found, expected)));
@@ -365,8 +364,7 @@ void mergeFilm(std::pair<Film, FilmIdentity>& merged, const std::string& merged_
         throw Error(
             ErrorKind::Usage,
             fmt::format("'{}' and '{}' hold samples of bits versions {} and {}, which do not make one "
-                        "image: render one of "
-                        "them anew",
+                        "image: render one of them anew",
                         merged_name, name, sum_identity.bits_version, identity.bits_version),
             {name});
     if (identity.scene_hash != sum_identity.scene_hash)

@@ -113,8 +113,7 @@ Film::Film(FilmShape shape) : shape_(shape) {
     if (bytes > kWorthAsking && bytes > availableHostMemory())
         throw Error(ErrorKind::Device,
                     fmt::format("a film of {} × {} pixels with {} channels takes {:.1f} GB of memory, and "
-                                "{:.1f} GB are free; make it smaller, or "
-                                "render parts of it with --crop",
+                                "{:.1f} GB are free; make it smaller, or render parts of it with --crop",
                                 shape.width, shape.height, shape.channels, static_cast<double>(bytes) / 1e9,
                                 static_cast<double>(availableHostMemory()) / 1e9));
     sums.assign(pixels * shape.channels * 2, 0.0);
@@ -125,8 +124,8 @@ Film::Film(FilmShape shape) : shape_(shape) {
 void Film::add(const Film& other) {
     if (!(shape_ == other.shape_))
         throw Error(ErrorKind::Usage, fmt::format("films differ in shape: {}×{} with {} channels and AOV "
-                                                  "mask {:#x}, and {}×{} with {} channels and "
-                                                  "AOV mask {:#x}",
+                                                  "mask {:#x}, and {}×{} with {} "
+                                                  "channels and AOV mask {:#x}",
                                                   shape_.width, shape_.height, shape_.channels, shape_.aovs,
                                                   other.shape_.width, other.shape_.height,
                                                   other.shape_.channels, other.shape_.aovs));

@@ -401,8 +401,8 @@ std::optional<Matrix3d> toLinearSrgb(const Image& image) {
     for (const ColorSpace space : {ColorSpace::AcesCg, ColorSpace::Xyz})
         if (is(space)) return multiply(xyzToRgb(ColorSpace::LinearSrgb), inverse(xyzToRgb(space)));
     throw Error(ErrorKind::Output,
-                "the image's primaries are neither those of sRGB, of ACEScg nor of XYZ, so it cannot become "
-                "8-bit sRGB");
+                "the image's primaries are neither those of sRGB, of "
+                "ACEScg nor of XYZ, so it cannot become 8-bit sRGB");
 }
 
 EncodedImage encodeSrgb8(const Image& image) {

@@ -153,8 +153,7 @@ void warnOfIdleLamps(const Scene& scene) {
     for (const std::string& lamp : idleLamps(scene))
         logWarning(
             "{} lights nothing: it emits on one side only, and neither a surface nor the camera is on that "
-            "side; reverse the order "
-            "of its vertices, or say 'two_sided: true'",
+            "side; reverse the order of its vertices, or say 'two_sided: true'",
             lamp);
 }
 

@@ -84,8 +84,8 @@ void FilmGuard::requireRoom(std::uint64_t samples) const {
         if (place.wanted && place.samples > samples)
             throw Error(ErrorKind::Usage,
                         fmt::format("'{}' holds {} samples per pixel and would be replaced by {}: add "
-                                    "--resume to go on from it, or "
-                                    "--overwrite to lose it, or choose another name",
+                                    "--resume to go on from it, or --overwrite "
+                                    "to lose it, or choose another name",
                                     path, place.samples, samples),
                         {path});
 }

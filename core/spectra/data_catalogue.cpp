@@ -183,8 +183,8 @@ NamedData readData(const std::string& name, const std::string& file) {
     if (row.outside != "clamp" && row.outside != "zero")
         throw Error(
             ErrorKind::Scene,
-            fmt::format("the data file '{}' has no line '# outside: clamp' or '# outside: zero' at its "
-                        "beginning",
+            fmt::format("the data file '{}' has no line '# outside: clamp' "
+                        "or '# outside: zero' at its beginning",
                         file),
             {file});
     SpectrumTable table = readSpectrumTable(file);

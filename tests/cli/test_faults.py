@@ -409,7 +409,10 @@ class Radiance(CliTest):
         if backend is None:
             self.skipTest("no backend can render light here")
         glass = "materials:\n  glass: {type: dielectric, ior: 1.5}\n"
-        pane = "  - name: pane\n    mesh: {positions: [[-1, 1, -1], [-1, 1, 1], [1, 1.2, 1], [1, 1.2, -1]], faces: [[0, 1, 2, 3]]}\n    material: glass\n"
+        pane = (
+            "  - name: pane\n    mesh: {positions: [[-1, 1, -1], [-1, 1, 1], [1, 1.2, 1], [1, 1.2, -1]], "
+            "faces: [[0, 1, 2, 3]]}\n    material: glass\n"
+        )
         lamp = "emission: {radiance: {blackbody: 4000, scale: 5}}"
         self.assertIn(lamp, test_cli.SCENE)
         images = {}

@@ -111,7 +111,8 @@ def case(*arguments, **options):
     CASES.append(Case(*arguments, **options))
 
 
-# ------------------------------------------------------------------------------------------------------------------- scenes
+# -----------------------------------------------------------------------------------------------------------
+# scenes
 
 def scene_cases():
     def scene(asked, text, codes=3, words=(), files=None, arguments=("info", "scene.yaml"), **options):
@@ -137,7 +138,8 @@ def scene_cases():
         scene(
             asked,
             HEAD
-            + f"materials: {{m: {{type: diffuse, reflectance: {text}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n",
+            + f"materials: {{m: {{type: diffuse, reflectance: {text}}}}}\nobjects: [{{{TRIANGLE}, material: "
+              f"m}}]\n",
             codes,
             words,
             **options,
@@ -398,7 +400,8 @@ def scene_cases():
         "40,000 lamps on one spot",
         HEAD
         + MATERIALS
-        + "objects: [{material: m, emission: {radiance: 1}, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: ["
+        + "objects: [{material: m, emission: {radiance: 1}, mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], "
+          "faces: ["
         + ",".join(["[0,1,2]"] * 40000)
         + "]}}]\n",
         0,
@@ -449,7 +452,8 @@ def endless_files(folder):
     os.close(here)
 
 
-# ------------------------------------------------------------------------------------------------------------------- meshes
+# -----------------------------------------------------------------------------------------------------------
+# meshes
 
 def mesh_cases():
     def mesh(asked, text, codes=3, words=(), files=None, material="m", **options):
@@ -502,7 +506,8 @@ def mesh_cases():
     mesh(
         "a star of 40,000 corners",
         "".join(
-            f"v {(1 if i % 2 else .5) * ((i / 20000) if i < 20000 else 2 - i / 20000):.6f} {i % 2} {(i * 7919 % 40000) / 4e7:.7f}\n"
+            f"v {(1 if i % 2 else .5) * ((i / 20000) if i < 20000 else 2 - i / 20000):.6f} {i % 2} "
+            f"{(i * 7919 % 40000) / 4e7:.7f}\n"
             for i in range(40000)
         )
         + "f "
@@ -597,7 +602,8 @@ def spectrum_cases():
             folder.write(
                 "scene.yaml",
                 HEAD
-                + f"materials: {{m: {{type: diffuse, reflectance: {{file: s.spd, outside: clamp}}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n",
+                + f"materials: {{m: {{type: diffuse, reflectance: {{file: s.spd, outside: "
+                  f"clamp}}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n",
             )
             folder.write("s.spd", text)
         case(
@@ -614,12 +620,13 @@ def spectrum_cases():
             folder.write(
                 "scene.yaml",
                 HEAD
-                + f"materials: {{m: {{type: diffuse, reflectance: {{file: '{name}', outside: clamp}}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n",
+                + f"materials: {{m: {{type: diffuse, reflectance: {{file: '{name}', outside: "
+                  f"clamp}}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n",
             )
         case("spectrum", f"{name} in place of a spectrum", ["info", "scene.yaml"], 3, (), prepare)
 
 
-# ---------------------------------------------------------------------------------------------------------
+# -----------------------------------------------------------------------------------------------------------
 # films and images
 
 def png(width, height, rows=None):
@@ -1068,7 +1075,8 @@ def environment_cases():
         case("plugins", f"the plugin '{name}'", ["scene.yaml", "-b", name, "-o", "a.pfm"], 4, (), good)
 
 
-# ------------------------------------------------------------------------------------------------------------------- faults
+# -----------------------------------------------------------------------------------------------------------
+# faults
 
 def loaded_bytes(path):
     """Of an ELF library: what lies behind it in the file, symbols for debuggers say, is not needed to run
@@ -1316,7 +1324,8 @@ def fault_cases(samples):
         folder.write(
             "scene.yaml",
             HEAD
-            + "materials: {m: {type: diffuse, reflectance: {file: s.spd, outside: clamp}}}\nobjects: [{obj: mesh.obj, material: m}, {obj: own.obj}]\n",
+            + "materials: {m: {type: diffuse, reflectance: {file: s.spd, outside: clamp}}}\nobjects: [{obj: "
+              "mesh.obj, material: m}, {obj: own.obj}]\n",
         )
         folder.write("mesh.obj", OBJ)
         folder.write("own.obj", "mtllib own.mtl\nusemtl a\n" + OBJ)
@@ -1476,7 +1485,8 @@ def large_film(samples):
     return samples["large"]
 
 
-# -------------------------------------------------------------------------------------------------------------------- running
+# -----------------------------------------------------------------------------------------------------------
+# running
 
 def descriptor_for(place, read_side):
     """What a standard stream is opened on; None is closed."""
@@ -1703,9 +1713,11 @@ def markdown(results):
     lines = [
         "# Hostile inputs and faults",
         "",
-        "Written by `tests/cli/test_hostile.py --write`, which makes every input, runs crt on it, and is part of `scripts/test`.",
+        "Written by `tests/cli/test_hostile.py --write`, which makes every input, runs crt on it, and is "
+        "part of `scripts/test`.",
         "",
-        f"{len(results) - faults} inputs and {faults} faults. Demanded of each: the exit code of the table, no crash, no hang (10 s of processor time), less than 2 GB of memory, every file that was "
+        f"{len(results) - faults} inputs and {faults} faults. Demanded of each: the exit code of the table, "
+        f"no crash, no hang (10 s of processor time), less than 2 GB of memory, every file that was "
         "there unchanged, no temporary file left.",
         "",
     ]
@@ -1761,12 +1773,16 @@ def main():
     for r in failed:
         words = " ".join(w if isinstance(w, str) else repr(w) for w in r["case"].arguments)
         print(
-            f"FAILED {r['case'].group}: {r['case'].asked}\n  crt {words[:200]}\n  {'; '.join(r['wrong'])}\n  {sentence(r) or r['text'][:300]}"
+            f"FAILED {r['case'].group}: {r['case'].asked}\n  crt {words[:200]}\n  {'; '.join(r['wrong'])}\n "
+            f" "
+            f"{sentence(r) or r['text'][:300]}"
         )
     slowest = max(results, key=lambda r: r["processor"])
     largest = max(results, key=lambda r: r["memory"])
     print(
-        f"{len(results)} cases, {len(failed)} failed; slowest {slowest['processor']:.1f} s of processor time ({slowest['case'].asked}), largest {largest['memory'] / 1e6:.0f} MB ({largest['case'].asked})"
+        f"{len(results)} cases, {len(failed)} failed; slowest {slowest['processor']:.1f} s of processor "
+        f"time "
+        f"({slowest['case'].asked}), largest {largest['memory'] / 1e6:.0f} MB ({largest['case'].asked})"
     )
     if options.write and not failed:
         with open(options.write, "w", encoding="utf-8") as file:

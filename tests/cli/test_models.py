@@ -40,7 +40,9 @@ class Meshes(CliTest):
     def test_a_mesh_without_materials_is_refused_with_the_line_to_add(self):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n", keys="", expect=3)
         self.assertIn(
-            "mesh.yaml:5:17: error: 2 of 2 triangles of object 0 have no material (the OBJ names 'lost.mtl', which is not there); "
+            "mesh.yaml:5:17: error: 2 of 2 triangles of object 0 have no material (the OBJ names "
+            "'lost.mtl', "
+            "which is not there); "
             "give them one with 'material: NAME'",
             said,
         )
@@ -50,7 +52,8 @@ class Meshes(CliTest):
     def test_the_same_mesh_renders_with_one(self):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n")
         self.assertIn(
-            "warning: mesh.obj: material 'red' is not defined, and no file 'lost.mtl' is there: 2 of 2 triangles have none of their own",
+            "warning: mesh.obj: material 'red' is not defined, and no file 'lost.mtl' is there: 2 of 2 "
+            "triangles have none of their own",
             said,
         )
 
@@ -60,7 +63,8 @@ class Meshes(CliTest):
         self.assertEqual(
             [line for line in said.splitlines() if "mesh.obj" in line],
             [
-                "crt: warning: mesh.obj: 2 materials: 1 diffuse, 1 glass; d below 1 without Ni above 1 read as opaque "
+                "crt: warning: mesh.obj: 2 materials: 1 diffuse, 1 glass; d below 1 without Ni above 1 read "
+                "as opaque "
                 "(crt has no opacity) (1); dropped: Ks (1)"
             ],
         )

@@ -75,7 +75,8 @@ def main() -> int:
                 result = subprocess.run(command, capture_output=True, text=True, check=False)
                 ok = result.returncode == 0
                 print(
-                    f"dialect_{header.stem}_{language}{' (no features)' if mask else ''}: {'ok' if ok else 'FAILED'}"
+                    f"dialect_{header.stem}_{language}{' (no features)' if mask else ''}: "
+                    f"{'ok' if ok else 'FAILED'}"
                 )
                 if not ok:
                     failed.append(header.name)

@@ -213,8 +213,8 @@ void addReferenceLines(Lines& lines, const ReferenceComparison& r) {
     }
     if (r.errors[0].rmse.spread)
         lines.heading(
-            "  ± is the standard error from the choice of reference: eight times an eighth of it was left "
-            "out.");
+            "  ± is the standard error from the choice of reference: "
+            "eight times an eighth of it was left out.");
 }
 
 Json referenceJson(const ReferenceComparison& r) {

@@ -185,8 +185,8 @@ private:
                 const std::optional<MadeReference> made = renderReference(scenes_[s], request, watch_);
                 if (!made) return;
                 logInfo(
-                    "{}: no reference was given; {} of the {} of --time made one: {} samples per pixel on "
-                    "{}{}",
+                    "{}: no reference was given; {} of the {} of --time "
+                    "made one: {} samples per pixel on {}{}",
                     names_[s], durationText(made->seconds), durationText(request_.seconds), made->samples,
                     backend, made->error ? ", its own " + crt::errorText(*made->error) : "");
             }
@@ -194,9 +194,8 @@ private:
             references_[s]->info.scene = names_[s];
             run_.notes.push_back(
                 fmt::format("{}: no reference was given, so {} % of --time went into one, made with {} and "
-                            "the scene's own light sampling; "
-                            "a bias that they share does not show against it ('crt reference' makes one "
-                            "that shares less)",
+                            "the scene's own light sampling; a bias that they share does not show against "
+                            "it ('crt reference' makes one that shares less)",
                             names_[s], 100 * kReferenceShare / static_cast<double>(missing), backend));
         }
         for (std::size_t s = 0; s < scenes_.size(); ++s) {
@@ -241,8 +240,8 @@ private:
         }
         if (!left_cold_)
             run_.notes.push_back(
-                "start-up takes so long that it was not tried beforehand everywhere: start-up times cannot "
-                "be compared");
+                "start-up takes so long that it was not tried beforehand "
+                "everywhere: start-up times cannot be compared");
         left_cold_ = true;
     }
 
@@ -408,8 +407,7 @@ private:
             if (info.kind == ReferenceKind::Independent && info.samples < 64 * most)
                 run_.notes.push_back(
                     fmt::format("the reference of {} has {} samples, less than 64 times the {} measured: "
-                                "its variance is subtracted, and "
-                                "widens what is said about bias",
+                                "its variance is subtracted, and widens what is said about bias",
                                 info.scene, info.samples, most));
     }
 

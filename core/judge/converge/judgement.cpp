@@ -86,8 +86,7 @@ std::optional<Judgement> faultOf(const ConfigurationFit& fit, const ImageTests& 
         // agree with each other on too little.
         return Judgement{Verdict::Inconclusive,
                          fmt::format("A pixel differs from the reference (p = {:.1e} after Šidák), or its "
-                                     "replicates are too few to be normal. "
-                                     "More samples decide.",
+                                     "replicates are too few to be normal. More samples decide.",
                                      *tests.smallest_pixel_p),
                          {}};
     return std::nullopt;

@@ -358,8 +358,8 @@ std::vector<Case> accumulationCases() {
         row("I10", "residuals", "Noise of two seeds, and of two ranges of samples", "uncorrelated", "–",
             "|r| < 4/√n", Level::Commit, samplers, residuals),
         row("I11", "sobol",
-            "Elementary intervals of Sobol points, also beyond 2^32 and in dimension 4001; prefixes of 3, "
-            "100 and 1000",
+            "Elementary intervals of Sobol points, also beyond 2^32 "
+            "and in dimension 4001; prefixes of 3, 100 and 1000",
             "one point in each; unbiased", "Sobol', Owen", "exactly; ± 1 %", Level::Commit,
             kDirectLight | CRT_FEATURE_SOBOL, sobol),
         row("I12", "coverage", "95 % intervals of 400 pixels from 16 scrambles each",

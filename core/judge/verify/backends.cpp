@@ -115,9 +115,8 @@ void lostDevices(Context& context) {
 
     context.notApplicable("a device lost, out of memory, out of time",
                           "asked of the host with a plugin that fails on demand: 'a device that fails in "
-                          "the middle costs little' "
-                          "(tests/unit_running.cpp), tests/cli, and CUDA's own failures against a simulated "
-                          "driver (tests/unit_cuda_program.cpp)");
+                          "the middle costs little' (tests/unit_running.cpp), tests/cli, and CUDA's own "
+                          "failures against a simulated driver (tests/unit_cuda_program.cpp)");
 }
 
 /// The calling thread's rounding mode and treatment of subnormals, put back at the end.

@@ -567,8 +567,8 @@ std::vector<Case> closedFormCases() {
         {.id = "A05",
          .name = "mirror-wall",
          .title = "A03 beside a perfect mirror: what the mirror adds",
-         .expected = "the form factor of the lamp's image; for a mirror at 2 0.001141273786, with the lamp "
-                     "0.2405977442",
+         .expected = "the form factor of the lamp's image; for a mirror "
+                     "at 2 0.001141273786, with the lamp 0.2405977442",
          .source = "images, rectangle formula",
          .tolerance = "± 1 % (mirror at 0.75), ± 0.3 % from merge on; mirror at 2 with the lamp ± 0.3 %, "
                       "alone ± 2 % at merge, ± 0.3 % at night",

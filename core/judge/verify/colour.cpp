@@ -315,8 +315,8 @@ void spectralBins(Context& context) {
         const Vec3d xyz = integrate(glow, from, from + 5);
         const std::string yaml = fmt::format(
             "crt: 1\nfilm: {{resolution: [4, 4]}}\nsampler: {{type: independent}}\n"
-            "environment: {{radiance: {{table: {{nm: [{}, {}, {}, {}], value: [0, 1, 1, 0]}}, outside: "
-            "zero}}}}\n",
+            "environment: {{radiance: {{table: {{nm: [{}, {}, {}, "
+            "{}], value: [0, 1, 1, 0]}}, outside: zero}}}}\n",
             from, from + 1, from + 4, from + 5);
         std::vector<double> ratios;
         for (int seed = 0; seed < seeds; ++seed) {

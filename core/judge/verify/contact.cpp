@@ -327,8 +327,7 @@ void threeWays(Context& context) {
                "faces: [[1,2,3,0]]}, "
                "material: wall, emission: {radiance: 1, two_sided: true}}\n"
                "  - {name: corner, mesh: {positions: [[1,0,0.875],[0.875,0,1],[1,0.125,1]], faces: "
-               "[[2,0,1]]}, "
-               "material: wall, emission: {radiance: 1, two_sided: true}}\n";
+               "[[2,0,1]]}, material: wall, emission: {radiance: 1, two_sided: true}}\n";
     };
     const JointMeasure ratio = [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); };
     const Effort effort{.samples = 256, .most = 4096};

@@ -343,8 +343,8 @@ std::vector<Case> lightCases() {
             "0.2394564705 always", "rectangle formula", "± 0.1 %", Level::Commit,
             kDirectLight | CRT_FEATURE_BVH, tiledLight),
         row("E08", "many-lights",
-            "How light sampling chooses among up to 1e7 lights of equal power, and between powers of 1e20 : "
-            "1",
+            "How light sampling chooses among up to 1e7 lights "
+            "of equal power, and between powers of 1e20 : 1",
             "equal shares; the weak light at least once in 2³²", "arithmetic", "0.5 %", Level::Commit, 0,
             choosingAmongMany),
         row("E09", "hopelessly-dim", "Under a lamp of 1e-10 beside one of 1e+10, chosen by power",

@@ -266,8 +266,8 @@ void overflowIsCounted(Context& context) {
     scene.environment->radiance = constantSpectrum(3e38);
     const Film film = context.renderRaw(scene, {});
     context.holds(
-        "radiance 3e38 times the width of the spectrum is beyond a float: every sample is dropped and "
-        "counted",
+        "radiance 3e38 times the width of the spectrum is beyond "
+        "a float: every sample is dropped and counted",
         film.invalidSamples() == 16 * 16, "256 samples",
         "samples that are no numbers are taken for black, or for bright, without a warning",
         fmt::format("{} of 256 samples counted as invalid", film.invalidSamples()));

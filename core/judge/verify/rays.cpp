@@ -78,8 +78,8 @@ Tally missesOfWall(Context& context, double width, double height, int axis, bool
 
 void raysInFaces(Context& context) {
     const std::string physics =
-        "a box is culled that the ray runs along: 0·∞ in the slab test, a clamped reciprocal, or the sign "
-        "of −0";
+        "a box is culled that the ray runs along: 0·∞ in the "
+        "slab test, a clamped reciprocal, or the sign of −0";
     for (const auto& [what, width, height] : {std::tuple{"rays in the plane of the boxes' faces", 0.5, 0.0},
                                               {"rays in two such planes, along an axis", 0.0, 0.0}}) {
         Tally all;
@@ -186,8 +186,8 @@ const char* const kTriangle =
     "crt: 1\ncamera: {{position: [0, 0, -3], target: [0, 0, 0], fov: 40}}\nfilm: {{resolution: [4, "
     "4]}}\nenvironment: {{radiance: 1}}\n"
     "materials: {{m: {{type: diffuse, reflectance: 0.5}}}}\n"
-    "objects: [{{material: m, mesh: {{positions: [[0, 0, 0], [1, 0, 0], [0, {}, 0]], faces: [[0, 1, "
-    "2]]}}}}]\n";
+    "objects: [{{material: m, mesh: {{positions: [[0, 0, 0], "
+    "[1, 0, 0], [0, {}, 0]], faces: [[0, 1, 2]]}}}}]\n";
 
 void verticesThatAreNone(Context& context) {
     for (const auto& [number, words] : {std::pair{".nan", "NaN and infinity have no place"},

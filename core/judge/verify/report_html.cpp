@@ -75,13 +75,12 @@ std::string outcomeRow(const Outcome& o) {
 std::string caseHtml(const CaseResult& c) {
     std::string text = fmt::format(
         "<details{}><summary><b>{}</b><span>{} <span class=\"soft\">{}</span></span><span "
-        "class=\"{}\">{}</span>"
-        "<span class=\"t\">{}</span></summary>\n",
+        "class=\"{}\">{}</span><span class=\"t\">{}</span></summary>\n",
         failed(c.verdict) ? " open" : "", c.which->id, escaped(c.which->title), c.which->name,
         styleOf(c.verdict), name(c.verdict), durationText(c.seconds));
     text += fmt::format(
-        "<div class=\"body\"><p>Expected: {}</p><p class=\"soft\">Source: {}. Tolerance: {}. Level: "
-        "{}.</p>\n",
+        "<div class=\"body\"><p>Expected: {}</p><p class=\"soft\">Source: "
+        "{}. Tolerance: {}. Level: {}.</p>\n",
         escaped(c.which->expected), escaped(c.which->source), escaped(c.which->tolerance),
         name(c.which->level));
     text +=

@@ -68,8 +68,8 @@ std::string registryMarkdown(const std::vector<std::string>& suites) {
         const std::string backend = json.at("backend").at("name");
         backends.push_back(backend);
         text += fmt::format(
-            "\nFigures of {}: level {}, {}, crt {}; the largest deviation of a case's answers from what is "
-            "expected.\n",
+            "\nFigures of {}: level {}, {}, crt {}; the largest deviation "
+            "of a case's answers from what is expected.\n",
             backend, json.at("level").get<std::string>(), json.at("backend").at("device").get<std::string>(),
             json.at("crt").at("version").get<std::string>());
         for (const Json& c : json.at("cases")) figures[{backend, c.at("id")}] = figureOf(c);

@@ -253,16 +253,16 @@ std::vector<Case> scaleCases() {
          .name = "far-away",
          .title = "A lit room moved along (1, 0.7, −0.3) by up to 1e8 of its size",
          .expected = "the same mean radiance, with the same random numbers",
-         .source = "radiance does not depend on the origin; representable shifts, which give the same bits, "
-                   "are M02",
+         .source = "radiance does not depend on the origin; representable "
+                   "shifts, which give the same bits, are M02",
          .tolerance = "± 0.1 %",
          .level = Level::Commit,
          .needs = kNeeds,
          .run = farAway},
         {.id = "B04",
          .name = "embrees-far-place",
-         .title = "D01's rays at vertices and edges at (148376, 1234, −223423), alone and in a scene as "
-                  "large as that",
+         .title = "D01's rays at vertices and edges at (148376, 1234, "
+                  "−223423), alone and in a scene as large as that",
          .expected = "no ray slips through a closed mesh",
          .source = "topology; the place is that of Embree's own watertightness tests",
          .tolerance = "rate of misses ≤ 1e-6",

@@ -366,8 +366,8 @@ std::vector<Case> scatteringCases() {
     constexpr std::uint64_t sky = CRT_FEATURE_ENVIRONMENT;
     return {
         row("G01", "cosine-law",
-            "Scattered directions of a diffuse surface, counted in 72 cells of a dome; a roughness of 1 to "
-            "1e-4",
+            "Scattered directions of a diffuse surface, counted "
+            "in 72 cells of a dome; a roughness of 1 to 1e-4",
             "shares by Lambert's formula; roughness is refused", "Lambert's formula; χ²", "p > 1e-3",
             Level::Merge, light | CRT_FEATURE_INDEPENDENT, lambertDirections),
         row("G02", "pdf", "A white floor in a glowing room, with and without light sampling",

@@ -260,8 +260,7 @@ std::string_view familyIntroduction(std::string_view family) {
     if (family == "material") return "What light does at a surface. `type` picks one of these.\n";
     if (family == "transform")
         return "A placement is a list of steps, each a map with one key, applied in order: `[{scale: 2}, "
-               "{rotate: {axis: [0, 1, 0], "
-               "angle_deg: 90}}, {translate: [0, 1, 0]}]`.\n";
+               "{rotate: {axis: [0, 1, 0], angle_deg: 90}}, {translate: [0, 1, 0]}]`.\n";
     return {};
 }
 

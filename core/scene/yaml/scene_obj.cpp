@@ -41,8 +41,8 @@ ObjectReader::ObjUse ObjectReader::readObjUse(const SectionReader& object, const
     use.options.use_mtl = false;
     if (use.material.empty())
         object.error("override",
-                     "there is nothing to put in place of the materials of the OBJ; name a material with "
-                     "'material:'");
+                     "there is nothing to put in place of the materials "
+                     "of the OBJ; name a material with 'material:'");
     if (object.has("material_overrides"))
         object.error("material_overrides",
                      "'override: true' replaces all materials of the OBJ; none is left for this");

@@ -45,10 +45,9 @@ KeySchema outsideKey() {
             .choices = {"clamp", "zero", "error"},
             .doc =
                 "Beyond the first and last wavelength: the end value, zero, or an error. Must be said "
-                "unless the "
-                "data cover 360 to 830 nm. With `zero` the table keeps its integral: where its end is not "
-                "0, the "
-                "step is spread over the nanometres that it touches, and one wavelength alone is refused, "
+                "unless the data cover 360 to 830 nm. With `zero` the table keeps its integral: where its "
+                "end is not 0, the step is spread over the nanometres that it touches, and one wavelength "
+                "alone is refused, "
                 "because it has no width."};
 }
 
@@ -122,8 +121,7 @@ SectionSchema camera() {
         "camera",
         "camera",
         "A perspective camera in a right-handed world: image right is (target − position) × up. Give `fov`, "
-        "or `focal_length` "
-        "with `sensor`, not both.",
+        "or `focal_length` with `sensor`, not both.",
         {
             {.name = "position",
              .kind = Kind::Number,
@@ -396,8 +394,7 @@ void addSpectra(std::vector<SectionSchema>& all) {
         {"spectrum/rgb",
          "an rgb spectrum",
          "A smooth spectrum of the colour (Jakob and Hanika 2019): below 1 as a reflectance, times D65 as "
-         "an emission. Not "
-         "for refractive indices.",
+         "an emission. Not for refractive indices.",
          {{.name = "rgb",
            .kind = Kind::Number,
            .shape = Shape::List,

@@ -35,8 +35,7 @@ std::optional<std::size_t> worstWavelength(const Spectrum& spectrum, const Value
 std::string outsideQuestion(double first_nm, double last_nm) {
     return fmt::format(
         "the data go from {} to {} nm and crt renders {} to {} nm; say what holds beyond them: 'outside: "
-        "clamp' or "
-        "'outside: zero'",
+        "clamp' or 'outside: zero'",
         first_nm, last_nm, kWavelengthMin_nm, kWavelengthMax_nm);
 }
 

@@ -257,8 +257,8 @@ void readCamera(const SectionReader& section, std::size_t errors_before, const F
         if (std::abs(pixel_aspect - 1) > kSquareEnough) {
             const SourcePlace at = section.place("sensor").resolved();
             logWarning(
-                "{}:{}:{}: sensor and resolution have different proportions: pixels are {:.4g} times as "
-                "wide as high",
+                "{}:{}:{}: sensor and resolution have different proportions: "
+                "pixels are {:.4g} times as wide as high",
                 at.file, at.line, at.column, pixel_aspect);
         }
     }

@@ -1,0 +1,35 @@
+#!/usr/bin/env python3
+"""Lines of sources, scripts and scenes end before column 110; exit code 1 names those that do not.
+
+Tables in Markdown, data and patches are what they are.
+"""
+
+import pathlib
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+FOLDERS = (".github", "bench", "cmake", "configs", "core", "docs", "plugins", "scripts", "tests")
+KINDS = {".c", ".cl", ".cmake", ".cpp", ".cu", ".h", ".in", ".map", ".py", ".supp", ".txt", ".yaml", ".yml"}
+COLUMNS = 109
+
+
+def is_source(path):
+    # Scripts have no ending.
+    return path.is_file() and (path.suffix in KINDS or not path.suffix) and "__pycache__" not in path.parts
+
+
+def main():
+    files = [f for folder in FOLDERS for f in sorted((ROOT / folder).rglob("*")) if is_source(f)]
+    files += [f for f in sorted(ROOT.iterdir()) if is_source(f)]
+    long = 0
+    for file in files:
+        for number, line in enumerate(file.read_text(errors="replace").splitlines(), 1):
+            if len(line) > COLUMNS:
+                print(f"{file.relative_to(ROOT)}:{number}: {len(line)} columns")
+                long += 1
+    print(f"{len(files)} files, {long} lines too long")
+    return 1 if long or not files else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
