@@ -1,5 +1,5 @@
 // Compiles every kernel variant that matters for one GPU with NVRTC, through the code of the CUDA backend,
-// and checks that none spills registers. Needs no GPU. Prints registers and compile time of each variant.
+// and checks that none spills more than a few registers. Needs no GPU. Prints registers and compile time of each variant.
 //
 //     nvrtc_variants [--arch 90] [SCENE.yaml …]
 //
@@ -101,15 +101,18 @@ int run(int argc, char** argv) {
         std::printf("%9u %6u %6u %8.1f %8.0f  0x%05x %s\n", use.registers, use.stack_bytes, use.spill_bytes,
                     static_cast<double>(cubin.bytes.size()) / 1e3, ms, mask, name.c_str());
         std::fflush(stdout);
-        // An entry that is not in the log would pass for one that does not spill.
+        // An entry that is not in the log would pass for one that spills nothing.
         if (use.registers == 0)
             std::printf("FAILED: the assembler's log says nothing of crt_render:\n%s\n", cubin.log.c_str());
-        if (use.spill_bytes != 0) std::printf("FAILED: %u bytes are spilled\n", use.spill_bytes);
-        // The only array that a thread may keep in memory is the BVH's traversal stack.
-        const bool stack_expected = (mask & CRT_FEATURE_BVH) != 0;
-        if (!stack_expected && use.stack_bytes != 0)
-            std::printf("FAILED: local memory without a traversal stack\n");
-        failures += use.registers == 0 || use.spill_bytes != 0 || (!stack_expected && use.stack_bytes != 0);
+        const bool spills = use.spill_bytes > crt::cuda::kSpillBytesAllowed;
+        if (spills)
+            std::printf("FAILED: %u bytes are spilled, and %u are allowed\n", use.spill_bytes,
+                        crt::cuda::kSpillBytesAllowed);
+        // The only array that a thread may keep in memory is the BVH's traversal stack. What is spilled has its
+        // place there, too, which no store or load is narrower than.
+        const bool array = (mask & CRT_FEATURE_BVH) == 0 && use.stack_bytes > use.spill_bytes;
+        if (array) std::printf("FAILED: local memory without a traversal stack\n");
+        failures += use.registers == 0 || spills || array;
     }
     std::printf("%d of %zu variants failed\n", failures, masks.size());
     return failures == 0 ? 0 : 1;

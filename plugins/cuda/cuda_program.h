@@ -25,9 +25,12 @@ constexpr std::uint32_t kRayCounters = 1024;
 /// The whole text that NVRTC compiles: the host's text of kernel/path.h, then kernels.cu.
 std::string kernelText(const std::string& path_text);
 
-/// How many blocks a multiprocessor should hold at once, in the order of trying: more hide memory better,
-/// but leave each thread fewer registers. The first that does not spill wins; the last is not judged.
+/// How many blocks a multiprocessor should hold at once, in the order of trying: more hide latency better, but
+/// leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the last is not
+/// judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md).
 constexpr int kBlocksPerMultiprocessor[] = {4, 3};
+/// Of all stores and loads in the code of crt_render.
+constexpr std::uint32_t kSpillBytesAllowed = 128;
 
 /// Options for NVRTC. Arithmetic stays IEEE: nothing is contracted, divisions and square roots are rounded
 /// correctly, subnormals are kept.
@@ -46,7 +49,7 @@ struct ResourceUse {
 };
 ResourceUse resourceUse(const std::string& log, const std::string& kernel);
 
-/// Machine code for a mask, with as many blocks on a multiprocessor as go without spilling. Throws
+/// Machine code for a mask, with as many blocks on a multiprocessor as go almost without spilling. Throws
 /// std::runtime_error. [any thread]
 Cubin compileLean(const Nvrtc& nvrtc, const std::string& text, int arch, std::uint32_t features);
 
