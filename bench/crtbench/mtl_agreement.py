@@ -7,6 +7,7 @@ crt and in Mitsuba 3: is the luminance the same?
 Needs mitsuba and numpy (--python). Mitsuba renders a scene made from the same numbers by a reader of its
 own (mtl_worker.py), in RGB and in wavelengths. Times nothing."""
 
+import argparse
 import json
 import math
 import pathlib
@@ -155,11 +156,14 @@ def compared(ours, theirs):
 
 def named_view(text):
     """'NAME=X,Y,Z,X,Y,Z,FOV' → (name, seven numbers)"""
-    name, _, numbers = text.partition("=")
-    values = [float(number) for number in numbers.split(",")]
-    if not name or len(values) != 7:
-        raise ValueError(text)   # argparse says which option it was.
-    return name, values
+    match = re.fullmatch(r"(.+)=([^=]+)", text)
+    try:
+        values = [float(number) for number in match[2].split(",")] if match else []
+    except ValueError:
+        values = []
+    if len(values) != 7:
+        raise argparse.ArgumentTypeError(f"'{text}' is not NAME=X,Y,Z,X,Y,Z,FOV")
+    return match[1], values
 
 
 def camera(obj, given):
