@@ -199,6 +199,15 @@ TEST_CASE("materials of families of exporters are what they were", "[mesh_io][mt
     // Maya
     CHECK(typeOf("illum 4\nKd 0.50 0.50 0.50\nKa 0.00 0.00 0.00\nTf 1.00 1.00 1.00\nNi 1.00\n") ==
           MaterialType::Diffuse);
+    // Maya, of a Sponza that 3ds Max wrote: its Ni stays. What lets light pass does so in Maya's files too.
+    const std::string maya =
+        "illum 4\nKd 0.78 0.78 0.78\nKa 0.00 0.00 0.00\nTf 1.00 1.00 1.00\nNi 1.50\nKs 0.00 0.00 0.00\nNs "
+        "50.00\n";
+    CHECK(typeOf(maya) == MaterialType::Diffuse);
+    CHECK_THAT(log.text(), Contains("illum 4 with a white Tf read as opaque (1)"));
+    CHECK(typeOf(maya + "Tf 0.5 0.5 0.5\n") == MaterialType::Dielectric);
+    CHECK(typeOf(maya + "d 0.5\n") == MaterialType::Dielectric);
+    CHECK(typeOf(maya + "illum 7\n") == MaterialType::Dielectric);
     // A Sponza in circulation
     CHECK(typeOf("Ns 7.843137\nKa 0 0 0\nKd 0.4704 0.4704 0.4704\nKs 0 0 0\nNi 1.000000\nd 0.000000\nillum "
                  "2\nmap_Kd KAMEN.JPG\n") == MaterialType::Diffuse);

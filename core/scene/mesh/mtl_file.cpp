@@ -60,7 +60,7 @@ const std::vector<MtlKey>& mtlKeys() {
          {},
          "0 to 10",
          "4, 6, 7 and 9 with `Ni` above 1: glass. 3 and 5 with Kd ≤ 0.1 and a Ks: mirror. Maya writes "
-         "`illum 4` with `Ni 1` for opaque surfaces."},
+         "`illum 4` and `Tf 1 1 1` for opaque surfaces, with any `Ni`: together they make no glass."},
         {"Pm",
          {},
          "metalness",
