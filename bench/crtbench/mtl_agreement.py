@@ -275,9 +275,9 @@ def measure_models(program, arguments, python, backend, results):
         "passes or that it is a mirror, and files with such materials are refused. A white `Tf`, `illum 4`, "
         "`Ni 1.5` and `d 1` say no such thing. Importers differ in this: Mitsuba 0.6 makes glass of every "
         "`illum 4`, and Blender, since it reads `Tf`, of every white one. Left out on both sides: normals, "
-        "images (the Kd beside a `map_Kd` counts) and highlights (Ks, Ns), which Mitsuba 0.6 reads as a Phong "
-        "lobe and Blender as the specular level of its Principled BSDF. Mean luminance (CIE Y) of the image; "
-        "crt over Mitsuba, less one, of the image and of the worst of all "
+        "images (the Kd beside a `map_Kd` counts) and highlights (Ks, Ns), which Mitsuba 0.6 reads as a "
+        "Phong lobe and Blender as the specular level of its Principled BSDF. Mean luminance (CIE Y) of the "
+        "image; crt over Mitsuba, less one, of the image and of the worst of all "
         f"{(MODEL_SIZE // BLOCK) ** 2} blocks of "
         f"{BLOCK} × {BLOCK} pixels; beside it the worst block of Mitsuba over itself with another seed."
     )
