@@ -1,5 +1,6 @@
 // Compiles every kernel variant that matters for one GPU with NVRTC, through the code of the CUDA backend,
-// and checks that none spills more than a few registers. Needs no GPU. Prints registers and compile time of each variant.
+// and checks that none spills more than a few registers. Needs no GPU. Prints registers and compile time of
+// each variant.
 //
 //     nvrtc_variants [--arch 90] [SCENE.yaml …]
 //
@@ -108,8 +109,8 @@ int run(int argc, char** argv) {
         if (spills)
             std::printf("FAILED: %u bytes are spilled, and %u are allowed\n", use.spill_bytes,
                         crt::cuda::kSpillBytesAllowed);
-        // The only array that a thread may keep in memory is the BVH's traversal stack. What is spilled has its
-        // place there, too, which no store or load is narrower than.
+        // The only array that a thread may keep in memory is the BVH's traversal stack. Spilled values are
+        // there, too, and each is stored and loaded at least once.
         const bool array = (mask & CRT_FEATURE_BVH) == 0 && use.stack_bytes > use.spill_bytes;
         if (array) std::printf("FAILED: local memory without a traversal stack\n");
         failures += use.registers == 0 || spills || array;

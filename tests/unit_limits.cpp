@@ -35,6 +35,13 @@ namespace fs = std::filesystem;
 
 namespace {
 
+// What is quadratic takes minutes; what runs under a sanitizer, several times as long as it should.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr double kSecondsAllowed = 20;
+#else
+constexpr double kSecondsAllowed = 2;
+#endif
+
 template <class Work>
 double secondsOf(const Work& work) {
     const auto start = std::chrono::steady_clock::now();
@@ -258,7 +265,7 @@ TEST_CASE("forty thousand triangles on one spot are compiled in a second", "[lim
         scene.objects = {object};
         CompiledScene compiled;
         const double seconds = secondsOf([&] { compiled = compileScene(scene, 0); });
-        CHECK(seconds < 2);
+        CHECK(seconds < kSecondsAllowed);
         CHECK(findNearSurfaces(compiled).asked > 0);
     }
 }
@@ -282,7 +289,7 @@ TEST_CASE("a disc of forty thousand lamps that share a corner is looked at in a 
     object.material = 0;
     object.emission = 0;
     scene.objects = {object};
-    CHECK(secondsOf([&] { compileScene(scene, 0); }) < 2);
+    CHECK(secondsOf([&] { compileScene(scene, 0); }) < kSecondsAllowed);
 }
 
 TEST_CASE("a polygon of forty thousand corners becomes triangles in a second", "[limits][mesh]") {
@@ -313,7 +320,7 @@ TEST_CASE("a polygon of forty thousand corners becomes triangles in a second", "
         });
         for (std::size_t i = 0; i < kCorners; ++i)
             whole += cross(polygon[i], polygon[(i + 1) % kCorners])[2] / 2;
-        CHECK(seconds < 2);
+        CHECK(seconds < kSecondsAllowed);
         CHECK(triangulator.crossingPolygons() == 0);
         CHECK(triangulator.split(polygon).size() == kCorners - 2);
         CHECK(std::abs(turned) == Approx(area).epsilon(1e-9));  // none overlaps another

@@ -199,6 +199,19 @@ TEST_CASE("materials of families of exporters are what they were", "[mesh_io][mt
     // Maya
     CHECK(typeOf("illum 4\nKd 0.50 0.50 0.50\nKa 0.00 0.00 0.00\nTf 1.00 1.00 1.00\nNi 1.00\n") ==
           MaterialType::Diffuse);
+    // Maya, of a Sponza that 3ds Max wrote: its Ni stays. What lets light pass does so in Maya's files too.
+    const std::string maya =
+        "illum 4\nKd 0.78 0.78 0.78\nKa 0.00 0.00 0.00\nTf 1.00 1.00 1.00\nNi 1.50\nKs 0.00 0.00 0.00\nNs "
+        "50.00\n";
+    CHECK(typeOf(maya) == MaterialType::Diffuse);
+    CHECK_THAT(log.text(), Contains("illum 4 with a white Tf read as opaque (1)"));
+    CHECK(typeOf(maya + "Tf 0.5 0.5 0.5\n") == MaterialType::Dielectric);
+    CHECK(typeOf(maya + "d 0.5\n") == MaterialType::Dielectric);
+    CHECK(typeOf(maya + "illum 7\n") == MaterialType::Dielectric);
+    // Maya, with a texture
+    const Material textured = loadMaterial("illum 4\nKd 0 0 0\nmap_Kd a.jpg\nTf 1 1 1\n").material;
+    CHECK(textured.reflectance[200] == Approx(0.6).epsilon(1e-3));
+    CHECK_THAT(log.text(), Contains("a black Kd beside map_Kd read as grey 0.6 (1)"));
     // A Sponza in circulation
     CHECK(typeOf("Ns 7.843137\nKa 0 0 0\nKd 0.4704 0.4704 0.4704\nKs 0 0 0\nNi 1.000000\nd 0.000000\nillum "
                  "2\nmap_Kd KAMEN.JPG\n") == MaterialType::Diffuse);

@@ -87,6 +87,22 @@ def main():
             command.add_argument(
                 "--samples", type=int, default=1024, help="per pixel, in both programs (1024)"
             )
+            command.add_argument("folders", nargs="*", type=pathlib.Path, metavar="FOLDER",
+                                 help="looked through for *.obj with an MTL; named REPOSITORY@COMMIT")
+            command.add_argument(
+                "--model-samples", type=int, default=256, help="as --samples, of the models (256)"
+            )
+            command.add_argument(
+                "--view",
+                action="append",
+                default=[],
+                type=mtl_agreement.named_view,
+                metavar="NAME=X,Y,Z,X,Y,Z,FOV",
+                help="camera of NAME.obj: where it is, what it looks at, degrees",
+            )
+            command.add_argument(
+                "--pictures", type=pathlib.Path, metavar="FOLDER", help="PNGs of the models by both programs"
+            )
             continue
         command.add_argument("--scenes", nargs="*", help="only these scenes, by name without .yaml")
     arguments = parser.parse_args()

@@ -25,9 +25,9 @@ constexpr std::uint32_t kRayCounters = 1024;
 /// The whole text that NVRTC compiles: the host's text of kernel/path.h, then kernels.cu.
 std::string kernelText(const std::string& path_text);
 
-/// How many blocks a multiprocessor should hold at once, in the order of trying: more hide latency better, but
-/// leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the last is not
-/// judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md).
+/// How many blocks a multiprocessor should hold at once, in the order of trying: more hide latency better,
+/// but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the last is
+/// not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md).
 constexpr int kBlocksPerMultiprocessor[] = {4, 3};
 /// Of all stores and loads in the code of crt_render.
 constexpr std::uint32_t kSpillBytesAllowed = 128;

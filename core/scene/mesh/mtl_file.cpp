@@ -60,7 +60,7 @@ const std::vector<MtlKey>& mtlKeys() {
          {},
          "0 to 10",
          "4, 6, 7 and 9 with `Ni` above 1: glass. 3 and 5 with Kd ≤ 0.1 and a Ks: mirror. Maya writes "
-         "`illum 4` with `Ni 1` for opaque surfaces."},
+         "`illum 4` and `Tf 1 1 1` for opaque surfaces, with any `Ni`: together they make no glass."},
         {"Pm",
          {},
          "metalness",
@@ -82,7 +82,9 @@ const std::vector<MtlKey>& mtlKeys() {
         {"Pcr", {}, "coat roughness", "Left out, with a warning if not 0."},
         {"aniso", {}, "anisotropy", "Left out, with a warning if not 0."},
         {"anisor", {}, "its angle", "Left out, with a warning if not 0."},
-        {"map_Kd", {}, "image", "Textures are left out, with a warning; the numbers beside them count."},
+        {"map_Kd", {}, "image",
+         "Textures are left out, with a warning; the numbers beside them count, but for a black Kd, which "
+         "exporters write there: it counts as grey 0.6."},
         {"map_Ka", {}, "image", "Ignored, as `Ka`."},
         {"map_Ks", {}, "image", "Left out, with a warning."},
         {"map_Ns", {}, "image", "Left out, with a warning."},

@@ -115,7 +115,12 @@ private:
 
     /// 3ds Max and Maya state a white Tf for everything, others a black one.
     bool filters() const { return tf_ && !isGrey(*tf_, 0.0) && !isGrey(*tf_, 1.0); }
-    bool lightPasses() const { return opacity_.value_or(1.0) < 1.0 || filters() || illumIs({4, 6, 7, 9}); }
+    /// Maya writes illum 4 and a white Tf for everything. Its Ni is the shader's: 1.5 in a model that came
+    /// from 3ds Max.
+    bool fromMaya() const { return illumIs({4}) && tf_ && isGrey(*tf_, 1.0); }
+    bool lightPasses() const {
+        return opacity_.value_or(1.0) < 1.0 || filters() || (illumIs({4, 6, 7, 9}) && !fromMaya());
+    }
     bool refracts() const { return ni_.value_or(1.0) > 1.0 && *ni_ <= kMaxIndex; }
     bool emits() const { return ke_ && brightest(*ke_) > 0.0; }
 
@@ -160,7 +165,8 @@ private:
             summary_.decided(fmt::format("{} without Ni above 1 read as opaque (crt has no opacity)",
                                          has("d") ? "d below 1" : "Tr above 0"));
         else if (illumIs({4, 6, 7, 9}))
-            summary_.decided(fmt::format("illum {} without Ni above 1 read as opaque", *illum_));
+            summary_.decided(fmt::format("illum {} {} read as opaque", *illum_,
+                                         refracts() ? "with a white Tf" : "without Ni above 1"));
         if (filters()) summary_.dropped("Tf");
     }
 
@@ -179,10 +185,14 @@ private:
         return color_ == MtlColor::Srgb ? srgbDecoded(stated) : stated;
     }
 
+    /// Exporters write a black Kd where a texture takes its place.
     Vec3d kdOrGrey() const {
-        if (kd_) return *kd_;
+        const bool replaced = kd_ && brightest(*kd_) == 0.0 && has("map_Kd");
+        if (kd_ && !replaced) return *kd_;
         if (emits() || has("crt_reflectance")) return {};
-        summary_.decided(fmt::format("no Kd read as grey {}", kUnstatedKd));
+        summary_.decided(
+            fmt::format("{} read as grey {}", replaced ? "a black Kd beside map_Kd" : "no Kd",
+                        kUnstatedKd));
         return {kUnstatedKd, kUnstatedKd, kUnstatedKd};
     }
 

@@ -53,7 +53,7 @@ private:
 /// A material of an MTL file as one of ours, by these rules, the first that fits (in full: mtlKeys()):
 ///
 ///  1. Ni above 1, and light passes (d < 1, or Tr > 0 without d; a Tf that is neither black nor white;
-///     illum 4, 6, 7 or 9): Dielectric, smooth and clear.
+///     illum 6, 7 or 9; illum 4 without a white Tf): Dielectric, smooth and clear.
 ///  2. Pm ≥ 0.5: Mirror with reflectance Kd. illum 3 or 5 with Kd ≤ 0.1 and a Ks: Mirror with reflectance
 ///  Ks.
 ///  3. Diffuse with reflectance Kd.

@@ -331,7 +331,7 @@ std::string mtlTable() {
         "A material is, by the first rule that fits,\n\n"
         "1. glass (dielectric, smooth and clear), if `Ni` is above 1 and the material says that light "
         "passes: `d` below 1, `Tr` above 0 without `d`, a `Tf` that is "
-        "neither black nor white, or `illum` 4, 6, 7 or 9;\n"
+        "neither black nor white, `illum` 6, 7 or 9, or `illum` 4 without a white `Tf`;\n"
         "2. a mirror, if `Pm` is 0.5 or more, or `illum` is 3 or 5 with Kd ≤ 0.1 and a Ks;\n"
         "3. diffuse.\n\n"
         "crt says in one line a file what its materials became and what was left out. A statement whose "
