@@ -247,23 +247,21 @@ class Program:
             return directory
         shutil.copytree(self.repository / "core" / "kernel", directory)
         asked = " || ".join(f"(CRT_FEATURES) == {mask:#x}u" for mask in masks)
-        # CRT_KERNEL_DIR wants features.h itself untouched.
+        # CRT_KERNEL_DIR wants the headers of the layout untouched, features.h among them: the first that
+        # includes them is told more.
         more = (
-            f'#include "features.h"\n#undef CRT_HAS\n#if {asked}\n'
-            f"#define CRT_HAS(name) ((((CRT_FEATURES) | {extra:#x}u) & (unsigned)CRT_FEATURE_##name) != "
-            f"0u)\n"
+            f"#undef CRT_HAS\n#if {asked}\n"
+            f"#define CRT_MORE ((CRT_FEATURES) | {extra:#x}u)\n"
+            "#define CRT_HAS(name) ((CRT_MORE & (unsigned)CRT_FEATURE_##name) != 0u)\n"
+            "#define CRT_KERNEL_MATERIALS (CRT_MORE & (unsigned)CRT_FEATURES_MATERIALS)\n"
             "#else\n#define CRT_HAS(name) (0)\n#endif\n"
         )
-        changed = 0
-        for header in directory.glob("*.h"):
-            text = header.read_text()
-            if header.name != "features.h" and '#include "features.h"\n' in text:
-                header.write_text(text.replace('#include "features.h"\n', more))
-                changed += 1
-        if changed == 0:
-            raise Failure(
-                "no kernel header includes features.h: kernels_with() has to be taught the new way"
-            )
+        include = '#include "layout.h"\n'
+        users = [h for h in directory.glob("*.h") if include in h.read_text()]
+        if not users:
+            raise Failure("no kernel header includes layout.h: kernels_with() has to be taught the new way")
+        for header in users:
+            header.write_text(header.read_text().replace(include, include + more))
         return directory
 
 

@@ -1,12 +1,7 @@
 #include "base/parallel.h"
 
 #include "base/listener.h"
-
-#include <tbb/blocked_range.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-#include <tbb/task_arena.h>
+#include "base/task_scheduler.h"
 
 #include <algorithm>
 #include <atomic>
@@ -19,11 +14,26 @@ namespace {
 class HandOver {
 public:
     HandOver() { order_.store(0, std::memory_order_release); }
-    void partBegins() const { (void)order_.load(std::memory_order_acquire); }
-    void partEnds() { order_.fetch_add(1, std::memory_order_acq_rel); }
     ~HandOver() { (void)order_.load(std::memory_order_acquire); }
     HandOver(const HandOver&) = delete;
     HandOver& operator=(const HandOver&) = delete;
+
+    /// Lives while a part is worked on, on whichever thread; the listener of the caller hears it.
+    class Part {
+    public:
+        Part(HandOver& all, const ListenerRef& listener) : all_(all), scope_(received(all, listener)) {}
+        ~Part() { all_.order_.fetch_add(1, std::memory_order_acq_rel); }
+        Part(const Part&) = delete;
+        Part& operator=(const Part&) = delete;
+
+    private:
+        static const ListenerRef& received(HandOver& all, const ListenerRef& listener) {
+            (void)all.order_.load(std::memory_order_acquire);
+            return listener;
+        }
+        HandOver& all_;
+        ListenerScope scope_;
+    };
 
 private:
     std::atomic<std::size_t> order_;
@@ -39,37 +49,28 @@ void parallelFor(std::size_t count, std::size_t part,
     }
     HandOver order;
     const ListenerRef listener = currentListener();
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, partsOf(count, part), 1),
-        [&](const tbb::blocked_range<std::size_t>& parts) {
-            order.partBegins();
-            const ListenerScope scope(listener);
-            for (std::size_t i = parts.begin(); i < parts.end(); ++i)
-                body(i * part, std::min(count, (i + 1) * part));
-            order.partEnds();
-        },
-        tbb::simple_partitioner());
+    scheduler::forEach(partsOf(count, part), [&](std::size_t i) {
+        const HandOver::Part here(order, listener);
+        body(i * part, std::min(count, (i + 1) * part));
+    });
 }
 
 void parallelInvoke(const std::function<void()>& one, const std::function<void()>& other) {
     HandOver order;
-    const auto ordered = [&order, listener = currentListener()](const std::function<void()>& work) {
-        order.partBegins();
-        const ListenerScope scope(listener);
+    const ListenerRef listener = currentListener();
+    const auto ordered = [&](const std::function<void()>& work) {
+        const HandOver::Part here(order, listener);
         work();
-        order.partEnds();
     };
-    tbb::parallel_invoke([&] { ordered(one); }, [&] { ordered(other); });
+    scheduler::both([&] { ordered(one); }, [&] { ordered(other); });
 }
 
 void runWithThreads(unsigned threads, const std::function<void()>& work) {
     if (threads == 0) return work();
-    // The arena limits what runs in it; the control lets it have more threads than processors.
-    const tbb::global_control most(tbb::global_control::max_allowed_parallelism, threads);
-    tbb::task_arena arena(static_cast<int>(threads));
-    // It may run on a thread of the arena.
-    arena.execute([&work, listener = currentListener()] {
-        const ListenerScope scope(listener);
+    HandOver order;
+    const ListenerRef listener = currentListener();
+    scheduler::withThreads(threads, [&] {
+        const HandOver::Part here(order, listener);
         work();
     });
 }

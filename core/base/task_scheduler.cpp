@@ -1,0 +1,31 @@
+#include "base/task_scheduler.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
+
+namespace crt::scheduler {
+
+void forEach(std::size_t count, const std::function<void(std::size_t index)>& body) {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, count, 1),
+        [&](const tbb::blocked_range<std::size_t>& some) {
+            for (std::size_t i = some.begin(); i < some.end(); ++i) body(i);
+        },
+        tbb::simple_partitioner());
+}
+
+void both(const std::function<void()>& one, const std::function<void()>& other) {
+    tbb::parallel_invoke(one, other);
+}
+
+void withThreads(unsigned threads, const std::function<void()>& work) {
+    // The arena limits what runs in it; the control lets it have more threads than processors.
+    const tbb::global_control most(tbb::global_control::max_allowed_parallelism, threads);
+    tbb::task_arena arena(static_cast<int>(threads));
+    arena.execute(work);
+}
+
+}  // namespace crt::scheduler
