@@ -9,33 +9,34 @@
 namespace crt {
 namespace {
 
-/// ThreadSanitizer does not see how TBB, which is not compiled with it, hands work over. These are the same
-/// orders in atomics that it sees: what was before the call is before the parts, and they before its return.
-class HandOver {
+/// Work as the scheduler calls it: the caller's listener hears each part. ThreadSanitizer does not see how
+/// TBB, which is not compiled with it, hands work over; `order_` says the same in a way that it sees: what
+/// was before the call is before the parts, and they before its return.
+class Work {
 public:
-    HandOver() { order_.store(0, std::memory_order_release); }
-    ~HandOver() { (void)order_.load(std::memory_order_acquire); }
-    HandOver(const HandOver&) = delete;
-    HandOver& operator=(const HandOver&) = delete;
+    explicit Work(const std::function<void(std::size_t)>& body) : body_(body) {
+        order_.store(0, std::memory_order_release);
+    }
+    ~Work() { (void)order_.load(std::memory_order_acquire); }
+    Work(const Work&) = delete;
+    Work& operator=(const Work&) = delete;
 
-    /// Lives while a part is worked on, on whichever thread; the listener of the caller hears it.
-    class Part {
-    public:
-        Part(HandOver& all, const ListenerRef& listener) : all_(all), scope_(received(all, listener)) {}
-        ~Part() { all_.order_.fetch_add(1, std::memory_order_acq_rel); }
-        Part(const Part&) = delete;
-        Part& operator=(const Part&) = delete;
-
-    private:
-        static const ListenerRef& received(HandOver& all, const ListenerRef& listener) {
-            (void)all.order_.load(std::memory_order_acquire);
-            return listener;
-        }
-        HandOver& all_;
-        ListenerScope scope_;
-    };
+    static void call(void* context, std::size_t index) {
+        Work& work = *static_cast<Work*>(context);
+        (void)work.order_.load(std::memory_order_acquire);
+        const Done done{work.order_};
+        const ListenerScope scope(work.listener_);
+        work.body_(index);
+    }
 
 private:
+    struct Done {
+        std::atomic<std::size_t>& order;
+        ~Done() { order.fetch_add(1, std::memory_order_acq_rel); }
+    };
+
+    const std::function<void(std::size_t)>& body_;
+    const ListenerRef listener_ = currentListener();
     std::atomic<std::size_t> order_;
 };
 
@@ -47,32 +48,24 @@ void parallelFor(std::size_t count, std::size_t part,
         if (count > 0) body(0, count);
         return;
     }
-    HandOver order;
-    const ListenerRef listener = currentListener();
-    scheduler::forEach(partsOf(count, part), [&](std::size_t i) {
-        const HandOver::Part here(order, listener);
+    const std::function<void(std::size_t)> each = [&](std::size_t i) {
         body(i * part, std::min(count, (i + 1) * part));
-    });
+    };
+    Work work(each);
+    scheduler::forEach(partsOf(count, part), &Work::call, &work);
 }
 
 void parallelInvoke(const std::function<void()>& one, const std::function<void()>& other) {
-    HandOver order;
-    const ListenerRef listener = currentListener();
-    const auto ordered = [&](const std::function<void()>& work) {
-        const HandOver::Part here(order, listener);
-        work();
-    };
-    scheduler::both([&] { ordered(one); }, [&] { ordered(other); });
+    const std::function<void(std::size_t)> each = [&](std::size_t i) { i == 0 ? one() : other(); };
+    Work work(each);
+    scheduler::forBoth(&Work::call, &work);
 }
 
 void runWithThreads(unsigned threads, const std::function<void()>& work) {
     if (threads == 0) return work();
-    HandOver order;
-    const ListenerRef listener = currentListener();
-    scheduler::withThreads(threads, [&] {
-        const HandOver::Part here(order, listener);
-        work();
-    });
+    const std::function<void(std::size_t)> all = [&](std::size_t) { work(); };
+    Work whole(all);
+    scheduler::withThreads(threads, &Work::call, &whole);
 }
 
 }  // namespace crt
