@@ -1,6 +1,5 @@
 # crt on Debian 12, with its CUDA, Embree and OpenCL backends. NVIDIA's driver comes from the host, by the
-# NVIDIA
-# Container Toolkit; without a GPU crt runs on the processor.
+# NVIDIA Container Toolkit; without a GPU crt runs on the processor.
 #
 #   docker build -t crt .
 #   docker run --rm --gpus all -v "$PWD:/work" crt scene.yaml -o scene.exr

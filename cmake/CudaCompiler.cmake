@@ -1,8 +1,7 @@
 # nvcc, cuda.h and their version: all that crt needs of a CUDA toolkit to build.
 #
 # Not find_package(CUDAToolkit): that of CMake 3.25 stops with an error at a toolkit that has no nvToolsExt,
-# as a CUDA 13 made of nvcc, NVRTC and the
-# run-time headers alone.
+# as a CUDA 13 made of nvcc, NVRTC and the run-time headers alone.
 #
 #   CRT_NVCC              path of nvcc
 #   CRT_CUDA_INCLUDE_DIR  folder of cuda.h

@@ -39,8 +39,7 @@ configure_package_config_file(
   INSTALL_DESTINATION ${CRT_INSTALL_CMAKE_DIR}
   NO_SET_AND_CHECK_MACRO)
 # A backend is compiled against the exact structs of the scene blob, which any release may change before 1.0;
-# after that the loader's
-# layout hash still has the last word.
+# after that the loader's layout hash still has the last word.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/generated/crtConfigVersion.cmake COMPATIBILITY
   SameMinorVersion)
 install(FILES

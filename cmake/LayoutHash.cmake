@@ -2,9 +2,8 @@
 #
 # A plugin reads the compiled scene as C structs, so core and plugin must have been built with the same
 # kernel/layout.h, kernel/channels.h and kernel/features.h. Their texts are hashed (SHA-256, first 64 bits)
-# into a header that both sides compile in; the loader refuses a
-# plugin that has another one. A changed comment changes the hash too: rebuilding is cheap, a misread scene
-# is not.
+# into a header that both sides compile in; the loader refuses a plugin that has another one. A changed
+# comment changes the hash too: rebuilding is cheap, a misread scene is not.
 #
 # Writes ${CMAKE_BINARY_DIR}/generated/backend/crt_layout_hash.h.
 

@@ -6,10 +6,8 @@
 #   crt-portable-tests.tar.gz  the conformance suite and its reference backend, to be unpacked over the first
 #
 # Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's.
-# OpenImageIO and the 250 libraries it brings
-# stay behind, being larger than all the rest: images are written as .pfm and .ppm, not .exr and .png. The
-# GPU's driver and NVRTC are the
-# machine's own.
+# OpenImageIO and the 250 libraries it brings stay behind, being larger than all the rest: images are written
+# as .pfm and .ppm, not .exr and .png. The GPU's driver and NVRTC are the machine's own.
 #
 # Run as a script (cmake -P) it makes the archives from a build tree; the target does so with everything
 # built.

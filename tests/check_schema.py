@@ -4,8 +4,7 @@
     check_schema.py CRT_PROGRAM CONFIG_DIR
 
 The schema is for editors; this keeps it from refusing what the program accepts. A few broken scenes make
-sure that it
-refuses anything at all. Needs python3-jsonschema and python3-yaml.
+sure that it refuses anything at all. Needs python3-jsonschema and python3-yaml.
 """
 
 import json

@@ -1,6 +1,6 @@
 # What leaves the build tree runs without it: crt as `cmake --install` puts it, moved, and crt as the target
-# `portable` packs it, unpacked. Both
-# render with an empty environment from a folder that has nothing to do with them.
+# `portable` packs it, unpacked. Both render with an empty environment from a folder that has nothing to do
+# with them.
 #
 #   cmake -DMODE=install|portable -DBUILD_DIR=… -DWORK_DIR=… [-DSTRIP=… -DREFERENCE_BACKEND=…
 #   -DPORTABLE_SCRIPT=…] -P installed_tree.cmake

@@ -1,8 +1,7 @@
 # The road of somebody whose program renders with libcrt: install crt, move the tree to where he wants it,
-# build docs/example_program against it
-# by find_package and by pkg-config, run it from elsewhere with an empty environment, and look at the image.
-# Nothing of the source or build tree
-# of crt is used after the install.
+# build docs/example_program against it by find_package and by pkg-config, run it from elsewhere with an
+# empty environment, and look at the image. Nothing of the source or build tree of crt is used after the
+# install.
 #
 #   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=… [-DCXX_FLAGS=…]
 #   [-DPKG_CONFIG=…] -P out_of_tree_program.cmake

@@ -228,8 +228,8 @@ TEST_CASE("images of other exposure, white balance or colour space are not compa
         CHECK_THAT(compareText(supposed), Contains("note") && Contains(supposed.notes[0]));
         CHECK(nlohmann::json::parse(compareJson(supposed))["notes"].size() == 1);
         CHECK(supposed.same);
-        REQUIRE(supposed.looks);
-        CHECK(supposed.looks->delta_e_max == 0);
+        REQUIRE(supposed.perceived);
+        CHECK(supposed.perceived->delta_e_max == 0);
         CHECK(compareWithReference(silent, silent, *other, false).notes.size() == 2);
         CHECK(compareImages(silent, plain).notes.empty());
     }

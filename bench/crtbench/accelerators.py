@@ -1,6 +1,5 @@
 """Ways to find what a ray hits: a loop over all triangles, a box around every object, a BVH. And from how
-many triangles on the BVH is faster
-than the loop: kBruteForceTriangles in core/compile/accelerator.h."""
+many triangles on the BVH is faster than the loop: kBruteForceTriangles in core/compile/accelerator.h."""
 
 import math
 import random

@@ -1,6 +1,6 @@
 """Paths and rays per second on the processor, all threads: the Cornell box at 1440 × 1440 with independent
-samples and no roulette, and a mesh of
-100,000 triangles at 400 × 400 with Sobol samples. With and without what it costs to begin."""
+samples and no roulette, and a mesh of 100,000 triangles at 400 × 400 with Sobol samples. With and without
+what it costs to begin."""
 
 from .program import Failure, Spread, significant
 from .results import Results

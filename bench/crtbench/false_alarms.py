@@ -1,10 +1,7 @@
 """How often statements of `crt converge` are wrong where the truth is known by construction. The rows are
-not
-rendered: they are progressive means of normal samples, pixel by pixel, of known variance, bias and cost,
-against a
-reference that is exact or has eight noisy folds; they go through the same analysis and the same sentences
-as rows of
-renders. Nothing is timed: it may run on a busy machine."""
+not rendered: they are progressive means of normal samples, pixel by pixel, of known variance, bias and cost,
+against a reference that is exact or has eight noisy folds; they go through the same analysis and the same
+sentences as rows of renders. Nothing is timed: it may run on a busy machine."""
 
 import json
 import math

@@ -1,8 +1,6 @@
-"""What leaving out saves: the kernel that has just what the scene needs against the one that has
-everything, and against the same kernel
-with one feature more, for every feature. The one feature more comes through CRT_KERNEL_DIR: a copy of the
-kernel texts in which every kernel
-has it."""
+"""What leaving out saves: the kernel that has just what the scene needs against the one that has everything,
+and against the same kernel with one feature more, for every feature. The one feature more comes through
+CRT_KERNEL_DIR: a copy of the kernel texts in which every kernel has it."""
 
 from .nvrtc import variants
 from .program import Spread, feature_bits, significant

@@ -1,14 +1,12 @@
 """Mitsuba 3 as a process that the measurement talks to: one JSON object a line in, one out. Runs under a
-Python that has mitsuba and numpy; nothing of crt
-is imported here.
+Python that has mitsuba and numpy; nothing of crt is imported here.
 
     {"do": "describe"} → versions, constants, CIE tables as Mitsuba evaluates them
     {"do": "render", "sampler": …, "spp": …, "seed": …, "roulette": …, "image": path.npy}
         → seconds, cpu_seconds, spp, mean
 
 Seconds are those of mi.render with its evaluation and synchronisation, on a scene that is loaded; every
-setting is rendered once, untimed, with another seed
-before it is timed, so that kernels are compiled."""
+setting is rendered once, untimed, with another seed before it is timed, so that kernels are compiled."""
 
 import json
 import os

@@ -1,6 +1,6 @@
 """What bench/peers needs beside crt: a Python with mitsuba, numpy and PyYAML, and an LLVM that Mitsuba's
-compiler accepts. Both are put into out/ when they are
-missing; nothing of them is ever part of the product. The measurement then runs under that Python."""
+compiler accepts. Both are put into out/ when they are missing; nothing of them is ever part of the product.
+The measurement then runs under that Python."""
 
 import argparse
 import os

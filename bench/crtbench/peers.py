@@ -2,9 +2,8 @@
 run, one machine, everything interleaved.
 
 The error of a setting with N samples is the root of the mean over pixels and renders of the squared
-difference in luminance from a converged image, over
-the mean luminance; the converged image's own variance is taken off. The spread between seeds would need no
-reference, but it is blind to what all seeds have in
+difference in luminance from a converged image, over the mean luminance; the converged image's own variance
+is taken off. The spread between seeds would need no reference, but it is blind to what all seeds have in
 common, and a low-discrepancy sampler that is scrambled alike for every seed has much of its error there."""
 
 import json

@@ -240,8 +240,8 @@ class Program:
 
     def kernels_with(self, extra, masks):
         """A copy of the kernel texts, for CRT_KERNEL_DIR, in which a kernel with one of the masks has the
-        feature `extra` as well. Kernels with other
-        masks, which were not asked for, have nothing at all, so that they compile fast."""
+        feature `extra` as well. Kernels with other masks, which were not asked for, have nothing at all, so
+        that they compile fast."""
         directory = self.scratch / f"kernel-{extra:05x}"
         if directory.exists():
             return directory

@@ -1,13 +1,11 @@
 """Renders every scene in many ways and compares the images bit by bit, all channels. The reference is the
-OpenCL backend with its defaults;
-variations of Embree (threads, tiles, resumed, merged) are compared with Embree's own image.
+OpenCL backend with its defaults; variations of Embree (threads, tiles, resumed, merged) are compared with
+Embree's own image.
 
 The images are half of it: the films, double sums of every pixel, are compared too. Where Embree's differ,
-both backends render every sample
-number alone and the samples that differ are counted. Between the fast backends all samples are compared;
-backends of one thread, and variations of
-one backend, which a quarter of the samples shows as well, have fewer. Times nothing, so it needs no quiet
-machine.
+both backends render every sample number alone and the samples that differ are counted. Between the fast
+backends all samples are compared; backends of one thread, and variations of one backend, which a quarter of
+the samples shows as well, have fewer. Times nothing, so it needs no quiet machine.
 """
 
 import ctypes
@@ -30,8 +28,8 @@ FILM_BOUND = (
 
 class FilmDifference:
     """How two films differ. `pixels`: whose sums, count or primitive differ in any bit; `exact_pixels`:
-    whose count or primitive differs; `relative`: the largest
-    difference of two sums, hi + lo, over the larger of them."""
+    whose count or primitive differs; `relative`: the largest difference of two sums, hi + lo, over the
+    larger of them."""
 
     def __init__(self, pixels=0, exact_pixels=0, relative=0.0):
         self.pixels, self.exact_pixels, self.relative = pixels, exact_pixels, relative
@@ -247,8 +245,8 @@ class Images:
 
 def beyond_promise(result):
     """Two backends may differ in one sample of a million; where no sample differs, nothing else may: not
-    the image, and not the film, but for the last words of
-    sums whose samples were added up in another order."""
+    the image, and not the film, but for the last words of sums whose samples were added up in another
+    order."""
     if result.get("differing_samples", 0) > 0:
         return result["differing_samples"] > SAMPLE_BOUND * result["samples"]
     film = result["film_beyond_promise"] if result["reordered"] else result["differing_film_pixels"] > 0

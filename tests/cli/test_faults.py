@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 """What happens to the program from outside: killed at any moment, disks that fill up or turn read-only,
-backends that hang, lie or lose their device, and
-storms of signals. Always the same demand: what was saved stays, and the exit code and one sentence say what
-happened (docs/architecture.md).
+backends that hang, lie or lose their device, and storms of signals. Always the same demand: what was saved
+stays, and the exit code and one sentence say what happened (docs/architecture.md).
 
     test_faults.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 

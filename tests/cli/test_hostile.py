@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 """What must not be able to harm crt: some 490 inputs and 70 faults, each with what happens. Always the same
-demand: an exit code of the documented ones and the
-right one, a message that says why, no crash, no hang, no memory that the input does not account for, and
-every file that was there still there.
+demand: an exit code of the documented ones and the right one, a message that says why, no crash, no hang, no
+memory that the input does not account for, and every file that was there still there.
 
     test_hostile.py CRT FAKE_PLUGIN_DIR [--write docs/results/hostile.md] [--only TEXT] [--slower FACTOR]
 

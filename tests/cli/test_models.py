@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Models of other people, from outside: what is said about a mesh without materials or of another format,
-and that McGuire's Cornell box
-has the luminance that Mitsuba 3 gives to the same numbers.
+and that McGuire's Cornell box has the luminance that Mitsuba 3 gives to the same numbers.
 
     test_models.py CRT CONFIG_DIR FAKE_PLUGIN_DIR REPOSITORY BACKEND [unittest arguments]
 

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """What people wait for: loading and building say how far they are and can be stopped, times add up, nothing
-is built that
-is never read, and checkpoints are small and written beside the render.
+is built that is never read, and checkpoints are small and written beside the render.
 
     test_waiting.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 

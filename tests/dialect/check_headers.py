@@ -4,9 +4,8 @@
     check_headers.py cxx|cuda|opencl COMPILER KERNEL_FOLDER
 
 Syntax and types only. A header that leans on another without including it, or that strays from the common
-subset of C++17, CUDA C++ and
-OpenCL C 1.2, fails here with its name. Exit code 77, which ctest shows as skipped, where the compiler is
-missing.
+subset of C++17, CUDA C++ and OpenCL C 1.2, fails here with its name. Exit code 77, which ctest shows as
+skipped, where the compiler is missing.
 """
 
 import pathlib

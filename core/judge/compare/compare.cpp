@@ -109,8 +109,9 @@ void addLooks(CompareResult& result, const Image& a, const Image& b, bool displa
     const auto seen_b = linearSrgb(b, b.chromaticities ? b.chromaticities : a.chromaticities);
     if (!seen_a || !seen_b) return;
     // Same colours look the same; the answer is known without seconds of FLIP.
-    result.looks = *seen_a == *seen_b ? Looks{0, !display_referred, 0, 0}
-                                      : compareLooks(*seen_a, *seen_b, a.width, a.height, display_referred);
+    result.perceived = *seen_a == *seen_b
+                           ? PerceivedDifference{0, !display_referred, 0, 0}
+                           : perceivedDifference(*seen_a, *seen_b, a.width, a.height, display_referred);
 }
 
 /// Why pixels of two crop windows of one picture do not belong together; empty when they do, or when one

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "film/film.h"
-#include "judge/compare/compare_looks.h"
+#include "judge/compare/perceived_difference.h"
 
 #include <array>
 #include <cstdint>
@@ -67,7 +67,8 @@ struct CompareResult {
     /// The error as crt states it everywhere (stats/luminance_error.h): of luminance, relative to b's mean
     /// luminance. With R, G and B only.
     std::optional<double> relative_rmse;
-    std::optional<Looks> looks;  ///< When both have R, G and B of known primaries, and metrics are valid.
+    /// When both have R, G and B of known primaries, and metrics are valid.
+    std::optional<PerceivedDifference> perceived;
     std::vector<std::string> other_channels;  ///< In one image only; they do not matter unless all_channels.
 };
 

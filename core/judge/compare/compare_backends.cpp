@@ -56,9 +56,9 @@ private:
 };
 
 /// A backend with its device, and what it renders of one scene with any seed.
-class Contestant {
+class SeededRenderer {
 public:
-    Contestant(const std::string& name, const Scene& scene, SharedProgress& progress)
+    SeededRenderer(const std::string& name, const Scene& scene, SharedProgress& progress)
         : session_(loadBackend(name)), scene_(scene), progress_(progress) {
         session_.openDevice();
     }
@@ -111,18 +111,18 @@ std::uint64_t seedAfter(std::uint64_t seed, std::uint64_t index) {
 
 /// With the scene's seed, and then with as many others as there are replicates, no two backends with the
 /// same.
-Renders renderAll(Contestant& contestant, const Scene& scene, const BackendComparison& plan,
+Renders renderAll(SeededRenderer& renderer, const Scene& scene, const BackendComparison& plan,
                   std::size_t backend) {
     Renders renders{
-        resolveImage(contestant.render(plan.seed, plan.samples), developmentOf(scene).forFloats(), 0),
+        resolveImage(renderer.render(plan.seed, plan.samples), developmentOf(scene).forFloats(), 0),
         {plan.width, plan.height, kColors},
         {},
         0};
     for (std::uint64_t r = 0; r < plan.replicates; ++r)
         renders.replicates.add(
-            colorsOf(contestant.render(seedAfter(plan.seed, backend * plan.replicates + r), plan.samples)));
-    renders.device = contestant.device();
-    renders.invalid_samples = contestant.invalidSamples();
+            colorsOf(renderer.render(seedAfter(plan.seed, backend * plan.replicates + r), plan.samples)));
+    renders.device = renderer.device();
+    renders.invalid_samples = renderer.invalidSamples();
     return renders;
 }
 
@@ -188,17 +188,17 @@ BackendComparison compareBackends(const Scene& scene, const BackendComparisonOpt
     SharedProgress progress(watch, renders * result.samples, std::uint64_t{result.width} * result.height);
 
     // All are opened first: a missing one must be reported at once, not after a minute.
-    std::vector<Contestant> contestants;
-    contestants.reserve(options.backends.size());
-    for (const std::string& name : options.backends) contestants.emplace_back(name, scene, progress);
+    std::vector<SeededRenderer> renderers;
+    renderers.reserve(options.backends.size());
+    for (const std::string& name : options.backends) renderers.emplace_back(name, scene, progress);
 
-    const std::size_t last = contestants.size() - 1;
-    const Renders reference = renderAll(contestants[last], scene, result, last);
+    const std::size_t last = renderers.size() - 1;
+    const Renders reference = renderAll(renderers[last], scene, result, last);
     result.reference_device = reference.device;
     for (std::size_t i = 0; i < last; ++i) {
         BackendAgainst& against = result.backends.emplace_back();
         against.backend = options.backends[i];
-        judge(against, renderAll(contestants[i], scene, result, i), reference, result.gate, result.samples);
+        judge(against, renderAll(renderers[i], scene, result, i), reference, result.gate, result.samples);
     }
     result.seconds = progress.seconds();
     return result;

@@ -4,7 +4,7 @@
 #include "base/statistics.h"
 #include "film/luminance_error.h"
 #include "image/image_metadata.h"
-#include "judge/compare/compare_looks.h"
+#include "judge/compare/perceived_difference.h"
 #include "judge/compare/image_noise.h"
 
 #include <fmt/format.h>
@@ -57,7 +57,7 @@ constexpr std::array<NamedMetric, 8> kMetrics{
 /// FLIP against eight more references of this many pixels takes seconds; beyond, its spread is left out.
 constexpr std::size_t kMostPixelsForFlipSpread = 1 << 16;
 
-/// Colours in the file's space for errors, in sRGB for looks.
+/// Colours in the file's space for errors, in sRGB for perceived differences.
 struct Colors {
     std::vector<float> values, luminances;
     std::optional<std::vector<float>> srgb;
@@ -68,10 +68,10 @@ ReferenceError errorAgainst(const Colors& test, const Colors& reference,
                             std::uint32_t height, bool display_referred) {
     ReferenceError error;
     error.metrics = stats::errorMetrics(test.values, reference.values);
-    const bool looks = test.srgb && reference.srgb && error.metrics.valid();
+    const bool comparable = test.srgb && reference.srgb && error.metrics.valid();
     const auto nan = std::numeric_limits<double>::quiet_NaN();
-    Looks seen{nan, !display_referred, nan, nan};
-    if (looks) seen = compareLooks(*test.srgb, *reference.srgb, width, height, display_referred);
+    PerceivedDifference seen{nan, !display_referred, nan, nan};
+    if (comparable) seen = perceivedDifference(*test.srgb, *reference.srgb, width, height, display_referred);
     for (const NamedMetric& m : kMetrics) (error.*m.to).value = error.metrics.*m.from;
     const auto relativeRmse = [&](const Colors& r) {
         return stats::luminanceError(test.luminances, r.luminances).relative_rmse;
@@ -92,10 +92,11 @@ ReferenceError errorAgainst(const Colors& test, const Colors& reference,
         for (const stats::ErrorMetrics& e : left_out) values.push_back(e.*m.from);
         (error.*m.to).spread = jackknifeError(values);
     }
-    if (!looks || std::size_t{width} * height > kMostPixelsForFlipSpread) return error;
+    if (!comparable || std::size_t{width} * height > kMostPixelsForFlipSpread) return error;
     std::vector<double> flips, means, largest;
     for (const Colors& r : without_fold) {
-        const Looks l = compareLooks(*test.srgb, *r.srgb, width, height, display_referred);
+        const PerceivedDifference l =
+            perceivedDifference(*test.srgb, *r.srgb, width, height, display_referred);
         flips.push_back(l.flip_mean);
         means.push_back(l.delta_e_mean);
         largest.push_back(l.delta_e_max);

@@ -57,8 +57,8 @@ void addMetricLines(Lines& lines, const CompareResult& r) {
     lines.add("SMAPE", number(r.smape));
     lines.add("mean",
               fmt::format("{} and {}, ratio {:.9g}", number(r.mean[0]), number(r.mean[1]), r.mean_ratio));
-    if (!r.looks) return;
-    const Looks& l = *r.looks;
+    if (!r.perceived) return;
+    const PerceivedDifference& l = *r.perceived;
     lines.add(l.high_range ? "HDR-FLIP" : "LDR-FLIP",
               std::isnan(l.flip_mean) ? "undefined: B is black"
                                       : number(l.flip_mean) + " (0 looks the same, 1 is the most)");
@@ -274,11 +274,11 @@ Json resultJson(const CompareResult& r) {
                            {"smape", r.smape},
                            {"mean", r.mean},
                            {"mean_ratio", r.mean_ratio}};
-    if (r.looks) {
-        json["metrics"]["flip"] = r.looks->flip_mean;
-        json["metrics"]["flip_kind"] = r.looks->high_range ? "HDR" : "LDR";
-        json["metrics"]["delta_e_2000_mean"] = r.looks->delta_e_mean;
-        json["metrics"]["delta_e_2000_max"] = r.looks->delta_e_max;
+    if (r.perceived) {
+        json["metrics"]["flip"] = r.perceived->flip_mean;
+        json["metrics"]["flip_kind"] = r.perceived->high_range ? "HDR" : "LDR";
+        json["metrics"]["delta_e_2000_mean"] = r.perceived->delta_e_mean;
+        json["metrics"]["delta_e_2000_max"] = r.perceived->delta_e_max;
     }
     return json;
 }

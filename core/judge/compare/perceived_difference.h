@@ -10,7 +10,7 @@
 
 namespace crt {
 
-struct Looks {
+struct PerceivedDifference {
     double flip_mean = 0;  ///< Andersson et al. 2020 and 2021, in [0, 1]. NaN against black where exposures
                            ///< are chosen by the reference.
     bool high_range = false;  ///< HDR-FLIP, over all exposures that the reference asks for; else LDR-FLIP.
@@ -24,7 +24,7 @@ std::optional<std::vector<float>> linearSrgb(const Image& image,
 
 /// Values as linearSrgb gives them, all finite. `display_referred`: both are as a screen shows them, as PNG
 /// files are; else they are radiances.
-Looks compareLooks(std::span<const float> test, std::span<const float> reference, std::uint32_t width,
-                   std::uint32_t height, bool display_referred);
+PerceivedDifference perceivedDifference(std::span<const float> test, std::span<const float> reference,
+                                        std::uint32_t width, std::uint32_t height, bool display_referred);
 
 }  // namespace crt

@@ -1,4 +1,4 @@
-#include "judge/compare/compare_looks.h"
+#include "judge/compare/perceived_difference.h"
 
 #include "base/error.h"
 #include "image/image_io.h"
@@ -38,8 +38,8 @@ std::optional<std::vector<float>> linearSrgb(const Image& image,
     return values;
 }
 
-Looks compareLooks(std::span<const float> test, std::span<const float> reference, std::uint32_t width,
-                   std::uint32_t height, bool display_referred) {
+PerceivedDifference perceivedDifference(std::span<const float> test, std::span<const float> reference,
+                                        std::uint32_t width, std::uint32_t height, bool display_referred) {
     const stats::RgbView a{test, width, height}, b{reference, width, height};
     const stats::ColorDifference color = stats::deltaE2000(a, b);
     const double flip = display_referred ? stats::flipLdr(a, b).mean : stats::flipHdr(a, b).mean;
