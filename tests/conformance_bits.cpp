@@ -78,6 +78,7 @@ struct Case {
     const char* sampler;
     const char* camera_extra;
     const char* filter;
+    bool sampled_environment = false;
 };
 
 // Together every feature bit, sampler, accelerator and view: asserted below.
@@ -89,6 +90,8 @@ const Case kCases[] = {
      "blackman-harris"},
     {"{type: normals, accelerator: bvh}", "{type: sobol}", "", "box"},
     {"{type: aabb}", "{type: sobol}", "", "box"},
+    {"{max_depth: 12}", "{type: sobol}", "", "box", true},
+    {"{max_depth: 4, accelerator: bvh}", "{type: independent}", "", "box", true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -122,12 +125,19 @@ struct Named {
 };
 
 crt::Scene sceneOf(const Case& c) {
-    return sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter));
+    crt::Scene scene = sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter));
+    scene.environment->light_sampling = c.sampled_environment;
+    return scene;
 }
 
 std::vector<Named> allScenes() {
-    const char* const names[] = {"sobol", "tree, independent, lens, gaussian",
-                                 "boxes, xorshift, blackman-harris", "normals", "boxes"};
+    const char* const names[] = {"sobol",
+                                 "tree, independent, lens, gaussian",
+                                 "boxes, xorshift, blackman-harris",
+                                 "normals",
+                                 "boxes",
+                                 "sampled environment",
+                                 "sampled environment, tree, independent"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

@@ -64,7 +64,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     std::size_t occluders = 0;
     const bool shows_boxes = scene.integrator.type == IntegratorType::Aabb;
     if (accelerator.kind == CRT_ACCELERATOR_BRUTE_FORCE && !shows_boxes) {
-        const std::vector<std::uint32_t> occluding = occludersOf(flat);
+        const std::vector<std::uint32_t> occluding =
+            samplesEnvironment(scene) ? accelerator.id_of_slot : occludersOf(flat);
         occluders = occluding.size();
         header.triangles8 = blob.append(compileTriangles8(flat, accelerator.id_of_slot));
         header.occluders8 = blob.append(compileTriangles8(flat, occluding));
@@ -78,6 +79,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 
     const LightPart lights = compileLights(scene, flat, emitting, accelerator, spectra);
     header.lights = blob.append(lights.lights);
+    header.environment_light = lights.environment;
     if (lights.lights.empty() && !scene.environment && scene.integrator.type == IntegratorType::Path)
         logWarning(
             "the scene has no light: the image will be black "

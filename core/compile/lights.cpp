@@ -4,7 +4,9 @@
 #include "compile/distributions.h"
 #include "compile/geometry.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 namespace crt {
@@ -37,9 +39,27 @@ std::optional<std::uint32_t> parallelogramCorner(const FlatScene& flat, std::siz
 }
 
 /// By luminance, but never zero for a lamp that the eye hardly sees: the film keeps all of XYZ.
-double brightness(const Emission& emission) {
-    const Vec3d xyz = spectrumToXyz(emission.radiance);
-    return xyz[0] + xyz[1] + xyz[2] + 1e-6 * emission.radiance.max();
+double brightness(const Spectrum& radiance) {
+    const Vec3d xyz = spectrumToXyz(radiance);
+    return xyz[0] + xyz[1] + xyz[2] + 1e-6 * radiance.max();
+}
+
+/// Area of the sphere around the scene: as much light of the environment enters it as a lamp of this area
+/// sends.
+double areaAround(const FlatScene& flat) {
+    Vec3d lower{}, upper{};
+    for (std::size_t i = 0; i < flat.triangles.size(); ++i)
+        for (std::size_t corner = 0; corner < 3; ++corner) {
+            const Vec3d v = vertexOf(flat, i, corner);
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                const bool first = i == 0 && corner == 0;
+                lower[axis] = first ? v[axis] : std::min(lower[axis], v[axis]);
+                upper[axis] = first ? v[axis] : std::max(upper[axis], v[axis]);
+            }
+        }
+    const Vec3d diagonal = upper - lower;
+    // 4 π r², and something where all lies in one point.
+    return std::max(std::numbers::pi * dot(diagonal, diagonal), 1e-12);
 }
 
 }  // namespace
@@ -84,7 +104,7 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         if (part.light_of[i] != CRT_NONE) continue;  // the other half of a parallelogram
         const Emission& emission = emissionOf(scene, flat.triangles[i]);
         std::optional<Shared>& own = shared[static_cast<std::size_t>(flat.triangles[i].emission)];
-        if (!own) own = {spectra.valueOf(emission.radiance), brightness(emission)};
+        if (!own) own = {spectra.valueOf(emission.radiance), brightness(emission.radiance)};
         double area = areaOf(flat, i);
         kernel::CrtLight light{};
         light.slot = accelerator.slot_of_id[i];
@@ -101,6 +121,14 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         part.lights.push_back(light);
         power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
     }
+    if (samplesEnvironment(scene)) {
+        kernel::CrtLight light{};
+        light.kind = CRT_LIGHT_ENVIRONMENT;
+        light.radiance = spectra.valueOf(scene.environment->radiance);
+        part.lights.push_back(light);
+        part.environment = static_cast<std::uint32_t>(part.lights.size());
+        power.push_back(areaAround(flat) * brightness(scene.environment->radiance));
+    }
     const std::vector<std::uint64_t> first = choiceTable(power);
     for (std::size_t i = 0; i < part.lights.size(); ++i) {
         part.lights[i].choice = static_cast<std::uint32_t>(first[i]);
@@ -108,6 +136,11 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
             static_cast<float>(std::ldexp(static_cast<double>(first[i + 1] - first[i]), -32));
     }
     return part;
+}
+
+bool samplesEnvironment(const Scene& scene) {
+    const Spectrum* radiance = spectrumOfEnvironment(scene);
+    return radiance != nullptr && scene.environment->light_sampling && radiance->max() > 0;
 }
 
 const Spectrum* spectrumOfEnvironment(const Scene& scene) {

@@ -24,10 +24,14 @@ std::vector<const Spectrum*> spectraOfLights(const Scene& scene, const FlatScene
 struct LightPart {
     std::vector<kernel::CrtLight> lights;
     std::vector<std::uint32_t> light_of;  ///< By primitive id: index of its light, or CRT_NONE.
+    std::uint32_t environment = 0;        ///< 1 + the index of its light; 0: it has none.
 };
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
                         const SpectrumTable& spectra);
+
+/// Whether the environment is among the lights: shadow rays then leave the scene.
+bool samplesEnvironment(const Scene& scene);
 
 /// The spectrum of the environment, where there is one and the view shows it; otherwise null.
 const Spectrum* spectrumOfEnvironment(const Scene& scene);

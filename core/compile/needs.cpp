@@ -32,11 +32,13 @@ std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     // The albedo of first hits is a material's, even where nothing is scattered.
     if (scatters(scene) || (header.aovs & kAovAlbedo) != 0) f |= materials.features;
     need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
-    need(header.lights.count > 0, CRT_FEATURE_AREA_LIGHT);
+    const bool samples_environment = header.environment_light != 0;
+    need(header.lights.count > (samples_environment ? 1u : 0u), CRT_FEATURE_AREA_LIGHT);
     need(scatters(scene) && header.lights.count > 0 && header.nee &&
              (materials.features & CRT_FEATURES_LOBE) != 0,
          CRT_FEATURE_NEE);
     need(header.environment != CRT_NONE, CRT_FEATURE_ENVIRONMENT);
+    need((f & CRT_FEATURE_NEE) != 0 && samples_environment, CRT_FEATURE_ENVIRONMENT_LIGHT);
     need(header.spectra.count > 0, CRT_FEATURE_TABLE);
     need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
     need(header.filter.count > 0, CRT_FEATURE_FILTER);
@@ -75,6 +77,10 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
                  !header.nee ? "integrator.nee is false"
                              : "no surface that scatters in all directions can be lit by an emitter");
     if (!has(CRT_FEATURE_ENVIRONMENT)) left_out("environment", "there is none");
+    if (has(CRT_FEATURE_ENVIRONMENT) && !has(CRT_FEATURE_ENVIRONMENT_LIGHT))
+        left_out("light sampling of the environment",
+                 header.environment_light == 0 ? "environment.light_sampling is false"
+                                               : "nothing that light sampling could light");
     if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
     if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
     if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");

@@ -75,7 +75,8 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
     const CrtLight* lights = CRT_ARRAY(CrtLight, blob, header.lights);
     const CrtTriangle* triangles = CRT_ARRAY(CrtTriangle, blob, header.triangles);
     std::vector<CrtLight> by_id(lights, lights + header.lights.count);
-    for (CrtLight& light : by_id) light.slot = triangles[light.slot].id;
+    for (CrtLight& light : by_id)
+        if (light.kind != CRT_LIGHT_ENVIRONMENT) light.slot = triangles[light.slot].id;
     hash.add(by_id.data(), by_id.size(), sizeof(CrtLight));
     return hash.digits();
 }

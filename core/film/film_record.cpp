@@ -174,7 +174,10 @@ SceneTrait lightsTrait(const Scene& scene) {
         digest.add(emission.two_sided);
         digest.add(emission.radiance);
     }
-    if (scene.environment) digest.add(scene.environment->radiance);
+    if (scene.environment) {
+        digest.add(scene.environment->radiance);
+        if (scene.environment->light_sampling) digest.add(true);
+    }
     return {
         "the light",
         fmt::format("{}, {} environment", counted(scene.emissions.size(), "kind of lamp", "kinds of lamp"),

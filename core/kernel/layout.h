@@ -123,6 +123,7 @@ CRT_ASSERT_SIZE(CrtMaterial, 32);
 
 #define CRT_LIGHT_TRIANGLE 0u
 #define CRT_LIGHT_PARALLELOGRAM 1u /* two triangles */
+#define CRT_LIGHT_ENVIRONMENT 2u   /* from far away: no slot, no area */
 
 #define CRT_LIGHT_TWO_SIDED 1u
 
@@ -214,7 +215,8 @@ typedef struct CrtScene {
     CrtSeed seed;
 
     u32 triangle_count;
-    u32 padding[3];
+    u32 environment_light; /* 1 + the index of its CrtLight; 0: light sampling leaves it to scattered rays */
+    u32 padding[2];
 
     CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
     CrtSpan faces;               /* CrtFace, by slot */

@@ -1,9 +1,10 @@
 /*
- * light.h: sampling the lights: crt_light_choose, crt_light_sample and crt_light_pdf. One emissive triangle,
- * or two that make a parallelogram, is one light, chosen by power. How a point on it is found is decided by
- * the shaded point and the light alone, in crt_light_view, which sampling and the pdf both ask: uniformly in
- * solid angle where it is seen large, else uniformly on its area; where neither works, scattered rays alone
- * find it.
+ * light.h: sampling the lights: crt_light_choose, then crt_light_sample and crt_light_pdf for emitters,
+ * crt_environment_sample and crt_environment_pdf for what lies around. One emissive triangle, or two that
+ * make a parallelogram, is one light, chosen by power, and so is the environment where the scene asks for
+ * it. How a point on it is found is decided by the shaded point and the light alone, in crt_light_view,
+ * which sampling and the pdf both ask: uniformly in solid angle where it is seen large, else uniformly on
+ * its area; where neither works, scattered rays alone find it.
  */
 #ifndef CRT_LIGHT_H
 #define CRT_LIGHT_H
@@ -288,6 +289,28 @@ CRT_FN CrtLightSeen crt_light_pdf(const CrtContext *ctx, u32 index, vec3 p, f32 
     seen.cosine = crt_abs(view.height) / distance;
     seen.pdf = light->choice_probability * crt_light_density(view, shape.area, seen.cosine, distance);
     return seen;
+}
+
+/* The environment among the lights. Of one that is the same in every direction nothing is known but that
+ * what arrives counts by its cosine with the shading normal ns, on the side of w_o: directions are sampled
+ * by it. What is transmitted is left to scattered rays. */
+typedef struct CrtEnvironmentSample {
+    vec3 wi; /* unit */
+    f32 pdf; /* per steradian, with the probability of choosing the environment; 0: none */
+} CrtEnvironmentSample;
+
+/* pdf of a direction with the cosine `cos_s` with ns. */
+CRT_FN f32 crt_environment_pdf(const CrtContext *ctx, f32 cos_s) {
+    CRT_GLOBAL const CrtLight *lights = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights);
+    return lights[ctx->scene->environment_light - 1u].choice_probability * crt_lambert(cos_s);
+}
+
+CRT_FN CrtEnvironmentSample crt_environment_sample(const CrtContext *ctx, CrtSampler *sampler, u32 dimension,
+                                                   vec3 ns) {
+    CrtEnvironmentSample s;
+    s.wi = crt_cosine_direction(ns, crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT));
+    s.pdf = crt_environment_pdf(ctx, dot3(s.wi, ns));
+    return s;
 }
 
 /* Veach's power heuristic for one sample of each of two techniques, by the ratio of the other's probability

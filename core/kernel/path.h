@@ -31,7 +31,8 @@ typedef struct CrtPath {
     vec4 throughput;
     vec4 radiance;
     f32 scatter_pdf;  /* of the direction that led here; 0: camera or delta, no light sampling competes */
-    f32 scatter_cosine; /* |cos| of that direction with the shading normal, where scatter_pdf is above 0 */
+    f32 scatter_cosine; /* of that direction with the shading normal on the side of w_o, where scatter_pdf is
+                           above 0 */
     vec3 p;           /* where it was scattered: a clearance off the ray's origin */
     f32 eta_square;   /* product of squared relative indices crossed: roulette must not see the n² of being
                          inside glass */
@@ -88,7 +89,7 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
             const f32 ratio = light.pdf / path->scatter_pdf * area;
             if (ctx->scene->nee == CRT_NEE_ONLY || !(ratio < 1e15f)) return;
             const f32 clearance = length3(path->ray.o - path->p);
-            const f32 cosines = (t + clearance / path->scatter_cosine) /
+            const f32 cosines = (t + clearance / crt_abs(path->scatter_cosine)) /
                                 distance; /* at p over that at the ray's origin */
             weight = area * cosines * crt_power_heuristic(ratio);
         }
@@ -96,6 +97,21 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
     path->radiance = path->radiance +
                      path->throughput *
                          crt_value(ctx, emitter->radiance, surface, path->wavelengths.position) * weight;
+}
+
+/* What a ray that meets nothing finds, weighted in the same way. */
+CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    f32 weight = 1.0f;
+    if (CRT_HAS(ENVIRONMENT_LIGHT) && scene->environment_light != 0u && scene->nee != CRT_NEE_NONE &&
+        path->scatter_pdf > 0.0f) {
+        const f32 pdf = crt_environment_pdf(ctx, path->scatter_cosine);
+        if (pdf > 0.0f && scene->nee == CRT_NEE_ONLY) return;
+        weight = crt_power_heuristic(pdf / path->scatter_pdf);
+    }
+    path->radiance = path->radiance +
+                     path->throughput * crt_value(ctx, scene->environment, 0, path->wavelengths.position) *
+                         weight;
 }
 
 /* A question that a vertex asks, and what it adds to the path's radiance if nothing is met. It is answered
@@ -106,10 +122,34 @@ typedef struct CrtShadow {
     vec4 radiance;
 } CrtShadow;
 
+/* Next event estimation: a direction of the environment. */
+CRT_FN void crt_ask_environment(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface,
+                                const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
+    const CrtEnvironmentSample sample =
+        crt_environment_sample(ctx, &path->sampler, dimension, bsdf->ns);
+    if (!(sample.pdf > 0.0f) || !(dot3(sample.wi, bsdf->ng) > 0.0f)) return;
+    if ((bsdf->flags & CRT_BSDF_REFLECTS) == 0u) return;
+    const vec4 scattered = crt_bsdf_eval(bsdf, sample.wi);
+    if (max4(scattered) == 0.0f) return;
+    shadow->asked = 1;
+    shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, bsdf->ng, sample.wi);
+    shadow->ray.d = sample.wi;
+    shadow->ray.reach = CRT_INFINITY;
+    f32 weight = 1.0f / sample.pdf;
+    if (ctx->scene->nee == CRT_NEE_MIS)
+        weight = weight * crt_power_heuristic(crt_bsdf_pdf(bsdf, sample.wi) / sample.pdf);
+    shadow->radiance = path->throughput * scattered *
+                       crt_value(ctx, ctx->scene->environment, 0, path->wavelengths.position) * weight;
+}
+
 /* Next event estimation: a light, and a ray towards it. */
 CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface,
                           const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
     const u32 index = crt_light_choose(ctx, &path->sampler, dimension);
+    if (CRT_HAS(ENVIRONMENT_LIGHT) && index + 1u == ctx->scene->environment_light) {
+        crt_ask_environment(ctx, path, surface, bsdf, dimension, shadow);
+        return;
+    }
     const CrtLightSample light = crt_light_sample(ctx, index, &path->sampler, dimension, surface->p);
     if (!(light.pdf > 0.0f)) return;
     const int before = dot3(light.wi, bsdf->ng) > 0.0f;
@@ -142,10 +182,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     shadow->asked = 0;
     if (hit.slot == CRT_NONE) {
-        if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE)
-            path->radiance = path->radiance +
-                             path->throughput * crt_value(ctx, scene->environment, 0,
-                                                          path->wavelengths.position);
+        if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE) crt_add_environment(ctx, path);
         return 0;
     }
     const CrtSurface surface = crt_surface(ctx, hit);
@@ -178,7 +215,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     }
     path->eta_square = path->eta_square * scatter.eta_square;
     path->scatter_pdf = scatter.pdf;
-    path->scatter_cosine = crt_abs(dot3(scatter.wi, bsdf.ns));
+    path->scatter_cosine = dot3(scatter.wi, bsdf.ns);
     path->p = surface.p;
     path->ray.o = crt_offset_origin(surface.p, surface.clearance, surface.ng, scatter.wi);
     path->ray.d = scatter.wi;

@@ -132,7 +132,8 @@ struct Object {
 };
 
 struct Environment {
-    Spectrum radiance;  ///< The same in every direction.
+    Spectrum radiance;            ///< The same in every direction.
+    bool light_sampling = false;  ///< Is it a light to sample, or left to scattered rays?
 };
 
 enum class OutputFormat { Exr, Png, Ppm, Pfm };

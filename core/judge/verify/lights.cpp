@@ -317,6 +317,82 @@ void enormousPdf(Context& context) {
                      {{0, "the lamp is lost: does its pdf, or the square of it, overflow?"}});
 }
 
+/// A floor in a black room with a square opening in its ceiling, at height 1 over the camera's point.
+Stage roomWithOpening(const std::string& floor, bool light_sampling, const std::string& integrator) {
+    return Stage("{position: [0.02, 0.05, 0], target: [0, 0, 0], fov: 0.01}", integrator)
+        .set("environment", fmt::format("{{radiance: 1, light_sampling: {}}}", light_sampling))
+        .material("floor", floor)
+        .material("black", "{type: diffuse, reflectance: 0}")
+        .quad("floor", "[[-4,0,-4],[-4,0,4],[4,0,4],[4,0,-4]]", "floor")
+        .quad("west", "[[-4,0,-4],[-4,1,-4],[-4,1,4],[-4,0,4]]", "black")
+        .quad("east", "[[4,0,-4],[4,0,4],[4,1,4],[4,1,-4]]", "black")
+        .quad("north", "[[-4,0,-4],[4,0,-4],[4,1,-4],[-4,1,-4]]", "black")
+        .quad("south", "[[-4,0,4],[-4,1,4],[4,1,4],[4,0,4]]", "black")
+        .quad("ceiling_west", "[[-4,1,-4],[-0.5,1,-4],[-0.5,1,4],[-4,1,4]]", "black")
+        .quad("ceiling_east", "[[0.5,1,-4],[4,1,-4],[4,1,4],[0.5,1,4]]", "black")
+        .quad("ceiling_north", "[[-0.5,1,-4],[0.5,1,-4],[0.5,1,-0.5],[-0.5,1,-0.5]]", "black")
+        .quad("ceiling_south", "[[-0.5,1,0.5],[0.5,1,0.5],[0.5,1,4],[-0.5,1,4]]", "black");
+}
+
+void environmentLight(Context& context) {
+    const std::string white = "{type: diffuse, reflectance: 1}";
+    const double opening = squareFormFactor(0, 0.5);
+    const std::vector<Mistake> mistakes = {
+        {opening * 2, "the environment counts twice: by light sampling, and in full by rays that miss"},
+        {opening / 2, "light sampling takes its share from rays that miss, and brings none itself"},
+        {1, "shadow rays that leave the scene meet nothing: are only those triangles tested that can come "
+            "between two points of it?"}};
+    for (const bool sampled : {true, false})
+        context.estimate(sampled ? "by light sampling and scattering" : "by scattering alone",
+                         roomWithOpening(white, sampled, kDirect).yaml(), meanRadiance, opening, 0.002,
+                         {.samples = 1024, .most = 65536}, mistakes);
+    context.estimate(
+        "the same with a BVH",
+        roomWithOpening(white, true, "{max_depth: 1, roulette: false, accelerator: bvh}").yaml(),
+        meanRadiance, opening, 0.002, {.samples = 1024, .most = 65536}, mistakes);
+
+    // With a lamp inside, light sampling chooses between the two.
+    const std::vector<Vec3d> lamp = {{0.8, 0.5, -0.2}, {1.2, 0.5, -0.2}, {1.2, 0.5, 0.2}, {0.8, 0.5, 0.2}};
+    const double both = opening + 2 * polygonFormFactor({0, 0, 0}, {0, 1, 0}, lamp);
+    const std::string lit = roomWithOpening(white, true, kDirect)
+                                .quad("lamp", "[[0.8,0.5,-0.2],[1.2,0.5,-0.2],[1.2,0.5,0.2],[0.8,0.5,0.2]]",
+                                      "black", "2")
+                                .yaml();
+    context.estimate("opening and lamp", lit, meanRadiance, both, 0.003, {.samples = 1024, .most = 65536},
+                     {{opening, "the lamp is lost"}});
+
+    // Open sky: light sampling and scattering draw from one density, so that each path brings albedo times
+    // the environment.
+    for (const bool sampled : {true, false}) {
+        const std::string sky =
+            Stage("{position: [0, 1, 0.5], target: [0, 0, 0], fov: 10}")
+                .set("environment", fmt::format("{{radiance: 1, light_sampling: {}}}", sampled))
+                .material("grey", "{type: diffuse, reflectance: 0.5}")
+                .quad("floor", "[[-4,0,-4],[-4,0,4],[4,0,4],[4,0,-4]]", "grey")
+                .yaml();
+        const Film film = context.render(sky, {.samples = 16});
+        const Film empty = context.render(
+            Stage("{position: [0, 1, 0.5], target: [0, 2, 0], fov: 10}")
+                .set("environment", "{radiance: 1}")
+                .material("grey", "{type: diffuse, reflectance: 0.5}")
+                .quad("floor", "[[-4,0,-4],[-4,0,4],[4,0,4],[4,0,-4]]", "grey")
+                .yaml(),
+            {.samples = 16});
+        context.relative(
+            fmt::format("an open sky, {}: the worst pixel", sampled ? "sampled" : "by scattering alone"),
+            worstRatio(film, empty, 0.5), 1, 2e-6);
+    }
+
+    if (!context.atLeast(Level::Merge)) return;
+    const JointMeasure ratio = [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); };
+    const std::string metal = "{type: rough_conductor, eta: 0.2, k: 3, roughness: 0.6}";
+    const std::string integrator = "{max_depth: 3, roulette: false}";
+    context.estimate("a floor of rough metal: with over without light sampling",
+                     {roomWithOpening(metal, true, integrator).yaml(),
+                      roomWithOpening(metal, false, integrator).yaml()},
+                     ratio, 1, 0.005, {.samples = 1024, .most = 65536});
+}
+
 }  // namespace
 
 std::vector<Case> lightCases() {
@@ -368,6 +444,12 @@ std::vector<Case> lightCases() {
             kDirectLight | CRT_FEATURE_DIELECTRIC, hiddenLamps),
         row("E14", "enormous-pdf", "A lamp of half side 1e-12 at distance 1", "1.2732395447e-24",
             "rectangle formula", "± 0.3 %", Level::Commit, kDirectLight, enormousPdf),
+        row("E15", "environment-light",
+            "A floor under a square opening in a black ceiling, the environment sampled as a light or not; "
+            "with a lamp beside it; under an open sky; of rough metal",
+            "the opening's form factor, and the lamp's; half of the sky in every pixel; ratio 1",
+            "rectangle formula, Lambert's polygon formula", "± 0.2 %, ± 0.3 %; 2e-6; ± 0.5 %", Level::Commit,
+            kDirectLight | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ROUGH_CONDUCTOR, environmentLight),
     };
 }
 

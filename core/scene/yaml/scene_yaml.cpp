@@ -348,8 +348,10 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
     if (const YamlNode* map = top.map("materials")) objects.readMaterials(*map);
     if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
     if (const auto section = top.section("environment", "environment"))
-        if (std::optional<Spectrum> radiance = spectra.read(*section, "radiance", SpectrumUse::Emission))
+        if (std::optional<Spectrum> radiance = spectra.read(*section, "radiance", SpectrumUse::Emission)) {
             scene.environment = Environment{*std::move(radiance)};
+            section->read("light_sampling", scene.environment->light_sampling);
+        }
     if (const YamlNode* list = top.list("outputs"))
         for (std::size_t i = 0; i < list->items.size(); ++i)
             readOutput(SectionReader(out, *list->items[i], list->items[i]->place, schemaSection("output"),
