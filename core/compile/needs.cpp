@@ -12,6 +12,11 @@
 namespace crt {
 namespace {
 
+// A sum of equal bits carries into another.
+#define CRT_FEATURE_SUM(bit, name, text) +(1ull << (bit))
+static_assert((0ull CRT_FEATURE_LIST(CRT_FEATURE_SUM)) == CRT_FEATURES_ALL, "two features share a bit");
+#undef CRT_FEATURE_SUM
+
 bool isPath(const Scene& scene) { return scene.integrator.type == IntegratorType::Path; }
 
 /// Whether light is ever scattered; if not, materials, light sampling and roulette have nothing to do.

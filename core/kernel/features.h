@@ -41,8 +41,8 @@
     F(16, VIEW, "normals and bounding-box views")                                            \
     F(17, AOV, "albedo, normal, depth and primitive outputs")                                \
     F(18, REPLICATES, "independent replicates, from which the image knows its error")        \
-    F(19, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
-    F(20, TABLE, "values tabulated by wavelength")
+    F(20, TABLE, "values tabulated by wavelength")                                           \
+    F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")
 
 #define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,
 enum CrtFeature { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) CRT_FEATURE_END };
