@@ -163,6 +163,9 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     });
     seen |= differs(CRT_FEATURE_ENVIRONMENT, 0,
                     [](Scene& s) { s.environment = crt::Environment{crt::constantSpectrum(1)}; });
+    seen |= differs(CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT, 0, [](Scene& s) {
+        s.environment = crt::Environment{crt::constantSpectrum(1), true};
+    });
     seen |= differs(CRT_FEATURE_LENS, 0, [](Scene& s) { s.camera.aperture_radius = 0.1; });
     seen |= differs(CRT_FEATURE_FILTER, 0, [](Scene& s) { s.film.filter = crt::PixelFilter::Gaussian; });
     constexpr std::uint32_t light =

@@ -69,9 +69,10 @@ std::vector<Variant> variants(int resolution) {
         s.film.filter = PixelFilter::BlackmanHarris;
         s.film.filter_radius = 1.5;
     });
-    add("no tree", [](Scene& s) {
+    add("no tree, environment sampled as a light", [](Scene& s) {
         s.objects.erase(s.objects.begin() + 5);  // the gem: few enough triangles are left
         s.integrator.accelerator = Accelerator::None;
+        s.environment->light_sampling = true;
     });
     add("view of the normals", [](Scene& s) { s.integrator.type = IntegratorType::Normals; });
     add("view of the boxes", [](Scene& s) { s.integrator.type = IntegratorType::Aabb; });
