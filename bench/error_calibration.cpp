@@ -1,10 +1,12 @@
 // Does the error that an image states of itself hold? One JSON object a line; bench/run calibration makes a
 // page of them.
 //
-//     error_calibration stated BACKEND SCENE SIDE SAMPLER SEEDS    the stated error against the real one, at
-//     many numbers of samples error_calibration price  BACKEND SCENE SIDE SAMPLER SEEDS    the error of an
-//     image with replicates, and of one sequence error_calibration stop   BACKEND SCENE SIDE SAMPLER SEEDS
-//     TARGET MOST    what --target-error stops at
+//     error_calibration stated BACKEND SCENE SIDE SAMPLER SEEDS
+//         the stated error against the real one, at many numbers of samples
+//     error_calibration price BACKEND SCENE SIDE SAMPLER SEEDS
+//         the error of an image with replicates, and of one sequence
+//     error_calibration stop BACKEND SCENE SIDE SAMPLER SEEDS TARGET MOST
+//         what --target-error stops at
 //
 // SCENE is a file, rendered at SIDE x SIDE pixels. SAMPLER: sobol or independent. The real error is the
 // spread between seeds; for `stop`, the distance from the mean of independent renders of MOST samples with

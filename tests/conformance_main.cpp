@@ -1,6 +1,6 @@
 // conformance --backend NAME [--against NAME] [--one-kernel] [Catch2 options]: one suite for every backend.
-// Exit code 77 and one sentence when the backend cannot
-// run here, so that a machine without a GPU skips visibly.
+// Exit code 77 and one sentence when the backend cannot run here, so that a machine without a GPU skips
+// visibly.
 #define CATCH_CONFIG_RUNNER
 #include "conformance.h"
 

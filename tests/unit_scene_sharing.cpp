@@ -277,6 +277,10 @@ TEST_CASE("folders of CRT_DATA_PATH add families, with the header that data must
     const std::string header =
         "# Grey\n# source: measured on Monday\n# quantity: reflectance\n# outside: clamp\n";
     write(folder, "root/mine/grey.csv", header + "400,0.5\n700,0.5\n");
+    // A comment line that begins with two blanks continues the one before.
+    write(folder, "root/mine/wrapped.csv",
+          "# Grey,\n#   still\n# source: measured\n#  on Tuesday\r\n#    and again\n"
+          "# quantity: reflectance\n# outside: clamp\n400,0.5\n700,0.5\n");
     write(folder, "root/mine/nameless.csv", "400,0.5\n700,0.5\n");
     write(folder, "root/mine/open.csv", "# x\n# source: y\n# quantity: z\n400,0.5\n700,0.5\n");
     write(folder, "beside.csv", header + "400,0.5\n700,0.5\n");
@@ -291,6 +295,11 @@ TEST_CASE("folders of CRT_DATA_PATH add families, with the header that data must
     CHECK(grey->title == "Grey");
     CHECK(grey->source == "measured on Monday");
     CHECK(dataSpectrum("mine/grey")->spectrum == constantSpectrum(0.5));
+    const auto wrapped = findData("mine/wrapped");
+    REQUIRE(wrapped);
+    CHECK(wrapped->title == "Grey, still");
+    CHECK(wrapped->source == "measured on Tuesday and again");
+    CHECK(wrapped->quantity == "reflectance");
     CHECK_THROWS_WITH(findData("mine/nameless"), Contains("'# source: …'"));
     CHECK_THROWS_WITH(findData("mine/open"), Contains("'# outside: clamp'"));
     unsetenv("CRT_DATA_PATH");

@@ -1,13 +1,9 @@
 """Does the error that an image states of itself hold? 100 renders of each scene that differ in nothing but
-the seed, and the
-real error beside what each of them states: at powers of two, one more, and numbers that a time limit or
-Ctrl-C might leave,
-and for a merge of two unequal ranges of samples. The real error is the spread between the seeds. Then what
-replicates cost
-against one sequence, and what `--target-error 5%` stops at. Times nothing: it may run on a busy machine.
---rows takes what
-error_calibration printed on another machine, with "mode", "scene", "side", "sampler" and "machine" added to
-each line.
+the seed, and the real error beside what each of them states: at powers of two, one more, and numbers that a
+time limit or Ctrl-C might leave, and for a merge of two unequal ranges of samples. The real error is the
+spread between the seeds. Then what replicates cost against one sequence, and what `--target-error 5%` stops
+at. Times nothing: it may run on a busy machine. --rows takes what error_calibration printed on another
+machine, with "mode", "scene", "side", "sampler" and "machine" added to each line.
 """
 
 import json

@@ -10,6 +10,10 @@ import re
 import shlex
 import subprocess
 import sys
+import textwrap
+
+# With a key and its indent before it a line ends before column 110.
+JSON_TEXT_COLUMNS = 80
 
 
 class Results:
@@ -108,9 +112,20 @@ class Results:
         page = folder / f"{self.name}.md"
         page.write_text("\n".join(self.lines).rstrip() + "\n")
         (folder / f"{self.name}.json").write_text(
-            json.dumps({"measured": facts, **self.data}, indent=1) + "\n"
+            json.dumps(folded({"measured": facts, **self.data}), indent=1, ensure_ascii=False) + "\n"
         )
         print(f"wrote {page} and {self.name}.json")
+
+
+def folded(value):
+    """The same value; texts too long for a line as lists of lines, which joined by blanks are the text."""
+    if isinstance(value, dict):
+        return {key: folded(v) for key, v in value.items()}
+    if isinstance(value, list):
+        return [folded(v) for v in value]
+    if isinstance(value, str) and len(value) > JSON_TEXT_COLUMNS:
+        return textwrap.wrap(value, JSON_TEXT_COLUMNS, break_long_words=False, break_on_hyphens=False)
+    return value
 
 
 def provenance(program):

@@ -1,6 +1,5 @@
 /// What commands print on standard output. Nothing throws on the way: a full disk is told once, at the end,
-/// and a reader that has had enough
-/// (`crt schema | head -1`) is no fault.
+/// and a reader that has had enough (`crt schema | head -1`) is no fault.
 #pragma once
 
 #include <fmt/format.h>

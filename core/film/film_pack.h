@@ -6,8 +6,8 @@
 /// into planes, one for each byte of a pixel's record. A plane is
 ///
 ///     u32      n: bytes that follow
-///     n bytes  n = 1: the byte that all of the plane are; n = number of pixels: the plane as it is; else a
-///     zstd frame of it
+///     n bytes  n = 1: the byte that all of the plane are; n = number of pixels: the plane as it is;
+///              else a zstd frame of it
 #pragma once
 
 #include "film/film.h"

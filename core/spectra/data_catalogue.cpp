@@ -146,19 +146,30 @@ std::vector<std::string> namesInFiles() {
     return names;
 }
 
-/// The value in "# key: value"; the comment itself for an empty key.
-std::string headerValue(const std::string& text, std::string_view key) {
-    std::string_view rest = text;
-    while (rest.starts_with('#')) {
-        const std::size_t length = std::min(rest.find('\n'), rest.size());
-        std::string_view line = rest.substr(1, length - 1);
+/// The comment lines at the beginning, each without its '#' and the blanks around it. A line that begins
+/// with two blanks or more continues the one before it.
+std::vector<std::string> headerLines(std::string_view text) {
+    std::vector<std::string> lines;
+    while (text.starts_with('#')) {
+        const std::size_t length = std::min(text.find('\n'), text.size());
+        std::string_view line = text.substr(1, length - 1);
+        const bool continues = line.starts_with("  ") && !lines.empty();
         while (line.starts_with(' ')) line.remove_prefix(1);
         while (line.ends_with('\r') || line.ends_with(' ')) line.remove_suffix(1);
-        if (key.empty()) return std::string(line);
+        if (continues)
+            lines.back().append(" ").append(line);
+        else
+            lines.emplace_back(line);
+        text.remove_prefix(std::min(length + 1, text.size()));
+    }
+    return lines;
+}
+
+/// The value in "key: value"; empty where no line has it.
+std::string headerValue(const std::vector<std::string>& lines, std::string_view key) {
+    for (const std::string_view line : lines)
         if (line.starts_with(key) && line.substr(key.size()).starts_with(": "))
             return std::string(line.substr(key.size() + 2));
-        rest.remove_prefix(std::min(length + 1, rest.size()));
-    }
     return {};
 }
 
@@ -169,11 +180,12 @@ NamedData readData(const std::string& name, const std::string& file) {
     } catch (const InputRefused& refused) {
         throw Error(ErrorKind::Scene, fmt::format("the data file '{}' {}", file, refused.what()), {file});
     }
+    const std::vector<std::string> header = headerLines(text);
     NamedData row{.name = name,
-                  .title = headerValue(text, ""),
-                  .quantity = headerValue(text, "quantity"),
-                  .source = headerValue(text, "source"),
-                  .outside = headerValue(text, "outside"),
+                  .title = header.empty() ? "" : header.front(),
+                  .quantity = headerValue(header, "quantity"),
+                  .source = headerValue(header, "source"),
+                  .outside = headerValue(header, "outside"),
                   .file = file};
     for (const auto& [key, value] : {std::pair{"source", &row.source}, {"quantity", &row.quantity}})
         if (value->empty())

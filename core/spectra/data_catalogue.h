@@ -2,9 +2,9 @@
 ///
 /// Names are FAMILY/NAME. The tables that keys of the scene format name already (illuminants, glasses,
 /// metals) are those of spectra_data.cpp; all others are files FAMILY/NAME.csv in dataDirectories()
-/// (base/modules.h): two columns as readSpectrumFile() reads them, after lines "# title", "# source: …", "#
-/// quantity: …" and
-/// "# outside: clamp" or "zero". So everybody can add a family, in a folder of CRT_DATA_PATH.
+/// (base/modules.h): two columns as readSpectrumFile() reads them, after the lines "# title",
+/// "# source: …", "# quantity: …" and "# outside: clamp" or "zero". A comment line that begins with two
+/// blanks continues the one before it. So everybody can add a family, in a folder of CRT_DATA_PATH.
 #pragma once
 
 #include "spectra/spectra.h"
@@ -23,9 +23,8 @@ struct NamedData {
     std::string title{};
     std::string quantity{};  ///< "reflectance", "radiance", "refractive index".
     std::string source{};
-    std::string
-        outside{};  ///< What holds beyond the table: "clamp", "zero"; "formula" where nothing is beyond.
-    std::string formula{};  ///< Of which the table is a sampling; empty: the table is what was published.
+    std::string outside{};   ///< Beyond the table: "clamp", "zero"; "formula" where nothing is beyond.
+    std::string formula{};   ///< Of which the table is a sampling; empty: the table is what was published.
     std::string file{};      ///< Empty: built in.
     std::vector<double> wavelength_nm{};
     std::vector<std::string> columns{};

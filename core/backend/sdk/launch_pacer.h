@@ -36,8 +36,11 @@ inline double launchSeconds(std::uint64_t start_ns, std::uint64_t end_ns, double
 /// next.
 ///
 ///     pacer.begin(range, tile_size);
-///     for (Launch launch; pacer.next(launch);) { …; pacer.finished(launch, seconds);
-///     progress(pacer.done()); }
+///     for (Launch launch; pacer.next(launch);) {
+///         …
+///         pacer.finished(launch, seconds);
+///         progress(pacer.done());
+///     }
 class LaunchPacer {
 public:
     /// `first_paths` is the size of the very first launch: small enough to be quick on the slowest device.

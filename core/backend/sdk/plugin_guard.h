@@ -5,9 +5,9 @@
 ///     public:
 ///         MyIntegrator(const crt::plugin::Host& host, const CrtCreateInfo& info);  // opens the device
 ///         void setScene(const CrtSceneBlob& scene);       // copies what it needs, clears the film
-///         bool render(const CrtRenderRange& range);       // adds to the film; false when the host
-///         cancelled void readFilm(const CrtFilmView& film); void report(CrtBackendReport& report); // all
-///         zero when it comes in
+///         bool render(const CrtRenderRange& range);       // adds to the film; false: the host cancelled
+///         void readFilm(const CrtFilmView& film);
+///         void report(CrtBackendReport& report);          // all zero when it comes in
 ///     };
 ///     std::vector<CrtDevice> probeDevices(const crt::plugin::Host& host);
 ///

@@ -3,8 +3,7 @@
 /// from a relation between images, never from an earlier render.
 ///
 /// To add a case: a function that takes a Context (context.h), and a row in its group's table. The manual
-/// (docs/stability.md), the list
-/// (`crt verify --list`) and the reports are made from the row.
+/// (docs/stability.md), the list (`crt verify --list`) and the reports are made from the row.
 #pragma once
 
 #include "base/statistics.h"

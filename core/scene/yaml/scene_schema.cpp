@@ -43,12 +43,20 @@ KeySchema outsideKey() {
     return {.name = "outside",
             .kind = Kind::Choice,
             .choices = {"clamp", "zero", "error"},
-            .doc =
-                "Beyond the first and last wavelength: the end value, zero, or an error. Must be said "
-                "unless the data cover 360 to 830 nm. With `zero` the table keeps its integral: where its "
-                "end is not 0, the step is spread over the nanometres that it touches, and one wavelength "
-                "alone is refused, "
-                "because it has no width."};
+            .doc = "Beyond the first and last wavelength: the end value, zero, or an error. Must be said "
+                   "unless the data cover 360 to 830 nm. With `zero` the table keeps its integral: where "
+                   "its end is not 0, the step is spread over the nanometres that it touches, and one "
+                   "wavelength alone is refused, because it has no width."};
+}
+
+/// What shines in a scene: lamps and the environment.
+KeySchema radianceKey(std::string doc) {
+    return {.name = "radiance",
+            .kind = Kind::Spectrum,
+            .range = kRadiance,
+            .unit = "W·m⁻²·sr⁻¹·nm⁻¹",
+            .required = true,
+            .doc = std::move(doc)};
 }
 
 KeySchema typeKey(std::string word) {
@@ -681,14 +689,9 @@ void addObjects(std::vector<SectionSchema>& all) {
     all.push_back({"emission",
                    "an emission",
                    "",
-                   {{.name = "radiance",
-                     .kind = Kind::Spectrum,
-                     .range = kRadiance,
-                     .unit = "W·m⁻²·sr⁻¹·nm⁻¹",
-                     .required = true,
-                     .doc = "Emitted equally in all directions. A lamp must not lie in the plane of another "
-                            "surface that it overlaps: rounding "
-                            "decides which of them is seen, and crt warns."},
+                   {radianceKey("Emitted equally in all directions. A lamp must not lie in the plane of "
+                                "another surface that it overlaps: rounding decides which of them is "
+                                "seen, and crt warns."),
                     {.name = "two_sided",
                      .kind = Kind::Boolean,
                      .fallback = yaml(Emission{}.two_sided),
@@ -700,12 +703,7 @@ void addOutside(std::vector<SectionSchema>& all) {
         {"environment",
          "environment",
          "",
-         {{.name = "radiance",
-           .kind = Kind::Spectrum,
-           .range = kRadiance,
-           .unit = "W·m⁻²·sr⁻¹·nm⁻¹",
-           .required = true,
-           .doc = "The same from every direction."},
+         {radianceKey("The same from every direction."),
           {.name = "light_sampling",
            .kind = Kind::Boolean,
            .fallback = yaml(Environment{}.light_sampling),
