@@ -334,6 +334,15 @@ Stage roomWithOpening(const std::string& floor, bool light_sampling, const std::
         .quad("ceiling_south", "[[-0.5,1,0.5],[0.5,1,0.5],[0.5,1,4],[-0.5,1,4]]", "black");
 }
 
+/// A grey floor, its edge 4 away, under a sky of radiance 1; seen from height 1 towards `target`.
+std::string greyFloorUnderSky(const char* target, bool light_sampling) {
+    return Stage(fmt::format("{{position: [0, 1, 0.5], target: {}, fov: 10}}", target))
+        .set("environment", fmt::format("{{radiance: 1, light_sampling: {}}}", light_sampling))
+        .material("grey", "{type: diffuse, reflectance: 0.5}")
+        .quad("floor", "[[-4,0,-4],[-4,0,4],[4,0,4],[4,0,-4]]", "grey")
+        .yaml();
+}
+
 void environmentLight(Context& context) {
     const std::string white = "{type: diffuse, reflectance: 1}";
     const double opening = squareFormFactor(0, 0.5);
@@ -364,20 +373,8 @@ void environmentLight(Context& context) {
     // Open sky: light sampling and scattering draw from one density, so that each path brings albedo times
     // the environment.
     for (const bool sampled : {true, false}) {
-        const std::string sky =
-            Stage("{position: [0, 1, 0.5], target: [0, 0, 0], fov: 10}")
-                .set("environment", fmt::format("{{radiance: 1, light_sampling: {}}}", sampled))
-                .material("grey", "{type: diffuse, reflectance: 0.5}")
-                .quad("floor", "[[-4,0,-4],[-4,0,4],[4,0,4],[4,0,-4]]", "grey")
-                .yaml();
-        const Film film = context.render(sky, {.samples = 16});
-        const Film empty = context.render(
-            Stage("{position: [0, 1, 0.5], target: [0, 2, 0], fov: 10}")
-                .set("environment", "{radiance: 1}")
-                .material("grey", "{type: diffuse, reflectance: 0.5}")
-                .quad("floor", "[[-4,0,-4],[-4,0,4],[4,0,4],[4,0,-4]]", "grey")
-                .yaml(),
-            {.samples = 16});
+        const Film film = context.render(greyFloorUnderSky("[0, 0, 0]", sampled), {.samples = 16});
+        const Film empty = context.render(greyFloorUnderSky("[0, 2, 0]", false), {.samples = 16});
         context.relative(
             fmt::format("an open sky, {}: the worst pixel", sampled ? "sampled" : "by scattering alone"),
             worstRatio(film, empty, 0.5), 1, 2e-6);

@@ -2,9 +2,9 @@
 // little; they need no reference.
 #include "judge/verify/context.h"
 #include "judge/verify/shapes.h"
-#include "base/temporary_folder.h"
 #include "judge/verify/variants.h"
 
+#include "base/temporary_folder.h"
 #include "kernel/features.h"
 #include "kernel/layout.h"
 

@@ -54,12 +54,12 @@ std::vector<Variant> variants(int resolution) {
         s.camera.aperture_radius = 0.03125;
         s.camera.focus_distance = 1.5;
         s.film.filter = PixelFilter::Gaussian;
+        s.film.filter_radius = 1.5;
         for (Material& material : s.materials)
             if (material.type == MaterialType::Conductor) {
                 material.type = MaterialType::RoughConductor;
                 material.roughness = 0.3;
             }
-        s.film.filter_radius = 1.5;
     });
     add("boxes of objects, xorshift, Blackman-Harris filter, no light sampling", [](Scene& s) {
         s.integrator.accelerator = Accelerator::Aabb;
