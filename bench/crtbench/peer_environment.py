@@ -1,6 +1,6 @@
-"""What bench/peers needs beside crt: a Python with mitsuba, numpy and PyYAML, and an LLVM that Mitsuba's
-compiler accepts. Both are put into out/ when they are missing; nothing of them is ever part of the product.
-The measurement then runs under that Python."""
+"""What bench/peers and bench/agree need beside crt: a Python with mitsuba, numpy and PyYAML, and an LLVM
+that Mitsuba's compiler accepts. Both are put into out/ when they are missing; nothing of them is ever part
+of the product. The measurement then runs under that Python."""
 
 import argparse
 import os
@@ -119,12 +119,17 @@ def main():
     return exit_code("bench/peers", arguments, lambda: measure(arguments))
 
 
-def measure(arguments):
+def under_mitsuba(tool, wanted):
+    """Starts bench/TOOL anew under a Python that has mitsuba, unless this one is it."""
     os.environ["DRJIT_LIBLLVM_PATH"] = llvm_library()
     if READY not in os.environ:
-        python = python_with_mitsuba(arguments.python)
+        python = python_with_mitsuba(wanted)
         os.execve(
-            python, [python, str(REPOSITORY / "bench" / "peers"), *sys.argv[1:]], {**os.environ, READY: "1"}
+            python, [python, str(REPOSITORY / "bench" / tool), *sys.argv[1:]], {**os.environ, READY: "1"}
         )
+
+
+def measure(arguments):
+    under_mitsuba("peers", arguments.python)
     from . import peers  # Needs what only the right Python has.
     return peers.measure(program_for(arguments), arguments)

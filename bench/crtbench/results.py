@@ -12,8 +12,8 @@ import subprocess
 import sys
 import textwrap
 
-# With a key and its indent before it a line ends before column 110.
-JSON_TEXT_COLUMNS = 80
+COLUMNS = 109
+JSON_TEXT_COLUMNS = 80  # A key and its indent stand before it.
 
 
 class Results:
@@ -32,7 +32,7 @@ class Results:
         self.started = datetime.datetime.now(datetime.timezone.utc)
 
     def paragraph(self, text):
-        self.lines += [text, ""]
+        self.lines += [*textwrap.wrap(text, COLUMNS, break_long_words=False, break_on_hyphens=False), ""]
 
     def heading(self, text):
         self.lines += [f"## {text}", ""]

@@ -1,0 +1,134 @@
+"""Renders the scenes of bench/scenes/agree by crt and by Mitsuba 3, and judges whether they agree."""
+
+import re
+import statistics
+
+import mitsuba as mi
+import numpy as np
+
+from . import agree_scene
+from .peer_agreement import TILES, Pool, ratio, tiles
+from .program import Failure
+from .results import Results
+
+FOLDER = "bench/scenes/agree"
+MARGIN = 0.005      # Of the image's mean: what counts as equal.
+CONFIDENCE = 0.95
+
+
+def beyond(confidence, of):
+    """The point of the normal distribution that the largest of so many passes with 1 - confidence (Šidák);
+    one-sided."""
+    return statistics.NormalDist().inv_cdf(confidence ** (1 / of))
+
+
+def crt_image(program, backend, file, samples, seed):
+    """XYZ, (height, width, 3), rows from the top."""
+    image = program.scratch / "image.pfm"
+    settings = ["film.color_space=xyz", f"sampler.seed={seed}"]
+    program.render(file, backend, ["--spp", samples], [image], settings)
+    data = image.read_bytes()
+    header = re.match(rb"PF\n(\d+) (\d+)\n-[0-9.]+\n", data)
+    width, height = int(header[1]), int(header[2])
+    return np.frombuffer(data[header.end():], dtype="<f4").reshape(height, width, 3)[::-1]
+
+
+class Agreement:
+    """One scene in both programs: the ratio of the means of luminance, and of every tile after it, with
+    their standard errors."""
+
+    def __init__(self, ours, theirs):
+        def mean(image):
+            return image[:, :, 1].mean(dtype=np.float64)
+
+        self.ratio, self.ratio_se = (float(v) for v in ratio(theirs, ours, mean))
+        (a, va), (b, vb) = ours.of(tiles), theirs.of(tiles)
+        whole = float(ours.of(mean)[0])
+        self.tiles = (b / self.ratio - a) / whole           # in units of the image's mean
+        self.tiles_se = np.sqrt(va + vb / self.ratio**2) / whole
+
+    def mean_agrees(self):
+        """Two one-sided tests."""
+        reach = beyond(CONFIDENCE, 1) * self.ratio_se
+        return abs(self.ratio - 1) + reach < MARGIN
+
+    def worst_excess(self):
+        """The largest part of a tile's difference beyond the margin, in its standard errors."""
+        return float(((np.abs(self.tiles) - MARGIN) / np.maximum(self.tiles_se, 1e-12)).max())
+
+    def tiles_agree(self):
+        return self.worst_excess() < beyond(CONFIDENCE, TILES * TILES)
+
+    def resolves(self):
+        """Whether a difference of two margins in the median tile would have been seen."""
+        return float(np.median(self.tiles_se)) * beyond(CONFIDENCE, TILES * TILES) < MARGIN
+
+
+def verdict(found, documented):
+    if found.mean_agrees() and found.tiles_agree():
+        return "agree" if found.resolves() else "not known: too few samples"
+    return "differ as documented" if documented else "DIFFER"
+
+
+def measure(program, arguments):
+    mi.set_variant(arguments.variant)
+    mi.set_log_level(mi.LogLevel.Error)
+    backend = arguments.backend or program.backends(["cuda", "embree", "opencl"])[0][0]
+    samples, renders = (4, 2) if arguments.tiny else (arguments.samples, arguments.renders)
+    files = sorted((program.repository / FOLDER).glob("*.yaml"))
+    if arguments.scenes:
+        files = [f for f in files if f.stem in arguments.scenes]
+        if unknown := set(arguments.scenes) - {f.stem for f in files}:
+            raise Failure(f"there is no {FOLDER}/{sorted(unknown)[0]}.yaml")
+    results = Results(program, arguments, "agree", "Do crt and Mitsuba 3 agree?")
+    results.tool = "bench/agree"
+    rows, notes, failed = [], [], 0
+    for file in files:
+        documented = agree_scene.difference(file)
+        ours, theirs = Pool(), Pool()
+        scene = mi.load_dict(agree_scene.translate(file, program.scratch, samples))
+        for seed in range(renders):
+            ours.add(crt_image(program, backend, file, samples, 1 + seed), samples)
+            theirs.add(np.array(mi.render(scene, spp=samples, seed=1 + seed))[:, :, :3], samples)
+        found = Agreement(ours, theirs)
+        said = verdict(found, documented)
+        failed += said == "DIFFER"
+        rows.append(
+            [
+                f"`{file.stem}`: {agree_scene.title(file)}",
+                f"{found.ratio - 1:+.3%} ± {1.96 * found.ratio_se:.3%}",
+                f"{np.abs(found.tiles).max():.2%}",
+                f"{found.worst_excess():.1f}",
+                f"**{said}**",
+            ]
+        )
+        print(*rows[-1], flush=True)
+        if documented:
+            notes.append(f"`{file.stem}`: {documented}")
+        results.data[file.stem] = {
+            "mitsuba_over_crt": found.ratio,
+            "standard_error": found.ratio_se,
+            "largest_tile": float(np.abs(found.tiles).max()),
+            "median_standard_error_of_tiles": float(np.median(found.tiles_se)),
+            "worst_excess": found.worst_excess(),
+            "verdict": said,
+        }
+    bound = beyond(CONFIDENCE, TILES * TILES)
+    results.paragraph(
+        f"Scenes of `{FOLDER}`, translated by `bench/crtbench/agree_scene.py`, rendered {renders} times by "
+        f"crt on `{backend}` and by Mitsuba {mi.__version__} (`{arguments.variant}`) with {samples} samples "
+        f"a pixel and seeds of their own. *Mean*: luminance of Mitsuba's image over that of crt's, less one, "
+        f"with its 95 % interval. It agrees when two one-sided tests at 95 % put it within "
+        f"{MARGIN:.1%}. *Worst tile*: the largest difference in one of {TILES} × {TILES} tiles after that "
+        f"common factor, in units of the image's mean. *Excess*: what is beyond {MARGIN:.1%} of it, in "
+        f"standard errors; chance gives up to {bound:.2f} in one of {TILES * TILES} tiles at 95 %. Both "
+        "programs have tables of the observer of their own, which alone make 0.1 % ([peers](peers.md))."
+    )
+    results.table(["scene", "Mitsuba over crt, mean", "worst tile", "excess", "verdict"], rows)
+    for note in notes:
+        results.paragraph(note)
+    results.command(f"crt render {FOLDER}/SCENE.yaml --backend {backend} --spp {samples} -o IMAGE.pfm")
+    if arguments.python:
+        results.shown = {arguments.python: "PYTHON"}
+    results.write()
+    return 1 if failed and not arguments.tiny else 0

@@ -1,0 +1,46 @@
+"""Do crt and Mitsuba 3 converge to one image? Scenes of bench/scenes/agree, a kind of material, texture or
+light each, are translated by a program (agree_scene.py) and rendered by both, several times with seeds of
+their own. The verdict is an equivalence test: the mean luminance of the two differs by less than 0.5 %, with
+95 % confidence, and in no tile of 8 × 8 do they differ, after the common factor, by more than 0.5 % of the
+image's mean beyond what chance gives in one of 64 tiles (Šidák). Where the models differ on purpose, the
+scene says how, and that is what is reported. Times nothing: it may run on a busy machine.
+
+Needs a Python with mitsuba, numpy and PyYAML (--python), and an LLVM for Mitsuba's llvm variant."""
+
+import argparse
+
+from .command import add_options, exit_code, program_for
+from .peer_environment import under_mitsuba
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        prog="bench/agree", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add_options(parser, busy="nothing happens")
+    parser.add_argument(
+        "--python",
+        help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in "
+             "out/peers-venv",
+    )
+    parser.add_argument(
+        "--variant",
+        default="llvm_ad_spectral",
+        help="of Mitsuba; a spectral one (llvm_ad_spectral; cuda_ad_spectral with a GPU)",
+    )
+    parser.add_argument(
+        "--backend", help="of crt (the first of cuda, embree and opencl that has a device)"
+    )
+    parser.add_argument(
+        "--samples", type=int, default=512, help="per pixel of each render, in both programs (512)"
+    )
+    parser.add_argument("--renders", type=int, default=8, help="of each scene by each program (8)")
+    parser.add_argument("--scenes", nargs="*", help="only these, by name without .yaml")
+    arguments = parser.parse_args()
+
+    def measure():
+        under_mitsuba("agree", arguments.python)
+        from . import agree  # Needs what only the right Python has.
+        return agree.measure(program_for(arguments), arguments)
+
+    return exit_code("bench/agree", arguments, measure)

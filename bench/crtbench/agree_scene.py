@@ -1,0 +1,169 @@
+"""A scene of crt as Mitsuba 3 loads it: the same triangles, materials, lights, camera and depth. Spectra are
+numbers, {rgb: …, space: linear} and tables with every value written out; what has no counterpart is refused,
+so that nothing is compared that was not translated."""
+
+import re
+
+import mitsuba as mi
+import numpy as np
+
+from . import scene_file
+from .program import Failure
+
+NEVER = 1_000_000  # The depth from which Mitsuba plays roulette.
+
+
+def refuse_all_but(what, given, known):
+    if unknown := set(given) - set(known):
+        raise Failure(f"{what}: {', '.join(sorted(unknown))} cannot be translated for Mitsuba")
+
+
+def spectrum(given):
+    if isinstance(given, (int, float)):
+        return {"type": "uniform", "value": float(given)}
+    refuse_all_but("a spectrum", given, {"rgb", "space"})
+    if given.get("space") != "linear":
+        raise Failure("an RGB colour without 'space: linear' cannot be translated for Mitsuba")
+    return {"type": "rgb", "value": given["rgb"]}
+
+
+def alpha(roughness):
+    """Width of GGX."""
+    return roughness**2
+
+
+def two_sided(bsdf):
+    """As crt has opaque materials."""
+    return {"type": "twosided", "bsdf": bsdf}
+
+
+def diffuse(given):
+    refuse_all_but("a diffuse material", given, {"type", "reflectance"})
+    return two_sided({"type": "diffuse", "reflectance": spectrum(given["reflectance"])})
+
+
+def rough_conductor(given):
+    refuse_all_but("a rough conductor", given, {"type", "eta", "k", "roughness"})
+    return two_sided(
+        {
+            "type": "roughconductor",
+            "distribution": "ggx",
+            "alpha": alpha(given["roughness"]),
+            "eta": spectrum(given["eta"]),
+            "k": spectrum(given["k"]),
+        }
+    )
+
+
+def conductor(given):
+    refuse_all_but("a conductor", given, {"type", "eta", "k"})
+    return two_sided({"type": "conductor", "eta": spectrum(given["eta"]), "k": spectrum(given["k"])})
+
+
+def dielectric(given):
+    refuse_all_but("a dielectric", given, {"type", "ior"})
+    return {"type": "dielectric", "int_ior": float(given["ior"]), "ext_ior": 1.0}
+
+
+MATERIALS = {
+    "diffuse": diffuse,
+    "conductor": conductor,
+    "rough_conductor": rough_conductor,
+    "dielectric": dielectric,
+}
+
+
+def material(given):
+    if given["type"] not in MATERIALS:
+        raise Failure(f"the material '{given['type']}' cannot be translated for Mitsuba")
+    return MATERIALS[given["type"]](given)
+
+
+def shape(mesh):
+    """Flat triangles without common vertices; polygons as fans from their first corner, as crt splits
+    them."""
+    refuse_all_but("a mesh", mesh, {"positions", "faces"})
+    positions = np.array(mesh["positions"], dtype=np.float64)
+    corners = np.array(
+        [
+            [face[0], face[i], face[i + 1]]
+            for face in mesh.get("faces", [list(range(len(positions)))])
+            for i in range(1, len(face) - 1)
+        ]
+    ).reshape(-1)
+    made = mi.Mesh("mesh", len(corners), len(corners) // 3)
+    parameters = mi.traverse(made)
+    parameters["vertex_positions"] = positions[corners].astype(np.float32).reshape(-1)
+    parameters["faces"] = np.arange(len(corners), dtype=np.uint32)
+    parameters.update()
+    return made
+
+
+def write_shape(mesh, path):
+    """As a file: a mesh takes its material and emitter only where it is loaded."""
+    shape(mesh).write_ply(str(path))
+    return {"type": "ply", "filename": str(path), "face_normals": True}
+
+
+def environment(given):
+    refuse_all_but("an environment", given, {"radiance", "light_sampling"})
+    return {"type": "constant", "radiance": spectrum(given["radiance"])}
+
+
+def translate(file, folder, samples):
+    """The dictionary that mi.load_dict takes. Meshes go to `folder`."""
+    given = scene_file.load(file)
+    known = {"crt", "title", "camera", "film", "integrator", "sampler", "materials", "objects", "environment"}
+    refuse_all_but("the scene", given, known)
+    camera, film, integrator = given["camera"], given["film"], given["integrator"]
+    refuse_all_but("the camera", camera, {"position", "target", "fov", "up"})
+    refuse_all_but("the film", film, {"resolution"})
+    if integrator.get("roulette") is not False:
+        raise Failure("a scene without 'roulette: false' cannot be translated: roulettes differ")
+    width, height = film["resolution"]
+    if width != height:
+        raise Failure("a film that is not square cannot be translated: fields of view differ in their axis")
+    made = {
+        "type": "scene",
+        # Mitsuba's depth counts the emitter, max_depth of crt does not.
+        "integrator": {"type": "path", "max_depth": integrator["max_depth"] + 1, "rr_depth": NEVER},
+        "sensor": {
+            "type": "perspective",
+            "fov": camera["fov"],
+            "near_clip": 1e-3,
+            "far_clip": 1e4,
+            "to_world": mi.ScalarTransform4f().look_at(
+                origin=camera["position"], target=camera["target"], up=camera.get("up", [0, 1, 0])
+            ),
+            "film": {
+                "type": "hdrfilm",
+                "width": width,
+                "height": height,
+                "pixel_format": "xyz",
+                "component_format": "float32",
+                "rfilter": {"type": "box"},
+            },
+            "sampler": {"type": "independent", "sample_count": samples},
+        },
+    }
+    if "environment" in given:
+        made["environment"] = environment(given["environment"])
+    for number, thing in enumerate(given["objects"]):
+        refuse_all_but("an object", thing, {"name", "mesh", "material", "emission"})
+        part = write_shape(thing["mesh"], folder / f"{number}.ply")
+        part["bsdf"] = material(given["materials"][thing["material"]])
+        if "emission" in thing:
+            refuse_all_but("an emission", thing["emission"], {"radiance"})
+            part["emitter"] = {"type": "area", "radiance": spectrum(thing["emission"]["radiance"])}
+        made[f"object{number}"] = part
+    return made
+
+
+def difference(file):
+    """What the scene says of how the models differ: the text of its comment "# differs: …", or None."""
+    text = re.search(r"^# differs: (.*(?:\n#   .*)*)$", file.read_text(), re.MULTILINE)
+    return " ".join(text[1].replace("\n#", " ").split()) if text else None
+
+
+def title(file):
+    return str(scene_file.load(file)["title"])
