@@ -305,7 +305,7 @@ def write_race(results, race, lines, arguments, roulette_from, reference):
         f"programs; "
         f"otherwise there is none. “1 sequence” "
         f"is "
-        "`sampler.replicates: 1`, “16 sequences” the default, from which an image knows its own error."
+        "`sampler.replicates: 1`, “2 sequences” the default, from which an image knows its own error."
     )
 
 

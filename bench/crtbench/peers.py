@@ -150,7 +150,7 @@ def run(program, arguments, results, scene, setup, crt_backends, workers, begin)
     lines = [
         Line(Crt(program, b, n, False, setup), MATCHED_WEIGHT if (b, n) == ("embree", 1) else 1)
         for b in crt_backends
-        for n in (1, 16)
+        for n in (1, 2)
     ]
     lines += [
         Line(Crt(program, "embree", 1, True, setup), HEADLINE_WEIGHT),

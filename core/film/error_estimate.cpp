@@ -39,13 +39,32 @@ bool belongs(std::uint32_t x, std::uint32_t y, PixelSet which) {
     return which == PixelSet::All || ((x + y) % 2 == 0) == (which == PixelSet::Even);
 }
 
+/// What parallelFor() gives out at a time.
+constexpr std::size_t kRows = 16;
+
+/// The sum of `add(sum, x, y)` over all pixels: rows by any thread, put together in their order.
+template <class Sum, class Add>
+Sum sumOverPixels(const Film& film, const Add& add) {
+    std::vector<Sum> rows(film.shape().height);
+    parallelFor(rows.size(), kRows, [&](std::size_t first, std::size_t end) {
+        for (std::size_t y = first; y < end; ++y) {
+            Sum sum{};
+            for (std::uint32_t x = 0; x < film.shape().width; ++x)
+                add(sum, x, static_cast<std::uint32_t>(y));
+            rows[y] = sum;
+        }
+    });
+    Sum all{};
+    for (const Sum& row : rows) all += row;
+    return all;
+}
+
 /// A number for each pixel; infinite where it is not known.
 class PixelMap {
 public:
     template <class Function>
     PixelMap(const Film& film, const Function& function)
         : width_(film.shape().width), height_(film.shape().height) {
-        constexpr std::size_t kRows = 16;
         values_.resize(std::size_t{width_} * height_);
         parallelFor(height_, kRows, [&](std::size_t first, std::size_t end) {
             for (auto y = static_cast<std::uint32_t>(first); y < end; ++y)
@@ -91,40 +110,37 @@ private:
 /// checkpoint may hold any finite sums.
 struct VarianceSums {
     double pixels = 0, known = 0, sum = 0, most = 0, squares = 0;
+    VarianceSums& operator+=(const VarianceSums& other) {
+        pixels += other.pixels;
+        known += other.known;
+        sum += other.sum;
+        most = std::max(most, other.most);
+        squares += other.squares;
+        return *this;
+    }
 };
 
 VarianceSums sumsOf(const Film& film, const PixelMap& variances, PixelSet which) {
-    VarianceSums s;
-    for (std::uint32_t y = 0; y < film.shape().height; ++y)
-        for (std::uint32_t x = 0; x < film.shape().width; ++x) {
-            if (!belongs(x, y, which)) continue;
-            s.pixels += 1;
-            if (!variances.known(x, y)) continue;
-            const double v = variances.at(x, y);
-            s.known += 1;
-            s.sum += v;
-            s.most = std::max(s.most, v);
-            s.squares += v * v;
-        }
-    return s;
+    return sumOverPixels<VarianceSums>(film, [&](VarianceSums& s, std::uint32_t x, std::uint32_t y) {
+        if (!belongs(x, y, which)) return;
+        s.pixels += 1;
+        if (!variances.known(x, y)) return;
+        const double v = variances.at(x, y);
+        s.known += 1;
+        s.sum += v;
+        s.most = std::max(s.most, v);
+        s.squares += v * v;
+    });
 }
 
 /// Variance of the sum S of variances, in their units, as it enters the relative error √S/M, whatever the
 /// distribution of samples.
 double measuredSpread(const Film& film, const LuminanceVariance& variance, const PixelMap& variances,
                       PixelSet which, const VarianceSums& sums, double largest, double luminance) {
-    // Each pixel's part by any thread, their sum in one order.
     const auto total = [&](const auto& of) {
-        const auto counts = [&](std::uint32_t x, std::uint32_t y) {
-            return belongs(x, y, which) && variances.known(x, y);
-        };
-        const PixelMap parts(
-            film, [&](std::uint32_t x, std::uint32_t y) { return counts(x, y) ? of(x, y) : 0.0; });
-        double sum = 0;
-        for (std::uint32_t y = 0; y < film.shape().height; ++y)
-            for (std::uint32_t x = 0; x < film.shape().width; ++x)
-                if (counts(x, y)) sum += parts.at(x, y);
-        return sum;
+        return sumOverPixels<double>(film, [&](double& sum, std::uint32_t x, std::uint32_t y) {
+            if (belongs(x, y, which) && variances.known(x, y)) sum += of(x, y);
+        });
     };
     if (variance.fromReplicates() && variance.degreesOfFreedom() >= 3)
         return total(
@@ -199,9 +215,8 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, boo
     const double largest = variances.largest(), unit = largest > 0 ? largest : 1;
     variances.divide(unit);
     const VarianceSums sums = sumsOf(film, variances, which);
-    double luminance = 0;
-    for (std::uint32_t y = 0; y < film.shape().height; ++y)
-        for (std::uint32_t x = 0; x < film.shape().width; ++x) luminance += film.mean(x, y, 1);
+    const auto luminance = sumOverPixels<double>(
+        film, [&](double& sum, std::uint32_t x, std::uint32_t y) { sum += film.mean(x, y, 1); });
     const double total = sums.sum * unit;
     if (sums.known == 0 || !(luminance > 0) || !std::isfinite(luminance) || !std::isfinite(total))
         return std::nullopt;
