@@ -79,7 +79,15 @@ struct Case {
     const char* camera_extra;
     const char* filter;
     bool sampled_environment = false;
+    const char* more = "";  // Further top-level lines.
 };
+
+const char* const kPointLights = R"(lights:
+  - {type: point, position: [0.2, 0.8, 0.2], luminous_flux_lm: 20000}
+  - {type: spot, position: [0.9, 0.9, 0.1], target: [0.4, 0, 0.6], penumbra_deg: 12, radiant_intensity: 2}
+  - {type: directional, direction: [0.2, -1, 0.3], irradiance: {blackbody: 4000}}
+  - {type: sun, direction: [0.3, -1, 0.1], angular_diameter_deg: 10, radiance: 40}
+)";
 
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
@@ -92,6 +100,8 @@ const Case kCases[] = {
     {"{type: aabb}", "{type: sobol}", "", "box"},
     {"{max_depth: 12}", "{type: sobol}", "", "box", true},
     {"{max_depth: 4, accelerator: bvh}", "{type: independent}", "", "box", true},
+    {"{max_depth: 12}", "{type: sobol}", "", "box", true, kPointLights},
+    {"{max_depth: 4, accelerator: bvh, mis: false}", "{type: independent}", "", "box", false, kPointLights},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -125,7 +135,7 @@ struct Named {
 };
 
 crt::Scene sceneOf(const Case& c) {
-    crt::Scene scene = sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter));
+    crt::Scene scene = sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter) + c.more);
     scene.environment->light_sampling = c.sampled_environment;
     return scene;
 }
@@ -137,7 +147,9 @@ std::vector<Named> allScenes() {
                                  "normals",
                                  "boxes",
                                  "sampled environment",
-                                 "sampled environment, tree, independent"};
+                                 "sampled environment, tree, independent",
+                                 "point lights",
+                                 "point lights, tree, independent, light sampling alone"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

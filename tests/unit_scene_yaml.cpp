@@ -114,7 +114,7 @@ TEST_CASE("writing every default of the schema out changes nothing", "[scene_yam
     }
     for (const KeySchema& key : schemaSection("").keys)
         if (!key.fallback.empty()) text += key.name + ": " + key.fallback + "\n", ++written;
-    CHECK(written == 26);
+    CHECK(written == 27);
 
     const Scene a = parse(""), b = parse(text);
     CHECK(a.camera.position == b.camera.position);

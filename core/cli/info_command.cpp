@@ -87,7 +87,15 @@ std::string lightsText(const Scene& scene, const CompiledScene& compiled) {
     if (compiled.emitters > 0)
         text = counted(compiled.emitters, "emitting triangle or parallelogram",
                        "emitting triangles or parallelograms");
-    if (scene.environment) text += text.empty() ? "constant environment" : ", constant environment";
+    const auto add = [&text](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
+    for (const auto& [type, word] : kPointLightNames) {
+        const auto count = std::count_if(scene.point_lights.begin(), scene.point_lights.end(),
+                                         [t = type](const PointLight& light) { return light.type == t; });
+        if (count > 0)
+            add(counted(static_cast<std::size_t>(count), fmt::format("{} light", word).c_str(),
+                        fmt::format("{} lights", word).c_str()));
+    }
+    if (scene.environment) add("constant environment");
     return text.empty() ? "none: every image will be black" : text;
 }
 

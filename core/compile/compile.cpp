@@ -41,6 +41,15 @@ std::vector<const Spectrum*> spectraOf(const Scene& scene, const FlatScene& flat
     return all;
 }
 
+/// Warns of lights that nothing in the scene can show.
+void warnOfUnseenLights(const Scene& scene, const kernel::CrtScene& header) {
+    if (header.point_lights.count == 0 || (header.features & CRT_FEATURE_POINT_LIGHT) != 0) return;
+    logWarning("{}: nothing scatters their light: surfaces that are mirrors, smooth metals and glass do not "
+               "show point, spot and directional lights{}",
+               scene.file,
+               scene.integrator.max_depth == 0 ? ", and 'max_depth: 0' shows no light on anything" : "");
+}
+
 /// From part to part: each function takes parts of the scene, or what was made of them, and returns a part
 /// of the blob. Nothing is changed by two of them.
 CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const CompileOptions& options) {
@@ -65,7 +74,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     const bool shows_boxes = scene.integrator.type == IntegratorType::Aabb;
     if (accelerator.kind == CRT_ACCELERATOR_BRUTE_FORCE && !shows_boxes) {
         const std::vector<std::uint32_t> occluding =
-            samplesEnvironment(scene) ? accelerator.id_of_slot : occludersOf(flat);
+            shadowRaysLeave(scene) ? accelerator.id_of_slot : occludersOf(flat);
         occluders = occluding.size();
         header.triangles8 = blob.append(compileTriangles8(flat, accelerator.id_of_slot));
         header.occluders8 = blob.append(compileTriangles8(flat, occluding));
@@ -80,10 +89,11 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     const LightPart lights = compileLights(scene, flat, emitting, accelerator, spectra);
     header.lights = blob.append(lights.lights);
     header.environment_light = lights.environment;
+    header.point_lights = blob.append(lights.point_lights);
     if (lights.lights.empty() && !scene.environment && scene.integrator.type == IntegratorType::Path)
         logWarning(
             "the scene has no light: the image will be black "
-            "(add emission to an object, or an environment)");
+            "(add emission to an object, lights, or an environment)");
     const Spectrum* environment = spectrumOfEnvironment(scene);
     header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
 
@@ -101,6 +111,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.filter = blob.append(filterTable(scene.film, CRT_FILTER_TABLE));
 
     header.features = featuresOf(scene, header, materials);
+    warnOfUnseenLights(scene, header);
 
     CompiledScene out;
     out.blob = blob.finish(header);
@@ -111,7 +122,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.channels = header.channels;
     out.aovs = header.aovs;
     out.triangles = header.triangle_count;
-    out.emitters = header.lights.count;
+    out.emitters = lights.emitters;
     out.objects = flat.placements;
     out.nodes = header.nodes.count;
     out.scale_exponent = flat.scale_exponent;

@@ -3,6 +3,7 @@
 #include "base/vec3d.h"
 #include "compile/distributions.h"
 #include "compile/geometry.h"
+#include "compile/point_lights.h"
 
 #include <algorithm>
 #include <cmath>
@@ -86,6 +87,7 @@ std::vector<const Spectrum*> spectraOfLights(const Scene& scene, const FlatScene
         if (!seen[emission]) spectra.push_back(&scene.emissions[emission].radiance);
         seen[emission] = true;
     }
+    for (const PointLight* light : shiningPointLights(scene)) spectra.push_back(&light->spectrum);
     return spectra;
 }
 
@@ -121,6 +123,7 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         part.lights.push_back(light);
         power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
     }
+    part.emitters = static_cast<std::uint32_t>(part.lights.size());
     if (samplesEnvironment(scene)) {
         kernel::CrtLight light{};
         light.kind = CRT_LIGHT_ENVIRONMENT;
@@ -129,6 +132,18 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         part.environment = static_cast<std::uint32_t>(part.lights.size());
         power.push_back(areaAround(flat) * brightness(scene.environment->radiance));
     }
+    const std::vector<const PointLight*> point_lights = shiningPointLights(scene);
+    const double around = point_lights.empty() ? 0 : areaAround(flat);
+    for (const PointLight* own : point_lights) {
+        kernel::CrtLight light{};
+        light.kind = kindOf(own->type);
+        light.radiance = spectra.valueOf(own->spectrum);
+        light.slot = static_cast<std::uint32_t>(part.point_lights.size());
+        part.point_lights.push_back(compilePointLight(*own, flat));
+        part.point_lights.back().light = static_cast<std::uint32_t>(part.lights.size());
+        part.lights.push_back(light);
+        power.push_back(powerOf(*own, part.point_lights.back(), around) * brightness(own->spectrum));
+    }
     const std::vector<std::uint64_t> first = choiceTable(power);
     for (std::size_t i = 0; i < part.lights.size(); ++i) {
         part.lights[i].choice = static_cast<std::uint32_t>(first[i]);
@@ -136,6 +151,10 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
             static_cast<float>(std::ldexp(static_cast<double>(first[i + 1] - first[i]), -32));
     }
     return part;
+}
+
+bool shadowRaysLeave(const Scene& scene) {
+    return samplesEnvironment(scene) || !shiningPointLights(scene).empty();
 }
 
 bool samplesEnvironment(const Scene& scene) {

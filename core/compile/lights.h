@@ -25,13 +25,18 @@ struct LightPart {
     std::vector<kernel::CrtLight> lights;
     std::vector<std::uint32_t> light_of;  ///< By primitive id: index of its light, or CRT_NONE.
     std::uint32_t environment = 0;        ///< 1 + the index of its light; 0: it has none.
+    std::vector<kernel::CrtPointLight> point_lights;
+    std::uint32_t emitters = 0;           ///< Lights that are triangles or parallelograms: the first ones.
 };
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
                         const SpectrumTable& spectra);
 
-/// Whether the environment is among the lights: shadow rays then leave the scene.
+/// Whether the environment is among the lights.
 bool samplesEnvironment(const Scene& scene);
+
+/// Whether shadow rays leave the scene: towards its environment, or lights without a surface.
+bool shadowRaysLeave(const Scene& scene);
 
 /// The spectrum of the environment, where there is one and the view shows it; otherwise null.
 const Spectrum* spectrumOfEnvironment(const Scene& scene);

@@ -1,6 +1,7 @@
 #include "compile/needs.h"
 
 #include "compile/accelerator.h"
+#include "compile/point_lights.h"
 #include "kernel/features.h"
 #include "scene/aov.h"
 
@@ -38,12 +39,18 @@ std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     if (scatters(scene) || (header.aovs & kAovAlbedo) != 0) f |= materials.features;
     need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
     const bool samples_environment = header.environment_light != 0;
-    need(header.lights.count > (samples_environment ? 1u : 0u), CRT_FEATURE_AREA_LIGHT);
+    need(header.lights.count > header.point_lights.count + (samples_environment ? 1u : 0u),
+         CRT_FEATURE_AREA_LIGHT);
     need(scatters(scene) && header.lights.count > 0 && header.nee &&
              (materials.features & CRT_FEATURES_LOBE) != 0,
          CRT_FEATURE_NEE);
     need(header.environment != CRT_NONE, CRT_FEATURE_ENVIRONMENT);
     need((f & CRT_FEATURE_NEE) != 0 && samples_environment, CRT_FEATURE_ENVIRONMENT_LIGHT);
+    // Of lights without a surface, suns alone are seen without light sampling. They come first.
+    const std::vector<const PointLight*> lights = shiningPointLights(scene);
+    need(!lights.empty() &&
+             ((f & CRT_FEATURE_NEE) != 0 || lights.front()->type == PointLightType::Sun),
+         CRT_FEATURE_POINT_LIGHT);
     need(header.spectra.count > 0, CRT_FEATURE_TABLE);
     need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
     need(header.filter.count > 0, CRT_FEATURE_FILTER);
@@ -86,6 +93,10 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
         left_out("light sampling of the environment",
                  header.environment_light == 0 ? "environment.light_sampling is false"
                                                : "nothing that light sampling could light");
+    if (!has(CRT_FEATURE_POINT_LIGHT))
+        left_out("point, spot, directional and sun lights",
+                 header.point_lights.count == 0 ? "there are none"
+                                                : "nothing that light sampling could light");
     if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
     if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
     if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");

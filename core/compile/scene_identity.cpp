@@ -46,7 +46,7 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
     for (kernel::CrtSpan* span :
          {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
           &header.normals, &header.nodes, &header.objects, &header.materials, &header.lights,
-          &header.spectra, &header.observer, &header.wavelengths, &header.filter})
+          &header.spectra, &header.observer, &header.wavelengths, &header.filter, &header.point_lights})
         *span = {};
     return header;
 }
@@ -76,8 +76,11 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
     const CrtTriangle* triangles = CRT_ARRAY(CrtTriangle, blob, header.triangles);
     std::vector<CrtLight> by_id(lights, lights + header.lights.count);
     for (CrtLight& light : by_id)
-        if (light.kind != CRT_LIGHT_ENVIRONMENT) light.slot = triangles[light.slot].id;
+        if (light.kind == CRT_LIGHT_TRIANGLE || light.kind == CRT_LIGHT_PARALLELOGRAM)
+            light.slot = triangles[light.slot].id;
     hash.add(by_id.data(), by_id.size(), sizeof(CrtLight));
+    hash.add(CRT_ARRAY(CrtPointLight, blob, header.point_lights), header.point_lights.count,
+             sizeof(CrtPointLight));
     return hash.digits();
 }
 

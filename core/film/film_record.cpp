@@ -178,10 +178,23 @@ SceneTrait lightsTrait(const Scene& scene) {
         digest.add(scene.environment->radiance);
         if (scene.environment->light_sampling) digest.add(true);
     }
+    for (const PointLight& light : scene.point_lights) {
+        digest.add(light.type);
+        digest.add(light.spectrum);
+        digest.add(light.strength);
+        for (const double x : {light.position[0], light.position[1], light.position[2], light.direction[0],
+                               light.direction[1], light.direction[2], light.cone_angle_deg,
+                               light.penumbra_deg, light.angular_diameter_deg})
+            digest.add(x);
+    }
+    const std::string without_surface =
+        scene.point_lights.empty()
+            ? std::string()
+            : fmt::format(", {} without a surface", counted(scene.point_lights.size(), "light", "lights"));
     return {
         "the light",
-        fmt::format("{}, {} environment", counted(scene.emissions.size(), "kind of lamp", "kinds of lamp"),
-                    scene.environment ? "an" : "no"),
+        fmt::format("{}{}, {} environment", counted(scene.emissions.size(), "kind of lamp", "kinds of lamp"),
+                    without_surface, scene.environment ? "an" : "no"),
         digest.digits()};
 }
 

@@ -1,12 +1,11 @@
 #include "image/image_io.h"
 
-#include "base/code_trust.h"
 #include "base/error.h"
 #include "base/input_file.h"
 #include "base/log.h"
-#include "base/modules.h"
 #include "image/image_metadata.h"
 #include "image/image_module.h"
+#include "image/open_module.h"
 
 #include <fmt/format.h>
 
@@ -17,7 +16,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <dlfcn.h>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -196,51 +194,6 @@ Image readPpm(const std::string& path, std::string_view bytes) {
 }
 
 // ---------------------------------------------------------------------------------------------- EXR, PNG, …
-
-/// Opens the codec module on first use and keeps it: OpenImageIO's threads outlive any one image.
-const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {
-    struct Opened {
-        const CrtImageModule* table = nullptr;
-        std::string reason;
-    };
-    static const Opened opened = [] {
-        Opened o;
-        const std::vector<std::string> directories = pluginDirectories();
-        for (const std::string& directory : directories) {
-            const std::string file = directory + "/" CRT_IMAGE_MODULE_FILE;
-            std::error_code ignored;
-            if (!std::filesystem::exists(file, ignored)) continue;
-            if (const std::string why = trust::whyNotByName(file); !why.empty()) {
-                o.reason = fmt::format("the image module is refused: {}", why);
-                return o;
-            }
-            void* const library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
-            if (library == nullptr) {
-                o.reason = fmt::format("the image module cannot be opened ({})", ::dlerror());
-                return o;
-            }
-            const auto entry =
-                reinterpret_cast<CrtImageModuleEntry>(::dlsym(library, CRT_IMAGE_MODULE_ENTRY_NAME));
-            const CrtImageModule* const table = entry != nullptr ? entry() : nullptr;
-            if (table == nullptr || table->struct_size < sizeof(CrtImageModule)) {
-                o.reason = fmt::format("'{}' is not the image module of this version of crt", file);
-                return o;
-            }
-            logDebug("image module: {} ({})", file, table->build);
-            o.table = table;
-            return o;
-        }
-        o.reason = fmt::format("the image module " CRT_IMAGE_MODULE_FILE " is not in {}",
-                               fmt::join(directories, ", "));
-        return o;
-    }();
-    if (opened.table == nullptr)
-        throw Error(kind,
-                    fmt::format("cannot {} '{}': {}; .pfm and .ppm work without it",
-                                kind == ErrorKind::Output ? "write" : "read", path, opened.reason),
-                    {path});
-    return *opened.table;
-}
 
 std::vector<CrtImageText> texts(const Image& image) {
     std::vector<CrtImageText> list;

@@ -1,7 +1,9 @@
-// The image codec module: EXR and PNG through OpenImageIO, behind image_module.h. Built as a library of its
+// The image codec module: EXR, PNG and HDR through OpenImageIO, JPEG through libjpeg-turbo, behind
+// image_module.h. Built as a library of its
 // own; nothing else in crt includes OpenImageIO.
 #include "image/image_headers.h"
 #include "image/image_module.h"
+#include "image/jpeg_reader.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -264,20 +266,35 @@ constexpr KnownFormat kKnownFormats[] = {
     {"hdr", std::string_view("#?RADIANCE", 10)},
 };
 
-std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
+/// How a file begins.
+std::string beginningOf(const char* path) {
     char beginning[16] = {};
     std::ifstream file(path, std::ios::binary);
     file.read(beginning, sizeof beginning);
-    const std::string_view there(beginning, static_cast<std::size_t>(file.gcount()));
+    return {beginning, static_cast<std::size_t>(file.gcount())};
+}
+
+/// Null for a file of no known format.
+std::unique_ptr<ImageInput> openKnown(const char* path, ImageSpec& spec, const ImageSpec& wishes) {
+    const std::string beginning = beginningOf(path);
+    const std::string_view there(beginning);
     for (const KnownFormat& format : kKnownFormats) {
         if (there.substr(0, format.signature.size()) != format.signature) continue;
         if (format.check_header != nullptr) format.check_header(path);
         std::unique_ptr<ImageInput> input = ImageInput::create(format.name);
         if (!input)
             throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
-        if (!input->open(path, spec)) throw Failure{wordsOr(input->geterror(), "it cannot be opened")};
+        if (!input->open(path, spec, wishes))
+            throw Failure{wordsOr(input->geterror(), "it cannot be opened")};
+        if (spec.deep) throw Failure{"it is a deep image"};
+        if (spec.depth > 1) throw Failure{"it is a volume"};
         return input;
     }
+    return nullptr;
+}
+
+std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
+    if (std::unique_ptr<ImageInput> input = openKnown(path, spec, ImageSpec())) return input;
     throw Failure{
         "it is no EXR, PNG, PFM, PPM or Radiance HDR file; OpenImageIO's oiiotool makes one of others: "
         "oiiotool IN -o OUT.exr"};
@@ -288,8 +305,6 @@ std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* rea
     return guarded(reason, reason_size, [&] {
         ImageSpec spec;
         const std::unique_ptr<ImageInput> input = openImage(path, spec);
-        if (spec.deep) throw Failure{"it is a deep image"};
-        if (spec.depth > 1) throw Failure{"it is a volume"};
         const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)),
                    height = static_cast<std::uint64_t>(std::max(spec.height, 0));
         crt::image::checkPixels(path, width, height,
@@ -368,9 +383,80 @@ std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* rea
     });
 }
 
-void freeImage(const CrtImagePlanes* image) {
-    delete static_cast<const OwnedImage*>(image);
+// ---- Images as values
+// -------------------------------------------------------------------------------------
+
+/// The channels that are the colour: R, G and B, or the only one beside alpha.
+std::vector<int> colorChannels(const ImageSpec& spec) {
+    std::vector<int> rgb;
+    for (const char* const name : {"R", "G", "B"})
+        if (const int c = spec.channelindex(name); c >= 0) rgb.push_back(c);
+    if (rgb.size() == 3) return rgb;
+    std::vector<int> others;
+    for (int c = 0; c < spec.nchannels; ++c)
+        if (c != spec.alpha_channel && c != spec.z_channel) others.push_back(c);
+    if (others.size() == 1) return others;
+    std::string names;
+    for (const std::string& name : spec.channelnames) names += (names.empty() ? "" : ", ") + name;
+    throw Failure{"it has the channels " + names.substr(0, 200) + "; a texture has R, G and B, or one"};
 }
+
+std::uint32_t texelType(const ImageSpec& spec) {
+    switch (spec.format.basetype) {
+        case TypeDesc::UINT8: return CRT_TEXELS_UINT8;
+        case TypeDesc::UINT16: return CRT_TEXELS_UINT16;
+        case TypeDesc::HALF:
+        case TypeDesc::FLOAT: return CRT_TEXELS_FLOAT;
+        default: throw Failure{"its pixels are neither floats nor of 8 or 16 bits"};
+    }
+}
+
+std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
+                        char* reason, std::uint32_t reason_size) {
+    return guarded(reason, reason_size, [&] {
+        *info = {};
+        if (beginningOf(path).compare(0, 3, "\xff\xd8\xff") == 0) {
+            const std::string why =
+                crt::image::readJpeg(path, info, static_cast<unsigned char*>(buffer), buffer_bytes);
+            if (!why.empty()) throw Failure{why};
+            return;
+        }
+        ImageSpec spec, wishes;
+        wishes.attribute("oiio:UnassociatedAlpha", 1);  // Else colours come multiplied by alpha.
+        const std::unique_ptr<ImageInput> input = openKnown(path, spec, wishes);
+        if (!input) throw Failure{"it is no PNG, JPEG, EXR, Radiance HDR or PFM file"};
+        const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)),
+                   height = static_cast<std::uint64_t>(std::max(spec.height, 0));
+        crt::image::checkPixels(path, width, height,
+                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
+        crt::image::checkRows(width, height, spec.pixel_bytes(true));
+        const std::vector<int> channels = colorChannels(spec);
+        info->width = static_cast<std::uint32_t>(width);
+        info->height = static_cast<std::uint32_t>(height);
+        info->channels = static_cast<std::uint32_t>(channels.size());
+        info->type = texelType(spec);
+        info->has_chromaticities =
+            spec.getattribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), info->chromaticities);
+        if (buffer == nullptr) return;
+
+        const TypeDesc type = info->type == CRT_TEXELS_UINT8    ? TypeDesc(TypeDesc::UINT8)
+                              : info->type == CRT_TEXELS_UINT16 ? TypeDesc(TypeDesc::UINT16)
+                                                                : TypeDesc(TypeDesc::FLOAT);
+        const std::size_t pixel = channels.size() * type.size();
+        if (width * height * pixel != buffer_bytes) throw Failure{"it has changed while it was read"};
+        for (std::size_t c = 0; c < channels.size();) {
+            std::size_t end = c + 1;
+            while (end < channels.size() && channels[end] == channels[end - 1] + 1) ++end;
+            if (!input->read_image(0, 0, channels[c], channels[end - 1] + 1, type,
+                                   static_cast<unsigned char*>(buffer) + c * type.size(),
+                                   static_cast<OIIO::stride_t>(pixel)))
+                throw Failure{wordsOr(input->geterror(), "its pixels cannot be read")};
+            c = end;
+        }
+    });
+}
+
+void freeImage(const CrtImagePlanes* image) { delete static_cast<const OwnedImage*>(image); }
 
 }  // namespace
 
@@ -385,6 +471,7 @@ extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
                                       writeExr,
                                       writePng,
                                       readImage,
-                                      freeImage};
+                                      freeImage,
+                                      readTexels};
     return &table;
 }

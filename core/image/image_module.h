@@ -1,7 +1,7 @@
 /*
  * image_module.h: the border between crt and its image codec module, lib/crt/crt_image_oiio.so. C99.
- * OpenImageIO and the thirty libraries it brings are behind it, so that only a job that reads or writes EXR
- * or PNG pays for them.
+ * OpenImageIO and the thirty libraries it brings are behind it, so that only a job that reads or writes EXR,
+ * PNG, HDR or JPEG pays for them.
  *
  * The module exports one symbol, which returns a table. No C++ type and no exception crosses; what the
  * module allocates the module frees. Functions return 0, or non-zero with one sentence in `reason`
@@ -18,8 +18,8 @@ extern "C" {
 
 #define CRT_IMAGE_MODULE_FILE "crt_image_oiio.so"
 /* The symbol carries the version: a module of another version does not have it. */
-#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v2
-#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v2"
+#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v3
+#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v3"
 
 typedef struct CrtImageText {
     const char *name;
@@ -49,6 +49,19 @@ typedef struct CrtImagePlanes {
     const float *adopted_neutral;      /* to write only: {x, y}, or null */
 } CrtImagePlanes;
 
+#define CRT_TEXELS_UINT8 0u
+#define CRT_TEXELS_UINT16 1u
+#define CRT_TEXELS_FLOAT 2u
+
+/* What the pixels of an image are that is a value of a scene: as the file holds them, without alpha. */
+typedef struct CrtTexelsInfo {
+    uint32_t width, height;
+    uint32_t channels;             /* 1: grey; 3: red, green, blue */
+    uint32_t type;                 /* CRT_TEXELS_…; floats are linear */
+    uint32_t has_chromaticities;
+    float chromaticities[8];       /* {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy} */
+} CrtTexelsInfo;
+
 typedef struct CrtImageModule {
     uint32_t struct_size;
     uint32_t reserved;
@@ -65,6 +78,10 @@ typedef struct CrtImageModule {
        until freed. */
     int32_t (*read)(const char *path, const CrtImagePlanes **image, char *reason, uint32_t reason_size);
     void (*free_image)(const CrtImagePlanes *image);
+    /* EXR, PNG, Radiance HDR or JPEG, by content. *info is filled in; with a buffer, which must have the
+       bytes that an earlier *info says, [height][width][channels], too. */
+    int32_t (*read_texels)(const char *path, CrtTexelsInfo *info, void *buffer, uint64_t buffer_bytes,
+                           char *reason, uint32_t reason_size);
 } CrtImageModule;
 
 typedef const CrtImageModule *(*CrtImageModuleEntry)(void);

@@ -124,6 +124,11 @@ CRT_ASSERT_SIZE(CrtMaterial, 32);
 #define CRT_LIGHT_TRIANGLE 0u
 #define CRT_LIGHT_PARALLELOGRAM 1u /* two triangles */
 #define CRT_LIGHT_ENVIRONMENT 2u   /* from far away: no slot, no area */
+/* Lights without a surface: `slot` is the index of a CrtPointLight, there is no area. */
+#define CRT_LIGHT_POINT 3u
+#define CRT_LIGHT_SPOT 4u
+#define CRT_LIGHT_DIRECTIONAL 5u
+#define CRT_LIGHT_SUN 6u
 
 #define CRT_LIGHT_TWO_SIDED 1u
 
@@ -138,6 +143,20 @@ typedef struct CrtLight {
     f32 area;
 } CrtLight;
 CRT_ASSERT_SIZE(CrtLight, 32);
+
+/* What a light without a surface has besides its CrtLight, whose `radiance` is a spectrum that `strength`
+   multiplies. Suns come first. */
+typedef struct CrtPointLight {
+    f32 position[3];      /* point, spot */
+    f32 strength;         /* point, spot (on its axis): radiant intensity, by squared length here;
+                             directional: irradiance of a plane that faces it; sun: radiance */
+    f32 direction[3];     /* unit, the way that the light goes; not of a point */
+    f32 cone;             /* spot, sun: 1 − cos of the angle from the axis to the edge */
+    f32 inverse_penumbra; /* spot: 1 / (cone − (1 − cos) where the penumbra begins) */
+    u32 light;            /* index of its CrtLight */
+    u32 reserved0, reserved1;
+} CrtPointLight;
+CRT_ASSERT_SIZE(CrtPointLight, 48);
 
 /* A film point (px, py), in pixels from the top left, looks along corner + px·step_x + py·step_y (not
    normalised; its component along the view axis is 1). */
@@ -232,10 +251,12 @@ typedef struct CrtScene {
     CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
     CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */
     CrtSpan filter;              /* CRT_FILTER_TABLE + 1 nodes of the offset from the pixel centre, pixels */
+    CrtSpan point_lights;        /* CrtPointLight */
+    CrtSpan reserved;
 
     CrtCamera camera;
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 336);
+CRT_ASSERT_SIZE(CrtScene, 352);
 
 CRT_KERNEL_END
 

@@ -7,7 +7,7 @@
 #ifndef CRT_PATH_H
 #define CRT_PATH_H
 
-#include "light.h"
+#include "point_light.h"
 
 CRT_KERNEL_BEGIN
 
@@ -142,12 +142,39 @@ CRT_FN void crt_ask_environment(const CrtContext *ctx, CrtPath *path, const CrtS
                        crt_value(ctx, ctx->scene->environment, 0, path->wavelengths.position) * weight;
 }
 
+/* Next event estimation: a light without a surface. */
+CRT_FN void crt_ask_point_light(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface,
+                                const CrtBsdf *bsdf, u32 index, u32 dimension, CrtShadow *shadow) {
+    const CrtPointLightSample light =
+        crt_point_light_sample(ctx, index, &path->sampler, dimension, surface->p);
+    if (!(light.irradiance > 0.0f)) return;
+    const int before = dot3(light.wi, bsdf->ng) > 0.0f;
+    if ((bsdf->flags & (before ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS)) == 0u) return;
+    const vec4 scattered = crt_bsdf_eval(bsdf, light.wi);
+    if (max4(scattered) == 0.0f) return;
+    shadow->asked = 1;
+    shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, bsdf->ng, light.wi);
+    shadow->ray.d = light.far ? light.wi : light.point - shadow->ray.o;
+    shadow->ray.reach = light.far ? CRT_INFINITY : CRT_POINT_LIGHT_REACH;
+    f32 weight = light.irradiance;
+    if (light.pdf > 0.0f && ctx->scene->nee == CRT_NEE_MIS)
+        weight = weight * crt_power_heuristic(crt_bsdf_pdf(bsdf, light.wi) / light.pdf);
+    const CrtValue spectrum = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[index].radiance;
+    shadow->radiance = path->throughput * scattered *
+                       crt_value(ctx, spectrum, 0, path->wavelengths.position) * weight;
+}
+
 /* Next event estimation: a light, and a ray towards it. */
 CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface,
                           const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
     const u32 index = crt_light_choose(ctx, &path->sampler, dimension);
     if (CRT_HAS(ENVIRONMENT_LIGHT) && index + 1u == ctx->scene->environment_light) {
         crt_ask_environment(ctx, path, surface, bsdf, dimension, shadow);
+        return;
+    }
+    if (CRT_HAS(POINT_LIGHT) &&
+        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[index].kind >= CRT_LIGHT_POINT) {
+        crt_ask_point_light(ctx, path, surface, bsdf, index, dimension, shadow);
         return;
     }
     const CrtLightSample light = crt_light_sample(ctx, index, &path->sampler, dimension, surface->p);
@@ -183,6 +210,10 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     shadow->asked = 0;
     if (hit.slot == CRT_NONE) {
         if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE) crt_add_environment(ctx, path);
+        if (CRT_HAS(POINT_LIGHT) && scene->point_lights.count != 0u)
+            path->radiance = path->radiance +
+                             path->throughput * crt_suns_seen(ctx, path->ray.d, path->scatter_pdf,
+                                                              path->wavelengths.position);
         return 0;
     }
     const CrtSurface surface = crt_surface(ctx, hit);

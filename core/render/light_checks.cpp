@@ -114,7 +114,7 @@ std::vector<std::string> reasonsForBlack(const Scene& scene) {
         if (!oneSidedFaces(scene, object).empty()) one_sided.push_back(nameOf(object));
     }
     const bool sky = scene.environment && scene.environment->radiance.max() > 0;
-    if (lamps.empty() && !sky) return {"the scene has no light"};
+    if (lamps.empty() && !sky && scene.point_lights.empty()) return {"the scene has no light"};
     std::vector<std::string> reasons;
     if (!one_sided.empty()) {
         constexpr std::size_t kShown = 3;
@@ -127,6 +127,9 @@ std::vector<std::string> reasonsForBlack(const Scene& scene) {
     }
     if (scene.integrator.max_depth == 0)
         reasons.emplace_back("'max_depth: 0' shows lamps and no light on anything");
+    if (!scene.point_lights.empty())
+        reasons.emplace_back("point, spot and directional lights are not seen by the camera, nor by way of "
+                             "mirrors, smooth metals and glass");
     if (!scene.integrator.nee && !sky) reasons.emplace_back("with 'nee: false' few paths meet a small lamp");
     reasons.emplace_back("the camera may be inside an object, or look past the scene");
     return reasons;

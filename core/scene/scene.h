@@ -131,6 +131,30 @@ struct Object {
     SourcePlace place;
 };
 
+enum class PointLightType { Point, Spot, Directional, Sun };
+/// Their names in scene files.
+inline constexpr std::pair<PointLightType, const char*> kPointLightNames[] = {
+    {PointLightType::Point, "point"},
+    {PointLightType::Spot, "spot"},
+    {PointLightType::Directional, "directional"},
+    {PointLightType::Sun, "sun"}};
+
+/// A light without a surface.
+struct PointLight {
+    std::string name;
+    PointLightType type = PointLightType::Point;
+    Spectrum spectrum;    ///< Times `strength`.
+    /// Radiant intensity (Point; Spot, on its axis), W·sr⁻¹·nm⁻¹; irradiance of a plane that faces it
+    /// (Directional), W·m⁻²·nm⁻¹; or radiance (Sun), W·m⁻²·sr⁻¹·nm⁻¹: per unit of the spectrum.
+    double strength = 1;
+    Vec3d position{};                 ///< Point, Spot.
+    Vec3d direction{0, -1, 0};        ///< Unit, the way that the light goes. All but Point.
+    double cone_angle_deg = 30;       ///< Spot: from the axis to the edge.
+    double penumbra_deg = 5;          ///< Spot: the outer part of that angle, where the light falls to 0.
+    double angular_diameter_deg = 0.53;  ///< Sun.
+    SourcePlace place;
+};
+
 struct Environment {
     Spectrum radiance;            ///< The same in every direction.
     bool light_sampling = false;  ///< Is it a light to sample, or left to scattered rays?
@@ -156,6 +180,7 @@ struct Scene {
     std::vector<Emission> emissions;
     std::vector<Mesh> meshes;
     std::vector<Object> objects;
+    std::vector<PointLight> point_lights;
     std::optional<Environment> environment;
     std::vector<Output> outputs;
     std::map<std::string, Vec3d> whites;  ///< Named spectra that are lights, with luminance: XYZ with Y = 1.

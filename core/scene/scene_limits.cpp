@@ -22,9 +22,10 @@ namespace {
 
 /// A light, and its name in messages.
 struct Light {
-    double radiance;  ///< At its brightest wavelength.
+    double radiance;  ///< At its brightest wavelength; intensity or irradiance where it has no surface.
     std::string name;
     SourcePlace place;
+    const char* quantity = "radiance";
 };
 
 /// All that shine, those of a mesh (Ke of its MTL) once for each object that has it.
@@ -47,6 +48,12 @@ std::vector<Light> lightsOf(const Scene& scene) {
                 fmt::format("a material (Ke) of '{}'", object.name), object.place);
         }
     }
+    for (const PointLight& light : scene.point_lights)
+        if (const double brightest = light.strength * light.spectrum.max(); brightest > 0)
+            lights.push_back({brightest, fmt::format("'{}'", light.name), light.place,
+                              light.type == PointLightType::Sun           ? "radiance"
+                              : light.type == PointLightType::Directional ? "irradiance"
+                                                                          : "radiant intensity"});
     if (scene.environment) add(scene.environment->radiance.max(), "the environment", {scene.file});
     return lights;
 }
@@ -96,17 +103,17 @@ void checkRadiance(const Scene& scene) {
                             [](const Light& a, const Light& b) { return a.radiance < b.radiance; });
     if (!(brightest->radiance <= kMostRadiance))
         refuse(*brightest,
-               fmt::format("the radiance of {} reaches {:g}, and single precision carries light up to {:g}",
-                           brightest->name, brightest->radiance, kMostRadiance));
+               fmt::format("the {} of {} reaches {:g}, and single precision carries light up to {:g}",
+                           brightest->quantity, brightest->name, brightest->radiance, kMostRadiance));
     if (brightest->radiance < kLeastRadiance)
         refuse(
             *brightest,
             fmt::format(
-                "{} is the brightest light, of radiance {:g}, and single precision carries light from {:g}",
-                brightest->name, brightest->radiance, kLeastRadiance));
+                "{} is the brightest light, of {} {:g}, and single precision carries light from {:g}",
+                brightest->name, brightest->quantity, brightest->radiance, kLeastRadiance));
     if (dimmest->radiance < static_cast<double>(std::numeric_limits<float>::min()))
-        logWarning("{}: {} has a radiance of {:g}, below single precision: it does not shine",
-                   at(dimmest->place), dimmest->name, dimmest->radiance);
+        logWarning("{}: {} has a {} of {:g}, below single precision: it does not shine", at(dimmest->place),
+                   dimmest->name, dimmest->quantity, dimmest->radiance);
 }
 
 }  // namespace crt

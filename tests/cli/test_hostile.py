@@ -328,6 +328,29 @@ def scene_cases():
         HEAD + "environment: {radiance: 1e-50}\n",
         words="single precision carries light from 1e-25",
     )
+    bulb = "{type: point, position: [0, 0, 1], power_w: 1}"
+    for text, words in (
+        ("7", "expected a list"),
+        ("[7]", "expected a map"),
+        ("[{}]", "'type' is missing"),
+        ("[{type: laser}]", "expected one of"),
+        ("[{type: point, position: [0, 0, 1]}]", "needs radiant_intensity or"),
+        ("[{type: point, position: [0, 0, nan], power_w: 1}]", "NaN"),
+        ("[{type: point, position: [0, 0, 1], power_w: -1}]", "must be 0 or more"),
+        ("[{type: point, position: [0, 0, 1], power_w: 1e300}]", "single precision carries light up to"),
+        ("[{type: point, position: [0, 0, 1], power_w: 1, spectrum: 0}]", "no light that 'power_w'"),
+        ("[{type: spot, position: [0, 0, 1], power_w: 1}]", "needs direction or target"),
+        ("[{type: spot, position: [0, 0, 1], power_w: 1, target: [0, 0, 1]}]", "where the light is"),
+        ("[{type: directional, direction: [0, 0, 0], irradiance: 1}]", "length 0"),
+        ("[{type: sun, direction: [0, -1, 0], radiance: 1, angular_diameter_deg: 400}]", "must be"),
+        (f"[{bulb}]\nintegrator: {{nee: false}}", "found by light sampling alone"),
+    ):
+        scene(f"lights: {text}".replace("\n", ", "), GOOD + f"lights: {text}\n", words=words)
+    scene(
+        "a light at 1e30 scene units",
+        GOOD + f"lights: [{bulb.replace('[0, 0, 1]', '[1e30, 0, 0]')}]\n",
+        words="too far from the scene for single precision",
+    )
     scene("an output of a kind unknown", HEAD + "outputs: [{file: a.docx}]\n", words="does not end in")
     scene("an output twice", HEAD + "outputs: [{file: a.exr}, {file: a.exr}]\n", words="written twice")
     placement = "[{translate: [1, 2, 3]}]"

@@ -25,6 +25,7 @@ KEYWORDS = ("SOURCES", "USES", "LIBRARIES", "HEADERS")
 OTHER_TARGETS = {
     "image/image_io_oiio.cpp",
     "image/image_headers.cpp",
+    "image/jpeg_reader.cpp",
     "backend/sdk/kernel_cache.cpp",
     "cli/main.cpp",
 }

@@ -92,6 +92,7 @@ std::vector<Case> scaleCases();          ///< B
 std::vector<Case> geometryCases();       ///< C
 std::vector<Case> rayCases();            ///< D
 std::vector<Case> lightCases();          ///< E
+std::vector<Case> pointLightCases();     ///< E, the part about lights without a surface
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> scatteringCases();     ///< G
 std::vector<Case> colourCases();         ///< H

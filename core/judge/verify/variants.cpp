@@ -74,6 +74,20 @@ std::vector<Variant> variants(int resolution) {
         s.integrator.accelerator = Accelerator::None;
         s.environment->light_sampling = true;
     });
+    add("lights without a surface", [](Scene& s) {
+        PointLight light;
+        light.spectrum = constantSpectrum(1);
+        light.position = {0.5, 0.5, 0.125};
+        light.strength = 0.25;
+        light.direction = unit({0.25, -0.5, 1});
+        for (const PointLightType type : {PointLightType::Point, PointLightType::Spot,
+                                          PointLightType::Directional, PointLightType::Sun}) {
+            light.type = type;
+            s.point_lights.push_back(light);
+        }
+        s.point_lights.back().angular_diameter_deg = 10;
+        s.point_lights.back().strength = 8;
+    });
     add("view of the normals", [](Scene& s) { s.integrator.type = IntegratorType::Normals; });
     add("view of the boxes", [](Scene& s) { s.integrator.type = IntegratorType::Aabb; });
     return all;

@@ -219,7 +219,7 @@ does:
   Where two files give the same key, the including file wins over what it includes, and of a list of files
   the later one wins over the earlier. A value is replaced as a whole: a material is never made of two
   halves. What excludes it gives way too: an included `focal_length` with its `sensor` to a `fov`.
-- `objects` are joined: those of the included files come first, in the order of the list.
+- `objects` and `lights` are joined: those of the included files come first, in the order of the list.
 - `title` and `outputs` are those of the file that wins.
 - `key: null` takes an included value away where `null` is a value of the key, such as `environment: null`.
 - A file that several files include counts once. A file that includes itself, directly or through others, is
@@ -258,6 +258,13 @@ std::string_view familyIntroduction(std::string_view family) {
                "- text: the name of an entry of `spectra` (for `white_balance` also of an illuminant);\n"
                "- a map of one of the forms below.\n";
     if (family == "material") return "What light does at a surface. `type` picks one of these.\n";
+    if (family == "light")
+        return "A light without a surface: `lights` lists them, and `type` picks one of these. How bright "
+               "it is says one key, whose name gives the unit: a spectrum in absolute terms, or an amount to "
+               "which `spectrum` is scaled. A scene unit counts as a metre.\n\n"
+               "Points, spots and directional lights are found by light sampling alone: cameras, mirrors "
+               "and smooth glass do not see them, their light does not pass smooth glass, and they need "
+               "`integrator.nee`. With `integrator.mis: false` they shine as ever.\n";
     if (family == "transform")
         return "A placement is a list of steps, each a map with one key, applied in order: `[{scale: 2}, "
                "{rotate: {axis: [0, 1, 0], angle_deg: 90}}, {translate: [0, 1, 0]}]`.\n";

@@ -49,7 +49,7 @@ void checkIncluded(const YamlNode& root, Diagnostics& out) {
 }
 
 /// Lists that grow: what an included room holds is there beside what the scene adds.
-bool isJoined(const std::string& key) { return key == "objects"; }
+bool isJoined(const std::string& key) { return key == "objects" || key == "lights"; }
 
 YamlNodePtr joined(const YamlNode& below, const YamlNode& above) {
     auto list = std::make_shared<YamlNode>(above);
@@ -104,7 +104,7 @@ std::set<std::string> givingWay(const std::string& key, const YamlNode& above) {
     return section ? givingWay(schemaSection(schema->section), above) : std::set<std::string>();
 }
 
-/// Two scenes as one. Sections, `spectra` and `materials` key by key, `objects` one after the other;
+/// Two scenes as one. Sections, `spectra` and `materials` key by key, `objects` and `lights` joined;
 /// everything else is that of `above` where it has it.
 YamlNodePtr merged(const YamlNode& below, const YamlNode& above) {
     const YamlNodePtr scene = keyByKey(below, above);

@@ -189,8 +189,12 @@ void SectionReader::checkKeys() const {
 void SectionReader::checkRules() const {
     for (const KeyRule& rule : schema_->rules) {
         std::vector<std::string> given, missing;
-        for (const std::string& key : rule.keys)
-            (node_->find(key) != nullptr ? given : missing).push_back(quotedName(key));
+        const YamlEntry* last = nullptr;  // Of those given.
+        for (const std::string& key : rule.keys) {
+            const YamlEntry* entry = node_->find(key);
+            (entry != nullptr ? given : missing).push_back(quotedName(key));
+            if (entry != nullptr) last = entry;
+        }
         switch (rule.kind) {
             case KeyRule::Kind::ExactlyOne:
                 if (given.empty())
@@ -199,7 +203,7 @@ void SectionReader::checkRules() const {
             case KeyRule::Kind::AtMostOne:
                 if (given.size() > 1)
                     out_->error(
-                        node_->find(rule.keys.back())->key_place,
+                        last->key_place,
                         fmt::format("{} in {} exclude each other", fmt::join(given, " and "), subject_));
                 break;
             case KeyRule::Kind::Together:

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
+#include "scene/yaml/scene_schema_lights.h"
 
 #include <fmt/format.h>
 
@@ -108,6 +109,12 @@ SectionSchema topLevel() {
                  .section = "object",
                  .fallback = "[]",
                  .doc = "The geometry."},
+                {.name = "lights",
+                 .kind = Kind::Section,
+                 .shape = Shape::List,
+                 .section = "light",
+                 .fallback = "[]",
+                 .doc = "Lights without a surface. Objects shine by their `emission`."},
                 {.name = "environment",
                  .kind = Kind::Section,
                  .section = "environment",
@@ -759,6 +766,7 @@ const std::vector<SectionSchema>& sceneSchema() {
         addSpectra(all);
         addMaterials(all);
         addObjects(all);
+        addLights(all);
         addOutside(all);
         return all;
     }();

@@ -4,6 +4,7 @@
 #include "base/log.h"
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_include.h"
+#include "scene/yaml/scene_lights.h"
 #include "scene/yaml/scene_objects.h"
 #include "scene/yaml/scene_reader.h"
 #include "scene/yaml/scene_schema.h"
@@ -347,6 +348,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
     ObjectReader objects(out, files, spectra, scene);
     if (const YamlNode* map = top.map("materials")) objects.readMaterials(*map);
     if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
+    if (const YamlNode* list = top.list("lights")) readLights(*list, out, spectra, scene);
     if (const auto section = top.section("environment", "environment"))
         if (std::optional<Spectrum> radiance = spectra.read(*section, "radiance", SpectrumUse::Emission)) {
             scene.environment = Environment{*std::move(radiance)};

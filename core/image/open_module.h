@@ -1,0 +1,16 @@
+/// The image codec module (image_module.h), from this side.
+#pragma once
+
+#include "base/error.h"
+#include "image/image_module.h"
+
+#include <string>
+
+namespace crt {
+
+/// Opens the module on first use and keeps it: OpenImageIO's threads outlive any one image. Throws
+/// crt::Error(kind), with the name of the file that is to be written (kind Output) or read, when there is
+/// none.
+const CrtImageModule& imageModule(const std::string& path, ErrorKind kind);
+
+}  // namespace crt

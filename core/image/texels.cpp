@@ -1,0 +1,170 @@
+#include "image/texels.h"
+
+#include "base/error.h"
+#include "base/input_file.h"
+#include "image/image_io.h"
+#include "image/open_module.h"
+#include "spectra/spectra.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <utility>
+
+namespace crt {
+namespace {
+
+[[noreturn]] void refuse(const std::string& path, const std::string& why) {
+    throw Error(ErrorKind::Scene, fmt::format("cannot read the image '{}': {}", path, why), {path});
+}
+
+std::uint64_t bytesOf(TexelType type) {
+    return type == TexelType::Uint8 ? 1 : type == TexelType::Uint16 ? 2 : 4;
+}
+
+void requireFile(const std::string& path) {
+    try {
+        requireInput(path);
+    } catch (const InputRefused& refused) {
+        refuse(path, fmt::format("it {}", refused.what()));
+    }
+}
+
+/// Which crt reads itself.
+bool isPfm(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    char mark[2] = {};
+    file.read(mark, 2);
+    return file && mark[0] == 'P' && (mark[1] == 'F' || mark[1] == 'f');
+}
+
+void requireSize(const std::string& path, std::uint64_t width, std::uint64_t height) {
+    if (width * height > kMostTexels)
+        refuse(path, fmt::format("it has {} x {} pixels; images in scenes have at most {} million", width,
+                                 height, kMostTexels >> 20));
+}
+
+Texels readPfm(const std::string& path) {
+    Image image;
+    try {
+        image = readImage(path);
+    } catch (const Error& e) {
+        throw Error(ErrorKind::Scene, e.what(), {path});
+    }
+    requireSize(path, image.width, image.height);
+    Texels texels;
+    texels.info = {image.width, image.height, 3, TexelType::Float, image.chromaticities};
+    texels.bytes.resize(image.pixels.size() * sizeof(float));
+    std::memcpy(texels.bytes.data(), image.pixels.data(), texels.bytes.size());
+    return texels;
+}
+
+TexelsInfo infoOf(const CrtTexelsInfo& raw) {
+    TexelsInfo info;
+    info.width = raw.width;
+    info.height = raw.height;
+    info.channels = raw.channels;
+    info.type = raw.type == CRT_TEXELS_UINT8    ? TexelType::Uint8
+                : raw.type == CRT_TEXELS_UINT16 ? TexelType::Uint16
+                                                : TexelType::Float;
+    if (raw.has_chromaticities != 0) {
+        info.chromaticities.emplace();
+        std::copy_n(raw.chromaticities, 8, info.chromaticities->begin());
+    }
+    return info;
+}
+
+/// Header, and pixels where there is a buffer.
+TexelsInfo readWithModule(const std::string& path, void* buffer, std::uint64_t bytes) {
+    const CrtImageModule& module = imageModule(path, ErrorKind::Scene);
+    CrtTexelsInfo raw{};
+    std::array<char, 512> reason{};
+    if (module.read_texels(path.c_str(), &raw, buffer, bytes, reason.data(), reason.size()) != 0)
+        refuse(path, reason.data());
+    requireSize(path, raw.width, raw.height);
+    return infoOf(raw);
+}
+
+template <class Code>
+void decode(const Texels& texels, const std::vector<float>& linear, std::vector<float>& rgb) {
+    const std::size_t channels = texels.info.channels;
+    for (std::size_t i = 0; i < texels.info.count(); ++i)
+        for (std::size_t k = 0; k < 3; ++k) {
+            Code code;
+            std::memcpy(&code, &texels.bytes[(i * channels + (channels == 3 ? k : 0)) * sizeof code],
+                        sizeof code);
+            if constexpr (std::is_same_v<Code, float>)
+                rgb[3 * i + k] = linear.empty() ? code : static_cast<float>(srgbToLinear(double{code}));
+            else
+                rgb[3 * i + k] = linear[code];
+        }
+}
+
+}  // namespace
+
+std::uint64_t TexelsInfo::bytes() const { return count() * channels * bytesOf(type); }
+
+TexelsInfo texelsInfo(const std::string& path) {
+    requireFile(path);
+    if (isPfm(path)) return readPfm(path).info;
+    return readWithModule(path, nullptr, 0);
+}
+
+Texels readTexels(const std::string& path) {
+    requireFile(path);
+    if (isPfm(path)) return readPfm(path);
+    Texels texels;
+    texels.info = readWithModule(path, nullptr, 0);
+    texels.bytes.resize(texels.info.bytes());
+    readWithModule(path, texels.bytes.data(), texels.bytes.size());
+    return texels;
+}
+
+std::vector<float> linearOfCodes(TexelType type, TexelColor color) {
+    if (type == TexelType::Float) return {};
+    std::vector<float> linear(type == TexelType::Uint8 ? 256 : 65536);
+    const double largest = static_cast<double>(linear.size() - 1);
+    for (std::size_t code = 0; code < linear.size(); ++code) {
+        const double value = static_cast<double>(code) / largest;
+        linear[code] = static_cast<float>(color == TexelColor::Linear ? value : srgbToLinear(value));
+    }
+    return linear;
+}
+
+std::optional<Matrix3d> primariesToSrgb(const TexelsInfo& info, const std::string& path) {
+    if (!info.chromaticities) return std::nullopt;
+    Image of;
+    of.chromaticities = info.chromaticities;
+    try {
+        return toLinearSrgb(of);
+    } catch (const Error&) {
+        refuse(path, "its primaries are neither those of sRGB, of ACEScg nor of XYZ");
+    }
+}
+
+std::vector<float> linearRgb(const Texels& texels, TexelColor color, const std::string& path) {
+    std::vector<float> rgb(texels.info.count() * 3);
+    switch (texels.info.type) {
+        case TexelType::Uint8:
+            decode<std::uint8_t>(texels, linearOfCodes(texels.info.type, color), rgb);
+            break;
+        case TexelType::Uint16:
+            decode<std::uint16_t>(texels, linearOfCodes(texels.info.type, color), rgb);
+            break;
+        case TexelType::Float:
+            // A table that is not empty says that the floats are encoded.
+            decode<float>(texels, std::vector<float>(color == TexelColor::Srgb ? 1 : 0), rgb);
+            break;
+    }
+    if (const std::optional<Matrix3d> to_srgb = primariesToSrgb(texels.info, path))
+        for (std::size_t i = 0; i < rgb.size(); i += 3) {
+            const Vec3d converted = multiply(*to_srgb, Vec3d{rgb[i], rgb[i + 1], rgb[i + 2]});
+            for (std::size_t k = 0; k < 3; ++k) rgb[i + k] = static_cast<float>(converted[k]);
+        }
+    return rgb;
+}
+
+}  // namespace crt

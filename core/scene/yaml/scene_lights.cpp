@@ -1,0 +1,123 @@
+#include "scene/yaml/scene_lights.h"
+
+#include "base/vec3d.h"
+#include "scene/light_units.h"
+#include "scene/yaml/scene_sun.h"
+
+#include <fmt/format.h>
+
+#include <numbers>
+#include <utility>
+
+namespace crt {
+namespace {
+
+void readDirection(const SectionReader& section, PointLight& light) {
+    Vec3d way{};
+    std::string_view key = "direction";
+    bool given = section.read("direction", way);
+    if (!given && section.schema().find("target") != nullptr && section.read("target", way)) {
+        way = way - light.position;
+        key = "target";
+        given = true;
+    }
+    if (!given) return;
+    if (const std::optional<Vec3d> unit = unitVector(way))
+        light.direction = *unit;
+    else
+        section.error(key, key == "direction" ? "a direction of length 0 leads nowhere"
+                                              : "the target is where the light is, or too far away");
+}
+
+void readCone(const SectionReader& section, PointLight& light) {
+    section.read("cone_angle_deg", light.cone_angle_deg);
+    const bool given = section.read("penumbra_deg", light.penumbra_deg);
+    if (light.penumbra_deg <= light.cone_angle_deg) return;
+    if (given)
+        section.error("penumbra_deg", fmt::format("a penumbra of {} degrees is wider than the cone of {}",
+                                                  light.penumbra_deg, light.cone_angle_deg));
+    light.penumbra_deg = light.cone_angle_deg;
+}
+
+/// What the amounts of a light measure: `flux_sr` is radiant flux over radiant intensity.
+double unitOf(const PointLight& light, std::string_view key) {
+    const double flux_sr = light.type == PointLightType::Spot
+                               ? spotSolidAngle_sr(light.cone_angle_deg, light.penumbra_deg)
+                               : 4 * std::numbers::pi;
+    if (key == "power_w") return flux_sr * integralOverWavelengths(light.spectrum);
+    if (key == "luminous_flux_lm") return flux_sr * photometric(light.spectrum);
+    if (key == "luminous_intensity_cd" || light.type == PointLightType::Directional)
+        return photometric(light.spectrum);
+    return photometric(light.spectrum) * sunProjectedSolidAngle_sr(light.angular_diameter_deg);
+}
+
+/// Spectrum and strength, by whichever key says how bright the light is.
+void readBrightness(const SectionReader& section, SpectrumReader& spectra, PointLight& light) {
+    light.spectrum = illuminantSpectrum("D65").value();
+    for (const char* key : {"radiant_intensity", "irradiance", "radiance"})
+        if (section.schema().find(key) != nullptr)
+            if (std::optional<Spectrum> spectrum = spectra.read(section, key, SpectrumUse::Emission)) {
+                light.spectrum = *std::move(spectrum);
+                return;
+            }
+    const std::size_t errors = section.diagnostics().count();
+    if (std::optional<Spectrum> spectrum = spectra.read(section, "spectrum", SpectrumUse::Emission))
+        light.spectrum = *std::move(spectrum);
+    if (section.diagnostics().count() != errors) return;
+    for (const char* key : {"power_w", "luminous_flux_lm", "luminous_intensity_cd", "illuminance_lx"}) {
+        double amount = 0;
+        if (section.schema().find(key) == nullptr || !section.read(key, amount)) continue;
+        const double unit = unitOf(light, key);
+        if (!(unit > 0))
+            section.error(section.has("spectrum") ? "spectrum" : key,
+                          fmt::format("this spectrum has no light that '{}' measures", key));
+        else
+            light.strength = amount / unit;
+    }
+}
+
+/// Light that nothing finds would be missing from the image without a word.
+void checkFound(const SectionReader& section, const PointLight& light,
+                const IntegratorSettings& integrator) {
+    if (integrator.nee || integrator.type != IntegratorType::Path || light.type == PointLightType::Sun)
+        return;
+    section.diagnostics().error(
+        section.place(),
+        fmt::format("{} is found by light sampling alone, and 'integrator.nee' is false", section.subject()),
+        "set 'integrator.nee: true', or use a lamp with a surface");
+}
+
+}  // namespace
+
+void readLights(const YamlNode& list, Diagnostics& out, SpectrumReader& spectra, Scene& scene) {
+    for (std::size_t i = 0; i < list.items.size(); ++i) {
+        const YamlNode& node = *list.items[i];
+        const YamlEntry* name = node.find("name");
+        const std::string subject = name != nullptr && name->value->kind == YamlKind::Scalar
+                                        ? fmt::format("light '{}'", name->value->text)
+                                        : fmt::format("light {}", i);
+        const std::optional<SectionReader> section = openVariant(out, node, node.place, "light", subject);
+        if (!section) continue;
+        PointLight light;
+        light.place = node.place.resolved();
+        light.name = fmt::format("light {}", i);
+        section->read("name", light.name);
+        const std::string kind = variantWord(section->schema());
+        for (const auto& [type, word] : kPointLightNames)
+            if (kind == word) light.type = type;
+        if (section->schema().find("position") != nullptr) section->read("position", light.position);
+        if (light.type == PointLightType::Spot || light.type == PointLightType::Directional)
+            readDirection(*section, light);
+        if (light.type == PointLightType::Spot) readCone(*section, light);
+        if (light.type == PointLightType::Sun) {
+            section->read("angular_diameter_deg", light.angular_diameter_deg);
+            if (const std::optional<Vec3d> sun = readTowardsSun(*section, light.angular_diameter_deg))
+                light.direction = *sun * -1;
+        }
+        readBrightness(*section, spectra, light);
+        checkFound(*section, light, scene.integrator);
+        scene.point_lights.push_back(std::move(light));
+    }
+}
+
+}  // namespace crt

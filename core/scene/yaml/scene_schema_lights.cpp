@@ -1,0 +1,202 @@
+// The part of the table of keys about lights without a surface.
+#include "scene/yaml/scene_schema_lights.h"
+
+#include "scene/scene.h"
+#include "scene/scene_limits.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+namespace crt {
+namespace {
+
+using Kind = ValueKind;
+using Shape = ValueShape;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr ValueRange kNotNegative{0, kInfinity, false, false};
+constexpr ValueRange kRadiance{0, kMostRadiance, false, false};
+
+KeySchema nameKey() { return {.name = "name", .doc = "For messages and reports."}; }
+
+KeySchema typeKey(std::string word) {
+    return {.name = "type",
+            .kind = Kind::Choice,
+            .choices = {std::move(word)},
+            .required = true,
+            .doc = "Picks this kind of light."};
+}
+
+KeySchema vectorKey(std::string name, std::string doc, std::string unit = {}, bool required = false) {
+    return {.name = std::move(name),
+            .kind = Kind::Number,
+            .shape = Shape::List,
+            .count_min = 3,
+            .count_max = 3,
+            .unit = std::move(unit),
+            .required = required,
+            .doc = std::move(doc)};
+}
+
+KeySchema positionKey() { return vectorKey("position", "Where it is.", "scene units", true); }
+
+KeySchema spectrumKey() {
+    return {.name = "spectrum",
+            .kind = Kind::Spectrum,
+            .range = kRadiance,
+            .fallback = "{illuminant: D65}",
+            .doc =
+                "Its colour: multiplied by what gives the value in lumens, watts and so on that the "
+                "other key asks for."};
+}
+
+/// In absolute terms, by wavelength.
+KeySchema spectralKey(std::string name, std::string unit, std::string doc) {
+    return {.name = std::move(name),
+            .kind = Kind::Spectrum,
+            .range = kRadiance,
+            .unit = std::move(unit),
+            .doc = std::move(doc)};
+}
+
+KeySchema amountKey(std::string name, std::string unit, std::string doc) {
+    return {.name = std::move(name),
+            .kind = Kind::Number,
+            .range = kNotNegative,
+            .unit = std::move(unit),
+            .doc = std::move(doc)};
+}
+
+KeySchema degreesKey(std::string name, ValueRange range, double fallback, std::string doc) {
+    return {.name = std::move(name),
+            .kind = Kind::Number,
+            .range = range,
+            .unit = "degrees",
+            .fallback = fmt::format("{}", fallback),
+            .doc = std::move(doc)};
+}
+
+/// What sends light from a point, and of `beam` what a figure of intensity means.
+std::vector<KeySchema> intensityKeys(const std::string& beam) {
+    return {spectralKey("radiant_intensity", "W·sr⁻¹·nm⁻¹", "Radiant intensity" + beam + "."),
+            amountKey("power_w", "W", "Radiant flux in all directions, from 360 to 830 nm."),
+            amountKey("luminous_flux_lm", "lm", "Luminous flux in all directions."),
+            amountKey("luminous_intensity_cd", "cd", "Luminous intensity" + beam + "."), spectrumKey()};
+}
+
+const std::vector<std::string> kIntensities{"radiant_intensity", "power_w", "luminous_flux_lm",
+                                            "luminous_intensity_cd"};
+
+KeyRule noSpectrumBeside(std::string key) {
+    return {KeyRule::Kind::AtMostOne, {"spectrum", std::move(key)}};
+}
+
+template <class Row>
+void add(std::vector<Row>& rows, const Row& row) {
+    rows.push_back(row);
+}
+template <class Row>
+void add(std::vector<Row>& rows, const std::vector<Row>& more) {
+    rows.insert(rows.end(), more.begin(), more.end());
+}
+/// Rows, and lists of them, one after the other.
+template <class Row, class... More>
+std::vector<Row> joined(std::vector<Row> rows, const More&... more) {
+    (add(rows, more), ...);
+    return rows;
+}
+
+}  // namespace
+
+void addLights(std::vector<SectionSchema>& all) {
+    const PointLight d;
+    all.push_back({"light/point",
+                   "a point light",
+                   "The same in all directions.",
+                   joined(std::vector{nameKey(), typeKey("point"), positionKey()}, intensityKeys("")),
+                   {{KeyRule::Kind::ExactlyOne, kIntensities}, noSpectrumBeside("radiant_intensity")}});
+    all.push_back(
+        {"light/spot",
+         "a spot light",
+         "A cone of light, even within and falling to 0 over its penumbra by Hermite's cubic of the cosine, "
+         "as in pbrt-v4.",
+         joined(
+             std::vector{
+                 nameKey(), typeKey("spot"), positionKey(),
+                 vectorKey("direction", "The way that the light goes along its axis; any length but 0."),
+                 vectorKey("target", "Or a point on its axis.", "scene units"),
+                 degreesKey("cone_angle_deg", {0, 180, true, false}, d.cone_angle_deg,
+                            "From the axis to where the light ends."),
+                 degreesKey("penumbra_deg", {0, 180, false, false}, d.penumbra_deg,
+                            "The outer part of that angle, in which the light falls to 0. At most "
+                            "`cone_angle_deg`, to which the default gives way.")},
+             intensityKeys(" on the axis")),
+         {{KeyRule::Kind::ExactlyOne, {"direction", "target"}},
+          {KeyRule::Kind::ExactlyOne, kIntensities},
+          noSpectrumBeside("radiant_intensity")}});
+    all.push_back(
+        {"light/directional",
+         "a directional light",
+         "From infinitely far away, all of it in one direction.",
+         {nameKey(), typeKey("directional"),
+          vectorKey("direction", "The way that the light goes; any length but 0.", "", true),
+          spectralKey("irradiance", "W·m⁻²·nm⁻¹", "Irradiance of a plane that faces the light."),
+          amountKey("illuminance_lx", "lx", "Illuminance of a plane that faces the light."), spectrumKey()},
+         {{KeyRule::Kind::ExactlyOne, {"irradiance", "illuminance_lx"}}, noSpectrumBeside("irradiance")}});
+    all.push_back(
+        {"light/sun", "a sun",
+         "A disk of the sky, infinitely far away and evenly bright. Cameras and mirrors see it. It stands "
+         "where `direction` says, or where it stood at a time and place (0.01 degrees, without refraction).",
+         joined(std::vector{nameKey(), typeKey("sun")}, sunKeys(),
+                degreesKey("angular_diameter_deg", {0.001, 90, false, false}, d.angular_diameter_deg,
+                           "How large the disk is."),
+                spectralKey("radiance", "W·m⁻²·sr⁻¹·nm⁻¹", "Radiance of the disk."),
+                amountKey("illuminance_lx", "lx", "Illuminance of a plane that faces the sun."),
+                spectrumKey()),
+         joined(sunRules(), KeyRule{KeyRule::Kind::ExactlyOne, {"radiance", "illuminance_lx"}},
+                noSpectrumBeside("radiance"))});
+}
+
+std::vector<KeySchema> sunKeys() {
+    KeySchema latitude{.name = "latitude_deg",
+                       .kind = Kind::Number,
+                       .range = {-90, 90, false, false},
+                       .unit = "degrees",
+                       .doc = "North is positive."},
+        longitude{.name = "longitude_deg",
+                  .kind = Kind::Number,
+                  .range = {-180, 180, false, false},
+                  .unit = "degrees",
+                  .doc = "East is positive."},
+        offset{.name = "utc_offset",
+               .kind = Kind::Number,
+               .range = {-12, 14, false, false},
+               .unit = "hours",
+               .fallback = "0",
+               .doc = "Of `time` from Universal Time: 1 in Berlin in winter, 2 in summer."};
+    KeySchema north = vectorKey("north", "Where north is; what points up of it does not count."),
+              up = vectorKey("up", "Where the zenith is.");
+    north.fallback = "[0, 0, -1]";
+    up.fallback = "[0, 1, 0]";
+    return {
+        vectorKey("direction", "The way that the light of the sun's middle goes; any length but 0."),
+        {.name = "date", .doc = "As `2026-06-21`, from 1950 to 2050. A sun below the horizon is refused."},
+        {.name = "time", .doc = "As `'14:30'` or `'14:30:00'`, in quotes."},
+        offset,
+        latitude,
+        longitude,
+        north,
+        up};
+}
+
+std::vector<KeyRule> sunRules() {
+    using Rule = KeyRule::Kind;
+    return {{Rule::ExactlyOne, {"direction", "date"}},
+            {Rule::Together, {"date", "time", "latitude_deg", "longitude_deg"}},
+            {Rule::AtMostOne, {"direction", "utc_offset"}},
+            {Rule::AtMostOne, {"direction", "north"}},
+            {Rule::AtMostOne, {"direction", "up"}}};
+}
+
+}  // namespace crt

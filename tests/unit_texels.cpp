@@ -1,0 +1,220 @@
+// Image files as values of a scene: every format gives the numbers that it holds, and what is damaged or too
+// large is refused before memory is spent on it.
+#include "base/error.h"
+#include "base/temporary_folder.h"
+#include "catch.h"
+#include "image/image_io.h"
+#include "image/texels.h"
+#include "jpeg_file.h"
+#include "spectra/spectra.h"
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+using namespace crt;
+
+namespace {
+
+std::string slurp(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+void spit(const std::string& path, const std::string& bytes) {
+    std::ofstream(path, std::ios::binary) << bytes;
+}
+
+/// Three pixels wide, two high: row 0 red, green, blue; row 1 black, grey, white.
+const std::vector<std::uint8_t> kCodes{255, 0, 0, 0,   255, 0,   0,   0,   255,
+                                       0,   0, 0, 128, 128, 128, 255, 255, 255};
+
+Image imageOf(const std::vector<float>& rgb) {
+    Image image;
+    image.width = 3;
+    image.height = 2;
+    image.channels = {"R", "G", "B"};
+    image.pixels = rgb;
+    return image;
+}
+
+std::vector<float> linearCodes() {
+    std::vector<float> linear;
+    for (const std::uint8_t code : kCodes) linear.push_back(static_cast<float>(srgbToLinear(code / 255.0)));
+    return linear;
+}
+
+/// The message of an error of kind Scene.
+std::string refusal(const std::function<void()>& work) {
+    try {
+        work();
+    } catch (const Error& e) {
+        CHECK(e.kind() == ErrorKind::Scene);
+        return e.what();
+    }
+    return "nothing was refused";
+}
+
+std::string refusalOf(const std::string& path) {
+    return refusal([&] { (void)readTexels(path); });
+}
+
+}  // namespace
+
+TEST_CASE("texels of each format, the top row first", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string png = folder.path() + "/a.png", exr = folder.path() + "/a.exr",
+                      pfm = folder.path() + "/a.pfm";
+    writeImage(png, OutputFormat::Png, imageOf(linearCodes()));
+    writeImage(exr, OutputFormat::Exr, imageOf(linearCodes()));
+    writeImage(pfm, OutputFormat::Pfm, imageOf(linearCodes()));
+    CHECK(texelsInfo(png).type == TexelType::Uint8);
+    CHECK(texelsInfo(exr).type == TexelType::Float);
+    CHECK(readTexels(png).bytes == kCodes);
+    for (const std::string& path : {png, exr, pfm}) {
+        INFO(path);
+        const Texels texels = readTexels(path);
+        CHECK(texels.info.width == 3);
+        CHECK(texels.info.height == 2);
+        CHECK(texels.info.channels == 3);
+        CHECK(texels.info.count() == texelsInfo(path).count());
+        CHECK(linearRgb(texels, TexelColor::Auto, path) == linearCodes());
+    }
+    // Said otherwise: codes are proportional to light, floats are encoded.
+    CHECK(linearRgb(readTexels(png), TexelColor::Linear, png)[12] == 128.0f / 255.0f);
+    CHECK(linearRgb(readTexels(exr), TexelColor::Srgb, exr)[12] ==
+          Approx(srgbToLinear(srgbToLinear(128 / 255.0))));
+}
+
+TEST_CASE("texels of an HDR", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/a.hdr";
+    using namespace std::string_literals;
+    spit(path,
+         "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 1\n"s + "\x80\x40\x20\x81" + "\x00\x00\x80\x85"s);
+    const Texels texels = readTexels(path);
+    CHECK(texels.info.type == TexelType::Float);
+    const std::vector<float> rgb = linearRgb(texels, TexelColor::Auto, path);
+    CHECK(rgb[0] == Approx(1).epsilon(0.01));
+    CHECK(rgb[1] == Approx(0.5).epsilon(0.02));
+    CHECK(rgb[5] == Approx(16).epsilon(0.01));
+}
+
+TEST_CASE("texels of a JPEG: colour, grey, progressive; metadata are skipped", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/a.jpg";
+    // Of one colour a block: coding at the best quality is off by rounding only.
+    const unsigned size = 16;
+    std::vector<std::uint8_t> codes;
+    for (unsigned y = 0; y < size; ++y)
+        for (unsigned x = 0; x < size; ++x) {
+            const std::uint8_t level = y < 8 ? 200 : 40;
+            codes.insert(codes.end(), {level, x < 8 ? std::uint8_t{100} : std::uint8_t{20}, 90});
+        }
+    for (const bool progressive : {false, true}) {
+        writeJpeg(path, size, size, 3, codes, progressive);
+        const Texels texels = readTexels(path);
+        REQUIRE(texels.bytes.size() == codes.size());
+        int worst = 0;
+        for (std::size_t i = 0; i < codes.size(); ++i)
+            worst = std::max(worst, std::abs(int{texels.bytes[i]} - int{codes[i]}));
+        CHECK(worst <= 2);
+    }
+    // An IPTC block whose sizes lie: the reader of OpenImageIO reads beyond it (docs/decisions/0005).
+    std::string bytes = slurp(path);
+    const std::string lies = std::string("\xff\xed\x00\x20", 4) + "Photoshop 3.0" + std::string(1, '\0') +
+                             "8BIM\x04\x04\xff\xff\xff\xff\xff\xff\x1c\x02";
+    std::string padded = lies;
+    padded.resize(2 + 0x20, '\xff');
+    bytes.insert(2, padded);
+    spit(path, bytes);
+    CHECK(readTexels(path).info.width == size);
+
+    std::vector<std::uint8_t> grey(std::size_t{size} * size, 77);
+    writeJpeg(path, size, size, 1, grey);
+    const Texels texels = readTexels(path);
+    CHECK(texels.info.channels == 1);
+    CHECK(texels.bytes == grey);
+    CHECK(linearRgb(texels, TexelColor::Auto, path).size() == 3 * grey.size());
+}
+
+TEST_CASE("colours of other primaries become those of sRGB", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/a.exr";
+    Image image = imageOf(std::vector<float>(18, 0.5f));
+    image.chromaticities = chromaticities(ColorSpace::Xyz);
+    writeImage(path, OutputFormat::Exr, image);
+    const std::vector<float> rgb = linearRgb(readTexels(path), TexelColor::Auto, path);
+    const Vec3d expected = multiply(xyzToRgb(ColorSpace::LinearSrgb), Vec3d{0.5, 0.5, 0.5});
+    for (std::size_t k = 0; k < 3; ++k) CHECK(rgb[k] == Approx(expected[k]).margin(1e-6));
+
+    image.chromaticities = std::array<double, 8>{0.7, 0.3, 0.2, 0.7, 0.1, 0.1, 0.3, 0.3};
+    writeImage(path, OutputFormat::Exr, image);
+    CHECK_THAT(refusal([&] { (void)linearRgb(readTexels(path), TexelColor::Auto, path); }),
+               Contains("primaries") && Contains("a.exr"));
+}
+
+TEST_CASE("images that cannot be values say why", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/a";
+    CHECK_THAT(refusalOf(path), Contains(path) && Contains("cannot be opened"));
+    CHECK_THAT(refusalOf(folder.path()), Contains("directory"));
+    spit(path, "");
+    CHECK_THAT(refusalOf(path), Contains("it is no PNG, JPEG"));
+    spit(path, "GIF89a");
+    CHECK_THAT(refusalOf(path), Contains("it is no PNG, JPEG"));
+
+    writeImage(path, OutputFormat::Png, imageOf(linearCodes()));
+    const std::string png = slurp(path);
+    spit(path, png.substr(0, png.size() - 30));
+    CHECK_THAT(refusalOf(path), Contains("cannot read the image"));
+
+    std::vector<std::uint8_t> noise(3 * 64 * 64);
+    for (std::size_t i = 0; i < noise.size(); ++i)
+        noise[i] = static_cast<std::uint8_t>(i * 2654435761u >> 13);
+    for (const bool progressive : {false, true}) {
+        writeJpeg(path, 64, 64, 3, noise, progressive);
+        const std::string jpeg = slurp(path);
+        REQUIRE(readTexels(path).info.width == 64);
+        spit(path, jpeg.substr(0, jpeg.size() * 2 / 3));
+        CHECK_THAT(refusalOf(path), Contains("cannot read the image") && Contains("end"));
+    }
+    writeJpeg(path, 64, 64, 4, std::vector<std::uint8_t>(4 * 64 * 64, 9));
+    CHECK_THAT(refusalOf(path), Contains("CMYK"));
+
+    // Sizes in headers that no file of this size has, and that no scene needs.
+    writeJpeg(path, 64, 64, 3, noise);
+    std::string large = slurp(path);
+    const std::size_t frame = large.find(std::string("\xff\xc0", 2));
+    REQUIRE(frame != std::string::npos);
+    large.replace(frame + 5, 4, "\x3f\xff\x3f\xff");  // 16383 x 16383
+    spit(path, large);
+    CHECK_THAT(refusalOf(path), Contains("file of its size"));
+    large.replace(frame + 5, 4, "\x7f\xff\x7f\xff");
+    large.resize(std::size_t{5} << 20, '\0');
+    spit(path, large);
+    CHECK_THAT(refusalOf(path), Contains("32767 x 32767") && Contains("256 million"));
+
+    // A film's other planes are no colour.
+    Image named = imageOf(linearCodes());
+    named.channels.push_back("depth.q");
+    named.pixels.resize(24, 0.25f);
+    writeImage(path, OutputFormat::Exr, named);
+    CHECK(readTexels(path).info.channels == 3);
+}
+
+TEST_CASE("a JPEG of endless scans is refused", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/a.jpg";
+    writeJpeg(path, 64, 64, 1, std::vector<std::uint8_t>(64 * 64, 77), true);
+    std::string bytes = slurp(path);
+    // The last scan again and again: each would cost a pass over the image.
+    const std::size_t last = bytes.rfind(std::string("\xff\xda", 2));
+    REQUIRE(last != std::string::npos);
+    const std::string scan = bytes.substr(last, bytes.size() - 2 - last);
+    std::string many = bytes.substr(0, last);
+    for (int i = 0; i < 1000; ++i) many += scan;
+    spit(path, many + bytes.substr(bytes.size() - 2));
+    CHECK_THAT(refusalOf(path), Contains("scans") || Contains("cannot read"));
+}
