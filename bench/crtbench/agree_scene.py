@@ -110,11 +110,52 @@ def environment(given):
     return {"type": "constant", "radiance": spectrum(given["radiance"])}
 
 
+def point(given):
+    refuse_all_but("a point light", given, {"type", "position", "radiant_intensity"})
+    return {
+        "type": "point",
+        "position": given["position"],
+        "intensity": spectrum(given["radiant_intensity"]),
+    }
+
+
+def spot(given):
+    known = {"type", "position", "target", "cone_angle_deg", "penumbra_deg", "radiant_intensity"}
+    refuse_all_but("a spot", given, known)
+    return {
+        "type": "spot",
+        "to_world": mi.ScalarTransform4f().look_at(
+            origin=given["position"], target=given["target"], up=[0, 1, 0]
+        ),
+        "intensity": spectrum(given["radiant_intensity"]),
+        "cutoff_angle": given["cone_angle_deg"],
+        "beam_width": given["cone_angle_deg"] - given["penumbra_deg"],
+    }
+
+
+def directional(given):
+    refuse_all_but("a directional light", given, {"type", "direction", "irradiance"})
+    return {
+        "type": "directional",
+        "direction": given["direction"],
+        "irradiance": spectrum(given["irradiance"]),
+    }
+
+
+LIGHTS = {"point": point, "spot": spot, "directional": directional}
+
+
+def light(given):
+    if given["type"] not in LIGHTS:
+        raise Failure(f"the light '{given['type']}' cannot be translated for Mitsuba")
+    return LIGHTS[given["type"]](given)
+
+
 def translate(file, folder, samples):
     """The dictionary that mi.load_dict takes. Meshes go to `folder`."""
     given = scene_file.load(file)
-    known = {"crt", "title", "camera", "film", "integrator", "sampler", "materials", "objects", "environment"}
-    refuse_all_but("the scene", given, known)
+    known = "crt title camera film integrator sampler materials objects lights environment"
+    refuse_all_but("the scene", given, known.split())
     camera, film, integrator = given["camera"], given["film"], given["integrator"]
     refuse_all_but("the camera", camera, {"position", "target", "fov", "up"})
     refuse_all_but("the film", film, {"resolution"})
@@ -148,6 +189,8 @@ def translate(file, folder, samples):
     }
     if "environment" in given:
         made["environment"] = environment(given["environment"])
+    for number, thing in enumerate(given.get("lights", [])):
+        made[f"light{number}"] = light(thing)
     for number, thing in enumerate(given["objects"]):
         refuse_all_but("an object", thing, {"name", "mesh", "material", "emission"})
         part = write_shape(thing["mesh"], folder / f"{number}.ply")

@@ -16,7 +16,7 @@ def merged(below, above):
     for key in below.keys() & above.keys():
         if isinstance(below[key], dict) and isinstance(above[key], dict):
             scene[key] = {**below[key], **above[key]}
-        elif key == "objects":
+        elif key in ("objects", "lights"):
             scene[key] = below[key] + above[key]
     return scene
 
