@@ -1,7 +1,6 @@
 """Renders the scenes of bench/scenes/agree by crt and by Mitsuba 3, and judges whether they agree."""
 
 import re
-import statistics
 
 import mitsuba as mi
 import numpy as np
@@ -16,10 +15,13 @@ MARGIN = 0.005      # Of the image's mean: what counts as equal.
 CONFIDENCE = 0.95
 
 
-def beyond(confidence, of):
-    """The point of the normal distribution that the largest of so many passes with 1 - confidence (Šidák);
-    one-sided."""
-    return statistics.NormalDist().inv_cdf(confidence ** (1 / of))
+def beyond(confidence, of, dof):
+    """The point that the largest of so many numbers of Student's distribution passes with 1 - confidence
+    (Šidák); one-sided."""
+    t = np.linspace(0.0, 100.0, 200_001)
+    density = (1 + t**2 / dof) ** (-(dof + 1) / 2)
+    below = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2)])
+    return float(np.interp(confidence ** (1 / of), 0.5 + 0.5 * below / below[-1], t))
 
 
 def crt_image(program, backend, file, samples, seed):
@@ -46,22 +48,28 @@ class Agreement:
         whole = float(ours.of(mean)[0])
         self.tiles = (b / self.ratio - a) / whole           # in units of the image's mean
         self.tiles_se = np.sqrt(va + vb / self.ratio**2) / whole
+        # At least so many, however unlike the two variances are (Welch).
+        self.dof = len(ours.images) - 1
 
     def mean_agrees(self):
         """Two one-sided tests."""
-        reach = beyond(CONFIDENCE, 1) * self.ratio_se
+        reach = beyond(CONFIDENCE, 1, self.dof) * self.ratio_se
         return abs(self.ratio - 1) + reach < MARGIN
 
     def worst_excess(self):
         """The largest part of a tile's difference beyond the margin, in its standard errors."""
         return float(((np.abs(self.tiles) - MARGIN) / np.maximum(self.tiles_se, 1e-12)).max())
 
+    def chance(self):
+        """What the largest of all tiles stays below by chance."""
+        return beyond(CONFIDENCE, TILES * TILES, self.dof)
+
     def tiles_agree(self):
-        return self.worst_excess() < beyond(CONFIDENCE, TILES * TILES)
+        return self.worst_excess() < self.chance()
 
     def resolves(self):
         """Whether a difference of two margins in the median tile would have been seen."""
-        return float(np.median(self.tiles_se)) * beyond(CONFIDENCE, TILES * TILES) < MARGIN
+        return float(np.median(self.tiles_se)) * self.chance() < MARGIN
 
 
 def verdict(found, documented):
@@ -96,7 +104,7 @@ def measure(program, arguments):
         rows.append(
             [
                 f"`{file.stem}`: {agree_scene.title(file)}",
-                f"{found.ratio - 1:+.3%} ± {1.96 * found.ratio_se:.3%}",
+                f"{found.ratio - 1:+.3%} ± {beyond(0.975, 1, found.dof) * found.ratio_se:.3%}",
                 f"{np.abs(found.tiles).max():.2%}",
                 f"{found.worst_excess():.1f}",
                 f"**{said}**",
@@ -113,7 +121,7 @@ def measure(program, arguments):
             "worst_excess": found.worst_excess(),
             "verdict": said,
         }
-    bound = beyond(CONFIDENCE, TILES * TILES)
+    bound = beyond(CONFIDENCE, TILES * TILES, renders - 1)
     results.paragraph(
         f"Scenes of `{FOLDER}`, translated by `bench/crtbench/agree_scene.py`, rendered {renders} times by "
         f"crt on `{backend}` and by Mitsuba {mi.__version__} (`{arguments.variant}`) with {samples} samples "

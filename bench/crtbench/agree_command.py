@@ -32,9 +32,9 @@ def main():
         "--backend", help="of crt (the first of cuda, embree and opencl that has a device)"
     )
     parser.add_argument(
-        "--samples", type=int, default=512, help="per pixel of each render, in both programs (512)"
+        "--samples", type=int, default=256, help="per pixel of each render, in both programs (256)"
     )
-    parser.add_argument("--renders", type=int, default=8, help="of each scene by each program (8)")
+    parser.add_argument("--renders", type=int, default=16, help="of each scene by each program (16)")
     parser.add_argument("--scenes", nargs="*", help="only these, by name without .yaml")
     arguments = parser.parse_args()
 
