@@ -94,6 +94,7 @@ std::vector<Case> rayCases();            ///< D
 std::vector<Case> lightCases();          ///< E
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> scatteringCases();     ///< G
+std::vector<Case> glasswareCases();      ///< G, rough glass and panes
 std::vector<Case> colourCases();         ///< H
 std::vector<Case> accumulationCases();   ///< I
 std::vector<Case> imageCases();          ///< J
