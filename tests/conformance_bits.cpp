@@ -24,8 +24,43 @@ using namespace conformance;
 namespace {
 
 /// A small box with something of everything; `extra` adds or replaces top-level parts.
+/// What glass can be beside smooth: of a scene of its own, so that others keep their bits.
+constexpr const char* kGlasswareMaterials = R"(
+  frosted: {type: rough_dielectric, ior: 1.5, roughness: 0.5}
+  matt_flint: {type: rough_dielectric, ior: {glass: SF10}, roughness: 0.3}
+  pane: {type: thin_dielectric, ior: {glass: N-BK7}}
+  polished: {type: plastic, reflectance: red}
+  satin: {type: plastic, reflectance: 0.8, roughness: 0.5, ior: 1.6}
+  bottle: {type: dielectric, ior: 1.5, absorption: {rgb: [0.9, 0.1, 0.7], space: linear, scale: 8}})";
+constexpr const char* kGlasswareObjects = R"(
+  - {name: window, mesh: {positions: [[0.1,0.05,0],[0.1,0.95,0],[0.45,0.95,0.1],[0.45,0.05,0.1]],
+      faces: [[0,1,2,3]]}, material: pane}
+  - name: frosted
+    material: frosted
+    mesh: {positions: [[0,0,0],[1,0,0],[0,1,0],[0,0,1]], faces: [[0,2,1],[0,1,3],[0,3,2],[1,2,3]]}
+    transform: [{scale: 0.35}, {translate: [0.55, 0.55, 0.25]}]
+  - {name: tile, mesh: {positions: [[0.05,0.02,0.1],[0.05,0.02,0.5],[0.5,0.02,0.5],[0.5,0.02,0.1]],
+      faces: [[0,1,2,3]]}, material: polished}
+  - {name: board, mesh: {positions: [[0.05,0.6,0.95],[0.05,0.9,0.9],[0.4,0.9,0.9],[0.4,0.6,0.95]],
+      faces: [[0,1,2,3]]}, material: satin}
+  - name: bottle, and a grain inside it
+    material: bottle
+    mesh: {positions: [[0,0,0],[1,0,0],[0,1,0],[0,0,1]], faces: [[0,2,1],[0,1,3],[0,3,2],[1,2,3]]}
+    transform: [{scale: 0.3}, {translate: [0.1, 0.25, 0.15]}]
+  - {name: grain, mesh: {positions: [[0.14,0.3,0.19],[0.2,0.3,0.19],[0.14,0.36,0.19]], faces: [[0,1,2]]},
+     material: satin}
+  - {name: spark, mesh: {positions: [[0.14,0.3,0.17],[0.17,0.27,0.17],[0.14,0.27,0.2]], faces: [[0,1,2]]},
+     material: white, emission: {radiance: 4, two_sided: true}}
+  - name: matt flint
+    material: matt_flint
+    mesh: {positions: [[0,0,0],[1,0,0],[1,1,0],[0,1,0],[0,0,1],[1,0,1],[1,1,1],[0,1,1]],
+      normals: [[-1,-1,-1],[1,-1,-1],[1,1,-1],[-1,1,-1],[-1,-1,1],[1,-1,1],[1,1,1],[-1,1,1]],
+      faces: [[0,3,2,1],[4,5,6,7],[0,1,5,4],[2,3,7,6],[0,4,7,3],[1,2,6,5]]}
+    transform: [{scale: 0.3}, {rotate: {axis: [0, 1, 0], angle_deg: 20}}, {translate: [0.55, 0.1, 0.2]}]
+)";
+
 std::string richScene(const std::string& integrator, const std::string& sampler,
-                      const std::string& camera_extra, const std::string& filter) {
+                      const std::string& camera_extra, const std::string& filter, bool glassware = false) {
     return fmt::format(R"(crt: 1
 camera: {{position: [0.5, 0.5, -1.4], target: [0.5, 0.5, 0.5], fov: 40{}}}
 film: {{resolution: [48, 40], filter: {}}}
@@ -41,7 +76,7 @@ materials:
   gold: {{type: conductor, metal: Au}}
   copper: {{type: rough_conductor, metal: Cu, roughness: 0.4}}
   glass: {{type: dielectric, ior: 1.5}}
-  flint: {{type: dielectric, ior: {{glass: SF10}}}}
+  flint: {{type: dielectric, ior: {{glass: SF10}}}}{}
 objects:
   - {{name: floor, mesh: {{positions: [[0,0,0],[0,0,1],[1,0,1],[1,0,0]], faces: [[0,1,2,3]]}},
       material: white}}
@@ -70,7 +105,8 @@ objects:
     mesh: {{positions: [[0,0,0],[1,0,0],[0,1,0],[0,0,1]], faces: [[0,2,1],[0,1,3],[0,3,2],[1,2,3]]}}
     transform: [{{scale: 0.3}}, {{translate: [0.35, 0.5, 0.4]}}]
 )",
-                       camera_extra, filter, integrator, sampler);
+                       camera_extra, filter, integrator, sampler, glassware ? kGlasswareMaterials : "") +
+           (glassware ? kGlasswareObjects : "");
 }
 
 struct Case {
@@ -80,6 +116,7 @@ struct Case {
     const char* filter;
     bool sampled_environment = false;
     const char* more = "";  // Further top-level lines.
+    bool glassware = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -102,6 +139,8 @@ const Case kCases[] = {
     {"{max_depth: 4, accelerator: bvh}", "{type: independent}", "", "box", true},
     {"{max_depth: 12}", "{type: sobol}", "", "box", true, kPointLights},
     {"{max_depth: 4, accelerator: bvh, mis: false}", "{type: independent}", "", "box", false, kPointLights},
+    {"{max_depth: 12}", "{type: sobol}", "", "box", false, "", true},
+    {"{max_depth: 8, accelerator: bvh}", "{type: xorshift}", "", "box", true, "", true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -135,7 +174,8 @@ struct Named {
 };
 
 crt::Scene sceneOf(const Case& c) {
-    crt::Scene scene = sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter) + c.more);
+    crt::Scene scene =
+        sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter, c.glassware) + c.more);
     scene.environment->light_sampling = c.sampled_environment;
     return scene;
 }
@@ -149,7 +189,9 @@ std::vector<Named> allScenes() {
                                  "sampled environment",
                                  "sampled environment, tree, independent",
                                  "point lights",
-                                 "point lights, tree, independent, light sampling alone"};
+                                 "point lights, tree, independent, light sampling alone",
+                                 "glassware",
+                                 "glassware, tree, xorshift, sampled environment"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

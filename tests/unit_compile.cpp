@@ -153,6 +153,30 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     seen |= differs(CRT_FEATURE_CONDUCTOR, 0, other(crt::MaterialType::Conductor));
     seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR, 0, other(crt::MaterialType::RoughConductor));
     seen |= differs(CRT_FEATURE_DIELECTRIC, 0, other(crt::MaterialType::Dielectric));
+    seen |= differs(CRT_FEATURE_ROUGH_DIELECTRIC, 0, other(crt::MaterialType::RoughDielectric));
+    seen |= differs(CRT_FEATURE_THIN_DIELECTRIC, 0, other(crt::MaterialType::ThinDielectric));
+    differs(CRT_FEATURE_ROUGH_DIELECTRIC | CRT_FEATURE_DISPERSION | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
+        other(crt::MaterialType::RoughDielectric)(s);
+        s.materials[1].eta = dispersiveIndex();
+    });
+    seen |= differs(CRT_FEATURE_PLASTIC, 0, other(crt::MaterialType::Plastic));
+    differs(CRT_FEATURE_PLASTIC | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
+        other(crt::MaterialType::Plastic)(s);
+        s.materials[1].roughness = 0.5;  // what its coat reflects is a table
+    });
+    seen |= differs(CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ABSORPTION, 0, [&](Scene& s) {
+        other(crt::MaterialType::Dielectric)(s);
+        s.materials[1].absorption = crt::constantSpectrum(2);
+    });
+    differs(CRT_FEATURE_DIELECTRIC, 0, [&](Scene& s) {
+        other(crt::MaterialType::Dielectric)(s);
+        s.materials[1].absorption = crt::constantSpectrum(0);
+    });
+    // A pane bends nothing, whatever its index.
+    differs(CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
+        other(crt::MaterialType::ThinDielectric)(s);
+        s.materials[1].eta = dispersiveIndex();
+    });
     seen |= differs(CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
         other(crt::MaterialType::Dielectric)(s);
         s.materials[1].eta = dispersiveIndex();
@@ -822,6 +846,23 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
         makeGlass(s);
         s.materials[0].eta = crt::constantSpectrum(1.25);
     });
+    const auto glassware = [&](const char* what, crt::MaterialType type, double roughness,
+                               double absorption) {
+        differs(what, [=](Scene& s) {
+            makeGlass(s);
+            s.materials[0].type = type;
+            s.materials[0].roughness = roughness;
+            if (absorption > 0) s.materials[0].absorption = crt::constantSpectrum(absorption);
+        });
+    };
+    glassware("rough glass", crt::MaterialType::RoughDielectric, 0.5, 0);
+    glassware("its roughness", crt::MaterialType::RoughDielectric, 0.25, 0);
+    glassware("its absorption", crt::MaterialType::RoughDielectric, 0.25, 1);
+    glassware("glass that absorbs", crt::MaterialType::Dielectric, 0, 1);
+    glassware("glass that absorbs more", crt::MaterialType::Dielectric, 0, 2);
+    glassware("a pane", crt::MaterialType::ThinDielectric, 0, 0);
+    glassware("plastic", crt::MaterialType::Plastic, 0, 0);
+    glassware("rough plastic", crt::MaterialType::Plastic, 0.5, 0);
     differs("radiance", [](Scene& s) { s.emissions[0].radiance[100] = 3; });
     differs("two-sided", [](Scene& s) { s.emissions[0].two_sided = true; });
     differs("what emits", [](Scene& s) { s.objects[0].emission = 0; });

@@ -75,6 +75,19 @@ TEST_CASE("sine and cosine of ten turns either way: 7.8e-8", "[kernel][math]") {
     CHECK(worst < 7.8e-8);
 }
 
+TEST_CASE("exponential function of what is not above 0: below 1.01 ulp", "[kernel][math]") {
+    double worst = 0;
+    forFloats(0x1p-26f, 86.99999f, 61, [&](f32 x) {
+        worst = std::max(worst, ulps(crt_exp_negative(-x), std::exp(static_cast<long double>(-x))));
+    });
+    CHECK(worst < 1.01);
+    CHECK(crt_exp_negative(0.0f) == 1.0f);
+    CHECK(crt_exp_negative(-1e-20f) == 1.0f);
+    CHECK(crt_exp_negative(-86.99999f) > 0x1p-126f);
+    CHECK(crt_exp_negative(-87.0f) == 0.0f);
+    CHECK(crt_exp_negative(-CRT_INFINITY) == 0.0f);
+}
+
 TEST_CASE("arc tangent of up to 1, and of two numbers: the ulps that are promised", "[kernel][math]") {
     double worst = 0;
     forFloats(0x1p-20f, 1.0f, 61, [&](f32 x) {

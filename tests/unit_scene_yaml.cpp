@@ -308,6 +308,21 @@ TEST_CASE("spectra in all their forms", "[scene_yaml]") {
     CHECK(material("{type: conductor, metal: Au}").k == metalIndex("Au")->second);
     CHECK(material("{type: conductor, eta: 0.2, k: 3}").eta == constantSpectrum(0.2));
     CHECK(material("{type: mirror, reflectance: 1}").type == MaterialType::Mirror);
+    const Material frosted = material(
+        "{type: rough_dielectric, ior: {glass: SF10}, roughness: 0.4, absorption: {rgb: [1, 0, 0], space: "
+        "linear, scale: 3}}");
+    CHECK(frosted.type == MaterialType::RoughDielectric);
+    CHECK(frosted.eta == *glassIndex("SF10"));
+    CHECK(frosted.roughness == 0.4);
+    CHECK((*frosted.absorption)[300] == Approx(3 * rgbReflectance({1, 0, 0})[300]));
+    CHECK_FALSE(material("{type: dielectric, ior: 1.5}").absorption);
+    CHECK(*material("{type: dielectric, ior: 1.5, absorption: 2}").absorption == constantSpectrum(2));
+    CHECK(material("{type: thin_dielectric, ior: 1.5}").eta == constantSpectrum(1.5));
+    CHECK(material("{type: plastic, reflectance: 0.5}").eta == constantSpectrum(1.5));
+    CHECK(material("{type: plastic, reflectance: 0.5}").roughness == 0);
+    const Material tile = material("{type: plastic, reflectance: 0.5, ior: 1.7, roughness: 0.2}");
+    CHECK(tile.eta == constantSpectrum(1.7));
+    CHECK(tile.roughness == 0.2);
 }
 
 TEST_CASE("one name means a reflectance to a wall and a light to a lamp", "[scene_yaml]") {
@@ -610,7 +625,8 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
                Contains("scene.yaml:3:1: error: duplicate key 'title', already given in line 2"));
     CHECK_THAT(refused("materials: {a: {type: difuse}}\n"),
                Contains("scene.yaml:2:23: error: expected one of diffuse, mirror, conductor, "
-                        "rough_conductor, dielectric for 'type'") &&
+                        "rough_conductor, dielectric, rough_dielectric, thin_dielectric, plastic "
+                        "for 'type'") &&
                    Contains("did you mean 'diffuse'?"));
     CHECK_THAT(refused("materials: {a: {typ: diffuse}}\n"),
                Contains("scene.yaml:2:17: error: unknown key 'typ' in material 'a'") &&
@@ -628,7 +644,8 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
 TEST_CASE("columns count characters, not bytes", "[scene_yaml][refused]") {
     const Error e = refusal("crt: 1\nmaterials: {grün: {refl: 1}}\n");
     CHECK_THAT(e.what(), Contains("scene.yaml:2:19: error: 'type' is missing in material 'grün': one of "
-                                  "diffuse, mirror, conductor, rough_conductor, dielectric\n"
+                                  "diffuse, mirror, conductor, rough_conductor, dielectric, "
+                                  "rough_dielectric, thin_dielectric, plastic\n"
                                   "    2 | materials: {grün: {refl: 1}}\n"
                                   "      |                   ^"));
     CHECK(e.place().file == "scene.yaml");
@@ -770,6 +787,25 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
                Contains("there is no spectrum 'whte'") && Contains("did you mean 'withe'?"));
     CHECK_THAT(refused("materials: {m: {type: dielectric, ior: {rgb: [1, 1, 1]}}}\n"),
                Contains("a refractive index is not a colour"));
+    const auto refusedMaterial = [](const std::string& m) {
+        return refused("materials: {m: " + m + "}\n");
+    };
+    CHECK_THAT(refusedMaterial("{type: rough_dielectric, ior: 1.5}"), Contains("'roughness' is missing"));
+    CHECK_THAT(refusedMaterial("{type: rough_dielectric, ior: 1.5, roughness: 1.01}"),
+               Contains("scene.yaml:2:62: error: 'roughness' is 1.01; it must be 0 to 1"));
+    CHECK_THAT(refusedMaterial("{type: dielectric, ior: 1.5, absorption: -1}"),
+               Contains("scene.yaml:2:57: error: 'absorption' of material 'm' is -1; it must be 0 to"));
+    CHECK_THAT(refusedMaterial("{type: dielectric, ior: 1.5, absorption: .inf}"), Contains("infinity"));
+    CHECK_THAT(refusedMaterial("{type: dielectric, ior: 1.5, absorption: {rgb: [2, 0, 0], space: linear}}"),
+               Contains("a component of this absorption is 2, beyond 1") && Contains("'scale'"));
+    CHECK_THAT(refusedMaterial("{type: thin_dielectric, ior: 1.5, absorption: 1}"),
+               Contains("unknown key 'absorption'"));
+    CHECK_THAT(refusedMaterial("{type: dielectric, ior: 1.5, roughness: 0.1}"),
+               Contains("unknown key 'roughness'"));
+    CHECK_THAT(refusedMaterial("{type: plastic, reflectance: 0.5, ior: 0.9}"),
+               Contains("'ior' is 0.9; it must be 1 to 10"));
+    CHECK_THAT(refusedMaterial("{type: plastic}"), Contains("'reflectance' is missing"));
+    CHECK_THAT(refusedMaterial("{type: plastik, reflectance: 1}"), Contains("did you mean 'plastic'?"));
     CHECK_THAT(refused("materials: {m: {type: dielectric, ior: 0}}\n"),
                Contains("'ior' of material 'm' is 0; it must be 0.001 to 1000"));
     CHECK_THAT(

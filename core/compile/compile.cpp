@@ -34,9 +34,9 @@ std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelera
 
 std::vector<const Spectrum*> spectraOf(const Scene& scene, const FlatScene& flat,
                                        const std::vector<std::uint32_t>& emitting,
-                                       const std::vector<const Material*>& materials) {
+                                       const std::vector<const Material*>& materials, const Coats& coats) {
     std::vector<const Spectrum*> all = spectraOfLights(scene, flat, emitting);
-    for (const Spectrum* spectrum : spectraOfMaterials(materials)) all.push_back(spectrum);
+    for (const Spectrum* spectrum : spectraOfMaterials(materials, coats)) all.push_back(spectrum);
     if (const Spectrum* environment = spectrumOfEnvironment(scene)) all.push_back(environment);
     return all;
 }
@@ -84,7 +84,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 
     const std::vector<std::uint32_t> emitting = emittingTriangles(scene, flat);
     const std::vector<const Material*> used = usedMaterials(scene, flat);
-    const SpectrumTable spectra(spectraOf(scene, flat, emitting, used));
+    const Coats coats = coatsOf(used);
+    const SpectrumTable spectra(spectraOf(scene, flat, emitting, used, coats));
 
     const LightPart lights = compileLights(scene, flat, emitting, accelerator, spectra);
     header.lights = blob.append(lights.lights);
@@ -97,7 +98,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     const Spectrum* environment = spectrumOfEnvironment(scene);
     header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
 
-    const MaterialPart materials = compileMaterials(used, spectra);
+    const MaterialPart materials = compileMaterials(used, coats, spectra);
     header.primitives = blob.appendFilled<kernel::CrtPrimitive>(count, [&](auto primitives) {
         compilePrimitives(flat, scene.materials.size(), lights.light_of, primitives);
     });

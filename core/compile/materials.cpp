@@ -24,18 +24,24 @@ bool isKnown(const FlatTriangle& triangle, std::size_t scene_materials) {
     return triangle.material >= 0 && static_cast<std::size_t>(triangle.material) < scene_materials;
 }
 
-std::vector<const Spectrum*> spectraOf(const Material& material) {
+std::vector<const Spectrum*> spectraOf(const Material& material, const Coats& coats) {
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror: return {&material.reflectance};
         case MaterialType::Conductor:
         case MaterialType::RoughConductor: return {&material.eta, &material.k};
-        case MaterialType::Dielectric: return {&material.eta};
+        case MaterialType::Dielectric:
+        case MaterialType::RoughDielectric:
+            if (material.absorption) return {&material.eta, &*material.absorption};
+            return {&material.eta};
+        case MaterialType::ThinDielectric: return {&material.eta};
+        case MaterialType::Plastic:
+            return {&material.reflectance, &material.eta, &coatOf(coats, material).albedo};
     }
     return {};
 }
 
-kernel::CrtMaterial recordOf(const Material& material, const SpectrumTable& spectra) {
+kernel::CrtMaterial recordOf(const Material& material, const Coats& coats, const SpectrumTable& spectra) {
     kernel::CrtMaterial record{};
     record.type = static_cast<std::uint32_t>(material.type);
     switch (material.type) {
@@ -46,9 +52,22 @@ kernel::CrtMaterial recordOf(const Material& material, const SpectrumTable& spec
             record.eta = spectra.valueOf(material.eta);
             record.k = spectra.valueOf(material.k);
             break;
+        case MaterialType::RoughDielectric: record.roughness = valueOf(material.roughness); [[fallthrough]];
         case MaterialType::Dielectric:
             record.eta = spectra.valueOf(material.eta);
             if (!material.eta.isConstant()) record.flags = CRT_MATERIAL_DISPERSIVE;
+            if (material.absorption) record.absorption = spectra.valueOf(*material.absorption);
+            break;
+        case MaterialType::ThinDielectric: record.eta = spectra.valueOf(material.eta); break;
+        case MaterialType::Plastic: {
+            const Coat& coat = coatOf(coats, material);
+            record.reflectance = spectra.valueOf(material.reflectance);
+            record.eta = spectra.valueOf(material.eta);
+            record.roughness = valueOf(material.roughness);
+            record.k = valueOf(coat.internal_reflectance);
+            record.coat = spectra.valueOf(coat.albedo);
+            break;
+        }
     }
     return record;
 }
@@ -68,22 +87,25 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
     return materials;
 }
 
-std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials) {
+std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials,
+                                                const Coats& coats) {
     std::vector<const Spectrum*> all;
     for (const Material* material : materials)
         if (material)
-            for (const Spectrum* spectrum : spectraOf(*material)) all.push_back(spectrum);
+            for (const Spectrum* spectrum : spectraOf(*material, coats)) all.push_back(spectrum);
     return all;
 }
 
-MaterialPart compileMaterials(const std::vector<const Material*>& materials, const SpectrumTable& spectra) {
+MaterialPart compileMaterials(const std::vector<const Material*>& materials, const Coats& coats,
+                              const SpectrumTable& spectra) {
     MaterialPart part;
     for (const Material* material : materials) {
-        part.records.push_back(material ? recordOf(*material, spectra) : kernel::CrtMaterial{});
+        part.records.push_back(material ? recordOf(*material, coats, spectra) : kernel::CrtMaterial{});
         if (!material) continue;
         const kernel::CrtMaterial& record = part.records.back();
         part.features |= 1u << record.type;
         if ((record.flags & CRT_MATERIAL_DISPERSIVE) != 0) part.features |= CRT_FEATURE_DISPERSION;
+        if (record.absorption != 0) part.features |= CRT_FEATURE_ABSORPTION;
     }
     return part;
 }

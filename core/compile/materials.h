@@ -1,6 +1,7 @@
 /// What surfaces are made of: materials, and what each triangle has of them.
 #pragma once
 
+#include "compile/coat.h"
 #include "compile/flatten.h"
 #include "compile/spectrum_table.h"
 #include "kernel/layout.h"
@@ -18,13 +19,15 @@ namespace crt {
 std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& flat);
 
 /// The spectra that compileMaterials asks the table for.
-std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials);
+std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials,
+                                                const Coats& coats);
 
 struct MaterialPart {
     std::vector<kernel::CrtMaterial> records;
     std::uint32_t features = 0;  ///< Of the materials that are used.
 };
-MaterialPart compileMaterials(const std::vector<const Material*>& materials, const SpectrumTable& spectra);
+MaterialPart compileMaterials(const std::vector<const Material*>& materials, const Coats& coats,
+                              const SpectrumTable& spectra);
 
 /// Fills in one a triangle, by primitive id. `light_of` as of LightPart.
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,

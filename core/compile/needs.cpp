@@ -37,6 +37,7 @@ std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(traces && header.accelerator == CRT_ACCELERATOR_AABB, CRT_FEATURE_AABB);
     // The albedo of first hits is a material's, even where nothing is scattered.
     if (scatters(scene) || (header.aovs & kAovAlbedo) != 0) f |= materials.features;
+    need(isPath(scene), materials.features & CRT_FEATURE_ABSORPTION);
     need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
     const bool samples_environment = header.environment_light != 0;
     need(header.lights.count > header.point_lights.count + (samples_environment ? 1u : 0u),
@@ -82,6 +83,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_TABLE)) left_out("tables of spectra", "all values are the same at all wavelengths");
     if (!has(CRT_FEATURE_DISPERSION))
         left_out("hero wavelength selection", "no index of refraction depends on wavelength");
+    if (!has(CRT_FEATURE_ABSORPTION)) left_out("absorption", "no body absorbs");
     if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
     if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
     if (!has(CRT_FEATURE_NEE))

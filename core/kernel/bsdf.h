@@ -3,239 +3,13 @@
  * crt_bsdf_sample, crt_bsdf_eval and crt_bsdf_pdf and the flags are all that path.h knows. A material is a
  * row of CRT_MATERIAL_LIST (features.h) and a case in each of the four; deltas, which can only be sampled,
  * need none in eval and pdf.
- *
- * w_o and w_i point away from the surface. Radiance is transported: crossing into an index η times the other
- * scales it by 1/η².
  */
 #ifndef CRT_BSDF_H
 #define CRT_BSDF_H
 
-#include "value.h"
+#include "plastic.h"
 
 CRT_KERNEL_BEGIN
-
-#define CRT_BSDF_DELTA 1u      /* scatters into single directions: light sampling finds none of them */
-#define CRT_BSDF_REFLECTS 2u   /* to the side of w_o */
-#define CRT_BSDF_TRANSMITS 4u  /* to the other side */
-#define CRT_BSDF_DISPERSIVE 8u /* directions depend on the wavelength */
-
-/* A material at one vertex. What its kind does not have is not set. */
-typedef struct CrtBsdf {
-    u32 type;         /* CRT_MATERIAL_… */
-    u32 flags;        /* CRT_BSDF_…; 0: everything is absorbed */
-    vec3 wo;          /* unit */
-    vec3 ns, ng;      /* on the side of w_o, the shading normal nearly so */
-    vec4 reflectance; /* diffuse, and what mirrors as a whole */
-    vec4 eta;         /* dielectric: index beyond the surface / index on w_o's side; rough conductor: real
-                         part of the index */
-    vec4 k;           /* rough conductor: extinction */
-    f32 alpha;        /* rough conductor: width of GGX */
-    vec4 albedo;      /* for the first-hit output; only where it is asked for */
-} CrtBsdf;
-
-typedef struct CrtScatter {
-    vec3 wi;        /* unit */
-    vec4 weight;    /* f·|cos| / pdf */
-    f32 pdf;        /* per steradian; 0 for a delta */
-    f32 eta_square; /* (index on the side of w_i / on the side of w_o)² where refracted, else 1 */
-    int hero_only;  /* refracted by a wavelength-dependent index: only the hero's direction is right */
-    int valid;
-} CrtScatter;
-
-/* (η·cos of refraction)² at cos of incidence, η² − 1 + cos²; ≤ 0 in total internal reflection. In this order
-   an index of 1 gives back cos² itself, however grazing. */
-CRT_FN f32 crt_refraction(f32 cos_i, f32 eta) { return (eta - 1.0f) * (eta + 1.0f) + cos_i * cos_i; }
-
-/* Unpolarised reflectance of an interface at |cos| of incidence; eta: index beyond / index before. Exactly 1
-   in total internal reflection, exactly 0 for an index of 1. */
-CRT_FN f32 crt_fresnel_dielectric(f32 cos_i, f32 eta) {
-    const f32 refraction = crt_refraction(cos_i, eta);
-    if (!(refraction > 0.0f)) return 1.0f;
-    const f32 cos_t = crt_sqrt(refraction) / eta;
-    const f32 rs = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    const f32 rp = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    return 0.5f * (rs * rs + rp * rp);
-}
-
-/* Unpolarised reflectance of a conductor of complex index n + ik at cos of incidence, four wavelengths at
- * once. */
-CRT_FN vec4 crt_fresnel_conductor(f32 cos_i, vec4 n, vec4 k) {
-    const f32 cos2 = cos_i * cos_i;
-    const f32 sin2 = 1.0f - cos2;
-    const vec4 n2 = n * n;
-    const vec4 k2 = k * k;
-    const vec4 t0 = n2 - k2 - splat4(sin2);
-    const vec4 a2b2 = crt_sqrt4(t0 * t0 + n2 * k2 * 4.0f);
-    const vec4 a = crt_sqrt4(crt_max4((a2b2 + t0) * 0.5f, splat4(0.0f)));
-    const vec4 t1 = a2b2 + splat4(cos2);
-    const vec4 t2 = a * (2.0f * cos_i);
-    const vec4 rs = (t1 - t2) / (t1 + t2);
-    const vec4 t3 = a2b2 * cos2 + splat4(sin2 * sin2);
-    const vec4 t4 = t2 * sin2;
-    const vec4 rp = rs * (t3 - t4) / (t3 + t4);
-    return (rs + rp) * 0.5f;
-}
-
-CRT_FN vec3 crt_reflect(vec3 wo, vec3 n) { return n * (2.0f * dot3(wo, n)) - wo; }
-
-/* Lambertian f·|cos| per unit reflectance for a direction at cos_s from the shading normal, and its pdf:
-   both cos/π; 0 below the horizon. */
-CRT_FN f32 crt_lambert(f32 cos_s) { return crt_max(cos_s, 0.0f) * CRT_INV_PI; }
-
-/* Nothing is scattered. */
-CRT_FN CrtScatter crt_no_scatter(void) {
-    CrtScatter s;
-    s.wi = make_vec3(0.0f, 0.0f, 0.0f);
-    s.weight = splat4(0.0f);
-    s.pdf = 0.0f;
-    s.eta_square = 1.0f;
-    s.hero_only = 0;
-    s.valid = 0;
-    return s;
-}
-
-/* Distributed as the cosine with n, over π; unit to 4 ulp. */
-CRT_FN vec3 crt_cosine_direction(vec3 n, CrtRandom2 u) {
-    const CrtRandom2 disk = crt_concentric_disk(u);
-    const f32 z = crt_sqrt(crt_max(0.0f, crt_fma(-disk.x, disk.x, crt_fma(-disk.y, disk.y, 1.0f))));
-    return crt_to_world(crt_frame(n), make_vec3(disk.x, disk.y, z));
-}
-
-CRT_FN CrtScatter crt_sample_diffuse(vec4 reflectance, vec3 ns, vec3 ng, CrtRandom2 u) {
-    CrtScatter s;
-    s.wi = crt_cosine_direction(ns, u);
-    s.weight = reflectance;
-    s.pdf = crt_lambert(dot3(s.wi, ns));
-    s.eta_square = 1.0f;
-    s.hero_only = 0;
-    /* Light that the shading normal would send through the surface is lost, not leaked. */
-    s.valid = dot3(s.wi, ng) > 0.0f && s.pdf > 0.0f;
-    return s;
-}
-
-CRT_FN CrtScatter crt_sample_mirror(vec4 reflectance, vec3 wo, vec3 ns, vec3 ng) {
-    CrtScatter s;
-    s.wi = normalize3(crt_reflect(wo, ns));
-    s.weight = reflectance;
-    s.pdf = 0.0f;
-    s.eta_square = 1.0f;
-    s.hero_only = 0;
-    s.valid = dot3(s.wi, ng) > 0.0f;
-    return s;
-}
-
-/* Smooth dielectric. `eta`: index beyond the surface / index on w_o's side. `hero`: 1 in the hero's lane, 0
-   elsewhere. `dispersive`: the index differs between the path's living wavelengths. `alone`: only the hero
-   is alive. */
-CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec4 hero, int dispersive,
-                                        int alone, f32 u) {
-    CrtScatter s;
-    const f32 cos_i = crt_min(dot3(wo, ns), 1.0f);
-    const f32 eta_hero = CRT_HAS(DISPERSION) ? sum4(eta * hero) : V4X(eta);
-    const f32 fresnel_hero = crt_fresnel_dielectric(cos_i, eta_hero);
-    vec4 fresnel = splat4(fresnel_hero);
-    f32 reflect = fresnel_hero;
-    if (CRT_HAS(DISPERSION) && dispersive && !alone) {
-        fresnel =
-            make_vec4(crt_fresnel_dielectric(cos_i, V4X(eta)), crt_fresnel_dielectric(cos_i, V4Y(eta)),
-                      crt_fresnel_dielectric(cos_i, V4Z(eta)), crt_fresnel_dielectric(cos_i, V4W(eta)));
-        reflect = 0.25f * sum4(fresnel);
-    }
-    s.pdf = 0.0f;
-    s.eta_square = 1.0f;
-    s.hero_only = 0;
-    if (u < reflect) {
-        s.wi = normalize3(crt_reflect(wo, ns));
-        s.weight = fresnel / reflect;
-        s.valid = dot3(s.wi, ng) > 0.0f;
-        return s;
-    }
-    const f32 inverse_eta = 1.0f / eta_hero;
-    const f32 refraction = crt_refraction(cos_i, eta_hero);
-    s.hero_only = CRT_HAS(DISPERSION) && dispersive && !alone;
-    s.eta_square = eta_hero * eta_hero;
-    s.weight = splat4((1.0f - fresnel_hero) / (1.0f - reflect) * (inverse_eta * inverse_eta));
-    /* An index of exactly 1 is no surface: the direction passes unrounded. */
-    s.wi = eta_hero == 1.0f ? -wo
-                            : normalize3(wo * -inverse_eta +
-                                         ns * (cos_i - crt_sqrt(crt_max(refraction, 0.0f))) * inverse_eta);
-    s.valid = refraction > 0.0f && dot3(s.wi, ng) < 0.0f;
-    return s;
-}
-
-/* Narrower than this GGX is taken for a mirror: its value and density would lose their digits in single
-   precision, and the image cannot tell. */
-#define CRT_ALPHA_MIN 1e-3f
-
-/* Two directions in the shading frame, each with the root of Smith's shadowing, a = √(cos² + α² sin²), of
-   which Λ = (a/cos − 1)/2 (Heitz 2014); and GGX's density of the normal halfway. */
-typedef struct CrtMicrofacet {
-    f32 cos_o, cos_i; /* 0 or below: the microfacets do not mirror between them */
-    f32 cos_m;        /* of both with the normal halfway */
-    f32 root_o, root_i;
-    f32 density;
-} CrtMicrofacet;
-
-CRT_FN f32 crt_smith_root(f32 cosine, f32 alpha) {
-    const f32 cos2 = cosine * cosine;
-    return crt_sqrt(crt_max(cos2 + alpha * alpha * (1.0f - cos2), 0.0f));
-}
-
-CRT_FN CrtMicrofacet crt_microfacet(const CrtBsdf *b, vec3 wi) {
-    const CrtFrame frame = crt_frame(b->ns);
-    const vec3 h = b->wo + wi;
-    const f32 x = dot3(frame.s, h), y = dot3(frame.t, h), z = dot3(frame.n, h);
-    const f32 hh = x * x + y * y + z * z;
-    CrtMicrofacet m;
-    m.cos_o = dot3(b->wo, b->ns);
-    m.cos_i = dot3(wi, b->ns);
-    m.cos_m = crt_min(dot3(b->wo, h) / crt_sqrt(hh), 1.0f);
-    m.root_o = crt_smith_root(m.cos_o, b->alpha);
-    m.root_i = crt_smith_root(m.cos_i, b->alpha);
-    /* D = α²/π / (sin² + α² cos²)², with the sines and cosines of h, which is not of unit length. */
-    const f32 spread = (x * x + y * y + b->alpha * b->alpha * (z * z)) / hh;
-    m.density = CRT_INV_PI * (b->alpha / spread) * (b->alpha / spread);
-    return m;
-}
-
-/* f·cos = F D G₂ / (4 cos_o), G₂ = 1 / (1 + Λ_o + Λ_i): shadowing and masking correlated by height. */
-CRT_FN vec4 crt_rough_conductor(const CrtBsdf *b, vec3 wi) {
-    const CrtMicrofacet m = crt_microfacet(b, wi);
-    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return splat4(0.0f);
-    return crt_fresnel_conductor(m.cos_m, b->eta, b->k) *
-           (m.density * m.cos_i / (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
-}
-
-/* The visible normals' density G₁ D cos_m / cos_o, turned into that of directions by 1 / (4 cos_m). */
-CRT_FN f32 crt_rough_conductor_pdf(const CrtBsdf *b, vec3 wi) {
-    const CrtMicrofacet m = crt_microfacet(b, wi);
-    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return 0.0f;
-    return m.density / (2.0f * (m.cos_o + m.root_o));
-}
-
-/* Mirrors w_o in one of the normals that it sees (Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with
-   Spherical Caps"): stretched by α, the visible normals are those halfway to a cap of the sphere. */
-CRT_FN CrtScatter crt_sample_rough_conductor(const CrtBsdf *b, CrtRandom2 u) {
-    const CrtFrame frame = crt_frame(b->ns);
-    const vec3 stretched = normalize3(make_vec3(b->alpha * dot3(b->wo, frame.s),
-                                                b->alpha * dot3(b->wo, frame.t), dot3(b->wo, frame.n)));
-    f32 cos_phi;
-    const f32 sin_phi = crt_sincos(2.0f * CRT_PI * u.x, &cos_phi);
-    const f32 z = crt_fma(1.0f - u.y, 1.0f + V3Z(stretched), -V3Z(stretched));
-    const f32 sine = crt_sqrt(crt_max(0.0f, 1.0f - z * z));
-    const vec3 cap = make_vec3(sine * cos_phi, sine * sin_phi, z) + stretched;
-    const vec3 normal = crt_to_world(
-        frame, normalize3(make_vec3(b->alpha * V3X(cap), b->alpha * V3Y(cap), crt_max(V3Z(cap), 0.0f))));
-    CrtScatter s = crt_no_scatter();
-    s.wi = normalize3(crt_reflect(b->wo, normal));
-    const CrtMicrofacet m = crt_microfacet(b, s.wi);
-    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return s;
-    s.pdf = m.density / (2.0f * (m.cos_o + m.root_o));
-    s.weight = crt_fresnel_conductor(m.cos_m, b->eta, b->k) *
-               (m.cos_i * (m.cos_o + m.root_o) / (m.root_o * m.cos_i + m.root_i * m.cos_o));
-    s.valid = dot3(s.wi, b->ng) > 0.0f && s.pdf > 0.0f;
-    return s;
-}
 
 /* A material's type; known without looking where the kernel has only one. */
 #define CRT_ONLY_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
@@ -245,10 +19,10 @@ CRT_FN u32 crt_material_type(u32 type) {
     return type;
 }
 
-/* What the material of `surface` does to light that leaves along wo. The first vertex asks for the albedo.
- */
+/* What the material of `surface` does to light that leaves along wo. `carried`: the path's throughput, which
+   the choice between wavelengths goes by. The first vertex asks for the albedo. */
 CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface *surface, vec3 wo,
-                             vec4 position, int albedo) {
+                             vec4 position, vec4 carried, int albedo) {
     const CrtMaterial material = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[surface->material];
     const int outside = dot3(wo, surface->ng) > 0.0f;
     b->type = crt_material_type(material.type);
@@ -300,18 +74,65 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
         case CRT_MATERIAL_DIELECTRIC:
             if (CRT_HAS(DIELECTRIC)) {
                 const vec4 eta = crt_value(ctx, material.eta, surface, position);
-                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA;
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA | CRT_BSDF_BOUNDS;
                 if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
                 b->eta = outside ? eta : splat4(1.0f) / eta;
+                b->absorption = material.absorption;
+            }
+            break;
+        case CRT_MATERIAL_ROUGH_DIELECTRIC:
+            if (CRT_HAS(ROUGH_DIELECTRIC)) {
+                const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
+                const vec4 eta = crt_value(ctx, material.eta, surface, position);
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_BOUNDS;
+                if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
+                b->eta = outside ? eta : splat4(1.0f) / eta;
+                b->absorption = material.absorption;
+                b->alpha = roughness * roughness;
+                b->lanes = carried / sum4(carried);
+                b->flags |= crt_is_rough(b->alpha, eta) ? CRT_BSDF_CHOOSES : CRT_BSDF_DELTA;
+            }
+            break;
+        case CRT_MATERIAL_THIN_DIELECTRIC:
+            if (CRT_HAS(THIN_DIELECTRIC)) {
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA;
+                b->eta = crt_value(ctx, material.eta, surface, position);
+                b->lanes = carried / sum4(carried);
+            }
+            break;
+        case CRT_MATERIAL_PLASTIC:
+            if (CRT_HAS(PLASTIC)) {
+                const vec4 base = crt_value(ctx, material.reflectance, surface, position);
+                const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
+                const f32 eta = V4X(crt_value(ctx, material.eta, surface, position));
+                const f32 k = V4X(crt_value(ctx, material.k, surface, position));
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_CHOOSES;
+                b->eta = splat4(eta);
+                b->alpha = roughness * roughness;
+                b->coat = 0;
+                if (CRT_HAS(TABLE) && (material.coat & CRT_VALUE_REFERENCE) != 0u)
+                    b->coat = CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) +
+                              (material.coat & CRT_VALUE_INDEX) * CRT_SPECTRUM_STRIDE;
+                /* Of what enters, the base sends this much back through the coat. */
+                const vec4 returned = base * (1.0f - k) / (splat4(1.0f) - base * k);
+                const f32 mirrored = crt_coat_albedo(b, dot3(wo, b->ns));
+                const f32 scattered = 0.25f * sum4(returned) * (1.0f - mirrored);
+                b->reflectance = returned * ((1.0f - mirrored) / ((1.0f - k) * eta * eta));
+                b->coat_chance = mirrored > 0.0f ? mirrored / (mirrored + scattered) : 0.0f;
+                if (albedo) {
+                    const f32 facing = crt_coat_albedo(b, 1.0f);
+                    b->albedo = splat4(facing) + returned * (1.0f - facing);
+                }
             }
             break;
         default: break;
     }
 }
 
-/* A direction w_i, distributed as crt_bsdf_pdf or a delta. `hero`: 1 in the hero's lane, 0 elsewhere.
-   `alone`: only the hero is alive. */
-CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, vec4 hero, int alone) {
+/* A direction w_i, distributed as crt_bsdf_pdf or a delta. `choice`: two more random numbers, where the
+   flags ask for them. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`: only the hero is alive. */
+CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero, int alone) {
+    (void)choice;
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
             if (CRT_HAS(DIFFUSE)) return crt_sample_diffuse(b->reflectance, b->ns, b->ng, u);
@@ -333,6 +154,19 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, vec4 hero, int
                 return crt_sample_dielectric(b->eta, b->wo, b->ns, b->ng, hero,
                                              (b->flags & CRT_BSDF_DISPERSIVE) != 0u, alone, u.x);
             break;
+        case CRT_MATERIAL_ROUGH_DIELECTRIC:
+            if (CRT_HAS(ROUGH_DIELECTRIC)) {
+                if ((b->flags & CRT_BSDF_DELTA) == 0u) return crt_sample_rough_dielectric(b, u, choice);
+                return crt_sample_dielectric(b->eta, b->wo, b->ns, b->ng, hero,
+                                             (b->flags & CRT_BSDF_DISPERSIVE) != 0u, alone, u.x);
+            }
+            break;
+        case CRT_MATERIAL_THIN_DIELECTRIC:
+            if (CRT_HAS(THIN_DIELECTRIC)) return crt_sample_thin_dielectric(b, u.x);
+            break;
+        case CRT_MATERIAL_PLASTIC:
+            if (CRT_HAS(PLASTIC)) return crt_sample_plastic(b, u, choice.x);
+            break;
         default: break;
     }
     return crt_no_scatter();
@@ -348,6 +182,18 @@ CRT_FN vec4 crt_bsdf_eval(const CrtBsdf *b, vec3 wi) {
             if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u)
                 return crt_rough_conductor(b, wi);
             break;
+        case CRT_MATERIAL_ROUGH_DIELECTRIC:
+            if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u) {
+                f32 unused;
+                return crt_rough_dielectric(b, wi, &unused);
+            }
+            break;
+        case CRT_MATERIAL_PLASTIC:
+            if (CRT_HAS(PLASTIC)) {
+                f32 unused;
+                return crt_plastic(b, wi, &unused);
+            }
+            break;
         default: break;
     }
     return splat4(0.0f);
@@ -362,6 +208,20 @@ CRT_FN f32 crt_bsdf_pdf(const CrtBsdf *b, vec3 wi) {
         case CRT_MATERIAL_ROUGH_CONDUCTOR:
             if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u)
                 return crt_rough_conductor_pdf(b, wi);
+            break;
+        case CRT_MATERIAL_ROUGH_DIELECTRIC:
+            if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u) {
+                f32 pdf;
+                (void)crt_rough_dielectric(b, wi, &pdf);
+                return pdf;
+            }
+            break;
+        case CRT_MATERIAL_PLASTIC:
+            if (CRT_HAS(PLASTIC)) {
+                f32 pdf;
+                (void)crt_plastic(b, wi, &pdf);
+                return pdf;
+            }
             break;
         default: break;
     }

@@ -9,7 +9,7 @@
  * CRT_MATERIAL_LIST(M, F) calls M(F, bit, NAME, Name, word, SCATTER, "what leaves…") for each kind of
  * material. Its bit is its number in the scene, too; `word` is its type in scene files. SCATTER is LOBE
  * where light that arrives from any direction may be scattered, so that it is worth sampling lights, and
- * DELTA where only that of single directions is.
+ * DELTA where only that of single directions is. A material may have both: it is LOBE.
  */
 #ifndef CRT_FEATURES_H
 #define CRT_FEATURES_H
@@ -20,7 +20,11 @@
     M(F, 7, CONDUCTOR, Conductor, conductor, DELTA, "smooth conductor")                      \
     M(F, 21, ROUGH_CONDUCTOR, RoughConductor, rough_conductor, LOBE, "rough conductor (GGX)") \
     M(F, 8, DIELECTRIC, Dielectric, dielectric, DELTA,                                       \
-      "smooth dielectric, total internal reflection")
+      "smooth dielectric, total internal reflection")                                        \
+    M(F, 23, ROUGH_DIELECTRIC, RoughDielectric, rough_dielectric, LOBE,                      \
+      "rough dielectric (GGX), refraction by microfacets")                                   \
+    M(F, 24, THIN_DIELECTRIC, ThinDielectric, thin_dielectric, DELTA, "thin panes")    \
+    M(F, 25, PLASTIC, Plastic, plastic, LOBE, "diffuse base under a clear coat")
 
 #define CRT_MATERIAL_FEATURE(F, bit, NAME, Name, word, scatter, text) F(bit, NAME, text)
 #define CRT_FEATURE_LIST(F)                                                                  \
@@ -43,6 +47,7 @@
     F(18, REPLICATES, "independent replicates, from which the image knows its error")        \
     F(20, TABLE, "values tabulated by wavelength")                                           \
     F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
+    F(26, ABSORPTION, "absorption inside dielectrics")                                        \
     F(28, POINT_LIGHT, "point, spot, directional and sun lights")
 
 #define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,

@@ -109,15 +109,19 @@ typedef u32 CrtValue;
 
 #define CRT_MATERIAL_DISPERSIVE 1u
 
+/* Steps between the cosines 0 and 1 of a coat's table, which is as long as a spectrum's. */
+#define CRT_COAT_STEPS 470.0f
+
 /* What a kind does not have is 0. */
 typedef struct CrtMaterial {
     u32 type; /* CRT_MATERIAL_… of features.h */
     u32 flags;
     CrtValue reflectance;
-    CrtValue eta; /* conductors: real part of the index; dielectric: index inside / outside */
-    CrtValue k;   /* conductors: extinction */
+    CrtValue eta; /* conductors: real part of the index; dielectrics: index inside / outside */
+    CrtValue k;   /* conductors: extinction; plastic: share that the coat sends back from below */
     CrtValue roughness; /* square root of the width α of GGX */
-    u32 reserved0, reserved1;
+    CrtValue coat; /* plastic: share that a rough coat reflects, by the cosine: a table; 0: smooth */
+    CrtValue absorption; /* dielectrics: of their inside, per scene unit */
 } CrtMaterial;
 CRT_ASSERT_SIZE(CrtMaterial, 32);
 

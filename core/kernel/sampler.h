@@ -17,11 +17,12 @@ CRT_KERNEL_BEGIN
 #define CRT_DIM_LENS 2u
 #define CRT_DIM_HERO 3u
 #define CRT_DIM_VERTEX 4u
-#define CRT_DIM_PER_VERTEX 8u /* four are for what materials to come ask for */
+#define CRT_DIM_PER_VERTEX 8u /* two are for what materials to come ask for */
 #define CRT_DIM_LIGHT 0u        /* point on the emitter */
 #define CRT_DIM_BSDF 1u         /* scattered direction, or which of two */
 #define CRT_DIM_LIGHT_CHOICE 2u /* which emitter */
 #define CRT_DIM_ROULETTE 3u
+#define CRT_DIM_CHOICE 4u       /* which of several ways to scatter; two numbers */
 
 typedef struct CrtSampler {
     u32 kind;

@@ -94,10 +94,12 @@ inline constexpr std::pair<MaterialType, const char*> kMaterialNames[] = {
 struct Material {
     std::string name;
     MaterialType type = MaterialType::Diffuse;
-    Spectrum reflectance;  ///< Diffuse and Mirror. In [0,1].
-    Spectrum eta;  ///< Conductors: real index n. Dielectric: index of the inside relative to the outside.
+    Spectrum reflectance;  ///< Diffuse, Mirror, and the base of Plastic. In [0,1].
+    Spectrum eta;  ///< Conductors: real index n. Dielectrics: index of the inside relative to the outside;
+                 ///< Plastic: of the coat.
     Spectrum k;            ///< Conductors: extinction.
-    double roughness = 0;  ///< RoughConductor. In [0,1].
+    std::optional<Spectrum> absorption;  ///< Dielectric, RoughDielectric. Per scene unit, at least 0.
+    double roughness = 0;  ///< Rough kinds, and the coat of Plastic. In [0,1].
     SourcePlace place;
 };
 

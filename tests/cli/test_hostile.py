@@ -189,6 +189,30 @@ def scene_cases():
     key("a number in octal", "sampler: {samples: 012}", {"duplicate key", "octal"})
     key("a hexadecimal number", "integrator: {max_depth: 0x10}", "decimal")
     key("yes for true", "integrator: {nee: yes}", "write true")
+    for text, word in (
+        ("{type: rough_dielectric, ior: 1.5, roughness: 1.5}", "'roughness'"),
+        ("{type: rough_dielectric, ior: 1.5, roughness: -0.1}", "'roughness'"),
+        ("{type: rough_dielectric, ior: 1.5, roughness: nan}", "NaN"),
+        ("{type: rough_dielectric, ior: 1e9, roughness: 0.5}", "'ior'"),
+        ("{type: dielectric, ior: 1.5, absorption: -1}", "'absorption'"),
+        ("{type: dielectric, ior: 1.5, absorption: {table: {nm: [400, 700], value: [1, -1]}}}",
+         "'absorption'"),
+        ("{type: dielectric, ior: 1.5, absorption: .inf}", "infinity"),
+        ("{type: dielectric, ior: 1.5, absorption: 1e300}", "'absorption'"),
+        ("{type: thin_dielectric, ior: 0}", "'ior'"),
+        ("{type: plastic, reflectance: 2}", "'reflectance'"),
+        ("{type: plastic, reflectance: 0.5, ior: 0}", "'ior'"),
+    ):
+        key(f"the material {text}", f"materials: {{m: {text}}}", word)
+    for text in (
+        "{type: rough_dielectric, ior: 1.0000001, roughness: 1}",
+        "{type: rough_dielectric, ior: 1000, roughness: 1}",
+        "{type: rough_dielectric, ior: 0.001, roughness: 0.04}",
+        "{type: dielectric, ior: 1.5, absorption: 1e25}",
+        "{type: plastic, reflectance: 1, ior: 10, roughness: 1}",
+    ):
+        spectrum_of = f"materials: {{m: {text}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n"
+        scene(f"the material {text}", HEAD + spectrum_of, 0)
     for size, word in (
         ("[0, 8]", "must be"),
         ("[-8, 8]", "must be"),

@@ -95,6 +95,7 @@ std::vector<Case> lightCases();          ///< E
 std::vector<Case> pointLightCases();     ///< E, the part about lights without a surface
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> scatteringCases();     ///< G
+std::vector<Case> glasswareCases();      ///< G, rough glass and panes
 std::vector<Case> colourCases();         ///< H
 std::vector<Case> accumulationCases();   ///< I
 std::vector<Case> imageCases();          ///< J

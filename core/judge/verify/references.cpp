@@ -118,23 +118,77 @@ double smithLambda(double cosine, double alpha) {
     return (std::sqrt(1 + alpha * alpha * tan2) - 1) / 2;
 }
 
+/// A microfacet's normal at `cos_m` to the surface's, seen at `between`, and the height-correlated shadowing
+/// of what it sends on at `cos_i`.
+struct Facet {
+    double cos_m, between;
+};
+
+/// Mean of f(m) over the normals of GGX as visible from `cosine`, but for G₁: the density D cos_m dm is
+/// dx dφ / 2π with tan²(m) = α² x / (1 − x), and half of φ is enough. With x = 1 − y² the facets that stand
+/// on edge, seen as 1/y, are integrated as exactly as others.
+double overNormals(double cosine, double alpha, const std::function<double(const Facet&)>& f,
+                   int panels = 24) {
+    const double sine = std::sqrt(1 - cosine * cosine);
+    const auto integrand = [&](double y, double phi) {
+        const double cos_m = y / std::sqrt(y * y + alpha * alpha * (1 - y * y));
+        const double sin_m = std::sqrt(std::max(0.0, 1 - cos_m * cos_m));
+        const double between = sine * sin_m * std::cos(phi) + cosine * cos_m;
+        return between > 0 ? 2 * y * f({cos_m, between}) * between / (cosine * cos_m) : 0.0;
+    };
+    return rectangleIntegral(integrand, 0, 1, 0, kPi, panels) / kPi;
+}
+
+double smithShadowing(double cos_o, double cos_i, double alpha) {
+    return 1 / (1 + smithLambda(cos_o, alpha) + smithLambda(cos_i, alpha));
+}
+
+double roughReflectance(double cosine, double eta, double roughness, int panels = 24) {
+    const double alpha = roughness * roughness;
+    if (alpha < 1e-3) return fresnelDielectric(cosine, eta);
+    return overNormals(
+        cosine, alpha,
+        [&](const Facet& m) {
+            const double cos_i = 2 * m.between * m.cos_m - cosine;
+            return cos_i > 0 ? fresnelDielectric(m.between, eta) * smithShadowing(cosine, cos_i, alpha)
+                             : 0.0;
+        },
+        panels);
+}
+
 }  // namespace
 
 double roughConductorAlbedo(double cosine, double n, double k, double roughness) {
     const double alpha = roughness * roughness;
     if (alpha < 1e-3) return fresnelConductor(cosine, n, k);  // the kernel's limit of the smooth metal
-    const double sine = std::sqrt(1 - cosine * cosine);
-    // With tan²(m) = α² x / (1 − x) the normals' density D cos(m) dm is dx dφ / 2π; half of φ is enough.
-    const auto integrand = [&](double x, double phi) {
-        const double cos_m = 1 / std::sqrt(1 + alpha * alpha * x / (1 - x));
-        const double sin_m = std::sqrt(std::max(0.0, 1 - cos_m * cos_m));
-        const double between = sine * sin_m * std::cos(phi) + cosine * cos_m;
-        const double cos_i = 2 * between * cos_m - cosine;
-        if (!(between > 0) || !(cos_i > 0)) return 0.0;
-        const double shadowing = 1 / (1 + smithLambda(cosine, alpha) + smithLambda(cos_i, alpha));
-        return fresnelConductor(between, n, k) * shadowing * between / (cosine * cos_m);
-    };
-    return rectangleIntegral(integrand, 0, 1, 0, kPi, 24) / kPi;
+    return overNormals(cosine, alpha, [&](const Facet& m) {
+        const double cos_i = 2 * m.between * m.cos_m - cosine;
+        return cos_i > 0 ? fresnelConductor(m.between, n, k) * smithShadowing(cosine, cos_i, alpha) : 0.0;
+    });
+}
+
+ScatteredShares roughDielectricShares(double cosine, double eta, double roughness) {
+    const double alpha = roughness * roughness;
+    const double reflected = roughReflectance(cosine, eta, roughness);
+    if (alpha < 1e-3) return {reflected, 1 - reflected};
+    const double transmitted = overNormals(cosine, alpha, [&](const Facet& m) {
+        const double sin2 = (1 - m.between * m.between) / (eta * eta);
+        if (sin2 >= 1) return 0.0;
+        // Snell's law about the microfacet's normal, and of its result the part along the surface's.
+        const double cos_i = (cosine - m.between * m.cos_m) / eta + std::sqrt(1 - sin2) * m.cos_m;
+        return cos_i > 0 ? (1 - fresnelDielectric(m.between, eta)) * smithShadowing(cosine, cos_i, alpha)
+                         : 0.0;
+    });
+    return {reflected, transmitted};
+}
+
+double plasticAlbedo(double cosine, double base, double eta, double roughness) {
+    const double mean = boost::math::quadrature::gauss<double, 20>::integrate(
+        [&](double c) { return 2 * c * roughReflectance(c, eta, roughness, 6); }, 0.0, 1.0);
+    const double below = 1 - (1 - mean) / (eta * eta), above = roughReflectance(cosine, eta, roughness);
+    double sum = above, round = (1 - above) * base;  // the share that leaves the base for the first time
+    for (int i = 0; i < 10000 && round > 1e-12; ++i, round *= below * base) sum += round * (1 - below);
+    return sum;
 }
 
 }  // namespace crt::verify

@@ -40,6 +40,20 @@ double fresnelDielectric(double cos_incidence, double eta);
 /// loses light: even of a perfect metal it is below 1.
 double roughConductorAlbedo(double cosine, double n, double k, double roughness);
 
+/// Of light from everywhere, the shares that rough glass sends towards a view at `cosine`; eta is the index
+/// beyond over the index on the side of the view. Microfacets as of roughConductorAlbedo, each of which
+/// reflects what Fresnel's equations say and refracts the rest by Snell's law about its normal.
+struct ScatteredShares {
+    double reflected, transmitted;
+};
+ScatteredShares roughDielectricShares(double cosine, double eta, double roughness);
+
+/// Of light from everywhere, the share that a diffuse base of albedo `base` under a coat of index `eta`
+/// sends towards a view at `cosine`: the coat's once-mirrored light, and of the rest all rounds between base
+/// and coat as a geometric series. What the coat sends back from below follows from what it lets in: diffuse
+/// light through it is η² times as much one way as the other.
+double plasticAlbedo(double cosine, double base, double eta, double roughness);
+
 /// Planck's law in W·m⁻³·sr⁻¹ (CODATA 2018, exact constants).
 double planck_W_m3_sr(double wavelength_nm, double temperature_K);
 

@@ -61,6 +61,20 @@ std::vector<Variant> variants(int resolution) {
                 material.roughness = 0.3;
             }
     });
+    add("rough dispersive gem, absorbing; pane; plastic", [](Scene& s) {
+        for (Material& material : s.materials)
+            if (material.type == MaterialType::Dielectric) {
+                const bool gem = !material.eta.isConstant();
+                material.type = gem ? MaterialType::RoughDielectric : MaterialType::ThinDielectric;
+                material.roughness = gem ? 0.4 : 0;
+                if (gem) material.absorption = flint();
+            } else if (material.type == MaterialType::Conductor) {
+                material.type = MaterialType::Plastic;
+                material.reflectance = constantSpectrum(0.6);
+                material.eta = constantSpectrum(1.5);
+                material.roughness = 0.3;
+            }
+    });
     add("boxes of objects, xorshift, Blackman-Harris filter, no light sampling", [](Scene& s) {
         s.integrator.accelerator = Accelerator::Aabb;
         s.integrator.nee = false;

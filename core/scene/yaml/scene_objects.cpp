@@ -141,7 +141,19 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
             take("k", SpectrumUse::Index, material.k);
             break;
         }
-        case MaterialType::Dielectric: take("ior", SpectrumUse::Index, material.eta); break;
+        case MaterialType::RoughDielectric: section->read("roughness", material.roughness); [[fallthrough]];
+        case MaterialType::Dielectric:
+            material.absorption = spectra_.read(*section, "absorption", SpectrumUse::Absorption);
+            [[fallthrough]];
+        case MaterialType::ThinDielectric: take("ior", SpectrumUse::Index, material.eta); break;
+        case MaterialType::Plastic: {
+            double ior = 1.5;
+            section->read("ior", ior);
+            section->read("roughness", material.roughness);
+            material.eta = constantSpectrum(ior);
+            take("reflectance", SpectrumUse::Reflectance, material.reflectance);
+            break;
+        }
     }
     named.index = static_cast<std::int32_t>(scene_.materials.size());
     scene_.materials.push_back(std::move(material));

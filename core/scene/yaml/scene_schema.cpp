@@ -508,6 +508,57 @@ void addSpectra(std::vector<SectionSchema>& all) {
                    {{.name = "ref", .required = true, .doc = "A name in `spectra`."}, scaleKey()}});
 }
 
+/// `fallback` empty: it must be given.
+KeySchema roughnessKey(const char* smooth, const char* fallback = "") {
+    return {.name = "roughness",
+            .kind = Kind::Number,
+            .range = {.min = 0, .max = 1},
+            .fallback = fallback,
+            .required = *fallback == '\0',
+            .doc = fmt::format("0 is {}, 1 the roughest. The square root of GGX's width α; below 0.03 it "
+                               "is taken for 0.",
+                               smooth)};
+}
+
+void addDielectrics(std::vector<SectionSchema>& all) {
+    const auto index = [](const char* doc) {
+        return KeySchema{.name = "ior",
+                         .kind = Kind::Spectrum,
+                         .range = {.min = 1e-3, .max = 1e3},
+                         .required = true,
+                         .doc = doc};
+    };
+    const KeySchema ior = index(
+        "Refractive index of the inside relative to the outside; inside is where normals point away from.");
+    const KeySchema absorption{
+        .name = "absorption",
+        .kind = Kind::Spectrum,
+        .range = {.min = 0, .max = kMostRadiance},
+        .unit = "1/scene unit",
+        .doc = "Absorption coefficient of the inside, by the Beer–Lambert law: over a distance d the "
+               "share exp(−absorption · d) is left. The mesh must be closed. Of bodies inside one another, "
+               "the one counts that light entered last; what is around bodies absorbs nothing. 0 where it "
+               "is not given."};
+    all.push_back({"material/dielectric",
+                   "a dielectric material",
+                   "Smooth glass or water: reflects and refracts, and may absorb.",
+                   {typeKey("dielectric"), ior, absorption}});
+    all.push_back({"material/rough_dielectric",
+                   "a rough_dielectric material",
+                   "Frosted glass: microfacets as of `rough_conductor`, each of which reflects and "
+                   "refracts. Light that meets the surface twice at once is left out. Where it would blur "
+                   "what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), it is taken for "
+                   "smooth.",
+                   {typeKey("rough_dielectric"), ior, roughnessKey("smooth"), absorption}});
+    all.push_back({"material/thin_dielectric",
+                   "a thin_dielectric material",
+                   "A window pane made of one sheet of faces: two parallel surfaces, between which light "
+                   "is reflected to and fro. What passes is not bent. As behind all glass, lamps light "
+                   "what is behind it by the paths that happen to meet them: shadow rays do not pass.",
+                   {typeKey("thin_dielectric"), index("Refractive index of the pane relative to what is "
+                                                      "around it.")}});
+}
+
 void addMaterials(std::vector<SectionSchema>& all) {
     const KeySchema reflectance{.name = "reflectance",
                                 .kind = Kind::Spectrum,
@@ -541,24 +592,21 @@ void addMaterials(std::vector<SectionSchema>& all) {
                    "A rough metal: microfacets of GGX's distribution, shadowed as Smith's heights "
                    "are. Light that meets it twice is left out, up to two thirds of it where it is "
                    "roughest. Give `metal`, or `eta` with `k`.",
-                   {typeKey("rough_conductor"), metal, eta, k,
-                    {.name = "roughness",
-                     .kind = Kind::Number,
-                     .range = {.min = 0, .max = 1},
-                     .required = true,
-                     .doc = "0 is a mirror, 1 the roughest. The square root of GGX's width α; below "
-                            "0.03 it is taken for 0."}},
+                   {typeKey("rough_conductor"), metal, eta, k, roughnessKey("a mirror")},
                    metal_or_index});
-    all.push_back({"material/dielectric",
-                   "a dielectric material",
-                   "Smooth glass or water: reflects and refracts.",
-                   {typeKey("dielectric"),
+    addDielectrics(all);
+    all.push_back({"material/plastic",
+                   "a plastic material",
+                   "Diffuse under a clear coat, as plastics, varnished wood and glazed tiles are. What the "
+                   "coat lets in is scattered below it, and what the coat sends back from below is "
+                   "scattered again, which makes colours deeper; a white base sends all light back. The "
+                   "model is that of Mitsuba's `roughplastic` with `nonlinear`.",
+                   {typeKey("plastic"), reflectance, roughnessKey("a polished coat", "0"),
                     {.name = "ior",
-                     .kind = Kind::Spectrum,
-                     .range = {.min = 1e-3, .max = 1e3},
-                     .required = true,
-                     .doc = "Refractive index of the inside relative to the outside; inside is where "
-                            "normals point away from."}}});
+                     .kind = Kind::Number,
+                     .range = {.min = 1, .max = 10},
+                     .fallback = "1.5",
+                     .doc = "Refractive index of the coat. 1: none, Lambert's law."}}});
 }
 
 void addObjects(std::vector<SectionSchema>& all) {

@@ -249,6 +249,11 @@ std::optional<Spectrum> SpectrumReader::rgb(const SectionReader& form, SpectrumU
         return std::nullopt;
     }
     const double brightest = *std::max_element(color.begin(), color.end());
+    if (brightest > 1 && use == SpectrumUse::Absorption) {
+        form.error("rgb", fmt::format("a component of this absorption is {}, beyond 1", brightest),
+                   "divide all three, and say by how much in 'scale'");
+        return std::nullopt;
+    }
     if (brightest > 1 && (!linear || use == SpectrumUse::Reflectance)) {
         form.error("rgb",
                    fmt::format("a component of this colour is {}; {}", brightest,
@@ -260,7 +265,7 @@ std::optional<Spectrum> SpectrumReader::rgb(const SectionReader& form, SpectrumU
     if (!linear)
         for (double& component : color) component = srgbToLinear(component);
     // Found by a fit, a third of a millisecond each; palettes repeat their colours.
-    const bool reflects = use == SpectrumUse::Reflectance;
+    const bool reflects = use == SpectrumUse::Reflectance || use == SpectrumUse::Absorption;
     const auto known = colors_.find({color, reflects});
     if (known != colors_.end()) return known->second;
     return colors_[{color, reflects}] = reflects ? rgbReflectance(color) : rgbEmission(color);

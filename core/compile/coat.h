@@ -1,0 +1,34 @@
+/// The clear coats of plastics: what they reflect from above and from below, worked out before rendering.
+#pragma once
+
+#include "scene/scene.h"
+
+#include <map>
+#include <utility>
+#include <vector>
+
+namespace crt {
+
+struct Coat {
+    /// Share of light from one direction that the coat reflects, at cosines in steps of 1/470: a table of as
+    /// many values as a spectrum has. Constant 0 for a smooth coat, which the kernel asks Fresnel about.
+    Spectrum albedo;
+    /// Share of diffuse light from below that it sends back.
+    double internal_reflectance = 0;
+};
+
+/// By index and roughness.
+using Coats = std::map<std::pair<double, double>, Coat>;
+
+const Coat& coatOf(const Coats& coats, const Material& plastic);
+
+/// Those of all plastics among the materials, each worked out once. Null materials are skipped.
+Coats coatsOf(const std::vector<const Material*>& materials);
+
+/// E(θ): the share that GGX microfacets of width `alpha` on an interface of relative index `eta` mirror once
+/// of light from one direction, Smith's shadowing correlated by height (Heitz 2014). Midpoint rule over the
+/// visible normals by spherical caps (Dupuy and Benyoub 2023); error below 3e-4
+/// (tests/unit_bsdf.cpp).
+double coatAlbedo(double cosine, double eta, double alpha);
+
+}  // namespace crt
