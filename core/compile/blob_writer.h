@@ -45,6 +45,12 @@ public:
         return {static_cast<std::uint32_t>(offset / 16), static_cast<std::uint32_t>(count)};
     }
 
+    /// What was appended, to fill it in when nothing will be appended any more.
+    template <class T>
+    std::span<T> items(const kernel::CrtSpan& span) {
+        return {reinterpret_cast<T*>(bytes() + std::size_t{span.offset} * 16), span.count};
+    }
+
     std::vector<CompiledScene::Line> finish(const kernel::CrtScene& header) {
         std::memcpy(bytes(), &header, sizeof(header));
         return std::move(lines_);

@@ -27,7 +27,9 @@ bool isKnown(const FlatTriangle& triangle, std::size_t scene_materials) {
 std::vector<const Spectrum*> spectraOf(const Material& material) {
     switch (material.type) {
         case MaterialType::Diffuse:
-        case MaterialType::Mirror: return {&material.reflectance};
+        case MaterialType::Mirror:
+            if (material.reflectance_texture != kNoTexture) return {};
+            return {&material.reflectance};
         case MaterialType::Conductor:
         case MaterialType::RoughConductor: return {&material.eta, &material.k};
         case MaterialType::Dielectric: return {&material.eta};
@@ -35,13 +37,22 @@ std::vector<const Spectrum*> spectraOf(const Material& material) {
     return {};
 }
 
-kernel::CrtMaterial recordOf(const Material& material, const SpectrumTable& spectra) {
+kernel::CrtMaterial recordOf(const Material& material, const SpectrumTable& spectra,
+                             const TexturePart& textures) {
     kernel::CrtMaterial record{};
     record.type = static_cast<std::uint32_t>(material.type);
     switch (material.type) {
         case MaterialType::Diffuse:
-        case MaterialType::Mirror: record.reflectance = spectra.valueOf(material.reflectance); break;
-        case MaterialType::RoughConductor: record.roughness = valueOf(material.roughness); [[fallthrough]];
+        case MaterialType::Mirror:
+            record.reflectance = material.reflectance_texture != kNoTexture
+                                     ? textures.valueOf(material.reflectance_texture)
+                                     : spectra.valueOf(material.reflectance);
+            break;
+        case MaterialType::RoughConductor:
+            record.roughness = material.roughness_texture != kNoTexture
+                                   ? textures.valueOf(material.roughness_texture)
+                                   : valueOf(material.roughness);
+            [[fallthrough]];
         case MaterialType::Conductor:
             record.eta = spectra.valueOf(material.eta);
             record.k = spectra.valueOf(material.k);
@@ -76,10 +87,11 @@ std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material
     return all;
 }
 
-MaterialPart compileMaterials(const std::vector<const Material*>& materials, const SpectrumTable& spectra) {
+MaterialPart compileMaterials(const std::vector<const Material*>& materials, const SpectrumTable& spectra,
+                              const TexturePart& textures) {
     MaterialPart part;
     for (const Material* material : materials) {
-        part.records.push_back(material ? recordOf(*material, spectra) : kernel::CrtMaterial{});
+        part.records.push_back(material ? recordOf(*material, spectra, textures) : kernel::CrtMaterial{});
         if (!material) continue;
         const kernel::CrtMaterial& record = part.records.back();
         part.features |= 1u << record.type;

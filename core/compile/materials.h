@@ -3,6 +3,7 @@
 
 #include "compile/flatten.h"
 #include "compile/spectrum_table.h"
+#include "compile/textures.h"
 #include "kernel/layout.h"
 #include "scene/scene.h"
 
@@ -24,7 +25,8 @@ struct MaterialPart {
     std::vector<kernel::CrtMaterial> records;
     std::uint32_t features = 0;  ///< Of the materials that are used.
 };
-MaterialPart compileMaterials(const std::vector<const Material*>& materials, const SpectrumTable& spectra);
+MaterialPart compileMaterials(const std::vector<const Material*>& materials, const SpectrumTable& spectra,
+                              const TexturePart& textures);
 
 /// Fills in one a triangle, by primitive id. `light_of` as of LightPart.
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,

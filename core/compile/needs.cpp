@@ -45,6 +45,7 @@ std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(header.environment != CRT_NONE, CRT_FEATURE_ENVIRONMENT);
     need((f & CRT_FEATURE_NEE) != 0 && samples_environment, CRT_FEATURE_ENVIRONMENT_LIGHT);
     need(header.spectra.count > 0, CRT_FEATURE_TABLE);
+    need(header.textures.count > 0, CRT_FEATURE_TEXTURE);
     need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
     need(header.filter.count > 0, CRT_FEATURE_FILTER);
     need(!isPath(scene), CRT_FEATURE_VIEW);
@@ -73,6 +74,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     CRT_MATERIAL_LIST(CRT_LEFT_OUT_MATERIAL, )
 #undef CRT_LEFT_OUT_MATERIAL
     if (!has(CRT_FEATURE_TABLE)) left_out("tables of spectra", "all values are the same at all wavelengths");
+    if (!has(CRT_FEATURE_TEXTURE)) left_out("textures", "no value depends on the place");
     if (!has(CRT_FEATURE_DISPERSION))
         left_out("hero wavelength selection", "no index of refraction depends on wavelength");
     if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");

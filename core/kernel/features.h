@@ -42,7 +42,8 @@
     F(17, AOV, "albedo, normal, depth and primitive outputs")                                \
     F(18, REPLICATES, "independent replicates, from which the image knows its error")        \
     F(20, TABLE, "values tabulated by wavelength")                                           \
-    F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")
+    F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
+    F(27, TEXTURE, "values that depend on the place: images, checkers, colours of vertices")
 
 #define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,
 enum CrtFeature { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) CRT_FEATURE_END };

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "kernel/features.h"
 #include "scene/aov.h"
+#include "scene/texture.h"
 #include "spectra/spectra.h"
 
 #include <array>
@@ -98,6 +99,8 @@ struct Material {
     Spectrum eta;  ///< Conductors: real index n. Dielectric: index of the inside relative to the outside.
     Spectrum k;            ///< Conductors: extinction.
     double roughness = 0;  ///< RoughConductor. In [0,1].
+    TextureIndex reflectance_texture = kNoTexture;  ///< In place of the reflectance.
+    TextureIndex roughness_texture = kNoTexture;    ///< In place of the roughness.
     SourcePlace place;
 };
 
@@ -108,11 +111,17 @@ struct Mesh {
     std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Indices into positions.
     std::vector<std::array<std::uint32_t, 3>>
         normal_index;                    ///< Empty, or one per triangle; kNoNormal = flat.
+    /// Texture coordinates, v up; empty, or referenced by `uv_index`.
+    std::vector<std::array<double, 2>> uvs;
+    std::vector<std::array<std::uint32_t, 3>> uv_index;  ///< Empty, or one per triangle; kNoUv = none.
+    /// Linear sRGB in [0, 1], as of `positions`; or empty.
+    std::vector<std::array<float, 3>> colors;
     std::vector<std::int32_t> material;  ///< Empty, or one index into Scene::materials per triangle.
     std::vector<std::int32_t>
         emission;  ///< Empty, or one index into Scene::emissions per triangle, −1 none.
 };
 inline constexpr std::uint32_t kNoNormal = 0xffffffffu;
+inline constexpr std::uint32_t kNoUv = 0xffffffffu;
 
 struct Emission {
     Spectrum radiance;  ///< W·m⁻²·sr⁻¹·nm⁻¹
@@ -153,6 +162,7 @@ struct Scene {
     IntegratorSettings integrator;
     SamplerSettings sampler;
     std::vector<Material> materials;
+    std::vector<Texture> textures;  ///< Those of a checker before it.
     std::vector<Emission> emissions;
     std::vector<Mesh> meshes;
     std::vector<Object> objects;

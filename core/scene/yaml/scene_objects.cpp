@@ -85,8 +85,14 @@ std::optional<std::vector<Vec3d>> readPoints(const SectionReader& mesh, std::str
 
 }  // namespace
 
-ObjectReader::ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene)
-    : out_(out), files_(files), spectra_(spectra), scene_(scene), limit_(scene.input_bytes) {}
+ObjectReader::ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra,
+                           TextureReader& textures, Scene& scene)
+    : out_(out),
+      files_(files),
+      spectra_(spectra),
+      textures_(textures),
+      scene_(scene),
+      limit_(scene.input_bytes) {}
 
 ObjectReader::~ObjectReader() = default;
 
@@ -130,9 +136,19 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror:
-            take("reflectance", SpectrumUse::Reflectance, material.reflectance);
+            if (TextureReader::isTexture(*section, "reflectance"))
+                material.reflectance_texture =
+                    textures_.read(*section, "reflectance", TexelKind::Spectra).value_or(kNoTexture);
+            else
+                take("reflectance", SpectrumUse::Reflectance, material.reflectance);
             break;
-        case MaterialType::RoughConductor: section->read("roughness", material.roughness); [[fallthrough]];
+        case MaterialType::RoughConductor:
+            if (TextureReader::isTexture(*section, "roughness"))
+                material.roughness_texture =
+                    textures_.read(*section, "roughness", TexelKind::Numbers).value_or(kNoTexture);
+            else
+                section->read("roughness", material.roughness);
+            [[fallthrough]];
         case MaterialType::Conductor: {
             std::string metal;
             if (section->readWord("metal", metal))
@@ -284,6 +300,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
                            fmt::format("normal {} has length 0", i));
         mesh.normals = *std::move(normals);
     }
+    readAttributes(section, mesh);
     if (faces->items.empty()) section.error("faces", "a mesh without faces cannot be seen");
 
     const KeySchema& row = *section.schema().find("faces");
@@ -341,6 +358,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
                    dropped, section.subject());
     }
     if (!mesh.normals.empty()) mesh.normal_index = mesh.triangles;
+    if (!mesh.uvs.empty()) mesh.uv_index = mesh.triangles;
     scene_.meshes.push_back(std::move(mesh));
     return static_cast<std::uint32_t>(scene_.meshes.size() - 1);
 }
@@ -394,6 +412,7 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
         scene_.emissions.push_back(std::move(emission));
     }
     object.mesh = mesh.value_or(0);
+    if (mesh) checkTextures(section, object);
     scene_.objects.push_back(std::move(object));
 }
 

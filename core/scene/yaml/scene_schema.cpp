@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
+#include "scene/yaml/scene_schema_textures.h"
 
 #include <fmt/format.h>
 
@@ -505,6 +506,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
     const KeySchema reflectance{.name = "reflectance",
                                 .kind = Kind::Spectrum,
                                 .range = {0, 1, false, false},
+                                .section = "texture",
                                 .required = true,
                                 .doc = "Fraction of light sent back, at every wavelength."};
     all.push_back(
@@ -538,6 +540,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
                     {.name = "roughness",
                      .kind = Kind::Number,
                      .range = {.min = 0, .max = 1},
+                     .section = "texture",
                      .required = true,
                      .doc = "0 is a mirror, 1 the roughest. The square root of GGX's width α; below "
                             "0.03 it is taken for 0."}},
@@ -636,6 +639,27 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .count_min = 3,
                         .count_max = 3,
                         .doc = "One per vertex, for smooth shading."},
+                       {.name = "uvs",
+                        .kind = Kind::Number,
+                        .shape = Shape::Lists,
+                        .count_min = 2,
+                        .count_max = 2,
+                        .range = {-kMostUv, kMostUv, false, false},
+                        .doc = "Texture coordinates [u, v], one per vertex: (0, 0) is the lower left corner "
+                               "of an image, (1, 1) the upper right."},
+                       {.name = "colors",
+                        .kind = Kind::Number,
+                        .shape = Shape::Lists,
+                        .count_min = 3,
+                        .count_max = 3,
+                        .range = {0, 1, false, false},
+                        .doc = "Reflectances [r, g, b] with sRGB primaries, one per vertex, for "
+                               "`{attribute: colors}`."},
+                       {.name = "color_space",
+                        .kind = Kind::Choice,
+                        .choices = {"srgb", "linear"},
+                        .fallback = "srgb",
+                        .doc = "Are `colors` sRGB-encoded or linear?"},
                    }});
     all.push_back({"transform/translate",
                    "a translation",
@@ -757,6 +781,7 @@ const std::vector<SectionSchema>& sceneSchema() {
     static const std::vector<SectionSchema> schema = [] {
         std::vector<SectionSchema> all{topLevel(), camera(), film(), filter(), integrator(), sampler()};
         addSpectra(all);
+        addTextures(all);
         addMaterials(all);
         addObjects(all);
         addOutside(all);
