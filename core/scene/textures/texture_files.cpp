@@ -10,8 +10,11 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <mutex>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -34,26 +37,94 @@ Code codeAt(const std::vector<unsigned char>& bytes, std::size_t i) {
     return code;
 }
 
-/// Colours of 8 or 16 bits. The table of coefficients is asked once for neighbours that are equal.
-template <class Code>
-void encodeCodes(const Texels& texels, const std::vector<float>& linear, std::span<std::uint16_t> words) {
-    const SigmoidTable& table = SigmoidTable::get();
+std::array<std::uint16_t, 3> texelOfCodes(const SigmoidTable& table, const std::vector<float>& linear,
+                                          const std::vector<SigmoidTable::Level>& levels,
+                                          const std::array<std::uint32_t, 3>& codes) {
+    const std::array<float, 3> color{linear[codes[0]], linear[codes[1]], linear[codes[2]]};
+    const std::size_t channel = largestOf(color);
+    return texelOf(table.coefficients(color, channel, levels[codes[channel]]));
+}
+
+std::vector<SigmoidTable::Level> levelsOf(const std::vector<float>& linear) {
     std::vector<SigmoidTable::Level> levels;
     for (const float value : linear) levels.push_back(SigmoidTable::level(value));
+    return levels;
+}
+
+/// The texels of all colours of 8 bits, each made when it is first asked for. 128 MB of address space, of
+/// which what images do not touch takes no memory; neighbouring colours lie close to each other, as their
+/// texels do in photographs. Shared by the images that are decoded at the same time. [any thread]
+class ByteColors {
+public:
+    static std::shared_ptr<ByteColors> get(TexelColor color) {
+        static std::mutex mutex;
+        static std::array<std::weak_ptr<ByteColors>, 2> known;
+        const std::scoped_lock lock(mutex);
+        std::weak_ptr<ByteColors>& weak = known[color == TexelColor::Linear];
+        std::shared_ptr<ByteColors> colors = weak.lock();
+        if (!colors) weak = colors = std::make_shared<ByteColors>(color);
+        return colors;
+    }
+
+    explicit ByteColors(TexelColor color)
+        : linear_(linearOfCodes(TexelType::Uint8, color)),
+          levels_(levelsOf(linear_)),
+          texels_(static_cast<std::uint64_t*>(std::calloc(std::size_t{1} << 24, sizeof(std::uint64_t)))) {
+        if (!texels_) throw std::bad_alloc();
+        for (std::size_t i = 0; i < 256; ++i)
+            for (std::size_t bit = 0; bit < 8; ++bit)
+                spread_[i] |= static_cast<std::uint32_t>(i >> bit & 1) << 3 * bit;
+    }
+
+    /// Three words, the first lowest; above them a mark.
+    std::uint64_t texel(std::uint8_t r, std::uint8_t g, std::uint8_t b) const {
+        const std::size_t i = spread_[r] << 2 | spread_[g] << 1 | spread_[b];
+        const std::atomic_ref<std::uint64_t> known(texels_.get()[i]);
+        std::uint64_t texel = known.load(std::memory_order_relaxed);
+        if (texel != 0) return texel;
+        const std::array<std::uint16_t, 3> words = texelOfCodes(table_, linear_, levels_, {r, g, b});
+        texel = words[0] | std::uint64_t{words[1]} << 16 | std::uint64_t{words[2]} << 32 |
+                std::uint64_t{1} << 63;
+        known.store(texel, std::memory_order_relaxed);  // Others make the same of it.
+        return texel;
+    }
+
+private:
+    struct Free {
+        void operator()(std::uint64_t* memory) const { std::free(memory); }
+    };
+    const SigmoidTable& table_ = SigmoidTable::get();
+    std::vector<float> linear_;
+    std::vector<SigmoidTable::Level> levels_;
+    std::array<std::uint32_t, 256> spread_{};
+    std::unique_ptr<std::uint64_t, Free> texels_;
+};
+
+void encodeBytes(const Texels& texels, TexelColor color, std::span<std::uint16_t> words) {
+    const std::shared_ptr<ByteColors> colors = ByteColors::get(color);
     const std::size_t channels = texels.info.channels;
     parallelFor(texels.info.count(), kPart, [&](std::size_t first, std::size_t end) {
-        std::array<Code, 3> before{};
-        std::array<std::uint16_t, 3> texel{};
+        const std::size_t g = channels == 3 ? 1 : 0, b = channels == 3 ? 2 : 0;
         for (std::size_t i = first; i < end; ++i) {
-            std::array<Code, 3> codes;
+            const unsigned char* const code = &texels.bytes[i * channels];
+            const std::uint64_t texel = colors->texel(code[0], code[g], code[b]);
             for (std::size_t k = 0; k < 3; ++k)
-                codes[k] = codeAt<Code>(texels.bytes, i * channels + (channels == 3 ? k : 0));
-            if (i == first || codes != before) {
-                const std::array<float, 3> color{linear[codes[0]], linear[codes[1]], linear[codes[2]]};
-                const std::size_t channel = largestOf(color);
-                texel = texelOf(table.coefficients(color, channel, levels[codes[channel]]));
-                before = codes;
-            }
+                words[3 * i + k] = static_cast<std::uint16_t>(texel >> 16 * k);
+        }
+    });
+}
+
+void encodeShorts(const Texels& texels, TexelColor color, std::span<std::uint16_t> words) {
+    const SigmoidTable& table = SigmoidTable::get();
+    const std::vector<float> linear = linearOfCodes(texels.info.type, color);
+    const std::vector<SigmoidTable::Level> levels = levelsOf(linear);
+    const std::size_t channels = texels.info.channels;
+    parallelFor(texels.info.count(), kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) {
+            std::array<std::uint32_t, 3> codes;
+            for (std::size_t k = 0; k < 3; ++k)
+                codes[k] = codeAt<std::uint16_t>(texels.bytes, i * channels + (channels == 3 ? k : 0));
+            const std::array<std::uint16_t, 3> texel = texelOfCodes(table, linear, levels, codes);
             std::copy(texel.begin(), texel.end(), &words[3 * i]);
         }
     });
@@ -106,10 +177,9 @@ void encodeFloats(const Texels& texels, TexelColor color, const std::string& pat
 
 void encodeSpectra(const Texels& texels, TexelColor color, const std::string& path,
                    std::span<std::uint16_t> words) {
-    const std::vector<float> linear = linearOfCodes(texels.info.type, color);
     switch (texels.info.type) {
-        case TexelType::Uint8: return encodeCodes<std::uint8_t>(texels, linear, words);
-        case TexelType::Uint16: return encodeCodes<std::uint16_t>(texels, linear, words);
+        case TexelType::Uint8: return encodeBytes(texels, color, words);
+        case TexelType::Uint16: return encodeShorts(texels, color, words);
         case TexelType::Float: return encodeFloats(texels, color, path, words);
     }
 }
