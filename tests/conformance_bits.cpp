@@ -17,6 +17,8 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <memory>
+#include <span>
 #include <sstream>
 
 using namespace conformance;
@@ -117,6 +119,7 @@ struct Case {
     bool sampled_environment = false;
     const char* more = "";  // Further top-level lines.
     bool glassware = false;
+    bool textured = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -125,6 +128,72 @@ const char* const kPointLights = R"(lights:
   - {type: directional, direction: [0.2, -1, 0.3], irradiance: {blackbody: 4000}}
   - {type: sun, direction: [0.3, -1, 0.1], angular_diameter_deg: 10, radiance: 40}
 )";
+
+/// Of random words, made anew for each compilation: any texel is a value.
+std::shared_ptr<const crt::TextureImage> randomImage(std::uint32_t width, std::uint32_t height,
+                                                     crt::TexelKind kind) {
+    auto image = std::make_shared<crt::TextureImage>();
+    image->file = "random";
+    image->width = width;
+    image->height = height;
+    image->kind = kind;
+    image->decode = [](std::span<std::uint16_t> words) {
+        std::uint64_t state = 1;
+        for (std::uint16_t& word : words) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            word = static_cast<std::uint16_t>(state >> 40);
+        }
+    };
+    return image;
+}
+
+/// Every kind of texture, filter and wrap.
+void addTextures(crt::Scene& scene) {
+    using crt::Texture;
+    const auto put = [&](const char* material, bool roughness, Texture texture) {
+        scene.textures.push_back(std::move(texture));
+        const auto index = static_cast<crt::TextureIndex>(scene.textures.size() - 1);
+        for (crt::Material& m : scene.materials)
+            if (m.name == material) (roughness ? m.roughness_texture : m.reflectance_texture) = index;
+        return index;
+    };
+    Texture mirrored;
+    mirrored.image = randomImage(7, 5, crt::TexelKind::Spectra);
+    mirrored.wrap = crt::TextureWrap::Mirror;
+    mirrored.transform = {2.5, 0.25, -0.5, -0.5, 3, 0.125};
+    Texture clamped = mirrored;
+    clamped.wrap = crt::TextureWrap::Clamp;
+    Texture nearest = mirrored;
+    nearest.wrap = crt::TextureWrap::Repeat;
+    nearest.filter = crt::TextureFilter::Nearest;
+    Texture checker;
+    checker.kind = Texture::Kind::Checker;
+    checker.transform = {8, 0, -3.5, 0, 8, 0};
+    checker.values[0].texture = put("", false, nearest);
+    checker.values[1].spectrum = scene.materials[1].reflectance;  // a table
+    put("white", false, mirrored);
+    put("red", false, checker);
+    put("mirror", false, clamped);
+    Texture rough;
+    rough.image = randomImage(16, 3, crt::TexelKind::Numbers);
+    put("copper", true, rough);
+    Texture vertices;
+    vertices.kind = Texture::Kind::VertexColors;
+    crt::Material coloured;
+    coloured.name = "coloured";
+    scene.materials.push_back(coloured);
+    put("coloured", false, vertices);
+    for (crt::Object& object : scene.objects)
+        if (object.name == "strip") object.material = static_cast<std::int32_t>(scene.materials.size() - 1);
+    for (crt::Mesh& mesh : scene.meshes) {
+        for (const crt::Vec3d& p : mesh.positions) {
+            mesh.uvs.push_back({p[0] + 0.3 * p[1], p[2] - 0.7 * p[1]});
+            mesh.colors.push_back({static_cast<float>(0.1 + 0.8 * p[0]), 0.4f,
+                                   static_cast<float>(0.9 - 0.8 * p[2])});
+        }
+        mesh.uv_index = mesh.triangles;
+    }
+}
 
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
@@ -141,6 +210,8 @@ const Case kCases[] = {
     {"{max_depth: 4, accelerator: bvh, mis: false}", "{type: independent}", "", "box", false, kPointLights},
     {"{max_depth: 12}", "{type: sobol}", "", "box", false, "", true},
     {"{max_depth: 8, accelerator: bvh}", "{type: xorshift}", "", "box", true, "", true},
+    {"{max_depth: 6}", "{type: sobol}", "", "box", false, "", false, true},
+    {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", false, "", false, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -177,6 +248,7 @@ crt::Scene sceneOf(const Case& c) {
     crt::Scene scene =
         sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter, c.glassware) + c.more);
     scene.environment->light_sampling = c.sampled_environment;
+    if (c.textured) addTextures(scene);
     return scene;
 }
 
@@ -191,7 +263,9 @@ std::vector<Named> allScenes() {
                                  "point lights",
                                  "point lights, tree, independent, light sampling alone",
                                  "glassware",
-                                 "glassware, tree, xorshift, sampled environment"};
+                                 "glassware, tree, xorshift, sampled environment",
+                                 "textures",
+                                 "textures, tree, independent"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

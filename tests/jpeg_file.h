@@ -9,10 +9,10 @@
 
 #include <jpeglib.h>
 
-/// `codes` row-major, `channels` (1, 3 or 4: CMYK) a pixel, with the best quality and colours of full
+/// `codes` row-major, `channels` (1, 3 or 4: CMYK) a pixel. With the best quality, colours have the full
 /// resolution.
 inline void writeJpeg(const std::string& path, unsigned width, unsigned height, int channels,
-                      const std::vector<std::uint8_t>& codes, bool progressive = false) {
+                      const std::vector<std::uint8_t>& codes, bool progressive = false, int quality = 100) {
     std::FILE* const file = std::fopen(path.c_str(), "wb");
     if (file == nullptr) throw std::runtime_error("cannot write " + path);
     jpeg_compress_struct codec{};
@@ -25,8 +25,8 @@ inline void writeJpeg(const std::string& path, unsigned width, unsigned height, 
     codec.input_components = channels;
     codec.in_color_space = channels == 1 ? JCS_GRAYSCALE : channels == 3 ? JCS_RGB : JCS_CMYK;
     jpeg_set_defaults(&codec);
-    jpeg_set_quality(&codec, 100, TRUE);
-    for (int c = 0; c < channels; ++c)
+    jpeg_set_quality(&codec, quality, TRUE);
+    for (int c = 0; quality == 100 && c < channels; ++c)
         codec.comp_info[c].h_samp_factor = codec.comp_info[c].v_samp_factor = 1;
     if (progressive) jpeg_simple_progression(&codec);
     jpeg_start_compress(&codec, TRUE);

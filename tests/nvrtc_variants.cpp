@@ -49,6 +49,7 @@ std::map<std::uint32_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_CONDUCTOR, "a mesh of metal"},
         {mesh | CRT_FEATURE_ROUGH_CONDUCTOR, "a mesh of rough metal"},
         {mesh | CRT_FEATURE_DIELECTRIC, "a mesh of glass"},
+        {mesh | CRT_FEATURE_TEXTURE, "a mesh with textures"},
         {mesh | glass, "a mesh of dispersive glass"},
         {mesh | CRT_FEATURE_ROUGH_DIELECTRIC, "a mesh of rough glass"},
         {mesh | CRT_FEATURE_ROUGH_DIELECTRIC | CRT_FEATURE_DISPERSION, "a mesh of dispersive rough glass"},

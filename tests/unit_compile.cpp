@@ -152,6 +152,10 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     seen |= differs(CRT_FEATURE_MIRROR, 0, other(crt::MaterialType::Mirror));
     seen |= differs(CRT_FEATURE_CONDUCTOR, 0, other(crt::MaterialType::Conductor));
     seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR, 0, other(crt::MaterialType::RoughConductor));
+    seen |= differs(CRT_FEATURE_TEXTURE, 0, [](Scene& s) {
+        s.textures.emplace_back().kind = crt::Texture::Kind::Checker;
+        s.materials[0].reflectance_texture = 0;
+    });
     seen |= differs(CRT_FEATURE_DIELECTRIC, 0, other(crt::MaterialType::Dielectric));
     seen |= differs(CRT_FEATURE_ROUGH_DIELECTRIC, 0, other(crt::MaterialType::RoughDielectric));
     seen |= differs(CRT_FEATURE_THIN_DIELECTRIC, 0, other(crt::MaterialType::ThinDielectric));

@@ -62,7 +62,7 @@ TEST_CASE("every case of the suite says what is asked, what is expected and from
                                        {'E', 19},
                                        {'F', 10},
                                        {'G', 11},
-                                       {'H', 11},
+                                       {'H', 13},
                                        {'I', 14},
                                        {'J', 8},
                                        {'K', 6},

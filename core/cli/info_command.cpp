@@ -82,6 +82,13 @@ std::string materialsText(const Scene& scene) {
     return text.empty() ? "none" : text;
 }
 
+std::string texturesText(const CompiledScene& compiled) {
+    if ((compiled.features & CRT_FEATURE_TEXTURE) == 0) return "none";
+    if (compiled.images == 0) return "no images";
+    return fmt::format("{}, {} of texels", counted(compiled.images, "image", "images"),
+                       bytesText(static_cast<double>(compiled.texel_bytes)));
+}
+
 std::string lightsText(const Scene& scene, const CompiledScene& compiled) {
     std::string text;
     if (compiled.emitters > 0)
@@ -118,6 +125,7 @@ void showScene(const SceneRequest& what) {
     printRow("geometry", counted(compiled.objects, "object", "objects") + ", " +
                         counted(compiled.triangles, "triangle", "triangles"));
     printRow("materials", materialsText(scene));
+    printRow("textures", texturesText(compiled));
     printRow("lights", lightsText(scene, compiled));
     printRow("sampler", fmt::format("{}, seed {}, {} samples per pixel", name(scene.sampler.type),
                                scene.sampler.seed, scene.sampler.samples));

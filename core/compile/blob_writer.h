@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "compile/compile.h"
 #include "kernel/layout.h"
 
@@ -21,7 +22,17 @@ public:
     BlobWriter() { grow(sizeof(kernel::CrtScene)); }
 
     /// Room for so many bytes in all, so that hundreds of megabytes are not moved while they grow.
-    void reserve(std::size_t bytes) { lines_.reserve(linesFor(bytes)); }
+    /// Large ones are touched by all threads: the system's giving them takes longer than filling them.
+    void reserve(std::size_t bytes) {
+        lines_.reserve(linesFor(bytes));
+        constexpr std::size_t kPage = 4096, kPart = std::size_t{4} << 20;
+        auto* const first = reinterpret_cast<unsigned char*>(lines_.data() + lines_.size());
+        const std::size_t room = (lines_.capacity() - lines_.size()) * sizeof(Line);
+        if (room < 16 * kPart) return;
+        parallelFor(room, kPart, [first](std::size_t begin, std::size_t end) {
+            for (std::size_t at = begin; at < end; at += kPage) first[at] = 0;
+        });
+    }
 
     template <class T>
     kernel::CrtSpan append(std::span<const T> items) {
@@ -43,6 +54,12 @@ public:
         const std::size_t offset = room(count * sizeof(T));
         fill(std::span<T>(reinterpret_cast<T*>(bytes() + offset), count));
         return {static_cast<std::uint32_t>(offset / 16), static_cast<std::uint32_t>(count)};
+    }
+
+    /// What was appended, to fill it in when nothing will be appended any more.
+    template <class T>
+    std::span<T> items(const kernel::CrtSpan& span) {
+        return {reinterpret_cast<T*>(bytes() + std::size_t{span.offset} * 16), span.count};
     }
 
     std::vector<CompiledScene::Line> finish(const kernel::CrtScene& header) {

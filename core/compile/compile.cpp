@@ -15,6 +15,7 @@
 #include "compile/scene_identity.h"
 #include "compile/settings.h"
 #include "compile/spectrum_table.h"
+#include "compile/textures.h"
 #include "kernel/layout.h"
 
 #include <chrono>
@@ -29,13 +30,17 @@ std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelera
     return kTables + accelerator.nodes.size() * sizeof(kernel::CrtNode4) +
            flat.triangles.size() *
                (sizeof(kernel::CrtTriangle) + sizeof(kernel::CrtFace) + sizeof(kernel::CrtPrimitive)) +
-           flat.normals.size() * sizeof(kernel::CrtNormals);
+           flat.normals.size() * sizeof(kernel::CrtNormals) +
+           flat.uvs.size() * sizeof(kernel::CrtUvs) +
+           flat.colors.size() * sizeof(kernel::CrtVertexColors);
 }
 
 std::vector<const Spectrum*> spectraOf(const Scene& scene, const FlatScene& flat,
                                        const std::vector<std::uint32_t>& emitting,
-                                       const std::vector<const Material*>& materials, const Coats& coats) {
+                                       const std::vector<const Material*>& materials, const Coats& coats,
+                                       const std::vector<TextureIndex>& textures) {
     std::vector<const Spectrum*> all = spectraOfLights(scene, flat, emitting);
+    for (const Spectrum* spectrum : spectraOfTextures(scene, textures)) all.push_back(spectrum);
     for (const Spectrum* spectrum : spectraOfMaterials(materials, coats)) all.push_back(spectrum);
     if (const Spectrum* environment = spectrumOfEnvironment(scene)) all.push_back(environment);
     return all;
@@ -60,7 +65,9 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     BlobWriter blob;
 
     AcceleratorPart accelerator = compileAccelerator(scene, flat, options);
-    blob.reserve(expectedBytes(flat, accelerator));
+    const std::vector<const Material*> used = usedMaterials(scene, flat);
+    const std::vector<TextureIndex> textures = usedTextures(scene, used);
+    blob.reserve(expectedBytes(flat, accelerator) + texelBytes(scene, textures));
     header.accelerator = accelerator.kind;
     header.nodes = blob.append(accelerator.nodes);
     accelerator.nodes = {};  // nobody asks for them again, and they may be hundreds of megabytes
@@ -83,9 +90,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
         header.objects = blob.append(compileObjects(flat));
 
     const std::vector<std::uint32_t> emitting = emittingTriangles(scene, flat);
-    const std::vector<const Material*> used = usedMaterials(scene, flat);
     const Coats coats = coatsOf(used);
-    const SpectrumTable spectra(spectraOf(scene, flat, emitting, used, coats));
+    const SpectrumTable spectra(spectraOf(scene, flat, emitting, used, coats, textures));
 
     const LightPart lights = compileLights(scene, flat, emitting, accelerator, spectra);
     header.lights = blob.append(lights.lights);
@@ -98,7 +104,13 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     const Spectrum* environment = spectrumOfEnvironment(scene);
     header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
 
-    const MaterialPart materials = compileMaterials(used, coats, spectra);
+    TexturePart texture_part = compileTextures(scene, textures, spectra, blob);
+    header.textures = blob.append(texture_part.records);
+    if (header.textures.count > 0) {
+        header.uvs = blob.append(flat.uvs);
+        header.vertex_colors = blob.append(flat.colors);
+    }
+    const MaterialPart materials = compileMaterials(used, coats, spectra, texture_part);
     header.primitives = blob.appendFilled<kernel::CrtPrimitive>(count, [&](auto primitives) {
         compilePrimitives(flat, scene.materials.size(), lights.light_of, primitives);
     });
@@ -113,6 +125,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 
     header.features = featuresOf(scene, header, materials);
     warnOfUnseenLights(scene, header);
+    decodeTextures(texture_part, blob);  // into the blob, which does not move any more
 
     CompiledScene out;
     out.blob = blob.finish(header);
@@ -126,6 +139,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.emitters = lights.emitters;
     out.objects = flat.placements;
     out.nodes = header.nodes.count;
+    out.images = texture_part.images.size();
+    out.texel_bytes = texture_part.texel_bytes;
     out.scale_exponent = flat.scale_exponent;
     out.centre = flat.centre;
     out.without_nodes = accelerator.without_nodes;

@@ -6,6 +6,7 @@
 #include "base/stage.h"
 #include "base/vec3d.h"
 #include "scene/scene_limits.h"
+#include "spectra/sigmoid.h"
 
 #include <fmt/format.h>
 
@@ -88,6 +89,12 @@ std::vector<Placement> placementsOf(const Scene& scene) {
     return placements;
 }
 
+bool hasTexture(const Scene& scene, bool of_vertices) {
+    return std::any_of(scene.textures.begin(), scene.textures.end(), [&](const Texture& t) {
+        return (t.kind == Texture::Kind::VertexColors) == of_vertices;
+    });
+}
+
 struct Bounds {
     static constexpr double kInf = std::numeric_limits<double>::infinity();
     Vec3d lower{kInf, kInf, kInf}, upper{-kInf, -kInf, -kInf};
@@ -139,6 +146,8 @@ public:
           stage_("placing triangles", 2 * static_cast<double>(count)) {
         flat_.triangles.resize(count);
         flat_.positions.resize(count);
+        if (hasTexture(scene, false)) flat_.uvs.resize(count);
+        if (hasTexture(scene, true)) flat_.colors.resize(count);
         flat_.placements = static_cast<std::uint32_t>(placements_.size());
     }
 
@@ -216,9 +225,33 @@ private:
                 if (!isFinite(p) && !part.infinite) part.infinite = &placement;
                 part.bounds.add(p);
             }
+            if (!flat_.uvs.empty()) setUvs(placement, triangle, flat_.uvs[i]);
+            if (!flat_.colors.empty()) setColors(placement, triangle, flat_.colors[i]);
             t.smooth = placement.normals(triangle).has_value();
             part.normals += t.smooth;
         });
+    }
+
+    static void setUvs(const Placement& placement, std::size_t triangle, kernel::CrtUvs& uvs) {
+        const Mesh& mesh = *placement.mesh;
+        if (mesh.uv_index.empty()) return;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint32_t index = mesh.uv_index[triangle][placement.from(k)];
+            if (index == kNoUv) continue;
+            uvs.uv[k] = static_cast<float>(mesh.uvs[index][0]);
+            uvs.uv[3 + k] = static_cast<float>(mesh.uvs[index][1]);
+        }
+    }
+
+    static void setColors(const Placement& placement, std::size_t triangle,
+                          kernel::CrtVertexColors& colors) {
+        const Mesh& mesh = *placement.mesh;
+        if (mesh.colors.empty()) return;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const SigmoidCoefficients c =
+                sigmoidCoefficients(mesh.colors[mesh.triangles[triangle][placement.from(k)]]);
+            std::copy(c.begin(), c.end(), &colors.c[3 * k]);
+        }
     }
 
     void placeNormals() {

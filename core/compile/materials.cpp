@@ -27,7 +27,9 @@ bool isKnown(const FlatTriangle& triangle, std::size_t scene_materials) {
 std::vector<const Spectrum*> spectraOf(const Material& material, const Coats& coats) {
     switch (material.type) {
         case MaterialType::Diffuse:
-        case MaterialType::Mirror: return {&material.reflectance};
+        case MaterialType::Mirror:
+            if (material.reflectance_texture != kNoTexture) return {};
+            return {&material.reflectance};
         case MaterialType::Conductor:
         case MaterialType::RoughConductor: return {&material.eta, &material.k};
         case MaterialType::Dielectric:
@@ -36,23 +38,34 @@ std::vector<const Spectrum*> spectraOf(const Material& material, const Coats& co
             return {&material.eta};
         case MaterialType::ThinDielectric: return {&material.eta};
         case MaterialType::Plastic:
+            if (material.reflectance_texture != kNoTexture)
+                return {&material.eta, &coatOf(coats, material).albedo};
             return {&material.reflectance, &material.eta, &coatOf(coats, material).albedo};
     }
     return {};
 }
 
-kernel::CrtMaterial recordOf(const Material& material, const Coats& coats, const SpectrumTable& spectra) {
+kernel::CrtMaterial recordOf(const Material& material, const Coats& coats, const SpectrumTable& spectra,
+                             const TexturePart& textures) {
+    const auto reflectance = [&] {
+        return material.reflectance_texture != kNoTexture ? textures.valueOf(material.reflectance_texture)
+                                                          : spectra.valueOf(material.reflectance);
+    };
+    const auto roughness = [&] {
+        return material.roughness_texture != kNoTexture ? textures.valueOf(material.roughness_texture)
+                                                        : valueOf(material.roughness);
+    };
     kernel::CrtMaterial record{};
     record.type = static_cast<std::uint32_t>(material.type);
     switch (material.type) {
         case MaterialType::Diffuse:
-        case MaterialType::Mirror: record.reflectance = spectra.valueOf(material.reflectance); break;
-        case MaterialType::RoughConductor: record.roughness = valueOf(material.roughness); [[fallthrough]];
+        case MaterialType::Mirror: record.reflectance = reflectance(); break;
+        case MaterialType::RoughConductor: record.roughness = roughness(); [[fallthrough]];
         case MaterialType::Conductor:
             record.eta = spectra.valueOf(material.eta);
             record.k = spectra.valueOf(material.k);
             break;
-        case MaterialType::RoughDielectric: record.roughness = valueOf(material.roughness); [[fallthrough]];
+        case MaterialType::RoughDielectric: record.roughness = roughness(); [[fallthrough]];
         case MaterialType::Dielectric:
             record.eta = spectra.valueOf(material.eta);
             if (!material.eta.isConstant()) record.flags = CRT_MATERIAL_DISPERSIVE;
@@ -61,7 +74,7 @@ kernel::CrtMaterial recordOf(const Material& material, const Coats& coats, const
         case MaterialType::ThinDielectric: record.eta = spectra.valueOf(material.eta); break;
         case MaterialType::Plastic: {
             const Coat& coat = coatOf(coats, material);
-            record.reflectance = spectra.valueOf(material.reflectance);
+            record.reflectance = reflectance();
             record.eta = spectra.valueOf(material.eta);
             record.roughness = valueOf(material.roughness);
             record.k = valueOf(coat.internal_reflectance);
@@ -97,10 +110,11 @@ std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material
 }
 
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const Coats& coats,
-                              const SpectrumTable& spectra) {
+                              const SpectrumTable& spectra, const TexturePart& textures) {
     MaterialPart part;
     for (const Material* material : materials) {
-        part.records.push_back(material ? recordOf(*material, coats, spectra) : kernel::CrtMaterial{});
+        part.records.push_back(material ? recordOf(*material, coats, spectra, textures)
+                                        : kernel::CrtMaterial{});
         if (!material) continue;
         const kernel::CrtMaterial& record = part.records.back();
         part.features |= 1u << record.type;

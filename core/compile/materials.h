@@ -4,6 +4,7 @@
 #include "compile/coat.h"
 #include "compile/flatten.h"
 #include "compile/spectrum_table.h"
+#include "compile/textures.h"
 #include "kernel/layout.h"
 #include "scene/scene.h"
 
@@ -27,7 +28,7 @@ struct MaterialPart {
     std::uint32_t features = 0;  ///< Of the materials that are used.
 };
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const Coats& coats,
-                              const SpectrumTable& spectra);
+                              const SpectrumTable& spectra, const TexturePart& textures);
 
 /// Fills in one a triangle, by primitive id. `light_of` as of LightPart.
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,

@@ -53,6 +53,7 @@ std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
              ((f & CRT_FEATURE_NEE) != 0 || lights.front()->type == PointLightType::Sun),
          CRT_FEATURE_POINT_LIGHT);
     need(header.spectra.count > 0, CRT_FEATURE_TABLE);
+    need(header.textures.count > 0, CRT_FEATURE_TEXTURE);
     need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
     need(header.filter.count > 0, CRT_FEATURE_FILTER);
     need(!isPath(scene), CRT_FEATURE_VIEW);
@@ -81,6 +82,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     CRT_MATERIAL_LIST(CRT_LEFT_OUT_MATERIAL, )
 #undef CRT_LEFT_OUT_MATERIAL
     if (!has(CRT_FEATURE_TABLE)) left_out("tables of spectra", "all values are the same at all wavelengths");
+    if (!has(CRT_FEATURE_TEXTURE)) left_out("textures", "no value depends on the place");
     if (!has(CRT_FEATURE_DISPERSION))
         left_out("hero wavelength selection", "no index of refraction depends on wavelength");
     if (!has(CRT_FEATURE_ABSORPTION)) left_out("absorption", "no body absorbs");

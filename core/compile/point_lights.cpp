@@ -13,12 +13,6 @@
 namespace crt {
 namespace {
 
-/// 1 − cos without cancellation.
-double oneMinusCos(double degrees) {
-    const double sine = std::sin(degrees * (std::numbers::pi / 360));
-    return 2 * sine * sine;
-}
-
 bool isAtInfinity(PointLightType type) {
     return type == PointLightType::Directional || type == PointLightType::Sun;
 }

@@ -45,8 +45,9 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
     header.accelerator = 0;
     for (kernel::CrtSpan* span :
          {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
-          &header.normals, &header.nodes, &header.objects, &header.materials, &header.lights,
-          &header.spectra, &header.observer, &header.wavelengths, &header.filter, &header.point_lights})
+          &header.normals, &header.textures, &header.uvs, &header.vertex_colors, &header.nodes,
+          &header.objects, &header.materials, &header.lights, &header.point_lights, &header.spectra,
+          &header.observer, &header.wavelengths, &header.filter})
         *span = {};
     return header;
 }
@@ -66,6 +67,17 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
              sizeof(CrtPrimitive));
     hash.add(CRT_ARRAY(CrtNormals, blob, header.normals), header.normals.count, sizeof(CrtNormals));
     hash.add(CRT_ARRAY(CrtMaterial, blob, header.materials), header.materials.count, sizeof(CrtMaterial));
+    // A texture names its texels by their place in the blob.
+    const CrtTexture* textures = CRT_ARRAY(CrtTexture, blob, header.textures);
+    for (std::uint32_t i = 0; i < header.textures.count; ++i) {
+        CrtTexture texture = textures[i];
+        hash.add(CRT_ARRAY(u16, blob, texture.texels), texture.texels.count, sizeof(u16));
+        texture.texels = {};
+        hash.add(&texture, 1, sizeof texture);
+    }
+    hash.add(CRT_ARRAY(CrtUvs, blob, header.uvs), header.uvs.count, sizeof(CrtUvs));
+    hash.add(CRT_ARRAY(CrtVertexColors, blob, header.vertex_colors), header.vertex_colors.count,
+             sizeof(CrtVertexColors));
     hash.add(CRT_ARRAY(f32, blob, header.spectra), header.spectra.count, CRT_SPECTRUM_STRIDE * sizeof(f32));
     hash.add(CRT_ARRAY(f32, blob, header.observer), header.observer.count, sizeof(f32));
     hash.add(CRT_ARRAY(f32, blob, header.wavelengths), header.wavelengths.count, sizeof(f32));

@@ -7,7 +7,7 @@
  * Arithmetic is IEEE, never contracted: crt_fma is written where a fused operation is meant. Data in memory
  * is scalars, arrays of scalars, or CrtVec4.
  *
- * Types: u32 i32 u64 f32 f64, vec3, vec4; vec8 and mask8 where CRT_SIMD8 is 1 (CPUs).
+ * Types: u16 u32 i32 u64 f32 f64, vec3, vec4; vec8 and mask8 where CRT_SIMD8 is 1 (CPUs).
  */
 #ifndef CRT_DIALECT_H
 #define CRT_DIALECT_H
@@ -22,6 +22,7 @@
 #define CRT_CONSTANT __constant
 #define CRT_KERNEL_BEGIN
 #define CRT_KERNEL_END
+typedef ushort u16;
 typedef uint u32;
 typedef int i32;
 typedef ulong u64;
@@ -91,6 +92,7 @@ CRT_FN u32 mask8_bits(mask8 m) {
 #define CRT_CONSTANT static __device__ const
 #define CRT_KERNEL_BEGIN
 #define CRT_KERNEL_END
+typedef unsigned short u16;
 typedef unsigned int u32;
 typedef int i32;
 typedef unsigned long long u64;
@@ -181,6 +183,7 @@ CRT_FN vec4 crt_max4(vec4 a, vec4 b) {
 #define CRT_KERNEL_BEGIN namespace crt { namespace kernel {
 #define CRT_KERNEL_END } }
 CRT_KERNEL_BEGIN
+typedef std::uint16_t u16;
 typedef std::uint32_t u32;
 typedef std::int32_t i32;
 typedef std::uint64_t u64;

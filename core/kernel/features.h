@@ -23,7 +23,7 @@
       "smooth dielectric, total internal reflection")                                        \
     M(F, 23, ROUGH_DIELECTRIC, RoughDielectric, rough_dielectric, LOBE,                      \
       "rough dielectric (GGX), refraction by microfacets")                                   \
-    M(F, 24, THIN_DIELECTRIC, ThinDielectric, thin_dielectric, DELTA, "thin panes")    \
+    M(F, 24, THIN_DIELECTRIC, ThinDielectric, thin_dielectric, DELTA, "thin panes")          \
     M(F, 25, PLASTIC, Plastic, plastic, LOBE, "diffuse base under a clear coat")
 
 #define CRT_MATERIAL_FEATURE(F, bit, NAME, Name, word, scatter, text) F(bit, NAME, text)
@@ -47,7 +47,8 @@
     F(18, REPLICATES, "independent replicates, from which the image knows its error")        \
     F(20, TABLE, "values tabulated by wavelength")                                           \
     F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
-    F(26, ABSORPTION, "absorption inside dielectrics")                                        \
+    F(26, ABSORPTION, "absorption inside dielectrics")                                       \
+    F(27, TEXTURE, "values that depend on the place: images, checkers, colours of vertices") \
     F(28, POINT_LIGHT, "point, spot, directional and sun lights")
 
 #define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,

@@ -79,6 +79,22 @@ typedef struct CrtNormals {
 } CrtNormals;
 CRT_ASSERT_SIZE(CrtNormals, 48);
 
+/* Texture coordinates at the three vertices: u of all, v of all. By primitive id, where the scene has
+   textures. */
+typedef struct CrtUvs {
+    f32 uv[6];
+    f32 reserved[2];
+} CrtUvs;
+CRT_ASSERT_SIZE(CrtUvs, 32);
+
+/* Colours of the three vertices: the coefficients of a sigmoid (crt_sigmoid) each. By primitive id, where
+   the scene has values that ask for them. */
+typedef struct CrtVertexColors {
+    f32 c[9];
+    f32 reserved[3];
+} CrtVertexColors;
+CRT_ASSERT_SIZE(CrtVertexColors, 48);
+
 /* Four children: bounds[2·axis + 0/1][child] is the lower/upper plane. child = index << 4 | count: count > 0
    is a leaf of the triangle slots index … index + count − 1, count = 0 an inner node. An unused child has
    lower = +inf, upper = −inf, so no ray enters it. */
@@ -105,7 +121,32 @@ CRT_ASSERT_SIZE(CrtObject, 32);
 typedef u32 CrtValue;
 #define CRT_VALUE_REFERENCE 0x80000000u
 #define CRT_VALUE_INDEX 0x0fffffffu
+#define CRT_VALUE_KIND 0xf0000000u
 #define CRT_VALUE_TABLE 0x80000000u /* kind 0: a spectrum of the scene's table */
+#define CRT_VALUE_TEXTURE 0x90000000u /* kind 1: depends on the place: an entry of the scene's textures */
+
+#define CRT_TEXTURE_SPECTRA 0u  /* an image of spectra: three words a texel (texture.h) */
+#define CRT_TEXTURE_NUMBERS 1u  /* an image of numbers: one word a texel, of 65535 */
+#define CRT_TEXTURE_CHECKER 2u  /* squares of two values */
+#define CRT_TEXTURE_VERTICES 3u /* between the colours of the vertices */
+
+#define CRT_WRAP_REPEAT 0u
+#define CRT_WRAP_MIRROR 1u
+#define CRT_WRAP_CLAMP 2u
+
+/* A value that depends on the place. What a kind does not have is 0. */
+typedef struct CrtTexture {
+    u32 kind; /* CRT_TEXTURE_… */
+    u32 width, height;
+    u32 wrap;    /* CRT_WRAP_…: what lies beyond the image */
+    u32 nearest; /* 1: the texel that a place lies in; 0: bilinear between the four around it */
+    CrtValue even, odd; /* checker; entries before this one where they are textures */
+    u32 reserved;
+    CrtSpan texels; /* words of 16 bits, the top row first */
+    f32 from_uv[6]; /* (s, t) = (f0 u + f1 v + f2, f3 u + f4 v + f5): of images the upper left corner is
+                       (0, 0), the lower right (1, 1); squares of a checker have side 1 */
+} CrtTexture;
+CRT_ASSERT_SIZE(CrtTexture, 64);
 
 #define CRT_MATERIAL_DISPERSIVE 1u
 
@@ -251,16 +292,18 @@ typedef struct CrtScene {
     CrtSpan objects;             /* CrtObject */
     CrtSpan materials;           /* CrtMaterial */
     CrtSpan lights;              /* CrtLight */
+    CrtSpan textures;            /* CrtTexture */
+    CrtSpan uvs;                 /* CrtUvs, by id; only where a texture asks */
+    CrtSpan vertex_colors;       /* CrtVertexColors, by id; only where a value asks */
+    CrtSpan point_lights;        /* CrtPointLight */
     CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
     CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
     CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */
     CrtSpan filter;              /* CRT_FILTER_TABLE + 1 nodes of the offset from the pixel centre, pixels */
-    CrtSpan point_lights;        /* CrtPointLight */
-    CrtSpan reserved;
 
     CrtCamera camera;
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 352);
+CRT_ASSERT_SIZE(CrtScene, 368);
 
 CRT_KERNEL_END
 

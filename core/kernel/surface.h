@@ -16,6 +16,9 @@ typedef struct CrtSurface {
     f32 clearance; /* how far along ng a ray must start from p to be sure of its side */
     u32 material;
     u32 light;     /* CRT_NONE: it does not emit */
+    u32 id;        /* primitive id; this and what follows for textures only */
+    f32 b1, b2;    /* barycentrics of the second and third vertex, of p */
+    f32 u, v;      /* texture coordinates; 0 where the mesh has none */
 } CrtSurface;
 
 CRT_FN vec3 crt_triangle_vertex(CRT_GLOBAL const CrtTriangle *triangle, u32 i) {
@@ -84,6 +87,17 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     s.ns = s.ng;
     s.material = primitive->material;
     s.light = primitive->light;
+    if (CRT_HAS(TEXTURE)) {
+        s.id = hit.id;
+        s.b1 = b1;
+        s.b2 = b2;
+        s.u = s.v = 0.0f;
+        if (ctx->scene->uvs.count != 0u) {
+            CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[hit.id].uv;
+            s.u = crt_fma(uv[0], b0, crt_fma(uv[1], b1, uv[2] * b2));
+            s.v = crt_fma(uv[3], b0, crt_fma(uv[4], b1, uv[5] * b2));
+        }
+    }
     if (CRT_HAS(SMOOTH_NORMALS) && primitive->normals != CRT_NONE) {
         CRT_GLOBAL const CrtNormals *n =
             CRT_ARRAY(CrtNormals, ctx->blob, ctx->scene->normals) + primitive->normals;

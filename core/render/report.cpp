@@ -128,6 +128,7 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
                        {"triangles", compiled.triangles},
                        {"emitters", compiled.emitters},
                        {"nodes", compiled.nodes},
+                       {"images", compiled.images},
                        {"seed", scene.sampler.seed}};
 
     Json left_out = Json::array();
@@ -170,6 +171,7 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
     report["speed"] = {{"mpaths_per_second", perSecond(static_cast<double>(b.paths) * 1e-6, render_seconds)},
                        {"mrays_per_second", perSecond(rays * 1e-6, render_seconds)}};
     report["memory"] = {{"scene_bytes", compiled.size_bytes},
+                        {"texel_bytes", compiled.texel_bytes},
                         {"host_peak_bytes", peakHostMemory()},
                         {"device_peak_bytes", b.peak_memory_bytes}};
     report["error"] = errorJson(facts);

@@ -8,13 +8,12 @@ namespace {
 
 double sineOf(double degrees) { return std::sin(degrees * (std::numbers::pi / 180)); }
 
-/// 1 − cos without cancellation.
+}  // namespace
+
 double oneMinusCos(double degrees) {
     const double sine = sineOf(degrees / 2);
     return 2 * sine * sine;
 }
-
-}  // namespace
 
 double photometric(const Spectrum& spectral) {
     return kLuminousEfficacy_lm_W * cieYIntegral() * spectrumToXyz(spectral)[1];

@@ -15,6 +15,9 @@ double photometric(const Spectrum& spectral);
 /// ∫ over 360–830 nm: watts of W·nm⁻¹.
 double integralOverWavelengths(const Spectrum& spectral);
 
+/// 1 − cos without cancellation.
+double oneMinusCos(double degrees);
+
 /// Solid angle that a spot of even radiant intensity would fill to have its flux: that of the cone without
 /// its penumbra, and half of the penumbra's, over which Hermite's cubic of the cosine has its mean ½.
 double spotSolidAngle_sr(double cone_angle_deg, double penumbra_deg);

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "kernel/features.h"
 #include "scene/aov.h"
+#include "scene/texture.h"
 #include "spectra/spectra.h"
 
 #include <array>
@@ -100,6 +101,8 @@ struct Material {
     Spectrum k;            ///< Conductors: extinction.
     std::optional<Spectrum> absorption;  ///< Dielectric, RoughDielectric. Per scene unit, at least 0.
     double roughness = 0;  ///< Rough kinds, and the coat of Plastic. In [0,1].
+    TextureIndex reflectance_texture = kNoTexture;  ///< In place of the reflectance.
+    TextureIndex roughness_texture = kNoTexture;    ///< In place of the roughness.
     SourcePlace place;
 };
 
@@ -110,11 +113,17 @@ struct Mesh {
     std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Indices into positions.
     std::vector<std::array<std::uint32_t, 3>>
         normal_index;                    ///< Empty, or one per triangle; kNoNormal = flat.
+    /// Texture coordinates, v up; empty, or referenced by `uv_index`.
+    std::vector<std::array<double, 2>> uvs;
+    std::vector<std::array<std::uint32_t, 3>> uv_index;  ///< Empty, or one per triangle; kNoUv = none.
+    /// Linear sRGB in [0, 1], as of `positions`; or empty.
+    std::vector<std::array<float, 3>> colors;
     std::vector<std::int32_t> material;  ///< Empty, or one index into Scene::materials per triangle.
     std::vector<std::int32_t>
         emission;  ///< Empty, or one index into Scene::emissions per triangle, −1 none.
 };
 inline constexpr std::uint32_t kNoNormal = 0xffffffffu;
+inline constexpr std::uint32_t kNoUv = 0xffffffffu;
 
 struct Emission {
     Spectrum radiance;  ///< W·m⁻²·sr⁻¹·nm⁻¹
@@ -179,6 +188,7 @@ struct Scene {
     IntegratorSettings integrator;
     SamplerSettings sampler;
     std::vector<Material> materials;
+    std::vector<Texture> textures;  ///< Those of a checker before it.
     std::vector<Emission> emissions;
     std::vector<Mesh> meshes;
     std::vector<Object> objects;

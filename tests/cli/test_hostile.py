@@ -673,6 +673,68 @@ def spectrum_cases():
 
 
 # -----------------------------------------------------------------------------------------------------------
+# textures
+
+def texture_cases(samples):
+    def texture(asked, name, data, words=(), codes=3, more="", mesh="uvs: [[0,0],[1,0],[0,1]], "):
+        def prepare(folder):
+            triangle = TRIANGLE.replace("{", "{" + mesh, 1)
+            folder.write(
+                "scene.yaml",
+                HEAD
+                + f"materials: {{m: {{type: diffuse, reflectance: {{texture: {name}{more}}}}}}}\n"
+                  f"objects: [{{{triangle}, material: m}}]\n",
+            )
+            if data is not None:
+                folder.write(name, data)
+        case("texture", asked, ["info", "scene.yaml"], codes, words, prepare)
+
+    with open(os.path.join(os.path.dirname(__file__), "../fuzz/corpus/texels/rgb.jpg"), "rb") as file:
+        jpeg = file.read()
+    texture("a good PNG", "a.png", png(8, 8), codes=0)
+    texture("a good JPEG", "a.jpg", jpeg, codes=0)
+    texture("an EXR", "a.exr", samples["exr"], codes=0)
+    texture("no file", "a.png", None, ("scene.yaml:4:", "cannot find 'a.png'"))
+    texture("an empty file", "a.png", b"", "it is no PNG, JPEG")
+    texture("text", "a.png", "not an image\n" * 100, "it is no PNG, JPEG")
+    texture("noise", "a.jpg", b"\xff\xd8\xff" + bytes(range(256)) * 10, "a.jpg")
+    texture("a TIFF", "a.tif", b"II*\0" + b"\0" * 100, "it is no PNG, JPEG")
+    texture("a mesh without texture coordinates", "a.png", png(8, 8), "no texture coordinates", mesh="")
+    texture("an unknown wrap", "a.png", png(8, 8), "did you mean 'repeat'", more=", wrap: repaet")
+    texture("a scale beyond all digits", "a.png", png(8, 8), "1000000", more=", scale: 1e300")
+    texture("texture coordinates of NaN", "a.png", png(8, 8), "nan", mesh="uvs: [[0,0],[1,nan],[0,1]], ")
+    texture("too few texture coordinates", "a.png", png(8, 8), "2 uvs for 3", mesh="uvs: [[0,0],[1,0]], ")
+    texture("a PNG of 60000 x 60000 in 100 bytes", "a.png", png(60000, 60000, b"\0" * 1000), "pixels")
+    texture("a PNG cut in the middle", "a.png", png(64, 64)[:80], "a.png")
+    texture("a PNG whose rows end early", "a.png", png(64, 64, b"\0" * 5000), "a.png")
+    grey = png(16384, 16384, b"\0" * (16385 * 16384)).replace(
+        struct.pack(">IIBBBBB", 16384, 16384, 8, 2, 0, 0, 0),
+        struct.pack(">IIBBBBB", 16384, 16384, 8, 0, 0, 0, 0),
+    )
+    head = grey.index(b"IHDR")
+    grey = grey[:head + 17] + struct.pack(">I", zlib.crc32(grey[head:head + 17])) + grey[head + 21:]
+    texture("16384 x 16384 black texels in 260 KB", "a.png", grey, "CRT_SCENE_MEMORY")
+    for cut in (20, len(jpeg) // 2, len(jpeg) - 20):
+        texture(f"a JPEG cut after {cut} bytes", "a.jpg", jpeg[:cut], "a.jpg")
+    frame = jpeg.index(b"\xff\xc0") + 5
+    texture(
+        "a JPEG of 30000 x 30000 in 800 bytes",
+        "a.jpg",
+        jpeg[:frame] + struct.pack(">HH", 30000, 30000) + jpeg[frame + 4:],
+        "pixels",
+    )
+    texture("a JPEG without a height", "a.jpg", jpeg[:frame] + b"\0\0" + jpeg[frame + 2:], "a.jpg")
+    for name in ("folder", "pipe", "/dev/zero", "noise", "sparse"):
+        def prepare(folder, name=name):
+            endless_files(folder)
+            folder.write(
+                "scene.yaml",
+                HEAD + f"materials: {{m: {{type: diffuse, reflectance: {{texture: '{name}'}}}}}}\n",
+            )
+        case("texture", f"{name} in place of a texture", ["info", "scene.yaml"], 3, (), prepare)
+
+
+# -----------------------------------------------------------------------------------------------------------
 # films and images
 
 def png(width, height, rows=None):
@@ -1798,6 +1860,7 @@ def main():
         scene_cases()
         mesh_cases()
         spectrum_cases()
+        texture_cases(samples)
         image_cases(samples)
         film_cases(samples)
         argument_cases(samples)

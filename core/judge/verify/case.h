@@ -97,6 +97,7 @@ std::vector<Case> stiffCases();          ///< F
 std::vector<Case> scatteringCases();     ///< G
 std::vector<Case> glasswareCases();      ///< G, rough glass and panes
 std::vector<Case> colourCases();         ///< H
+std::vector<Case> textureCases();        ///< H, the part about textures
 std::vector<Case> accumulationCases();   ///< I
 std::vector<Case> imageCases();          ///< J
 std::vector<Case> inputCases();          ///< K

@@ -102,6 +102,20 @@ std::vector<Variant> variants(int resolution) {
         s.point_lights.back().angular_diameter_deg = 10;
         s.point_lights.back().strength = 8;
     });
+    add("textures", [](Scene& s) {
+        Texture checker;
+        checker.kind = Texture::Kind::Checker;
+        checker.transform = {5, 0, 0.25, 0, 5, 0.25};
+        checker.values = {TextureValue{flint(), kNoTexture},
+                          TextureValue{constantSpectrum(0.25), kNoTexture}};
+        for (double& value : checker.values[0].spectrum.values) value *= 0.5;
+        s.textures.push_back(std::move(checker));
+        for (Material& material : s.materials) material.reflectance_texture = 0;
+        for (Mesh& mesh : s.meshes) {
+            for (const Vec3d& p : mesh.positions) mesh.uvs.push_back({p[0] + 0.5 * p[1], p[2] - 0.5 * p[1]});
+            mesh.uv_index = mesh.triangles;
+        }
+    });
     add("view of the normals", [](Scene& s) { s.integrator.type = IntegratorType::Normals; });
     add("view of the boxes", [](Scene& s) { s.integrator.type = IntegratorType::Aabb; });
     return all;

@@ -77,11 +77,13 @@ public:
 private:
     /// The triangles of a block of faces.
     struct Part {
-        std::vector<std::array<std::uint32_t, 3>> triangles, normals;  ///< Normals where the file has any.
+        /// Normals and texture coordinates where the file has any.
+        std::vector<std::array<std::uint32_t, 3>> triangles, normals, uvs;
         std::vector<std::int32_t> material;  ///< As of ObjFace, where the file names any.
         std::vector<std::int32_t> used;      ///< Materials, in the order in which faces use them.
         ObjLoss wild_normals;
         std::uint64_t flat_faces = 0, faces_without_position = 0, degenerate = 0, crossing = 0;
+        std::uint64_t triangles_without_uv = 0;
         bool any_smooth = false;
     };
 
@@ -164,18 +166,23 @@ private:
             ++part.degenerate;
             return;
         }
-        std::array<std::uint32_t, 3> position, normal;
-        bool smooth = true;
+        std::array<std::uint32_t, 3> position, normal, uv;
+        bool smooth = true, has_uv = true;
         for (std::size_t k = 0; k < 3; ++k) {
             const ObjCorner& corner = corners[triangle[k]];
             position[k] = corner.position;
             normal[k] = corner.normal;
             smooth &= usable(corner.normal);
+            uv[k] = corner.uv;
+            has_uv &= corner.uv != kNoObjUv;
         }
+        if (!has_uv) uv.fill(kNoUv);
+        part.triangles_without_uv += !has_uv;
         if (!smooth) normal.fill(kNoNormal);
         part.any_smooth |= smooth;
         part.triangles.push_back(position);
         if (!obj_.normals.empty()) part.normals.push_back(normal);
+        if (!obj_.uvs.empty()) part.uvs.push_back(uv);
         if (namesMaterials()) part.material.push_back(face.material);
     }
 
@@ -190,6 +197,7 @@ private:
         out_.degenerate_faces += part.degenerate;
         crossing_polygons_ += part.crossing;
         any_smooth_ |= part.any_smooth;
+        triangles_without_uv_ += part.triangles_without_uv;
         if (options_.use_mtl)
             for (const std::int32_t name : part.used) addMaterial(static_cast<std::size_t>(name));
     }
@@ -207,6 +215,7 @@ private:
         Mesh& mesh = out_.mesh;
         mesh.triangles.resize(triangles_);
         if (any_smooth_) mesh.normal_index.resize(triangles_);
+        if (anyUv()) mesh.uv_index.resize(triangles_);
         if (!out_.materials.empty()) mesh.material.resize(triangles_);
         std::vector<std::size_t> first(parts_.size());
         for (std::size_t i = 1; i < parts_.size(); ++i)
@@ -217,6 +226,7 @@ private:
             std::copy(part.triangles.begin(), part.triangles.end(), mesh.triangles.begin() + at);
             if (any_smooth_)
                 std::copy(part.normals.begin(), part.normals.end(), mesh.normal_index.begin() + at);
+            if (anyUv()) std::copy(part.uvs.begin(), part.uvs.end(), mesh.uv_index.begin() + at);
             if (!out_.materials.empty())
                 std::transform(part.material.begin(), part.material.end(), mesh.material.begin() + at,
                                [this](std::int32_t name) {
@@ -264,7 +274,10 @@ private:
         for (Vec3d& n : obj_.normals)
             if (!isNumber(n)) n = {0, 0, 0};
         if (any_smooth_) mesh.normals = std::move(obj_.normals);
+        if (anyUv()) mesh.uvs = std::move(obj_.uvs);
     }
+
+    bool anyUv() const { return !obj_.uvs.empty() && triangles_without_uv_ < triangles_; }
 
     void sayWhatIsLost() const {
         if (faces_without_position_ > 0)
@@ -284,6 +297,9 @@ private:
         else if (flat_faces_ > 0)
             logWarning("{}: {} shaded flat: a normal of theirs has no direction", path_,
                        counted(flat_faces_, "face"));
+        if (obj_.bad_uvs.count > 0)
+            logWarning("{}:{}: {}; taken for (0, 0), as {} in all", path_, obj_.bad_uvs.line,
+                       obj_.bad_uvs.sentence, counted(obj_.bad_uvs.count, "pair"));
         if (crossing_polygons_ > 0)
             logWarning("{}: {} may be split wrongly, because their outlines cross themselves", path_,
                        counted(crossing_polygons_, "polygon"));
@@ -344,7 +360,7 @@ private:
     std::vector<std::int32_t> material_index_;  ///< By the number of the name in the OBJ; −1: not used yet.
     std::vector<Part> parts_;
     ObjLoss wild_normals_;
-    std::size_t triangles_ = 0;
+    std::size_t triangles_ = 0, triangles_without_uv_ = 0;
     std::uint64_t flat_faces_ = 0, faces_without_position_ = 0, crossing_polygons_ = 0;
     bool any_faces_ = false, any_smooth_ = false;
 };

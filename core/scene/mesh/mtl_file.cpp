@@ -83,8 +83,10 @@ const std::vector<MtlKey>& mtlKeys() {
         {"aniso", {}, "anisotropy", "Left out, with a warning if not 0."},
         {"anisor", {}, "its angle", "Left out, with a warning if not 0."},
         {"map_Kd", {}, "image",
-         "Textures are left out, with a warning; the numbers beside them count, but for a black Kd, which "
-         "exporters write there: it counts as grey 0.6."},
+         "A texture that takes the place of `Kd`, where `vt` say how it lies: sRGB for 8 and 16 bits. "
+         "Looked up beside the MTL, with `/` for `\\`, without its folders, in another case. `-s`, `-o` and "
+         "`-clamp` are read. Where the file is not there or cannot be read, with a warning, `Kd` counts; a "
+         "black one, which exporters write beside a texture, as grey 0.6."},
         {"map_Ka", {}, "image", "Ignored, as `Ka`."},
         {"map_Ks", {}, "image", "Left out, with a warning."},
         {"map_Ns", {}, "image", "Left out, with a warning."},

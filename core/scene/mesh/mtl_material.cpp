@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <set>
@@ -32,6 +33,31 @@ Vec3d srgbDecoded(const Vec3d& encoded) {
     return rgb;
 }
 
+/// The file of this name: as it stands, with '/' for '\\', without its folders, or in another case; beside
+/// the MTL.
+std::optional<std::string> findMap(const std::string& name, const std::string& mtl_file) {
+    namespace fs = std::filesystem;
+    std::string slashed = name;
+    std::replace(slashed.begin(), slashed.end(), '\\', '/');
+    const fs::path folder = fs::path(mtl_file).parent_path(), path(slashed);
+    std::error_code ignored;
+    for (const fs::path& candidate : {folder / name, folder / path, folder / path.filename()})
+        if (path.has_filename() && fs::is_regular_file(candidate, ignored)) return candidate.string();
+    const auto lower = [](std::string text) {
+        for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        return text;
+    };
+    const std::string wanted = lower(path.filename().string());
+    std::vector<std::string> like;  // Of several, the first in the order of the alphabet.
+    for (const fs::path& where : {folder / path.parent_path(), folder}) {
+        for (fs::directory_iterator entry(where.empty() ? fs::path(".") : where, ignored), end;
+             !ignored && entry != end; entry.increment(ignored))
+            if (lower(entry->path().filename().string()) == wanted) like.push_back(entry->path().string());
+        if (!like.empty()) return *std::min_element(like.begin(), like.end());
+    }
+    return std::nullopt;
+}
+
 /// Maps one material.
 class MaterialMapper {
 public:
@@ -55,6 +81,7 @@ public:
         m.name = mtl_.name;
         m.place = {mtl_.file, mtl_.line};
         const bool metallic = pm_.value_or(0.0) >= 0.5;
+        if (has("map_Kd") && !has("crt_reflectance")) map_kd_ = map("map_Kd");
         const bool polished = illumIs({3, 5}) && brightest(kd_.value_or(Vec3d{})) <= 0.1 &&
                               brightest(ks_.value_or(Vec3d{})) > 0.0;
         if (lightPasses() && refracts())
@@ -63,6 +90,7 @@ public:
             mirror(m, metallic);
         else
             diffuse(m);
+        if (reflects_kd_) mapped.map_kd = map_kd_;
         if (emits()) {
             mapped.emission = Emission{rgbEmission(linear(*ke_)), false};
             summary_.became("emitting");
@@ -140,6 +168,7 @@ private:
     void mirror(Material& m, bool metallic) {
         summary_.became("mirror");
         m.type = MaterialType::Mirror;
+        reflects_kd_ = metallic;
         m.reflectance = metallic ? reflectance(kdOrGrey(), "Kd") : reflectance(*ks_, "Ks");
         if (metallic && *pm_ < 1.0) summary_.decided("Pm from 0.5 to 1 read as 1");
         opaque();
@@ -149,6 +178,7 @@ private:
     void diffuse(Material& m) {
         summary_.became("diffuse");
         m.type = MaterialType::Diffuse;
+        reflects_kd_ = true;
         m.reflectance = reflectance(kdOrGrey(), "Kd");
         if (pm_.value_or(0.0) > 0.0) summary_.decided("Pm below 0.5 read as 0");
         opaque();
@@ -189,6 +219,7 @@ private:
     Vec3d kdOrGrey() const {
         const bool replaced = kd_ && brightest(*kd_) == 0.0 && has("map_Kd");
         if (kd_ && !replaced) return *kd_;
+        if (map_kd_) return {kUnstatedKd, kUnstatedKd, kUnstatedKd};  // unless the image cannot be read
         if (emits() || has("crt_reflectance")) return {};
         summary_.decided(
             fmt::format("{} read as grey {}", replaced ? "a black Kd beside map_Kd" : "no Kd",
@@ -209,6 +240,49 @@ private:
             linear({std::min(stated[0], 1.0), std::min(stated[1], 1.0), std::min(stated[2], 1.0)}));
     }
 
+    // ---- Images ----
+
+    /// Options and the name of a file, which may have blanks. Nothing, and noted, where it is not there.
+    std::optional<MtlMap> map(const char* keyword) const {
+        const MtlStatement& statement = *mtl_.find(keyword);
+        MtlMap map;
+        map.place = {mtl_.file, statement.line};
+        std::string_view rest = statement.arguments;
+        for (;;) {
+            std::string_view after = rest;
+            const std::string_view option = nextField(after);
+            if (option.empty() || option[0] != '-') break;
+            if (option == "-s" || option == "-o" || option == "-t") {
+                for (std::size_t k = 0; k < 3; ++k) {
+                    std::string_view behind = after;
+                    const std::optional<double> value = numberOf(nextField(behind));
+                    if (!value) break;
+                    after = behind;
+                    constexpr double kMost = 1e6;
+                    if (k == 2 || option == "-t" || !(std::abs(*value) <= kMost)) continue;
+                    map.transform[option == "-s" ? 4 * k : 2 + 3 * k] = *value;
+                }
+            } else {
+                const int arguments = option == "-mm" ? 2 : 1;
+                for (int i = 0; i < arguments; ++i) {
+                    const std::string_view value = nextField(after);
+                    if (option == "-clamp") map.clamp = value == "on";
+                }
+            }
+            rest = after;
+        }
+        std::string name(trimmed(rest));
+        if (name.size() >= 2 && name.front() == '"' && name.back() == '"')
+            name = name.substr(1, name.size() - 2);
+        const std::optional<std::string> file = findMap(name, mtl_.file);
+        if (!file) {
+            if (!name.empty()) summary_.dropped(keyword);
+            return std::nullopt;
+        }
+        map.file = *file;
+        return map;
+    }
+
     // ---- The rest ----
 
     /// Keywords that no rule above reads: textures, and numbers that are not 0.
@@ -220,6 +294,8 @@ private:
             if (read_above.contains(keyword) || ignored.contains(keyword) || statement.arguments.empty())
                 continue;
             std::string_view rest = statement.arguments;
+            if (keyword == "map_Kd" && !has("crt_reflectance") && reflects_kd_)
+                continue;  // told above where it is not there
             if (findMtlKey(keyword) == nullptr)
                 summary_.unknown(keyword);
             else if (numberOf(nextField(rest)) != 0.0)
@@ -233,6 +309,8 @@ private:
     std::optional<Vec3d> kd_, ks_, ke_, tf_;
     std::optional<double> ni_, pm_, opacity_, illum_;
     std::string spectrum_file_;
+    std::optional<MtlMap> map_kd_;
+    bool reflects_kd_ = false;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include "scene/mesh/mtl_file.h"
 #include "scene/scene.h"
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -14,8 +15,17 @@ namespace crt {
 /// colour pickers show them.
 enum class MtlColor { Linear, Srgb };
 
+/// An image that a material names, and how it lies.
+struct MtlMap {
+    std::string file;                                  ///< It is there; nobody has looked into it.
+    std::array<double, 6> transform{1, 0, 0, 0, 1, 0};  ///< As of Texture.
+    bool clamp = false;
+    SourcePlace place;
+};
+
 struct MtlMaterial {
     Material material;
+    std::optional<MtlMap> map_kd;      ///< To take the place of the material's reflectance.
     std::optional<Emission> emission;  ///< Ke, if it is not black.
     std::string spectrum_file;         ///< Read for crt_reflectance; empty without it.
 };

@@ -21,17 +21,19 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint32_t kMostIndex = kBadObjNormal - 1;  ///< Corners hold what is below.
+constexpr double kMostObjUv = 1e6;  // Beyond it nothing is left of the texel.
 constexpr std::int32_t kAsBefore = -2;  ///< The material that the lines before the block ended with.
 
 /// What a block of lines says, as far as it can be known without the blocks before it: lines, materials and
 /// what counts backwards are of the block alone.
 struct ObjPart {
     std::vector<Vec3d> positions, normals;
+    std::vector<std::array<double, 2>> uvs;
     ObjBlock block;
     std::vector<std::string> material_names;
     std::int32_t material = kAsBefore;  ///< At its end.
     std::vector<ObjContents::Library> libraries;
-    ObjLoss bad_positions, bad_normals, small_faces;
+    ObjLoss bad_positions, bad_normals, bad_uvs, small_faces;
     std::uint64_t lines = 0, points = 0, free_forms = 0;
     bool vertex_colors = false;
     int lines_taken = 0;
@@ -42,7 +44,7 @@ struct ObjPart {
         std::size_t corner;
         std::int64_t index, written;
         int line;
-        bool normal;
+        enum class What { Position, Normal, Uv } what;
         std::size_t before;  ///< So many vertices stood before it in the block.
     };
     std::vector<Backwards> backwards;
@@ -74,6 +76,8 @@ private:
         else if (keyword == "vn") {
             std::string_view rest = lines_.arguments();
             part_.normals.push_back(threeNumbers(rest, "a vertex normal", part_.bad_normals));
+        } else if (keyword == "vt") {
+            textureCoordinates();
         } else if (keyword == "f" || keyword == "fo")
             face();
         else if (keyword == "usemtl")
@@ -123,8 +127,28 @@ private:
         while (!part_.vertex_colors && !nextField(rest).empty()) part_.vertex_colors = ++more >= 3;
     }
 
-    /// Of "7", "7/1", "7//3" or "7/1/3"; counted from 1, or backwards from the newest with a minus. What
-    /// stands for the texture is not looked at.
+    /// One number or more; the second is 0 where it is left out. A pair that cannot be read is (0, 0).
+    void textureCoordinates() {
+        std::string_view rest = lines_.arguments();
+        std::array<double, 2> uv{};
+        for (std::size_t k = 0; k < 2; ++k) {
+            const std::string_view field = nextField(rest);
+            if (k > 0 && field.empty()) break;
+            const std::optional<double> value = numberOf(field);
+            if (value && std::abs(*value) <= kMostObjUv) {
+                uv[k] = *value;
+                continue;
+            }
+            part_.bad_uvs.add(lines_.number(),
+                              fmt::format("texture coordinates must be numbers up to {:g}, found {}",
+                                          kMostObjUv, inQuotes(field)));
+            uv = {};
+            break;
+        }
+        part_.uvs.push_back(uv);
+    }
+
+    /// Of "7", "7/1", "7//3" or "7/1/3"; counted from 1, or backwards from the newest with a minus.
     void addCorner(std::string_view field) {
         const std::size_t number = part_.block.corners.size();
         ObjCorner corner{0, kNoObjNormal};
@@ -134,7 +158,7 @@ private:
             fail(fmt::format("{} is not a corner of a face (v, v/vt, v//vn or v/vt/vn, counted from 1)",
                              inQuotes(field)));
         if (at < 0)
-            addBackwards(number, at, part_.positions.size(), false);
+            addBackwards(number, at, part_.positions.size(), ObjPart::Backwards::What::Position);
         else if (at > kMostIndex)
             part_.beyond.emplace_back(number, at - 1);
         else
@@ -143,24 +167,34 @@ private:
         const std::size_t texture = position.size();  // Of the first '/'.
         const std::size_t second =
             texture < field.size() ? field.find('/', texture + 1) : std::string_view::npos;
+        if (texture + 1 < field.size()) {
+            const std::string_view uv = field.substr(texture + 1, second - texture - 1);
+            if (!uv.empty() && readIndex(uv, at)) {
+                if (at < 0)
+                    addBackwards(number, at, part_.uvs.size(), ObjPart::Backwards::What::Uv);
+                else if (at <= kMostIndex)
+                    corner.uv = static_cast<std::uint32_t>(at - 1);
+            }
+        }
         if (second != std::string_view::npos && second + 1 < field.size()) {
             std::string_view normal = field.substr(second + 1);
             normal = normal.substr(0, normal.find('/'));
             const bool readable = readIndex(normal, at);
             corner.normal = kBadObjNormal;
             if (readable && at < 0)
-                addBackwards(number, at, part_.normals.size(), true);
+                addBackwards(number, at, part_.normals.size(), ObjPart::Backwards::What::Normal);
             else if (readable && at <= kMostIndex)
                 corner.normal = static_cast<std::uint32_t>(at - 1);
         }
         part_.block.corners.push_back(corner);
     }
 
-    void addBackwards(std::size_t corner, std::int64_t at, std::size_t before, bool normal) {
+    void addBackwards(std::size_t corner, std::int64_t at, std::size_t before,
+                      ObjPart::Backwards::What what) {
         // Far beyond any file, so that sums of it fit.
         const std::int64_t index = std::max<std::int64_t>(at, std::int64_t{-1} << 61);
         part_.backwards.push_back(
-            {corner, static_cast<std::int64_t>(before) + index, at, lines_.number(), normal, before});
+            {corner, static_cast<std::int64_t>(before) + index, at, lines_.number(), what, before});
     }
 
     /// A whole number other than 0.
@@ -238,7 +272,7 @@ public:
 
     ObjContents join() {
         findPlaces();
-        if (positions_ > kMostIndex || normals_ > kMostIndex)
+        if (positions_ > kMostIndex || normals_ > kMostIndex || uvs_ > kMostIndex)
             throw Error(ErrorKind::Scene, "the file has more than four thousand million vertices", {path_});
         for (std::size_t i = 0; i < parts_.size(); ++i) {
             resolveBackwards(i);
@@ -249,6 +283,7 @@ public:
         joinStatements();
         obj_.positions.resize(positions_);
         obj_.normals.resize(normals_);
+        obj_.uvs.resize(uvs_);
         obj_.blocks.resize(parts_.size());
         parallelFor(parts_.size(), 1, [this](std::size_t i, std::size_t) { joinVertices(i); });
         for (const Place& place : places_)
@@ -263,7 +298,7 @@ private:
     };
     /// What comes before a part.
     struct Place {
-        std::size_t positions = 0, normals = 0;
+        std::size_t positions = 0, normals = 0, uvs = 0;
         int line = 0;
         std::vector<std::int32_t> material;  ///< In the file, of those in the part.
         std::int32_t material_before = -1;
@@ -275,9 +310,11 @@ private:
         for (std::size_t i = 0; i < parts_.size(); ++i) {
             places_[i].positions = positions_;
             places_[i].normals = normals_;
+            places_[i].uvs = uvs_;
             places_[i].line = line;
             positions_ += parts_[i].positions.size();
             normals_ += parts_[i].normals.size();
+            uvs_ += parts_[i].uvs.size();
             line += parts_[i].lines_taken;
         }
     }
@@ -287,11 +324,17 @@ private:
         for (const ObjPart::Backwards& b : parts_[i].backwards) {
             if (b.corner >= parts_[i].block.corners.size()) continue;  // of a field that cannot be read
             ObjCorner& corner = parts_[i].block.corners[b.corner];
-            const std::int64_t index =
-                static_cast<std::int64_t>(b.normal ? place.normals : place.positions) + b.index;
+            using What = ObjPart::Backwards::What;
+            const std::size_t first = b.what == What::Position ? place.positions
+                                      : b.what == What::Normal ? place.normals
+                                                               : place.uvs;
+            std::uint32_t& target = b.what == What::Position ? corner.position
+                                    : b.what == What::Normal ? corner.normal
+                                                             : corner.uv;
+            const std::int64_t index = static_cast<std::int64_t>(first) + b.index;
             if (index >= 0)
-                (b.normal ? corner.normal : corner.position) = static_cast<std::uint32_t>(index);
-            else if (!b.normal)
+                target = static_cast<std::uint32_t>(index);
+            else if (b.what == What::Position)
                 throw Error(ErrorKind::Scene,
                             fmt::format("a face names vertex {}, but only {} stand before it", b.written,
                                         place.positions + b.before),
@@ -321,6 +364,7 @@ private:
                     obj_.libraries.push_back({std::move(library.arguments), place.line + library.line});
             obj_.bad_positions.add(part.bad_positions, place.line);
             obj_.bad_normals.add(part.bad_normals, place.line);
+            obj_.bad_uvs.add(part.bad_uvs, place.line);
             obj_.small_faces.add(part.small_faces, place.line);
             obj_.lines += part.lines;
             obj_.points += part.points;
@@ -336,6 +380,8 @@ private:
                   obj_.positions.begin() + static_cast<std::ptrdiff_t>(place.positions));
         std::copy(part.normals.begin(), part.normals.end(),
                   obj_.normals.begin() + static_cast<std::ptrdiff_t>(place.normals));
+        std::copy(part.uvs.begin(), part.uvs.end(),
+                  obj_.uvs.begin() + static_cast<std::ptrdiff_t>(place.uvs));
         std::size_t beyond = 0;
         for (ObjFace& face : part.block.faces) {
             face.line += place.line;
@@ -351,6 +397,7 @@ private:
                     place.missing = {too_large ? part.beyond[beyond].second : corner.position, face.line};
                 if (corner.normal != kNoObjNormal && corner.normal >= normals_)
                     corner.normal = kBadObjNormal;
+                if (corner.uv >= uvs_) corner.uv = kNoObjUv;
             }
         }
         obj_.blocks[i] = std::move(part.block);
@@ -367,7 +414,7 @@ private:
     std::vector<ObjPart> parts_;
     const std::string& path_;
     std::vector<Place> places_;
-    std::size_t positions_ = 0, normals_ = 0;
+    std::size_t positions_ = 0, normals_ = 0, uvs_ = 0;
     ObjContents obj_;
 };
 

@@ -5,6 +5,7 @@
 #include "base/stage.h"
 #include "spectra/spectra.h"
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -16,10 +17,12 @@ namespace crt {
 struct ObjCorner {
     std::uint32_t position;
     std::uint32_t normal;  ///< kNoObjNormal where it names none, kBadObjNormal where that is not there.
+    std::uint32_t uv = 0xffffffffu;  ///< kNoObjUv where it names none that is there.
     bool operator==(const ObjCorner&) const = default;
 };
 inline constexpr std::uint32_t kNoObjNormal = 0xffffffffu;
 inline constexpr std::uint32_t kBadObjNormal = 0xfffffffeu;
+inline constexpr std::uint32_t kNoObjUv = 0xffffffffu;
 
 /// A polygon: a run of corners, its material, and where it stands in the file.
 struct ObjFace {
@@ -55,6 +58,7 @@ struct ObjLoss {
 struct ObjContents {
     std::vector<Vec3d> positions;             ///< NaN where they cannot be read.
     std::vector<Vec3d> normals;               ///< As they stand there; NaN where they cannot be read.
+    std::vector<std::array<double, 2>> uvs;   ///< Texture coordinates; 0 where they cannot be read.
     std::vector<ObjBlock> blocks;             ///< In the order of the file.
     std::vector<std::string> material_names;  ///< Of usemtl, each once.
     struct Library {
@@ -63,7 +67,7 @@ struct ObjContents {
     };
     std::vector<Library> libraries;  ///< The mtllib statements, each once.
 
-    ObjLoss bad_positions, bad_normals, small_faces;
+    ObjLoss bad_positions, bad_normals, bad_uvs, small_faces;
     std::uint64_t lines = 0, points = 0, free_forms = 0;  ///< Statements l, p, and curves or surfaces.
     bool vertex_colors = false;
 };

@@ -61,21 +61,21 @@ Json valueSchema(const KeySchema& key) {
         case ValueKind::Number:
             schema["type"] = key.kind == ValueKind::Integer ? "integer" : "number";
             addRange(schema, key.range);
-            return schema;
+            break;
         case ValueKind::Boolean: return {{"type", "boolean"}};
         case ValueKind::Text: return {{"type", "string"}, {"minLength", 1}};
         case ValueKind::Choice:
             schema["enum"] = key.choices;
-            if (!key.section.empty())
-                return {{"anyOf", Json::array({std::move(schema), familySchema(key.section)})}};
-            return schema;
+            break;
         case ValueKind::Spectrum:
             schema["type"] = "number";
             addRange(schema, key.range);
-            return {{"anyOf", Json::array({std::move(schema), reference("spectrum")})}};
+            schema = {{"anyOf", Json::array({std::move(schema), reference("spectrum")})}};
+            break;
         case ValueKind::Section: return familySchema(key.section);
     }
-    return schema;
+    if (key.section.empty()) return schema;
+    return {{"anyOf", Json::array({std::move(schema), familySchema(key.section)})}};
 }
 
 Json listSchema(Json items, int count_min, int count_max) {
@@ -257,6 +257,10 @@ std::string_view familyIntroduction(std::string_view family) {
                "- a number: the same at every wavelength;\n"
                "- text: the name of an entry of `spectra` (for `white_balance` also of an illuminant);\n"
                "- a map of one of the forms below.\n";
+    if (family == "texture")
+        return "A value that depends on the place: where a key takes a texture, it takes a map of one of "
+               "these forms, too. An alias (`&wood`, `*wood`) uses one several times; a file is read once "
+               "however often it is named.\n";
     if (family == "material") return "What light does at a surface. `type` picks one of these.\n";
     if (family == "light")
         return "A light without a surface: `lights` lists them, and `type` picks one of these. How bright "
@@ -279,16 +283,15 @@ std::string headingOf(const SectionSchema& section) {
 std::string linkTo(const std::string& family) { return fmt::format("[{0}](#{0})", family); }
 
 std::string kindText(const KeySchema& key) {
+    const std::string or_map =
+        key.section.empty() ? std::string() : fmt::format(", or a {} map", linkTo(key.section));
     switch (key.kind) {
         case ValueKind::Integer: return "whole number";
-        case ValueKind::Number: return "number";
+        case ValueKind::Number: return "number" + or_map;
         case ValueKind::Boolean: return "true or false";
         case ValueKind::Text: return "text";
-        case ValueKind::Choice: {
-            const std::string words = fmt::format("`{}`", fmt::join(key.choices, "`, `"));
-            return key.section.empty() ? words : fmt::format("{}, or a {} map", words, linkTo(key.section));
-        }
-        case ValueKind::Spectrum: return linkTo("spectrum");
+        case ValueKind::Choice: return fmt::format("`{}`{}", fmt::join(key.choices, "`, `"), or_map);
+        case ValueKind::Spectrum: return linkTo("spectrum") + or_map;
         case ValueKind::Section: return fmt::format("{} map", linkTo(key.section));
     }
     return {};

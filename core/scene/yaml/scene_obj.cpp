@@ -64,6 +64,7 @@ LoadedMesh* ObjectReader::load(const SectionReader& object, const std::string& p
         try {
             file->second = std::make_unique<LoadedMesh>(loadObj(path, options));
             for (const std::string& read : file->second->files) files_.note(read);
+            addMaps(*file->second, path);
         } catch (const Error& e) {
             if (e.kind() == ErrorKind::Internal) throw;
             object.error("obj", sentenceWithPlace(e));

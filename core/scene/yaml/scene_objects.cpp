@@ -85,8 +85,14 @@ std::optional<std::vector<Vec3d>> readPoints(const SectionReader& mesh, std::str
 
 }  // namespace
 
-ObjectReader::ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene)
-    : out_(out), files_(files), spectra_(spectra), scene_(scene), limit_(scene.input_bytes) {}
+ObjectReader::ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra,
+                           TextureReader& textures, Scene& scene)
+    : out_(out),
+      files_(files),
+      spectra_(spectra),
+      textures_(textures),
+      scene_(scene),
+      limit_(scene.input_bytes) {}
 
 ObjectReader::~ObjectReader() = default;
 
@@ -124,15 +130,27 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
     const auto take = [&](std::string_view key, SpectrumUse use, Spectrum& into) {
         if (std::optional<Spectrum> s = spectra_.read(*section, key, use)) into = *std::move(s);
     };
+    const auto takeReflectance = [&] {
+        if (TextureReader::isTexture(*section, "reflectance"))
+            material.reflectance_texture =
+                textures_.read(*section, "reflectance", TexelKind::Spectra).value_or(kNoTexture);
+        else
+            take("reflectance", SpectrumUse::Reflectance, material.reflectance);
+    };
+    const auto takeRoughness = [&] {
+        if (TextureReader::isTexture(*section, "roughness"))
+            material.roughness_texture =
+                textures_.read(*section, "roughness", TexelKind::Numbers).value_or(kNoTexture);
+        else
+            section->read("roughness", material.roughness);
+    };
     const std::string kind = variantWord(section->schema());
     for (const auto& [type, word] : kMaterialNames)
         if (kind == word) material.type = type;
     switch (material.type) {
         case MaterialType::Diffuse:
-        case MaterialType::Mirror:
-            take("reflectance", SpectrumUse::Reflectance, material.reflectance);
-            break;
-        case MaterialType::RoughConductor: section->read("roughness", material.roughness); [[fallthrough]];
+        case MaterialType::Mirror: takeReflectance(); break;
+        case MaterialType::RoughConductor: takeRoughness(); [[fallthrough]];
         case MaterialType::Conductor: {
             std::string metal;
             if (section->readWord("metal", metal))
@@ -141,7 +159,7 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
             take("k", SpectrumUse::Index, material.k);
             break;
         }
-        case MaterialType::RoughDielectric: section->read("roughness", material.roughness); [[fallthrough]];
+        case MaterialType::RoughDielectric: takeRoughness(); [[fallthrough]];
         case MaterialType::Dielectric:
             material.absorption = spectra_.read(*section, "absorption", SpectrumUse::Absorption);
             [[fallthrough]];
@@ -151,7 +169,7 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
             section->read("ior", ior);
             section->read("roughness", material.roughness);
             material.eta = constantSpectrum(ior);
-            take("reflectance", SpectrumUse::Reflectance, material.reflectance);
+            takeReflectance();
             break;
         }
     }
@@ -296,6 +314,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
                            fmt::format("normal {} has length 0", i));
         mesh.normals = *std::move(normals);
     }
+    readAttributes(section, mesh);
     if (faces->items.empty()) section.error("faces", "a mesh without faces cannot be seen");
 
     const KeySchema& row = *section.schema().find("faces");
@@ -353,6 +372,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
                    dropped, section.subject());
     }
     if (!mesh.normals.empty()) mesh.normal_index = mesh.triangles;
+    if (!mesh.uvs.empty()) mesh.uv_index = mesh.triangles;
     scene_.meshes.push_back(std::move(mesh));
     return static_cast<std::uint32_t>(scene_.meshes.size() - 1);
 }
@@ -406,6 +426,7 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
         scene_.emissions.push_back(std::move(emission));
     }
     object.mesh = mesh.value_or(0);
+    if (mesh) checkTextures(section, object);
     scene_.objects.push_back(std::move(object));
 }
 

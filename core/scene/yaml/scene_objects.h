@@ -5,6 +5,7 @@
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_spectra.h"
+#include "scene/yaml/scene_textures.h"
 
 #include <cstdint>
 #include <map>
@@ -19,7 +20,8 @@ namespace crt {
 
 class ObjectReader {
 public:
-    ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene);
+    ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, TextureReader& textures,
+                 Scene& scene);
 
     ~ObjectReader();
 
@@ -48,6 +50,9 @@ private:
     Mesh withSceneMaterials(LoadedMesh& loaded, std::uint32_t number, const std::string& path,
                             const Overrides& overrides);
     void checkOverrides(const SectionReader& object, const LoadedMesh& loaded, const Overrides& overrides);
+    void readAttributes(const SectionReader& section, Mesh& mesh) const;
+    void addMaps(LoadedMesh& loaded, const std::string& path);
+    void checkTextures(const SectionReader& section, const Object& object) const;
     void checkMaterials(const SectionReader& object, const LoadedMesh& loaded, const Mesh& mesh,
                         const ObjUse& use) const;
     std::optional<std::uint32_t> readMesh(const SectionReader& mesh);
@@ -69,6 +74,7 @@ private:
     Diagnostics& out_;
     SceneFiles& files_;
     SpectrumReader& spectra_;
+    TextureReader& textures_;
     Scene& scene_;
     std::map<std::string, NamedMaterial> materials_;
     std::vector<std::string> material_names_;  ///< In the order of the file.

@@ -4,6 +4,7 @@
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_schema_lights.h"
+#include "scene/yaml/scene_schema_textures.h"
 
 #include <fmt/format.h>
 
@@ -520,6 +521,12 @@ KeySchema roughnessKey(const char* smooth, const char* fallback = "") {
                                smooth)};
 }
 
+/// The same, where an image may stand, too.
+KeySchema textured(KeySchema key) {
+    key.section = "texture";
+    return key;
+}
+
 void addDielectrics(std::vector<SectionSchema>& all) {
     const auto index = [](const char* doc) {
         return KeySchema{.name = "ior",
@@ -549,7 +556,7 @@ void addDielectrics(std::vector<SectionSchema>& all) {
                    "refracts. Light that meets the surface twice at once is left out. Where it would blur "
                    "what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), it is taken for "
                    "smooth.",
-                   {typeKey("rough_dielectric"), ior, roughnessKey("smooth"), absorption}});
+                   {typeKey("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption}});
     all.push_back({"material/thin_dielectric",
                    "a thin_dielectric material",
                    "A window pane made of one sheet of faces: two parallel surfaces, between which light "
@@ -563,6 +570,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
     const KeySchema reflectance{.name = "reflectance",
                                 .kind = Kind::Spectrum,
                                 .range = {0, 1, false, false},
+                                .section = "texture",
                                 .required = true,
                                 .doc = "Fraction of light sent back, at every wavelength."};
     all.push_back(
@@ -592,7 +600,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
                    "A rough metal: microfacets of GGX's distribution, shadowed as Smith's heights "
                    "are. Light that meets it twice is left out, up to two thirds of it where it is "
                    "roughest. Give `metal`, or `eta` with `k`.",
-                   {typeKey("rough_conductor"), metal, eta, k, roughnessKey("a mirror")},
+                   {typeKey("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror"))},
                    metal_or_index});
     addDielectrics(all);
     all.push_back({"material/plastic",
@@ -691,6 +699,27 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .count_min = 3,
                         .count_max = 3,
                         .doc = "One per vertex, for smooth shading."},
+                       {.name = "uvs",
+                        .kind = Kind::Number,
+                        .shape = Shape::Lists,
+                        .count_min = 2,
+                        .count_max = 2,
+                        .range = {-kMostUv, kMostUv, false, false},
+                        .doc = "Texture coordinates [u, v], one per vertex: (0, 0) is the lower left corner "
+                               "of an image, (1, 1) the upper right."},
+                       {.name = "colors",
+                        .kind = Kind::Number,
+                        .shape = Shape::Lists,
+                        .count_min = 3,
+                        .count_max = 3,
+                        .range = {0, 1, false, false},
+                        .doc = "Reflectances [r, g, b] with sRGB primaries, one per vertex, for "
+                               "`{attribute: colors}`."},
+                       {.name = "color_space",
+                        .kind = Kind::Choice,
+                        .choices = {"srgb", "linear"},
+                        .fallback = "srgb",
+                        .doc = "Are `colors` sRGB-encoded or linear?"},
                    }});
     all.push_back({"transform/translate",
                    "a translation",
@@ -812,6 +841,7 @@ const std::vector<SectionSchema>& sceneSchema() {
     static const std::vector<SectionSchema> schema = [] {
         std::vector<SectionSchema> all{topLevel(), camera(), film(), filter(), integrator(), sampler()};
         addSpectra(all);
+        addTextures(all);
         addMaterials(all);
         addObjects(all);
         addLights(all);

@@ -14,8 +14,7 @@ enum class ValueKind {
     Number,
     Boolean,
     Text,
-    Choice,    ///< One of KeySchema::choices. Where `section` is set too, a map of that section will do
-               ///< instead.
+    Choice,    ///< One of KeySchema::choices.
     Spectrum,  ///< Number, name of a spectrum, or a map of one of the "spectrum/…" sections.
     Section,   ///< A map described by `section`.
 };
@@ -57,6 +56,7 @@ struct KeySchema {
     std::vector<std::string>
         choices{};  ///< In the order of the C++ enumeration they stand for, if there is one.
     std::string section{};               ///< Name of the section, or the part before '/' of its variants.
+                                         ///< Of other kinds: a map of it will do instead.
     std::string fallback{};              ///< The default, as YAML; empty when there is none.
     bool required = false;
     bool nullable = false;               ///< `null` says "none".

@@ -57,11 +57,15 @@ std::optional<Spectrum> SpectrumReader::read(const SectionReader& section, std::
                                              SpectrumUse use) {
     const YamlEntry* entry = section.find(key);
     if (entry == nullptr) return std::nullopt;
-    const std::string what = fmt::format("'{}' of {}", key, section.subject());
-    std::optional<Spectrum> spectrum = resolve(*entry->value, entry->place, what, use);
-    if (!spectrum) return std::nullopt;
+    return read(*entry->value, entry->place, fmt::format("'{}' of {}", key, section.subject()),
+                section.schema().find(key)->range, use);
+}
 
-    const ValueRange& range = section.schema().find(key)->range;
+std::optional<Spectrum> SpectrumReader::read(const YamlNode& node, const YamlPlace& place,
+                                             const std::string& what, const ValueRange& range,
+                                             SpectrumUse use) {
+    std::optional<Spectrum> spectrum = resolve(node, place, what, use);
+    if (!spectrum) return std::nullopt;
     const std::optional<std::size_t> worst = worstWavelength(*spectrum, range);
     if (!worst) return spectrum;
     const double value = (*spectrum)[*worst];
@@ -69,7 +73,7 @@ std::optional<Spectrum> SpectrumReader::read(const SectionReader& section, std::
                                   ? std::string()
                                   : fmt::format(" at {} nm", kWavelengthMin_nm + static_cast<int>(*worst));
     const std::string extreme = value > range.max && !spectrum->isConstant() ? "reaches" : "is";
-    out_.error(entry->place, fmt::format("{} {} {}{}; it must be {}", what, extreme, value, where,
+    out_.error(place, fmt::format("{} {} {}{}; it must be {}", what, extreme, value, where,
                                          std::isfinite(value) ? range.text() : "finite"));
     return std::nullopt;
 }

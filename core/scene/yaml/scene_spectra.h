@@ -24,6 +24,10 @@ public:
     /// The spectrum under `key`, checked against the range of the table. Nothing when it is absent or wrong.
     std::optional<Spectrum> read(const SectionReader& section, std::string_view key, SpectrumUse use);
 
+    /// The spectrum that `node` is; `what` as in messages.
+    std::optional<Spectrum> read(const YamlNode& node, const YamlPlace& place, const std::string& what,
+                                 const ValueRange& range, SpectrumUse use);
+
     /// Checks the named spectra that nothing used, and warns about them.
     void finish();
 

@@ -345,7 +345,8 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
         readIntegrator(*section, scene.integrator);
     if (const auto section = top.section("sampler", "sampler")) readSampler(*section, scene.sampler);
 
-    ObjectReader objects(out, files, spectra, scene);
+    TextureReader textures(out, files, spectra, scene);
+    ObjectReader objects(out, files, spectra, textures, scene);
     if (const YamlNode* map = top.map("materials")) objects.readMaterials(*map);
     if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
     if (const YamlNode* list = top.list("lights")) readLights(*list, out, spectra, scene);

@@ -1,0 +1,128 @@
+#include "compile/textures.h"
+
+#include "base/parallel.h"
+#include "base/stage.h"
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+
+namespace crt {
+namespace {
+
+const Texture& at(const Scene& scene, TextureIndex index) {
+    return scene.textures[static_cast<std::size_t>(index)];
+}
+
+/// (s, t) of the kernel, t down from the upper edge, from (u, v), v up.
+void setTransform(const Texture& texture, kernel::CrtTexture& record) {
+    const std::array<double, 6>& m = texture.transform;
+    const bool image = texture.kind == Texture::Kind::Image;
+    for (std::size_t i = 0; i < 3; ++i) {
+        record.from_uv[i] = static_cast<float>(m[i]);
+        record.from_uv[3 + i] = static_cast<float>(image ? (i == 2 ? 1 - m[5] : -m[3 + i]) : m[3 + i]);
+    }
+}
+
+std::uint32_t kindOf(const Texture& texture) {
+    switch (texture.kind) {
+        case Texture::Kind::Image:
+            return texture.image->kind == TexelKind::Spectra ? CRT_TEXTURE_SPECTRA : CRT_TEXTURE_NUMBERS;
+        case Texture::Kind::Checker: return CRT_TEXTURE_CHECKER;
+        case Texture::Kind::VertexColors: break;
+    }
+    return CRT_TEXTURE_VERTICES;
+}
+
+}  // namespace
+
+std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<const Material*>& materials) {
+    std::vector<bool> used(scene.textures.size());
+    const auto use = [&](TextureIndex index) {
+        if (index != kNoTexture) used[static_cast<std::size_t>(index)] = true;
+    };
+    for (const Material* material : materials)
+        if (material) {
+            use(material->reflectance_texture);
+            use(material->roughness_texture);
+        }
+    // From the last on: what a checker is made of comes before it.
+    std::vector<TextureIndex> all;
+    for (std::size_t i = used.size(); i-- > 0;) {
+        if (!used[i]) continue;
+        all.push_back(static_cast<TextureIndex>(i));
+        for (const TextureValue& value : scene.textures[i].values) use(value.texture);
+    }
+    std::reverse(all.begin(), all.end());
+    return all;
+}
+
+std::vector<const Spectrum*> spectraOfTextures(const Scene& scene,
+                                               const std::vector<TextureIndex>& textures) {
+    std::vector<const Spectrum*> all;
+    for (const TextureIndex index : textures)
+        if (at(scene, index).kind == Texture::Kind::Checker)
+            for (const TextureValue& value : at(scene, index).values)
+                if (value.texture == kNoTexture) all.push_back(&value.spectrum);
+    return all;
+}
+
+std::uint64_t texelBytes(const Scene& scene, const std::vector<TextureIndex>& textures) {
+    std::map<const TextureImage*, std::uint64_t> bytes;
+    for (const TextureIndex index : textures)
+        if (const auto& image = at(scene, index).image)
+            bytes[image.get()] = image->words() * sizeof(std::uint16_t) + sizeof(CompiledScene::Line);
+    std::uint64_t sum = 0;
+    for (const auto& [image, each] : bytes) sum += each;
+    return sum;
+}
+
+TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>& textures,
+                            const SpectrumTable& spectra, BlobWriter& blob) {
+    TexturePart part;
+    part.record_of.resize(scene.textures.size());
+    std::map<const TextureImage*, kernel::CrtSpan> span_of;
+    for (const TextureIndex index : textures) {
+        const Texture& texture = at(scene, index);
+        kernel::CrtTexture record{};
+        record.kind = kindOf(texture);
+        setTransform(texture, record);
+        if (texture.kind == Texture::Kind::Image) {
+            const TextureImage& image = *texture.image;
+            record.width = image.width;
+            record.height = image.height;
+            record.wrap = static_cast<std::uint32_t>(texture.wrap);
+            record.nearest = texture.filter == TextureFilter::Nearest;
+            const auto [known, fresh] = span_of.try_emplace(&image);
+            if (fresh) {
+                known->second = blob.appendFilled<std::uint16_t>(image.words(), [](auto) {});
+                part.images.emplace_back(&image, known->second);
+                part.texel_bytes += image.words() * sizeof(std::uint16_t);
+            }
+            record.texels = known->second;
+        } else if (texture.kind == Texture::Kind::Checker) {
+            const auto valueOf = [&](const TextureValue& value) {
+                return value.texture != kNoTexture ? part.valueOf(value.texture)
+                                                   : spectra.valueOf(value.spectrum);
+            };
+            record.even = valueOf(texture.values[0]);
+            record.odd = valueOf(texture.values[1]);
+        }
+        part.record_of[static_cast<std::size_t>(index)] = static_cast<std::uint32_t>(part.records.size());
+        part.records.push_back(record);
+    }
+    return part;
+}
+
+void decodeTextures(const TexturePart& part, BlobWriter& blob) {
+    if (part.images.empty()) return;
+    Stage stage("decoding textures", static_cast<double>(part.texel_bytes));
+    std::atomic<std::uint64_t> done{0};
+    parallelFor(part.images.size(), 1, [&](std::size_t i, std::size_t) {
+        const auto& [image, span] = part.images[i];
+        image->decode(blob.items<std::uint16_t>(span));
+        stage.at(static_cast<double>(done += span.count * sizeof(std::uint16_t)));
+    });
+}
+
+}  // namespace crt

@@ -1,0 +1,42 @@
+/// Values that depend on the place, as records and texels of the blob.
+#pragma once
+
+#include "compile/blob_writer.h"
+#include "compile/spectrum_table.h"
+#include "kernel/layout.h"
+#include "scene/scene.h"
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace crt {
+
+/// The textures of the scene that the materials name, and those of their checkers, in the scene's order.
+std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<const Material*>& materials);
+
+/// The spectra that compileTextures asks the table for.
+std::vector<const Spectrum*> spectraOfTextures(const Scene& scene,
+                                               const std::vector<TextureIndex>& textures);
+
+/// That their images take in the blob.
+std::uint64_t texelBytes(const Scene& scene, const std::vector<TextureIndex>& textures);
+
+struct TexturePart {
+    std::vector<kernel::CrtTexture> records;
+    std::vector<std::uint32_t> record_of;  ///< By the scene's number.
+    std::vector<std::pair<const TextureImage*, kernel::CrtSpan>> images;  ///< Each once.
+    std::uint64_t texel_bytes = 0;
+
+    kernel::CrtValue valueOf(TextureIndex texture) const {
+        return CRT_VALUE_TEXTURE | record_of[static_cast<std::size_t>(texture)];
+    }
+};
+/// Makes room in the blob for the texels, each image once.
+TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>& textures,
+                            const SpectrumTable& spectra, BlobWriter& blob);
+
+/// Fills the texels in, by threads. Throws crt::Error(Scene) for files that are damaged.
+void decodeTextures(const TexturePart& part, BlobWriter& blob);
+
+}  // namespace crt

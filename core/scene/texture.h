@@ -1,0 +1,63 @@
+/// Values of a scene that depend on the place on a surface.
+#pragma once
+
+#include "base/error.h"
+#include "spectra/spectra.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace crt {
+
+/// Index into Scene::textures; −1: the value is the same everywhere.
+using TextureIndex = std::int32_t;
+inline constexpr TextureIndex kNoTexture = -1;
+
+/// What the texels of an image are.
+enum class TexelKind {
+    Spectra,  ///< Reflectances: three words, the coefficients of a sigmoid (kernel/texture.h).
+    Numbers,  ///< In [0, 1]: one word, of 65535.
+};
+constexpr std::size_t wordsOf(TexelKind kind) { return kind == TexelKind::Spectra ? 3 : 1; }
+
+/// An image file, open for whoever needs its texels. They may be gigabytes: nobody holds them but the
+/// compiled scene, into which they are decoded.
+struct TextureImage {
+    std::string file;
+    std::uint32_t width = 0, height = 0;
+    TexelKind kind = TexelKind::Spectra;
+    /// Fills in the words of all texels, the top row first. Throws crt::Error(Scene) for a file that is
+    /// damaged, or whose texels are no values. [any thread]
+    std::function<void(std::span<std::uint16_t> words)> decode;
+
+    std::size_t words() const { return std::size_t{width} * height * wordsOf(kind); }
+};
+
+enum class TextureFilter { Bilinear, Nearest };
+enum class TextureWrap { Repeat, Mirror, Clamp };
+
+/// A value of its own, or another texture.
+struct TextureValue {
+    Spectrum spectrum;
+    TextureIndex texture = kNoTexture;
+};
+
+struct Texture {
+    enum class Kind { Image, Checker, VertexColors };
+    Kind kind = Kind::Image;
+    std::shared_ptr<const TextureImage> image;  ///< Image.
+    TextureFilter filter = TextureFilter::Bilinear;
+    TextureWrap wrap = TextureWrap::Repeat;
+    std::array<TextureValue, 2> values;  ///< Checker. Textures among them come before this one.
+    /// Texture coordinates → those of the image, both with v up: rows of two and an offset, (u', v') = (m0 u
+    /// + m1 v + m2, m3 u + m4 v + m5). The image is the unit square, as are the squares of a checker.
+    std::array<double, 6> transform{1, 0, 0, 0, 1, 0};
+    SourcePlace place;
+};
+
+}  // namespace crt

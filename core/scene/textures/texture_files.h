@@ -1,0 +1,40 @@
+/// Image files as textures: opened once for each use, and decoded into spectra or numbers.
+#pragma once
+
+#include "image/texels.h"
+#include "scene/texture.h"
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <tuple>
+
+namespace crt {
+
+/// How the texels of a file are read.
+struct TexelUse {
+    TexelKind kind = TexelKind::Spectra;
+    TexelColor color = TexelColor::Auto;  ///< Spectra. Numbers are taken as they are.
+    std::size_t channel = 0;              ///< Numbers: which of red, green and blue.
+
+    auto operator<=>(const TexelUse&) const = default;
+};
+
+/// The images of a scene. The same file, used in the same way, is one image.
+class TextureFiles {
+public:
+    /// Reads the header. Throws crt::Error(Scene) as texelsInfo() does.
+    std::shared_ptr<const TextureImage> open(const std::string& path, const TexelUse& use);
+
+private:
+    std::map<std::pair<std::string, TexelUse>, std::shared_ptr<const TextureImage>> open_;
+};
+
+/// The three words of a texel that has this reflectance: its sigmoid's coefficients with an error of 2⁻¹⁵ to
+/// 2⁻¹³ of the power of two above the largest. Beyond ±8191, where the sigmoid is 0 or 1, all are scaled
+/// down.
+std::array<std::uint16_t, 3> texelOf(const std::array<float, 3>& coefficients);
+
+}  // namespace crt

@@ -1,0 +1,135 @@
+/// The part of ObjectReader that reads what meshes have at their vertices beside positions and normals, and
+/// asks whether a mesh has what its materials need.
+#include "scene/yaml/scene_objects.h"
+
+#include "base/log.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace crt {
+namespace {
+
+/// What a texture needs of a mesh, that of its parts too.
+struct Needs {
+    bool uvs = false, colors = false;
+};
+
+Needs needsOf(const Scene& scene, TextureIndex index) {
+    Needs needs;
+    std::set<TextureIndex> waiting{index};
+    while (!waiting.empty()) {
+        const TextureIndex next = *waiting.begin();
+        waiting.erase(waiting.begin());
+        if (next == kNoTexture) continue;
+        const Texture& texture = scene.textures[static_cast<std::size_t>(next)];
+        (texture.kind == Texture::Kind::VertexColors ? needs.colors : needs.uvs) = true;
+        for (const TextureValue& value : texture.values) waiting.insert(value.texture);
+    }
+    return needs;
+}
+
+Needs needsOf(const Scene& scene, const Material& material) {
+    const Needs a = needsOf(scene, material.reflectance_texture),
+                b = needsOf(scene, material.roughness_texture);
+    return {a.uvs || b.uvs, a.colors || b.colors};
+}
+
+/// Lists of numbers, one of them for each position. Nothing where the key is not there, or wrong.
+std::vector<std::vector<double>> readPerVertex(const SectionReader& mesh, std::string_view key,
+                                               const char* one, std::size_t positions) {
+    const YamlNode* list = mesh.list(key);
+    if (list == nullptr) return {};
+    std::vector<std::vector<double>> all;
+    all.reserve(list->items.size());
+    const KeySchema& row = *mesh.schema().find(key);
+    bool good = true;
+    for (std::size_t i = 0; i < list->items.size(); ++i) {
+        const YamlNode& item = *list->items[i];
+        std::vector<double> values;
+        good &= readNumbers(mesh.diagnostics(), item, item.place, row, fmt::format("{} {}", one, i), values);
+        all.push_back(std::move(values));
+    }
+    if (good && all.size() != positions) {
+        mesh.error(key, fmt::format("there are {} {} for {} positions", all.size(), key, positions));
+        good = false;
+    }
+    return good ? all : std::vector<std::vector<double>>{};
+}
+
+}  // namespace
+
+void ObjectReader::readAttributes(const SectionReader& section, Mesh& mesh) const {
+    const std::size_t positions = mesh.positions.size();
+    for (const std::vector<double>& uv : readPerVertex(section, "uvs", "texture coordinates", positions))
+        mesh.uvs.push_back({uv[0], uv[1]});
+    bool linear = false;
+    section.readEnum("color_space", linear);  // The choices are srgb and linear.
+    for (const std::vector<double>& c : readPerVertex(section, "colors", "colour", positions)) {
+        std::array<float, 3> color;
+        for (std::size_t k = 0; k < 3; ++k)
+            color[k] = static_cast<float>(linear ? c[k] : srgbToLinear(c[k]));
+        mesh.colors.push_back(color);
+    }
+    if (section.has("color_space") && !section.has("colors"))
+        section.error("color_space", "there are no 'colors' that it could be about");
+}
+
+void ObjectReader::checkTextures(const SectionReader& section, const Object& object) const {
+    if (scene_.textures.empty()) return;
+    const Mesh& mesh = scene_.meshes[object.mesh];
+    std::set<std::int32_t> materials(mesh.material.begin(), mesh.material.end());
+    if (mesh.material.empty() || materials.contains(-1)) materials.insert(object.material);
+    materials.erase(-1);
+    const std::string_view named = section.has("material") ? "material"
+                                   : section.has("obj")    ? "obj"
+                                                           : "mesh";
+    for (const std::int32_t index : materials) {
+        const Material& material = scene_.materials[static_cast<std::size_t>(index)];
+        const Needs needs = needsOf(scene_, material);
+        if (needs.uvs && mesh.uvs.empty())
+            section.error(named,
+                          fmt::format("material '{}' has a texture, but the mesh of {} has no texture "
+                                      "coordinates",
+                                      material.name, section.subject()),
+                          section.has("obj") ? "" : "give the mesh 'uvs', one [u, v] for each position");
+        if (needs.colors && mesh.colors.empty())
+            section.error(named,
+                          fmt::format("material '{}' asks for colours of vertices, but the mesh of {} has "
+                                      "none",
+                                      material.name, section.subject()),
+                          section.has("obj") ? "only meshes that are written out have them"
+                                             : "give the mesh 'colors', one [r, g, b] for each position");
+    }
+}
+
+/// Images that the materials of an OBJ name take the place of their Kd where they can be read; else Kd
+/// stays, with a warning.
+void ObjectReader::addMaps(LoadedMesh& loaded, const std::string& path) {
+    std::size_t without_uvs = 0;
+    for (LoadedMaterial& material : loaded.materials) {
+        if (!material.mtl || !material.mtl->map_kd) continue;
+        const MtlMap& map = *material.mtl->map_kd;
+        if (loaded.mesh.uvs.empty()) {
+            ++without_uvs;
+            continue;
+        }
+        try {
+            material.mtl->material.reflectance_texture = textures_.addImage(
+                map.file, map.transform, map.clamp ? TextureWrap::Clamp : TextureWrap::Repeat, map.place);
+        } catch (const Error& e) {
+            if (e.kind() == ErrorKind::Internal) throw;
+            logWarning("{}:{}: {}; the Kd beside it counts", map.place.file, map.place.line, e.what());
+        }
+    }
+    if (without_uvs > 0)
+        logWarning("{}: map_Kd of {} material{} left out: the file has no texture coordinates (vt)", path,
+                   without_uvs, without_uvs == 1 ? "" : "s");
+}
+
+}  // namespace crt

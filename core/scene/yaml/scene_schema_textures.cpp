@@ -1,0 +1,106 @@
+#include "scene/yaml/scene_schema_textures.h"
+
+#include <string>
+
+namespace crt {
+namespace {
+
+using Kind = ValueKind;
+using Shape = ValueShape;
+
+constexpr ValueRange kTurns{-kMostUv, kMostUv, false, false};
+
+/// What texture coordinates go through, whatever they pick.
+std::vector<KeySchema> transformKeys() {
+    return {{.name = "scale",
+             .kind = Kind::Number,
+             .shape = Shape::OneOrList,
+             .count_min = 2,
+             .count_max = 2,
+             .range = kTurns,
+             .fallback = "1",
+             .doc = "Factor on u and v, one for both or [for u, for v], applied first: 4 repeats an image "
+                    "four times, -1 mirrors it."},
+            {.name = "rotation_deg",
+             .kind = Kind::Number,
+             .range = kTurns,
+             .unit = "degrees",
+             .fallback = "0",
+             .doc = "Then (u, v) is turned counter-clockwise about (0, 0), which turns the picture "
+                    "clockwise."},
+            {.name = "offset",
+             .kind = Kind::Number,
+             .shape = Shape::List,
+             .count_min = 2,
+             .count_max = 2,
+             .range = kTurns,
+             .fallback = "[0, 0]",
+             .doc = "Then [u, v] is added."}};
+}
+
+SectionSchema with(SectionSchema section, const std::vector<KeySchema>& keys) {
+    section.keys.insert(section.keys.end(), keys.begin(), keys.end());
+    return section;
+}
+
+}  // namespace
+
+void addTextures(std::vector<SectionSchema>& all) {
+    all.push_back(with(
+        {"texture/texture",
+         "a texture",
+         "An image on a surface with texture coordinates (`uvs` of a mesh, `vt` of an OBJ): (0, 0) is the "
+         "lower left corner of the image, (1, 1) the upper right. Colours become spectra as `rgb` does; "
+         "alpha is not looked at.",
+         {{.name = "texture",
+           .required = true,
+           .doc = "A PNG, JPEG, EXR, Radiance HDR or PFM, by content; looked up beside the scene, then in "
+                  "CRT_MESH_PATH."},
+          {.name = "color_space",
+           .kind = Kind::Choice,
+           .choices = {"auto", "srgb", "linear", "raw"},
+           .fallback = "auto",
+           .doc = "Are the numbers sRGB-encoded, linear, or to be taken as they are (`raw`: for what is no "
+                  "colour)? `auto` is srgb for 8 and 16 bits, linear for floats, raw where the key wants a "
+                  "number. Reflectances above 1 are clamped, with a warning."},
+          {.name = "channel",
+           .kind = Kind::Choice,
+           .choices = {"red", "green", "blue"},
+           .fallback = "red",
+           .doc = "Of an image in colours, where the key wants a number."},
+          {.name = "filter",
+           .kind = Kind::Choice,
+           .choices = {"bilinear", "nearest"},
+           .fallback = "bilinear",
+           .doc = "Between texels: linear in reflectance, at every wavelength; or the texel itself."},
+          {.name = "wrap",
+           .kind = Kind::Choice,
+           .choices = {"repeat", "mirror", "clamp"},
+           .fallback = "repeat",
+           .doc = "Beyond the image: the image again, the image mirrored, or its edge."}}},
+        transformKeys()));
+    all.push_back(with({"texture/checker",
+                        "a checker",
+                        "Squares of two values in turn, of side 1 in u and v, on a surface with texture "
+                        "coordinates.",
+                        {{.name = "checker",
+                          .kind = Kind::Spectrum,
+                          .shape = Shape::List,
+                          .count_min = 2,
+                          .count_max = 2,
+                          .section = "texture",
+                          .required = true,
+                          .doc = "The value of the square from (0, 0) to (1, 1), and of its neighbours. "
+                                 "Each may be a texture."}}},
+                       transformKeys()));
+    all.push_back({"texture/attribute",
+                   "an attribute",
+                   "What a mesh has at its vertices, linear between them at every wavelength.",
+                   {{.name = "attribute",
+                     .kind = Kind::Choice,
+                     .choices = {"colors"},
+                     .required = true,
+                     .doc = "`colors` of a mesh that is written out."}}});
+}
+
+}  // namespace crt

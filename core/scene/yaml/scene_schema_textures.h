@@ -1,0 +1,15 @@
+/// The part of the scene schema (scene_schema.h) that is about textures.
+#pragma once
+
+#include "scene/yaml/scene_schema.h"
+
+#include <vector>
+
+namespace crt {
+
+/// Beyond this texture coordinates have no digits left for the texel.
+inline constexpr double kMostUv = 1e6;
+
+void addTextures(std::vector<SectionSchema>& all);
+
+}  // namespace crt

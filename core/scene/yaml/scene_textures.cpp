@@ -1,0 +1,197 @@
+#include "scene/yaml/scene_textures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <set>
+#include <utility>
+#include <vector>
+
+namespace crt {
+namespace {
+
+/// Sine of an angle in degrees, exact at multiples of 90°.
+double sineOfDegrees(double degrees) {
+    const double turn = std::remainder(degrees, 360.0);
+    if (turn == 0 || std::abs(turn) == 180) return 0;
+    if (std::abs(turn) == 90) return std::copysign(1.0, turn);
+    return std::sin(turn * (std::numbers::pi / 180));
+}
+
+}  // namespace
+
+TextureReader::TextureReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene)
+    : out_(out), files_(files), spectra_(spectra), scene_(scene) {}
+
+bool TextureReader::isTexture(const SectionReader& section, std::string_view key) {
+    const YamlEntry* entry = section.find(key);
+    if (entry == nullptr || entry->value->kind != YamlKind::Map) return false;
+    for (const SectionSchema* variant : schemaVariants("texture"))
+        if (entry->value->find(variantWord(*variant)) != nullptr) return true;
+    // A number cannot be a map of another kind: let a misspelt texture be told as one.
+    return section.schema().find(key)->kind == ValueKind::Number;
+}
+
+std::optional<TextureIndex> TextureReader::read(const SectionReader& section, std::string_view key,
+                                                TexelKind kind) {
+    const YamlEntry* entry = section.find(key);
+    return readForm(*entry->value, entry->place, fmt::format("'{}' of {}", key, section.subject()),
+                    *section.schema().find(key), kind);
+}
+
+TextureIndex TextureReader::add(Texture texture) {
+    scene_.textures.push_back(std::move(texture));
+    return static_cast<TextureIndex>(scene_.textures.size() - 1);
+}
+
+std::optional<TextureIndex> TextureReader::readForm(const YamlNode& node, const YamlPlace& place,
+                                                    const std::string& what, const KeySchema& row,
+                                                    TexelKind kind) {
+    const auto [known, fresh] = written_.try_emplace({&node, kind});
+    if (!fresh) return known->second;
+    const std::optional<SectionReader> form = openVariant(out_, node, place, "texture", what);
+    if (!form) return std::nullopt;
+    const std::string word = variantWord(form->schema());
+    std::optional<Texture> texture;
+    if (word == "texture") {
+        texture = readImage(*form, kind);
+    } else if (word == "checker") {
+        texture = readChecker(*form, row, kind);
+    } else {
+        texture.emplace().kind = Texture::Kind::VertexColors;
+        if (kind == TexelKind::Numbers) {
+            form->error("attribute",
+                        fmt::format("{} is a number, and colours of vertices are colours", what));
+            return std::nullopt;
+        }
+    }
+    if (!texture) return std::nullopt;
+    texture->place = place.resolved();
+    return written_[{&node, kind}] = add(*std::move(texture));
+}
+
+/// (u, v) is scaled, turned and moved, in this order: a scale of 4 puts four images side by side.
+void TextureReader::readTransform(const SectionReader& form, Texture& texture) {
+    std::vector<double> scale{1, 1}, offset{0, 0};
+    double degrees = 0;
+    if (const YamlEntry* given = form.find("scale")) {
+        if (given->value->kind == YamlKind::List) {
+            form.read("scale", scale);
+        } else if (double both = 1; form.read("scale", both)) {
+            scale = {both, both};
+        }
+    }
+    form.read("offset", offset);
+    form.read("rotation_deg", degrees);
+    const double s = sineOfDegrees(degrees),
+                 c = sineOfDegrees(90 - std::abs(std::remainder(degrees, 360.0)));
+    texture.transform = {c * scale[0], -s * scale[1], offset[0], s * scale[0], c * scale[1], offset[1]};
+}
+
+std::optional<Texture> TextureReader::readImage(const SectionReader& form, TexelKind kind) {
+    Texture texture;
+    form.readEnum("filter", texture.filter);
+    form.readEnum("wrap", texture.wrap);
+    readTransform(form, texture);
+    TexelUse use{.kind = kind};
+    std::string space = "auto";
+    form.readWord("color_space", space);
+    use.color = space == "srgb" ? TexelColor::Srgb : space == "auto" ? TexelColor::Auto : TexelColor::Linear;
+    if (kind == TexelKind::Numbers) {
+        use.color = TexelColor::Auto;
+        if (space == "srgb" || space == "linear")
+            form.error("color_space",
+                       fmt::format("the texels are numbers here, not colours; '{}' would bend them", space),
+                       "write 'color_space: raw', or leave it out");
+        form.readEnum("channel", use.channel);
+    } else if (form.has("channel")) {
+        form.error("channel", "the texels are colours here; 'channel' picks one for a number");
+    }
+    std::string name;
+    if (!form.read("texture", name)) return std::nullopt;
+    const std::optional<std::string> path = files_.locate(name, form.place("texture"), out_);
+    if (!path) return std::nullopt;
+    try {
+        texture.image = images_.open(*path, use);
+        requireRoom(*texture.image, *path);
+    } catch (const Error& e) {
+        if (e.kind() == ErrorKind::Internal) throw;
+        form.error("texture", e.what());
+        return std::nullopt;
+    }
+    files_.note(*path);
+    return texture;
+}
+
+bool TextureReader::readPart(const YamlNode& node, const std::string& what, const KeySchema& row,
+                             TexelKind kind, TextureValue& value) {
+    const auto isForm = [&] {
+        if (node.kind != YamlKind::Map) return false;
+        for (const SectionSchema* variant : schemaVariants("texture"))
+            if (node.find(variantWord(*variant)) != nullptr) return true;
+        return kind == TexelKind::Numbers;
+    };
+    if (isForm()) {
+        const std::optional<TextureIndex> texture = readForm(node, node.place, what, row, kind);
+        value.texture = texture.value_or(kNoTexture);
+        return texture.has_value();
+    }
+    if (kind == TexelKind::Numbers) {
+        double number = 0;
+        if (!readScalar(out_, node, node.place, row, what, number)) return false;
+        value.spectrum = constantSpectrum(number);
+        return true;
+    }
+    std::optional<Spectrum> spectrum =
+        spectra_.read(node, node.place, what, row.range, SpectrumUse::Reflectance);
+    if (spectrum) value.spectrum = *std::move(spectrum);
+    return spectrum.has_value();
+}
+
+std::optional<Texture> TextureReader::readChecker(const SectionReader& form, const KeySchema& row,
+                                                  TexelKind kind) {
+    Texture texture;
+    texture.kind = Texture::Kind::Checker;
+    readTransform(form, texture);
+    const YamlNode* const list = form.list("checker");
+    if (list == nullptr) return std::nullopt;
+    if (list->items.size() != 2) {
+        form.error("checker", fmt::format("a checker has two values, not {}", list->items.size()));
+        return std::nullopt;
+    }
+    bool good = true;
+    for (std::size_t i = 0; i < 2; ++i)
+        good &= readPart(*list->items[i], fmt::format("value {} of {}", i + 1, form.subject()), row, kind,
+                         texture.values[i]);
+    if (!good) return std::nullopt;
+    return texture;
+}
+
+/// Stops at the image that makes the scene larger than its files allow (scene_limits.h).
+void TextureReader::requireRoom(const TextureImage& image, const std::string& path) {
+    if (!bytes_of_.try_emplace(&image, image.words()).second) return;
+    std::error_code unknown;
+    const std::uintmax_t size = std::filesystem::file_size(path, unknown);
+    bytes_ += 2 * image.words();
+    file_bytes_ += unknown ? 0 : size;
+    const std::string why =
+        ExpansionLimit(scene_.input_bytes + file_bytes_).refusal(bytes_, "bytes of texels", 1);
+    if (!why.empty()) throw Error(ErrorKind::Scene, why);
+}
+
+TextureIndex TextureReader::addImage(const std::string& path, const std::array<double, 6>& transform,
+                                     TextureWrap wrap, const SourcePlace& place) {
+    Texture texture;
+    texture.image = images_.open(path, {});
+    requireRoom(*texture.image, path);
+    files_.note(path);
+    texture.wrap = wrap;
+    texture.transform = transform;
+    texture.place = place;
+    return add(std::move(texture));
+}
+
+}  // namespace crt

@@ -1,0 +1,55 @@
+/// Values of a scene that depend on the place: images, checkers, colours of vertices.
+#pragma once
+
+#include "scene/scene.h"
+#include "scene/scene_limits.h"
+#include "scene/textures/texture_files.h"
+#include "scene/yaml/scene_spectra.h"
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <tuple>
+
+namespace crt {
+
+class TextureReader {
+public:
+    /// All references live as long as the reader.
+    TextureReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene);
+
+    /// Whether the value under `key` is written as a texture.
+    static bool isTexture(const SectionReader& section, std::string_view key);
+
+    /// The texture under `key`, put into the scene. Nothing when it is wrong, which is told.
+    std::optional<TextureIndex> read(const SectionReader& section, std::string_view key, TexelKind kind);
+
+    /// An image of a material file, as a reflectance. Throws crt::Error(Scene) where it cannot be read.
+    TextureIndex addImage(const std::string& path, const std::array<double, 6>& transform, TextureWrap wrap,
+                          const SourcePlace& place);
+
+private:
+    std::optional<TextureIndex> readForm(const YamlNode& node, const YamlPlace& place,
+                                         const std::string& what, const KeySchema& row, TexelKind kind);
+    std::optional<Texture> readImage(const SectionReader& form, TexelKind kind);
+    std::optional<Texture> readChecker(const SectionReader& form, const KeySchema& row, TexelKind kind);
+    bool readPart(const YamlNode& node, const std::string& what, const KeySchema& row, TexelKind kind,
+                  TextureValue& value);
+    void readTransform(const SectionReader& form, Texture& texture);
+    void requireRoom(const TextureImage& image, const std::string& path);
+    TextureIndex add(Texture texture);
+
+    Diagnostics& out_;
+    SceneFiles& files_;
+    SpectrumReader& spectra_;
+    Scene& scene_;
+    TextureFiles images_;
+    std::map<std::pair<const YamlNode*, TexelKind>, std::optional<TextureIndex>>
+        written_;  ///< By node: what an alias repeats is read once.
+    std::map<const TextureImage*, std::uint64_t> bytes_of_;
+    std::uint64_t bytes_ = 0, file_bytes_ = 0;
+};
+
+}  // namespace crt

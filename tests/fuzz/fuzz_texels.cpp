@@ -1,0 +1,27 @@
+// Image files as values of a scene: PNG, JPEG, EXR, HDR and PFM, header and pixels, as textures read them.
+#include "fuzz_target.h"
+
+#include "image/texels.h"
+
+/// Opens the codec module before the first run, or libFuzzer would not count what it covers.
+extern "C" int LLVMFuzzerInitialize(int*, char***) {
+    const crt::fuzz::Directory directory;
+    const std::string path = directory.write("empty.exr", std::string_view("\x76\x2f\x31\x01", 4));
+    crt::fuzz::expectRefusalOrSuccess(crt::ErrorKind::Scene, [&] { crt::texelsInfo(path); });
+    return 0;
+}
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    using namespace crt;
+    static const fuzz::Directory directory;
+    const std::string path = directory.write("a.image", data, size);
+    fuzz::expectRefusalOrSuccess(ErrorKind::Scene, [&] {
+        const Texels texels = readTexels(path);
+        if (texels.bytes.size() != texels.info.bytes() || texels.info.count() > kMostTexels ||
+            (texels.info.channels != 1 && texels.info.channels != 3))
+            fuzz::finding("texels", "are not what their size and channels say");
+        if (linearRgb(texels, TexelColor::Auto, path).size() != 3 * texels.info.count())
+            fuzz::finding("texels", "are not as many as the pixels");
+    });
+    return 0;
+}
