@@ -24,11 +24,21 @@ def beyond(confidence, of, dof):
     return float(np.interp(confidence ** (1 / of), 0.5 + 0.5 * below / below[-1], t))
 
 
+def write_picture(path):
+    """What textured scenes show: colours that change across and down, and a corner that is unlike the
+    others."""
+    v, u = np.mgrid[0:12, 0:16] / 16
+    rgb = np.stack([0.15 + 0.7 * u, 0.2 + 0.6 * v, 0.75 - 0.5 * u * v], axis=2)
+    rgb[:3, :4] = [0.8, 0.1, 0.1]
+    mi.Bitmap(np.round(255 * rgb).astype(np.uint8)).write(str(path))
+
+
 def crt_image(program, backend, file, samples, seed):
     """XYZ, (height, width, 3), rows from the top."""
     image = program.scratch / "image.pfm"
     settings = ["film.color_space=xyz", f"sampler.seed={seed}"]
-    program.render(file, backend, ["--spp", samples], [image], settings)
+    where = {"CRT_MESH_PATH": str(program.scratch)}
+    program.render(file, backend, ["--spp", samples], [image], settings, environment=where)
     data = image.read_bytes()
     header = re.match(rb"PF\n(\d+) (\d+)\n-[0-9.]+\n", data)
     width, height = int(header[1]), int(header[2])
@@ -50,6 +60,10 @@ class Agreement:
         self.tiles_se = np.sqrt(va + vb / self.ratio**2) / whole
         # At least so many, however unlike the two variances are (Welch).
         self.dof = len(ours.images) - 1
+
+    def reach(self):
+        """Half of the ratio's 95 % interval."""
+        return beyond(0.975, 1, self.dof) * self.ratio_se
 
     def mean_agrees(self):
         """Two one-sided tests."""
@@ -90,6 +104,7 @@ def measure(program, arguments):
             raise Failure(f"there is no {FOLDER}/{sorted(unknown)[0]}.yaml")
     results = Results(program, arguments, "agree", "Do crt and Mitsuba 3 agree?")
     results.tool = "bench/agree"
+    write_picture(program.scratch / "picture.png")
     rows, notes, failed = [], [], 0
     for file in files:
         documented = agree_scene.difference(file)
@@ -104,7 +119,7 @@ def measure(program, arguments):
         rows.append(
             [
                 f"`{file.stem}`: {agree_scene.title(file)}",
-                f"{found.ratio - 1:+.3%} ± {beyond(0.975, 1, found.dof) * found.ratio_se:.3%}",
+                f"{found.ratio - 1:+.3%} ± {found.reach():.3%}",
                 f"{np.abs(found.tiles).max():.2%}",
                 f"{found.worst_excess():.1f}",
                 f"**{said}**",
@@ -125,8 +140,8 @@ def measure(program, arguments):
     results.paragraph(
         f"Scenes of `{FOLDER}`, translated by `bench/crtbench/agree_scene.py`, rendered {renders} times by "
         f"crt on `{backend}` and by Mitsuba {mi.__version__} (`{arguments.variant}`) with {samples} samples "
-        f"a pixel and seeds of their own. *Mean*: luminance of Mitsuba's image over that of crt's, less one, "
-        f"with its 95 % interval. It agrees when two one-sided tests at 95 % put it within "
+        f"a pixel and seeds of their own. *Mean*: luminance of Mitsuba's image over that of crt's, less "
+        f"one, with its 95 % interval. It agrees when two one-sided tests at 95 % put it within "
         f"{MARGIN:.1%}. *Worst tile*: the largest difference in one of {TILES} × {TILES} tiles after that "
         f"common factor, in units of the image's mean. *Excess*: what is beyond {MARGIN:.1%} of it, in "
         f"standard errors; chance gives up to {bound:.2f} in one of {TILES * TILES} tiles at 95 %. Both "

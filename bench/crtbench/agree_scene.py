@@ -27,6 +27,41 @@ def spectrum(given):
     return {"type": "rgb", "value": given["rgb"]}
 
 
+def uv_transform(given):
+    """Scale, then rotation about (0, 0), then offset."""
+    scale = given.get("scale", 1)
+    u, v = scale if isinstance(scale, list) else (scale, scale)
+    offset = given.get("offset", [0, 0])
+    turn = mi.ScalarTransform4f().rotate([0, 0, 1], given.get("rotation_deg", 0))
+    return (
+        mi.ScalarTransform4f().translate([*offset, 0]) @ turn @ mi.ScalarTransform4f().scale([u, v, 1])
+    )
+
+
+def texture(given, folder):
+    """A spectrum, or a map of one of the forms of a texture."""
+    placed = {"scale", "rotation_deg", "offset"}
+    if isinstance(given, dict) and "texture" in given:
+        refuse_all_but("a texture", given, {"texture", *placed})
+        return {
+            "type": "bitmap",
+            "filename": str(folder / given["texture"]),
+            "to_uv": uv_transform(given),
+        }
+    if isinstance(given, dict) and "checker" in given:
+        refuse_all_but("a checker", given, {"checker", *placed})
+        one, other = given["checker"]
+        # Mitsuba's squares have a side of one half.
+        half = mi.ScalarTransform4f().scale([0.5, 0.5, 1])
+        return {
+            "type": "checkerboard",
+            "color0": spectrum(one),
+            "color1": spectrum(other),
+            "to_uv": half @ uv_transform(given),
+        }
+    return spectrum(given)
+
+
 def alpha(roughness):
     """Width of GGX."""
     return roughness**2
@@ -37,12 +72,12 @@ def two_sided(bsdf):
     return {"type": "twosided", "bsdf": bsdf}
 
 
-def diffuse(given):
+def diffuse(given, folder):
     refuse_all_but("a diffuse material", given, {"type", "reflectance"})
-    return two_sided({"type": "diffuse", "reflectance": spectrum(given["reflectance"])})
+    return two_sided({"type": "diffuse", "reflectance": texture(given["reflectance"], folder)})
 
 
-def rough_conductor(given):
+def rough_conductor(given, folder):
     refuse_all_but("a rough conductor", given, {"type", "eta", "k", "roughness"})
     return two_sided(
         {
@@ -55,14 +90,44 @@ def rough_conductor(given):
     )
 
 
-def conductor(given):
+def conductor(given, folder):
     refuse_all_but("a conductor", given, {"type", "eta", "k"})
     return two_sided({"type": "conductor", "eta": spectrum(given["eta"]), "k": spectrum(given["k"])})
 
 
-def dielectric(given):
+def dielectric(given, folder):
     refuse_all_but("a dielectric", given, {"type", "ior"})
     return {"type": "dielectric", "int_ior": float(given["ior"]), "ext_ior": 1.0}
+
+
+def rough_dielectric(given, folder):
+    refuse_all_but("a rough dielectric", given, {"type", "ior", "roughness"})
+    return {
+        "type": "roughdielectric",
+        "distribution": "ggx",
+        "alpha": alpha(given["roughness"]),
+        "int_ior": float(given["ior"]),
+        "ext_ior": 1.0,
+    }
+
+
+def thin_dielectric(given, folder):
+    refuse_all_but("a thin dielectric", given, {"type", "ior"})
+    return {"type": "thindielectric", "int_ior": float(given["ior"]), "ext_ior": 1.0}
+
+
+def plastic(given, folder):
+    refuse_all_but("a plastic", given, {"type", "ior", "roughness", "reflectance"})
+    made = {
+        "type": "plastic",
+        "diffuse_reflectance": texture(given["reflectance"], folder),
+        "int_ior": float(given.get("ior", 1.5)),
+        "ext_ior": 1.0,
+        "nonlinear": True,
+    }
+    if given.get("roughness", 0) > 0:
+        made |= {"type": "roughplastic", "distribution": "ggx", "alpha": alpha(given["roughness"])}
+    return two_sided(made)
 
 
 MATERIALS = {
@@ -70,19 +135,22 @@ MATERIALS = {
     "conductor": conductor,
     "rough_conductor": rough_conductor,
     "dielectric": dielectric,
+    "rough_dielectric": rough_dielectric,
+    "thin_dielectric": thin_dielectric,
+    "plastic": plastic,
 }
 
 
-def material(given):
+def material(given, folder):
     if given["type"] not in MATERIALS:
         raise Failure(f"the material '{given['type']}' cannot be translated for Mitsuba")
-    return MATERIALS[given["type"]](given)
+    return MATERIALS[given["type"]](given, folder)
 
 
 def shape(mesh):
     """Flat triangles without common vertices; polygons as fans from their first corner, as crt splits
     them."""
-    refuse_all_but("a mesh", mesh, {"positions", "faces"})
+    refuse_all_but("a mesh", mesh, {"positions", "faces", "uvs"})
     positions = np.array(mesh["positions"], dtype=np.float64)
     corners = np.array(
         [
@@ -91,9 +159,11 @@ def shape(mesh):
             for i in range(1, len(face) - 1)
         ]
     ).reshape(-1)
-    made = mi.Mesh("mesh", len(corners), len(corners) // 3)
+    made = mi.Mesh("mesh", len(corners), len(corners) // 3, has_vertex_texcoords="uvs" in mesh)
     parameters = mi.traverse(made)
     parameters["vertex_positions"] = positions[corners].astype(np.float32).reshape(-1)
+    if "uvs" in mesh:
+        parameters["vertex_texcoords"] = np.array(mesh["uvs"], dtype=np.float32)[corners].reshape(-1)
     parameters["faces"] = np.arange(len(corners), dtype=np.uint32)
     parameters.update()
     return made
@@ -152,7 +222,7 @@ def light(given):
 
 
 def translate(file, folder, samples):
-    """The dictionary that mi.load_dict takes. Meshes go to `folder`."""
+    """The dictionary that mi.load_dict takes. Meshes go to `folder`, where images are."""
     given = scene_file.load(file)
     known = "crt title camera film integrator sampler materials objects lights environment"
     refuse_all_but("the scene", given, known.split())
@@ -194,7 +264,7 @@ def translate(file, folder, samples):
     for number, thing in enumerate(given["objects"]):
         refuse_all_but("an object", thing, {"name", "mesh", "material", "emission"})
         part = write_shape(thing["mesh"], folder / f"{number}.ply")
-        part["bsdf"] = material(given["materials"][thing["material"]])
+        part["bsdf"] = material(given["materials"][thing["material"]], folder)
         if "emission" in thing:
             refuse_all_but("an emission", thing["emission"], {"radiance"})
             part["emitter"] = {"type": "area", "radiance": spectrum(thing["emission"]["radiance"])}
