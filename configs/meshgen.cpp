@@ -1,5 +1,5 @@
-/// crt-meshgen OUTDIR: writes the meshes that the scenes in this folder use: sphere.obj, figure.obj,
-/// dragon.obj, prism.obj.
+/// crt-meshgen OUTDIR: writes the meshes that the scenes in this folder use: sphere.obj, ball.obj,
+/// figure.obj, dragon.obj, prism.obj.
 ///
 /// They are made rather than shipped: the source says what they are, nothing is downloaded, and every run
 /// writes the same bytes. Sphere and prism are written down directly. Figure and dragon are modelled as
@@ -554,33 +554,32 @@ private:
 
 // --- sphere and prism ------------------------------------------------------------------------------------
 
-Mesh sphere() {
-    constexpr std::uint32_t kSegments = 32, kRings = 16;
+Mesh sphere(std::uint32_t segments, std::uint32_t rings) {
     Mesh mesh;
     const auto add = [&](Vec n) {
         mesh.normals.push_back(n);
         mesh.positions.push_back(0.5 * n + Vec{0, 0.5, 0});
     };
     add({0, 1, 0});
-    for (std::uint32_t ring = 1; ring < kRings; ++ring)
-        for (std::uint32_t segment = 0; segment < kSegments; ++segment) {
-            const double theta = kPi * ring / kRings, phi = 2.0 * kPi * segment / kSegments;
+    for (std::uint32_t ring = 1; ring < rings; ++ring)
+        for (std::uint32_t segment = 0; segment < segments; ++segment) {
+            const double theta = kPi * ring / rings, phi = 2.0 * kPi * segment / segments;
             add({std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi)});
         }
     add({0, -1, 0});
 
     const auto at = [&](std::uint32_t ring, std::uint32_t segment) {
-        return 1 + (ring - 1) * kSegments + segment % kSegments;
+        return 1 + (ring - 1) * segments + segment % segments;
     };
-    const std::uint32_t south = 1 + (kRings - 1) * kSegments;
-    for (std::uint32_t s = 0; s < kSegments; ++s) mesh.triangles.push_back({0, at(1, s + 1), at(1, s)});
-    for (std::uint32_t ring = 1; ring + 1 < kRings; ++ring)
-        for (std::uint32_t s = 0; s < kSegments; ++s) {
+    const std::uint32_t south = 1 + (rings - 1) * segments;
+    for (std::uint32_t s = 0; s < segments; ++s) mesh.triangles.push_back({0, at(1, s + 1), at(1, s)});
+    for (std::uint32_t ring = 1; ring + 1 < rings; ++ring)
+        for (std::uint32_t s = 0; s < segments; ++s) {
             mesh.triangles.push_back({at(ring, s), at(ring, s + 1), at(ring + 1, s + 1)});
             mesh.triangles.push_back({at(ring, s), at(ring + 1, s + 1), at(ring + 1, s)});
         }
-    for (std::uint32_t s = 0; s < kSegments; ++s)
-        mesh.triangles.push_back({south, at(kRings - 1, s), at(kRings - 1, s + 1)});
+    for (std::uint32_t s = 0; s < segments; ++s)
+        mesh.triangles.push_back({south, at(rings - 1, s), at(rings - 1, s + 1)});
     return mesh;
 }
 
@@ -942,14 +941,15 @@ int main(int argc, char** argv) {
     const bool asks_for_help = argument == "--help" || argument == "-h";
     if (argument.empty() || argument[0] == '-') {
         std::fprintf(asks_for_help ? stdout : stderr,
-                     "usage: crt-meshgen OUTDIR\nWrites sphere.obj, figure.obj, dragon.obj and prism.obj "
-                     "into the folder OUTDIR, which is made if need be.\n");
+                     "usage: crt-meshgen OUTDIR\nWrites sphere.obj, ball.obj, figure.obj, dragon.obj and "
+                     "prism.obj into the folder OUTDIR, which is made if need be.\n");
         return asks_for_help ? 0 : 2;
     }
     try {
         const std::filesystem::path folder = argument;
         std::filesystem::create_directories(folder);
-        writeObj(sphere(), folder / "sphere.obj", "sphere of 32 segments and 16 rings");
+        writeObj(sphere(32, 16), folder / "sphere.obj", "sphere of 32 segments and 16 rings");
+        writeObj(sphere(128, 64), folder / "ball.obj", "sphere of 128 segments and 64 rings");
         writeObj(prism(), folder / "prism.obj", "60 degree prism");
         writeObj(figure(), folder / "figure.obj", "ape, thinking");
         writeObj(dragon(), folder / "dragon.obj", "dragon");

@@ -71,6 +71,7 @@ struct Expected {
 };
 constexpr Expected kExpected[] = {
     {"sphere.obj", 960, 0, true, 0.5152427},
+    {"ball.obj", 16128, 0, true, 0.5231},
     {"figure.obj", 4745, 3, true, 0.150},
     {"dragon.obj", 100000, 0, true, 0.102},
     {"prism.obj", 8, 0, false, 1.1547005},

@@ -195,7 +195,7 @@ def scene_cases():
         ("{type: rough_dielectric, ior: 1.5, roughness: nan}", "NaN"),
         ("{type: rough_dielectric, ior: 1e9, roughness: 0.5}", "'ior'"),
         ("{type: dielectric, ior: 1.5, absorption: -1}", "'absorption'"),
-        ("{type: dielectric, ior: 1.5, absorption: {table: {nm: [400, 700], value: [1, -1]}}}",
+        ("{type: dielectric, ior: 1.5, absorption: {table: {nm: [360, 830], value: [1, -1]}}}",
          "'absorption'"),
         ("{type: dielectric, ior: 1.5, absorption: .inf}", "infinity"),
         ("{type: dielectric, ior: 1.5, absorption: 1e300}", "'absorption'"),
