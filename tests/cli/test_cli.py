@@ -437,6 +437,7 @@ class Rendering(CliTest):
                 "triangles",
                 "emitters",
                 "nodes",
+                "images",
                 "seed",
             ],
             "features": ["mask", "kept", "left_out"],
@@ -458,7 +459,7 @@ class Rendering(CliTest):
             "samples": ["target", "per_pixel", "resumed", "rendered", "ranges", "chunks", "invalid"],
             "rays": ["paths", "closest", "shadow"],
             "speed": ["mpaths_per_second", "mrays_per_second"],
-            "memory": ["scene_bytes", "host_peak_bytes", "device_peak_bytes"],
+            "memory": ["scene_bytes", "texel_bytes", "host_peak_bytes", "device_peak_bytes"],
             "error": [
                 "knowledge",
                 "mean_luminance",
