@@ -80,6 +80,7 @@ struct Case {
     const char* filter;
     bool sampled_environment = false;
     const char* more = "";  // Further top-level lines.
+    bool sky = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -102,6 +103,8 @@ const Case kCases[] = {
     {"{max_depth: 4, accelerator: bvh}", "{type: independent}", "", "box", true},
     {"{max_depth: 12}", "{type: sobol}", "", "box", true, kPointLights},
     {"{max_depth: 4, accelerator: bvh, mis: false}", "{type: independent}", "", "box", false, kPointLights},
+    {"{max_depth: 12}", "{type: sobol}", "", "box", true, "", true},
+    {"{max_depth: 4, accelerator: bvh}", "{type: xorshift}", "", "box", true, kPointLights, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -137,6 +140,9 @@ struct Named {
 crt::Scene sceneOf(const Case& c) {
     crt::Scene scene = sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter) + c.more);
     scene.environment->light_sampling = c.sampled_environment;
+    if (c.sky)
+        scene.environment->sky =
+            crt::CieSky{.towards_sun = {0.36, 0.8, -0.48}, .amount = 4, .rows = 32};
     return scene;
 }
 
@@ -149,7 +155,9 @@ std::vector<Named> allScenes() {
                                  "sampled environment",
                                  "sampled environment, tree, independent",
                                  "point lights",
-                                 "point lights, tree, independent, light sampling alone"};
+                                 "point lights, tree, independent, light sampling alone",
+                                 "sky",
+                                 "sky and point lights, tree, xorshift"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

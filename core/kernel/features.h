@@ -43,7 +43,8 @@
     F(18, REPLICATES, "independent replicates, from which the image knows its error")        \
     F(20, TABLE, "values tabulated by wavelength")                                           \
     F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
-    F(28, POINT_LIGHT, "point, spot, directional and sun lights")
+    F(28, POINT_LIGHT, "point, spot, directional and sun lights")                            \
+    F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")
 
 #define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,
 enum CrtFeature { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) CRT_FEATURE_END };

@@ -102,16 +102,17 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
 /* What a ray that meets nothing finds, weighted in the same way. */
 CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    const CrtEnvironmentPlace place = crt_environment_towards(ctx, path->ray.d);
     f32 weight = 1.0f;
     if (CRT_HAS(ENVIRONMENT_LIGHT) && scene->environment_light != 0u && scene->nee != CRT_NEE_NONE &&
         path->scatter_pdf > 0.0f) {
-        const f32 pdf = crt_environment_pdf(ctx, path->scatter_cosine);
+        const f32 pdf = crt_environment_pdf(ctx, place, path->scatter_cosine);
         if (pdf > 0.0f && scene->nee == CRT_NEE_ONLY) return;
         weight = crt_power_heuristic(pdf / path->scatter_pdf);
     }
-    path->radiance = path->radiance +
-                     path->throughput * crt_value(ctx, scene->environment, 0, path->wavelengths.position) *
-                         weight;
+    path->radiance =
+        path->radiance +
+        path->throughput * crt_environment_radiance(ctx, place, path->wavelengths.position) * weight;
 }
 
 /* A question that a vertex asks, and what it adds to the path's radiance if nothing is met. It is answered
@@ -127,8 +128,9 @@ CRT_FN void crt_ask_environment(const CrtContext *ctx, CrtPath *path, const CrtS
                                 const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
     const CrtEnvironmentSample sample =
         crt_environment_sample(ctx, &path->sampler, dimension, bsdf->ns);
-    if (!(sample.pdf > 0.0f) || !(dot3(sample.wi, bsdf->ng) > 0.0f)) return;
-    if ((bsdf->flags & CRT_BSDF_REFLECTS) == 0u) return;
+    const int before = dot3(sample.wi, bsdf->ng) > 0.0f;
+    if (!(sample.pdf > 0.0f) || (!before && !crt_has_environment_image(ctx))) return;
+    if ((bsdf->flags & (before ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS)) == 0u) return;
     const vec4 scattered = crt_bsdf_eval(bsdf, sample.wi);
     if (max4(scattered) == 0.0f) return;
     shadow->asked = 1;
@@ -139,7 +141,7 @@ CRT_FN void crt_ask_environment(const CrtContext *ctx, CrtPath *path, const CrtS
     if (ctx->scene->nee == CRT_NEE_MIS)
         weight = weight * crt_power_heuristic(crt_bsdf_pdf(bsdf, sample.wi) / sample.pdf);
     shadow->radiance = path->throughput * scattered *
-                       crt_value(ctx, ctx->scene->environment, 0, path->wavelengths.position) * weight;
+                       crt_environment_radiance(ctx, sample.place, path->wavelengths.position) * weight;
 }
 
 /* Next event estimation: a light without a surface. */

@@ -210,7 +210,7 @@ Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vect
     return s;
 }
 
-SpectrumTable readSpectrumTable(const std::string& path) {
+SpectrumColumns readSpectrumTable(const std::string& path) {
     std::string text;
     try {
         text = readInput(path, kMostSpectrumBytes);
@@ -218,7 +218,7 @@ SpectrumTable readSpectrumTable(const std::string& path) {
         fail(fmt::format("this spectrum file {}", refused.what()), {path});
     }
 
-    SpectrumTable table;
+    SpectrumColumns table;
     auto& [wavelength, value] = table;
     std::string_view rest = text;
     if (rest.starts_with("\xEF\xBB\xBF"))

@@ -260,8 +260,8 @@ std::string_view familyIntroduction(std::string_view family) {
     if (family == "material") return "What light does at a surface. `type` picks one of these.\n";
     if (family == "light")
         return "A light without a surface: `lights` lists them, and `type` picks one of these. How bright "
-               "it is says one key, whose name gives the unit: a spectrum in absolute terms, or an amount to "
-               "which `spectrum` is scaled. A scene unit counts as a metre.\n\n"
+               "it is says one key, whose name gives the unit: a spectrum in absolute terms, or an amount "
+               "to which `spectrum` is scaled. A scene unit counts as a metre.\n\n"
                "Points, spots and directional lights are found by light sampling alone: cameras, mirrors "
                "and smooth glass do not see them, their light does not pass smooth glass, and they need "
                "`integrator.nee`. With `integrator.mis: false` they shine as ever.\n";
