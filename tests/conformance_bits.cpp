@@ -120,6 +120,7 @@ struct Case {
     const char* more = "";  // Further top-level lines.
     bool glassware = false;
     bool textured = false;
+    bool sky = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -212,6 +213,9 @@ const Case kCases[] = {
     {"{max_depth: 8, accelerator: bvh}", "{type: xorshift}", "", "box", true, "", true},
     {"{max_depth: 6}", "{type: sobol}", "", "box", false, "", false, true},
     {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", false, "", false, true},
+    {"{max_depth: 12}", "{type: sobol}", "", "box", true, "", false, false, true},
+    {"{max_depth: 4, accelerator: bvh}", "{type: xorshift}", "", "box", true, kPointLights, false, false,
+     true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -249,6 +253,9 @@ crt::Scene sceneOf(const Case& c) {
         sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter, c.glassware) + c.more);
     scene.environment->light_sampling = c.sampled_environment;
     if (c.textured) addTextures(scene);
+    if (c.sky)
+        scene.environment->sky =
+            crt::CieSky{.towards_sun = {0.36, 0.8, -0.48}, .amount = 4, .rows = 32};
     return scene;
 }
 
@@ -265,7 +272,9 @@ std::vector<Named> allScenes() {
                                  "glassware",
                                  "glassware, tree, xorshift, sampled environment",
                                  "textures",
-                                 "textures, tree, independent"};
+                                 "textures, tree, independent",
+                                 "sky",
+                                 "sky and point lights, tree, xorshift"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

@@ -57,6 +57,8 @@ std::map<std::uint32_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_PLASTIC, "a mesh of plastic"},
         {mesh | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ABSORPTION, "a mesh of absorbing glass"},
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT, "a mesh, sampled environment"},
+        {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT | CRT_FEATURE_ENVIRONMENT_IMAGE,
+         "a mesh, environment image"},
         {mesh | CRT_FEATURE_POINT_LIGHT, "a mesh, lights without a surface"},
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "a mesh, environment, lens and filter"},

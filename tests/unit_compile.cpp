@@ -82,6 +82,12 @@ crt::Spectrum dispersiveIndex() {
     return s;
 }
 
+crt::Environment clearSky(bool sampled) {
+    crt::Environment sky{crt::illuminantSpectrum("D65").value(), sampled};
+    sky.sky = crt::CieSky{.towards_sun = {0.6, 0.8, 0}, .rows = 16};
+    return sky;
+}
+
 void makeGlass(Scene& s) {
     s.materials[0].type = crt::MaterialType::Dielectric;
     s.materials[0].eta = crt::constantSpectrum(1.5);
@@ -202,6 +208,11 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
             s.point_lights[0].spectrum = crt::constantSpectrum(1);
         };
     };
+    seen |= differs(CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_IMAGE | CRT_FEATURE_TABLE, 0,
+                    [](Scene& s) { s.environment = clearSky(false); });
+    differs(CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_IMAGE | CRT_FEATURE_ENVIRONMENT_LIGHT |
+                CRT_FEATURE_TABLE,
+            0, [](Scene& s) { s.environment = clearSky(true); });
     for (const auto& [type, word] : crt::kPointLightNames) {
         INFO(word);
         seen |= differs(CRT_FEATURE_POINT_LIGHT, 0, lamp(type));
@@ -880,6 +891,18 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
             change(s.point_lights[0]);
         };
     };
+    const auto sky = [](const std::function<void(crt::CieSky&)>& change) {
+        return [change](Scene& s) {
+            s.environment = clearSky(true);
+            change(*s.environment->sky);
+        };
+    };
+    differs("a sky", sky([](crt::CieSky&) {}));
+    differs("its type", sky([](crt::CieSky& k) { k.type = 11; }));
+    differs("its sun", sky([](crt::CieSky& k) { k.towards_sun = {0, 0.8, 0.6}; }));
+    differs("its amount", sky([](crt::CieSky& k) { k.amount = 2; }));
+    differs("its rows", sky([](crt::CieSky& k) { k.rows = 18; }));
+    differs("its zenith", sky([](crt::CieSky& k) { k.axes = {{0, 1, 0}, {-1, 0, 0}, {0, 0, -1}}; }));
     differs("a lamp without a surface", lamp([](crt::PointLight&) {}));
     differs("its kind", lamp([](crt::PointLight& l) { l.type = crt::PointLightType::Point; }));
     differs("a sun", lamp([](crt::PointLight& l) { l.type = crt::PointLightType::Sun; }));

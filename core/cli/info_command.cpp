@@ -102,7 +102,10 @@ std::string lightsText(const Scene& scene, const CompiledScene& compiled) {
             add(counted(static_cast<std::size_t>(count), fmt::format("{} light", word).c_str(),
                         fmt::format("{} lights", word).c_str()));
     }
-    if (scene.environment) add("constant environment");
+    if (scene.environment)
+        add(scene.environment->image ? fmt::format("environment of {}", scene.environment->image->file)
+            : scene.environment->sky ? fmt::format("CIE sky of type {}", scene.environment->sky->type)
+                                     : "constant environment");
     return text.empty() ? "none: every image will be black" : text;
 }
 

@@ -5,6 +5,7 @@
 #include "compile/accelerator.h"
 #include "compile/blob_writer.h"
 #include "compile/distributions.h"
+#include "compile/environment_image.h"
 #include "compile/flatten.h"
 #include "compile/geometry.h"
 #include "compile/lights.h"
@@ -93,7 +94,13 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     const Coats coats = coatsOf(used);
     const SpectrumTable spectra(spectraOf(scene, flat, emitting, used, coats, textures));
 
-    const LightPart lights = compileLights(scene, flat, emitting, accelerator, spectra);
+    std::optional<EnvironmentTexels> around;
+    if (spectrumOfEnvironment(scene) && scene.environment->dependsOnDirection()) {
+        around = environmentTexels(*scene.environment);
+        header.environment_image = appendEnvironmentImage(blob, *scene.environment, *around);
+    }
+    const LightPart lights =
+        compileLights(scene, flat, emitting, accelerator, spectra, around ? &*around : nullptr);
     header.lights = blob.append(lights.lights);
     header.environment_light = lights.environment;
     header.point_lights = blob.append(lights.point_lights);

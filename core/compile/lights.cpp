@@ -93,7 +93,7 @@ std::vector<const Spectrum*> spectraOfLights(const Scene& scene, const FlatScene
 
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
-                        const SpectrumTable& spectra) {
+                        const SpectrumTable& spectra, const EnvironmentTexels* around) {
     LightPart part;
     part.light_of.assign(flat.triangles.size(), CRT_NONE);
     struct Shared {
@@ -124,16 +124,17 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
     }
     part.emitters = static_cast<std::uint32_t>(part.lights.size());
-    if (samplesEnvironment(scene)) {
+    if (samplesEnvironment(scene) && (around == nullptr || around->mean_brightness > 0)) {
         kernel::CrtLight light{};
         light.kind = CRT_LIGHT_ENVIRONMENT;
         light.radiance = spectra.valueOf(scene.environment->radiance);
         part.lights.push_back(light);
         part.environment = static_cast<std::uint32_t>(part.lights.size());
-        power.push_back(areaAround(flat) * brightness(scene.environment->radiance));
+        power.push_back(areaAround(flat) *
+                        (around ? around->mean_brightness : brightness(scene.environment->radiance)));
     }
     const std::vector<const PointLight*> point_lights = shiningPointLights(scene);
-    const double around = point_lights.empty() ? 0 : areaAround(flat);
+    const double area_around = point_lights.empty() ? 0 : areaAround(flat);
     for (const PointLight* own : point_lights) {
         kernel::CrtLight light{};
         light.kind = kindOf(own->type);
@@ -142,7 +143,7 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         part.point_lights.push_back(compilePointLight(*own, flat));
         part.point_lights.back().light = static_cast<std::uint32_t>(part.lights.size());
         part.lights.push_back(light);
-        power.push_back(powerOf(*own, part.point_lights.back(), around) * brightness(own->spectrum));
+        power.push_back(powerOf(*own, part.point_lights.back(), area_around) * brightness(own->spectrum));
     }
     const std::vector<std::uint64_t> first = choiceTable(power);
     for (std::size_t i = 0; i < part.lights.size(); ++i) {

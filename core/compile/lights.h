@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compile/accelerator.h"
+#include "compile/environment_image.h"
 #include "compile/flatten.h"
 #include "compile/spectrum_table.h"
 #include "kernel/layout.h"
@@ -28,9 +29,10 @@ struct LightPart {
     std::vector<kernel::CrtPointLight> point_lights;
     std::uint32_t emitters = 0;           ///< Lights that are triangles or parallelograms: the first ones.
 };
+/// `around`: the texels of an environment that has them, or null.
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
-                        const SpectrumTable& spectra);
+                        const SpectrumTable& spectra, const EnvironmentTexels* around);
 
 /// Whether the environment is among the lights.
 bool samplesEnvironment(const Scene& scene);

@@ -46,6 +46,7 @@ std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
              (materials.features & CRT_FEATURES_LOBE) != 0,
          CRT_FEATURE_NEE);
     need(header.environment != CRT_NONE, CRT_FEATURE_ENVIRONMENT);
+    need(header.environment_image.count > 0, CRT_FEATURE_ENVIRONMENT_IMAGE);
     need((f & CRT_FEATURE_NEE) != 0 && samples_environment, CRT_FEATURE_ENVIRONMENT_LIGHT);
     // Of lights without a surface, suns alone are seen without light sampling. They come first.
     const std::vector<const PointLight*> lights = shiningPointLights(scene);
@@ -93,6 +94,8 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
                  !header.nee ? "integrator.nee is false"
                              : "no surface that scatters in all directions can be lit by an emitter");
     if (!has(CRT_FEATURE_ENVIRONMENT)) left_out("environment", "there is none");
+    if (has(CRT_FEATURE_ENVIRONMENT) && !has(CRT_FEATURE_ENVIRONMENT_IMAGE))
+        left_out("environment image", "the environment is the same in every direction");
     if (has(CRT_FEATURE_ENVIRONMENT) && !has(CRT_FEATURE_ENVIRONMENT_LIGHT))
         left_out("light sampling of the environment",
                  header.environment_light == 0 ? "environment.light_sampling is false"

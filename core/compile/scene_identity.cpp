@@ -46,8 +46,9 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
     for (kernel::CrtSpan* span :
          {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
           &header.normals, &header.textures, &header.uvs, &header.vertex_colors, &header.nodes,
-          &header.objects, &header.materials, &header.lights, &header.point_lights, &header.spectra,
-          &header.observer, &header.wavelengths, &header.filter})
+          &header.objects, &header.materials, &header.lights, &header.point_lights,
+          &header.environment_image, &header.spectra, &header.observer, &header.wavelengths,
+          &header.filter})
         *span = {};
     return header;
 }
@@ -93,6 +94,15 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
     hash.add(by_id.data(), by_id.size(), sizeof(CrtLight));
     hash.add(CRT_ARRAY(CrtPointLight, blob, header.point_lights), header.point_lights.count,
              sizeof(CrtPointLight));
+    if (header.environment_image.count > 0) {
+        CrtEnvironmentImage image = *CRT_ARRAY(CrtEnvironmentImage, blob, header.environment_image);
+        hash.add(CRT_ARRAY(CrtEnvironmentTexel, blob, image.texels), image.texels.count,
+                 sizeof(CrtEnvironmentTexel));
+        hash.add(CRT_ARRAY(u32, blob, image.rows), image.rows.count, sizeof(u32));
+        hash.add(CRT_ARRAY(u32, blob, image.columns), image.columns.count, sizeof(u32));
+        image.texels = image.rows = image.columns = {};
+        hash.add(&image, 1, sizeof image);
+    }
     return hash.digits();
 }
 

@@ -177,6 +177,22 @@ SceneTrait lightsTrait(const Scene& scene) {
     if (scene.environment) {
         digest.add(scene.environment->radiance);
         if (scene.environment->light_sampling) digest.add(true);
+        const auto add_axes = [&digest](const Axes& axes) {
+            for (const Vec3d& axis : {axes.right, axes.up, axes.ahead})
+                for (const double x : axis) digest.add(x);
+        };
+        if (const auto& image = scene.environment->image) {
+            digest.add(image->scale);
+            add_axes(image->axes);
+        }
+        if (const auto& sky = scene.environment->sky) {
+            for (const double x : sky->towards_sun) digest.add(x);
+            digest.add(sky->type);
+            digest.add(sky->horizontal);
+            digest.add(sky->amount);
+            digest.add(sky->rows);
+            add_axes(sky->axes);
+        }
     }
     for (const PointLight& light : scene.point_lights) {
         digest.add(light.type);

@@ -49,7 +49,8 @@
     F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
     F(26, ABSORPTION, "absorption inside dielectrics")                                       \
     F(27, TEXTURE, "values that depend on the place: images, checkers, colours of vertices") \
-    F(28, POINT_LIGHT, "point, spot, directional and sun lights")
+    F(28, POINT_LIGHT, "point, spot, directional and sun lights")                            \
+    F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")
 
 #define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,
 enum CrtFeature { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) CRT_FEATURE_END };

@@ -203,6 +203,25 @@ typedef struct CrtPointLight {
 } CrtPointLight;
 CRT_ASSERT_SIZE(CrtPointLight, 48);
 
+/* A texel of the environment: `scale` times the sigmoid (spectrum.h) times the environment's spectrum. */
+typedef struct CrtEnvironmentTexel {
+    f32 c0, c1, c2;
+    f32 scale;
+} CrtEnvironmentTexel;
+CRT_ASSERT_SIZE(CrtEnvironmentTexel, 16);
+
+/* Latitudes and longitudes. Rows go from `up` down; columns to the right as seen from within, the middle one
+   `ahead`. A 32-bit number u chooses the last row with rows ≤ u, and another a column of it. */
+typedef struct CrtEnvironmentImage {
+    u32 width, height;
+    CrtSpan texels;   /* CrtEnvironmentTexel, row by row */
+    CrtSpan rows;     /* u32, height of them */
+    CrtSpan columns;  /* u32, width of them for each row */
+    f32 right[3], up[3], ahead[3]; /* unit, perpendicular to each other */
+    u32 reserved[3];
+} CrtEnvironmentImage;
+CRT_ASSERT_SIZE(CrtEnvironmentImage, 80);
+
 /* A film point (px, py), in pixels from the top left, looks along corner + px·step_x + py·step_y (not
    normalised; its component along the view axis is 1). */
 typedef struct CrtCamera {
@@ -274,7 +293,7 @@ typedef struct CrtScene {
     u32 max_depth;               /* scattering events */
     u32 roulette_depth;          /* CRT_NONE: never */
     u32 nee;
-    CrtValue environment;        /* its radiance, or CRT_NONE */
+    CrtValue environment;        /* its radiance, of an image per unit of its texels; or CRT_NONE */
 
     CrtSeed seed;
 
@@ -296,6 +315,8 @@ typedef struct CrtScene {
     CrtSpan uvs;                 /* CrtUvs, by id; only where a texture asks */
     CrtSpan vertex_colors;       /* CrtVertexColors, by id; only where a value asks */
     CrtSpan point_lights;        /* CrtPointLight */
+    CrtSpan environment_image;   /* CrtEnvironmentImage, 1 or none */
+    u32 padding2[2];
     CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
     CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
     CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */
@@ -303,7 +324,7 @@ typedef struct CrtScene {
 
     CrtCamera camera;
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 368);
+CRT_ASSERT_SIZE(CrtScene, 384);
 
 CRT_KERNEL_END
 

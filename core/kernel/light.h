@@ -9,6 +9,7 @@
 #ifndef CRT_LIGHT_H
 #define CRT_LIGHT_H
 
+#include "environment_image.h"
 #include "medium.h"
 
 CRT_KERNEL_BEGIN
@@ -293,23 +294,49 @@ CRT_FN CrtLightSeen crt_light_pdf(const CrtContext *ctx, u32 index, vec3 p, f32 
 
 /* The environment among the lights. Of one that is the same in every direction nothing is known but that
  * what arrives counts by its cosine with the shading normal ns, on the side of w_o: directions are sampled
- * by it. What is transmitted is left to scattered rays. */
+ * by it. What is transmitted is left to scattered rays. Of an image they are sampled by its radiance, on
+ * both sides. */
 typedef struct CrtEnvironmentSample {
     vec3 wi; /* unit */
+    CrtEnvironmentPlace place; /* of wi */
     f32 pdf; /* per steradian, with the probability of choosing the environment; 0: none */
 } CrtEnvironmentSample;
 
-/* pdf of a direction with the cosine `cos_s` with ns. */
-CRT_FN f32 crt_environment_pdf(const CrtContext *ctx, f32 cos_s) {
+/* Whether the environment depends on the direction. */
+CRT_FN int crt_has_environment_image(const CrtContext *ctx) {
+    return CRT_HAS(ENVIRONMENT_IMAGE) && ctx->scene->environment_image.count != 0u;
+}
+
+/* Where in the environment a direction leads. */
+CRT_FN CrtEnvironmentPlace crt_environment_towards(const CrtContext *ctx, vec3 d) {
+    CrtEnvironmentPlace place;
+    place.row = place.column = 0u;
+    place.sine = 0.0f;
+    if (crt_has_environment_image(ctx)) place = crt_environment_place(crt_environment_image(ctx), d);
+    return place;
+}
+
+CRT_FN vec4 crt_environment_radiance(const CrtContext *ctx, CrtEnvironmentPlace place, vec4 position) {
+    if (crt_has_environment_image(ctx)) return crt_environment_texel(ctx, place, position);
+    return crt_value(ctx, ctx->scene->environment, 0, position);
+}
+
+/* pdf of a direction that leads to `place`, with the cosine `cos_s` with ns. */
+CRT_FN f32 crt_environment_pdf(const CrtContext *ctx, CrtEnvironmentPlace place, f32 cos_s) {
     CRT_GLOBAL const CrtLight *lights = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights);
-    return lights[ctx->scene->environment_light - 1u].choice_probability * crt_lambert(cos_s);
+    return lights[ctx->scene->environment_light - 1u].choice_probability *
+           (crt_has_environment_image(ctx) ? crt_environment_density(ctx, place) : crt_lambert(cos_s));
 }
 
 CRT_FN CrtEnvironmentSample crt_environment_sample(const CrtContext *ctx, CrtSampler *sampler, u32 dimension,
                                                    vec3 ns) {
     CrtEnvironmentSample s;
-    s.wi = crt_cosine_direction(ns, crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT));
-    s.pdf = crt_environment_pdf(ctx, dot3(s.wi, ns));
+    const CrtRandom2 u = crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT);
+    s.place.row = s.place.column = 0u;
+    s.place.sine = 0.0f;
+    s.wi = crt_has_environment_image(ctx) ? crt_environment_direction(ctx, u, &s.place)
+                                          : crt_cosine_direction(ns, u);
+    s.pdf = crt_environment_pdf(ctx, s.place, dot3(s.wi, ns));
     return s;
 }
 

@@ -104,16 +104,17 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
 /* What a ray that meets nothing finds, weighted in the same way. */
 CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    const CrtEnvironmentPlace place = crt_environment_towards(ctx, path->ray.d);
     f32 weight = 1.0f;
     if (CRT_HAS(ENVIRONMENT_LIGHT) && scene->environment_light != 0u && scene->nee != CRT_NEE_NONE &&
         path->scatter_pdf > 0.0f) {
-        const f32 pdf = crt_environment_pdf(ctx, path->scatter_cosine);
+        const f32 pdf = crt_environment_pdf(ctx, place, path->scatter_cosine);
         if (pdf > 0.0f && scene->nee == CRT_NEE_ONLY) return;
         weight = crt_power_heuristic(pdf / path->scatter_pdf);
     }
-    path->radiance = path->radiance +
-                     path->throughput * crt_value(ctx, scene->environment, 0, path->wavelengths.position) *
-                         weight;
+    path->radiance =
+        path->radiance +
+        path->throughput * crt_environment_radiance(ctx, place, path->wavelengths.position) * weight;
 }
 
 /* What is left of the path's throughput after the way to `surface`, or, with none, to nowhere. */
@@ -149,8 +150,9 @@ CRT_FN void crt_ask_environment(const CrtContext *ctx, CrtPath *path, const CrtS
                                 const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
     const CrtEnvironmentSample sample =
         crt_environment_sample(ctx, &path->sampler, dimension, bsdf->ns);
-    if (!(sample.pdf > 0.0f) || !(dot3(sample.wi, bsdf->ng) > 0.0f)) return;
-    if ((bsdf->flags & CRT_BSDF_REFLECTS) == 0u) return;
+    const int before = dot3(sample.wi, bsdf->ng) > 0.0f;
+    if (!(sample.pdf > 0.0f) || (!before && !crt_has_environment_image(ctx))) return;
+    if ((bsdf->flags & (before ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS)) == 0u) return;
     const vec4 scattered = crt_bsdf_eval(bsdf, sample.wi);
     if (max4(scattered) == 0.0f) return;
     shadow->asked = 1;
@@ -161,7 +163,7 @@ CRT_FN void crt_ask_environment(const CrtContext *ctx, CrtPath *path, const CrtS
     if (ctx->scene->nee == CRT_NEE_MIS)
         weight = weight * crt_power_heuristic(crt_bsdf_pdf(bsdf, sample.wi) / sample.pdf);
     shadow->radiance = path->throughput * scattered *
-                       crt_value(ctx, ctx->scene->environment, 0, path->wavelengths.position) * weight;
+                       crt_environment_radiance(ctx, sample.place, path->wavelengths.position) * weight;
     if (CRT_HAS(ABSORPTION)) crt_absorb_shadow(ctx, path, surface, bsdf, sample.wi, CRT_INFINITY, shadow);
 }
 

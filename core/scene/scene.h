@@ -166,9 +166,36 @@ struct PointLight {
     SourcePlace place;
 };
 
+/// Of what is far away: perpendicular unit vectors.
+struct Axes {
+    Vec3d right{1, 0, 0}, up{0, 1, 0}, ahead{0, 0, -1};
+};
+
+/// A file of latitudes (rows, from `up` down) and longitudes (columns, the middle one `ahead`).
+struct EnvironmentImage {
+    std::string file;
+    double scale = 1;  ///< Times linear sRGB: radiance, as that of a spectrum {rgb: …}.
+    Axes axes;
+    SourcePlace place;
+};
+
+/// A CIE standard general sky (cie_sky.h).
+struct CieSky {
+    int type = 12;            ///< 1 to 15.
+    Vec3d towards_sun{0, 1, 0};  ///< Unit.
+    bool horizontal = false;  ///< What `amount` is.
+    double amount = 1;  ///< Radiance of the zenith or irradiance of the ground, per unit of the spectrum.
+    Axes axes;                ///< The zenith is `up`.
+    int rows = 256;           ///< Of the image that it becomes, twice as wide.
+};
+
 struct Environment {
-    Spectrum radiance;            ///< The same in every direction.
+    Spectrum radiance;            ///< The same in every direction; or times what `image` or `sky` has.
     bool light_sampling = false;  ///< Is it a light to sample, or left to scattered rays?
+    std::optional<EnvironmentImage> image{};
+    std::optional<CieSky> sky{};
+
+    bool dependsOnDirection() const { return image || sky; }
 };
 
 enum class OutputFormat { Exr, Png, Ppm, Pfm };

@@ -375,6 +375,35 @@ def scene_cases():
         GOOD + f"lights: [{bulb.replace('[0, 0, 1]', '[1e30, 0, 0]')}]\n",
         words="too far from the scene for single precision",
     )
+
+    def pfm(width, height, *values):
+        return f"PF\n{width} {height}\n-1.0\n".encode() + struct.pack(f"<{len(values)}f", *values)
+
+    def around(asked, data, words, name="sky.pfm"):
+        scene(asked, GOOD + f"environment: {{image: {name}}}\n", words=words, files={name: data})
+
+    one = [1.0] * 6
+    around("a sky with a negative texel", pfm(2, 1, *one[:5], -1.0), ("not negative", "pixel (1, 0)"))
+    around("a sky with a NaN", pfm(2, 1, *one[:5], float("nan")), ("is a number", "pixel (1, 0)"))
+    around("a sky with an infinite texel", pfm(2, 1, *one[:5], float("inf")), "light is finite")
+    around("a sky that is too bright", pfm(2, 1, *one[:5], 1e30), "radiance goes up to 1e+25")
+    around("a square sky", pfm(2, 2, *(one * 2)), "twice as wide as high")
+    around("a sky cut short", pfm(200, 100, *one), "sky.pfm")
+    around("a sky of 10^12 texels", pfm(2000000, 1000000, *one), "sky.pfm")
+    around("a sky that is text", b"no image\n", "sky.pfm")
+    around("an empty sky", b"", "sky.exr", "sky.exr")
+    around("an EXR cut short", b"v/1\x01\x02\0\0\0channels\0", "sky.exr", "sky.exr")
+    for text, words in (
+        ("{}", "needs radiance or image or sky"),
+        ("{image: none.exr}", "cannot find"),
+        ("{radiance: 1, rotation_deg: 3}", "exclude each other"),
+        ("{sky: {type: 0, zenith_luminance_cd_m2: 1, direction: [0, -1, 0]}}", "must be 1 to 15"),
+        ("{sky: {type: 1, zenith_luminance_cd_m2: 1, direction: [0, 1, 0]}}", "below the horizon"),
+        ("{sky: {type: 1, zenith_luminance_cd_m2: 1}}", "needs direction or date"),
+        ("{sky: {type: 1, zenith_luminance_cd_m2: 1, direction: [0, -1, 0], rows: 1e9}}", "must be"),
+        ("{sky: {type: 1, zenith_luminance_cd_m2: 1e40, direction: [0, -1, 0]}}", "radiance goes up to"),
+    ):
+        scene(f"environment: {text}", GOOD + f"environment: {text}\n", words=words)
     scene("an output of a kind unknown", HEAD + "outputs: [{file: a.docx}]\n", words="does not end in")
     scene("an output twice", HEAD + "outputs: [{file: a.exr}, {file: a.exr}]\n", words="written twice")
     placement = "[{translate: [1, 2, 3]}]"

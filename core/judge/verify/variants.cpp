@@ -116,6 +116,13 @@ std::vector<Variant> variants(int resolution) {
             mesh.uv_index = mesh.triangles;
         }
     });
+    add("a sky", [](Scene& s) {
+        CieSky sky;
+        sky.towards_sun = unit({0.25, 1, -0.5});
+        sky.rows = 32;
+        s.environment->sky = sky;
+        s.environment->light_sampling = true;
+    });
     add("view of the normals", [](Scene& s) { s.integrator.type = IntegratorType::Normals; });
     add("view of the boxes", [](Scene& s) { s.integrator.type = IntegratorType::Aabb; });
     return all;

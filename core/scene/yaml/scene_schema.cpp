@@ -783,17 +783,52 @@ void addObjects(std::vector<SectionSchema>& all) {
 }
 
 void addOutside(std::vector<SectionSchema>& all) {
+    KeySchema constant = radianceKey("The same from every direction.");
+    constant.required = false;
     all.push_back(
         {"environment",
          "environment",
-         "",
-         {radianceKey("The same from every direction."),
+         "Light from infinitely far away. An image and a sky are even within each of their pixels.",
+         {constant,
+          {.name = "image",
+           .doc = "An EXR, HDR or PFM file of longitudes by latitudes, twice as wide as high, the zenith at "
+                  "the top; each pixel as a light of that `rgb`. Looked up beside the scene."},
+          {.name = "scale",
+           .kind = Kind::Number,
+           .range = kNotNegative,
+           .fallback = "1",
+           .doc = "Factor on the radiance of `image`."},
+          {.name = "rotation_deg",
+           .kind = Kind::Number,
+           .unit = "degrees",
+           .fallback = "0",
+           .doc = "Turns `image` about `up`, counter-clockwise seen from above."},
+          {.name = "up",
+           .kind = Kind::Number,
+           .shape = Shape::List,
+           .count_min = 3,
+           .count_max = 3,
+           .fallback = "[0, 1, 0]",
+           .doc = "Where the top of `image` is. Its middle is towards −z, or +y where z is up."},
+          {.name = "sky",
+           .kind = Kind::Section,
+           .section = "sky",
+           .doc = "A CIE standard general sky."},
           {.name = "light_sampling",
            .kind = Kind::Boolean,
            .fallback = yaml(Environment{}.light_sampling),
            .doc = "Sample directions of the environment where surfaces scatter, too. Pays where most "
                   "of them are blocked, as in a room with a window (0.7 of the time to equal error); "
-                  "under an open sky it takes two to three times as long."}}});
+                  "under an open sky it takes two to three times as long. Of an image or a sky they are "
+                  "chosen by its brightness, and the default is `true`."}},
+         {{KeyRule::Kind::ExactlyOne, {"radiance", "image", "sky"}},
+          {KeyRule::Kind::AtMostOne, {"radiance", "scale"}},
+          {KeyRule::Kind::AtMostOne, {"radiance", "rotation_deg"}},
+          {KeyRule::Kind::AtMostOne, {"radiance", "up"}},
+          {KeyRule::Kind::AtMostOne, {"sky", "scale"}},
+          {KeyRule::Kind::AtMostOne, {"sky", "rotation_deg"}},
+          {KeyRule::Kind::AtMostOne, {"sky", "up"}}}});
+    addSky(all);
     all.push_back({"output",
                    "an output",
                    "",

@@ -1,6 +1,7 @@
 // The part of the table of keys about lights without a surface.
 #include "scene/yaml/scene_schema_lights.h"
 
+#include "scene/cie_sky.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
 
@@ -156,6 +157,34 @@ void addLights(std::vector<SectionSchema>& all) {
                 spectrumKey()),
          joined(sunRules(), KeyRule{KeyRule::Kind::ExactlyOne, {"radiance", "illuminance_lx"}},
                 noSpectrumBeside("radiance"))});
+}
+
+void addSky(std::vector<SectionSchema>& all) {
+    const CieSky d;
+    all.push_back(
+        {"sky", "a sky",
+         "A CIE standard general sky (ISO 15469:2004, CIE S 011): how its brightness depends on the "
+         "direction "
+         "and on where the sun stands. Without the sun itself, which is a light of type `sun`, and black "
+         "below the horizon.",
+         joined(
+             std::vector<KeySchema>{{.name = "type",
+                                     .kind = Kind::Integer,
+                                     .range = {1, kCieSkyTypes, false, false},
+                                     .required = true,
+                                     .doc = "Of the standard's table: 1 overcast, 5 uniform, 7 partly "
+                                            "cloudy, 12 clear, 13 clear and polluted, 15 hazy."},
+                                    amountKey("zenith_luminance_cd_m2", "cd/m²", "Luminance of the zenith."),
+                                    amountKey("horizontal_illuminance_lx", "lx",
+                                              "Illuminance of level ground under the whole sky.")},
+             sunKeys(), spectrumKey(),
+             KeySchema{.name = "rows",
+                       .kind = Kind::Integer,
+                       .range = {2, 4096, false, false},
+                       .fallback = fmt::format("{}", d.rows),
+                       .doc = "Of the image that the sky becomes at load, twice as wide; an even number."}),
+         joined(sunRules(), KeyRule{KeyRule::Kind::ExactlyOne,
+                                    {"zenith_luminance_cd_m2", "horizontal_illuminance_lx"}})});
 }
 
 std::vector<KeySchema> sunKeys() {

@@ -3,6 +3,7 @@
 #include "base/input_file.h"
 #include "base/log.h"
 #include "scene/scene_limits.h"
+#include "scene/yaml/scene_environment.h"
 #include "scene/yaml/scene_include.h"
 #include "scene/yaml/scene_lights.h"
 #include "scene/yaml/scene_objects.h"
@@ -351,10 +352,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
     if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
     if (const YamlNode* list = top.list("lights")) readLights(*list, out, spectra, scene);
     if (const auto section = top.section("environment", "environment"))
-        if (std::optional<Spectrum> radiance = spectra.read(*section, "radiance", SpectrumUse::Emission)) {
-            scene.environment = Environment{*std::move(radiance)};
-            section->read("light_sampling", scene.environment->light_sampling);
-        }
+        scene.environment = readEnvironment(*section, spectra, files);
     if (const YamlNode* list = top.list("outputs"))
         for (std::size_t i = 0; i < list->items.size(); ++i)
             readOutput(SectionReader(out, *list->items[i], list->items[i]->place, schemaSection("output"),

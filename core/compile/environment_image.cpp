@@ -1,0 +1,199 @@
+#include "compile/environment_image.h"
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "compile/distributions.h"
+#include "image/texels.h"
+#include "scene/cie_sky.h"
+#include "scene/scene_limits.h"
+#include "spectra/sigmoid.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace crt {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+[[noreturn]] void refuse(const SourcePlace& place, const std::string& sentence) {
+    throw Error(ErrorKind::Scene,
+                fmt::format("{}:{}:{}: error: {}", place.file, place.line, place.column, sentence), place);
+}
+
+/// Solid angle of a texel of a row, per radian of its width: cos at its upper edge less that at its lower
+/// one, without cancellation at the poles.
+double heightOf(std::size_t row, std::size_t rows) {
+    const double step = kPi / static_cast<double>(rows);
+    return 2 * std::sin((static_cast<double>(row) + 0.5) * step) * std::sin(step / 2);
+}
+
+/// X + Y + Z of linear sRGB: columns of IEC 61966-2-1 added up.
+double brightnessOf(const float* rgb) {
+    return 0.64441441 * rgb[0] + 1.19191779 * rgb[1] + 1.20318306 * rgb[2];
+}
+
+void checkShape(const EnvironmentImage& image, const TexelsInfo& info) {
+    if (info.width == 2 * info.height) return;
+    refuse(image.place,
+           fmt::format("'{}' has {} x {} pixels; an image of the surroundings is twice as wide as high, "
+                       "longitudes by latitudes",
+                       image.file, info.width, info.height));
+}
+
+/// The first texel that cannot be light, in words; empty when all can.
+std::string fault(const std::vector<float>& rgb, std::uint32_t width, double scale) {
+    for (std::size_t i = 0; i < rgb.size(); ++i) {
+        const double value = rgb[i] * scale;
+        if (value >= 0 && value <= kMostRadiance) continue;
+        const std::size_t texel = i / 3;
+        return fmt::format("is {} in pixel ({}, {}), from the top left; {}", rgb[i], texel % width,
+                           texel / width,
+                           std::isnan(rgb[i])   ? "light is a number"
+                           : std::isinf(rgb[i]) ? "light is finite"
+                           : rgb[i] < 0         ? "light is not negative"
+                                                : fmt::format("radiance goes up to {:g}", kMostRadiance));
+    }
+    return {};
+}
+
+EnvironmentTexels texelsOf(const EnvironmentImage& image) {
+    EnvironmentTexels out;
+    std::vector<float> rgb;
+    try {
+        const TexelsInfo info = texelsInfo(image.file);
+        checkShape(image, info);
+        out.width = info.width;
+        out.height = info.height;
+        rgb = linearRgb(readTexels(image.file), TexelColor::Auto, image.file);
+    } catch (const Error& error) {
+        if (error.kind() != ErrorKind::Scene || error.place().line > 0) throw;
+        refuse(image.place, error.what());
+    }
+    if (const std::string wrong = fault(rgb, out.width, image.scale); !wrong.empty())
+        refuse(image.place, fmt::format("'{}' {}", image.file, wrong));
+    const std::size_t count = std::size_t{out.width} * out.height;
+    out.texels.resize(count);
+    out.brightness.resize(count);
+    sigmoidCoefficients({0.5f, 0.25f, 0.5f});  // makes the table, once
+    parallelFor(count, std::size_t{1} << 14, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) {
+            const float* color = rgb.data() + 3 * i;
+            const float largest = std::max({color[0], color[1], color[2]});
+            if (!(largest > 0)) continue;
+            // As rgbEmission: half of the range, where the sigmoid is smoothest.
+            const float by = 0.5f / largest;
+            const SigmoidCoefficients c = sigmoidCoefficients({color[0] * by, color[1] * by, color[2] * by});
+            out.texels[i] = {c[0], c[1], c[2], static_cast<float>(2.0 * largest * image.scale)};
+            out.brightness[i] = static_cast<float>(brightnessOf(color) * image.scale);
+        }
+    });
+    return out;
+}
+
+/// The direction of the middle of a texel.
+Vec3d directionOf(const Axes& axes, double row, double column, std::size_t rows) {
+    const double theta = row * kPi / static_cast<double>(rows),
+                 phi = (column / static_cast<double>(rows) - 1) * kPi;
+    return axes.right * (std::sin(theta) * std::sin(phi)) + axes.up * std::cos(theta) +
+           axes.ahead * (std::sin(theta) * std::cos(phi));
+}
+
+EnvironmentTexels texelsOf(const CieSky& sky, const Spectrum& unit) {
+    EnvironmentTexels out;
+    out.height = static_cast<std::uint32_t>(sky.rows);
+    out.width = 2 * out.height;
+    const std::size_t count = std::size_t{out.width} * out.height;
+    out.texels.resize(count);
+    out.brightness.resize(count);
+    const Vec3d xyz = spectrumToXyz(unit);
+    // A mean of four points: the gradation is steep at the horizon, the indicatrix at the sun.
+    constexpr double kNear = 0.5 - 0.28867513459481287, kFar = 0.5 + 0.28867513459481287;
+    double horizontal = 0;  // ∫ cos over the upper half, of the relative luminance.
+    std::vector<double> relative(count);
+    for (std::size_t row = 0; row < out.height; ++row)
+        for (std::size_t column = 0; column < out.width; ++column) {
+            double sum = 0;
+            for (const double y : {kNear, kFar})
+                for (const double x : {kNear, kFar})
+                    sum += cieSkyLuminance(sky.type,
+                                           directionOf(sky.axes, static_cast<double>(row) + y,
+                                                       static_cast<double>(column) + x, out.height),
+                                           sky.towards_sun, sky.axes.up);
+            const std::size_t i = row * out.width + column;
+            relative[i] = sum / 4;
+            const double upper = kPi * static_cast<double>(row) / out.height,
+                         lower = kPi * static_cast<double>(row + 1) / out.height;
+            if (relative[i] > 0)
+                horizontal += relative[i] * (2 * kPi / out.width) *
+                              (std::pow(std::sin(lower), 2) - std::pow(std::sin(upper), 2)) / 2;
+        }
+    const double scale = sky.horizontal ? sky.amount / horizontal : sky.amount;
+    for (std::size_t i = 0; i < count; ++i) {
+        // Coefficients of 0 are the constant ½.
+        out.texels[i] = {0, 0, 0, static_cast<float>(2 * relative[i] * scale)};
+        out.brightness[i] = static_cast<float>((xyz[0] + xyz[1] + xyz[2]) * relative[i] * scale);
+    }
+    return out;
+}
+
+/// Shares of 2³² by which items are chosen: where each begins.
+template <class Weights>
+void choose(const Weights& weights, std::span<kernel::u32> first) {
+    const std::vector<std::uint64_t> boundaries = choiceTable(weights);
+    for (std::size_t i = 0; i < first.size(); ++i) first[i] = static_cast<kernel::u32>(boundaries[i]);
+}
+
+}  // namespace
+
+EnvironmentTexels environmentTexels(const Environment& environment) {
+    EnvironmentTexels out = environment.image ? texelsOf(*environment.image)
+                                              : texelsOf(environment.sky.value(), environment.radiance);
+    double sum = 0;
+    for (std::size_t row = 0; row < out.height; ++row) {
+        double of_row = 0;
+        for (std::size_t i = row * out.width; i < (row + 1) * out.width; ++i) of_row += out.brightness[i];
+        sum += of_row / out.width * heightOf(row, out.height) / 2;
+    }
+    out.mean_brightness = sum;
+    return out;
+}
+
+kernel::CrtSpan appendEnvironmentImage(BlobWriter& blob, const Environment& environment,
+                                       const EnvironmentTexels& texels) {
+    kernel::CrtEnvironmentImage image{};
+    image.width = texels.width;
+    image.height = texels.height;
+    const Axes& axes = environment.image ? environment.image->axes : environment.sky->axes;
+    for (std::size_t k = 0; k < 3; ++k) {
+        image.right[k] = static_cast<float>(axes.right[k]);
+        image.up[k] = static_cast<float>(axes.up[k]);
+        image.ahead[k] = static_cast<float>(axes.ahead[k]);
+    }
+    image.texels = blob.append(texels.texels);
+    std::vector<double> of_rows(texels.height);
+    image.columns = blob.appendFilled<kernel::u32>(texels.texels.size(), [&](std::span<kernel::u32> first) {
+        parallelFor(texels.height, 16, [&](std::size_t begin, std::size_t end) {
+            std::vector<double> weights(texels.width);
+            for (std::size_t row = begin; row < end; ++row) {
+                double sum = 0;
+                for (std::size_t column = 0; column < texels.width; ++column) {
+                    weights[column] = texels.brightness[row * texels.width + column];
+                    sum += weights[column];
+                }
+                of_rows[row] = sum * heightOf(row, texels.height);
+                if (!(sum > 0)) std::fill(weights.begin(), weights.end(), 1.0);
+                choose(weights, first.subspan(row * texels.width, texels.width));
+            }
+        });
+    });
+    if (!(texels.mean_brightness > 0)) std::fill(of_rows.begin(), of_rows.end(), 1.0);
+    image.rows = blob.appendFilled<kernel::u32>(
+        texels.height, [&](std::span<kernel::u32> first) { choose(of_rows, first); });
+    return blob.append(std::vector{image});
+}
+
+}  // namespace crt

@@ -1,0 +1,16 @@
+/// What lies around a scene: a radiance, an image or a sky.
+#pragma once
+
+#include "scene/scene.h"
+#include "scene/yaml/scene_spectra.h"
+
+#include <optional>
+
+namespace crt {
+
+/// Reads the section `environment`. Nothing, with an error, when it is wrong. Images are looked for, and
+/// read later (compile/environment_image.h).
+std::optional<Environment> readEnvironment(const SectionReader& section, SpectrumReader& spectra,
+                                           SceneFiles& files);
+
+}  // namespace crt
