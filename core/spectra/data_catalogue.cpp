@@ -199,7 +199,7 @@ NamedData readData(const std::string& name, const std::string& file) {
                         "or '# outside: zero' at its beginning",
                         file),
             {file});
-    SpectrumTable table = readSpectrumTable(file);
+    SpectrumColumns table = readSpectrumColumns(file);
     row.wavelength_nm = std::move(table.wavelength_nm);
     row.columns = {row.quantity};
     row.values = {std::move(table.value)};

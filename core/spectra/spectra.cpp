@@ -210,7 +210,7 @@ Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vect
     return s;
 }
 
-SpectrumTable readSpectrumTable(const std::string& path) {
+SpectrumColumns readSpectrumColumns(const std::string& path) {
     std::string text;
     try {
         text = readInput(path, kMostSpectrumBytes);
@@ -218,7 +218,7 @@ SpectrumTable readSpectrumTable(const std::string& path) {
         fail(fmt::format("this spectrum file {}", refused.what()), {path});
     }
 
-    SpectrumTable table;
+    SpectrumColumns table;
     auto& [wavelength, value] = table;
     std::string_view rest = text;
     if (rest.starts_with("\xEF\xBB\xBF"))
@@ -255,7 +255,7 @@ SpectrumTable readSpectrumTable(const std::string& path) {
 }
 
 Spectrum readSpectrumFile(const std::string& path, Outside outside) {
-    const auto [wavelength, value] = readSpectrumTable(path);
+    const auto [wavelength, value] = readSpectrumColumns(path);
     // What is left to find concerns the table as a whole; the message gains the file it is about.
     try {
         return tableSpectrum(wavelength, value, outside);

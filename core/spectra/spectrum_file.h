@@ -7,12 +7,12 @@
 namespace crt {
 
 /// Wavelengths strictly increasing, both columns of one length, everything finite.
-struct SpectrumTable {
+struct SpectrumColumns {
     std::vector<double> wavelength_nm;
     std::vector<double> value;
 };
 
 /// What readSpectrumFile() (spectra.h) reads. Throws crt::Error(Scene) with file and line.
-SpectrumTable readSpectrumTable(const std::string& path);
+SpectrumColumns readSpectrumColumns(const std::string& path);
 
 }  // namespace crt
