@@ -3,6 +3,7 @@
 #include "base/temporary_folder.h"
 #include "film/resolve.h"
 #include "image/image_io.h"
+#include "image/open_module.h"
 #include "judge/verify/context.h"
 #include "judge/verify/scenes.h"
 #include "judge/verify/shapes.h"
@@ -156,6 +157,12 @@ void textureColours(Context& context) {
     // Codes of an image, and what is seen of them under D65.
     const TemporaryFolder folder;
     const std::string path = folder.path() + "/codes.png";
+    try {
+        (void)imageModule(path, ErrorKind::Output);
+    } catch (const Error& error) {  // An archive for machines on which nothing can be installed has none.
+        context.notApplicable("texels of 8 bits", error.what());
+        return;
+    }
     const std::array<std::array<int, 3>, 6> codes{
         {{255, 0, 0}, {12, 200, 40}, {30, 60, 250}, {250, 240, 230}, {128, 128, 128}, {90, 45, 20}}};
     std::vector<float> linear;
