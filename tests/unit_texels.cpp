@@ -101,7 +101,7 @@ TEST_CASE("texels of an HDR", "[texels]") {
     CHECK(rgb[5] == Approx(16).epsilon(0.01));
 }
 
-TEST_CASE("texels of a JPEG: colour, grey, progressive; metadata are skipped", "[texels]") {
+TEST_CASE("texels of a JPEG: colour, grey, progressive, without metadata", "[texels]") {
     const TemporaryFolder folder;
     const std::string path = folder.path() + "/a.jpg";
     // Of one colour a block: coding at the best quality is off by rounding only.
