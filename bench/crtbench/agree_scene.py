@@ -46,7 +46,10 @@ def texture(given, folder):
         return {
             "type": "bitmap",
             "filename": str(folder / given["texture"]),
-            "to_uv": uv_transform(given),
+            # Mitsuba's v goes down the image.
+            "to_uv": mi.ScalarTransform4f().translate([0, 1, 0])
+            @ mi.ScalarTransform4f().scale([1, -1, 1])
+            @ uv_transform(given),
         }
     if isinstance(given, dict) and "checker" in given:
         refuse_all_but("a checker", given, {"checker", *placed})
