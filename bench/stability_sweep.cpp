@@ -109,8 +109,8 @@ void compareMoved(Context& context, const char* sweep, std::uint64_t rays, const
 }
 
 void far(Context& context, std::uint64_t rays) {
-    // Its vertices are multiples of 2⁻⁴, which whole shifts below 2⁴⁸ leave exact; a third of it rounds at
-    // every shift.
+    // Its vertices are multiples of 2⁻⁴, which whole shifts below 2⁴⁸ leave exact; a third of it
+    // rounds at every shift.
     const Scene whole = litRoom(48, kSeed), third = moved(whole, 1.0 / 3, {});
     for (int exponent = 0; exponent <= 14; exponent += 2) {
         const double t = std::pow(10.0, exponent);

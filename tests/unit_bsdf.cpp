@@ -78,8 +78,8 @@ Material plastic(double reflectance, double roughness, double ior = 1.5) {
 /// As prepared by Bench, λ − 360 nm: whole nanometres, where tables have their nodes.
 constexpr std::array<std::size_t, 4> kPositions{20, 120, 230, 400};
 
-/// (Index behind the surface over that before it)², at a wavelength of the bench: what lies between radiance
-/// and what refraction keeps.
+/// (Index behind the surface over that before it)², at a wavelength of the bench: what lies between
+/// radiance and what refraction keeps.
 double indexSquare(const Material& m, u32 lane) {
     if (m.type != MaterialType::Dielectric && m.type != MaterialType::RoughDielectric) return 1;
     return m.eta[kPositions[lane]] * m.eta[kPositions[lane]];

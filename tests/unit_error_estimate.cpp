@@ -153,8 +153,8 @@ TEST_CASE("a pixel that lost samples has no error bar, and the others keep their
 
 TEST_CASE("the variance of a variance is measured without bias, for short tails and long ones", "[error]") {
     std::mt19937_64 random(11);
-    // Replicates' means of one sample each. Var of k2/R = (k4/R + 2 k2²/(R − 1))/R²: normal k2 = 1, k4 = 0;
-    // exponential k2 = 1, k4 = 6.
+    // Replicates' means of one sample each. Var of k2/R = (k4/R + 2 k2²/(R − 1))/R²: normal k2 = 1, k4 =
+    // 0; exponential k2 = 1, k4 = 6.
     const bool exponential = GENERATE(false, true);
     constexpr int kRepeats = 400000;
     double sum = 0;

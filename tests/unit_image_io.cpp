@@ -168,7 +168,8 @@ TEST_CASE("what lies outside 8 bits is clipped and counted, not what rounding pu
 TEST_CASE("8-bit images of other colour spaces are converted to sRGB", "[image_io]") {
     const Vec3d srgb{0.8, 0.3, 0.1};
     const EncodedImage expected = encodeSrgb8(rgbImage(1, 1, {0.8f, 0.3f, 0.1f}));
-    // srgb → XYZ by columns of the published matrix's inverse: solve with the forward one, by Cramer's rule.
+    // srgb → XYZ by columns of the published matrix's inverse: solve with the forward one, by Cramer's
+    // rule.
     const Matrix3d m = xyzToRgb(ColorSpace::LinearSrgb);
     const auto determinant = [](const Matrix3d& a) {
         return a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -

@@ -50,7 +50,8 @@ double solidAngle(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
         2 * std::atan2(triple, la * lb * lc + dotl(a, b) * lc + dotl(b, c) * la + dotl(c, a) * lb));
 }
 
-/// Lambert 1760: ∫ cos dω / π over a polygon above the horizon, for a receiver at the origin with normal n.
+/// Lambert 1760: ∫ cos dω / π over a polygon above the horizon, for a receiver at the origin with normal
+/// n.
 double formFactor(const std::vector<Vec3d>& polygon, const Vec3d& n) {
     double sum = 0;
     for (std::size_t i = 0; i < polygon.size(); ++i) {

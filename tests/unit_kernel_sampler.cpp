@@ -109,7 +109,8 @@ TEST_CASE("the independent sampler is Philox of (pixel, sample, dimension) under
 }
 
 TEST_CASE("Sobol's second dimension is the Sobol sequence", "[kernel][sampler]") {
-    // Direction numbers from the primitive polynomial x + 1 (Sobol' 1967): v₁ = ½, vᵢ = vᵢ₋₁ ⊕ vᵢ₋₁/2.
+    // Direction numbers from the primitive polynomial x + 1 (Sobol' 1967): v₁ = ½, vᵢ = vᵢ₋₁ ⊕
+    // vᵢ₋₁/2.
     u32 direction[32];
     direction[0] = 1u << 31;
     for (int i = 1; i < 32; ++i) direction[i] = direction[i - 1] ^ (direction[i - 1] >> 1);

@@ -58,8 +58,8 @@ TEST_CASE("errors relative to what is negative, black or below the noise subtrac
 TEST_CASE("effective pixels tell equal variances from unequal ones", "[luminance]") {
     CHECK(effectivePixels(std::vector<double>(100, 0.0), 7) == 100);
     CHECK(effectivePixels(std::vector<double>{1, 0, 0, 0}, 1e9) == Approx(1));
-    // 4000 estimates of 7 degrees of freedom: σ² = 1 everywhere; then 16 in one pixel of eight and 1 in the
-    // rest, which makes (23/8)² / (263/8) of them.
+    // 4000 estimates of 7 degrees of freedom: σ² = 1 everywhere; then 16 in one pixel of eight and 1 in
+    // the rest, which makes (23/8)² / (263/8) of them.
     std::mt19937_64 engine(5);
     std::chi_squared_distribution<double> chi(7);
     std::vector<double> equal(4000), unequal(4000);

@@ -10,9 +10,9 @@
 
 namespace crt {
 
-/// Calls body(first, end) for [0, part), [part, 2 part), … of [0, count), in any order and at the same time.
-/// Returns when all are done. An exception of one of them reaches the caller; which of several, is left to
-/// chance.
+/// Calls body(first, end) for [0, part), [part, 2 part), … of [0, count), in any order and at the same
+/// time. Returns when all are done. An exception of one of them reaches the caller; which of several, is
+/// left to chance.
 void parallelFor(std::size_t count, std::size_t part,
                  const std::function<void(std::size_t first, std::size_t end)>& body);
 

@@ -74,8 +74,8 @@ const char* verdictName(Verdict verdict);
 
 /// Equivalence within ±delta (Schuirmann 1987, two one-sided tests): Pass when the whole interval of the
 /// difference lies within, Fail when all of it lies outside, else Inconclusive: more samples are needed. NaN
-/// is Inconclusive. With an interval of confidence c, a difference of delta or more passes at most (1 − c)/2
-/// of the time, and one below delta fails as rarely.
+/// is Inconclusive. With an interval of confidence c, a difference of delta or more passes at most (1 −
+/// c)/2 of the time, and one below delta fails as rarely.
 Verdict equivalence(const Interval& difference, double delta);
 
 /// Which of several hypotheses fall, such that the probability that any true one does is at most alpha,

@@ -1,5 +1,5 @@
-/// The command line: arguments → one of commands.h → exit code. `--help` and `--version` open no backend and
-/// no library.
+/// The command line: arguments → one of commands.h → exit code. `--help` and `--version` open no backend
+/// and no library.
 #include "base/error.h"
 #include "base/listener.h"
 #include "base/log.h"

@@ -25,10 +25,9 @@ const Coat& coatOf(const Coats& coats, const Material& plastic);
 /// Those of all plastics among the materials, each worked out once. Null materials are skipped.
 Coats coatsOf(const std::vector<const Material*>& materials);
 
-/// E(θ): the share that GGX microfacets of width `alpha` on an interface of relative index `eta` mirror once
-/// of light from one direction, Smith's shadowing correlated by height (Heitz 2014). Midpoint rule over the
-/// visible normals by spherical caps (Dupuy and Benyoub 2023); error below 3e-4
-/// (tests/unit_bsdf.cpp).
+/// E(θ): the share that GGX microfacets of width `alpha` on an interface of relative index `eta` mirror
+/// once of light from one direction, Smith's shadowing correlated by height (Heitz 2014). Midpoint rule over
+/// the visible normals by spherical caps (Dupuy and Benyoub 2023); error below 3e-4 (tests/unit_bsdf.cpp).
 double coatAlbedo(double cosine, double eta, double alpha);
 
 }  // namespace crt

@@ -1,5 +1,5 @@
-/// Scene → CompiledScene: one flat, pointer-free blob (kernel/layout.h) and the feature mask that says what
-/// it needs.
+/// Scene → CompiledScene: one flat, pointer-free blob (kernel/layout.h) and the feature mask that says
+/// what it needs.
 #pragma once
 
 #include "scene/scene.h"

@@ -20,9 +20,9 @@ std::vector<float> observerTable(std::size_t stride);
 /// film's filter along one axis. Empty for the box of radius ½, which is uniform in the pixel.
 std::vector<float> filterTable(const FilmSettings& film, std::size_t cells);
 
-/// Shares of 2^32 proportional to `weights` (≥ 0, one of them > 0), at least 1 each: item i is chosen by the
-/// 32-bit numbers in [first[i], first[i+1]). Returns weights.size() + 1 boundaries, the last 2^32; {0} for
-/// no items.
+/// Shares of 2^32 proportional to `weights` (≥ 0, one of them > 0), at least 1 each: item i is chosen by
+/// the 32-bit numbers in [first[i], first[i+1]). Returns weights.size() + 1 boundaries, the last 2^32; {0}
+/// for no items.
 std::vector<std::uint64_t> choiceTable(const std::vector<double>& weights);
 
 }  // namespace crt

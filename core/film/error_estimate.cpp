@@ -166,8 +166,8 @@ LuminanceVariance::LuminanceVariance(const Film& film)
     dof_ = film.replicates() - 1;
 }
 
-/// Analysis of variance between replicates with means m_r of n_r samples each: s² = Σ n_r (m_r − m)²/(R −
-/// 1), and s²/n for the mean of all n samples. With equal n_r it is the variance of the R means over R.
+/// Analysis of variance between replicates with means m_r of n_r samples each: s² = Σ n_r (m_r − m)²/(R
+/// − 1), and s²/n for the mean of all n samples. With equal n_r it is the variance of the R means over R.
 double LuminanceVariance::betweenReplicates(std::uint32_t x, std::uint32_t y) const {
     const auto n = static_cast<double>(film_.samples.count());
     const double mean = film_.sum(x, y, 1) / n;
@@ -192,8 +192,8 @@ double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
     return spread / static_cast<double>(n - 1);
 }
 
-/// Var k₂ of R values is estimated without bias by (2R k₂² + (R − 1) k₄) / (R (R + 1)) (Kendall and Stuart
-/// 1969, 12.16); the variance of the mean is k₂/R.
+/// Var k₂ of R values is estimated without bias by (2R k₂² + (R − 1) k₄) / (R (R + 1)) (Kendall and
+/// Stuart 1969, 12.16); the variance of the mean is k₂/R.
 double LuminanceVariance::varianceOfVariance(std::uint32_t x, std::uint32_t y, double unit) const {
     const double r = dof_ + 1, mean = film_.mean(x, y, 1);
     double squares = 0, fourth_powers = 0;

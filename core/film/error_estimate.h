@@ -57,9 +57,9 @@ struct ErrorEstimate {
     double relative_rmse = 0;  ///< √(mean of the pixels' variances) / mean luminance: expected root mean
                                ///< square error over the pixels.
     stats::Interval relative_rmse_95;  ///< Of that expectation: χ² with degrees_of_freedom.
-    /// With probability 95 % the root mean square error that this image really has is at most this: √(F₀.₉₅
-    /// · mean variance) / mean. For one pixel it is Student's half-width t₀.₉₇₅ · standard error, for many
-    /// it tends to relative_rmse.
+    /// With probability 95 % the root mean square error that this image really has is at most this:
+    /// √(F₀.₉₅ · mean variance) / mean. For one pixel it is Student's half-width t₀.₉₇₅ ·
+    /// standard error, for many it tends to relative_rmse.
     double half_width_95 = 0;
     /// Of the mean's variance S: 2 S² / Var S (Satterthwaite 1946), where Var S is measured and not taken
     /// from the normal distribution.

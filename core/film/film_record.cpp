@@ -52,8 +52,8 @@ void addCamera(FilmRecord& record, const Camera& camera) {
     const Vec3d right = normalised(cross(view, camera.up)), up = cross(right, view);
     const Vec3d back{-view[0], -view[1], -view[2]};
     record.world_to_camera = matrixOf({{{right}, {up}, {back}, {{}, 1}}}, camera.position);
-    // x / depth runs from −tan_half_width to tan_half_width, and depth is w. The depth of the result is 1 /
-    // depth: no reader needs it, but a matrix that has an inverse is of more use than one that has none.
+    // x / depth runs from −tan_half_width to tan_half_width, and depth is w. The depth of the result is 1
+    // / depth: no reader needs it, but a matrix that has an inverse is of more use than one that has none.
     const Vec3d x = right * (0.5 / camera.tan_half_width) + view * 0.5;
     const Vec3d y = view * 0.5 - up * (0.5 / camera.tan_half_height);
     record.world_to_ndc = matrixOf({{{x}, {y}, {{}, 1}, {view}}}, camera.position);

@@ -20,8 +20,8 @@ double relativeTo(double x, double scale) { return x == 0 ? 0 : x / std::abs(sca
 
 }  // namespace
 
-// The weights w satisfy w · M = (0, 1, 0) with M = XYZ → RGB. Column c of Mᵀ is row c of M, so Cramer's rule
-// replaces one row of M by (0, 1, 0).
+// The weights w satisfy w · M = (0, 1, 0) with M = XYZ → RGB. Column c of Mᵀ is row c of M, so Cramer's
+// rule replaces one row of M by (0, 1, 0).
 Rgb luminanceWeights(ColorSpace space) {
     const Matrix3d m = xyzToRgb(space);
     const Rgb &r = m[0], &g = m[1], &b = m[2], y{0, 1, 0};

@@ -58,9 +58,9 @@ struct LuminanceError {
 };
 LuminanceError luminanceError(std::span<const float> test, std::span<const float> reference);
 
-/// Of how many independent pixels with equal variances the mean variance would be known as well: (Σ σ²)² / Σ
-/// σ⁴, from estimates s² of `dof` degrees of freedom each, whose squares are too large by 1 + 2/dof on
-/// average. At least 1, at most the number of pixels; that number where all are 0.
+/// Of how many independent pixels with equal variances the mean variance would be known as well: (Σ σ²)²
+/// / Σ σ⁴, from estimates s² of `dof` degrees of freedom each, whose squares are too large by 1 + 2/dof
+/// on average. At least 1, at most the number of pixels; that number where all are 0.
 double effectivePixels(std::span<const double> variances, double dof);
 
 }  // namespace crt::stats

@@ -193,7 +193,8 @@ Image readPpm(const std::string& path, std::string_view bytes) {
     return image;
 }
 
-// ---------------------------------------------------------------------------------------------- EXR, PNG, …
+// ---------------------------------------------------------------------------------------------- EXR, PNG,
+// …
 
 std::vector<CrtImageText> texts(const Image& image) {
     std::vector<CrtImageText> list;

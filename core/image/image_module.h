@@ -39,8 +39,8 @@ typedef struct CrtImagePlanes {
     uint32_t srgb_encoded; /* read only: 1 when R, G and B are 8- or 16-bit sRGB codes scaled to [0,1], 0
                               when they are linear */
     const float *chromaticities;       /* {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy}, or null */
-    /* The pixels are [left, left + width) × [top, top + height) of a picture of whole_width × whole_height,
-       which is 0 × 0 where they are all of it. EXR: data window and display window. */
+    /* The pixels are [left, left + width) × [top, top + height) of a picture of whole_width ×
+       whole_height, which is 0 × 0 where they are all of it. EXR: data window and display window. */
     int32_t left, top;
     uint32_t whole_width, whole_height;
     /* EXR, to write only: 4 × 4, row-major, for points as rows, as OpenEXR defines the attributes of these

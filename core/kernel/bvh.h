@@ -12,7 +12,8 @@ CRT_KERNEL_BEGIN
 
 #define CRT_BVH_STACK 96 /* three entries a level; bvh_build.cpp keeps the tree below 32 levels */
 
-/* Which of a box's two planes a ray meets first, per axis, by the sign bit, so that −0 is told from +0; and
+/* Which of a box's two planes a ray meets first, per axis, by the sign bit, so that −0 is told from +0;
+   and
  * 1/d, infinite where d is zero. */
 typedef struct CrtSlab {
     u32 near_x, near_y, near_z;

@@ -1,6 +1,6 @@
 /*
- * camera.h: film point → ray. Perspective, pinhole or thin lens; pixel filters by importance sampling (Ernst
- * et al. 2006), so a sample belongs to one pixel and has weight 1.
+ * camera.h: film point → ray. Perspective, pinhole or thin lens; pixel filters by importance sampling
+ * (Ernst et al. 2006), so a sample belongs to one pixel and has weight 1.
  */
 #ifndef CRT_CAMERA_H
 #define CRT_CAMERA_H

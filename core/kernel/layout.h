@@ -95,9 +95,9 @@ typedef struct CrtVertexColors {
 } CrtVertexColors;
 CRT_ASSERT_SIZE(CrtVertexColors, 48);
 
-/* Four children: bounds[2·axis + 0/1][child] is the lower/upper plane. child = index << 4 | count: count > 0
-   is a leaf of the triangle slots index … index + count − 1, count = 0 an inner node. An unused child has
-   lower = +inf, upper = −inf, so no ray enters it. */
+/* Four children: bounds[2·axis + 0/1][child] is the lower/upper plane. child = index << 4 | count: count >
+   0 is a leaf of the triangle slots index … index + count − 1, count = 0 an inner node. An unused child
+   has lower = +inf, upper = −inf, so no ray enters it. */
 typedef struct CrtNode4 {
     f32 bounds[6][4];
     u32 child[4];

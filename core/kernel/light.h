@@ -26,9 +26,9 @@ CRT_KERNEL_BEGIN
    across from each other, and rounding turns the arcs between them by more than 1e-3. */
 #define CRT_SOLID_ANGLE_HEIGHT 2.5e-4f
 
-/* Nearer to the plane than that, points are sampled by area where the largest weight of one, area · cosine /
-   distance² at the emitter's nearest point, is at most this. Elsewhere the emitter is within a few heights,
-   and left to chance. */
+/* Nearer to the plane than that, points are sampled by area where the largest weight of one, area · cosine
+   / distance² at the emitter's nearest point, is at most this. Elsewhere the emitter is within a few
+   heights, and left to chance. */
 #define CRT_AREA_WEIGHT_MAX 32.0f
 
 typedef struct CrtLightSample {
@@ -41,8 +41,8 @@ typedef struct CrtLightSample {
     f32 reach;    /* share of the way to `point` that is sure to end before the emitter */
 } CrtLightSample;
 
-/* Solid angle of the triangle of the unit vectors a, b, c, given their |a·(b×c)|: tan(Ω/2) = |a·(b×c)| / (1
-   + a·b + b·c + c·a) (Van Oosterom and Strackee 1983); accurate for the smallest triangles. */
+/* Solid angle of the triangle of the unit vectors a, b, c, given their |a·(b×c)|: tan(Ω/2) = |a·(b×c)|
+   / (1 + a·b + b·c + c·a) (Van Oosterom and Strackee 1983); accurate for the smallest triangles. */
 CRT_FN f32 crt_solid_angle(f32 triple, vec3 a, vec3 b, vec3 c) {
     return 2.0f * crt_atan2(triple, 1.0f + dot3(a, b) + dot3(b, c) + dot3(c, a));
 }
@@ -170,9 +170,9 @@ CRT_FN vec3 crt_perpendicular(vec3 v, vec3 n) { return normalize3(v - n * dot3(v
 /*
  * A direction uniform in the solid angle `omega` of the spherical triangle a, b, c, whose |a·(b×c)| is
  * `triple` (after Arvo 1995). The side from a to c is cut at x so that a, b, x has the wanted part w of the
- * area; then a point on the arc from b to x is chosen. With Todhunter's tan(w/2) = tan(ab/2) tan(ax/2) sin α
- * / (1 + tan(ab/2) tan(ax/2) cos α) (1886, § 103) the cut is at tan(ax/2) = sin(w/2) / (tan(ab/2) sin(α −
- * w/2)).
+ * area; then a point on the arc from b to x is chosen. With Todhunter's tan(w/2) = tan(ab/2) tan(ax/2) sin
+ * α / (1 + tan(ab/2) tan(ax/2) cos α) (1886, § 103) the cut is at tan(ax/2) = sin(w/2) / (tan(ab/2)
+ * sin(α − w/2)).
  */
 CRT_FN vec3 crt_sample_spherical_triangle(vec3 a, vec3 b, vec3 c, f32 triple, f32 omega, CrtRandom2 u) {
     /* The longest side, which may be nearly half a circle, is the one that is cut: arcs from the corner

@@ -30,8 +30,8 @@ CRT_FN vec3 crt_fma3(vec3 v, f32 s, vec3 a) {
     return make_vec3(crt_fma(V3X(v), s, V3X(a)), crt_fma(V3Y(v), s, V3Y(a)), crt_fma(V3Z(v), s, V3Z(a)));
 }
 
-/* a·b − c·d with an error of at most 1.5 ulp, by Kahan: exact sign, so an edge shared by two triangles is
-   seen alike from both, whatever the compiler contracts (Jeannerod, Louvet, Muller 2013). */
+/* a·b − c·d with an error of at most 1.5 ulp, by Kahan: exact sign, so an edge shared by two triangles
+   is seen alike from both, whatever the compiler contracts (Jeannerod, Louvet, Muller 2013). */
 CRT_FN f32 crt_difference_of_products(f32 a, f32 b, f32 c, f32 d) {
     const f32 cd = c * d;
     const f32 error = crt_fma(-c, d, cd);
@@ -74,7 +74,8 @@ CRT_FN vec3 crt_to_world(CrtFrame f, vec3 v) {
     return crt_fma3(f.s, V3X(v), crt_fma3(f.t, V3Y(v), f.n * V3Z(v)));
 }
 
-/* sin(x) and cos(x) for |x| ≤ π/4, minimax polynomials (Cephes sinf, cosf): error at most 0.74 and 0.88 ulp,
+/* sin(x) and cos(x) for |x| ≤ π/4, minimax polynomials (Cephes sinf, cosf): error at most 0.74 and 0.88
+   ulp,
  * over all floats. */
 CRT_FN f32 crt_sin_quarter(f32 x) {
     const f32 z = x * x;
@@ -88,8 +89,8 @@ CRT_FN f32 crt_cos_quarter(f32 x) {
         z, 1.0f);
 }
 
-/* sin and cos of any |x| < 64: reduction by multiples of π/2 in three parts (Cody and Waite), absolute error
-   < 7.8e-8. */
+/* sin and cos of any |x| < 64: reduction by multiples of π/2 in three parts (Cody and Waite), absolute
+   error < 7.8e-8. */
 CRT_FN f32 crt_sincos(f32 x, f32 *cosine) {
     const f32 q = crt_floor(x * 0.63661977236758134308f + 0.5f);
     f32 r = crt_fma(q, -1.5703125f, x);

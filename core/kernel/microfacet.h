@@ -13,8 +13,8 @@ CRT_KERNEL_BEGIN
    precision, and the image cannot tell. */
 #define CRT_ALPHA_MIN 1e-3f
 
-/* Two directions in the shading frame, each with the root of Smith's shadowing, a = √(cos² + α² sin²), of
-   which Λ = (a/cos − 1)/2 (Heitz 2014); and GGX's density of the normal halfway. */
+/* Two directions in the shading frame, each with the root of Smith's shadowing, a = √(cos² + α² sin²),
+   of which Λ = (a/cos − 1)/2 (Heitz 2014); and GGX's density of the normal halfway. */
 typedef struct CrtMicrofacet {
     f32 cos_o, cos_i; /* 0 or below: the microfacets do not mirror between them */
     f32 cos_m;        /* of both with the normal halfway */
@@ -44,7 +44,8 @@ CRT_FN CrtMicrofacet crt_microfacet(const CrtBsdf *b, vec3 wi) {
     return m;
 }
 
-/* f·cos = F D G₂ / (4 cos_o), G₂ = 1 / (1 + Λ_o + Λ_i): shadowing and masking correlated by height. */
+/* f·cos = F D G₂ / (4 cos_o), G₂ = 1 / (1 + Λ_o + Λ_i): shadowing and masking correlated by height.
+   */
 CRT_FN vec4 crt_rough_conductor(const CrtBsdf *b, vec3 wi) {
     const CrtMicrofacet m = crt_microfacet(b, wi);
     if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return splat4(0.0f);
@@ -130,8 +131,9 @@ CRT_FN CrtRefracted crt_rough_refraction(const CrtBsdf *b, vec3 wi, f32 eta) {
     const f32 spread = (x * x + y * y + b->alpha * b->alpha * (z * z)) / hh;
     const f32 density = CRT_INV_PI * (b->alpha / spread) * (b->alpha / spread);
     const f32 passed = 1.0f - crt_fresnel_dielectric(crt_min(h_o / crt_sqrt(hh), 1.0f), eta);
-    /* |w_i·m| |w_o·m| / (w_o·m + η w_i·m)², with m = h/√hh, is h_i h_o / hh². The density of normals becomes
-       that of directions by dm/dw_i = η² |w_i·m| / (w_o·m + η w_i·m)² (Walter, equation 17). */
+    /* |w_i·m| |w_o·m| / (w_o·m + η w_i·m)², with m = h/√hh, is h_i h_o / hh². The density of
+       normals becomes that of directions by dm/dw_i = η² |w_i·m| / (w_o·m + η w_i·m)² (Walter,
+       equation 17). */
     const f32 turned = passed * density * (h_o / hh) * (h_i / hh);
     r.value = turned * 2.0f * cos_i / (root_o * cos_i + root_i * cos_o);
     r.pdf = turned * 2.0f * eta * eta / (cos_o + root_o);

@@ -6,9 +6,10 @@
  *     f = f_coat + a/π (1 − E(θ_o)) (1 − E(θ_i)) / (η² (1 − a k)),    k = 1 − (1 − Ē)/η²
  *
  * with a the base's albedo, Ē the mean of E over the cosine and k the share of diffuse light that the coat
- * sends back from below, which (1 − k) η² = 1 − Ē ties to what it lets in. It is Mitsuba's `roughplastic`
- * with `nonlinear` (Jakob et al. 2022), whose tables of transmittance are here E of microfacets that mirror
- * once: what they lose enters. It is reciprocal, and a white base sends all light back.
+ * sends back from below, which (1 − k) η² = 1 − Ē ties to what it lets in. It is Mitsuba's
+ * `roughplastic` with `nonlinear` (Jakob et al. 2022), whose tables of transmittance are here E of
+ * microfacets that mirror once: what they lose enters. It is reciprocal, and a white base sends all light
+ * back.
  */
 #ifndef CRT_PLASTIC_H
 #define CRT_PLASTIC_H
@@ -17,8 +18,8 @@
 
 CRT_KERNEL_BEGIN
 
-/* E(θ) of a rough coat, tabulated by the compiler of the scene at cosines in steps of 1/CRT_COAT_STEPS; of a
-   smooth one, Fresnel's. */
+/* E(θ) of a rough coat, tabulated by the compiler of the scene at cosines in steps of 1/CRT_COAT_STEPS; of
+   a smooth one, Fresnel's. */
 CRT_FN f32 crt_coat_albedo(const CrtBsdf *b, f32 cosine) {
     const f32 c = crt_min(cosine, 1.0f);
     if (CRT_HAS(TABLE) && b->coat != 0) return crt_lookup(b->coat, c * CRT_COAT_STEPS);

@@ -2,8 +2,8 @@
  * scatter.h: what a BSDF is made of (CrtBsdf) and what it answers (CrtScatter); Fresnel's equations; and the
  * surfaces without microfacets: Lambert's, mirrors, smooth dielectrics, panes.
  *
- * w_o and w_i point away from the surface. Radiance is transported: crossing into an index η times the other
- * scales it by 1/η².
+ * w_o and w_i point away from the surface. Radiance is transported: crossing into an index η times the
+ * other scales it by 1/η².
  */
 #ifndef CRT_SCATTER_H
 #define CRT_SCATTER_H
@@ -49,8 +49,8 @@ typedef struct CrtScatter {
     int valid;
 } CrtScatter;
 
-/* (η·cos of refraction)² at cos of incidence, η² − 1 + cos²; ≤ 0 in total internal reflection. In this order
-   an index of 1 gives back cos² itself, however grazing. */
+/* (η·cos of refraction)² at cos of incidence, η² − 1 + cos²; ≤ 0 in total internal reflection. In
+   this order an index of 1 gives back cos² itself, however grazing. */
 CRT_FN f32 crt_refraction(f32 cos_i, f32 eta) { return (eta - 1.0f) * (eta + 1.0f) + cos_i * cos_i; }
 
 /* Unpolarised reflectance of an interface at |cos| of incidence; eta: index beyond / index before. Exactly 1
@@ -136,8 +136,8 @@ CRT_FN CrtScatter crt_sample_mirror(vec4 reflectance, vec3 wo, vec3 ns, vec3 ng)
     return s;
 }
 
-/* A thin pane: two parallel interfaces, their reflections to and fro summed: R + T²R/(1 − R²) = 2R/(1 + R).
-   What passes is not bent. */
+/* A thin pane: two parallel interfaces, their reflections to and fro summed: R + T²R/(1 − R²) = 2R/(1 +
+   R). What passes is not bent. */
 CRT_FN CrtScatter crt_sample_thin_dielectric(const CrtBsdf *b, f32 u) {
     const vec4 single = crt_fresnel_dielectric4(crt_min(dot3(b->wo, b->ns), 1.0f), b->eta);
     const vec4 fresnel = single * 2.0f / (single + splat4(1.0f));

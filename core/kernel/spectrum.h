@@ -71,9 +71,9 @@ CRT_FN vec4 crt_spectrum(const CrtContext *ctx, u32 index, vec4 position) {
                      crt_lookup(table, V4Z(position)), crt_lookup(table, V4W(position)));
 }
 
-/* ½ + x / (2√(1 + x²)). 1 / (2h(h + |x|)), with h = √(1 + x²), is the smaller of that and 1 minus that: no
-   digits cancel, also where a surface is nearly black. Six roundings: error < 6 ulp of the result, or
-   of 1 minus it. */
+/* ½ + x / (2√(1 + x²)). 1 / (2h(h + |x|)), with h = √(1 + x²), is the smaller of that and 1 minus
+   that: no digits cancel, also where a surface is nearly black. Six roundings: error < 6 ulp of the result,
+   or of 1 minus it. */
 CRT_FN f32 crt_sigmoid_of(f32 x) {
     const f32 size = crt_abs(x);
     const f32 h = crt_sqrt(crt_fma(size, size, 1.0f));
@@ -81,8 +81,8 @@ CRT_FN f32 crt_sigmoid_of(f32 x) {
     return x < 0.0f ? smaller : 1.0f - smaller;
 }
 
-/* A reflectance of three numbers (Jakob and Hanika 2019): the sigmoid of c0 + c1 t + c2 t², t the wavelength
-   as -1 (360 nm) to 1 (830 nm). */
+/* A reflectance of three numbers (Jakob and Hanika 2019): the sigmoid of c0 + c1 t + c2 t², t the
+   wavelength as -1 (360 nm) to 1 (830 nm). */
 CRT_FN vec4 crt_sigmoid(f32 c0, f32 c1, f32 c2, vec4 position) {
     const f32 scale = 2.0f / (f32)(CRT_WAVELENGTH_COUNT - 1u);
     const f32 t0 = crt_fma(V4X(position), scale, -1.0f);

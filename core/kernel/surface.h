@@ -42,11 +42,10 @@ CRT_FN f32 crt_clearance(f32 coordinate, f32 size) {
     return 1.7320509f * (coordinate * CRT_GAMMA(9.0f) + size * CRT_TEST_ERROR);
 }
 
-/* A ray's origin o may be taken for the wrong side of a triangle's plane within γ(1)·coordinate + γ(8)·size,
-   by the triangle test, and 4 · 2^-24
-   (|ox| + |oy| + |oz|), by rounding of its height: less than the clearance. Eight triangles at a time
-   (intersect.h) compare CRT_HEIGHT_SCALE times the height with the slack of a ray, which is 64 · 2^-24 (1 +
-   |ox| + |oy| + |oz|): this is what is left of the sum. */
+/* A ray's origin o may be taken for the wrong side of a triangle's plane within γ(1)·coordinate +
+   γ(8)·size, by the triangle test, and 4 · 2^-24 (|ox| + |oy| + |oz|), by rounding of its height: less
+   than the clearance. Eight triangles at a time (intersect.h) compare CRT_HEIGHT_SCALE times the height with
+   the slack of a ray, which is 64 · 2^-24 (1 + |ox| + |oy| + |oz|): this is what is left of the sum. */
 CRT_FN f32 crt_height_slack(f32 coordinate, f32 size) {
     return CRT_HEIGHT_SCALE * (CRT_GAMMA(1.0f) * coordinate + CRT_GAMMA(8.0f) * size) - 64.0f * CRT_EPSILON;
 }

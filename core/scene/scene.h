@@ -155,8 +155,9 @@ struct PointLight {
     std::string name;
     PointLightType type = PointLightType::Point;
     Spectrum spectrum;    ///< Times `strength`.
-    /// Radiant intensity (Point; Spot, on its axis), W·sr⁻¹·nm⁻¹; irradiance of a plane that faces it
-    /// (Directional), W·m⁻²·nm⁻¹; or radiance (Sun), W·m⁻²·sr⁻¹·nm⁻¹: per unit of the spectrum.
+    /// Radiant intensity (Point; Spot, on its axis), W·sr⁻¹·nm⁻¹; irradiance of a plane that faces
+    /// it (Directional), W·m⁻²·nm⁻¹; or radiance (Sun), W·m⁻²·sr⁻¹·nm⁻¹: per unit of the
+    /// spectrum.
     double strength = 1;
     Vec3d position{};                 ///< Point, Spot.
     Vec3d direction{0, -1, 0};        ///< Unit, the way that the light goes. All but Point.

@@ -10,9 +10,9 @@
 
 namespace crt {
 
-/// W·m⁻²·sr⁻¹·nm⁻¹. A float goes from 1e-38 to 3e38; what lies between these bounds and those is room for
-/// the factors that a path multiplies radiance by (areas over squared distances, 1/pdf), so that neither a
-/// bright sample becomes infinite nor a dim one zero.
+/// W·m⁻²·sr⁻¹·nm⁻¹. A float goes from 1e-38 to 3e38; what lies between these bounds and those is
+/// room for the factors that a path multiplies radiance by (areas over squared distances, 1/pdf), so that
+/// neither a bright sample becomes infinite nor a dim one zero.
 inline constexpr double kMostRadiance = 1e25;
 inline constexpr double kLeastRadiance = 1e-25;
 

@@ -54,8 +54,8 @@ struct Texture {
     TextureFilter filter = TextureFilter::Bilinear;
     TextureWrap wrap = TextureWrap::Repeat;
     std::array<TextureValue, 2> values;  ///< Checker. Textures among them come before this one.
-    /// Texture coordinates → those of the image, both with v up: rows of two and an offset, (u', v') = (m0 u
-    /// + m1 v + m2, m3 u + m4 v + m5). The image is the unit square, as are the squares of a checker.
+    /// Texture coordinates → those of the image, both with v up: rows of two and an offset, (u', v') = (m0
+    /// u + m1 v + m2, m3 u + m4 v + m5). The image is the unit square, as are the squares of a checker.
     std::array<double, 6> transform{1, 0, 0, 0, 1, 0};
     SourcePlace place;
 };

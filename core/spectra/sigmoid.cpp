@@ -102,8 +102,8 @@ const std::array<Spectrum, 3>& rgbWeights() {
     return weights;
 }
 
-/// Gauss–Newton, with Levenberg–Marquardt damping because at the faces of the RGB cube the sigmoid saturates
-/// and a bare step would leave for infinity.
+/// Gauss–Newton, with Levenberg–Marquardt damping because at the faces of the RGB cube the sigmoid
+/// saturates and a bare step would leave for infinity.
 void fitSigmoid(Vec3d& c, const Vec3d& rgb, std::span<const SigmoidNode> nodes, double accuracy) {
     constexpr int kMaxSteps = 400;
     const double good_enough = accuracy * accuracy * *std::max_element(rgb.begin(), rgb.end());

@@ -1,7 +1,7 @@
 /// Reflectances of three numbers. W. Jakob and J. Hanika, "A Low-Dimensional Function Space for Efficient
 /// Spectral Upsampling", Computer Graphics Forum 38(2), 2019: the sigmoid ½ + x / (2√(1 + x²)) of
-/// x = c₀ + c₁t + c₂t², t the wavelength as −1 (360 nm) to 1 (830 nm), is smooth and cannot leave (0, 1).
-/// The kernel evaluates it (crt_sigmoid in kernel/spectrum.h).
+/// x = c₀ + c₁t + c₂t², t the wavelength as −1 (360 nm) to 1 (830 nm), is smooth and cannot leave
+/// (0, 1). The kernel evaluates it (crt_sigmoid in kernel/spectrum.h).
 #pragma once
 
 #include "spectra/spectra.h"
@@ -16,8 +16,8 @@ namespace crt {
 using SigmoidCoefficients = std::array<float, 3>;
 
 /// Coefficients of a linear sRGB colour in [0, 1]. The colour that the reflectance shows under D65 is within
-/// 10⁻⁴ of it in each component on average, and 3·10⁻³ at worst, next to white (tests/unit_sigmoid.cpp);
-/// greys are exact. Black and white are 10⁻⁷ off 0 and 1. What lies outside
+/// 10⁻⁴ of it in each component on average, and 3·10⁻³ at worst, next to white
+/// (tests/unit_sigmoid.cpp); greys are exact. Black and white are 10⁻⁷ off 0 and 1. What lies outside
 /// [0, 1] counts as the nearer end; NaN as 0. The first call makes a table of 2.7 MB, by threads, in a
 /// fraction of a second. [any thread]
 SigmoidCoefficients sigmoidCoefficients(const std::array<float, 3>& linear_srgb);

@@ -70,8 +70,8 @@ private:
     std::shared_ptr<Array> shared_;
 };
 
-/// A function of wavelength, sampled at 360, 361, … 830 nm and linear between. Everything a scene names as a
-/// spectrum is resolved to this at load.
+/// A function of wavelength, sampled at 360, 361, … 830 nm and linear between. Everything a scene names as
+/// a spectrum is resolved to this at load.
 struct Spectrum {
     SpectrumValues values;
 
@@ -135,10 +135,12 @@ Spectrum rgbEmission(const Vec3d& linear_srgb);
 double srgbToLinear(double encoded);
 double linearToSrgb(double linear);
 
-/// CIE 1931 2° colour-matching functions x̄, ȳ, z̄ on the 1 nm grid, and ∫ȳ dλ by the sum over the grid.
+/// CIE 1931 2° colour-matching functions x̄, ȳ, z̄ on the 1 nm grid, and ∫ȳ dλ by the sum over the
+/// grid.
 const std::array<Spectrum, 3>& cieObserver();
 double cieYIntegral();
-/// XYZ of a radiance spectrum: ∫L·(x̄,ȳ,z̄)dλ / ∫ȳdλ (sum on the 1 nm grid), so that L = 1 gives Y = 1.
+/// XYZ of a radiance spectrum: ∫L·(x̄,ȳ,z̄)dλ / ∫ȳdλ (sum on the 1 nm grid), so that L = 1 gives
+/// Y = 1.
 Vec3d spectrumToXyz(const Spectrum& radiance);
 
 /// Output colour spaces.

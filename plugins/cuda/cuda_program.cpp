@@ -77,8 +77,8 @@ KernelCache::Key cacheKey(const std::string& text, int arch, std::uint32_t featu
 }
 
 ResourceUse resourceUse(const std::string& log, const std::string& kernel) {
-    // "… Function properties for crt_render", then a line about the stack and the spills, and one with "Used
-    // 96 registers"; each kernel in turn.
+    // "… Function properties for crt_render", then a line about the stack and the spills, and one with
+    // "Used 96 registers"; each kernel in turn.
     ResourceUse use;
     bool ours = false;
     std::istringstream lines(log);

@@ -24,9 +24,9 @@ using kernel::CrtTriangle;
 /// reach.
 constexpr float kReachSlack = 1.0f + 1e-5f;
 
-/// Embree tests the boxes of user primitives without its robust mode's care: planes err by some 7 · 2^-24 of
-/// the coordinates that take part, whatever the scene's flags say. For rays that start within Tracer::kReach
-/// of the scene (which lies within ±1) this holds what they touch, with room to spare.
+/// Embree tests the boxes of user primitives without its robust mode's care: planes err by some 7 · 2^-24
+/// of the coordinates that take part, whatever the scene's flags say. For rays that start within
+/// Tracer::kReach of the scene (which lies within ±1) this holds what they touch, with room to spare.
 constexpr float kBoxPadding = 8 * CRT_BOX_PADDING;
 
 #if RTC_VERSION_MAJOR >= 4

@@ -1,5 +1,5 @@
-// Checkpoint files → Film → checkpoint file and images. A random file never has the right checksum, so the
-// first byte of the input chooses: 0 takes the rest as it is; 1 puts in the checksum that belongs to it;
+// Checkpoint files → Film → checkpoint file and images. A random file never has the right checksum, so
+// the first byte of the input chooses: 0 takes the rest as it is; 1 puts in the checksum that belongs to it;
 // anything else the size of the file as well.
 #include "fuzz_target.h"
 

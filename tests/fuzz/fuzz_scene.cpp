@@ -1,5 +1,5 @@
-// Scene YAML → Scene → CompiledScene, with a BVH and without, and what its films say of it. The text is a
-// whole scene file; beside it lie a mesh and a spectrum that it may name.
+// Scene YAML → Scene → CompiledScene, with a BVH and without, and what its films say of it. The text is
+// a whole scene file; beside it lie a mesh and a spectrum that it may name.
 #include "fuzz_target.h"
 
 #include "compile/compile.h"

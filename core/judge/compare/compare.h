@@ -80,8 +80,8 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
 /// a − b of R, G and B.
 Image differenceImage(const Image& a, const Image& b);
 /// The same to look at: black where all bits agree, else from blue (10⁻⁷ of the mean of b, about one
-/// rounding) over green (10⁻⁴) to red (10⁻¹ and more) by the largest difference of the pixel; magenta where
-/// a value is not finite. Linear sRGB.
+/// rounding) over green (10⁻⁴) to red (10⁻¹ and more) by the largest difference of the pixel; magenta
+/// where a value is not finite. Linear sRGB.
 Image falseColorDifference(const Image& a, const Image& b);
 /// Writes the difference: as values to .exr and .pfm, in false colour to .png and .ppm. Throws
 /// crt::Error(Usage) for another extension or images that do not match, crt::Error(Output) when it cannot be

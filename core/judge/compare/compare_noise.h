@@ -41,8 +41,8 @@ struct NoiseComparison {
     /// where no noise. The standard error is the larger of the pixel's own and the average of the 7 × 7
     /// pixels about it.
     std::vector<double> z;
-    /// √(Σ (a − b)² / Σ stated variances): 1 when all the difference is noise, and the noise is what the
-    /// images say. Unbiased with any degrees of freedom, which the mean square of single z's is not.
+    /// √(Σ (a − b)² / Σ stated variances): 1 when all the difference is noise, and the noise is what
+    /// the images say. Unbiased with any degrees of freedom, which the mean square of single z's is not.
     double rms_z = 0;
 };
 

@@ -32,8 +32,8 @@ std::vector<float> colorValues(const Image& image) {
     return values;
 }
 
-/// Jackknife: √((k − 1)/k · Σ (e₋ᵢ − ē)²) over the k references that lack one fold each (Efron and Stein
-/// 1981).
+/// Jackknife: √((k − 1)/k · Σ (e₋ᵢ − ē)²) over the k references that lack one fold each (Efron
+/// and Stein 1981).
 double jackknifeError(const std::vector<double>& values) {
     const stats::Summary s = stats::summarize(values);
     const double k = static_cast<double>(values.size());

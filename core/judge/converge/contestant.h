@@ -69,8 +69,8 @@ private:
     Plane last_error_;          ///< The image's own standard error, relative to its mean.
 };
 
-/// What becomes known when replicates can be compared: (R − 1)/R · mean (I_r − mean of the others)², into
-/// the rows.
+/// What becomes known when replicates can be compared: (R − 1)/R · mean (I_r − mean of the others)²,
+/// into the rows.
 void fillBetweenReplicates(std::vector<Row>& rows, const Key& key,
                            const std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks);
 

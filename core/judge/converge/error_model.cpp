@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Line through (x, y) whose errors are relative to y: weights 1/y², then 1/line², so that a low point does
-/// not weigh more for being low.
+/// Line through (x, y) whose errors are relative to y: weights 1/y², then 1/line², so that a low point
+/// does not weigh more for being low.
 stats::LineFit relativeLine(std::span<const double> x, std::span<const double> y) {
     std::vector<double> weights(y.size());
     std::transform(y.begin(), y.end(), weights.begin(), [](double value) { return 1 / (value * value); });

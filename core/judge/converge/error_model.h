@@ -2,7 +2,8 @@
 /// any part of the replicates and of the reference. fits.h makes intervals of them.
 ///
 /// With a reference of k folds F the squared error of an image I is the mean over pairs of folds of
-/// mean (I − F_i)(I − F_j): what the noise of the reference adds cancels, and leaving out a fold is cheap.
+/// mean (I − F_i)(I − F_j): what the noise of the reference adds cancels, and leaving out a fold is
+/// cheap.
 #pragma once
 
 #include "base/statistics.h"

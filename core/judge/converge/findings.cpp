@@ -17,8 +17,9 @@ namespace {
 using Fits = std::vector<const ConfigurationFit*>;
 
 /// Quotient of two independent positive estimates, as one of `comparisons` that are looked at: on a
-/// logarithmic scale half widths add in quadrature, and Student's quantile becomes that of confidence 1 − (1
-/// − c)/comparisons (Bonferroni), so that who was picked because it came out first is not taken for first.
+/// logarithmic scale half widths add in quadrature, and Student's quantile becomes that of confidence 1 −
+/// (1 − c)/comparisons (Bonferroni), so that who was picked because it came out first is not taken for
+/// first.
 Estimate quotient(const Estimate& a, const Estimate& b, std::size_t comparisons, std::uint32_t replicates,
                   double confidence) {
     const auto quantile = [&](double alpha) {

@@ -2,8 +2,8 @@
 /// sure all that is.
 ///
 /// Relative to the scene. Errors are of luminance, divided by the mean luminance of the reference (of the
-/// replicates, without one; stats/luminance_error.h), so mean squared errors here are relative² and 0.01² is
-/// "1 %". The reference's own variance is subtracted from every mean squared error.
+/// replicates, without one; stats/luminance_error.h), so mean squared errors here are relative² and 0.01²
+/// is "1 %". The reference's own variance is subtracted from every mean squared error.
 ///
 /// Where intervals come from. Rows of one replicate are looks at one progressive render, so only replicates
 /// are independent, and so are the folds of a reference. Every interval is the jackknife over both

@@ -33,10 +33,10 @@ struct SampleCounts {
 
 enum class Scale { Linear, Logarithmic };
 
-/// Without bounds (low −∞ or, on the logarithmic scale, 0; high ∞) where the statistic is not finite on some
-/// part, or one of the samples is a single one. NaN altogether where it is not finite on all. Of very many
-/// replicates whole groups are left out (Wolter, Introduction to Variance Estimation, 4.2): the time would
-/// grow with their square.
+/// Without bounds (low −∞ or, on the logarithmic scale, 0; high ∞) where the statistic is not finite
+/// on some part, or one of the samples is a single one. NaN altogether where it is not finite on all. Of
+/// very many replicates whole groups are left out (Wolter, Introduction to Variance Estimation, 4.2): the
+/// time would grow with their square.
 Estimate jackknife(const SampleCounts& counts, const Statistic& statistic, Scale scale, double confidence);
 
 /// Standard error of the same on a linear scale that the folds alone cause; 0 without folds, infinite where

@@ -71,10 +71,11 @@ struct Row {
     /// Mean squared difference from each fold of the reference alone, absolute; empty where it has none.
     /// With ReferenceInfo::fold_distance it says what the error would be against any of the folds.
     std::vector<double> fold_mse;
-    /// (R − 1)/R · mean (I_r − Ī_r)², Ī_r the mean of the configuration's other R − 1 replicates at the same
-    /// N. Its mean over replicates is their sample variance: unbiased for the variance of one image, blind
-    /// to bias. It stands in for the error where there is no reference, and where there is one,
-    /// mean(error->mse − between_replicates_mse) estimates bias². Known when all replicates have reached N.
+    /// (R − 1)/R · mean (I_r − Ī_r)², Ī_r the mean of the configuration's other R − 1 replicates
+    /// at the same N. Its mean over replicates is their sample variance: unbiased for the variance of one
+    /// image, blind to bias. It stands in for the error where there is no reference, and where there is one,
+    /// mean(error->mse − between_replicates_mse) estimates bias². Known when all replicates have reached
+    /// N.
     std::optional<double> between_replicates_mse;
     /// stats::effectivePixels of that variance; known with it.
     std::optional<double> effective_pixels;

@@ -11,8 +11,8 @@ namespace {
 
 double secondsOf(const Row& row) { return row.seconds_before_first_sample + row.render_wall_seconds; }
 
-/// √ of a mean squared error. In logarithms where the error is known well; else from a line, which may begin
-/// at 0: below the reference's own noise there is no logarithm.
+/// √ of a mean squared error. In logarithms where the error is known well; else from a line, which may
+/// begin at 0: below the reference's own noise there is no logarithm.
 Estimate rootOf(const SampleCounts& counts, const Statistic& mse, double confidence) {
     const Estimate e = jackknife(counts, mse, Scale::Linear, confidence);
     if (e.low > 0.25 * e.value) {

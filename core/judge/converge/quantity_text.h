@@ -9,8 +9,8 @@
 
 namespace crt::converge {
 
-/// `digits` significant ones, without exponent between 10⁻⁴ and 10⁶: "0.0123", "412", "1.2·10⁷". Not a
-/// number: "–".
+/// `digits` significant ones, without exponent between 10⁻⁴ and 10⁶: "0.0123", "412", "1.2·10⁷".
+/// Not a number: "–".
 std::string numberText(double value, int digits = 3);
 /// "1.23 %"; of 0.0123.
 std::string percentText(double value, int digits = 3);

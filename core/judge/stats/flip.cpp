@@ -90,7 +90,8 @@ void scale(Taps& taps, double factor) {
 }
 double sum(const Taps& taps) { return std::accumulate(taps.begin(), taps.end(), 0.0); }
 
-/// exp(−π²x²/b), x in degrees: the Fourier transform of a Gaussian contrast sensitivity (2020, equation 2).
+/// exp(−π²x²/b), x in degrees: the Fourier transform of a Gaussian contrast sensitivity (2020, equation
+/// 2).
 Taps sensitivityTaps(double b, int radius, double pixels_per_degree) {
     Taps taps;
     for (int i = -radius; i <= radius; ++i)
@@ -222,8 +223,8 @@ void finish(FlipResult& result) {
 
 // ------------------------------------------------------------------------------------------------- exposure
 
-/// (k₀x² + k₁x + k₂) / (k₃x² + k₄x + k₅): Narkowicz' fit to the ACES curve, its input scaled by 0.6 (2021,
-/// section 3).
+/// (k₀x² + k₁x + k₂) / (k₃x² + k₄x + k₅): Narkowicz' fit to the ACES curve, its input scaled
+/// by 0.6 (2021, section 3).
 struct ToneCurve {
     std::array<double, 6> k{0.6 * 0.6 * 2.51, 0.6 * 0.03, 0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14};
 

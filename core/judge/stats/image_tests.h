@@ -34,8 +34,8 @@ struct TestFamily {
 };
 /// Adjusted and rejected by Holm's steps: however the tests depend on each other.
 TestFamily holmFamily(std::span<const double> p_values, double alpha);
-/// By Šidák's one limit. Exact for independent tests; on the safe side where they agree with each other, as
-/// channels do.
+/// By Šidák's one limit. Exact for independent tests; on the safe side where they agree with each other,
+/// as channels do.
 TestFamily sidakFamily(std::span<const double> p_values, double alpha);
 
 /// Side of a square of pixels that are tested together.
@@ -62,8 +62,8 @@ public:
     /// Tiles in reading order; those at the right and lower border may be smaller.
     Summary tileMean(std::size_t tile, std::uint32_t channel) const;
     Summary pixel(std::size_t pixel, std::uint32_t channel) const;
-    /// Largest part of Σ (I − Ī)², over all pixels, channels and replicates, that is one of them; 0 without
-    /// any spread.
+    /// Largest part of Σ (I − Ī)², over all pixels, channels and replicates, that is one of them; 0
+    /// without any spread.
     double largestShare() const;
 
 private:

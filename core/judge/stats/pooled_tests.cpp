@@ -85,8 +85,8 @@ double symmetricP(const DifferenceSums& d) {
     return d.squares > 0 ? std::min(1.0, kTailFactor * normalTwoSided(d.sum / std::sqrt(d.squares))) : 1.0;
 }
 
-/// With mean m, n values and S = Σ (d − m)², the test of a shift δ rejects when n (m − δ) > q √(S + n (m −
-/// δ)²).
+/// With mean m, n values and S = Σ (d − m)², the test of a shift δ rejects when n (m − δ) > q √(S
+/// + n (m − δ)²).
 double symmetricHalfWidth(const DifferenceSums& d, double confidence) {
     const double n = static_cast<double>(d.count),
                  q = normalQuantile(1 - 0.5 * (1 - confidence) / kTailFactor);

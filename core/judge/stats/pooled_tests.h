@@ -21,8 +21,8 @@ struct PixelSums {
     void add(double pixel_value, double pixel_variance);
     void add(const PixelSums& other);
     /// Degrees of freedom of the summed variance when each pixel's has `dof` (Satterthwaite 1946). An
-    /// estimate s² of d degrees of freedom has E[s⁴] = σ⁴ (d + 2)/d, which is taken out; never below `dof`,
-    /// never above count · dof.
+    /// estimate s² of d degrees of freedom has E[s⁴] = σ⁴ (d + 2)/d, which is taken out; never below
+    /// `dof`, never above count · dof.
     double degreesOfFreedom(double dof) const;
     /// The pixels' mean with its variance: independent pixels' variances add.
     Mean mean(double dof) const;

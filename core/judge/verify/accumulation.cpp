@@ -296,8 +296,8 @@ void infiniteSamples(Context& context) {
     context.holds("the image is finite", finite, "finite", "infinite samples are added to the film");
 }
 
-/// Glass that reflects one path in 2^17 at normal incidence, of index (1 + √R)/(1 − √R), under a lamp behind
-/// the eye; black below.
+/// Glass that reflects one path in 2^17 at normal incidence, of index (1 + √R)/(1 − √R), under a lamp
+/// behind the eye; black below.
 std::string rareReflection(double radiance) {
     const double r = std::sqrt(std::ldexp(1.0, -17));
     return Stage("{position: [0, 0, 1], target: [0, 0, 0], fov: 0.0001}", kDirect)

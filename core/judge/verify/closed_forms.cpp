@@ -125,9 +125,9 @@ std::string table(const std::function<double(double)>& value_at) {
 }
 
 void kirchhoff(Context& context) {
-    // Walls of emissivity 1 − ρ(λ) radiate as a black body once light has been to and fro often enough; at
-    // .9^181 what is missing is 5e-9. The same seed gives the same wavelengths, so each pixel is the black
-    // one's.
+    // Walls of emissivity 1 − ρ(λ) radiate as a black body once light has been to and fro often enough;
+    // at .9^181 what is missing is 5e-9. The same seed gives the same wavelengths, so each pixel is the
+    // black one's.
     const auto room = [](const std::string& reflectance, const std::string& radiance, int depth) {
         Cube cube = furnace(0, depth);
         cube.reflectance = reflectance;
@@ -272,9 +272,9 @@ void parallelMirrors(Context& context) {
     }
 }
 
-/// Nyström solution of the radiosity equation of the unit cube with a glowing ceiling, reflectance ½, E = 1:
-/// graded Gauss–Legendre panels with the singularity subtracted, six discretisations agreeing to 1e-6, and
-/// an independent Monte Carlo of 4·10⁶ walks agreeing within its error.
+/// Nyström solution of the radiosity equation of the unit cube with a glowing ceiling, reflectance ½, E =
+/// 1: graded Gauss–Legendre panels with the singularity subtracted, six discretisations agreeing to 1e-6,
+/// and an independent Monte Carlo of 4·10⁶ walks agreeing within its error.
 struct CubeProbe {
     const char* where;
     const char* camera;
@@ -321,8 +321,8 @@ void glowingCeiling(Context& context) {
 
 void energyBalance(Context& context) {
     // A room of six colours with a lamp flush in its ceiling. Seen from the centre with a field of view of
-    // 90°, a wall fills the film, and pixels are equal areas of it. What the walls absorb is (1 − ρ)/ρ of
-    // what they reflect.
+    // 90°, a wall fills the film, and pixels are equal areas of it. What the walls absorb is (1 − ρ)/ρ
+    // of what they reflect.
     struct Wall {
         const char* name;
         const char* corners;

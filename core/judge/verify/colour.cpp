@@ -29,8 +29,8 @@ std::string lamp(const std::string& radiance) {
         .yaml();
 }
 
-/// ∫ L (x̄, ȳ, z̄) dλ / ∫ȳ dλ by trapezoids of 0.01 nm, all tables linear between nanometres as the kernels
-/// have them.
+/// ∫ L (x̄, ȳ, z̄) dλ / ∫ȳ dλ by trapezoids of 0.01 nm, all tables linear between nanometres as
+/// the kernels have them.
 Vec3d integrate(const std::function<double(double)>& radiance, double from_nm, double to_nm,
                 double step_nm = 0.01) {
     const auto& cie = cieObserver();
@@ -284,8 +284,8 @@ void needlessDispersion(Context& context) {
     }
 }
 
-/// Σ over lags of the squared autocorrelation: χ² with `lags` degrees of freedom for independent residuals
-/// (Ljung and Box 1978).
+/// Σ over lags of the squared autocorrelation: χ² with `lags` degrees of freedom for independent
+/// residuals (Ljung and Box 1978).
 double ljungBox(const std::vector<double>& residuals, std::size_t lags) {
     const auto n = static_cast<double>(residuals.size());
     double variance = 0, q = 0;

@@ -256,7 +256,8 @@ void plasticFurnace(Context& context) {
 }
 
 void absorbingSlab(Context& context) {
-    // A slab of thickness 0.5 before a lamp. Seen straight on: T = (1 − R)² A / (1 − R² A²), A = exp(−σ d).
+    // A slab of thickness 0.5 before a lamp. Seen straight on: T = (1 − R)² A / (1 − R² A²), A =
+    // exp(−σ d).
     const auto slab = [](const std::string& glass, const char* camera) {
         return Stage(camera, "{max_depth: 64, roulette: false}")
             .material("glass", glass)

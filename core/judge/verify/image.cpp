@@ -46,8 +46,8 @@ void sizes(Context& context) {
                 luminance(f) > 0,
             "16 samples in each pixel", "pixels are missed");
     }
-    // A crop of a film of 46340² pixels, the largest below 2^31, at its far corner: pixel numbers there need
-    // all 31 bits, offsets of bytes 37.
+    // A crop of a film of 46340² pixels, the largest below 2^31, at its far corner: pixel numbers there
+    // need all 31 bits, offsets of bytes 37.
     const auto corner = [](int size) {
         return fmt::format("{{resolution: [{0}, {0}], crop: [{1}, {1}, {0}, {0}]}}", size, size - 4);
     };

@@ -69,8 +69,8 @@ void brightAndDim(Context& context) {
 
 void hopelesslyDim(Context& context) {
     const double f = squareFormFactor(0, 0.5);
-    // The dim lamp is chosen by light sampling once in 2³² times: the scattered rays that meet it must count
-    // in full.
+    // The dim lamp is chosen by light sampling once in 2³² times: the scattered rays that meet it must
+    // count in full.
     context.estimate("under the lamp of 1e-10, beside one of 1e+10", twoLamps(-2, "1e-10", "1e10"),
                      meanRadiance, 1e-10 * f, 0.01, {.samples = 4096, .most = 65536},
                      {{0, "the dim lamp is never sampled, and scattered rays that meet it do not count"}});
@@ -265,8 +265,8 @@ void techniquesAgree(Context& context) {
             text += "sampler: {type: independent}\n";
             return pathVariance(context.render(text, {.samples = 16384, .squares = true}));
         };
-        // Veach's bound for two techniques of one sample each (1997, theorem 9.2): the better one's and μ²/2
-        // more. It matters where chance alone has hardly any noise; elsewhere 1.1.
+        // Veach's bound for two techniques of one sample each (1997, theorem 9.2): the better one's and
+        // μ²/2 more. It matters where chance alone has hardly any noise; elsewhere 1.1.
         const double ratio = variance(both) / variance(scattering);
         const double bound = half > 1 ? 1.5 : 1.1;
         context.holds(fmt::format("half side {}: variance of both over that of chance alone", half),

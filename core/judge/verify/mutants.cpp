@@ -144,8 +144,8 @@ void colour(Context& context) {
 }
 
 void lastNanometre(Context& context) {
-    // Radiance rises from 0 at 829 to 1 at 830 nm. The observer is linear in between: ∫ t (a + (b − a) t) dt
-    // = (a + 2b) / 6.
+    // Radiance rises from 0 at 829 to 1 at 830 nm. The observer is linear in between: ∫ t (a + (b − a)
+    // t) dt = (a + 2b) / 6.
     const double a = cieObserver()[0][kSpectrumSize - 2], b = cieObserver()[0][kSpectrumSize - 1];
     context.estimate("X of light between 829 and 830 nm",
                      "crt: 1\nfilm: {resolution: [32, 32]}\nenvironment: {radiance: {table: {nm: [829, "

@@ -200,8 +200,8 @@ void verticesThatAreNone(Context& context) {
     context.holds("a vertex at 1e30", film.invalidSamples() == 0, "accepted, finite", "an overflow");
 }
 
-/// Triangles of 10^least to 10^most, of all shapes, within ±1, a third of them in planes of constant x, y or
-/// z.
+/// Triangles of 10^least to 10^most, of all shapes, within ±1, a third of them in planes of constant x, y
+/// or z.
 Mesh soup(Dice& dice, int count, double least = -2.5, double most = -0.5) {
     Mesh mesh;
     for (int i = 0; i < count; ++i) {

@@ -125,8 +125,8 @@ struct Facet {
 };
 
 /// Mean of f(m) over the normals of GGX as visible from `cosine`, but for G₁: the density D cos_m dm is
-/// dx dφ / 2π with tan²(m) = α² x / (1 − x), and half of φ is enough. With x = 1 − y² the facets that stand
-/// on edge, seen as 1/y, are integrated as exactly as others.
+/// dx dφ / 2π with tan²(m) = α² x / (1 − x), and half of φ is enough. With x = 1 − y² the facets
+/// that stand on edge, seen as 1/y, are integrated as exactly as others.
 double overNormals(double cosine, double alpha, const std::function<double(const Facet&)>& f,
                    int panels = 24) {
     const double sine = std::sqrt(1 - cosine * cosine);

@@ -9,25 +9,27 @@
 namespace crt::verify {
 
 /// Form factor of a polygon seen from a point with a unit normal: the share of the Lambertian's hemisphere
-/// that it fills, irradiance over π·radiance. Lambert's formula (1760): (1/2π) Σ Θᵢ Γᵢ·n over the edges,
-/// after cutting off what lies below the horizon. The polygon is flat and convex; its sense does not matter.
+/// that it fills, irradiance over π·radiance. Lambert's formula (1760): (1/2π) Σ Θᵢ Γᵢ·n over the
+/// edges, after cutting off what lies below the horizon. The polygon is flat and convex; its sense does not
+/// matter.
 double polygonFormFactor(const Vec3d& point, const Vec3d& normal, const std::vector<Vec3d>& polygon);
 
 /// The same of an axis-parallel square of half side `half_side` at height 1 over a horizontal point, its
-/// centre at horizontal offset x: the sum of corner rectangles, F(a, b) = (1/2π) (A atan B + …) (Howell, "A
-/// Catalog of Radiation Heat Transfer Configuration Factors", B-3). A second route to the same number.
+/// centre at horizontal offset x: the sum of corner rectangles, F(a, b) = (1/2π) (A atan B + …) (Howell,
+/// "A Catalog of Radiation Heat Transfer Configuration Factors", B-3). A second route to the same number.
 double squareFormFactor(double x, double half_side);
 
 /// The same between two rectangles that stand on each other at a right angle with a common edge of length 1:
 /// from the one that reaches `depth` away from the edge to the one that reaches `height` (Howell, C-14).
 double perpendicularFormFactor(double depth, double height);
 
-/// ∫∫ f(u, v) over [u0, u1] × [v0, v1], Gauss–Legendre of 30 × 30 points on `panels` × `panels` panels.
+/// ∫∫ f(u, v) over [u0, u1] × [v0, v1], Gauss–Legendre of 30 × 30 points on `panels` × `panels`
+/// panels.
 double rectangleIntegral(const std::function<double(double, double)>& f, double u0, double u1, double v0,
                          double v1, int panels = 4);
 
-/// E (1 − ρ^(k+1)) / (1 − ρ) for E = 1: radiance in a closed room whose walls emit 1 and reflect ρ, after k
-/// scattering events. ρ > 0, not 1.
+/// E (1 − ρ^(k+1)) / (1 − ρ) for E = 1: radiance in a closed room whose walls emit 1 and reflect ρ,
+/// after k scattering events. ρ > 0, not 1.
 double furnaceRadiance(double albedo, int depth);
 
 /// Unpolarised reflectance of a smooth interface; eta is the index beyond over the index before. 1 in total

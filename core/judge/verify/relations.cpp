@@ -34,8 +34,8 @@ void scaling(Context& context) {
 void translation(Context& context) {
     const Scene scene = litRoom(24, 1);
     const Film here = context.render(scene, samples(4, kAllAovs));
-    // Vertices are multiples of 2⁻⁴ up to 1: with shifts of up to 2²⁷ that are whole, sums are exact in
-    // double, and in an OBJ's decimal digits.
+    // Vertices are multiples of 2⁻⁴ up to 1: with shifts of up to 2²⁷ that are whole, sums are exact
+    // in double, and in an OBJ's decimal digits.
     for (const double t : {1.0, 1e2, 1e4, 1e6, 1e8}) {
         const Vec3d shift{t, std::round(0.7 * t), -std::round(0.3 * t)};
         context.sameBits(fmt::format("by {:g} of its size", t), here,

@@ -92,7 +92,8 @@ void warned(Context& context, const std::string& what, const Scene& scene) {
                   "geometry that cannot be resolved is rendered without a warning");
 }
 
-/// A screw of 10⁻³ on the ground, under a lamp, in a world of 10⁶: the ground's mesh gets finer towards it.
+/// A screw of 10⁻³ on the ground, under a lamp, in a world of 10⁶: the ground's mesh gets finer towards
+/// it.
 Scene screwOnGround(bool whole_world, bool one_quad = false) {
     Scene scene = emptyScene(24, 1, {0, 3e-3, -3e-3}, {0, 0, 0}, 0.25);
     scene.integrator.nee = true;

@@ -38,8 +38,8 @@ public:
     Stage& set(const std::string& key, const std::string& value);
     /// As "glass", "{type: dielectric, ior: 1.5}".
     Stage& material(const std::string& name, const std::string& definition);
-    /// Four corners, counter-clockwise seen from the front. `radiance` empty: no light; "…, two_sided: true"
-    /// is possible.
+    /// Four corners, counter-clockwise seen from the front. `radiance` empty: no light; "…, two_sided:
+    /// true" is possible.
     Stage& quad(const std::string& name, const std::string& corners, const std::string& material,
                 const std::string& radiance = "");
     Stage& mesh(const std::string& name, const std::string& positions, const std::string& faces,

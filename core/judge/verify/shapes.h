@@ -49,9 +49,9 @@ Material glass(double index);
 std::size_t addObject(Scene& scene, Mesh mesh, Material material, double radiance = 0,
                       bool two_sided = false);
 
-/// Two triangles, 2⁻²⁰ of it in size, that hold the scene's bounding box at centre ± half on every axis, so
-/// that its normalisation is known whatever else is in it. Add them last: they are then the scene's last two
-/// primitives.
+/// Two triangles, 2⁻²⁰ of it in size, that hold the scene's bounding box at centre ± half on every
+/// axis, so that its normalisation is known whatever else is in it. Add them last: they are then the scene's
+/// last two primitives.
 void addAnchors(Scene& scene, const Vec3d& centre, double half);
 
 /// An empty scene: square film, independent sampler, paths without roulette or light sampling, BVH. The

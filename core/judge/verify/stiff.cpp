@@ -1,5 +1,5 @@
-// Group F: stiff transport. The condition number of L = E / (1 − ρ) is ρ / (1 − ρ): what a rounding or a
-// bias does grows with it.
+// Group F: stiff transport. The condition number of L = E / (1 − ρ) is ρ / (1 − ρ): what a rounding
+// or a bias does grows with it.
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"

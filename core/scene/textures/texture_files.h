@@ -32,9 +32,9 @@ private:
     std::map<std::pair<std::string, TexelUse>, std::shared_ptr<const TextureImage>> open_;
 };
 
-/// The three words of a texel that has this reflectance: its sigmoid's coefficients with an error of 2⁻¹⁵ to
-/// 2⁻¹³ of the power of two above the largest. Beyond ±8191, where the sigmoid is 0 or 1, all are scaled
-/// down.
+/// The three words of a texel that has this reflectance: its sigmoid's coefficients with an error of
+/// 2⁻¹⁵ to 2⁻¹³ of the power of two above the largest. Beyond ±8191, where the sigmoid is 0 or 1,
+/// all are scaled down.
 std::array<std::uint16_t, 3> texelOf(const std::array<float, 3>& coefficients);
 
 }  // namespace crt

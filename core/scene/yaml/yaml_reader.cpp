@@ -90,7 +90,8 @@ public:
     }
 };
 
-// ---- Events → tree --------------------------------------------------------------------------------------
+// ---- Events → tree
+// --------------------------------------------------------------------------------------
 
 /// yaml-cpp blames what follows a tab, not the tab.
 std::string tabHint(const YamlSource& source, int line) {

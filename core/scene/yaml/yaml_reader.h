@@ -1,5 +1,5 @@
-/// The safe walk of yaml-cpp: text → a tree of our own that keeps the place of every key and value, and the
-/// list of everything found wrong on the way.
+/// The safe walk of yaml-cpp: text → a tree of our own that keeps the place of every key and value, and
+/// the list of everything found wrong on the way.
 ///
 /// yaml-cpp 0.7's Node silently keeps duplicate keys, reads 012 as ten, refuses 1e3 as an integer, calls
 /// `no` a boolean and lets an alias close a cycle. So only its events are used here; text becomes numbers in
