@@ -215,7 +215,8 @@ TEST_CASE("Holm's family raises a false alarm no more often than alpha, and find
 TEST_CASE("Šidák's alpha, with digits left for millions of tests", "[statistics]") {
     CHECK(sidak(0.05, 1) == Approx(0.05).epsilon(1e-14));
     CHECK(sidak(0.05, 10) == Approx(0.005116196891823743).epsilon(1e-12));  // 1 − 0.95^(1/10)
-    CHECK(sidak(1e-6, 1'000'000'000'000) == Approx(1.0000005000003333e-18).epsilon(1e-12));  // −ln(1 − α)/m
+    // −ln(1 − α)/m
+    CHECK(sidak(1e-6, 1'000'000'000'000) == Approx(1.0000005000003333e-18).epsilon(1e-12));
     CHECK_THROWS_AS(sidak(0.05, 0), Error);
 }
 

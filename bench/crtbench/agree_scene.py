@@ -1,6 +1,6 @@
 """A scene of crt as Mitsuba 3 loads it: the same triangles, materials, lights, camera and depth. Spectra are
-numbers, {rgb: …, space: linear} and tables with every value written out; what has no counterpart is refused,
-so that nothing is compared that was not translated."""
+numbers, {rgb: …, space: linear} and tables with every value written out; what has no counterpart is
+refused, so that nothing is compared that was not translated."""
 
 import re
 

@@ -121,7 +121,8 @@ def measure(program, arguments):
     results.paragraph(
         "Path tracing with light sampling and MIS, at most 5 scattering events, box filter, no AOVs, all "
         "threads. "
-        f"`{BOX}`: 1440 × 1440, 8 samples per pixel, independent sampler, no roulette. `{MESH}`: 400 × 400, "
+        f"`{BOX}`: 1440 × 1440, 8 samples per pixel, independent sampler, "
+        f"no roulette. `{MESH}`: 400 × 400, "
         f"64 samples per pixel, Sobol "
         "sampler, roulette as in the scene."
     )

@@ -86,8 +86,10 @@ def write_agreement(results, found, described):
         f"(Mitsuba's `max_depth` counts the emitter too: {found['max_depth'] + 1}).".format(found["fov"])
     )
     results.paragraph(
-        "**Units.** crt: pixel = ∫L·(x̄, ȳ, z̄)dλ / ∫ȳdλ with L in W·m⁻²·sr⁻¹·nm⁻¹, the observer every nm, "
-        f"∫ȳdλ = {p['crt_y_integral_nm']:.6f} nm. Mitsuba: pixel = k·∫L·(x̄, ȳ, z̄)dλ with the observer "
+        "**Units.** crt: pixel = ∫L·(x̄, ȳ, z̄)dλ / ∫ȳdλ with L in "
+        "W·m⁻²·sr⁻¹·nm⁻¹, the observer every nm, "
+        f"∫ȳdλ = {p['crt_y_integral_nm']:.6f} nm. Mitsuba: pixel = "
+        f"k·∫L·(x̄, ȳ, z̄)dλ with the observer "
         f"every 5 nm, linear between, and "
         f"k = 1/{1 / p['mitsuba_y_normalization']:.6f} nm, which is not quite the inverse of its own "
         f"table's "

@@ -104,7 +104,8 @@ Estimate jackknife(const SampleCounts& counts, const Statistic& statistic, Scale
     std::vector<Component> components;
     if (counts.errors > 0) {
         Component errors = parts.errors(whole);
-        errors.variance *= counts.widening * counts.widening;  // 0 · ∞ is a NaN, which has no bounds either.
+        // 0 · ∞ is a NaN, which has no bounds either.
+        errors.variance *= counts.widening * counts.widening;
         components.push_back(errors);
     }
     if (counts.times > 0) components.push_back(parts.times(whole));

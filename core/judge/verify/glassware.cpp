@@ -341,7 +341,8 @@ std::vector<Case> glasswareCases() {
     constexpr std::uint64_t rough = CRT_FEATURE_ROUGH_DIELECTRIC;
     return {
         row("G13", "rough-glass",
-            "Rough glass of roughness .1, .5 and 1 in a constant environment, at 0°, 60° and 85° from both "
+            "Rough glass of roughness .1, .5 and 1 in a constant "
+            "environment, at 0°, 60° and 85° from both "
             "sides; and in a glowing room, with and without light sampling",
             "the shares of light that GGX reflects and refracts once, by quadrature in double; n² in "
             "refraction",

@@ -197,7 +197,8 @@ void choosingAmongMany(Context& context) {
                          static_cast<double>(first.back()), std::ldexp(1.0, 32), 0);
     }
     const std::vector<std::uint64_t> first = choiceTable({1e20, 1});
-    context.holds("powers 1e20 : 1: the weak one can be chosen", first[2] > first[1], "at least once in 2³²",
+    context.holds("powers 1e20 : 1: the weak one can be chosen", first[2] > first[1],
+        "at least once in 2³²",
                   "a light that is never chosen loses what only light sampling finds");
 }
 
@@ -424,11 +425,13 @@ std::vector<Case> lightCases() {
             "the floor as under its lamp alone", "rectangle formula", "± 1 %", Level::Merge, kDirectLight,
             hopelesslyDim),
         row("E10", "emissive-specular", "Mirrors that glow, glass that glows",
-            "E (1 − R^(k+1)) / (1 − R); the pane's emission once", "geometric series", "2e-6", Level::Commit,
+            "E (1 − R^(k+1)) / (1 − R); the pane's emission once", "geometric series", "2e-6",
+            Level::Commit,
             CRT_FEATURE_CONDUCTOR | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT |
                 CRT_FEATURE_ENVIRONMENT,
             emissiveSpecular),
-        row("E11", "no-light", "No lamp; radiance 0, −1, NaN, infinite", "black; the last three are refused",
+        row("E11", "no-light", "No lamp; radiance 0, −1, NaN, infinite",
+            "black; the last three are refused",
             "docs/scene.md", "exactly", Level::Commit, kDirectLight, noLight),
         row("E12", "techniques",
             "Lamps of half side 0.05, 0.5 and 5, by light sampling with scattering and by scattering alone",
@@ -445,7 +448,8 @@ std::vector<Case> lightCases() {
             "A floor under a square opening in a black ceiling, the environment sampled as a light or not; "
             "with a lamp beside it; under an open sky; of rough metal",
             "the opening's form factor, and the lamp's; half of the sky in every pixel; ratio 1",
-            "rectangle formula, Lambert's polygon formula", "± 0.2 %, ± 0.3 %; 2e-6; ± 0.5 %", Level::Commit,
+            "rectangle formula, Lambert's polygon formula", "± 0.2 %, ± 0.3 %; 2e-6; ± 0.5 %",
+            Level::Commit,
             kDirectLight | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ROUGH_CONDUCTOR, environmentLight),
     };
 }

@@ -136,7 +136,8 @@ SectionSchema camera() {
     return {
         "camera",
         "camera",
-        "A perspective camera in a right-handed world: image right is (target − position) × up. Give `fov`, "
+        "A perspective camera in a right-handed world: image right is "
+        "(target − position) × up. Give `fov`, "
         "or `focal_length` with `sensor`, not both.",
         {
             {.name = "position",
@@ -437,7 +438,8 @@ void addSpectra(std::vector<SectionSchema>& all) {
                     {.name = "normalise",
                      .kind = Kind::Boolean,
                      .fallback = "true",
-                     .doc = "Scale the maximum within 360 to 830 nm to 1; false leaves W·m⁻²·sr⁻¹·nm⁻¹."},
+                     .doc = "Scale the maximum within 360 to 830 nm to 1; false leaves "
+                             "W·m⁻²·sr⁻¹·nm⁻¹."},
                     scaleKey()}});
     all.push_back({"spectrum/illuminant",
                    "an illuminant",
@@ -543,7 +545,8 @@ void addDielectrics(std::vector<SectionSchema>& all) {
         .range = {.min = 0, .max = kMostRadiance},
         .unit = "1/scene unit",
         .doc = "Absorption coefficient of the inside, by the Beer–Lambert law: over a distance d the "
-               "share exp(−absorption · d) is left. The mesh must be closed. Of bodies inside one another, "
+               "share exp(−absorption · d) is left. The mesh must be "
+               "closed. Of bodies inside one another, "
                "the one counts that light entered last; what is around bodies absorbs nothing. 0 where it "
                "is not given."};
     all.push_back({"material/dielectric",
