@@ -1,6 +1,7 @@
 # The rooms of core/: one folder, one target, and the arrows between them.
 #
-#   crt_room(<folder> [SOURCES <file>…] [USES <folder>…] [LIBRARIES <target>…] [HEADERS <file of core/>…])
+#   crt_room(<folder> [SOURCES <file>…] [USES <folder>…] [LIBRARIES <target>…]
+#            [HEADERS <file of core/>…])
 #
 # makes the static library crt_<folder> (a '/' becomes '_') of core/<folder>, or an interface library where
 # it has headers alone. HEADERS are further ones that it shows. Its headers are included as

@@ -66,7 +66,7 @@ else()
       math(EXPR bytes "${bytes} + ${size}")
     endif()
   endforeach()
-  set(limit 16777216)  # 16 MiB
+  set(limit 12582912)  # 12 MiB
   if(bytes GREATER limit)
     message(FATAL_ERROR
       "crt-portable has ${bytes} bytes unpacked, meshes and Embree aside: more than ${limit}")

@@ -32,10 +32,10 @@ constexpr int kSkipped = 77;
 std::map<std::uint32_t, std::string> representativeMasks() {
     constexpr std::uint32_t lit =
         CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_TABLE;
-    constexpr std::uint32_t sobol = CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES;
-    constexpr std::uint32_t box = lit | sobol | CRT_FEATURE_BRUTE_FORCE;
-    constexpr std::uint32_t mesh = lit | sobol | CRT_FEATURE_BVH;
-    constexpr std::uint32_t glass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION;
+    constexpr std::uint64_t sobol = CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES;
+    constexpr std::uint64_t box = lit | sobol | CRT_FEATURE_BRUTE_FORCE;
+    constexpr std::uint64_t mesh = lit | sobol | CRT_FEATURE_BVH;
+    constexpr std::uint64_t glass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION;
     return {
         {CRT_FEATURES_ALL, "everything"},
         {box, "a box, Sobol, brute force"},

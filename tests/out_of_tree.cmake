@@ -2,8 +2,8 @@
 # docs/example_backend against it, and see that it is usable and passes the ABI part of the conformance
 # suite. Nothing of the source or build tree of crt is used after the install but that suite.
 #
-#   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=… [-DCXX_FLAGS=…] -P
-#   out_of_tree.cmake
+#   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=…
+#     [-DCXX_FLAGS=…] -P out_of_tree.cmake
 
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)

@@ -3,7 +3,8 @@
 # empty environment, and look at the image. Nothing of the source or build tree of crt is used after the
 # install.
 #
-#   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=… [-DCXX_FLAGS=…]
+#   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=…
+#     [-DCXX_FLAGS=…]
 #   [-DPKG_CONFIG=…] -P out_of_tree_program.cmake
 
 function(run)

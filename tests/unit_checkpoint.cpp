@@ -6,12 +6,12 @@
 #include "film/film_pack.h"
 #include "base/temporary_folder.h"
 #include "scene/yaml/scene_schema.h"
+#include "file_bytes.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <random>
 #include <unistd.h>
 
@@ -38,14 +38,6 @@ Film randomFilm(FilmShape shape, SampleRange range, std::uint32_t seed) {
     for (auto& id : film.primitives) id = static_cast<std::uint32_t>(generator());
     film.samples.add(range);
     return film;
-}
-
-std::string slurp(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-void spit(const std::string& path, const std::string& bytes) {
-    std::ofstream(path, std::ios::binary) << bytes;
 }
 
 bool sameBits(const std::vector<double>& a, const std::vector<double>& b) {

@@ -9,6 +9,7 @@
 #include "judge/converge/report_html.h"
 #include "judge/converge/svg_plot.h"
 #include "base/temporary_folder.h"
+#include "file_bytes.h"
 #include "synthetic_run.h"
 
 #include <fmt/format.h>
@@ -28,15 +29,6 @@ using crt::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
-
-std::string readText(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
-void writeText(const std::string& path, const std::string& text) {
-    std::ofstream(path, std::ios::binary) << text;
-}
 
 /// A box lit from above, and noise on it.
 Maps syntheticMaps(double deviation, std::uint64_t seed) {
@@ -279,14 +271,14 @@ TEST_CASE("a torn last line is left out, and cut off before the next row", "[con
     const std::string path = folder / "results.jsonl";
     const std::vector<Row> rows = fewRows();
     { ResultsLog(path).append(rows[0]); }
-    const std::string whole = readText(path);
-    writeText(path, whole + whole.substr(0, whole.size() / 2));
+    const std::string whole = slurp(path);
+    spit(path, whole + whole.substr(0, whole.size() / 2));
     CHECK(readResults(path).size() == 1);
     { ResultsLog(path).append(rows[1]); }
     const std::vector<Row> read = readResults(path);
     REQUIRE(read.size() == 2);
     CHECK(sameRow(read[1], rows[1]));
-    writeText(path, whole + "{\"scene\":1}\n");
+    spit(path, whole + "{\"scene\":1}\n");
     CHECK_THROWS_WITH(readResults(path), Contains("not a row"));
 }
 
@@ -318,15 +310,15 @@ TEST_CASE("results.csv has as many fields in each line as in its header", "[conv
         if (lines > 0) CHECK_THAT(line, Contains("\"scene, with \"\"quotes\"\"\""));
     }
     CHECK(lines == 7);
-    CHECK_THAT(readText(folder / "results.csv"), Contains("0.30000000000000004"));  // Every bit here, too.
+    CHECK_THAT(slurp(folder / "results.csv"), Contains("0.30000000000000004"));  // Every bit here, too.
 }
 
 TEST_CASE("the manifest has size and hash of every file", "[converge]") {
     const TemporaryFolder folder;
-    writeText(folder / "empty.txt", "");
-    writeText(folder / "a.txt", "a");
+    spit(folder / "empty.txt", "");
+    spit(folder / "a.txt", "a");
     writeManifest(folder / "manifest.json", syntheticStudy(), {"empty.txt", "a.txt"});
-    const nlohmann::json manifest = nlohmann::json::parse(readText(folder / "manifest.json"));
+    const nlohmann::json manifest = nlohmann::json::parse(slurp(folder / "manifest.json"));
     CHECK(manifest["files"][0]["xxh3_128"] ==
           "99aa06d3014798d86001c324468d497f");  // XXH3's published value of nothing.
     CHECK(manifest["files"][1]["bytes"] == 1);
@@ -359,7 +351,7 @@ TEST_CASE("markup in names is escaped", "[converge]") {
     for (Row& row : run.rows) row.key.scene = "<b>&\"";
     const TemporaryFolder folder;
     writeReport(folder.path(), run, analyze(run));
-    const std::string html = readText(folder / "report.html");
+    const std::string html = slurp(folder / "report.html");
     CHECK(html.find("<b>&") == std::string::npos);
     CHECK(whyNotWellFormed(html) == "");
 }
@@ -373,7 +365,7 @@ TEST_CASE("the report is one well-formed page without requests, and leaves nothi
     const Run run = syntheticStudy();
     const Analysis analysis = analyze(run);
     const std::vector<std::string> files = writeReport(folder, run, analysis);
-    const std::string html = readText(folder + "/report.html");
+    const std::string html = slurp(folder + "/report.html");
 
     CHECK(whyNotWellFormed(html) == "");
     for (const char* request :
@@ -414,7 +406,7 @@ TEST_CASE("the report is one well-formed page without requests, and leaves nothi
     std::size_t svgs = 0, pngs = 0;
     for (const std::string& file : files) {
         INFO(file);
-        const std::string bytes = readText(folder + "/" + file);
+        const std::string bytes = slurp(folder + "/" + file);
         REQUIRE_FALSE(bytes.empty());
         if (file.ends_with(".svg")) {
             ++svgs;
@@ -520,9 +512,9 @@ TEST_CASE("a run without rows still makes a report", "[converge]") {
     run.rows.clear();
     const TemporaryFolder folder;
     writeReport(folder.path(), run, analyze(run));
-    CHECK(whyNotWellFormed(readText(folder / "report.html")) == "");
+    CHECK(whyNotWellFormed(slurp(folder / "report.html")) == "");
     writeSummary(folder / "summary.json", run, analyze(run));
-    CHECK(nlohmann::json::parse(readText(folder / "summary.json"))["fits"].size() == 13);
+    CHECK(nlohmann::json::parse(slurp(folder / "summary.json"))["fits"].size() == 13);
 }
 
 TEST_CASE("few replicates, few looks and no reference make a report with what there is", "[converge]") {
@@ -540,14 +532,14 @@ TEST_CASE("few replicates, few looks and no reference make a report with what th
             const Analysis analysis = analyze(run);
             for (const std::string& file : writeReport(folder.path(), run, analysis)) {
                 INFO(file);
-                const std::string text = readText(folder / file);
+                const std::string text = slurp(folder / file);
                 CHECK(whyNotWellFormed(text) == "");
                 for (const char* wrong :
                      {"\"nan", "\"-nan", "\"inf", "\"-inf", " nan", " inf ", ">nan", ">inf"})
                     CHECK_THAT(text, !Contains(wrong));
             }
             writeSummary(folder / "summary.json", run, analysis);
-            CHECK(nlohmann::json::parse(readText(folder / "summary.json"))["fits"].size() == 1);
+            CHECK(nlohmann::json::parse(slurp(folder / "summary.json"))["fits"].size() == 1);
         }
 }
 
@@ -561,7 +553,7 @@ TEST_CASE("the report bounds an error floor, but not by 0 where errors fall fast
         const Run run = syntheticRun(what, 1);
         const TemporaryFolder folder;
         writeReport(folder.path(), run, analyze(run));
-        const std::string html = readText(folder / "report.html");
+        const std::string html = slurp(folder / "report.html");
         CHECK_THAT(html, Contains(rate == 1.0 ? "none seen<span class=\"ci\">below "
                                               : "none seen<span class=\"ci\">falls faster than 1/√N"));
         CHECK_THAT(html, !Contains("below 0 %"));
@@ -572,7 +564,7 @@ TEST_CASE("the summary has the fits of every configuration", "[converge]") {
     const TemporaryFolder folder;
     const Run run = syntheticStudy();
     writeSummary(folder / "summary.json", run, analyze(run));
-    const nlohmann::json summary = nlohmann::json::parse(readText(folder / "summary.json"));
+    const nlohmann::json summary = nlohmann::json::parse(slurp(folder / "summary.json"));
     CHECK(summary["configurations"].size() == 13);
     CHECK(summary["fits"][0]["points"].size() == 12);
     CHECK(summary["fits"][0]["targets"][0]["reached"] == true);

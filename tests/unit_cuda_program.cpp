@@ -44,7 +44,7 @@ TEST_CASE("no option relaxes arithmetic", "[cuda]") {
     CHECK(has("--prec-div=true"));
     CHECK(has("--prec-sqrt=true"));
     CHECK(has("--ftz=false"));
-    CHECK(has("-DCRT_FEATURES=0x1851u"));
+    CHECK(has("-DCRT_FEATURES=0x1851ul"));
     for (const std::string& option : options) CHECK(option.find("fast") == std::string::npos);
 }
 

@@ -4,12 +4,12 @@
 #include "catch.h"
 #include "image/image_io.h"
 #include "base/temporary_folder.h"
+#include "file_bytes.h"
 
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -19,14 +19,6 @@ using crt::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
-
-std::string slurp(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-void spit(const std::string& path, const std::string& bytes) {
-    std::ofstream(path, std::ios::binary) << bytes;
-}
 
 std::string floatBytes(const std::vector<float>& values) {
     return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float)};

@@ -713,7 +713,8 @@ TEST_CASE("no path leaves a closed room, and none meets the wall that it leaves"
                                        turn == 0 ? 0 : 33 * 3.14159265358979 / 180, r.far),
                                   0);
             const Walk walk = walkIn(compiled, 60000, random);
-            INFO("room " << r.scale[0] << "×" << r.scale[1] << "×" << r.scale[2] << ", triangle at " << r.far
+            INFO("room " << r.scale[0] << "×" << r.scale[1] << "×" << r.scale[2] << ""
+                         << ", triangle at " << r.far
                          << ", turn " << turn);
             CHECK(walk.escapes == 0);
             CHECK(walk.self_hits == 0);

@@ -3,12 +3,12 @@
 #include "catch.h"
 #include "base/temporary_folder.h"
 #include "scene/mesh/mesh_io.h"
+#include "file_bytes.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <sstream>
@@ -55,11 +55,6 @@ double agreement(const Mesh& m) {
         }
     }
     return good / all;
-}
-
-std::string slurp(const std::filesystem::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
 struct Expected {

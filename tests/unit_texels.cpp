@@ -5,26 +5,18 @@
 #include "catch.h"
 #include "image/image_io.h"
 #include "image/texels.h"
+#include "file_bytes.h"
 #include "jpeg_file.h"
 #include "spectra/spectra.h"
 
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 
 using namespace crt;
 
 namespace {
-
-std::string slurp(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-void spit(const std::string& path, const std::string& bytes) {
-    std::ofstream(path, std::ios::binary) << bytes;
-}
 
 /// Three pixels wide, two high: row 0 red, green, blue; row 1 black, grey, white.
 const std::vector<std::uint8_t> kCodes{255, 0, 0, 0,   255, 0,   0,   0,   255,

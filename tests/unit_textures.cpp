@@ -1,5 +1,6 @@
 // Textures: texels against the colours they hold, look-ups against double arithmetic, orientation, what a
 // scene file may say of them, and what OBJ and MTL files bring.
+#include "file_bytes.h"
 #include "kernel_test.h"
 
 #include "base/error.h"
@@ -52,10 +53,6 @@ void write(const std::string& path, crt::OutputFormat format, const Picture& pic
     for (const Color& c : picture.texels)
         for (const double v : c) image.pixels.push_back(static_cast<float>(v));
     crt::writeImage(path, format, image);
-}
-
-void spit(const std::string& path, const std::string& bytes) {
-    std::ofstream(path, std::ios::binary) << bytes;
 }
 
 /// A square of side 1 with (u, v) = (x, z), whose reflectance is `value`.
@@ -469,14 +466,14 @@ TEST_CASE("what is wrong about textures is told with its place", "[texture]") {
                Contains("0 to 1"));
     CHECK_THAT(refusal("crt: 1\nenvironment: {radiance: {texture: a.png}}\n", in), Contains("texture"));
 
-    spit(in + "/text.png", "hello");
+    crt::spit(in + "/text.png", "hello");
     CHECK_THAT(refusal(squareWith("{texture: text.png}"), in),
                Contains("test.yaml:2:") && Contains("it is no PNG, JPEG"));
     std::ifstream file(in + "/a.png", std::ios::binary);
     std::string bytes{std::istreambuf_iterator<char>(file), {}};
     const std::size_t pixels = bytes.find("IDAT") + 8;
     bytes[pixels] = static_cast<char>(bytes[pixels] ^ 0x55);
-    spit(in + "/bent.png", bytes);
+    crt::spit(in + "/bent.png", bytes);
     CHECK_THAT(refusalAtCompile(squareWith("{texture: bent.png}"), in), Contains("bent.png"));
     write(in + "/nan.exr", crt::OutputFormat::Exr, {2, 1, {{0, 0, 0}, {0, std::nan(""), 0}}});
     CHECK_THAT(refusalAtCompile(squareWith("{texture: nan.exr}"), in), Contains("x = 1, y = 0"));
@@ -493,10 +490,10 @@ TEST_CASE("an OBJ brings texture coordinates, its MTL images", "[texture][obj]")
     const std::string& in = folder.path();
     const Color left{0.7, 0.2, 0.1}, right{0.1, 0.2, 0.7};
     write(in + "/Wood Tiles.exr", crt::OutputFormat::Exr, {2, 1, {left, right}});
-    spit(in + "/a.mtl",
+    crt::spit(in + "/a.mtl",
          "newmtl wood\nKd 0 0 0\nmap_Kd -s 1 1 -clamp on textures\\wood tiles.EXR\nnewmtl gone\nKd 0.5 0.5 "
          "0.5\nmap_Kd gone.png\nnewmtl broken\nKd 0.25 0.25 0.25\nmap_Kd a.obj\n");
-    spit(in + "/a.obj",
+    crt::spit(in + "/a.obj",
          "mtllib a.mtl\nv 0 0 0\nv 0 0 1\nv 1 0 1\nv 1 0 0\nvt 0 0\nvt 0 1 0\nvt 1 1\nvt 1\n"
          "usemtl wood\nf 1/1 2/2 3/3 4/4\nusemtl gone\nf -4/-4 -3/-3 -2/-2\nusemtl broken\nf 1 2 3\n");
     const std::string yaml = "crt: 1\nobjects: [{obj: a.obj}]\nenvironment: {radiance: 1}\n";
@@ -526,6 +523,6 @@ TEST_CASE("an OBJ brings texture coordinates, its MTL images", "[texture][obj]")
         return text.replace(text.find("NAME"), 4, name);
     };
     CHECK_NOTHROW(sceneOf(with("a.obj"), in));
-    spit(in + "/b.obj", "v 0 0 0\nv 0 0 1\nv 1 0 1\nf 1 2 3\n");
+    crt::spit(in + "/b.obj", "v 0 0 0\nv 0 0 1\nv 1 0 1\nf 1 2 3\n");
     CHECK_THAT(refusal(with("b.obj"), in), Contains("no texture coordinates") && Contains("test.yaml:3:"));
 }

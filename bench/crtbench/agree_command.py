@@ -7,22 +7,12 @@ scene says how, and that is what is reported. Times nothing: it may run on a bus
 
 Needs a Python with mitsuba, numpy and PyYAML (--python), and an LLVM for Mitsuba's llvm variant."""
 
-import argparse
-
-from .command import add_options, exit_code, program_for
-from .peer_environment import under_mitsuba
+from .command import exit_code, program_for
+from .peer_environment import mitsuba_parser, under_mitsuba
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        prog="bench/agree", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    add_options(parser, busy="nothing happens")
-    parser.add_argument(
-        "--python",
-        help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in "
-             "out/peers-venv",
-    )
+    parser = mitsuba_parser("bench/agree", __doc__, busy="nothing happens")
     parser.add_argument(
         "--variant",
         default="llvm_ad_spectral",

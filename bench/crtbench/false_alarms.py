@@ -26,7 +26,7 @@ def measure(program, arguments):
         "end) unless it says otherwise. *Stated*: the part that may be wrong. A part above what is stated "
         "by "
         "more than "
-        "three standard errors of the counting is **bold**. Intervals of *b²* are wide on purpose: around 0 "
+        "three standard errors of the counting is **bold**. Intervals of *b²* are wide by intent: around 0 "
         "the "
         "jackknife is too careful, and what it misses is covered by Fisher's F. *FAIL of what is right*, *a "
         "floor where "

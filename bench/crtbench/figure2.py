@@ -1,6 +1,6 @@
 """Figure 2 of the paper that crt grew out of: render time against samples per pixel, 1 … 1024, of the
-Cornell box at 1440 × 1440, and at 2880 × 2880, for every backend. --rows takes measurements of the same kind
-made on another machine (JSON Lines with backend, resolution, spp, repeat, render).
+Cornell box at 1440 × 1440, and at 2880 × 2880, for every backend. --rows takes measurements of the same
+kind made on another machine (JSON Lines with backend, resolution, spp, repeat, render).
 """
 
 import json

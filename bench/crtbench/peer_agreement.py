@@ -75,7 +75,7 @@ def integral(nm, values):
 
 
 def predicted_ratios(repository, described, scene):
-    """Mitsuba/crt in X, Y, Z that the tables of the observer alone account for: light of the lamp after 0 …
+    """Mitsuba/crt in X, Y, Z that the observer's tables alone account for: light of the lamp after 0 …
     3 reflections by white. Both tables are taken as piecewise linear; Mitsuba's has a node every 5 nm and is
     divided by a constant of its own, crt's every nm and is divided by ∫ȳdλ.
     """

@@ -87,16 +87,22 @@ def llvm_library():
     return newest()
 
 
-def main():
+def mitsuba_parser(prog, description, busy):
+    """Of a bench command that runs under a Python with mitsuba; `busy` as in add_options()."""
     parser = argparse.ArgumentParser(
-        prog="bench/peers", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=prog, description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    add_options(parser, busy="a wall time is marked")
+    add_options(parser, busy=busy)
     parser.add_argument(
         "--python",
         help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in "
              "out/peers-venv",
     )
+    return parser
+
+
+def main():
+    parser = mitsuba_parser("bench/peers", __doc__, busy="a wall time is marked")
     parser.add_argument(
         "--seconds",
         type=float,

@@ -314,7 +314,7 @@ def write_race(results, race, lines, arguments, roulette_from, reference):
 def write_samplers(results, scores, roulette_from):
     results.heading("Mitsuba's samplers")
     results.paragraph(
-        f"`llvm_ad_spectral`, 3 renders each, roulette from event {roulette_from}; the least error² × time "
+        f"`llvm_ad_spectral`, 3 renders each, roulette from event {roulette_from}; least error² × time "
         f"goes into the race, in all variants, with and without "
         "roulette. Spectra are tables on a regular grid, which Mitsuba evaluates faster than irregular "
         "ones, "

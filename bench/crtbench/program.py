@@ -246,14 +246,14 @@ class Program:
         if directory.exists():
             return directory
         shutil.copytree(self.repository / "core" / "kernel", directory)
-        asked = " || ".join(f"(CRT_FEATURES) == {mask:#x}u" for mask in masks)
+        asked = " || ".join(f"(CRT_FEATURES) == {mask:#x}ul" for mask in masks)
         # CRT_KERNEL_DIR wants the headers of the layout untouched, features.h among them: the first that
         # includes them is told more.
         more = (
             f"#undef CRT_HAS\n#if {asked}\n"
-            f"#define CRT_MORE ((CRT_FEATURES) | {extra:#x}u)\n"
-            "#define CRT_HAS(name) ((CRT_MORE & (unsigned)CRT_FEATURE_##name) != 0u)\n"
-            "#define CRT_KERNEL_MATERIALS (CRT_MORE & (unsigned)CRT_FEATURES_MATERIALS)\n"
+            f"#define CRT_MORE ((CRT_FEATURES) | {extra:#x}ul)\n"
+            "#define CRT_HAS(name) CRT_IN_MASK(CRT_MORE, name)\n"
+            "#undef CRT_KERNEL_MATERIALS\n#define CRT_KERNEL_MATERIALS (CRT_MORE & CRT_FEATURES_MATERIALS)\n"
             "#else\n#define CRT_HAS(name) (0)\n#endif\n"
         )
         include = '#include "layout.h"\n'

@@ -214,7 +214,7 @@ def scale(results, points):
 
 def fov(results, points):
     results.paragraph(
-        "Stripes two pixels wide exactly where the film's columns are, 128 × 128 pixels, the view along (1, "
+        "Stripes two pixels wide where the film's columns are, 128 × 128 pixels, the view along (1, "
         "1, 1). Failures are rays that see the stripe of another column: what the rounding "
         "of directions to float costs, in rays."
     )

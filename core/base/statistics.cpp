@@ -187,7 +187,7 @@ double sidak(double alpha, std::uint64_t tests) {
     requireProbability(alpha, "alpha lies between 0 and 1");
     require(tests > 0, "there is no test to share alpha with");
     return -std::expm1(std::log1p(-alpha) /
-                       static_cast<double>(tests));  // With many tests 1 − (…) would have no digits left.
+                       static_cast<double>(tests));  // With many tests 1 − (…) would lose its digits.
 }
 
 double kolmogorovSmirnovUniform(std::span<const double> p_values) {

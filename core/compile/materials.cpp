@@ -117,7 +117,7 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
                                         : kernel::CrtMaterial{});
         if (!material) continue;
         const kernel::CrtMaterial& record = part.records.back();
-        part.features |= 1u << record.type;
+        part.features |= 1ul << record.type;
         if ((record.flags & CRT_MATERIAL_DISPERSIVE) != 0) part.features |= CRT_FEATURE_DISPERSION;
         if (record.absorption != 0) part.features |= CRT_FEATURE_ABSORPTION;
     }

@@ -25,7 +25,7 @@ std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material
 
 struct MaterialPart {
     std::vector<kernel::CrtMaterial> records;
-    std::uint32_t features = 0;  ///< Of the materials that are used.
+    std::uint64_t features = 0;  ///< Of the materials that are used.
 };
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const Coats& coats,
                               const SpectrumTable& spectra, const TexturePart& textures);

@@ -25,9 +25,9 @@ bool scatters(const Scene& scene) { return isPath(scene) && scene.integrator.max
 
 }  // namespace
 
-std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials) {
-    std::uint32_t f = 0;
-    const auto need = [&](bool condition, std::uint32_t feature) { f |= condition ? feature : 0u; };
+std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials) {
+    std::uint64_t f = 0;
+    const auto need = [&](bool condition, std::uint64_t feature) { f |= condition ? feature : 0; };
     need(header.sampler == CRT_SAMPLER_SOBOL, CRT_FEATURE_SOBOL);
     need(header.sampler == CRT_SAMPLER_INDEPENDENT, CRT_FEATURE_INDEPENDENT);
     need(header.sampler == CRT_SAMPLER_XORSHIFT, CRT_FEATURE_XORSHIFT);
@@ -67,7 +67,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
                 bool without_nodes) {
     LeftOut all;
     const auto left_out = [&](const char* what, const std::string& why) { all.emplace_back(what, why); };
-    const auto has = [&](std::uint32_t feature) { return (header.features & feature) != 0; };
+    const auto has = [&](std::uint64_t feature) { return (header.features & feature) != 0; };
     if (header.accelerator != CRT_ACCELERATOR_BVH)
         left_out("BVH", scene.integrator.accelerator == Accelerator::Auto
                             ? fmt::format("{} triangles: testing all of them is faster (up to {})",
@@ -120,7 +120,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
 std::string featureNames(std::uint64_t mask) {
     std::string names;
 #define CRT_FEATURE_NAME(bit, name, text) \
-    if (mask & (1u << bit)) names += (names.empty() ? "" : ", ") + std::string(#name);
+    if (mask & (1ul << bit)) names += (names.empty() ? "" : ", ") + std::string(#name);
     CRT_FEATURE_LIST(CRT_FEATURE_NAME)
 #undef CRT_FEATURE_NAME
     std::transform(names.begin(), names.end(), names.begin(),

@@ -14,7 +14,7 @@
 namespace crt {
 
 /// `header` is complete but for its features.
-std::uint32_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials);
+std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials);
 
 /// What is left out, and why.
 using LeftOut = std::vector<std::pair<std::string, std::string>>;

@@ -95,7 +95,8 @@ std::string vectorText(const Vec3d& v) { return fmt::format("({}, {}, {})", v[0]
 
 std::string cameraText(const Camera& c) {
     std::string text =
-        fmt::format("at {} looking at {}, up {}, {:.4g} × {:.4g} wide at distance 1", vectorText(c.position),
+        fmt::format("at {} looking at {}, up {}, {:.4g} × {:.4g} wide at distance 1",
+                    vectorText(c.position),
                     vectorText(c.target), vectorText(c.up), 2 * c.tan_half_width, 2 * c.tan_half_height);
     if (c.aperture_radius > 0)
         text += fmt::format(", lens of radius {} focused at {}", c.aperture_radius, c.focus_distance);
@@ -323,7 +324,8 @@ FilmRecord recordFrom(const Json& json) {
 
     if (std::max(record.width, record.height) > kSideMax)
         throw Error(ErrorKind::Usage,
-                    fmt::format("has a film of {} × {} pixels, and films have up to {} a side", record.width,
+                    fmt::format("has a film of {} × {} pixels, and films have up to {} a side",
+                                 record.width,
                                 record.height, kSideMax));
     const auto& [x0, y0, x1, y1] = record.window;
     if (x0 < 0 || y0 < 0 || x0 >= x1 || y0 >= y1 || x1 > record.width || y1 > record.height)

@@ -13,8 +13,9 @@ CRT_KERNEL_BEGIN
 
 /* A material's type; known without looking where the kernel has only one. */
 #define CRT_ONLY_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
-    if (CRT_KERNEL_MATERIALS == 1 << bit) return bit;
+    if (only == 1ul << bit) return bit;
 CRT_FN u32 crt_material_type(u32 type) {
+    const u64 only = CRT_KERNEL_MATERIALS;
     CRT_MATERIAL_LIST(CRT_ONLY_MATERIAL, )
     return type;
 }

@@ -62,6 +62,7 @@ CRT_FN u32 crt_reverse_bits(u32 x) {
 /* min, max and select lane by lane; a < b ? a : b, so that a NaN in `a` yields b. */
 CRT_FN vec4 crt_min4(vec4 a, vec4 b) { return select(b, a, a < b); }
 CRT_FN vec4 crt_max4(vec4 a, vec4 b) { return select(b, a, a > b); }
+#define CRT_ROLLED _Pragma("unroll 1")
 #ifndef CRT_SIMD8
 #define CRT_SIMD8 1
 #endif
@@ -165,6 +166,11 @@ CRT_FN vec4 crt_max4(vec4 a, vec4 b) {
     return make_vec4(a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z,
                      a.w > b.w ? a.w : b.w);
 }
+#ifdef CRT_CUDA_ON_HOST
+#define CRT_ROLLED _Pragma("GCC unroll 1")
+#else
+#define CRT_ROLLED _Pragma("unroll 1")
+#endif
 #define CRT_SIMD8 0
 #define CRT_ASSERT_SIZE(type, bytes) static_assert(sizeof(type) == (bytes), "layout of " #type)
 
@@ -176,6 +182,7 @@ CRT_FN vec4 crt_max4(vec4 a, vec4 b) {
 #include <immintrin.h>
 #endif
 #define CRT_FN static inline
+#define CRT_ROLLED _Pragma("GCC unroll 1") /* before a loop whose body is too long to repeat */
 #define CRT_HOT_FN \
     __attribute__((always_inline)) static inline /* called twice a vertex, where a call costs 1 % */
 #define CRT_GLOBAL

@@ -20,6 +20,14 @@ typedef struct CrtEnvironmentPlace {
     f32 sine; /* of its angle with the image's axis */
 } CrtEnvironmentPlace;
 
+/* Of an environment without an image. */
+CRT_FN CrtEnvironmentPlace crt_no_place(void) {
+    CrtEnvironmentPlace place;
+    place.row = place.column = 0u;
+    place.sine = 0.0f;
+    return place;
+}
+
 CRT_FN CrtEnvironmentPlace crt_environment_place(CRT_GLOBAL const CrtEnvironmentImage *image, vec3 d) {
     CrtEnvironmentPlace place;
     const f32 right = dot3(crt_load3(image->right), d);

@@ -52,25 +52,28 @@
     F(28, POINT_LIGHT, "point, spot, directional and sun lights")                            \
     F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")
 
-#define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1 << bit,
-enum CrtFeature { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) CRT_FEATURE_END };
+#define CRT_FEATURE_NUMBER(bit, name, text) CRT_BIT_##name = bit,
+enum CrtFeatureNumber { CRT_FEATURE_LIST(CRT_FEATURE_NUMBER) };
+
+#ifdef __cplusplus /* masks have 64 bits, enumerators of OpenCL C 32 */
+#define CRT_FEATURE_ENUM(bit, name, text) CRT_FEATURE_##name = 1ul << bit,
+enum CrtFeature : unsigned long { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) };
+#endif
 
 /* Every bit of the list. */
-#define CRT_FEATURE_BIT(bit, name, text) | (1u << bit)
-#define CRT_FEATURES_ALL (0u CRT_FEATURE_LIST(CRT_FEATURE_BIT))
+#define CRT_FEATURE_BIT(bit, name, text) | (1ul << bit)
+#define CRT_FEATURES_ALL (0ul CRT_FEATURE_LIST(CRT_FEATURE_BIT))
 
 /* Kinds of materials by their bits; the mask of all, and of those that scatter in more than single
    directions. */
 #define CRT_MATERIAL_ENUM(F, bit, NAME, Name, word, scatter, text) CRT_MATERIAL_##NAME = bit,
-#define CRT_MATERIAL_BIT(F, bit, NAME, Name, word, scatter, text) | (1 << bit)
-#define CRT_SCATTERS_LOBE(bit) | (1 << bit)
+#define CRT_MATERIAL_BIT(F, bit, NAME, Name, word, scatter, text) | (1ul << bit)
+#define CRT_SCATTERS_LOBE(bit) | (1ul << bit)
 #define CRT_SCATTERS_DELTA(bit)
 #define CRT_LOBE_BIT(F, bit, NAME, Name, word, scatter, text) CRT_SCATTERS_##scatter(bit)
-enum CrtMaterialType {
-    CRT_MATERIAL_LIST(CRT_MATERIAL_ENUM, )
-    CRT_FEATURES_MATERIALS = 0 CRT_MATERIAL_LIST(CRT_MATERIAL_BIT, ),
-    CRT_FEATURES_LOBE = 0 CRT_MATERIAL_LIST(CRT_LOBE_BIT, )
-};
+enum CrtMaterialType { CRT_MATERIAL_LIST(CRT_MATERIAL_ENUM, ) };
+#define CRT_FEATURES_MATERIALS (0ul CRT_MATERIAL_LIST(CRT_MATERIAL_BIT, ))
+#define CRT_FEATURES_LOBE (0ul CRT_MATERIAL_LIST(CRT_LOBE_BIT, ))
 
 /* The mask that this kernel is compiled for; everything when the build says nothing. */
 #ifndef CRT_FEATURES
@@ -78,8 +81,10 @@ enum CrtMaterialType {
 #endif
 
 /* The kinds of materials that it has. */
-enum CrtKernelMaterials { CRT_KERNEL_MATERIALS = (CRT_FEATURES) & (unsigned)CRT_FEATURES_MATERIALS };
+#define CRT_KERNEL_MATERIALS ((CRT_FEATURES) & CRT_FEATURES_MATERIALS)
 
-#define CRT_HAS(name) (((CRT_FEATURES) & (unsigned)CRT_FEATURE_##name) != 0u)
+/* Whether a mask, and whether this kernel, has a feature. */
+#define CRT_IN_MASK(mask, name) ((((mask) >> CRT_BIT_##name) & 1ul) != 0ul)
+#define CRT_HAS(name) CRT_IN_MASK(CRT_FEATURES, name)
 
 #endif

@@ -53,8 +53,8 @@ CRT_FN CrtShear crt_shear(CrtRay ray) {
     return s;
 }
 
-/* Around boxes, in lengths after normalisation (coordinates within ±1): the triangle test accepts hits whose
-   offset from the ray is rounding, a few 2^-24; what culls must not cull what it would accept. */
+/* Around boxes, in lengths after normalisation (coordinates within ±1): the triangle test accepts hits
+   whose offset from the ray is rounding, a few 2^-24; what culls must not cull what it would accept. */
 #define CRT_BOX_PADDING 5e-7f
 
 /* Does the ray hit the triangle at 0 < t < limit? Fills t, b1, b2. There is no least t: a ray starts far
@@ -120,8 +120,8 @@ CRT_FN CrtHit crt_no_hit(f32 reach) {
 
 #if CRT_SIMD8
 /* Slack of crt_candidates8 for a ray from o, in lengths: bounds the rounding of its edge distances (at most
-   some 30 · 2^-24 of 1 + |o|, scene coordinates being within ±1) and what the exact test accepts outside an
-   edge. */
+   some 30 · 2^-24 of 1 + |o|, scene coordinates being within ±1) and what the exact test accepts outside
+   an edge. */
 CRT_FN f32 crt_candidate_slack(vec3 o) {
     return 64.0f * CRT_EPSILON * (1.0f + crt_abs(V3X(o)) + crt_abs(V3Y(o)) + crt_abs(V3Z(o)));
 }
@@ -135,9 +135,9 @@ CRT_FN vec8 crt_row8(CRT_GLOBAL const f32 *row, vec8 x, vec8 y, vec8 z, vec8 w) 
 
 /* Lanes of eight triangles that the ray may hit before `limit`. In homogeneous form, without a division:
    with h the height of the origin over the plane and n the height gained per length of the ray, the ray
-   meets the plane at (n·o − h·d) / n. It may name a triangle that crt_intersect_triangle refuses, never miss
-   one that it accepts: close to a plane the sign of h is not known. The slack there is smaller than the
-   clearance of the triangle's own rays, or each would be a candidate of the triangle that it leaves:
+   meets the plane at (n·o − h·d) / n. It may name a triangle that crt_intersect_triangle refuses, never
+   miss one that it accepts: close to a plane the sign of h is not known. The slack there is smaller than
+   the clearance of the triangle's own rays, or each would be a candidate of the triangle that it leaves:
    crt_height_slack. */
 CRT_FN u32 crt_candidates8(CRT_GLOBAL const CrtTriangle8 *block, CrtRay ray, f32 slack, f32 limit) {
     CRT_GLOBAL const f32 *row = &block->row[0][0][0];

@@ -272,7 +272,8 @@ typedef struct CrtSeed {
 
 typedef struct CrtScene {
     u32 magic;
-    u32 features; /* of the scene; the kernel has at least these */
+    u32 environment_light; /* 1 + the index of its CrtLight; 0: light sampling leaves it to scattered rays */
+    u64 features;          /* of the scene; the kernel has at least these */
     u32 view;
     u32 accelerator;
 
@@ -298,8 +299,7 @@ typedef struct CrtScene {
     CrtSeed seed;
 
     u32 triangle_count;
-    u32 environment_light; /* 1 + the index of its CrtLight; 0: light sampling leaves it to scattered rays */
-    u32 padding[2];
+    u32 padding;
 
     CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
     CrtSpan faces;               /* CrtFace, by slot */

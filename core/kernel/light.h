@@ -309,11 +309,8 @@ CRT_FN int crt_has_environment_image(const CrtContext *ctx) {
 
 /* Where in the environment a direction leads. */
 CRT_FN CrtEnvironmentPlace crt_environment_towards(const CrtContext *ctx, vec3 d) {
-    CrtEnvironmentPlace place;
-    place.row = place.column = 0u;
-    place.sine = 0.0f;
-    if (crt_has_environment_image(ctx)) place = crt_environment_place(crt_environment_image(ctx), d);
-    return place;
+    if (!crt_has_environment_image(ctx)) return crt_no_place();
+    return crt_environment_place(crt_environment_image(ctx), d);
 }
 
 CRT_FN vec4 crt_environment_radiance(const CrtContext *ctx, CrtEnvironmentPlace place, vec4 position) {
@@ -332,8 +329,7 @@ CRT_FN CrtEnvironmentSample crt_environment_sample(const CrtContext *ctx, CrtSam
                                                    vec3 ns) {
     CrtEnvironmentSample s;
     const CrtRandom2 u = crt_sample_2d(sampler, dimension + CRT_DIM_LIGHT);
-    s.place.row = s.place.column = 0u;
-    s.place.sine = 0.0f;
+    s.place = crt_no_place();
     s.wi = crt_has_environment_image(ctx) ? crt_environment_direction(ctx, u, &s.place)
                                           : crt_cosine_direction(ns, u);
     s.pdf = crt_environment_pdf(ctx, s.place, dot3(s.wi, ns));

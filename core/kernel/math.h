@@ -50,6 +50,14 @@ CRT_FN vec3 normalize3(vec3 v) { return v * (1.0f / length3(v)); }
 
 CRT_FN vec3 abs3(vec3 v) { return make_vec3(crt_abs(V3X(v)), crt_abs(V3Y(v)), crt_abs(V3Z(v))); }
 
+/* One lane of four, and a vector with one lane replaced. */
+CRT_FN f32 crt_lane(vec4 v, u32 lane) {
+    return lane == 0u ? V4X(v) : (lane == 1u ? V4Y(v) : (lane == 2u ? V4Z(v) : V4W(v)));
+}
+CRT_FN vec4 crt_with_lane(vec4 v, u32 lane, f32 x) {
+    return make_vec4(lane == 0u ? x : V4X(v), lane == 1u ? x : V4Y(v), lane == 2u ? x : V4Z(v),
+                     lane == 3u ? x : V4W(v));
+}
 CRT_FN f32 sum4(vec4 v) { return (V4X(v) + V4Y(v)) + (V4Z(v) + V4W(v)); }
 CRT_FN f32 max4(vec4 v) { return crt_max(crt_max(V4X(v), V4Y(v)), crt_max(V4Z(v), V4W(v))); }
 

@@ -156,16 +156,15 @@ CRT_FN vec4 crt_rough_dielectric(const CrtBsdf *b, vec3 wi, f32 *pdf) {
                (m.density / (2.0f * (m.cos_o + m.root_o)));
         return fresnel * (m.density * m.cos_i / (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
     }
-    const CrtRefracted x = crt_rough_refraction(b, wi, V4X(b->eta));
-    if (!dispersive) {
-        *pdf = x.pdf;
-        return splat4(x.value);
+    const u32 lanes = dispersive ? 4u : 1u;
+    vec4 value = splat4(0.0f), density = splat4(0.0f);
+    CRT_ROLLED for (u32 lane = 0u; lane < lanes; ++lane) {
+        const CrtRefracted r = crt_rough_refraction(b, wi, crt_lane(b->eta, lane));
+        value = crt_with_lane(value, lane, r.value);
+        density = crt_with_lane(density, lane, r.pdf);
     }
-    const CrtRefracted y = crt_rough_refraction(b, wi, V4Y(b->eta));
-    const CrtRefracted z = crt_rough_refraction(b, wi, V4Z(b->eta));
-    const CrtRefracted w = crt_rough_refraction(b, wi, V4W(b->eta));
-    *pdf = sum4(b->lanes * make_vec4(x.pdf, y.pdf, z.pdf, w.pdf));
-    return make_vec4(x.value, y.value, z.value, w.value);
+    *pdf = dispersive ? sum4(b->lanes * density) : V4X(density);
+    return dispersive ? value : splat4(V4X(value));
 }
 
 /* `choice`: of mirroring and refracting, and of the wavelength by whose index. */

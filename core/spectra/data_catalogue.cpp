@@ -190,7 +190,8 @@ NamedData readData(const std::string& name, const std::string& file) {
     for (const auto& [key, value] : {std::pair{"source", &row.source}, {"quantity", &row.quantity}})
         if (value->empty())
             throw Error(ErrorKind::Scene,
-                        fmt::format("the data file '{}' has no line '# {}: …' at its beginning", file, key),
+                        fmt::format("the data file '{}' has no line '# {}: …' at its beginning", file,
+                                     key),
                         {file});
     if (row.outside != "clamp" && row.outside != "zero")
         throw Error(

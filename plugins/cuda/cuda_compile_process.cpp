@@ -252,7 +252,7 @@ int runCompileProcess(int job_descriptor, int answer_descriptor) {
         job.nvrtc_path = request.nextText();
         job.text = request.nextText();
         job.arch = request.nextNumber<int>();
-        job.features = request.nextNumber<std::uint32_t>();
+        job.features = request.nextNumber<std::uint64_t>();
         job.cache_directory = request.nextText();
         const std::vector<unsigned char> key = request.next();
         std::copy_n(key.begin(), std::min(key.size(), job.key.size()), job.key.begin());

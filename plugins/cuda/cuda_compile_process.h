@@ -24,7 +24,7 @@ struct CompileJob {
     std::string nvrtc_path;  ///< As Nvrtc::path() has it.
     std::string text;
     int arch = 0;
-    std::uint32_t features = 0;
+    std::uint64_t features = 0;
     std::string
         cache_directory;  ///< Empty: none; then only the process that waits could use the kernel.
     plugin::KernelCache::Key key{};

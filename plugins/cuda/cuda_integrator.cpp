@@ -73,7 +73,7 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     slice_count_ = 0;
     scene_ = scene;
 
-    const std::uint32_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
+    const std::uint64_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
     if (!program_ || program_->features() != features) {
         if (program_) {
             compile_seconds_ += program_->compileSeconds();

@@ -54,9 +54,9 @@ std::string kernelText(const std::string& path_text) {
     return path_text + "\n#line 1 \"kernels.cu\"\n" + kKernelText;
 }
 
-std::vector<std::string> nvrtcOptions(int arch, std::uint32_t features, int blocks_per_multiprocessor) {
+std::vector<std::string> nvrtcOptions(int arch, std::uint64_t features, int blocks_per_multiprocessor) {
     char mask[48];
-    std::snprintf(mask, sizeof mask, "-DCRT_FEATURES=0x%xu", features);
+    std::snprintf(mask, sizeof mask, "-DCRT_FEATURES=0x%llxul", static_cast<unsigned long long>(features));
     return {"--gpu-architecture=sm_" + std::to_string(arch),
             "--std=c++17",
             "--fmad=false",
@@ -68,7 +68,7 @@ std::vector<std::string> nvrtcOptions(int arch, std::uint32_t features, int bloc
             "-DCRT_BLOCKS_PER_SM=" + std::to_string(blocks_per_multiprocessor)};
 }
 
-KernelCache::Key cacheKey(const std::string& text, int arch, std::uint32_t features,
+KernelCache::Key cacheKey(const std::string& text, int arch, std::uint64_t features,
                           const std::string& compiler, const std::string& driver_version) {
     std::string options;
     for (const int blocks : kBlocksPerMultiprocessor)
@@ -98,7 +98,7 @@ ResourceUse resourceUse(const std::string& log, const std::string& kernel) {
     return use;
 }
 
-Cubin compileLean(const Nvrtc& compiler, const std::string& text, int arch, std::uint32_t features) {
+Cubin compileLean(const Nvrtc& compiler, const std::string& text, int arch, std::uint64_t features) {
     Cubin cubin;
     for (const int blocks : kBlocksPerMultiprocessor) {
         cubin = compiler.compile(text, "path.h", nvrtcOptions(arch, features, blocks));
@@ -107,7 +107,7 @@ Cubin compileLean(const Nvrtc& compiler, const std::string& text, int arch, std:
     return cubin;
 }
 
-Module::Module(const void* image, std::uint32_t features, std::string name)
+Module::Module(const void* image, std::uint64_t features, std::string name)
     : features_(features), name_(std::move(name)) {
     const Driver& cuda = driver();
     cuda.check(cuda.cuModuleLoadData(&module_, image), "loading the " + name_ + " kernel");
@@ -155,7 +155,7 @@ Module::~Module() {
     if (module_ != nullptr) driver().cuModuleUnload(module_);
 }
 
-CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::uint32_t scene_features,
+CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::uint64_t scene_features,
                          CrtKernelChoice choice)
     : host_(host), features_(choice == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene_features) {
     const auto loadPrecompiled = [&] {

@@ -34,11 +34,11 @@ constexpr std::uint32_t kSpillBytesAllowed = 128;
 
 /// Options for NVRTC. Arithmetic stays IEEE: nothing is contracted, divisions and square roots are rounded
 /// correctly, subnormals are kept.
-std::vector<std::string> nvrtcOptions(int arch, std::uint32_t features, int blocks_per_multiprocessor);
+std::vector<std::string> nvrtcOptions(int arch, std::uint64_t features, int blocks_per_multiprocessor);
 
 /// Key of the machine code: everything that decides it, and the driver's version, so that no driver has to
 /// take what another one was given.
-plugin::KernelCache::Key cacheKey(const std::string& text, int arch, std::uint32_t features,
+plugin::KernelCache::Key cacheKey(const std::string& text, int arch, std::uint64_t features,
                                   const std::string& compiler, const std::string& driver_version);
 
 /// What a kernel takes on the device, as the assembler reports it (--ptxas-options=-v).
@@ -51,14 +51,14 @@ ResourceUse resourceUse(const std::string& log, const std::string& kernel);
 
 /// Machine code for a mask, with as many blocks on a multiprocessor as go almost without spilling. Throws
 /// std::runtime_error. [any thread]
-Cubin compileLean(const Nvrtc& nvrtc, const std::string& text, int arch, std::uint32_t features);
+Cubin compileLean(const Nvrtc& nvrtc, const std::string& text, int arch, std::uint64_t features);
 
 /// The kernels of one loaded module.
 class Module {
 public:
     Module() = default;
     /// `image`: a CUBIN or a fat binary.
-    Module(const void* image, std::uint32_t features, std::string name);
+    Module(const void* image, std::uint64_t features, std::string name);
     Module(Module&& other) noexcept { *this = std::move(other); }
     Module& operator=(Module&& other) noexcept;
     ~Module();
@@ -66,7 +66,7 @@ public:
 
     CUfunction render() const { return render_; }
     CUfunction addSlices() const { return add_slices_; }
-    std::uint32_t features() const { return features_; }
+    std::uint64_t features() const { return features_; }
     const std::string& name() const { return name_; }
     std::uint32_t registers() const { return registers_; }
     std::uint32_t spillBytes() const { return spill_bytes_; }
@@ -76,14 +76,14 @@ public:
 private:
     CUmodule module_ = nullptr;
     CUfunction render_ = nullptr, add_slices_ = nullptr;
-    std::uint32_t features_ = 0, registers_ = 0, spill_bytes_ = 0, resident_blocks_ = 1;
+    std::uint64_t features_ = 0, registers_ = 0, spill_bytes_ = 0, resident_blocks_ = 1;
     std::string name_;
 };
 
 /// The kernel for one mask on one device. Used by one thread at a time, the context current.
 class CudaProgram {
 public:
-    CudaProgram(const plugin::Host& host, const Device& device, std::uint32_t scene_features,
+    CudaProgram(const plugin::Host& host, const Device& device, std::uint64_t scene_features,
                 CrtKernelChoice choice);
     CudaProgram(const CudaProgram&) = delete;
     CudaProgram& operator=(const CudaProgram&) = delete;
@@ -91,7 +91,7 @@ public:
     /// The best kernel that there is by now.
     const Module& current();
 
-    std::uint32_t features() const { return features_; }
+    std::uint64_t features() const { return features_; }
     bool fromCache() const { return from_cache_; }
     double compileSeconds() const { return compile_seconds_; }
     double cacheSeconds() const { return cache_seconds_; }
@@ -102,7 +102,7 @@ private:
     void takeLean(const CompiledKernel& compiled);
 
     plugin::Host host_;
-    std::uint32_t features_;
+    std::uint64_t features_;
     std::string lean_name_;
     Module precompiled_, lean_;
     bool from_cache_ = false;

@@ -8,10 +8,16 @@
      CRT_FEATURE_REPLICATES | CRT_FEATURE_TABLE)
 
 /// A handful of diffuse triangles.
-#define CRT_EMBREE_BOX_FEATURES ((unsigned)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BRUTE_FORCE))
+#define CRT_EMBREE_BOX_FEATURES ((unsigned long)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BRUTE_FORCE))
 /// Diffuse meshes: Embree's BVH and smooth normals.
 #define CRT_EMBREE_MESH_FEATURES \
-    ((unsigned)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BVH | CRT_FEATURE_SMOOTH_NORMALS))
+    ((unsigned long)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BVH | CRT_FEATURE_SMOOTH_NORMALS))
+/// Mirrors, metals and glass without roughness, in any shape.
+#define CRT_EMBREE_SMOOTH_FEATURES                                                             \
+    ((unsigned long)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_BVH |     \
+                     CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_MIRROR | CRT_FEATURE_CONDUCTOR | \
+                     CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION | CRT_FEATURE_LENS |      \
+                     CRT_FEATURE_ENVIRONMENT))
 /// Every scene.
 #define CRT_EMBREE_ALL_FEATURES CRT_FEATURES_ALL
 

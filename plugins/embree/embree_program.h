@@ -28,10 +28,10 @@ struct RayTotals {
 
 struct Program {
     const char* name;
-    std::uint32_t features;
+    std::uint64_t features;
     RayTotals (*render)(const TileJob& job);  ///< [any thread], for disjoint pixels
 };
 
-const Program& chooseProgram(std::uint32_t scene_features, CrtKernelChoice choice);
+const Program& chooseProgram(std::uint64_t scene_features, CrtKernelChoice choice);
 
 }  // namespace crt::embree

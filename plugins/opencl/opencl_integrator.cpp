@@ -76,7 +76,7 @@ void OpenClIntegrator::fill(const Buffer& buffer, std::uint64_t bytes, cl_uint p
 
 void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     const auto& scene = *static_cast<const kernel::CrtScene*>(blob.data);
-    const std::uint32_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
+    const std::uint64_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
     if (!program_.render || program_.features != features) {
         const double compile_seconds = program_.compile_seconds, cache_seconds = program_.cache_seconds;
         program_ = buildProgram(host_, device_, session_, features);

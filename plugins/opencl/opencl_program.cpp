@@ -88,12 +88,13 @@ ProgramHandle fromText(const Session& session, const Device& device, const std::
 
 GroupSize groupSize(const Device& device) { return device.is_cpu ? GroupSize{1, 1} : GroupSize{8, 8}; }
 
-std::string buildOptions(const Device& device, std::uint32_t features) {
+std::string buildOptions(const Device& device, std::uint64_t features) {
     const GroupSize group = groupSize(device);
     char options[256];
     std::snprintf(
         options, sizeof options,
-        "-cl-std=CL1.2 -DCRT_FEATURES=0x%xu -DCRT_SIMD8=%d -DCRT_GROUP_X=%u -DCRT_GROUP_Y=%u", features,
+        "-cl-std=CL1.2 -DCRT_FEATURES=0x%llxul -DCRT_SIMD8=%d -DCRT_GROUP_X=%u -DCRT_GROUP_Y=%u",
+        static_cast<unsigned long long>(features),
         device.is_cpu ? 1
                       : 0,  // a GPU's lanes are its work-items: eight-wide vectors only cost it registers
         group.x, group.y);
@@ -102,7 +103,7 @@ std::string buildOptions(const Device& device, std::uint32_t features) {
 }
 
 Program buildProgram(const plugin::Host& host, const Device& device, const Session& session,
-                     std::uint32_t features) {
+                     std::uint64_t features) {
     Program built;
     built.features = features;
     const std::string options = buildOptions(device, features);

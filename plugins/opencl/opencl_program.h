@@ -24,7 +24,7 @@ GroupSize groupSize(const Device& device);
 struct Program {
     ProgramHandle program;
     Kernel render;
-    std::uint32_t features = 0;
+    std::uint64_t features = 0;
     bool from_cache = false;
     double compile_seconds = 0;
     double cache_seconds = 0;
@@ -32,10 +32,10 @@ struct Program {
 
 /// Options that a mask and a device are compiled with. No option that relaxes arithmetic: OpenCL's defaults
 /// keep IEEE rounding.
-std::string buildOptions(const Device& device, std::uint32_t features);
+std::string buildOptions(const Device& device, std::uint64_t features);
 
 /// Compiles the kernel for `features`, or takes it from the host's cache.
 Program buildProgram(const plugin::Host& host, const Device& device, const Session& session,
-                     std::uint32_t features);
+                     std::uint64_t features);
 
 }  // namespace crt::opencl

@@ -115,7 +115,7 @@ struct Feature {
 /// Tests of the images against the reference that need pixels: what stats::gate() finds at the most samples.
 struct ImageTests {
     std::optional<double> smallest_tile_p;   ///< Welch on 8×8 tiles, smallest p after Holm's adjustment.
-    std::optional<double> tile_p_uniformity;  ///< Kolmogorov–Smirnov p of the tiles' p-values being uniform
+    std::optional<double> tile_p_uniformity;  ///< Kolmogorov–Smirnov p: are the tiles' p-values uniform?
                                               ///< (Jung et al. 2020); shown, not judged by.
     std::optional<double> smallest_pixel_p;  ///< Of all pixels and channels, Šidák-adjusted.
     std::optional<double> largest_share;     ///< Part of the squared spread of all replicates that one value

@@ -407,7 +407,8 @@ std::string environmentSection(const Run& run) {
     html += definition(
         "load, 1, 5 and 15 min",
         h(e.load_start + (e.load_end.empty() ? "" : " at the start, " + e.load_end + " at the end")));
-    html += definition("begun and finished", h(e.started + (e.finished.empty() ? "" : " – " + e.finished)));
+    const std::string finished = e.finished.empty() ? "" : " – " + e.finished;
+    html += definition("begun and finished", h(e.started + finished));
     html += definition("time",
                        h(secondsText(e.spent_seconds) +
                          (e.budget_seconds > 0 ? " of a budget of " + secondsText(e.budget_seconds) : "")));

@@ -27,7 +27,8 @@ nav{margin:12px 0 0;display:flex;flex-wrap:wrap;gap:4px 18px}
 .findings li{padding:5px 0 5px 26px;position:relative}
 .findings li::before{position:absolute;left:2px;top:5px;font-weight:700}
 .good::before{content:"✓";color:var(--good)}.neutral::before{content:"•";color:var(--muted)}
-.warning::before{content:"!";color:var(--warn);left:6px!important}.bad::before{content:"✗";color:var(--bad)}
+.warning::before{content:"!";color:var(--warn);left:6px!important}
+.bad::before{content:"✗";color:var(--bad)}
 .findings .verdict{font-size:.85em;margin-left:.5em}
 .figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,460px),1fr));gap:36px 40px;
 margin:26px 0;align-items:start}

@@ -84,7 +84,7 @@ inline constexpr std::uint64_t kFewestForPixels = 8;
 struct GateOptions {
     double delta = 0.01;          ///< Means that differ by less, relative to b's, are equivalent.
     double confidence =
-        0.999;  ///< Of the interval of each channel's mean; 1 − confidence is alpha of tiles and of pixels.
+        0.999;  ///< Of each channel mean's interval; 1 − confidence is alpha of tiles and of pixels.
     double largest_share = 0.05;  ///< Of the squared error that one value may carry.
     std::vector<std::string> channel_names;  ///< For the reasons; numbers where there are too few.
 };

@@ -22,7 +22,7 @@ struct ErrorMetrics {
     double mse;            ///< mean (I − R)²
     double rmse;           ///< √mse
     double relative_rmse;  ///< rmse / |mean R|; 0 when both are the same, infinite against black.
-    double relmse;         ///< mean (I − R)² / (R² + ε²), ε = mean(R)/100: the same at every exposure.
+    double relmse;         ///< mean (I − R)² / (R² + ε²), ε = mean(R)/100: same at any exposure.
     double smape;          ///< mean 2|I − R| / (|I| + |R|), in [0, 2]
     double mae;            ///< mean |I − R|
     double p99_absolute;   ///< The smallest |I − R| that 99 % of all do not exceed.

@@ -586,8 +586,8 @@ std::vector<Case> closedFormCases() {
          .run = parallelMirrors},
         {.id = "A07",
          .name = "unit-cube",
-         .title = "Unit cube of reflectance ½ under a glowing ceiling: four probes, depths 1 to 64 (nine of "
-                  "the 24 before merge)",
+         .title = "Unit cube of reflectance ½ under a glowing ceiling: four probes, depths 1 to 64 (nine "
+                  "of the 24 before merge)",
          .expected = "radiosity at each depth, e.g. 0.1544164 at the floor's centre after 2 events, "
                      "0.197603 in the end",
          .source = "Nyström solution of the radiosity equation, six discretisations agreeing to 1e-6",

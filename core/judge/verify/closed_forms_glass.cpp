@@ -420,7 +420,8 @@ std::vector<Case> glassCases() {
         {.id = "A13",
          .name = "glass-cube-trap",
          .title = "Eye in the centre of a glass cube in a constant environment",
-         .expected = "n² within 41.81° of each axis, exactly 0 elsewhere, mean n²(3 − √5) = 1.7188470506; "
+         .expected = "n² within 41.81° of each axis, exactly 0 elsewhere, "
+                     "mean n²(3 − √5) = 1.7188470506; "
                      "paths end at the depth",
          .source = "total internal reflection at all three pairs of faces",
          .tolerance = "1e-5 and exactly 0; mean 0.5 %; ± 0.05 % for n²(1 − 0.04^k)",
@@ -438,8 +439,8 @@ std::vector<Case> glassCases() {
          .run = outOfGlass},
         {.id = "A15",
          .name = "prism",
-         .title = "60° prism of N-BK7 at the d line's least deviation: where the lines d, F, C, 400 and 700 "
-                  "nm go (d alone before merge)",
+         .title = "60° prism of N-BK7 at the d line's least deviation: where the lines d, F, C, 400 and "
+                  "700 nm go (d alone before merge)",
          .expected = "deviations of 38.6466985°, 39.1390498°, 38.4293164°, 39.8956926°, 38.3192326°",
          .source = "Snell's law and Schott's Sellmeier coefficients to 30 digits, the lines at 587.5618, "
                    "486.1327 and 656.2725 nm",

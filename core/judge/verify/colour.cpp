@@ -207,7 +207,8 @@ void metamers(Context& context) {
     const Vec3d white = spectrumToXyz(d65);
     const Vec3d a = labOf(meanXyz(context.render(patch("0.5", "{illuminant: D65}"), how)), white),
                 b = labOf(meanXyz(context.render(patch(metamer, "{illuminant: D65}"), how)), white);
-    context.absolute("under D65: colour difference ΔE*ab", std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]),
+    context.absolute("under D65: colour difference ΔE*ab", 
+                     std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]),
                      0, 0.1, {});
     const double expected = (0.5 + scale * unseen[589 - kWavelengthMin_nm]) / 0.5;
     context.estimate(
@@ -380,7 +381,8 @@ std::vector<Case> colourCases() {
             "trapezoids of 0.1 nm", "1e-3", Level::Commit, kLamp, fluorescent),
         row("H05", "metamers", "Two reflectances that are one under D65 and two under a line at 589 nm",
             "no colour difference; the ratio of reflectances at 589 nm",
-            "orthogonal to D65 times the observer", "ΔE*ab < 0.1; ± 0.3 %", Level::Commit, patch, metamers),
+            "orthogonal to D65 times the observer", "ΔE*ab < 0.1; ± 0.3 %", Level::Commit, patch,
+             metamers),
         row("H06", "lasers", "Lines at 450, 532 and 638 nm", "chromaticities of the spectral locus",
             "CIE 1931 table", "± 0.002", Level::Commit, kLamp, lasers),
         row("H07", "equal-energy", "Radiance 1 at all wavelengths", "X, Y, Z of the tables' integrals",

@@ -228,7 +228,8 @@ std::vector<Case> environmentCases() {
             "by "
             "light sampling, alone and by chance; turned and scaled",
             "the constant environment; sums of each texel's irradiance; the texel where it belongs",
-            "closed form of a texel over level ground", "5e-4; ± 0.3 %; 2 %", Level::Commit, kNeeds, images),
+            "closed form of a texel over level ground", "5e-4; ± 0.3 %; 2 %", Level::Commit, kNeeds,
+            images),
         row("E21", "cie-sky", "CIE general skies over a floor, by zenith luminance and by illuminance",
             "pi L for the uniform sky; the horizontal illuminance", "quadrature of ISO 15469:2004",
             "± 0.3 %; 1 %", Level::Commit, kNeeds | CRT_FEATURE_TABLE, skies),

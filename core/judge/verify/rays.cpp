@@ -15,7 +15,7 @@
 namespace crt::verify {
 namespace {
 
-constexpr std::uint32_t kNeeds = CRT_FEATURE_BVH | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_INDEPENDENT;
+constexpr std::uint64_t kNeeds = CRT_FEATURE_BVH | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_INDEPENDENT;
 
 void aimedRays(Context& context) {
     for (const Aim aim : {Aim::Vertex, Aim::Edge, Aim::Face}) {

@@ -244,7 +244,8 @@ Case furnaceCase(const char* id, const char* name, double albedo, int depth, con
         .title = fmt::format("A01 at albedo {}: {} scattering events", albedo, depth),
         .expected = fmt::format("{:.9g}; every path of {} rays", furnaceRadiance(albedo, depth), depth + 1),
         .source = "geometric series",
-        .tolerance = fmt::format("{:.2g}: 4·cond·2⁻²⁴ + k·2⁻²⁵, condition {:.0f}; with roulette ± 1 % {}",
+        .tolerance = fmt::format("{:.2g}: 4·cond·2⁻²⁴ + k·2⁻²⁵, condition {:.0f}; "
+                                  "with roulette ± 1 % {}",
                                  4 * condition * std::ldexp(1.0, -24) + depth * std::ldexp(1.0, -25),
                                  condition, roulette),
         .level = Level::Commit,

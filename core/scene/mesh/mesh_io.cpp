@@ -357,7 +357,7 @@ private:
     MaterialFiles files_;
     MtlSummary summary_;
     LoadedMesh out_;
-    std::vector<std::int32_t> material_index_;  ///< By the number of the name in the OBJ; −1: not used yet.
+    std::vector<std::int32_t> material_index_;  ///< By the name's number in the OBJ; −1: not used yet.
     std::vector<Part> parts_;
     ObjLoss wild_normals_;
     std::size_t triangles_ = 0, triangles_without_uv_ = 0;

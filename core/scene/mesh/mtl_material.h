@@ -64,7 +64,7 @@ private:
 ///
 ///  1. Ni above 1, and light passes (d < 1, or Tr > 0 without d; a Tf that is neither black nor white;
 ///     illum 6, 7 or 9; illum 4 without a white Tf): Dielectric, smooth and clear.
-///  2. Pm ≥ 0.5: Mirror with reflectance Kd. illum 3 or 5 with Kd ≤ 0.1 and a Ks: Mirror with reflectance
+///  2. Pm ≥ 0.5: Mirror with reflectance Kd. illum 3 or 5 with Kd ≤ 0.1 and a Ks: Mirror of reflectance
 ///  Ks.
 ///  3. Diffuse with reflectance Kd.
 ///

@@ -5,6 +5,7 @@
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_schema_lights.h"
 #include "scene/yaml/scene_schema_textures.h"
+#include "scene/yaml/scene_schema_values.h"
 
 #include <fmt/format.h>
 
@@ -14,24 +15,7 @@
 namespace crt {
 namespace {
 
-using Kind = ValueKind;
-using Shape = ValueShape;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr ValueRange kNotNegative{0, kInfinity, false, false};
-constexpr ValueRange kRadiance{0, kMostRadiance, false, false};
-constexpr ValueRange kPositive{0, kInfinity, true, false};
-
-/// A default read off core/scene/scene.h, so that the manual cannot disagree with the code.
-std::string yaml(double value) { return fmt::format("{}", value); }
-std::string yaml(bool value) { return value ? "true" : "false"; }
-std::string yaml(int value) { return fmt::format("{}", value); }
-std::string yaml(std::uint64_t value) { return fmt::format("{}", value); }
-std::string yaml(const Vec3d& v) { return fmt::format("[{}, {}, {}]", v[0], v[1], v[2]); }
-template <class Enum>
-std::string yaml(const std::vector<std::string>& choices, Enum value) {
-    return choices[static_cast<std::size_t>(value)];
-}
+using namespace schema;
 
 std::string trimmed(double degrees) { return fmt::format("{:.13g}", degrees); }
 
@@ -61,10 +45,7 @@ KeySchema radianceKey(std::string doc) {
             .doc = std::move(doc)};
 }
 
-KeySchema typeKey(std::string word) {
-    return {.name = "type", .kind = Kind::Choice, .choices = {std::move(word)}, .required = true,
-            .doc = "Picks this kind of material."};
-}
+KeySchema typeKey(std::string word) { return schema::typeKey(std::move(word), "material"); }
 
 SectionSchema topLevel() {
     return {"",
@@ -557,8 +538,8 @@ void addDielectrics(std::vector<SectionSchema>& all) {
                    "a rough_dielectric material",
                    "Frosted glass: microfacets as of `rough_conductor`, each of which reflects and "
                    "refracts. Light that meets the surface twice at once is left out. Where it would blur "
-                   "what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), it is taken for "
-                   "smooth.",
+                   "what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), it is taken "
+                   "for smooth.",
                    {typeKey("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption}});
     all.push_back({"material/thin_dielectric",
                    "a thin_dielectric material",

@@ -4,6 +4,7 @@
 #include "scene/cie_sky.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
+#include "scene/yaml/scene_schema_values.h"
 
 #include <fmt/format.h>
 
@@ -12,22 +13,11 @@
 namespace crt {
 namespace {
 
-using Kind = ValueKind;
-using Shape = ValueShape;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr ValueRange kNotNegative{0, kInfinity, false, false};
-constexpr ValueRange kRadiance{0, kMostRadiance, false, false};
+using namespace schema;
 
 KeySchema nameKey() { return {.name = "name", .doc = "For messages and reports."}; }
 
-KeySchema typeKey(std::string word) {
-    return {.name = "type",
-            .kind = Kind::Choice,
-            .choices = {std::move(word)},
-            .required = true,
-            .doc = "Picks this kind of light."};
-}
+KeySchema typeKey(std::string word) { return schema::typeKey(std::move(word), "light"); }
 
 KeySchema vectorKey(std::string name, std::string doc, std::string unit = {}, bool required = false) {
     return {.name = std::move(name),
@@ -174,7 +164,8 @@ void addSky(std::vector<SectionSchema>& all) {
                                      .required = true,
                                      .doc = "Of the standard's table: 1 overcast, 5 uniform, 7 partly "
                                             "cloudy, 12 clear, 13 clear and polluted, 15 hazy."},
-                                    amountKey("zenith_luminance_cd_m2", "cd/m²", "Luminance of the zenith."),
+                                    amountKey("zenith_luminance_cd_m2", "cd/m²",
+                                               "Luminance of the zenith."),
                                     amountKey("horizontal_illuminance_lx", "lx",
                                               "Illuminance of level ground under the whole sky.")},
              sunKeys(), spectrumKey(),

@@ -1,12 +1,13 @@
 #include "scene/yaml/scene_schema_textures.h"
 
+#include "scene/yaml/scene_schema_values.h"
+
 #include <string>
 
 namespace crt {
 namespace {
 
-using Kind = ValueKind;
-using Shape = ValueShape;
+using namespace schema;
 
 constexpr ValueRange kTurns{-kMostUv, kMostUv, false, false};
 
