@@ -1663,7 +1663,8 @@ def start(case_, folder, env):
                 signal.signal(number, signal.SIG_DFL)
             for what, limit in case_.how.get("limits", {}).items():
                 # Only the soft limit of processor time: the hard one kills.
-                resource.setrlimit(what, (limit, 30 if what == resource.RLIMIT_CPU else limit))
+                hard = 30 * SLOWER if what == resource.RLIMIT_CPU else limit
+                resource.setrlimit(what, (limit, int(hard)))
             for number, descriptor in enumerate(child):
                 if descriptor is None:
                     os.close(number)
