@@ -121,6 +121,7 @@ struct Case {
     bool glassware = false;
     bool textured = false;
     bool sky = false;
+    bool composed = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -146,6 +147,14 @@ std::shared_ptr<const crt::TextureImage> randomImage(std::uint32_t width, std::u
         }
     };
     return image;
+}
+
+void addUvs(crt::Scene& scene) {
+    for (crt::Mesh& mesh : scene.meshes) {
+        for (const crt::Vec3d& p : mesh.positions)
+            mesh.uvs.push_back({p[0] + 0.3 * p[1], p[2] - 0.7 * p[1]});
+        mesh.uv_index = mesh.triangles;
+    }
 }
 
 /// Every kind of texture, filter and wrap.
@@ -186,14 +195,51 @@ void addTextures(crt::Scene& scene) {
     put("coloured", false, vertices);
     for (crt::Object& object : scene.objects)
         if (object.name == "strip") object.material = static_cast<std::int32_t>(scene.materials.size() - 1);
-    for (crt::Mesh& mesh : scene.meshes) {
-        for (const crt::Vec3d& p : mesh.positions) {
-            mesh.uvs.push_back({p[0] + 0.3 * p[1], p[2] - 0.7 * p[1]});
+    for (crt::Mesh& mesh : scene.meshes)
+        for (const crt::Vec3d& p : mesh.positions)
             mesh.colors.push_back({static_cast<float>(0.1 + 0.8 * p[0]), 0.4f,
                                    static_cast<float>(0.9 - 0.8 * p[2])});
-        }
-        mesh.uv_index = mesh.triangles;
-    }
+    addUvs(scene);
+}
+
+/// Mixes in mixes, by a number and by a texture, of lobes and deltas; sides; surfaces with holes, emitters
+/// among them.
+void addCompositions(crt::Scene& scene) {
+    addUvs(scene);
+    const auto indexOf = [&](const std::string& name) {
+        std::int32_t index = 0;
+        while (scene.materials[static_cast<std::size_t>(index)].name != name) ++index;
+        return index;
+    };
+    const auto compose = [&](const char* name, crt::MaterialType type, const char* first,
+                             const char* second) -> crt::Material& {
+        crt::Material m;
+        m.name = name;
+        m.type = type;
+        m.parts = {indexOf(first), indexOf(second)};
+        scene.materials.push_back(m);
+        return scene.materials.back();
+    };
+    const auto give = [&](const char* object, const char* material) {
+        for (crt::Object& o : scene.objects)
+            if (o.name == object) o.material = indexOf(material);
+    };
+    crt::Texture numbers;
+    numbers.image = randomImage(6, 9, crt::TexelKind::Numbers);
+    scene.textures.push_back(numbers);
+    compose("worn", crt::MaterialType::Mix, "mirror", "red").amount_texture = 0;
+    compose("sheet", crt::MaterialType::TwoSided, "copper", "worn");
+    compose("everything", crt::MaterialType::Mix, "sheet", "flint").amount = 0.375;
+    crt::Material& veil = compose("veil", crt::MaterialType::Mix, "gold", "white");
+    veil.amount = 0.75;
+    veil.opacity = 0.5;
+    for (crt::Material& m : scene.materials)
+        if (m.name == "glass") m.opacity_texture = 0;
+    give("back", "worn");
+    give("shield", "veil");
+    give("gems", "everything");
+    give("right", "sheet");
+    give("strip", "veil");
 }
 
 // Together every feature bit, sampler, accelerator and view: asserted below.
@@ -216,6 +262,11 @@ const Case kCases[] = {
     {"{max_depth: 12}", "{type: sobol}", "", "box", true, "", false, false, true},
     {"{max_depth: 4, accelerator: bvh}", "{type: xorshift}", "", "box", true, kPointLights, false, false,
      true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, false, false, false, true},
+    {"{max_depth: 4, accelerator: bvh}", "{type: xorshift}", "", "box", false, "", false, false, false,
+     true},
+    {"{max_depth: 4, accelerator: bvh, mis: false}", "{type: independent}", "", "box", true, "", false, false,
+     false, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -253,6 +304,7 @@ crt::Scene sceneOf(const Case& c) {
         sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter, c.glassware) + c.more);
     scene.environment->light_sampling = c.sampled_environment;
     if (c.textured) addTextures(scene);
+    if (c.composed) addCompositions(scene);
     if (c.sky)
         scene.environment->sky =
             crt::CieSky{.towards_sun = {0.36, 0.8, -0.48}, .amount = 4, .rows = 32};
@@ -274,7 +326,10 @@ std::vector<Named> allScenes() {
                                  "textures",
                                  "textures, tree, independent",
                                  "sky",
-                                 "sky and point lights, tree, xorshift"};
+                                 "sky and point lights, tree, xorshift",
+                                 "mixes and holes",
+                                 "mixes and holes, tree, xorshift",
+                                 "mixes and holes, tree, independent, light sampling alone"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

@@ -42,10 +42,8 @@ std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<con
         if (index != kNoTexture) used[static_cast<std::size_t>(index)] = true;
     };
     for (const Material* material : materials)
-        if (material) {
-            use(material->reflectance_texture);
-            use(material->roughness_texture);
-        }
+        if (material)
+            for (const TextureIndex index : material->textures()) use(index);
     // From the last on: what a checker is made of comes before it.
     std::vector<TextureIndex> all;
     for (std::size_t i = used.size(); i-- > 0;) {

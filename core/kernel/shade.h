@@ -5,6 +5,7 @@
 #ifndef CRT_SHADE_H
 #define CRT_SHADE_H
 
+#include "composition.h"
 #include "point_light.h"
 
 CRT_KERNEL_BEGIN
@@ -255,7 +256,11 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
                                                               path->wavelengths.position);
         return 0;
     }
-    const CrtSurface surface = crt_surface(ctx, hit);
+    const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
+    CrtSurface surface = crt_surface(ctx, hit);
+    if (CRT_HAS(MIX))
+        surface.material =
+            crt_chosen_material(ctx, &surface, path->ray.d, &path->sampler, dimension + CRT_DIM_MIX);
     if (CRT_HAS(ABSORPTION)) crt_absorb(ctx, path, &surface);
     if (CRT_HAS(AREA_LIGHT) && surface.light != CRT_NONE) crt_add_emission(ctx, path, &surface, hit.t);
 
@@ -272,7 +277,6 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
         if (path->depth >= scene->max_depth) return 0;
     }
 
-    const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
     if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->lights.count != 0u &&
         (bsdf.flags & CRT_BSDF_DELTA) == 0u)
         crt_ask_light(ctx, path, &surface, &bsdf, dimension, shadow);

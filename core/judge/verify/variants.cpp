@@ -116,6 +116,16 @@ std::vector<Variant> variants(int resolution) {
             mesh.uv_index = mesh.triangles;
         }
     });
+    add("mixes and holes", [](Scene& s) {
+        Material mix;
+        mix.name = "mix";
+        mix.type = MaterialType::Mix;
+        mix.parts = {0, 1};
+        mix.amount = 0.375;
+        mix.opacity = 0.75;
+        s.objects[0].material = static_cast<std::int32_t>(s.materials.size());
+        s.materials.push_back(std::move(mix));
+    });
     add("a sky", [](Scene& s) {
         CieSky sky;
         sky.towards_sun = unit({0.25, 1, -0.5});
