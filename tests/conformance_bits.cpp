@@ -122,6 +122,7 @@ struct Case {
     bool textured = false;
     bool sky = false;
     bool composed = false;
+    bool mapped = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -242,6 +243,22 @@ void addCompositions(crt::Scene& scene) {
     give("strip", "veil");
 }
 
+/// Of random directions, some below the surface, on every material, flat and smooth, with either handedness.
+void addNormalMaps(crt::Scene& scene) {
+    addUvs(scene);
+    crt::Texture map;
+    map.image = randomImage(8, 4, crt::TexelKind::Normals);
+    map.transform = {2, 0.5, 0.25, -0.5, 3, 0.125};
+    scene.textures.push_back(map);
+    map.filter = crt::TextureFilter::Nearest;
+    map.transform = {-1, 0, 0, 0, 1, 0};
+    scene.textures.push_back(map);
+    for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+        scene.materials[i].normal_texture = static_cast<crt::TextureIndex>(i % 2);
+        scene.materials[i].normal_strength = i % 3 == 0 ? 1 : 0.375;
+    }
+}
+
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
     {"{max_depth: 12}", "{type: sobol}", "", "box"},
@@ -265,8 +282,11 @@ const Case kCases[] = {
     {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, false, false, false, true},
     {"{max_depth: 4, accelerator: bvh}", "{type: xorshift}", "", "box", false, "", false, false, false,
      true},
-    {"{max_depth: 4, accelerator: bvh, mis: false}", "{type: independent}", "", "box", true, "", false, false,
-     false, true},
+    {"{max_depth: 4, accelerator: bvh, mis: false}", "{type: independent}", "", "box", true, "", false,
+     false, false, true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, false, false, false, false, true},
+    {"{max_depth: 6, accelerator: bvh}", "{type: xorshift}", "", "box", true, "", true, false, true, false,
+     true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -305,6 +325,7 @@ crt::Scene sceneOf(const Case& c) {
     scene.environment->light_sampling = c.sampled_environment;
     if (c.textured) addTextures(scene);
     if (c.composed) addCompositions(scene);
+    if (c.mapped) addNormalMaps(scene);
     if (c.sky)
         scene.environment->sky =
             crt::CieSky{.towards_sun = {0.36, 0.8, -0.48}, .amount = 4, .rows = 32};
@@ -329,7 +350,9 @@ std::vector<Named> allScenes() {
                                  "sky and point lights, tree, xorshift",
                                  "mixes and holes",
                                  "mixes and holes, tree, xorshift",
-                                 "mixes and holes, tree, independent, light sampling alone"};
+                                 "mixes and holes, tree, independent, light sampling alone",
+                                 "normal maps",
+                                 "normal maps, glassware, tree, xorshift"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

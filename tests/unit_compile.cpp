@@ -177,6 +177,10 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         s.textures.emplace_back().kind = crt::Texture::Kind::Checker;
         s.materials[0].opacity_texture = 0;
     });
+    seen |= differs(CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_TEXTURE, 0, [](Scene& s) {
+        s.textures.emplace_back().kind = crt::Texture::Kind::Checker;
+        s.materials[0].normal_texture = 0;
+    });
     seen |= differs(CRT_FEATURE_DIELECTRIC, 0, other(crt::MaterialType::Dielectric));
     seen |= differs(CRT_FEATURE_ROUGH_DIELECTRIC, 0, other(crt::MaterialType::RoughDielectric));
     seen |= differs(CRT_FEATURE_THIN_DIELECTRIC, 0, other(crt::MaterialType::ThinDielectric));
@@ -901,6 +905,12 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     mix("sides", crt::MaterialType::TwoSided, 0.25);
     differs("opacity", [](Scene& s) { s.materials[0].opacity = 0.5; });
     differs("another opacity", [](Scene& s) { s.materials[0].opacity = 0.25; });
+    for (const double strength : {1.0, 0.5})
+        differs("normal map", [=](Scene& s) {
+            s.textures.emplace_back().kind = crt::Texture::Kind::Checker;
+            s.materials[0].normal_texture = 0;
+            s.materials[0].normal_strength = strength;
+        });
     glassware("rough glass", crt::MaterialType::RoughDielectric, 0.5, 0);
     glassware("its roughness", crt::MaterialType::RoughDielectric, 0.25, 0);
     glassware("its absorption", crt::MaterialType::RoughDielectric, 0.25, 1);

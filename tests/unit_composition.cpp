@@ -1,5 +1,5 @@
-// Materials made of others, and surfaces that are there in part: what the kernel chooses and passes, and what
-// scene files may say of it.
+// Materials made of others, and surfaces that are there in part: what the kernel chooses and passes, and
+// what scene files may say of it. Normal maps.
 #include "kernel_test.h"
 
 #include "base/error.h"
@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <memory>
+#include <span>
 #include <string>
 
 using namespace kernel_test;
@@ -29,7 +31,7 @@ std::string sceneWith(const std::string& materials) {
 /// What is wrong with a scene; empty: nothing.
 std::string refusal(const std::string& materials) {
     try {
-        (void)crt::parseScene(sceneWith(materials), "scene.yaml");
+        (void)crt::parseScene(sceneWith(materials), "scene.yaml", "");
     } catch (const crt::Error& error) {
         CHECK(error.kind() == crt::ErrorKind::Scene);
         return error.what();
@@ -37,7 +39,9 @@ std::string refusal(const std::string& materials) {
     return {};
 }
 
-bool says(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
+bool says(const std::string& text, const std::string& words) {
+    return text.find(words) != std::string::npos;
+}
 
 /// A sampler whose one-dimensional numbers go through (0, 1) as the sample does.
 CrtSampler samplerAt(std::uint64_t sample) {
@@ -51,7 +55,7 @@ struct Sheet {
     CrtHit hit = crt_no_hit(CRT_INFINITY);
 
     explicit Sheet(const std::string& materials)
-        : compiled(crt::compileScene(crt::parseScene(sceneWith(materials), "scene.yaml"), 0)),
+        : compiled(crt::compileScene(crt::parseScene(sceneWith(materials), "scene.yaml", ""), 0)),
           ctx(contextOf(compiled)) {
         hit.t = 1;
         hit.slot = hit.id = 0;
@@ -79,7 +83,8 @@ const vec3 kFromFront = make_vec3(0, 0, -1), kFromBack = make_vec3(0, 0, 1);
 TEST_CASE("mix: each material is found as often as the amounts say", "[composition]") {
     // One number of the sequence for all of the choices: stratified, so that shares are nearly exact.
     const Sheet deep(
-        "  x: {type: mix, materials: [a, b], amount: 0.25}\n  y: {type: mix, materials: [x, c], amount: 0.5}\n"
+        "  x: {type: mix, materials: [a, b], amount: 0.25}\n"
+        "  y: {type: mix, materials: [x, c], amount: 0.5}\n"
         "  m: {type: mix, materials: [a, y], amount: 0.75}\n");
     CHECK(deep.share("a", kFromFront) == Approx(0.25 + 0.75 * 0.5 * 0.75).margin(3e-4));
     CHECK(deep.share("b", kFromFront) == Approx(0.75 * 0.5 * 0.25).margin(3e-4));
@@ -164,7 +169,9 @@ TEST_CASE("opacity: a shadow ray goes on to where it went", "[composition]") {
 TEST_CASE("mix: what a scene may not say", "[composition][yaml]") {
     CHECK(refusal("  m: {type: mix, materials: [a, b]}\n").empty());
     // Parts may come later in the file.
-    CHECK(refusal("  m: {type: mix, materials: [z, b]}\n  z: {type: two_sided, front: a, back: c}\n").empty());
+    CHECK(refusal("  m: {type: mix, materials: [z, b]}\n"
+                  "  z: {type: two_sided, front: a, back: c}\n")
+              .empty());
 
     const std::string cyclic = refusal("  m: {type: mix, materials: [a, z]}\n"
                                        "  z: {type: two_sided, front: c, back: m}\n");
@@ -191,4 +198,124 @@ TEST_CASE("mix: what a scene may not say", "[composition][yaml]") {
                              i < 7 ? "m" + std::to_string(i + 1) : "b");
     CHECK(refusal(chain).empty());
     CHECK(says(refusal("  n: {type: mix, materials: [m, a]}\n" + chain), "more than 8 deep"));
+}
+
+namespace {
+
+/// One texel, of this direction.
+crt::Texture mapOf(const crt::Vec3d& n) {
+    auto image = std::make_shared<crt::TextureImage>();
+    image->file = "one normal";
+    image->width = image->height = 1;
+    image->kind = crt::TexelKind::Normals;
+    image->decode = [n](std::span<std::uint16_t> words) {
+        for (std::size_t k = 0; k < 3; ++k)
+            words[k] = static_cast<std::uint16_t>(std::lround((n[k] + 1) / 2 * 65535));
+    };
+    crt::Texture texture;
+    texture.image = image;
+    return texture;
+}
+
+}  // namespace
+
+TEST_CASE("normal map: red leans to where u grows, green to where v grows", "[composition]") {
+    Random random(8);
+    const auto point = [&] {
+        return crt::Vec3d{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+    };
+    for (int i = 0; i < 200; ++i) {
+        crt::Mesh mesh;
+        mesh.positions = {point(), point(), point()};
+        mesh.triangles = {{0, 1, 2}};
+        mesh.uvs = {{random.uniform(), random.uniform()}, {random.uniform(), random.uniform()},
+                    {random.uniform(), random.uniform()}};
+        mesh.uv_index = mesh.triangles;
+        const crt::Vec3d e1 = minus(mesh.positions[1], mesh.positions[0]),
+                         e2 = minus(mesh.positions[2], mesh.positions[0]);
+        const double u1 = mesh.uvs[1][0] - mesh.uvs[0][0], u2 = mesh.uvs[2][0] - mesh.uvs[0][0],
+                     v1 = mesh.uvs[1][1] - mesh.uvs[0][1], v2 = mesh.uvs[2][1] - mesh.uvs[0][1];
+        const double det = u1 * v2 - u2 * v1;
+        const crt::Vec3d normal = cross(e1, e2);
+        if (std::abs(det) < 0.05 || length(normal) < 0.2) continue;
+        // Where u grows and v stays, and the other way round.
+        const crt::Vec3d along_u = times(plus(times(e1, v2), times(e2, -v1)), 1 / det),
+                         along_v = times(plus(times(e1, -u2), times(e2, u1)), 1 / det);
+        for (const bool mirrored : {false, true}) {
+            crt::Scene scene = sceneOf(mesh);
+            scene.textures.push_back(mapOf(unit({0.6, 0, 0.8})));
+            scene.textures.push_back(mapOf(unit({0, 0.6, 0.8})));
+            if (mirrored) scene.objects[0].transforms[0][0] = -1;  // x
+            scene.materials.resize(1);
+            scene.objects[0].material = 0;
+            const auto flip = [&](const crt::Vec3d& w) {
+                return crt::Vec3d{mirrored ? -w[0] : w[0], w[1], w[2]};
+            };
+            for (const bool green : {false, true}) {
+                scene.materials[0].normal_texture = green;
+                const crt::CompiledScene compiled = crt::compileScene(scene, 0);
+                const CrtContext ctx = contextOf(compiled);
+                CrtHit hit = crt_no_hit(CRT_INFINITY);
+                hit.slot = hit.id = 0;
+                hit.b1 = hit.b2 = 0.3f;
+                CrtSurface surface = crt_surface(&ctx, hit);
+                const crt::Vec3d n = toDouble(surface.ng);
+                vec3 wo = surface.ng;
+                CrtBsdf bsdf{};
+                crt_map_normal(&ctx, &surface, hit.slot, &wo, &bsdf);
+                const crt::Vec3d mapped = toDouble(surface.ns);
+                CHECK(bsdf.facet == 1);
+                CHECK(dot(mapped, n) == Approx(0.8).margin(1e-3));
+                // Green is upright on red, whatever angle u and v have.
+                const crt::Vec3d u = unit(flip(along_u)), v = flip(along_v);
+                const crt::Vec3d up = unit(minus(v, times(u, dot(u, v))));
+                CHECK(dot(mapped, green ? up : u) == Approx(0.6).margin(1e-3));
+            }
+        }
+    }
+}
+
+TEST_CASE("normal map: a viewer behind the facet sees it from its front", "[composition]") {
+    Random random(9);
+    crt::Mesh mesh;
+    mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}};  // its normal is +z
+    mesh.triangles = mesh.uv_index = {{0, 1, 2}};
+    mesh.uvs = {{0, 0}, {1, 0}, {0.5, 1}};
+    crt::Scene scene = sceneOf(mesh);
+    scene.textures.push_back(mapOf(unit({0.9, 0.1, 0.4})));
+    scene.materials.resize(1);
+    scene.materials[0].normal_texture = 0;
+    scene.objects[0].material = 0;
+    for (const bool transmits : {false, true}) {
+        if (transmits) {
+            scene.materials[0].type = crt::MaterialType::Dielectric;
+            scene.materials[0].eta = crt::constantSpectrum(1.5);
+        }
+        const crt::CompiledScene compiled = crt::compileScene(scene, 0);
+        const CrtContext ctx = contextOf(compiled);
+        CrtHit hit = crt_no_hit(CRT_INFINITY);
+        hit.slot = hit.id = 0;
+        hit.b1 = hit.b2 = 0.3f;
+        std::uint64_t behind = 0;
+        for (int i = 0; i < 1000; ++i) {
+            CrtSurface surface = crt_surface(&ctx, hit);
+            const crt::Vec3d before = random.direction();
+            const double front = before[2] > 0 ? 1 : -1;
+            vec3 wo = toFloat(before);
+            CrtBsdf bsdf{};
+            crt_map_normal(&ctx, &surface, hit.slot, &wo, &bsdf);
+            const crt::Vec3d facet = times(toDouble(surface.ns), front), after = toDouble(wo);
+            CHECK(bsdf.facet == !transmits);
+            if (transmits) {
+                CHECK(after == toDouble(toFloat(before)));
+                continue;
+            }
+            CHECK(dot(after, facet) > 0);
+            CHECK(length(after) == Approx(1).margin(1e-6));
+            CHECK(after[2] == Approx(before[2]).margin(1e-6));  // a wall is upright
+            if (dot(before, facet) > 0) CHECK(after == toDouble(toFloat(before)));
+            else ++behind;
+        }
+        CHECK((transmits || behind > 100));
+    }
 }

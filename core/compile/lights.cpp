@@ -132,7 +132,8 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         if (passable) light.flags |= CRT_LIGHT_UNSAMPLED;
         part.lights.push_back(light);
         constexpr double kHardlyEver = 1e-6;
-        power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1) * (passable ? kHardlyEver : 1));
+        if (passable) area *= kHardlyEver;
+        power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
     }
     part.emitters = static_cast<std::uint32_t>(part.lights.size());
     if (samplesEnvironment(scene) && (around == nullptr || around->mean_brightness > 0)) {

@@ -128,6 +128,7 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (!material) continue;
         const kernel::CrtMaterial& record = part.records.back();
         if (!material->isOpaque()) part.features |= CRT_FEATURE_OPACITY;
+        if (material->normal_texture != kNoTexture) part.features |= CRT_FEATURE_NORMAL_MAP;
         if (material->isComposed()) {
             part.features |= CRT_FEATURE_MIX;
             continue;
@@ -158,7 +159,13 @@ std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const 
             }
             if (material->type == MaterialType::Mix)
                 record.amount = number(material->amount, material->amount_texture);
-            needed |= material->isComposed() || !material->isOpaque();
+            const bool mapped = material->normal_texture != kNoTexture;
+            if (mapped) {
+                record.normal_map = textures.valueOf(material->normal_texture);
+                record.normal_strength = static_cast<float>(material->normal_strength);
+                record.walled = !material->transmits();
+            }
+            needed |= mapped || material->isComposed() || !material->isOpaque();
         }
         records.push_back(record);
     }

@@ -27,7 +27,12 @@ void setTransform(const Texture& texture, kernel::CrtTexture& record) {
 std::uint32_t kindOf(const Texture& texture) {
     switch (texture.kind) {
         case Texture::Kind::Image:
-            return texture.image->kind == TexelKind::Spectra ? CRT_TEXTURE_SPECTRA : CRT_TEXTURE_NUMBERS;
+            switch (texture.image->kind) {
+                case TexelKind::Spectra: return CRT_TEXTURE_SPECTRA;
+                case TexelKind::Numbers: return CRT_TEXTURE_NUMBERS;
+                case TexelKind::Normals: return CRT_TEXTURE_NORMALS;
+            }
+            break;
         case Texture::Kind::Checker: return CRT_TEXTURE_CHECKER;
         case Texture::Kind::VertexColors: break;
     }

@@ -3,8 +3,8 @@
  *
  * Of a mix, one material is chosen at each vertex, before anything else is asked of it: light sampling and
  * scattering see the same one, so that its density alone is what they weigh each other by. A surface of
- * opacity a stops a share a of the rays that meet it, camera rays, scattered and shadow rays alike, each by a
- * random number of its own; the others go on behind it, as if it were not there.
+ * opacity a stops a share a of the rays that meet it, scattered and shadow rays alike, each by a random
+ * number of its own; the others go on behind it, as if it were not there.
  */
 #ifndef CRT_COMPOSITION_H
 #define CRT_COMPOSITION_H

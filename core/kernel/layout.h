@@ -129,6 +129,7 @@ typedef u32 CrtValue;
 #define CRT_TEXTURE_NUMBERS 1u  /* an image of numbers: one word a texel, of 65535 */
 #define CRT_TEXTURE_CHECKER 2u  /* squares of two values */
 #define CRT_TEXTURE_VERTICES 3u /* between the colours of the vertices */
+#define CRT_TEXTURE_NORMALS 4u  /* an image of directions: three words a texel, −1 to 1. Not a value */
 
 #define CRT_WRAP_REPEAT 0u
 #define CRT_WRAP_MIRROR 1u
@@ -178,7 +179,9 @@ typedef struct CrtComposition {
     u32 first, second; /* materials */
     CrtValue amount;   /* mix: the probability of the second */
     CrtValue opacity;  /* the share of the surface that is there */
-    u32 reserved0, reserved1, reserved2;
+    CrtValue normal_map; /* a texture of normals; 0: none */
+    f32 normal_strength;
+    u32 walled; /* beside its facets are walls (normal_map.h) */
 } CrtComposition;
 CRT_ASSERT_SIZE(CrtComposition, 32);
 

@@ -115,14 +115,21 @@ struct Material {
     /// Mix; TwoSided: front and back. Indices into Scene::materials. Not of a material that is itself, or is
     /// made of, this one.
     std::array<std::int32_t, 2> parts{-1, -1};
+    TextureIndex normal_texture = kNoTexture;   ///< In tangent space, OpenGL's convention.
+    double normal_strength = 1;                 ///< Of its slopes. At least 0.
     double amount = 0.5;                        ///< Mix: share of the second. In [0,1].
     TextureIndex amount_texture = kNoTexture;   ///< In place of the amount.
 
     bool isComposed() const { return type == MaterialType::Mix || type == MaterialType::TwoSided; }
     bool isOpaque() const { return opacity >= 1 && opacity_texture == kNoTexture; }
     /// The textures that it names itself; kNoTexture among them.
-    std::array<TextureIndex, 4> textures() const {
-        return {reflectance_texture, roughness_texture, opacity_texture, amount_texture};
+    std::array<TextureIndex, 5> textures() const {
+        return {reflectance_texture, roughness_texture, opacity_texture, amount_texture, normal_texture};
+    }
+    /// Whether light comes out on the other side.
+    bool transmits() const {
+        return type == MaterialType::Dielectric || type == MaterialType::RoughDielectric ||
+               type == MaterialType::ThinDielectric;
     }
 };
 

@@ -9,16 +9,6 @@
 #include <vector>
 
 namespace crt {
-namespace {
-
-/// Whether light comes out on the other side.
-bool transmits(const Material& material) {
-    return material.type == MaterialType::Dielectric || material.type == MaterialType::RoughDielectric ||
-           material.type == MaterialType::ThinDielectric;
-}
-
-}  // namespace
-
 /// Of the material that is being read, which gets the next number.
 void ObjectReader::readParts(const SectionReader& material) {
     std::array<PartName, 2>& parts = parts_[static_cast<std::int32_t>(scene_.materials.size())];
@@ -95,7 +85,7 @@ void ObjectReader::checkParts(const std::vector<std::int32_t>& way) {
         const bool one_side = std::any_of(way.begin(), way.end(), [&](std::int32_t index) {
             return at(index).type == MaterialType::TwoSided;
         });
-        if (one_side && transmits(at(part)))
+        if (one_side && at(part).transmits())
             out_.error(place, fmt::format("material '{}' lets light through: it has both sides itself, and "
                                           "cannot be one of a two_sided material",
                                           at(part).name));

@@ -153,6 +153,12 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
     for (const auto& [type, word] : kComposedNames)
         if (kind == word) material.type = type;
     takeNumber("opacity", material.opacity, material.opacity_texture);
+    if (section->schema().find("normal_map") != nullptr)
+        if (const auto map =
+                section->section("normal_map", fmt::format("the normal map of {}", section->subject()))) {
+            material.normal_texture = textures_.readNormalMap(*map);
+            map->read("strength", material.normal_strength);
+        }
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror: takeReflectance(); break;
@@ -170,7 +176,9 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
             material.absorption = spectra_.read(*section, "absorption", SpectrumUse::Absorption);
             [[fallthrough]];
         case MaterialType::ThinDielectric: take("ior", SpectrumUse::Index, material.eta); break;
-        case MaterialType::Mix: takeNumber("amount", material.amount, material.amount_texture); [[fallthrough]];
+        case MaterialType::Mix:
+            takeNumber("amount", material.amount, material.amount_texture);
+            [[fallthrough]];
         case MaterialType::TwoSided: readParts(*section); break;
         case MaterialType::Plastic: {
             double ior = 1.5;
