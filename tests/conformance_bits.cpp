@@ -121,6 +121,8 @@ struct Case {
     bool glassware = false;
     bool textured = false;
     bool sky = false;
+    bool composed = false;
+    bool mapped = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -146,6 +148,14 @@ std::shared_ptr<const crt::TextureImage> randomImage(std::uint32_t width, std::u
         }
     };
     return image;
+}
+
+void addUvs(crt::Scene& scene) {
+    for (crt::Mesh& mesh : scene.meshes) {
+        for (const crt::Vec3d& p : mesh.positions)
+            mesh.uvs.push_back({p[0] + 0.3 * p[1], p[2] - 0.7 * p[1]});
+        mesh.uv_index = mesh.triangles;
+    }
 }
 
 /// Every kind of texture, filter and wrap.
@@ -186,13 +196,66 @@ void addTextures(crt::Scene& scene) {
     put("coloured", false, vertices);
     for (crt::Object& object : scene.objects)
         if (object.name == "strip") object.material = static_cast<std::int32_t>(scene.materials.size() - 1);
-    for (crt::Mesh& mesh : scene.meshes) {
-        for (const crt::Vec3d& p : mesh.positions) {
-            mesh.uvs.push_back({p[0] + 0.3 * p[1], p[2] - 0.7 * p[1]});
+    for (crt::Mesh& mesh : scene.meshes)
+        for (const crt::Vec3d& p : mesh.positions)
             mesh.colors.push_back({static_cast<float>(0.1 + 0.8 * p[0]), 0.4f,
                                    static_cast<float>(0.9 - 0.8 * p[2])});
-        }
-        mesh.uv_index = mesh.triangles;
+    addUvs(scene);
+}
+
+/// Mixes in mixes, by a number and by a texture, of lobes and deltas; sides; surfaces with holes, emitters
+/// among them.
+void addCompositions(crt::Scene& scene) {
+    addUvs(scene);
+    const auto indexOf = [&](const std::string& name) {
+        std::int32_t index = 0;
+        while (scene.materials[static_cast<std::size_t>(index)].name != name) ++index;
+        return index;
+    };
+    const auto compose = [&](const char* name, crt::MaterialType type, const char* first,
+                             const char* second) -> crt::Material& {
+        crt::Material m;
+        m.name = name;
+        m.type = type;
+        m.parts = {indexOf(first), indexOf(second)};
+        scene.materials.push_back(m);
+        return scene.materials.back();
+    };
+    const auto give = [&](const char* object, const char* material) {
+        for (crt::Object& o : scene.objects)
+            if (o.name == object) o.material = indexOf(material);
+    };
+    crt::Texture numbers;
+    numbers.image = randomImage(6, 9, crt::TexelKind::Numbers);
+    scene.textures.push_back(numbers);
+    compose("worn", crt::MaterialType::Mix, "mirror", "red").amount_texture = 0;
+    compose("sheet", crt::MaterialType::TwoSided, "copper", "worn");
+    compose("everything", crt::MaterialType::Mix, "sheet", "flint").amount = 0.375;
+    crt::Material& veil = compose("veil", crt::MaterialType::Mix, "gold", "white");
+    veil.amount = 0.75;
+    veil.opacity = 0.5;
+    for (crt::Material& m : scene.materials)
+        if (m.name == "glass") m.opacity_texture = 0;
+    give("back", "worn");
+    give("shield", "veil");
+    give("gems", "everything");
+    give("right", "sheet");
+    give("strip", "veil");
+}
+
+/// Of random directions, some below the surface, on every material, flat and smooth, with either handedness.
+void addNormalMaps(crt::Scene& scene) {
+    addUvs(scene);
+    crt::Texture map;
+    map.image = randomImage(8, 4, crt::TexelKind::Normals);
+    map.transform = {2, 0.5, 0.25, -0.5, 3, 0.125};
+    scene.textures.push_back(map);
+    map.filter = crt::TextureFilter::Nearest;
+    map.transform = {-1, 0, 0, 0, 1, 0};
+    scene.textures.push_back(map);
+    for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+        scene.materials[i].normal_texture = static_cast<crt::TextureIndex>(i % 2);
+        scene.materials[i].normal_strength = i % 3 == 0 ? 1 : 0.375;
     }
 }
 
@@ -215,6 +278,14 @@ const Case kCases[] = {
     {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", false, "", false, true},
     {"{max_depth: 12}", "{type: sobol}", "", "box", true, "", false, false, true},
     {"{max_depth: 4, accelerator: bvh}", "{type: xorshift}", "", "box", true, kPointLights, false, false,
+     true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, false, false, false, true},
+    {"{max_depth: 4, accelerator: bvh}", "{type: xorshift}", "", "box", false, "", false, false, false,
+     true},
+    {"{max_depth: 4, accelerator: bvh, mis: false}", "{type: independent}", "", "box", true, "", false,
+     false, false, true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, false, false, false, false, true},
+    {"{max_depth: 6, accelerator: bvh}", "{type: xorshift}", "", "box", true, "", true, false, true, false,
      true},
 };
 
@@ -253,6 +324,8 @@ crt::Scene sceneOf(const Case& c) {
         sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter, c.glassware) + c.more);
     scene.environment->light_sampling = c.sampled_environment;
     if (c.textured) addTextures(scene);
+    if (c.composed) addCompositions(scene);
+    if (c.mapped) addNormalMaps(scene);
     if (c.sky)
         scene.environment->sky =
             crt::CieSky{.towards_sun = {0.36, 0.8, -0.48}, .amount = 4, .rows = 32};
@@ -274,7 +347,12 @@ std::vector<Named> allScenes() {
                                  "textures",
                                  "textures, tree, independent",
                                  "sky",
-                                 "sky and point lights, tree, xorshift"};
+                                 "sky and point lights, tree, xorshift",
+                                 "mixes and holes",
+                                 "mixes and holes, tree, xorshift",
+                                 "mixes and holes, tree, independent, light sampling alone",
+                                 "normal maps",
+                                 "normal maps, glassware, tree, xorshift"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

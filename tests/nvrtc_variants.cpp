@@ -29,8 +29,8 @@ namespace {
 constexpr int kSkipped = 77;
 
 /// Masks as compileScene derives them, by name. One is compiled once however many names lead to it.
-std::map<std::uint32_t, std::string> representativeMasks() {
-    constexpr std::uint32_t lit =
+std::map<std::uint64_t, std::string> representativeMasks() {
+    constexpr std::uint64_t lit =
         CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_TABLE;
     constexpr std::uint64_t sobol = CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES;
     constexpr std::uint64_t box = lit | sobol | CRT_FEATURE_BRUTE_FORCE;
@@ -63,6 +63,9 @@ std::map<std::uint32_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "a mesh, environment, lens and filter"},
         {mesh | CRT_FEATURE_AOV, "a mesh with AOVs"},
+        {mesh | CRT_FEATURE_MIX | CRT_FEATURE_MIRROR, "a mesh of a mix"},
+        {mesh | CRT_FEATURE_OPACITY, "a mesh of opacity below 1"},
+        {mesh | CRT_FEATURE_TEXTURE | CRT_FEATURE_NORMAL_MAP, "a mesh with a normal map"},
         {mesh | glass | CRT_FEATURE_MIRROR | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_SMOOTH_NORMALS |
              CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "all materials, BVH"},
@@ -72,7 +75,7 @@ std::map<std::uint32_t, std::string> representativeMasks() {
 
 int run(int argc, char** argv) {
     int arch = 90;
-    std::map<std::uint32_t, std::string> masks = representativeMasks();
+    std::map<std::uint64_t, std::string> masks = representativeMasks();
     for (int i = 1; i < argc; ++i) {
         if (std::strcmp(argv[i], "--arch") == 0 && i + 1 < argc) {
             arch = std::atoi(argv[++i]);
@@ -109,8 +112,8 @@ int run(int argc, char** argv) {
         const double ms =
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         const crt::cuda::ResourceUse use = crt::cuda::resourceUse(cubin.log, "crt_render");
-        std::printf("%9u %6u %6u %8.1f %8.0f  0x%05x %s\n", use.registers, use.stack_bytes, use.spill_bytes,
-                    static_cast<double>(cubin.bytes.size()) / 1e3, ms, mask, name.c_str());
+        std::printf("%9u %6u %6u %8.1f %8.0f  0x%010lx %s\n", use.registers, use.stack_bytes,
+                    use.spill_bytes, static_cast<double>(cubin.bytes.size()) / 1e3, ms, mask, name.c_str());
         std::fflush(stdout);
         // An entry that is not in the log would pass for one that spills nothing.
         if (use.registers == 0)

@@ -162,6 +162,25 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         s.textures.emplace_back().kind = crt::Texture::Kind::Checker;
         s.materials[0].reflectance_texture = 0;
     });
+    const auto mixed = [&](crt::MaterialType part) {
+        return [&, part](Scene& s) {
+            other(part)(s);
+            s.materials.emplace_back().type = crt::MaterialType::Mix;
+            s.materials[2].parts = {0, 1};
+            s.objects[1].material = 2;
+        };
+    };
+    seen |= differs(CRT_FEATURE_MIX, 0, mixed(crt::MaterialType::Diffuse));
+    differs(CRT_FEATURE_MIX | CRT_FEATURE_MIRROR, 0, mixed(crt::MaterialType::Mirror));
+    seen |= differs(CRT_FEATURE_OPACITY, 0, [](Scene& s) { s.materials[0].opacity = 0.5; });
+    differs(CRT_FEATURE_OPACITY | CRT_FEATURE_TEXTURE, 0, [](Scene& s) {
+        s.textures.emplace_back().kind = crt::Texture::Kind::Checker;
+        s.materials[0].opacity_texture = 0;
+    });
+    seen |= differs(CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_TEXTURE, 0, [](Scene& s) {
+        s.textures.emplace_back().kind = crt::Texture::Kind::Checker;
+        s.materials[0].normal_texture = 0;
+    });
     seen |= differs(CRT_FEATURE_DIELECTRIC, 0, other(crt::MaterialType::Dielectric));
     seen |= differs(CRT_FEATURE_ROUGH_DIELECTRIC, 0, other(crt::MaterialType::RoughDielectric));
     seen |= differs(CRT_FEATURE_THIN_DIELECTRIC, 0, other(crt::MaterialType::ThinDielectric));
@@ -871,6 +890,27 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
             if (absorption > 0) s.materials[0].absorption = crt::constantSpectrum(absorption);
         });
     };
+    const auto mix = [&](const char* what, crt::MaterialType type, double amount) {
+        differs(what, [=](Scene& s) {
+            s.materials.push_back(s.materials[0]);
+            s.materials[1].reflectance = crt::constantSpectrum(0.25);
+            s.materials.emplace_back().type = type;
+            s.materials[2].parts = {0, 1};
+            s.materials[2].amount = amount;
+            s.objects[0].material = 2;
+        });
+    };
+    mix("mix", crt::MaterialType::Mix, 0.5);
+    mix("its amount", crt::MaterialType::Mix, 0.25);
+    mix("sides", crt::MaterialType::TwoSided, 0.25);
+    differs("opacity", [](Scene& s) { s.materials[0].opacity = 0.5; });
+    differs("another opacity", [](Scene& s) { s.materials[0].opacity = 0.25; });
+    for (const double strength : {1.0, 0.5})
+        differs("normal map", [=](Scene& s) {
+            s.textures.emplace_back().kind = crt::Texture::Kind::Checker;
+            s.materials[0].normal_texture = 0;
+            s.materials[0].normal_strength = strength;
+        });
     glassware("rough glass", crt::MaterialType::RoughDielectric, 0.5, 0);
     glassware("its roughness", crt::MaterialType::RoughDielectric, 0.25, 0);
     glassware("its absorption", crt::MaterialType::RoughDielectric, 0.25, 1);

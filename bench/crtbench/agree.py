@@ -33,6 +33,14 @@ def write_picture(path):
     mi.Bitmap(np.round(255 * rgb).astype(np.uint8)).write(str(path))
 
 
+def write_normals(path):
+    """What scenes with normal maps show: waves across, and a slope up the picture that grows."""
+    v, u = np.mgrid[0:24, 0:32] / 32
+    normals = np.stack([0.2 * np.sin(4 * np.pi * u), 0.25 * (0.75 - v) - 0.1, np.ones_like(u)], axis=2)
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    mi.Bitmap(np.round(127.5 * (normals + 1)).astype(np.uint8)).write(str(path))
+
+
 def crt_image(program, backend, file, samples, seed):
     """XYZ, (height, width, 3), rows from the top."""
     image = program.scratch / "image.pfm"
@@ -105,6 +113,7 @@ def measure(program, arguments):
     results = Results(program, arguments, "agree", "Do crt and Mitsuba 3 agree?")
     results.tool = "bench/agree"
     write_picture(program.scratch / "picture.png")
+    write_normals(program.scratch / "normals.png")
     rows, notes, failed = [], [], 0
     for file in files:
         documented = agree_scene.difference(file)

@@ -70,9 +70,9 @@ def alpha(roughness):
     return roughness**2
 
 
-def two_sided(bsdf):
-    """As crt has opaque materials."""
-    return {"type": "twosided", "bsdf": bsdf}
+def two_sided(*bsdfs):
+    """As crt has opaque materials: one for both sides, or one for each."""
+    return {"type": "twosided", **{f"bsdf{number}": bsdf for number, bsdf in enumerate(bsdfs)}}
 
 
 def diffuse(given, folder):
@@ -133,6 +133,20 @@ def plastic(given, folder):
     return two_sided(made)
 
 
+def mix(given, folder, materials):
+    refuse_all_but("a mix", given, {"type", "materials", "amount"})
+    first, second = (plain(materials[name], folder, materials) for name in given["materials"])
+    amount = texture(given.get("amount", 0.5), folder)
+    return {"type": "blendbsdf", "weight": amount, "a": first, "b": second}
+
+
+def sides(given, folder, materials):
+    refuse_all_but("a two-sided material", given, {"type", "front", "back"})
+    front, back = (plain(materials[given[side]], folder, materials) for side in ("front", "back"))
+    return two_sided(front, back)
+
+
+COMPOSED = {"mix": mix, "two_sided": sides}
 MATERIALS = {
     "diffuse": diffuse,
     "conductor": conductor,
@@ -144,10 +158,34 @@ MATERIALS = {
 }
 
 
-def material(given, folder):
+def mapped(given, inner, folder):
+    """With the normal map, which Mitsuba reads as it is."""
+    refuse_all_but("a normal map", given, {"texture", "scale", "offset"})
+    image = texture(given, folder) | {"raw": True}
+    return {"type": "normalmap", "normalmap": image, "bsdf": inner}
+
+
+def plain(given, folder, materials):
+    """Of one side, without opacity: as a part of another takes it."""
+    if given["type"] in COMPOSED:
+        return COMPOSED[given["type"]](given, folder, materials)
     if given["type"] not in MATERIALS:
         raise Failure(f"the material '{given['type']}' cannot be translated for Mitsuba")
-    return MATERIALS[given["type"]](given, folder)
+    made = MATERIALS[given["type"]](
+        {key: value for key, value in given.items() if key != "normal_map"}, folder
+    )
+    inner = made["bsdf0"] if made["type"] == "twosided" else made
+    return mapped(given["normal_map"], inner, folder) if "normal_map" in given else inner
+
+
+def material(given, folder, materials):
+    """Both sides of opaque ones, and how much of it is there."""
+    made = plain({key: value for key, value in given.items() if key != "opacity"}, folder, materials)
+    if not made["type"].endswith("dielectric") and made["type"] != "twosided":
+        made = two_sided(made)
+    if "opacity" in given:
+        made = {"type": "mask", "opacity": texture(given["opacity"], folder), "bsdf": made}
+    return made
 
 
 def shape(mesh):
@@ -267,7 +305,7 @@ def translate(file, folder, samples):
     for number, thing in enumerate(given["objects"]):
         refuse_all_but("an object", thing, {"name", "mesh", "material", "emission"})
         part = write_shape(thing["mesh"], folder / f"{number}.ply")
-        part["bsdf"] = material(given["materials"][thing["material"]], folder)
+        part["bsdf"] = material(given["materials"][thing["material"]], folder, given["materials"])
         if "emission" in thing:
             refuse_all_but("an emission", thing["emission"], {"radiance"})
             part["emitter"] = {"type": "area", "radiance": spectrum(thing["emission"]["radiance"])}

@@ -31,6 +31,8 @@ namespace {
 const char* name(MaterialType type) {
     for (const auto& [known, word] : kMaterialNames)
         if (known == type) return word;
+    for (const auto& [known, word] : kComposedNames)
+        if (known == type) return word;
     return "";
 }
 

@@ -45,6 +45,14 @@ double brightness(const Spectrum& radiance) {
     return xyz[0] + xyz[1] + xyz[2] + 1e-6 * radiance.max();
 }
 
+/// Whether rays may pass the triangle. What light sampling finds of such an emitter would have to be asked
+/// for its opacity there; scattered rays find what is there.
+bool isPassable(const Scene& scene, const FlatTriangle& triangle) {
+    const auto material = static_cast<std::size_t>(triangle.material);
+    return triangle.material >= 0 && material < scene.materials.size() &&
+           !scene.materials[material].isOpaque();
+}
+
 /// Area of the sphere around the scene: as much light of the environment enters it as a lamp of this area
 /// sends.
 double areaAround(const FlatScene& flat) {
@@ -120,7 +128,11 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
             area += areaOf(flat, i + 1);
         }
         light.area = static_cast<float>(area);
+        const bool passable = isPassable(scene, flat.triangles[i]);
+        if (passable) light.flags |= CRT_LIGHT_UNSAMPLED;
         part.lights.push_back(light);
+        constexpr double kHardlyEver = 1e-6;
+        if (passable) area *= kHardlyEver;
         power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
     }
     part.emitters = static_cast<std::uint32_t>(part.lights.size());

@@ -37,6 +37,8 @@ std::vector<const Spectrum*> spectraOf(const Material& material, const Coats& co
             if (material.absorption) return {&material.eta, &*material.absorption};
             return {&material.eta};
         case MaterialType::ThinDielectric: return {&material.eta};
+        case MaterialType::Mix:
+        case MaterialType::TwoSided: return {};
         case MaterialType::Plastic:
             if (material.reflectance_texture != kNoTexture)
                 return {&material.eta, &coatOf(coats, material).albedo};
@@ -72,6 +74,8 @@ kernel::CrtMaterial recordOf(const Material& material, const Coats& coats, const
             if (material.absorption) record.absorption = spectra.valueOf(*material.absorption);
             break;
         case MaterialType::ThinDielectric: record.eta = spectra.valueOf(material.eta); break;
+        case MaterialType::Mix:
+        case MaterialType::TwoSided: return {};
         case MaterialType::Plastic: {
             const Coat& coat = coatOf(coats, material);
             record.reflectance = reflectance();
@@ -92,6 +96,12 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
     std::vector<bool> used(count + 1, false);
     for (const FlatTriangle& t : flat.triangles)
         used[isKnown(t, count) ? static_cast<std::size_t>(t.material) : count] = true;
+    // What is made of others comes in any order.
+    for (int depth = 0; depth < kDeepestComposition; ++depth)
+        for (std::size_t i = 0; i < count; ++i)
+            if (used[i] && scene.materials[i].isComposed())
+                for (const std::int32_t part : scene.materials[i].parts)
+                    used[static_cast<std::size_t>(part)] = true;
     const bool scattered = scene.integrator.type == IntegratorType::Path;
     std::vector<const Material*> materials;
     for (std::size_t i = 0; i < count; ++i)
@@ -117,11 +127,50 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
                                         : kernel::CrtMaterial{});
         if (!material) continue;
         const kernel::CrtMaterial& record = part.records.back();
+        if (!material->isOpaque()) part.features |= CRT_FEATURE_OPACITY;
+        if (material->normal_texture != kNoTexture) part.features |= CRT_FEATURE_NORMAL_MAP;
+        if (material->isComposed()) {
+            part.features |= CRT_FEATURE_MIX;
+            continue;
+        }
         part.features |= 1ul << record.type;
         if ((record.flags & CRT_MATERIAL_DISPERSIVE) != 0) part.features |= CRT_FEATURE_DISPERSION;
         if (record.absorption != 0) part.features |= CRT_FEATURE_ABSORPTION;
     }
     return part;
+}
+
+std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const Material*>& materials,
+                                                        const TexturePart& textures) {
+    const auto number = [&](double value, TextureIndex texture) {
+        return texture != kNoTexture ? textures.valueOf(texture) : valueOf(value);
+    };
+    std::vector<kernel::CrtComposition> records;
+    bool needed = false;
+    for (const Material* material : materials) {
+        kernel::CrtComposition record{};
+        record.opacity = CRT_OPAQUE;
+        if (material) {
+            record.opacity = number(material->opacity, material->opacity_texture);
+            if (material->isComposed()) {
+                record.kind = material->type == MaterialType::Mix ? CRT_COMPOSED_MIX : CRT_COMPOSED_SIDES;
+                record.first = static_cast<std::uint32_t>(material->parts[0]);
+                record.second = static_cast<std::uint32_t>(material->parts[1]);
+            }
+            if (material->type == MaterialType::Mix)
+                record.amount = number(material->amount, material->amount_texture);
+            const bool mapped = material->normal_texture != kNoTexture;
+            if (mapped) {
+                record.normal_map = textures.valueOf(material->normal_texture);
+                record.normal_strength = static_cast<float>(material->normal_strength);
+                record.walled = !material->transmits();
+            }
+            needed |= mapped || material->isComposed() || !material->isOpaque();
+        }
+        records.push_back(record);
+    }
+    if (!needed) records.clear();
+    return records;
 }
 
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,

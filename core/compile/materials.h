@@ -30,6 +30,10 @@ struct MaterialPart {
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const Coats& coats,
                               const SpectrumTable& spectra, const TexturePart& textures);
 
+/// How the materials are composed, in their order; none where all are plain and opaque.
+std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const Material*>& materials,
+                                                        const TexturePart& textures);
+
 /// Fills in one a triangle, by primitive id. `light_of` as of LightPart.
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
                        const std::vector<std::uint32_t>& light_of,

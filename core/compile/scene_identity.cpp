@@ -46,7 +46,7 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
     for (kernel::CrtSpan* span :
          {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
           &header.normals, &header.textures, &header.uvs, &header.vertex_colors, &header.nodes,
-          &header.objects, &header.materials, &header.lights, &header.point_lights,
+          &header.objects, &header.materials, &header.compositions, &header.lights, &header.point_lights,
           &header.environment_image, &header.spectra, &header.observer, &header.wavelengths,
           &header.filter})
         *span = {};
@@ -68,6 +68,9 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
              sizeof(CrtPrimitive));
     hash.add(CRT_ARRAY(CrtNormals, blob, header.normals), header.normals.count, sizeof(CrtNormals));
     hash.add(CRT_ARRAY(CrtMaterial, blob, header.materials), header.materials.count, sizeof(CrtMaterial));
+    if (header.compositions.count > 0)
+        hash.add(CRT_ARRAY(CrtComposition, blob, header.compositions), header.compositions.count,
+                 sizeof(CrtComposition));
     // A texture names its texels by their place in the blob.
     const CrtTexture* textures = CRT_ARRAY(CrtTexture, blob, header.textures);
     for (std::uint32_t i = 0; i < header.textures.count; ++i) {

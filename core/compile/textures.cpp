@@ -27,7 +27,12 @@ void setTransform(const Texture& texture, kernel::CrtTexture& record) {
 std::uint32_t kindOf(const Texture& texture) {
     switch (texture.kind) {
         case Texture::Kind::Image:
-            return texture.image->kind == TexelKind::Spectra ? CRT_TEXTURE_SPECTRA : CRT_TEXTURE_NUMBERS;
+            switch (texture.image->kind) {
+                case TexelKind::Spectra: return CRT_TEXTURE_SPECTRA;
+                case TexelKind::Numbers: return CRT_TEXTURE_NUMBERS;
+                case TexelKind::Normals: return CRT_TEXTURE_NORMALS;
+            }
+            break;
         case Texture::Kind::Checker: return CRT_TEXTURE_CHECKER;
         case Texture::Kind::VertexColors: break;
     }
@@ -42,10 +47,8 @@ std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<con
         if (index != kNoTexture) used[static_cast<std::size_t>(index)] = true;
     };
     for (const Material* material : materials)
-        if (material) {
-            use(material->reflectance_texture);
-            use(material->roughness_texture);
-        }
+        if (material)
+            for (const TextureIndex index : material->textures()) use(index);
     // From the last on: what a checker is made of comes before it.
     std::vector<TextureIndex> all;
     for (std::size_t i = used.size(); i-- > 0;) {

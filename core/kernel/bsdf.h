@@ -32,7 +32,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
     b->ng = outside ? surface->ng : -surface->ng;
     b->ns = outside ? surface->ns : -surface->ns;
     /* A shading normal that turns away from the viewer would reflect light from behind the surface. */
-    if (CRT_HAS(SMOOTH_NORMALS) && !(dot3(wo, b->ns) > 0.0f)) b->ns = b->ng;
+    if ((CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) && !(dot3(wo, b->ns) > 0.0f)) b->ns = b->ng;
     b->albedo = splat4(1.0f);
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:

@@ -129,6 +129,7 @@ typedef u32 CrtValue;
 #define CRT_TEXTURE_NUMBERS 1u  /* an image of numbers: one word a texel, of 65535 */
 #define CRT_TEXTURE_CHECKER 2u  /* squares of two values */
 #define CRT_TEXTURE_VERTICES 3u /* between the colours of the vertices */
+#define CRT_TEXTURE_NORMALS 4u  /* an image of directions: three words a texel, −1 to 1. Not a value */
 
 #define CRT_WRAP_REPEAT 0u
 #define CRT_WRAP_MIRROR 1u
@@ -166,6 +167,24 @@ typedef struct CrtMaterial {
 } CrtMaterial;
 CRT_ASSERT_SIZE(CrtMaterial, 32);
 
+#define CRT_COMPOSED_PLAIN 0u
+#define CRT_COMPOSED_MIX 1u   /* of two materials, one by chance */
+#define CRT_COMPOSED_SIDES 2u /* `first` seen from the front, `second` from the back */
+
+#define CRT_OPAQUE 0x3f800000u /* the CrtValue 1 */
+
+/* How a material is composed, by its number. Only in scenes in which one is. */
+typedef struct CrtComposition {
+    u32 kind; /* CRT_COMPOSED_… */
+    u32 first, second; /* materials */
+    CrtValue amount;   /* mix: the probability of the second */
+    CrtValue opacity;  /* the share of the surface that is there */
+    CrtValue normal_map; /* a texture of normals; 0: none */
+    f32 normal_strength;
+    u32 walled; /* beside its facets are walls (normal_map.h) */
+} CrtComposition;
+CRT_ASSERT_SIZE(CrtComposition, 32);
+
 #define CRT_LIGHT_TRIANGLE 0u
 #define CRT_LIGHT_PARALLELOGRAM 1u /* two triangles */
 #define CRT_LIGHT_ENVIRONMENT 2u   /* from far away: no slot, no area */
@@ -176,6 +195,7 @@ CRT_ASSERT_SIZE(CrtMaterial, 32);
 #define CRT_LIGHT_SUN 6u
 
 #define CRT_LIGHT_TWO_SIDED 1u
+#define CRT_LIGHT_UNSAMPLED 2u /* left to scattered rays: its surface is not all there */
 
 typedef struct CrtLight {
     u32 kind; /* CRT_LIGHT_… */
@@ -316,7 +336,7 @@ typedef struct CrtScene {
     CrtSpan vertex_colors;       /* CrtVertexColors, by id; only where a value asks */
     CrtSpan point_lights;        /* CrtPointLight */
     CrtSpan environment_image;   /* CrtEnvironmentImage, 1 or none */
-    u32 padding2[2];
+    CrtSpan compositions;        /* CrtComposition, as many as materials; or none */
     CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
     CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
     CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */

@@ -223,13 +223,20 @@ CRT_FN u32 crt_light_choose(const CrtContext *ctx, CrtSampler *sampler, u32 dime
     return index;
 }
 
+/* The emitter as seen from p. */
+CRT_FN CrtLightView crt_emitter_view(CRT_GLOBAL const CrtLight *light, const CrtLightShape *shape, vec3 p) {
+    CrtLightView view = crt_light_view(shape, p);
+    if (CRT_HAS(OPACITY) && (light->flags & CRT_LIGHT_UNSAMPLED) != 0u) view.technique = CRT_LIGHT_BY_CHANCE;
+    return view;
+}
+
 /* A direction from p to a point of the light. */
 CRT_FN CrtLightSample crt_light_sample(const CrtContext *ctx, u32 index, CrtSampler *sampler, u32 dimension,
                                        vec3 p) {
     CRT_GLOBAL const CrtLight *light = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + index;
     CrtLightSample s;
     const CrtLightShape shape = crt_light_shape(ctx, light);
-    const CrtLightView view = crt_light_view(&shape, p);
+    const CrtLightView view = crt_emitter_view(light, &shape, p);
     s.pdf = 0.0f;
     s.reach = 0.0f;
     s.point = p;
@@ -285,7 +292,7 @@ typedef struct CrtLightSeen {
 CRT_FN CrtLightSeen crt_light_pdf(const CrtContext *ctx, u32 index, vec3 p, f32 distance) {
     CRT_GLOBAL const CrtLight *light = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + index;
     const CrtLightShape shape = crt_light_shape(ctx, light);
-    const CrtLightView view = crt_light_view(&shape, p);
+    const CrtLightView view = crt_emitter_view(light, &shape, p);
     CrtLightSeen seen;
     seen.cosine = crt_abs(view.height) / distance;
     seen.pdf = light->choice_probability * crt_light_density(view, shape.area, seen.cosine, distance);

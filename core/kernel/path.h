@@ -15,9 +15,53 @@ typedef struct CrtRayCount {
     u32 closest, shadow;
 } CrtRayCount;
 
+/* crt_path_vertex where rays may pass surfaces. One loop traces the path's ray, then the shadow ray: both go
+   on until something stops them, and so a shadow ray has to know what it meets first. */
+CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+    CrtShadow shadow;
+    CrtRay ray = path->ray;
+    int answering = 0; /* what the vertex asked */
+    int alive = 0;
+    const int passable = ctx->scene->compositions.count != 0u;
+    u32 dimension = CRT_DIM_PASS + 2u * CRT_PASSES_MAX * path->depth;
+    u32 passed = 0u;
+    rays->closest += 1u;
+    for (;;) {
+        CrtHit hit = crt_no_hit(ray.reach);
+        if (ray.reach > 0.0f) hit = crt_trace_closest(ctx, ray);
+        if (passable && hit.slot != CRT_NONE && passed < CRT_PASSES_MAX &&
+            crt_passes(ctx, hit, &path->sampler, dimension + passed, &ray)) {
+            passed += 1u;
+            continue;
+        }
+        if (answering) {
+            if (hit.slot == CRT_NONE) path->radiance = path->radiance + shadow.radiance;
+            return alive;
+        }
+        hit.t = hit.t + dot3(ray.o - path->ray.o, ray.d); /* from where the path's ray began */
+        alive = crt_shade(ctx, path, hit, &shadow);
+        if (!(CRT_HAS(NEE) && shadow.asked)) return alive;
+        if (!passable || !(shadow.ray.reach > 0.0f)) {
+            int blocked = 0;
+            if (shadow.ray.reach > 0.0f) {
+                rays->shadow += 1u;
+                blocked = crt_trace_any(ctx, shadow.ray);
+            }
+            if (!blocked) path->radiance = path->radiance + shadow.radiance;
+            return alive;
+        }
+        rays->shadow += 1u;
+        answering = 1;
+        ray = shadow.ray;
+        dimension += CRT_PASSES_MAX;
+        passed = 0u;
+    }
+}
+
 /* Traces the path's ray to its next vertex, shades it and answers what it asks. Returns 0 when the path has
    ended. */
 CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+    if (CRT_HAS(OPACITY)) return crt_path_vertex_passing(ctx, path, rays);
     CrtShadow shadow;
     rays->closest += 1u;
     const int alive = crt_shade(ctx, path, crt_trace_closest(ctx, path->ray), &shadow);

@@ -23,6 +23,12 @@ CRT_KERNEL_BEGIN
 #define CRT_DIM_LIGHT_CHOICE 2u /* which emitter */
 #define CRT_DIM_ROULETTE 3u
 #define CRT_DIM_CHOICE 4u       /* which of several ways to scatter; two numbers */
+#define CRT_DIM_MIX 7u          /* which material of a mix */
+
+/* Those of the surfaces that a ray meets before it ends, in their order, follow CRT_DIM_PASS +
+   CRT_PASSES_MAX · (2 · vertex), and of the vertex's shadow ray CRT_PASSES_MAX later. */
+#define CRT_DIM_PASS 0x80000000u
+#define CRT_PASSES_MAX 4096u /* what a ray meets after so many stops it */
 
 typedef struct CrtSampler {
     u32 kind;

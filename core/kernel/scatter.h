@@ -38,6 +38,9 @@ typedef struct CrtBsdf {
     f32 coat_chance;  /* plastic: of sampling the coat */
     CRT_GLOBAL const f32 *coat; /* plastic: table of what it reflects by the cosine; 0: it is smooth */
     vec4 albedo;      /* for the first-hit output; only where it is asked for */
+    int facet;        /* it is of a mapped surface (normal_map.h); then: */
+    vec3 base;        /* unit, the surface's own shading normal, on the side of w_o */
+    vec3 side;        /* unit, its geometric normal, on that side */
 } CrtBsdf;
 
 typedef struct CrtScatter {

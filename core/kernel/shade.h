@@ -5,6 +5,7 @@
 #ifndef CRT_SHADE_H
 #define CRT_SHADE_H
 
+#include "normal_map.h"
 #include "point_light.h"
 
 CRT_KERNEL_BEGIN
@@ -168,12 +169,13 @@ CRT_FN CrtOffer crt_offer(const CrtContext *ctx, CrtSampler *sampler, u32 dimens
     offer.place = crt_no_place();
     offer.environment = CRT_HAS(ENVIRONMENT_LIGHT) && offer.light + 1u == ctx->scene->environment_light;
     if (offer.environment) {
-        const CrtEnvironmentSample s = crt_environment_sample(ctx, sampler, dimension, bsdf->ns);
+        const CrtEnvironmentSample s = crt_environment_sample(ctx, sampler, dimension, crt_base(bsdf));
         offer.wi = s.wi;
         offer.pdf = s.pdf;
         offer.place = s.place;
         /* Of one without an image, what would be transmitted is left to scattered rays. */
-        const int sampled = s.pdf > 0.0f && (crt_has_environment_image(ctx) || dot3(s.wi, bsdf->ng) > 0.0f);
+        const int sampled =
+            s.pdf > 0.0f && (crt_has_environment_image(ctx) || dot3(s.wi, crt_side(bsdf)) > 0.0f);
         offer.irradiance = sampled ? 1.0f / s.pdf : 0.0f;
         return offer;
     }
@@ -205,10 +207,10 @@ CRT_FN CrtOffer crt_offer(const CrtContext *ctx, CrtSampler *sampler, u32 dimens
    area (crt_add_emission): of a ray scattered at the shadow ray's origin pdf·|n·d|/|d|³, of light
    sampling pdf·cos/distance². */
 CRT_FN f32 crt_offer_ratio(const CrtOffer *offer, const CrtBsdf *bsdf, CrtRay ray) {
-    if (!offer->area) return crt_bsdf_pdf(bsdf, offer->wi) / offer->pdf;
+    if (!offer->area) return crt_surface_pdf(bsdf, offer->wi) / offer->pdf;
     const f32 squared = dot3(ray.d, ray.d);
     const vec3 towards = ray.d * (1.0f / crt_sqrt(squared));
-    return crt_bsdf_pdf(bsdf, towards) * crt_abs(dot3(offer->normal, towards)) * offer->distance *
+    return crt_surface_pdf(bsdf, towards) * crt_abs(dot3(offer->normal, towards)) * offer->distance *
            offer->distance / (offer->pdf * offer->cosine * squared);
 }
 
@@ -217,13 +219,13 @@ CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface
                           const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
     const CrtOffer offer = crt_offer(ctx, &path->sampler, dimension, surface->p, bsdf);
     if (!(offer.irradiance > 0.0f)) return;
-    const int before = dot3(offer.wi, bsdf->ng) > 0.0f;
+    const int before = dot3(offer.wi, crt_side(bsdf)) > 0.0f;
     if ((bsdf->flags & (before ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS)) == 0u) return;
-    const vec4 scattered = crt_bsdf_eval(bsdf, offer.wi);
+    const vec4 scattered = crt_surface_eval(bsdf, offer.wi);
     if (max4(scattered) == 0.0f) return;
     const int far = offer.distance == CRT_INFINITY;
     shadow->asked = 1;
-    shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, bsdf->ng, offer.wi);
+    shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, crt_side(bsdf), offer.wi);
     shadow->ray.d = far ? offer.wi : offer.point - shadow->ray.o;
     shadow->ray.reach = far ? CRT_INFINITY : offer.reach;
     f32 weight = offer.irradiance;
@@ -255,15 +257,22 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
                                                               path->wavelengths.position);
         return 0;
     }
-    const CrtSurface surface = crt_surface(ctx, hit);
+    const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
+    CrtSurface surface = crt_surface(ctx, hit);
+    if (CRT_HAS(MIX))
+        surface.material =
+            crt_chosen_material(ctx, &surface, path->ray.d, &path->sampler, dimension + CRT_DIM_MIX);
     if (CRT_HAS(ABSORPTION)) crt_absorb(ctx, path, &surface);
     if (CRT_HAS(AREA_LIGHT) && surface.light != CRT_NONE) crt_add_emission(ctx, path, &surface, hit.t);
 
     const int first = CRT_HAS(AOV) && scene->aovs != 0u && path->depth == 0u;
     if (!first && path->depth >= scene->max_depth) return 0;
     CrtBsdf bsdf;
-    crt_bsdf_prepare(ctx, &bsdf, &surface, -path->ray.d, path->wavelengths.position, path->throughput,
-                     first);
+    vec3 wo = -path->ray.d;
+    const vec3 ng = surface.ng;
+    if (CRT_HAS(NORMAL_MAP)) crt_map_normal(ctx, &surface, hit.slot, &wo, &bsdf);
+    crt_bsdf_prepare(ctx, &bsdf, &surface, wo, path->wavelengths.position, path->throughput, first);
+    surface.ng = ng;
     if (first) {
         path->first.normal = bsdf.ns;
         path->first.depth = hit.t * scene->depth_scale;
@@ -272,7 +281,6 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
         if (path->depth >= scene->max_depth) return 0;
     }
 
-    const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
     if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->lights.count != 0u &&
         (bsdf.flags & CRT_BSDF_DELTA) == 0u)
         crt_ask_light(ctx, path, &surface, &bsdf, dimension, shadow);
@@ -280,7 +288,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     CrtRandom2 choice = u;
     if ((CRT_HAS(ROUGH_DIELECTRIC) || CRT_HAS(PLASTIC)) && (bsdf.flags & CRT_BSDF_CHOOSES) != 0u)
         choice = crt_sample_2d(&path->sampler, dimension + CRT_DIM_CHOICE);
-    const CrtScatter scatter = crt_bsdf_sample(&bsdf, u, choice, path->hero, path->alone);
+    const CrtScatter scatter = crt_surface_sample(&bsdf, u, choice, path->hero, path->alone);
     if (!scatter.valid) return 0;
 
     path->throughput = path->throughput * scatter.weight;
@@ -290,7 +298,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     }
     path->eta_square = path->eta_square * scatter.eta_square;
     path->scatter_pdf = scatter.pdf;
-    path->scatter_cosine = dot3(scatter.wi, bsdf.ns);
+    path->scatter_cosine = dot3(scatter.wi, crt_base(&bsdf));
     path->p = surface.p;
     if (CRT_HAS(ABSORPTION))
         path->absorption = crt_medium_behind(&surface, &bsdf, scatter.wi, path->absorption);

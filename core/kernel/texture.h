@@ -61,6 +61,11 @@ CRT_FN vec4 crt_texel_spectrum(CRT_GLOBAL const u16 *texel, vec4 position) {
 CRT_FN vec4 crt_texel(const CrtContext *ctx, const CrtTexture *texture, i32 x, i32 y, vec4 position) {
     CRT_GLOBAL const u16 *words = CRT_ARRAY(u16, ctx->blob, texture->texels);
     const u64 index = (u64)(u32)y * texture->width + (u32)x;
+    if (CRT_HAS(NORMAL_MAP) && texture->kind == CRT_TEXTURE_NORMALS) {
+        CRT_GLOBAL const u16 *n = words + index * 3u;
+        return make_vec4((f32)n[0], (f32)n[1], (f32)n[2], 0.0f) * (2.0f / 65535.0f) -
+               make_vec4(1.0f, 1.0f, 1.0f, 0.0f);
+    }
     if (texture->kind == CRT_TEXTURE_NUMBERS) return splat4((f32)words[index] * (1.0f / 65535.0f));
     return crt_texel_spectrum(words + index * 3u, position);
 }

@@ -82,6 +82,9 @@ enum class MaterialType : std::uint32_t {
 #define CRT_MATERIAL_TYPE(F, bit, NAME, Name, word, scatter, text) Name = bit,
     CRT_MATERIAL_LIST(CRT_MATERIAL_TYPE, )
 #undef CRT_MATERIAL_TYPE
+    // Made of others; the kernel finds one of those at each vertex.
+    Mix = 0x100,
+    TwoSided,
 };
 
 /// Their names in scene files.
@@ -90,7 +93,10 @@ inline constexpr std::pair<MaterialType, const char*> kMaterialNames[] = {
     CRT_MATERIAL_LIST(CRT_MATERIAL_NAME, )
 #undef CRT_MATERIAL_NAME
 };
-
+inline constexpr std::pair<MaterialType, const char*> kComposedNames[] = {
+    {MaterialType::Mix, "mix"}, {MaterialType::TwoSided, "two_sided"}};
+/// How deep mixes and two-sided materials may be made of one another.
+inline constexpr int kDeepestComposition = 8;
 
 struct Material {
     std::string name;
@@ -104,6 +110,27 @@ struct Material {
     TextureIndex reflectance_texture = kNoTexture;  ///< In place of the reflectance.
     TextureIndex roughness_texture = kNoTexture;    ///< In place of the roughness.
     SourcePlace place;
+    double opacity = 1;  ///< Share of the surface that is there. In [0,1].
+    TextureIndex opacity_texture = kNoTexture;  ///< In place of the opacity.
+    /// Mix; TwoSided: front and back. Indices into Scene::materials. Not of a material that is itself, or is
+    /// made of, this one.
+    std::array<std::int32_t, 2> parts{-1, -1};
+    TextureIndex normal_texture = kNoTexture;   ///< In tangent space, OpenGL's convention.
+    double normal_strength = 1;                 ///< Of its slopes. At least 0.
+    double amount = 0.5;                        ///< Mix: share of the second. In [0,1].
+    TextureIndex amount_texture = kNoTexture;   ///< In place of the amount.
+
+    bool isComposed() const { return type == MaterialType::Mix || type == MaterialType::TwoSided; }
+    bool isOpaque() const { return opacity >= 1 && opacity_texture == kNoTexture; }
+    /// The textures that it names itself; kNoTexture among them.
+    std::array<TextureIndex, 5> textures() const {
+        return {reflectance_texture, roughness_texture, opacity_texture, amount_texture, normal_texture};
+    }
+    /// Whether light comes out on the other side.
+    bool transmits() const {
+        return type == MaterialType::Dielectric || type == MaterialType::RoughDielectric ||
+               type == MaterialType::ThinDielectric;
+    }
 };
 
 /// A triangle mesh in object space. Polygons are already triangulated.

@@ -22,8 +22,9 @@ inline constexpr TextureIndex kNoTexture = -1;
 enum class TexelKind {
     Spectra,  ///< Reflectances: three words, the coefficients of a sigmoid (kernel/texture.h).
     Numbers,  ///< In [0, 1]: one word, of 65535.
+    Normals,  ///< Directions, each component in [−1, 1]: three words, 0 to 65535.
 };
-constexpr std::size_t wordsOf(TexelKind kind) { return kind == TexelKind::Spectra ? 3 : 1; }
+constexpr std::size_t wordsOf(TexelKind kind) { return kind == TexelKind::Numbers ? 1 : 3; }
 
 /// An image file, open for whoever needs its texels. They may be gigabytes: nobody holds them but the
 /// compiled scene, into which they are decoded.

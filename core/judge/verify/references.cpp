@@ -103,14 +103,14 @@ double planck_W_m3_sr(double wavelength_nm, double temperature_K) {
     return 2 * h * c * c / (std::pow(metres, 5) * std::expm1(h * c / (metres * k * temperature_K)));
 }
 
-namespace {
-
 double fresnelConductor(double cosine, double n, double k) {
     const std::complex<double> eta(n, k), root = std::sqrt(eta * eta - (1 - cosine * cosine));
     return (std::norm((cosine - root) / (cosine + root)) +
             std::norm((eta * eta * cosine - root) / (eta * eta * cosine + root))) /
            2;
 }
+
+namespace {
 
 /// Smith's Λ for GGX.
 double smithLambda(double cosine, double alpha) {

@@ -36,6 +36,9 @@ double furnaceRadiance(double albedo, int depth);
 /// internal reflection.
 double fresnelDielectric(double cos_incidence, double eta);
 
+/// The same of a metal of index n + ik, in complex arithmetic.
+double fresnelConductor(double cosine, double n, double k);
+
 /// The share of light from everywhere that a metal of index n + ik and GGX microfacets of width
 /// α = roughness² scatters towards a view at `cosine`, each ray mirrored once: quadrature over the normals
 /// of Fresnel's reflectance times Smith's height-correlated shadowing (Heitz 2014), in double. 1 bounce

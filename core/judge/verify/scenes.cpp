@@ -1,10 +1,22 @@
 #include "judge/verify/scenes.h"
 
+#include "image/image_io.h"
+
 #include <fmt/format.h>
 
 #include <utility>
 
 namespace crt::verify {
+
+void writeRgb(const std::string& path, OutputFormat format, std::uint32_t width, std::uint32_t height,
+              const std::vector<float>& rgb) {
+    Image image;
+    image.width = width;
+    image.height = height;
+    image.channels = {"R", "G", "B"};
+    image.pixels = rgb;
+    writeImage(path, format, image);
+}
 
 std::string yaml(const Cube& cube) {
     std::string text = fmt::format(

@@ -2,11 +2,19 @@
 /// -o DIR` keeps them).
 #pragma once
 
+#include "scene/scene.h"
+
 #include <array>
+#include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
 namespace crt::verify {
+
+/// An image of linear red, green and blue, the top row first, for scenes that name it.
+void writeRgb(const std::string& path, OutputFormat format, std::uint32_t width, std::uint32_t height,
+              const std::vector<float>& rgb);
 
 /// Unit cube seen from inside, each wall a quad facing inwards, all of one reflectance.
 struct Cube {

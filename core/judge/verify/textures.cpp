@@ -68,16 +68,6 @@ double bilinear(const Greys& image, double u, double v, Wrap wrap) {
                ((1 - fx) * beyond(image, left, top + 1, wrap) + fx * beyond(image, left + 1, top + 1, wrap));
 }
 
-void writeRgb(const std::string& path, OutputFormat format, std::uint32_t width, std::uint32_t height,
-              const std::vector<float>& rgb) {
-    Image image;
-    image.width = width;
-    image.height = height;
-    image.channels = {"R", "G", "B"};
-    image.pixels = rgb;
-    writeImage(path, format, image);
-}
-
 /// Against a white square, whose paths have the same wavelengths.
 double seen(Context& context, const std::string& yaml) {
     const Render how{.samples = 16};

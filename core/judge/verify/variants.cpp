@@ -3,6 +3,8 @@
 #include "judge/verify/shapes.h"
 #include "kernel/path.h"
 
+#include <memory>
+#include <span>
 #include <utility>
 
 namespace crt::verify {
@@ -111,6 +113,34 @@ std::vector<Variant> variants(int resolution) {
         for (double& value : checker.values[0].spectrum.values) value *= 0.5;
         s.textures.push_back(std::move(checker));
         for (Material& material : s.materials) material.reflectance_texture = 0;
+        for (Mesh& mesh : s.meshes) {
+            for (const Vec3d& p : mesh.positions) mesh.uvs.push_back({p[0] + 0.5 * p[1], p[2] - 0.5 * p[1]});
+            mesh.uv_index = mesh.triangles;
+        }
+    });
+    add("mixes and holes", [](Scene& s) {
+        Material mix;
+        mix.name = "mix";
+        mix.type = MaterialType::Mix;
+        mix.parts = {0, 1};
+        mix.amount = 0.375;
+        mix.opacity = 0.75;
+        s.objects[0].material = static_cast<std::int32_t>(s.materials.size());
+        s.materials.push_back(std::move(mix));
+    });
+    add("normal maps", [](Scene& s) {
+        auto image = std::make_shared<TextureImage>();
+        image->file = "slopes";
+        image->width = image->height = 4;
+        image->kind = TexelKind::Normals;
+        image->decode = [](std::span<std::uint16_t> words) {
+            for (std::size_t i = 0; i < words.size(); ++i)
+                words[i] = static_cast<std::uint16_t>(i % 3 == 2 ? 60000 : 65535 * (i * 7 % 11) / 11);
+        };
+        Texture map;
+        map.image = std::move(image);
+        s.textures.push_back(std::move(map));
+        for (Material& material : s.materials) material.normal_texture = 0;
         for (Mesh& mesh : s.meshes) {
             for (const Vec3d& p : mesh.positions) mesh.uvs.push_back({p[0] + 0.5 * p[1], p[2] - 0.5 * p[1]});
             mesh.uv_index = mesh.triangles;

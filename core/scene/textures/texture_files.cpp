@@ -206,6 +206,14 @@ void encodeNumbers(const Texels& texels, std::size_t channel, const std::string&
     odd.tell(texels, path);
 }
 
+void encodeNormals(const Texels& texels, const std::string& path, std::span<std::uint16_t> words) {
+    for (std::size_t k = 0; k < 3; ++k) {
+        std::vector<std::uint16_t> one(texels.info.count());
+        encodeNumbers(texels, k, path, one);
+        for (std::size_t i = 0; i < one.size(); ++i) words[3 * i + k] = one[i];
+    }
+}
+
 }  // namespace
 
 std::array<std::uint16_t, 3> texelOf(const std::array<float, 3>& coefficients) {
@@ -238,6 +246,12 @@ std::shared_ptr<const TextureImage> TextureFiles::open(const std::string& path, 
     if (known) return known;
     const TexelsInfo info = texelsInfo(path);
     if (use.kind == TexelKind::Spectra) (void)primariesToSrgb(info, path);  // refuses those it does not know
+    if (use.kind == TexelKind::Normals && info.channels != 3)
+        throw Error(ErrorKind::Scene,
+                    fmt::format("the image '{}' is grey: a normal map has the three components of its "
+                                "normals as red, green and blue",
+                                path),
+                    {path});
     auto image = std::make_shared<TextureImage>();
     image->file = path;
     image->width = info.width;
@@ -250,6 +264,8 @@ std::shared_ptr<const TextureImage> TextureFiles::open(const std::string& path, 
                         fmt::format("the image '{}' has changed since its header was read", path), {path});
         if (use.kind == TexelKind::Spectra)
             encodeSpectra(texels, use.color, path, words);
+        else if (use.kind == TexelKind::Normals)
+            encodeNormals(texels, path, words);
         else
             encodeNumbers(texels, use.channel, path, words);
     };

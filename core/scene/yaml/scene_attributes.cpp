@@ -34,10 +34,17 @@ Needs needsOf(const Scene& scene, TextureIndex index) {
     return needs;
 }
 
+/// That of what it is made of, too.
 Needs needsOf(const Scene& scene, const Material& material) {
-    const Needs a = needsOf(scene, material.reflectance_texture),
-                b = needsOf(scene, material.roughness_texture);
-    return {a.uvs || b.uvs, a.colors || b.colors};
+    Needs needs;
+    const auto add = [&](const Needs& more) {
+        needs.uvs |= more.uvs;
+        needs.colors |= more.colors;
+    };
+    for (const TextureIndex texture : material.textures()) add(needsOf(scene, texture));
+    for (const std::int32_t part : material.parts)
+        if (part >= 0) add(needsOf(scene, scene.materials[static_cast<std::size_t>(part)]));
+    return needs;
 }
 
 /// Lists of numbers, one of them for each position. Nothing where the key is not there, or wrong.

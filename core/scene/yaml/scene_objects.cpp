@@ -108,6 +108,7 @@ void ObjectReader::requireRoom(const YamlPlace& place) {
 
 void ObjectReader::readMaterials(const YamlNode& map) {
     for (const YamlEntry& entry : map.entries) readMaterial(entry);
+    resolveParts();
 }
 
 void ObjectReader::readMaterial(const YamlEntry& entry) {
@@ -137,16 +138,27 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
         else
             take("reflectance", SpectrumUse::Reflectance, material.reflectance);
     };
-    const auto takeRoughness = [&] {
-        if (TextureReader::isTexture(*section, "roughness"))
-            material.roughness_texture =
-                textures_.read(*section, "roughness", TexelKind::Numbers).value_or(kNoTexture);
+    const auto takeNumber = [&](std::string_view key, double& number, TextureIndex& texture) {
+        if (TextureReader::isTexture(*section, key))
+            texture = textures_.read(*section, key, TexelKind::Numbers).value_or(kNoTexture);
         else
-            section->read("roughness", material.roughness);
+            section->read(key, number);
+    };
+    const auto takeRoughness = [&] {
+        takeNumber("roughness", material.roughness, material.roughness_texture);
     };
     const std::string kind = variantWord(section->schema());
     for (const auto& [type, word] : kMaterialNames)
         if (kind == word) material.type = type;
+    for (const auto& [type, word] : kComposedNames)
+        if (kind == word) material.type = type;
+    takeNumber("opacity", material.opacity, material.opacity_texture);
+    if (section->schema().find("normal_map") != nullptr)
+        if (const auto map =
+                section->section("normal_map", fmt::format("the normal map of {}", section->subject()))) {
+            material.normal_texture = textures_.readNormalMap(*map);
+            map->read("strength", material.normal_strength);
+        }
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror: takeReflectance(); break;
@@ -164,6 +176,10 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
             material.absorption = spectra_.read(*section, "absorption", SpectrumUse::Absorption);
             [[fallthrough]];
         case MaterialType::ThinDielectric: take("ior", SpectrumUse::Index, material.eta); break;
+        case MaterialType::Mix:
+            takeNumber("amount", material.amount, material.amount_texture);
+            [[fallthrough]];
+        case MaterialType::TwoSided: readParts(*section); break;
         case MaterialType::Plastic: {
             double ior = 1.5;
             section->read("ior", ior);
@@ -173,6 +189,11 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
             break;
         }
     }
+    if (material.absorption && !material.isOpaque())
+        section->error("opacity",
+                       "a body that absorbs is closed: where its surface is not there, light would enter it "
+                       "unseen",
+                       "leave 'opacity' or 'absorption' out");
     named.index = static_cast<std::int32_t>(scene_.materials.size());
     scene_.materials.push_back(std::move(material));
 }

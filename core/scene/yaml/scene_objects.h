@@ -7,6 +7,7 @@
 #include "scene/yaml/scene_spectra.h"
 #include "scene/yaml/scene_textures.h"
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -41,6 +42,9 @@ private:
     };
 
     void readMaterial(const YamlEntry& entry);
+    void readParts(const SectionReader& material);
+    void resolveParts();
+    void checkParts(const std::vector<std::int32_t>& way);
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
     ObjUse readObjUse(const SectionReader& object, const std::string& material);
     void refuseObjKeys(const SectionReader& object) const;
@@ -78,6 +82,12 @@ private:
     Scene& scene_;
     std::map<std::string, NamedMaterial> materials_;
     std::vector<std::string> material_names_;  ///< In the order of the file.
+    /// By the number of a material that is made of others: what they are called, and where.
+    struct PartName {
+        std::string name;
+        YamlPlace place;
+    };
+    std::map<std::int32_t, std::array<PartName, 2>> parts_;
     /// By node: what an alias repeats is read once.
     std::map<const YamlNode*, std::optional<std::uint32_t>> written_meshes_;
     std::map<const YamlNode*, std::optional<Matrix4d>> written_placements_;

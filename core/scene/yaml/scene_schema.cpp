@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
+#include "scene/yaml/scene_schema_composition.h"
 #include "scene/yaml/scene_schema_lights.h"
 #include "scene/yaml/scene_schema_textures.h"
 #include "scene/yaml/scene_schema_values.h"
@@ -862,6 +863,7 @@ const std::vector<SectionSchema>& sceneSchema() {
         addSpectra(all);
         addTextures(all);
         addMaterials(all);
+        addCompositions(all);
         addObjects(all);
         addLights(all);
         addOutside(all);

@@ -110,20 +110,39 @@ std::optional<Texture> TextureReader::readImage(const SectionReader& form, Texel
     } else if (form.has("channel")) {
         form.error("channel", "the texels are colours here; 'channel' picks one for a number");
     }
+    texture.image = openImage(form, use);
+    if (!texture.image) return std::nullopt;
+    return texture;
+}
+
+/// The file that `texture` names; null where it cannot be read.
+std::shared_ptr<const TextureImage> TextureReader::openImage(const SectionReader& form,
+                                                             const TexelUse& use) {
     std::string name;
-    if (!form.read("texture", name)) return std::nullopt;
+    if (!form.read("texture", name)) return nullptr;
     const std::optional<std::string> path = files_.locate(name, form.place("texture"), out_);
-    if (!path) return std::nullopt;
+    if (!path) return nullptr;
+    std::shared_ptr<const TextureImage> image;
     try {
-        texture.image = images_.open(*path, use);
-        requireRoom(*texture.image, *path);
+        image = images_.open(*path, use);
+        requireRoom(*image, *path);
     } catch (const Error& e) {
         if (e.kind() == ErrorKind::Internal) throw;
         form.error("texture", e.what());
-        return std::nullopt;
+        return nullptr;
     }
     files_.note(*path);
-    return texture;
+    return image;
+}
+
+TextureIndex TextureReader::readNormalMap(const SectionReader& form) {
+    Texture texture;
+    texture.place = form.place().resolved();
+    form.readEnum("filter", texture.filter);
+    form.readEnum("wrap", texture.wrap);
+    readTransform(form, texture);
+    texture.image = openImage(form, {.kind = TexelKind::Normals});
+    return texture.image ? add(std::move(texture)) : kNoTexture;
 }
 
 bool TextureReader::readPart(const YamlNode& node, const std::string& what, const KeySchema& row,

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -26,6 +27,9 @@ public:
     /// The texture under `key`, put into the scene. Nothing when it is wrong, which is told.
     std::optional<TextureIndex> read(const SectionReader& section, std::string_view key, TexelKind kind);
 
+    /// The image of a `normal_map`, put into the scene. kNoTexture when it is wrong, which is told.
+    TextureIndex readNormalMap(const SectionReader& form);
+
     /// An image of a material file, as a reflectance. Throws crt::Error(Scene) where it cannot be read.
     TextureIndex addImage(const std::string& path, const std::array<double, 6>& transform, TextureWrap wrap,
                           const SourcePlace& place);
@@ -34,6 +38,7 @@ private:
     std::optional<TextureIndex> readForm(const YamlNode& node, const YamlPlace& place,
                                          const std::string& what, const KeySchema& row, TexelKind kind);
     std::optional<Texture> readImage(const SectionReader& form, TexelKind kind);
+    std::shared_ptr<const TextureImage> openImage(const SectionReader& form, const TexelUse& use);
     std::optional<Texture> readChecker(const SectionReader& form, const KeySchema& row, TexelKind kind);
     bool readPart(const YamlNode& node, const std::string& what, const KeySchema& row, TexelKind kind,
                   TextureValue& value);

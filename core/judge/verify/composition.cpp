@@ -1,0 +1,394 @@
+// Group G, the part about surfaces that are there in part, materials made of others, and normal maps.
+#include "base/temporary_folder.h"
+#include "base/vec3d.h"
+#include "judge/verify/context.h"
+#include "judge/verify/references.h"
+#include "judge/verify/scenes.h"
+
+#include "kernel/features.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace crt::verify {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// Light sampling and scattered rays together, and each alone where it can be.
+constexpr std::pair<const char*, const char*> kTechniques[] = {
+    {"MIS", "{max_depth: 1, roulette: false}"},
+    {"scattered rays", "{max_depth: 1, roulette: false, nee: false}"},
+    {"light sampling", "{max_depth: 1, roulette: false, mis: false}"}};
+
+constexpr const char* kDown = "{position: [0.1, 2, 0.05], target: [0.1, 0, 0.05], up: [0, 0, 1], fov: 0.01}";
+
+/// A square with (u, v) = ((x + 8) / 16, (z + 8) / 16), at height y.
+Stage& sheet(Stage& stage, double y, const char* material, const char* radiance = "") {
+    return stage.mesh(fmt::format("sheet at {}", y),
+                      fmt::format("[[-8,{0},-8],[-8,{0},8],[8,{0},8],[8,{0},-8]], uvs: [[0,0],[0,1],[1,1],"
+                                  "[1,0]]",
+                                  y),
+                      "[[0,1,2,3]]", material, radiance);
+}
+
+std::string black(const std::string& opacity) {
+    return fmt::format("{{type: diffuse, reflectance: 0, opacity: {}}}", opacity);
+}
+
+void sheets(Context& context) {
+    const Effort effort{.samples = 64, .most = 65536};
+    // What a camera ray passes. Nothing is scattered: that a depth of 0 suffices says so.
+    for (const int count : {1, 4})
+        for (const double opacity : {0.0, 0.3, 1.0}) {
+            Stage stage(kDown, "{max_depth: 0}");
+            stage.set("environment", "{radiance: 1}").material("veil", black(fmt::format("{}", opacity)));
+            for (int i = 0; i < count; ++i) sheet(stage, 0.1 * i, "veil");
+            if (opacity == 1)
+                context.relative(fmt::format("{} opaque sheets", count),
+                                 radiance(context.render(stage.yaml())), 0, 0);
+            else context.estimate(fmt::format("{} sheets of opacity {}, seen through", count, opacity),
+                             stage.yaml(), meanRadiance, std::pow(1 - opacity, count), 0.005, effort,
+                             {{1 - opacity, "one sheet alone stops light, or all decide alike"}});
+        }
+    // What the rays pass that light a floor: from a lamp, a light without a surface, all around.
+    for (const auto& [name, integrator] : kTechniques)
+        for (const int count : {1, 3}) {
+            constexpr double kOpacity = 0.4;
+            const auto lit = [&, integrator = integrator](const std::string& opacity, const char* lamp) {
+                Stage stage("{position: [9, 0.05, 0], target: [0.1, 0, 0], fov: 0.01}", integrator);
+                stage.material("floor", "{type: diffuse, reflectance: 1}").material("veil", black(opacity))
+                    .material("black", "{type: diffuse, reflectance: 0}")
+                    .quad("floor", "[[-9,0,-9],[-9,0,9],[9,0,9],[9,0,-9]]", "floor");
+                for (int i = 0; i < count; ++i) sheet(stage, 0.2 + 0.2 * i, "veil");
+                if (lamp[0] == '{') return stage.set("lights", fmt::format("[{}]", lamp)).yaml();
+                if (lamp[0] == 'r') return stage.set("environment", fmt::format("{{{}}}", lamp)).yaml();
+                return stage.quad("lamp", "[[-1,1,-1],[1,1,-1],[1,1,1],[-1,1,1]]", "black", lamp).yaml();
+            };
+            const auto ratio = [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); };
+            for (const char* lamp : {"1", "radiance: 1, light_sampling: true",
+                                     "{type: point, position: [0, 1, 0], radiant_intensity: 1}"}) {
+                if (lamp[0] == '{' && name[0] == 's') continue;  // scattered rays find no points
+                const double kept = std::pow(1 - kOpacity, count);
+                context.estimate(fmt::format("through {} sheets, lit by {{{}}}, {}", count, lamp, name),
+                                 {lit(fmt::format("{}", kOpacity), lamp), lit("0", lamp)}, ratio, kept,
+                                 0.01, effort,
+                                 {{0, "shadow rays do not pass what others pass"},
+                                  {1, "shadow rays pass everything"},
+                                  {1 - kOpacity, "shadow rays pass all but one sheet"}});
+            }
+        }
+}
+
+void texturedOpacity(Context& context) {
+    // Squares of a quarter: 0.25 where the camera looks down, 0.75 where the light comes down.
+    const char* checker = "{checker: [0.25, 0.75], scale: 32}";
+    const auto expectedAt = [](double x, double z) {
+        const double s = std::floor((x + 8) * 2), t = std::floor((z + 8) * 2);
+        return std::fmod(s + t, 2) == 0 ? 0.25 : 0.75;
+    };
+    const Effort effort{.samples = 64, .most = 65536};
+    for (const double x : {0.1, 0.6, 1.1}) {
+        Stage stage(fmt::format("{{position: [{0}, 2, 0.05], target: [{0}, 0, 0.05], up: [0, 0, 1], fov: "
+                                "0.01}}",
+                                x),
+                    "{max_depth: 0}");
+        sheet(stage.set("environment", "{radiance: 1}").material("veil", black(checker)), 1, "veil");
+        context.estimate(fmt::format("a checker at x = {}, seen through", x), stage.yaml(), meanRadiance,
+                         1 - expectedAt(x, 0.05), 0.005, effort,
+                         {{expectedAt(x, 0.05), "opacity is transparency"}});
+        // Seen from the side, below the sheet, under a light from straight above.
+        Stage below(fmt::format("{{position: [{0}, 0.5, -0.5], target: [{0}, 0, 0.05], fov: 0.01}}", x));
+        below.set("lights", "[{type: directional, direction: [0, -1, 0], irradiance: 1}]")
+            .material("veil", black(checker))
+            .material("floor", "{type: diffuse, reflectance: 1}")
+            .quad("floor", "[[-8,0,-8],[-8,0,8],[8,0,8],[8,0,-8]]", "floor");
+        context.estimate(fmt::format("a checker at x = {}, lit through", x),
+                         sheet(below, 1, "veil").yaml(), meanRadiance, (1 - expectedAt(x, 0.05)) / kPi,
+                         0.005, effort, {{expectedAt(x, 0.05) / kPi, "opacity is transparency"}});
+    }
+    context.refused("an opacity of 1.1",
+                    "crt: 1\nmaterials: {m: {type: mirror, reflectance: 1, opacity: 1.1}}\n",
+                    "'opacity'");
+}
+
+void emittersWithHoles(Context& context) {
+    const Effort effort{.samples = 64, .most = 65536};
+    constexpr double kOpacity = 0.3;
+    for (const auto& [name, integrator] : kTechniques) {
+        const auto lit = [&, integrator = integrator](double opacity) {
+            Stage stage("{position: [9, 0.05, 0], target: [0.1, 0, 0], fov: 0.01}", integrator);
+            stage.material("floor", "{type: diffuse, reflectance: 1}")
+                .material("lamp", black(fmt::format("{}", opacity)))
+                .quad("floor", "[[-9,0,-9],[-9,0,9],[9,0,9],[9,0,-9]]", "floor")
+                .quad("lamp", "[[-1,1,-1],[1,1,-1],[1,1,1],[-1,1,1]]", "lamp", "1");
+            return stage.yaml();
+        };
+        context.estimate(fmt::format("a lamp of opacity {}, {}", kOpacity, name), {lit(kOpacity), lit(1)},
+                         [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); },
+                         kOpacity, 0.01, effort,
+                         {{1, "light sampling does not know of holes in lamps"},
+                          {kOpacity * kOpacity, "holes in lamps count twice"}});
+    }
+    // Ends of the range: all of it, and none.
+    const auto room = [](const char* opacity) {
+        Stage stage("{position: [0.2, 3, 4], target: [0, 0.4, 0], fov: 20}",
+                    "{max_depth: 3, roulette: false}");
+        stage.set("film", "{resolution: [8, 8]}").set("environment", "{radiance: 1}")
+            .material("floor", "{type: diffuse, reflectance: 0.5}")
+            .quad("floor", "[[-8,-0.5,-8],[-8,-0.5,8],[8,-0.5,8],[8,-0.5,-8]]", "floor")
+            .quad("wall", "[[-8,1,-8],[-8,-0.5,-8],[8,-0.5,-8],[8,1,-8]]", "floor");
+        if (opacity[0] != '-')
+            stage.material("red", fmt::format("{{type: diffuse, reflectance: 0.8{}}}", opacity))
+                .box("box", {-0.5, 0, -0.5}, {0.5, 0.8, 0.5}, "red");
+        return stage.yaml();
+    };
+    context.sameBits("opacity 1, and none", context.render(room(", opacity: 1")), context.render(room("")),
+                     "an opacity of 1 is not the default");
+    const Film absent = context.render(room("-")), holes = context.render(room(", opacity: 0"));
+    context.relative("opacity 0 over nothing there", radiance(holes) / radiance(absent), 1, 1e-4);
+}
+
+void mixes(Context& context) {
+    const auto floor = [](const char* integrator, const std::string& material, const char* light = "") {
+        Stage stage("{position: [0.3, 0.6, 0.2], target: [0, 0, 0], fov: 0.01}", integrator);
+        stage.material("light", "{type: diffuse, reflectance: 0.8}")
+            .material("dark", "{type: diffuse, reflectance: 0.2}")
+            .material("gold", "{type: conductor, eta: 0.4, k: 2.5}")
+            .material("satin", "{type: rough_conductor, eta: 0.4, k: 2.5, roughness: 0.5}")
+            .material("inner", "{type: mix, materials: [light, dark], amount: 0.75}")
+            .material("it", material)
+            .mesh("it", "[[-8,0,-8],[-8,0,8],[8,0,8],[8,0,-8]], uvs: [[0,0],[0,1],[1,1],[1,0]]",
+                  "[[0,1,2,3]]", "it");
+        if (light[0] == 'r') return stage.set("environment", fmt::format("{{{}}}", light)).yaml();
+        return stage.material("black", "{type: diffuse, reflectance: 0}")
+            .mesh("room", "[[-2,0,-2],[2,0,-2],[-2,1,-2],[2,1,-2],[-2,0,2],[2,0,2],[-2,1,2],[2,1,2]]",
+                  "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,2,6,4],[1,5,7,3]]", "black", "1, two_sided: true")
+            .yaml();
+    };
+    const double cosine = 0.6 / std::sqrt(0.3 * 0.3 + 0.6 * 0.6 + 0.2 * 0.2);
+    const double metal = fresnelConductor(cosine, 0.4, 2.5);
+    const double satin = roughConductorAlbedo(cosine, 0.4, 2.5, 0.5);
+    struct Mix {
+        const char* what;
+        std::string material;
+        double albedo;
+        std::vector<Mistake> mistakes;
+    };
+    const Mix all[] = {
+        {"two Lambertian", "{type: mix, materials: [light, dark], amount: 0.25}", 0.65,
+         {{0.35, "the amount is that of the first"}, {0.5, "the amount is not asked"}}},
+        {"one in another", "{type: mix, materials: [dark, inner], amount: 0.5}",
+         0.5 * 0.2 + 0.5 * (0.25 * 0.8 + 0.75 * 0.2), {{0.2, "the inner mix is not asked"}}},
+        {"a mirroring metal and Lambert", "{type: mix, materials: [gold, dark], amount: 0.4}",
+         0.6 * metal + 0.4 * 0.2, {{0.4 * metal + 0.6 * 0.2, "the amount is that of the first"}}},
+        {"a rough metal and Lambert", "{type: mix, materials: [satin, light], amount: 0.4}",
+         0.6 * satin + 0.4 * 0.8, {{0.4 * satin + 0.6 * 0.8, "the amount is that of the first"}}},
+        {"by a checker", "{type: mix, materials: [light, dark], amount: {checker: [0.25, 0.75]}}", 0.65,
+         {{0.35, "the amount is that of the first"}}},
+        {"sides", "{type: two_sided, front: light, back: dark}", 0.8, {{0.2, "the sides are swapped"}}},
+    };
+    const Effort effort{.samples = 64, .most = 65536};
+    for (const Mix& mix : all) {
+        context.estimate(fmt::format("{}, in light from everywhere", mix.what),
+                         floor(kDirect, mix.material, "radiance: 1"), meanRadiance, mix.albedo, 0.005,
+                         effort, mix.mistakes);
+        for (const auto& [name, integrator] : kTechniques)
+            context.estimate(fmt::format("{}, in a glowing room, {}", mix.what, name),
+                             floor(integrator, mix.material), meanRadiance, mix.albedo, 0.01, effort,
+                             mix.mistakes);
+    }
+    context.refused("a mix of itself",
+                    "crt: 1\nmaterials: {a: {type: mix, materials: [b, c]}, b: {type: two_sided, front: c, "
+                    "back: a}, c: {type: diffuse, reflectance: 1}}\n",
+                    "made of itself");
+    context.refused("a mix of what is not there",
+                    "crt: 1\nmaterials: {a: {type: mix, materials: [a1, a2]}}\n", "no material 'a1'");
+}
+
+/// A floor with the normal n, in tangent space, everywhere. (u, v) runs along `right` and `up`.
+Stage mappedFloor(const std::string& path, const Vec3d& n, const std::string& camera,
+                  const char* integrator, const std::string& material, bool mirrored = false,
+                  const char* transform = "") {
+    std::vector<float> rgb;
+    for (int i = 0; i < 4; ++i)
+        for (const double c : n) rgb.push_back(static_cast<float>((c + 1) / 2));
+    writeRgb(path, OutputFormat::Pfm, 2, 2, rgb);
+    Stage stage(camera, integrator);
+    stage.material("it", fmt::format("{{{}, normal_map: {{texture: '{}'{}}}}}", material, path, transform))
+        .mesh("it",
+              fmt::format("[[-8,0,-8],[-8,0,8],[8,0,8],[8,0,-8]], uvs: {}",
+                          mirrored ? "[[0,0],[0,1],[1,1],[1,0]]" : "[[0,1],[0,0],[1,0],[1,1]]"),
+              "[[0,1,2,3]]", "it");
+    return stage;
+}
+
+Vec3d spherical(double degrees, double azimuth) {
+    const double s = std::sin(degrees * kPi / 180);
+    return {s * std::cos(azimuth), std::cos(degrees * kPi / 180), s * std::sin(azimuth)};
+}
+
+std::string seenFrom(const Vec3d& d, double distance = 1) {
+    return fmt::format("{{position: [{:.9g}, {:.9g}, {:.9g}], target: [0, 0, 0], up: [0.3, 0.2, 1], fov: "
+                       "0.001}}",
+                       d[0] * distance, d[1] * distance, d[2] * distance);
+}
+
+void normalMap(Context& context) {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/normals.pfm";
+    constexpr const char* kWhite = "type: diffuse, reflectance: 1";
+    // Its paths have the same wavelengths as those of the floor.
+    const double white = radiance(context.render(
+        Stage(kDown).set("environment", "{radiance: 1}").yaml(), {.samples = 64}));
+    // A light from one direction: the cosine with the facet, and with it in the mirror that the surface is.
+    for (const auto& [slope, azimuth] : {std::pair{25.0, 0.4}, {25.0, 2.5}, {60.0, -1.2}, {60.0, 1.9}})
+        for (const bool mirrored : {false, true}) {
+            const Vec3d n = spherical(slope, azimuth);  // (x, y, z) = right, up the normal, along v
+            // v runs along z where the picture is mirrored, against it otherwise.
+            const double v = mirrored ? 1 : -1;
+            const auto lit = [&](const Vec3d& normal, const Vec3d& light) {
+                const auto positive = [](double x) { return std::max(x, 0.0); };
+                const double level = normal[1] * light[1],
+                             aside = normal[0] * light[0] + normal[2] * light[2];
+                return (positive(aside + level) + positive(aside - level)) / kPi;
+            };
+            for (const double height : {15.0, 60.0}) {
+                const Vec3d towards = spherical(90 - height, 0.7);
+                const auto shown = [&](const char* transform) {
+                    const double seen = radiance(context.render(
+                        mappedFloor(path, {n[0], n[2], n[1]}, seenFrom(spherical(40, -0.5)), kDirect, kWhite,
+                                    mirrored, transform)
+                            .set("lights",
+                                 fmt::format("[{{type: directional, direction: [{:.9g}, {:.9g}, {:.9g}], "
+                                             "irradiance: 1}}]",
+                                             -towards[0], -towards[1], -towards[2]))
+                            .yaml(),
+                        {.samples = 64}));
+                    return seen / white;
+                };
+                const std::string what =
+                    fmt::format("slope {}° towards {}, light at {}°{}", slope, azimuth, height,
+                                mirrored ? ", mirrored picture" : "");
+                const Vec3d world{n[0], n[1], v * n[2]};
+                context.absolute(what, shown(""), lit(world, towards), 1e-4,
+                                 {{lit({n[0], n[1], -v * n[2]}, towards), "green points down the picture"},
+                                  {lit({0, 1, 0}, towards), "the map is not asked"}});
+                // Turned by 90°, the picture's rows run against v.
+                context.absolute(what + ", turned by 90°", shown(", rotation_deg: 90"),
+                                 lit({n[2], n[1], -v * n[0]}, towards), 1e-4,
+                                 {{lit(world, towards), "vectors do not turn with the picture"}});
+                // Twice the slopes.
+                const double steep = std::sqrt(4 * n[0] * n[0] + n[1] * n[1] + 4 * n[2] * n[2]);
+                context.absolute(
+                    what + ", strength 2", shown(", strength: 2"),
+                    lit({2 * n[0] / steep, n[1] / steep, v * 2 * n[2] / steep}, towards), 1e-4,
+                    {{lit(world, towards), "the strength is not asked"}});
+            }
+        }
+    context.refused("a normal map on a mesh without texture coordinates",
+                    Stage(kDown)
+                        .material("it", fmt::format("{{{}, normal_map: {{texture: '{}'}}}}", kWhite, path))
+                        .quad("it", "[[-8,0,-8],[-8,0,8],[8,0,8],[8,0,-8]]", "it")
+                        .yaml(),
+                    "no texture coordinates");
+}
+
+void normalMapEnergy(Context& context) {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/normals.pfm";
+    constexpr std::pair<const char*, const char*> kMaterials[] = {
+        {"Lambert", "type: diffuse, reflectance: 1"},
+        {"mirror", "type: mirror, reflectance: 1"},
+        {"plastic", "type: plastic, reflectance: 1, roughness: 0.3"}};
+    const auto mistakes = [](double slope) {
+        const double kept = (1 + std::cos(slope * kPi / 180)) / 2;
+        return std::vector<Mistake>{{kept, "what is scattered below the surface is lost"},
+                                    {0, "facets that turn away from the viewer are black"}};
+    };
+    for (const auto& [name, material] : kMaterials)
+        for (const double slope : {20.0, 75.0})
+            for (const double view : {0.0, 60.0, 85.0})
+                for (const double azimuth : {0.0, 2.8}) {
+                    const Vec3d n = spherical(slope, azimuth);
+                    context.estimate(
+                        fmt::format("white {}, slope {}° towards {}, seen from {}°", name, slope, azimuth,
+                                    view),
+                        mappedFloor(path, {n[0], n[2], n[1]}, seenFrom(spherical(view, 0)), kDirect,
+                                    material)
+                            .set("environment", "{radiance: 1}")
+                            .yaml(),
+                        meanRadiance, 1, 0.005, {.samples = 64, .most = 65536}, mistakes(slope));
+                }
+    // Light sampling and scattered rays share the work, or one does it alone.
+    for (const auto& [technique, integrator] : kTechniques)
+        for (const double azimuth : {0.0, 2.8}) {
+            const Vec3d n = spherical(50, azimuth);
+            for (const char* lamps : {"room", "sky"}) {
+                Stage stage = mappedFloor(path, {n[0], n[2], n[1]}, seenFrom(spherical(60, 0), 0.5),
+                                          integrator, kMaterials[0].second);
+                if (lamps[0] == 's')
+                    stage.set("environment", "{radiance: 1, light_sampling: true}");
+                else
+                    stage.material("black", "{type: diffuse, reflectance: 0}")
+                        .mesh("room",
+                              "[[-2,0,-2],[2,0,-2],[-2,1,-2],[2,1,-2],[-2,0,2],[2,0,2],[-2,1,2],[2,1,2]]",
+                              "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,2,6,4],[1,5,7,3]]", "black",
+                              "1, two_sided: true");
+                context.estimate(fmt::format("white Lambert in a glowing {}, towards {}, {}", lamps, azimuth,
+                                             technique),
+                                 stage.yaml(), meanRadiance, 1, 0.01, {.samples = 64, .most = 65536},
+                                 mistakes(50));
+            }
+        }
+}
+
+}  // namespace
+
+std::vector<Case> compositionCases() {
+    constexpr std::uint64_t light =
+        CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_ENVIRONMENT;
+    return {
+        row("G24", "opacity",
+            "Stacked sheets of opacity 0 to 1 before a sky, and over a floor that is lit by lamps, points "
+            "and a sky, by light sampling and without",
+            "(1 − a)^k of the light", "independent decisions", "± 0.5 %, 1 %", Level::Commit,
+            light | CRT_FEATURE_OPACITY | CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_ENVIRONMENT_LIGHT, sheets),
+        row("G25", "textured-opacity", "A checker of opacities, seen through and lit through",
+            "1 − a at the place", "independent decisions", "± 0.5 %; refused", Level::Commit,
+            light | CRT_FEATURE_OPACITY | CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_TEXTURE, texturedOpacity),
+        row("G26", "opacity-limits",
+            "A lamp of opacity .3, with and without light sampling; a box of opacity 1 and 0",
+            "0.3 of the light; the same as without; nothing", "conservation of energy",
+            "± 1 %; same bits; 1e-4", Level::Commit, light | CRT_FEATURE_OPACITY, emittersWithHoles),
+        row("G27", "mix",
+            "Mixes of Lambertian and metallic materials, one in another, by a texture, and two sides; in "
+            "light from everywhere and in a glowing room, by light sampling and without",
+            "the mean of the albedos, by their shares", "linearity in the BSDF; Fresnel's equations",
+            "± 0.5 %, 1 %; refused", Level::Commit,
+            light | CRT_FEATURE_MIX | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ROUGH_CONDUCTOR |
+                CRT_FEATURE_TEXTURE,
+            mixes),
+        row("G28", "normal-map",
+            "A floor whose map has one normal, under a light from one direction: pictures of either "
+            "handedness, turned, and steeper",
+            "1/π of the facet's cosine with the light, and with the light in the mirror of the floor",
+            "vectors in double", "± 1e-4; refused", Level::Commit,
+            light | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_TEXTURE | CRT_FEATURE_POINT_LIGHT, normalMap),
+        row("G29", "normal-map-energy",
+            "White mapped surfaces of slopes up to 75°, seen from 0° to 85°, in light from everywhere; "
+            "and in glowing rooms, by light sampling and without",
+            "1", "conservation of energy", "± 0.5 %, 1 %", Level::Commit,
+            light | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_TEXTURE | CRT_FEATURE_MIRROR | CRT_FEATURE_PLASTIC |
+                CRT_FEATURE_ENVIRONMENT_LIGHT,
+            normalMapEnergy),
+    };
+}
+
+}  // namespace crt::verify

@@ -1,0 +1,96 @@
+/// The part of ObjectReader that reads materials made of others: names looked up, since they may come later
+/// in the file, and what cannot be refused.
+#include "scene/yaml/scene_objects.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+namespace crt {
+/// Of the material that is being read, which gets the next number.
+void ObjectReader::readParts(const SectionReader& material) {
+    std::array<PartName, 2>& parts = parts_[static_cast<std::int32_t>(scene_.materials.size())];
+    if (variantWord(material.schema()) == "two_sided") {
+        constexpr const char* kSides[] = {"front", "back"};
+        for (std::size_t i = 0; i < 2; ++i) {
+            material.read(kSides[i], parts[i].name);
+            parts[i].place = material.place(kSides[i]);
+        }
+        return;
+    }
+    const YamlNode* const list = material.list("materials");
+    if (list == nullptr) return;
+    if (list->items.size() != 2) {
+        material.error("materials",
+                       fmt::format("a mix is of two materials, not {}", list->items.size()),
+                       list->items.size() > 2 ? "mix two of them first, and the mix with the next" : "");
+        return;
+    }
+    for (std::size_t i = 0; i < 2; ++i) {
+        const YamlNode& item = *list->items[i];
+        parts[i].place = item.place;
+        readText(out_, item, item.place, fmt::format("material {} of {}", i + 1, material.subject()),
+                 parts[i].name);
+    }
+}
+
+void ObjectReader::resolveParts() {
+    const std::size_t errors_before = out_.count();
+    for (const auto& [index, names] : parts_)
+        for (std::size_t i = 0; i < 2; ++i)
+            if (!names[i].name.empty())
+                scene_.materials[static_cast<std::size_t>(index)].parts[i] =
+                    findMaterial(names[i].name, names[i].place, false).value_or(-1);
+    if (out_.count() != errors_before) return;
+    for (const auto& [index, names] : parts_) {
+        checkParts({index});
+        if (out_.count() != errors_before) return;  // a cycle would be told of each of its materials
+    }
+}
+
+/// `way`: from a material to one that it is made of, by way of others.
+void ObjectReader::checkParts(const std::vector<std::int32_t>& way) {
+    const auto found = parts_.find(way.back());
+    if (found == parts_.end()) return;
+    const auto at = [&](std::int32_t index) -> const Material& {
+        return scene_.materials[static_cast<std::size_t>(index)];
+    };
+    const Material& whole = at(way.back());
+    for (std::size_t i = 0; i < 2; ++i) {
+        const std::int32_t part = whole.parts[i];
+        const YamlPlace& place = found->second[i].place;
+        if (part < 0) continue;
+        std::vector<std::int32_t> further = way;
+        further.push_back(part);
+        if (const auto again = std::find(way.begin(), way.end(), part); again != way.end()) {
+            std::vector<std::string> names;
+            for (auto step = further.begin() + (again - way.begin()); step != further.end(); ++step)
+                names.push_back("'" + at(*step).name + "'");
+            out_.error(place, fmt::format("material '{}' is made of itself: {}", at(part).name,
+                                          fmt::join(names, " of ")));
+            return;
+        }
+        if (further.size() > static_cast<std::size_t>(kDeepestComposition) + 1) {
+            out_.error(place, fmt::format("material '{}' is made of others more than {} deep",
+                                          at(way.front()).name, kDeepestComposition));
+            return;
+        }
+        if (!at(part).isOpaque())
+            out_.error(place,
+                       fmt::format("material '{}' has an opacity, which a part of another cannot have",
+                                   at(part).name),
+                       fmt::format("give the opacity to '{}'", at(way.front()).name));
+        const bool one_side = std::any_of(way.begin(), way.end(), [&](std::int32_t index) {
+            return at(index).type == MaterialType::TwoSided;
+        });
+        if (one_side && at(part).transmits())
+            out_.error(place, fmt::format("material '{}' lets light through: it has both sides itself, and "
+                                          "cannot be one of a two_sided material",
+                                          at(part).name));
+        checkParts(further);
+    }
+}
+
+}  // namespace crt
