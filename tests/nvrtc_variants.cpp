@@ -29,8 +29,8 @@ namespace {
 constexpr int kSkipped = 77;
 
 /// Masks as compileScene derives them, by name. One is compiled once however many names lead to it.
-std::map<std::uint32_t, std::string> representativeMasks() {
-    constexpr std::uint32_t lit =
+std::map<std::uint64_t, std::string> representativeMasks() {
+    constexpr std::uint64_t lit =
         CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_TABLE;
     constexpr std::uint64_t sobol = CRT_FEATURE_SOBOL | CRT_FEATURE_REPLICATES;
     constexpr std::uint64_t box = lit | sobol | CRT_FEATURE_BRUTE_FORCE;
@@ -60,6 +60,7 @@ std::map<std::uint32_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT | CRT_FEATURE_ENVIRONMENT_IMAGE,
          "a mesh, environment image"},
         {mesh | CRT_FEATURE_POINT_LIGHT, "a mesh, lights without a surface"},
+        {mesh | CRT_FEATURE_SPECTRAL_FILM, "a mesh, spectral film"},
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "a mesh, environment, lens and filter"},
         {mesh | CRT_FEATURE_AOV, "a mesh with AOVs"},
@@ -72,7 +73,7 @@ std::map<std::uint32_t, std::string> representativeMasks() {
 
 int run(int argc, char** argv) {
     int arch = 90;
-    std::map<std::uint32_t, std::string> masks = representativeMasks();
+    std::map<std::uint64_t, std::string> masks = representativeMasks();
     for (int i = 1; i < argc; ++i) {
         if (std::strcmp(argv[i], "--arch") == 0 && i + 1 < argc) {
             arch = std::atoi(argv[++i]);
