@@ -4,6 +4,7 @@
 #include "bits_hashes.h"
 #include "kernel/bits_version.h"
 #include "kernel/features.h"
+#include "render/session.h"
 
 #include <fmt/format.h>
 
@@ -123,6 +124,7 @@ struct Case {
     bool sky = false;
     bool composed = false;
     bool mapped = false;
+    bool instruments = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -259,6 +261,20 @@ void addNormalMaps(crt::Scene& scene) {
     }
 }
 
+/// Bins that do not cover all wavelengths, and two sensors.
+void addInstruments(crt::Scene& scene) {
+    crt::SpectralFilm& film = scene.film.spectral;
+    film.bins = {400, 731.5, 13};
+    for (const std::size_t peak : {90u, 300u}) {
+        crt::Spectrum response;
+        for (std::size_t i = 0; i < crt::kSpectrumSize; ++i) {
+            const double away = (static_cast<double>(i) - static_cast<double>(peak)) / 60;
+            response[i] = std::max(0.0, 1 - away * away);
+        }
+        film.responses.push_back({peak < 200 ? "blue" : "red", response});
+    }
+}
+
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
     {"{max_depth: 12}", "{type: sobol}", "", "box"},
@@ -286,6 +302,8 @@ const Case kCases[] = {
      false, false, true},
     {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, false, false, false, false, true},
     {"{max_depth: 6, accelerator: bvh}", "{type: xorshift}", "", "box", true, "", true, false, true, false,
+     true},
+    {"{max_depth: 12}", "{type: sobol}", "", "box", false, "", false, false, false, false, false,
      true},
 };
 
@@ -329,6 +347,7 @@ crt::Scene sceneOf(const Case& c) {
     if (c.sky)
         scene.environment->sky =
             crt::CieSky{.towards_sun = {0.36, 0.8, -0.48}, .amount = 4, .rows = 32};
+    if (c.instruments) addInstruments(scene);
     return scene;
 }
 
@@ -352,7 +371,8 @@ std::vector<Named> allScenes() {
                                  "mixes and holes, tree, xorshift",
                                  "mixes and holes, tree, independent, light sampling alone",
                                  "normal maps",
-                                 "normal maps, glassware, tree, xorshift"};
+                                 "normal maps, glassware, tree, xorshift",
+                                 "spectral film"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});
@@ -502,7 +522,7 @@ TEST_CASE("what a backend brings shows in no bit", "[bits]") {
         crt::Integrator integrator(backend(), {});
         integrator.setScene(compiled);
         REQUIRE(integrator.render({.first_sample = 0, .sample_count = 4}));
-        crt::Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+        crt::Film film(crt::filmShapeOf(compiled));
         integrator.readFilm(film);
         return film;
     };

@@ -60,6 +60,7 @@ std::map<std::uint64_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT | CRT_FEATURE_ENVIRONMENT_IMAGE,
          "a mesh, environment image"},
         {mesh | CRT_FEATURE_POINT_LIGHT, "a mesh, lights without a surface"},
+        {mesh | CRT_FEATURE_SPECTRAL_FILM, "a mesh, spectral film"},
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "a mesh, environment, lens and filter"},
         {mesh | CRT_FEATURE_AOV, "a mesh with AOVs"},

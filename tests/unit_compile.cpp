@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "compile/distributions.h"
 #include "compile/scene_identity.h"
+#include "render/session.h"
 
 #include <algorithm>
 #include <bit>
@@ -259,6 +260,14 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         differs(CRT_FEATURE_VIEW, light, [](Scene& s) { s.integrator.type = crt::IntegratorType::Normals; });
     seen |= differs(CRT_FEATURE_VIEW, light | CRT_FEATURE_BRUTE_FORCE,
                     [](Scene& s) { s.integrator.type = crt::IntegratorType::Aabb; });
+    seen |= differs(CRT_FEATURE_SPECTRAL_FILM, 0, [](Scene& s) { s.film.spectral.bins = {400, 700, 30}; });
+    differs(CRT_FEATURE_SPECTRAL_FILM, 0, [](Scene& s) {
+        s.film.spectral.responses = {{"flat", crt::constantSpectrum(1)}};
+    });
+    differs(CRT_FEATURE_VIEW, light, [](Scene& s) {  // which shows no spectrum
+        s.film.spectral.bins = {400, 700, 30};
+        s.integrator.type = crt::IntegratorType::Normals;
+    });
     seen |= compiled(litFloor(), crt::kAovDepth).features;
     CHECK(compiled(litFloor(), crt::kAovDepth).features == (base | CRT_FEATURE_AOV));
     // The film keeps these itself; the kernel need not know.
@@ -812,6 +821,58 @@ TEST_CASE("AOVs take channels in order, and only those that are asked for", "[co
     CHECK(depth.channels == CRT_CHANNELS_BASE + 2);
 }
 
+TEST_CASE("bins and responses are the last channels of a film, and leave the others where they were",
+          "[compile]") {
+    Scene scene = litFloor();
+    scene.sampler.replicates = 8;
+    const CompiledScene plain = compiled(scene, crt::kAovDepth);
+    scene.film.spectral = {{400, 700, 30}, {{"flat", crt::constantSpectrum(2)}}, true};
+    const CompiledScene spectral = compiled(scene, crt::kAovDepth);
+    CHECK(plain.spectral_channels == 0);
+    CHECK(spectral.spectral_channels == 31);
+    CHECK(spectral.channels == plain.channels + 31);
+    CHECK(headerOf(spectral).depth_channel == headerOf(plain).depth_channel);
+    CHECK(headerOf(spectral).replicate_channel == headerOf(plain).replicate_channel);
+    const CrtSpectralFilm film = listOf<CrtSpectralFilm>(spectral, headerOf(spectral).spectral_film).at(0);
+    CHECK(film.channel == plain.channels);
+    CHECK(film.bins == 30);
+    CHECK(film.first == 40);
+    CHECK(film.per_nm == 0.1f);
+    REQUIRE(film.responses.count == 1);
+    CHECK(arrayOf<f32>(spectral, film.responses)[100] == static_cast<float>(1.0 / 470));
+    const crt::FilmShape shape = crt::filmShapeOf(spectral);
+    CHECK(shape.replicates() == 8);
+    CHECK(shape.firstSpectral() == film.channel);
+    CHECK_NOTHROW(crt::Film(shape));
+    crt::FilmShape wrong = shape;
+    wrong.spectral = 30;
+    CHECK_THROWS_AS(crt::Film(wrong), crt::Error);
+}
+
+TEST_CASE("half of the wavelengths of a spectral film are uniform over what it measures", "[compile]") {
+    constexpr std::size_t kCells = 1024;
+    const std::vector<float> plain = crt::wavelengthTable(kCells);
+    CHECK(crt::wavelengthTable(kCells, {}) == plain);
+    const crt::SpectralFilm narrow{{600, 610, 10}, {}, true};
+    const std::vector<float> table = crt::wavelengthTable(kCells, narrow);
+    CHECK(std::is_sorted(table.begin(), table.end()));
+    CHECK(table.front() == 360);
+    CHECK(table.back() == 830);
+    const auto share = [kCells](const std::vector<float>& nodes, float from_nm, float to_nm) {
+        const auto at = [&](float nm) { return std::lower_bound(nodes.begin(), nodes.end(), nm); };
+        return static_cast<double>(at(to_nm) - at(from_nm)) / kCells;
+    };
+    // The ends are known to a quarter of a nanometre: a step of the quadrature.
+    constexpr double kEnds = 0.5 * 0.25 / 10;
+    CHECK(share(table, 600, 610) == Approx(0.5 + 0.5 * share(plain, 600, 610)).margin(kEnds));
+    CHECK(share(table, 400, 600) == Approx(0.5 * share(plain, 400, 600)).margin(kEnds));
+    // From where a response begins to where it ends.
+    crt::Spectrum red;
+    for (std::size_t i = 240; i <= 250; ++i) red[i] = 1;
+    const std::vector<float> sensor = crt::wavelengthTable(kCells, {{}, {{"red", red}}, true});
+    CHECK(share(sensor, 599, 611) == Approx(0.5 + 0.5 * share(plain, 599, 611)).margin(kEnds));
+}
+
 TEST_CASE("the bits of AOVs never change: film files hold them", "[compile]") {
     CHECK(crt::kAovAlbedo == 1);
     CHECK(crt::kAovNormal == 2);
@@ -957,6 +1018,23 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     differs("its colour", lamp([](crt::PointLight& l) { l.spectrum[3] = 2; }));
     differs("its cone", lamp([](crt::PointLight& l) { l.cone_angle_deg = 31; }));
     differs("its penumbra", lamp([](crt::PointLight& l) { l.penumbra_deg = 4; }));
+    const auto instrument = [](const std::function<void(crt::SpectralFilm&)>& change) {
+        return [change](Scene& s) {
+            s.film.spectral = {{400, 700, 30}, {{"flat", crt::constantSpectrum(1)}}, true};
+            change(s.film.spectral);
+        };
+    };
+    differs("a spectral film", instrument([](crt::SpectralFilm&) {}));
+    differs("where its bins begin", instrument([](crt::SpectralFilm& f) { f.bins.from_nm = 410; }));
+    differs("where its bins end", instrument([](crt::SpectralFilm& f) { f.bins.to_nm = 710; }));
+    differs("the number of its bins", instrument([](crt::SpectralFilm& f) { f.bins.count = 31; }));
+    differs("its bins alone", instrument([](crt::SpectralFilm& f) { f.responses.clear(); }));
+    differs("its response", instrument([](crt::SpectralFilm& f) { f.responses[0].spectrum[7] = 2; }));
+    differs("its response as it is", instrument([](crt::SpectralFilm& f) { f.normalise = false; }));
+    differs("a bin for a response", instrument([](crt::SpectralFilm& f) {
+                f.bins.count = 31;
+                f.responses.clear();
+            }));
     differs("a vertex", [](Scene& s) { s.meshes[0].positions[2][1] = 1e-6; });
     differs("the order of triangles",
             [](Scene& s) { std::swap(s.meshes[0].triangles[0], s.meshes[0].triangles[1]); });
@@ -1045,6 +1123,7 @@ TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]")
         const CompiledScene c = changed([&](Scene& s) {
             s.integrator.accelerator = accelerator;
             s.film.filter = crt::PixelFilter::Gaussian;
+            s.film.spectral.bins = {400, 700, 30};
             s.meshes.push_back(smoothTetrahedron());
             s.objects.emplace_back();
             s.objects.back().mesh = 2;
@@ -1068,7 +1147,8 @@ TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]")
                                                           {h.observer, sizeof(f32)},
                                                           {h.wavelengths, sizeof(f32)},
                                                           {h.filter, sizeof(f32)},
-                                                          {h.point_lights, sizeof(CrtPointLight)}};
+                                                          {h.point_lights, sizeof(CrtPointLight)},
+                                                          {h.spectral_film, sizeof(CrtSpectralFilm)}};
         for (const auto& [span, size] : arrays) {
             if (span.count == 0) continue;
             CHECK(span.offset % 4 == 0);

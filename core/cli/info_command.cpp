@@ -70,6 +70,8 @@ std::string filmText(const Scene& scene) {
                                    name(scene.film.filter));
     const auto& [x0, y0, x1, y1] = scene.film.crop;
     if (x1 > x0) text += fmt::format(", cropped to [{}, {}) x [{}, {})", x0, x1, y0, y1);
+    if (const std::string spectral = spectralText(spectralChannelsOf(scene)); !spectral.empty())
+        text += "\n" + spectral;
     return text;
 }
 
@@ -173,6 +175,7 @@ void showRecord(const FilmRecord& record) {
         printRow("window",
             fmt::format("[{}, {}) x [{}, {}) of {} x {} pixels", record.window[0], record.window[2],
                         record.window[1], record.window[3], record.width, record.height));
+    optional_row("spectral", spectralText(record.spectral));
     printRow("developed in", developmentText(record.development));
     std::vector<std::string> lights;
     for (const auto& [name, white] : record.whites) lights.push_back(name);

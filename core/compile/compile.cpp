@@ -15,6 +15,7 @@
 #include "compile/needs.h"
 #include "compile/scene_identity.h"
 #include "compile/settings.h"
+#include "compile/spectral_film.h"
 #include "compile/spectrum_table.h"
 #include "compile/textures.h"
 #include "kernel/layout.h"
@@ -128,7 +129,11 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.spectra = blob.append(spectra.floats());
     header.spectra.count = spectra.count();
     header.observer = blob.append(observerTable(CRT_SPECTRUM_STRIDE));
-    header.wavelengths = blob.append(wavelengthTable(CRT_WAVELENGTH_TABLE));
+    const bool measures_spectra = spectralChannelsOf(scene).count() > 0;
+    header.wavelengths = blob.append(
+        wavelengthTable(CRT_WAVELENGTH_TABLE, measures_spectra ? scene.film.spectral : SpectralFilm{}));
+    if (measures_spectra)
+        header.spectral_film = appendSpectralFilm(blob, scene.film.spectral, header.channels);
     header.filter = blob.append(filterTable(scene.film, CRT_FILTER_TABLE));
 
     header.features = featuresOf(scene, header, materials);
@@ -143,6 +148,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.height = header.height;
     out.channels = header.channels;
     out.aovs = header.aovs;
+    out.spectral_channels = spectralChannelsOf(scene).count();
     out.triangles = header.triangle_count;
     out.emitters = lights.emitters;
     out.objects = flat.placements;

@@ -1,10 +1,12 @@
 #include "compile/distributions.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
 #include <numeric>
+#include <optional>
 
 namespace crt {
 namespace {
@@ -46,8 +48,28 @@ double blackmanHarris(double x, double radius) {
 
 }  // namespace
 
+namespace {
+
+/// From the first to the last wavelength that bins or responses measure; nothing where there are none.
+std::optional<std::array<double, 2>> measuredRange_nm(const SpectralFilm& film) {
+    std::optional<std::array<double, 2>> range;
+    const auto extend = [&](double from_nm, double to_nm) {
+        range = range ? std::array{std::min((*range)[0], from_nm), std::max((*range)[1], to_nm)}
+                      : std::array{from_nm, to_nm};
+    };
+    if (film.bins.count > 0) extend(film.bins.from_nm, film.bins.to_nm);
+    for (const SensorResponse& response : film.responses)
+        for (std::size_t i = 0; i + 1 < kSpectrumSize; ++i)
+            if (response.spectrum[i] > 0 || response.spectrum[i + 1] > 0)
+                extend(kWavelengthMin_nm + static_cast<double>(i),
+                       kWavelengthMin_nm + static_cast<double>(i + 1));
+    return range;
+}
+
+}  // namespace
+
 // (x̄ + ȳ + z̄)^0.4: docs/decisions/0008-wavelengths.md says why not x̄ + ȳ + z̄ itself.
-std::vector<float> wavelengthTable(std::size_t cells) {
+std::vector<float> wavelengthTable(std::size_t cells, const SpectralFilm& film) {
     const auto& cie = cieObserver();
     const auto density = [&](double wavelength_nm) {
         const double position =
@@ -59,8 +81,20 @@ std::vector<float> wavelengthTable(std::size_t cells) {
         for (const Spectrum& s : cie) sum += s[i] + f * (s[i + 1] - s[i]);
         return std::pow(sum, 0.4);
     };
-    return toFloat(
-        inverseDistribution(density, kWavelengthMin_nm, kWavelengthMax_nm, 4 * (kSpectrumSize - 1), cells));
+    constexpr std::size_t kSteps = 4 * (kSpectrumSize - 1);
+    const auto table = [&](const std::function<double(double)>& wanted) {
+        return toFloat(inverseDistribution(wanted, kWavelengthMin_nm, kWavelengthMax_nm, kSteps, cells));
+    };
+    const auto measured = measuredRange_nm(film);
+    if (!measured) return table(density);
+    const auto [from_nm, to_nm] = *measured;
+    const double step = static_cast<double>(kSpectrumSize - 1) / static_cast<double>(kSteps);
+    double seen = 0;
+    for (std::size_t i = 0; i < kSteps; ++i)
+        seen += density(kWavelengthMin_nm + step * (static_cast<double>(i) + 0.5)) * step;
+    return table([&, from = from_nm, to = to_nm](double nm) {
+        return density(nm) / seen + (nm >= from && nm <= to ? 1 / (to - from) : 0.0);
+    });
 }
 
 std::vector<float> observerTable(std::size_t stride) {

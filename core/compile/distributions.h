@@ -9,9 +9,10 @@
 namespace crt {
 
 /// cells + 1 wavelengths in nm, 360 … 830, increasing: the inverse of a distribution whose density follows
-/// (x̄ + ȳ + z̄)^0.4 (docs/decisions/0008-wavelengths.md). Linear between nodes, so each cell has the
-/// density 1/(cells·Δλ) exactly.
-std::vector<float> wavelengthTable(std::size_t cells);
+/// (x̄ + ȳ + z̄)^0.4 (docs/decisions/0008-wavelengths.md). Half of it where `film` measures spectra; the
+/// other half is uniform over what it measures (0025-spectral-film.md). Linear between
+/// nodes, so each cell has the density 1/(cells·Δλ) exactly.
+std::vector<float> wavelengthTable(std::size_t cells, const SpectralFilm& film = {});
 
 /// `stride` times (x̄, ȳ, z̄, 0) / ∫ȳ dλ, at 360, 361, … nm; the last repeats 830 nm.
 std::vector<float> observerTable(std::size_t stride);

@@ -61,6 +61,7 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(!isPath(scene), CRT_FEATURE_VIEW);
     need((header.aovs & kAovsOfFirstHits) != 0, CRT_FEATURE_AOV);
     need((header.aovs & kAovReplicates) != 0, CRT_FEATURE_REPLICATES);
+    need(header.spectral_film.count > 0, CRT_FEATURE_SPECTRAL_FILM);
     return f;
 }
 
@@ -113,6 +114,9 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");
     if (!has(CRT_FEATURE_REPLICATES))
         left_out("replicates", !isPath(scene) ? "integrator.type is a view" : "sampler.replicates is 1");
+    if (!has(CRT_FEATURE_SPECTRAL_FILM))
+        left_out("spectral film", !isPath(scene) ? "integrator.type is a view"
+                                                 : "the film has neither bins nor responses");
     if (!has(CRT_FEATURE_VIEW)) left_out("normals and bounding-box views", "integrator.type is path");
     for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"},
                                         std::pair{CRT_FEATURE_INDEPENDENT, "independent sampler"},

@@ -47,8 +47,8 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
          {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
           &header.normals, &header.textures, &header.uvs, &header.vertex_colors, &header.nodes,
           &header.objects, &header.materials, &header.compositions, &header.lights, &header.point_lights,
-          &header.environment_image, &header.spectra, &header.observer, &header.wavelengths,
-          &header.filter})
+          &header.environment_image, &header.spectral_film, &header.spectra, &header.observer,
+          &header.wavelengths, &header.filter})
         *span = {};
     return header;
 }
@@ -105,6 +105,13 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
         hash.add(CRT_ARRAY(u32, blob, image.columns), image.columns.count, sizeof(u32));
         image.texels = image.rows = image.columns = {};
         hash.add(&image, 1, sizeof image);
+    }
+    if (header.spectral_film.count > 0) {
+        CrtSpectralFilm film = *CRT_ARRAY(CrtSpectralFilm, blob, header.spectral_film);
+        hash.add(CRT_ARRAY(f32, blob, film.responses), film.responses.count,
+                 CRT_SPECTRUM_STRIDE * sizeof(f32));
+        film.responses = {};
+        hash.add(&film, 1, sizeof film);
     }
     return hash.digits();
 }

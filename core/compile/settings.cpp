@@ -39,7 +39,7 @@ void setFilm(const Scene& scene, std::uint32_t aovs, kernel::CrtScene& header) {
     header.height = cropped ? static_cast<std::uint32_t>(film.crop[3] - film.crop[1]) : header.film_height;
     header.aovs = aovs;
     const auto replicates = static_cast<std::uint32_t>(replicatesOf(scene));
-    header.channels = channelsFor(aovs, replicates);
+    header.channels = channelsFor(aovs, replicates) + spectralChannelsOf(scene).count();
     header.replicate_shift = static_cast<std::uint32_t>(std::bit_width(replicates) - 1);
 #define CRT_SET_CHANNEL(bit, NAME, Name, stem, width, SOURCE, name, exr) \
     header.stem##_channel = firstChannel(aovs, kAov##Name);

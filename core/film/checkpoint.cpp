@@ -140,7 +140,7 @@ Wide headBytes(const Header& h) { return Wide{tailBytes(h)} + sizeof(Header); }
 bool sizesFit(const Header& h) {
     if (h.header_bytes != headBytes(h)) return false;
     if (h.format_version > kCheckpointVersionUnpacked)
-        return h.file_bytes >= headBytes(h) + leastPackedBytes({h.width, h.height, h.channels, h.aovs});
+        return h.file_bytes >= headBytes(h) + leastPackedBytes({h.width, h.height, h.channels, h.aovs, 0});
     const Wide pixels = Wide{h.width} * h.height;
     const Wide ids = (h.aovs & kAovPrimitive) != 0 ? (pixels * 4 + 7) / 8 * 8 : 0;
     return h.record_bytes == 0 && h.file_bytes == headBytes(h) + pixels * h.channels * 16 + pixels * 8 + ids;
@@ -170,6 +170,9 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
     if (identity.version.size() > kVersionBytesMax || film.samples.ranges().size() > kRangesMax)
         throw Error(ErrorKind::Internal,
                     "the film has too many sample ranges, or crt too long a version, for a checkpoint");
+
+    if (film.shape().spectral != (identity.record ? identity.record->spectral.count() : 0))
+        throw Error(ErrorKind::Internal, "the film has other spectral channels than its record says");
 
     const std::string record = identity.record ? recordText(*identity.record) : std::string();
     if (record.size() > kRecordBytesMax)
@@ -250,12 +253,17 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         if (checksum.value() != header.checksum) refuse(path, kBadChecksum);
     }
 
+    std::optional<FilmRecord> record;
+    if (header.record_bytes > 0) record = readRecordOf(path, tail, header);
+    const std::uint32_t spectral = record ? record->spectral.count() : 0;
+
     // The shape of an unpacked film is used before the checksum is known; Film refuses one that cannot be.
     const auto make_film = [&] {
         try {
             const bool squares = header.format_version == kCheckpointVersionUnpacked;
             return Film(
-                {header.width, header.height, header.channels, header.aovs | (squares ? kAovSquares : 0u)});
+                {header.width, header.height, header.channels, header.aovs | (squares ? kAovSquares : 0u),
+                 spectral});
         } catch (const Error& error) {
             if (error.kind() != ErrorKind::Internal) throw;  // Too large for this machine is not damaged.
             refuse(path, kBadChecksum);
@@ -286,7 +294,7 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         std::string(reinterpret_cast<const char*>(tail.data()) + header.range_count * std::size_t{16},
                     header.version_bytes),
         header.bits_version};
-    if (header.record_bytes > 0) identity.record = readRecordOf(path, tail, header);
+    identity.record = std::move(record);
     if (!isHexHash(identity.scene_hash.data(), identity.scene_hash.size()))
         refuse(path, "holds a scene hash that is not one");
     try {

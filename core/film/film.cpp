@@ -37,8 +37,9 @@ void addPair(double* pair, const double* other) {
 
 bool hasRightChannels(const FilmShape& shape) {
     const std::uint32_t replicates = shape.replicates();
-    return shape.channels == channelsFor(shape.aovs, replicates) && std::has_single_bit(replicates) &&
-           replicates <= CRT_REPLICATES_MAX;
+    return shape.channels >= shape.spectral &&
+           shape.firstSpectral() == channelsFor(shape.aovs, replicates) &&
+           std::has_single_bit(replicates) && replicates <= CRT_REPLICATES_MAX;
 }
 
 /// Samples of `range` that belong to a replicate: they take turns.
@@ -155,7 +156,7 @@ double Film::mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const
 
 std::uint32_t FilmShape::replicates() const {
     const std::uint32_t without = channelsFor(aovs & ~kAovReplicates);
-    return (aovs & kAovReplicates) != 0 && channels > without ? channels - without + 1 : 1;
+    return (aovs & kAovReplicates) != 0 && firstSpectral() > without ? firstSpectral() - without + 1 : 1;
 }
 
 double Film::replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const {

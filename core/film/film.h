@@ -44,9 +44,12 @@ struct FilmShape {
     std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, then those of kernel/channels.h.
     std::uint32_t aovs =
         0;  ///< Bits of Aov that need film channels or the primitive plane, kAovReplicates among them.
+    std::uint32_t spectral = 0;  ///< Of these channels, the last: scene/spectral_film.h.
     /// Independent sequences that samples take turns between (layout.h); 1: the film does not tell them
     /// apart.
     std::uint32_t replicates() const;
+    /// The first of the `spectral` channels.
+    std::uint32_t firstSpectral() const { return channels - spectral; }
     bool operator==(const FilmShape&) const = default;
 };
 

@@ -215,6 +215,17 @@ SceneTrait lightsTrait(const Scene& scene) {
         digest.digits()};
 }
 
+SceneTrait spectralTrait(const Scene& scene) {
+    const SpectralChannels channels = spectralChannelsOf(scene);
+    if (channels.count() == 0) return {"the spectral film", "none", {}};
+    Digest digest;
+    digest.add(channels.bins.from_nm);
+    digest.add(channels.bins.to_nm);
+    digest.add(scene.film.spectral.normalise);
+    for (const SensorResponse& response : scene.film.spectral.responses) digest.add(response.spectrum);
+    return {"the spectral film", spectralText(channels), digest.digits()};
+}
+
 std::vector<SceneTrait> traitsOf(const Scene& scene, std::uint32_t aovs) {
     const auto& [x0, y0, x1, y1] = scene.film.crop;
     const IntegratorSettings& i = scene.integrator;
@@ -235,7 +246,8 @@ std::vector<SceneTrait> traitsOf(const Scene& scene, std::uint32_t aovs) {
             geometryTrait(scene),
             materialsTrait(scene),
             lightsTrait(scene),
-            {"the AOVs of first hits", planesText(aovs), {}}};
+            {"the AOVs of first hits", planesText(aovs), {}},
+            spectralTrait(scene)};
 }
 
 // ---- JSON -----------------------------------------------------------------------------------------------
@@ -279,6 +291,24 @@ Development developmentFrom(const Json& json) {
     return development;
 }
 
+Json spectralJson(const SpectralChannels& channels) {
+    const SpectralBins& bins = channels.bins;
+    return {{"from_nm", bins.from_nm}, {"to_nm", bins.to_nm}, {"bins", bins.count},
+            {"responses", channels.responses}};
+}
+
+SpectralChannels spectralFrom(const Json& json) {
+    SpectralChannels channels;
+    channels.bins = {inRange(json.at("from_nm"), 0, kWavelengthMax_nm),
+                     inRange(json.at("to_nm"), 0, kWavelengthMax_nm),
+                     static_cast<std::uint32_t>(inRange(json.at("bins"), 0, kMostSpectralBins))};
+    channels.responses = json.at("responses").get<std::vector<std::string>>();
+    if (!areSpectralBins(channels.bins) || channels.responses.size() > kMostSensorResponses ||
+        !std::all_of(channels.responses.begin(), channels.responses.end(), isResponseName))
+        throw Error(ErrorKind::Usage, "has a spectral film that none can be");
+    return channels;
+}
+
 std::vector<std::string> aovNamesOf(std::uint32_t aovs) {
     std::vector<std::string> names;
     for (const AovRow& row : kAovRows)
@@ -310,6 +340,7 @@ FilmRecord recordFrom(const Json& json) {
     record.height = json.at("resolution").at(1).get<int>();
     record.window = json.at("window").get<std::array<int, 4>>();
     for (const Json& name : json.at("aovs")) record.aovs |= aovNamed(name.get<std::string>());
+    if (json.contains("spectral")) record.spectral = spectralFrom(json.at("spectral"));
     record.development = developmentFrom(json.at("development"));
     for (const auto& [name, white] : json.at("lights_xyz").items()) record.whites[name] = whiteFrom(white);
     record.world_to_camera = json.at("world_to_camera").get<RowMatrix4d>();
@@ -346,6 +377,7 @@ FilmRecord recordOf(const Scene& scene) {
                         ? scene.film.crop
                         : std::array<int, 4>{0, 0, scene.film.width, scene.film.height};
     for (const Output& output : scene.outputs) record.aovs |= output.aovs;
+    record.spectral = spectralChannelsOf(scene);
     record.development = developmentOf(scene);
     record.whites = scene.whites;
     addCamera(record, scene.camera);
@@ -372,6 +404,7 @@ std::string recordText(const FilmRecord& record) {
     for (const auto& [name, white] : record.whites) json["lights_xyz"][name] = white;
     for (const SceneTrait& trait : record.traits)
         json["traits"].push_back({trait.name, trait.text, trait.digest});
+    if (record.spectral.count() > 0) json["spectral"] = spectralJson(record.spectral);
     if (record.complete) json["complete"] = *record.complete;
     // Titles are bytes, not necessarily UTF-8.
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);

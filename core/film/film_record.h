@@ -5,6 +5,7 @@
 
 #include "image/development.h"
 #include "image/image.h"
+#include "scene/spectral_film.h"
 
 #include <array>
 #include <cstdint>
@@ -31,6 +32,7 @@ struct FilmRecord {
     int width = 0, height = 0;            ///< Of the whole film.
     std::array<int, 4> window{};          ///< What the film holds of it: x0, y0, x1, y1, half open.
     std::uint32_t aovs = 0;               ///< Bits of Aov that the scene's EXR files ask for.
+    SpectralChannels spectral;            ///< What the film's last channels are.
     Development development;
     std::map<std::string, Vec3d> whites;  ///< Named spectra of the scene that are lights: XYZ with Y = 1.
     RowMatrix4d world_to_camera{};        ///< x to the right, y up, the camera looks along −z.

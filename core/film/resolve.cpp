@@ -26,10 +26,27 @@ const char* spaceName(ColorSpace space) {
     return "lin_ciexyzd65_scene";
 }
 
+/// As Fichet et al. 2021 have it, and pbrt-v4: Stokes component 0, and a comma in the number, since a point
+/// would divide layers.
+std::string binName(double centre_nm) {
+    std::string name = fmt::format("S0.{:.6f}nm", centre_nm);
+    name[name.rfind('.')] = ',';
+    return name;
+}
+
+void nameSpectralChannels(const SpectralChannels& spectral, Image& image) {
+    for (std::uint32_t bin = 0; bin < spectral.bins.count; ++bin)
+        image.channels.push_back(binName(spectral.bins.centre_nm(bin)));
+    for (const std::string& name : spectral.responses) image.channels.push_back("Response." + name);
+}
+
 }  // namespace
 
-Image resolveImage(const Film& film, const Development& development, std::uint32_t aovs) {
+Image resolveImage(const Film& film, const Development& development, std::uint32_t aovs,
+                   const SpectralChannels& spectral) {
     const FilmShape& shape = film.shape();
+    if (spectral.count() > shape.spectral)
+        throw Error(ErrorKind::Internal, "an image asks for more spectral channels than its film has");
     for (const AovRow& row : kAovRows)
         if ((aovs & kAovsOfFirstHits & ~shape.aovs & row.aov) != 0)
             throw Error(ErrorKind::Usage,
@@ -67,6 +84,8 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
         for (std::string& name : exrNames(row)) names.push_back(std::move(name));
     }
 
+    nameSpectralChannels(spectral, image);
+
     const LuminanceVariance variance(film);
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
     image.pixels.resize(pixels * image.channels.size());
@@ -103,6 +122,7 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
                 case kAovError: add(error(x, y)); break;
             }
         }
+        for (std::uint32_t c = 0; c < spectral.count(); ++c) add(film.mean(x, y, shape.firstSpectral() + c));
     };
     constexpr std::size_t kRows = 16;
     parallelFor(shape.height, kRows, [&](std::size_t first, std::size_t end) {
@@ -122,6 +142,10 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
                       {kExposureKey, fmt::format("{}", development.exposure_ev)},
                       {kWhiteBalanceKey, whiteBalanceText(development)},
                       {"crt/invalidSamples", std::to_string(film.invalidSamples())}};
+    if (spectral.bins.count > 0) {
+        image.metadata.emplace_back("spectralLayoutVersion", "1.0");
+        image.metadata.emplace_back("emissiveUnits", "W.m^-2.sr^-1.nm^-1");
+    }
     if ((aovs & (kAovVariance | kAovError)) && variance.degreesOfFreedom() >= 1)
         image.metadata.emplace_back(kErrorDofKey, fmt::format("{:.6g}", variance.degreesOfFreedom()));
     return image;

@@ -12,6 +12,11 @@ namespace crt {
 /// XYZ sums → colour image, developed as said; AOVs as asked. StdError and Variance are of the luminance
 /// that the image has. The metadata is what the film and the development know. Throws crt::Error(Usage) for
 /// an AOV that the film lacks.
-Image resolveImage(const Film& film, const Development& development, std::uint32_t aovs);
+///
+/// `spectral` names the film's spectral channels, which follow in the layout of Fichet et al.
+/// (2021): "S0.550,000000nm" is the mean radiance of the bin around 550 nm, "Response.NAME" the signal
+/// of a sensor. No development changes them.
+Image resolveImage(const Film& film, const Development& development, std::uint32_t aovs,
+                   const SpectralChannels& spectral = {});
 
 }  // namespace crt

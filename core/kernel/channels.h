@@ -13,6 +13,8 @@
  * none: IDS is the film's plane of primitive ids, FILM is made of the film when it is resolved. TYPE is
  * FLOAT or UINT.
  *
+ * A spectral film has its bins and the responses of its sensors behind all of these: CrtSpectralFilm.
+ *
  * An empty name: no output. EXR channels are separated by commas; those of the CRT_CHANNEL_LIST are floats.
  * A bit never changes its meaning, because film files hold the mask.
  */

@@ -242,6 +242,18 @@ typedef struct CrtEnvironmentImage {
 } CrtEnvironmentImage;
 CRT_ASSERT_SIZE(CrtEnvironmentImage, 80);
 
+/* What a film has of the spectrum, in channels behind all others: the mean radiance in equal bins of
+   wavelengths, then what the responses of sensors make of the radiance. */
+typedef struct CrtSpectralFilm {
+    u32 channel;       /* of the first bin */
+    u32 bins;
+    f32 first;         /* lower edge of the first bin, nm above CRT_WAVELENGTH_MIN_NM */
+    f32 per_nm;        /* bins in a nanometre */
+    CrtSpan responses; /* count tables of CRT_SPECTRUM_STRIDE floats */
+    u32 reserved[2];
+} CrtSpectralFilm;
+CRT_ASSERT_SIZE(CrtSpectralFilm, 32);
+
 /* A film point (px, py), in pixels from the top left, looks along corner + px·step_x + py·step_y (not
    normalised; its component along the view axis is 1). */
 typedef struct CrtCamera {
@@ -337,6 +349,8 @@ typedef struct CrtScene {
     CrtSpan point_lights;        /* CrtPointLight */
     CrtSpan environment_image;   /* CrtEnvironmentImage, 1 or none */
     CrtSpan compositions;        /* CrtComposition, as many as materials; or none */
+    CrtSpan spectral_film;       /* CrtSpectralFilm, 1 or none */
+    u32 padding2[2];
     CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
     CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
     CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */
@@ -344,7 +358,7 @@ typedef struct CrtScene {
 
     CrtCamera camera;
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 384);
+CRT_ASSERT_SIZE(CrtScene, 400);
 
 CRT_KERNEL_END
 

@@ -161,6 +161,28 @@ CRT_FN void crt_add_aovs(const CrtContext *ctx, const CrtPath *path, CRT_GLOBAL 
     CRT_CHANNEL_LIST(CRT_ADD_CHANNEL)
 }
 
+/* What a sample adds to the bins and the responses of a spectral film: the radiance of its four wavelengths,
+   over the density of each. */
+CRT_FN void crt_add_spectrum(const CrtContext *ctx, const CrtPath *path, CRT_GLOBAL f64 *pixel) {
+    CRT_GLOBAL const CrtSpectralFilm *film =
+        CRT_ARRAY(CrtSpectralFilm, ctx->blob, ctx->scene->spectral_film);
+    const vec4 position = path->wavelengths.position;
+    vec4 inverse_pdf;
+    (void)crt_four_wavelengths(ctx, path->wavelengths.u, &inverse_pdf);
+    const vec4 integral = path->radiance * inverse_pdf;
+    CRT_GLOBAL f64 *pairs = pixel + 2u * film->channel;
+    CRT_ROLLED for (u32 lane = 0u; lane < 4u; ++lane) {
+        const f32 bin = (crt_lane(position, lane) - film->first) * film->per_nm;
+        if (bin >= 0.0f && bin < (f32)film->bins)
+            crt_film_add(pairs + 2u * (u32)bin, (f64)crt_lane(integral, lane) * (f64)film->per_nm);
+    }
+    pairs += 2u * film->bins;
+    CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, film->responses);
+    CRT_ROLLED for (u32 k = 0u; k < film->responses.count; ++k)
+        crt_film_add(pairs + 2u * k,
+                     (f64)sum4(crt_lookup4(table + k * CRT_SPECTRUM_STRIDE, position) * integral));
+}
+
 /* A pixel of the crop window, some of whose samples are being taken: their sums go to its place in the film.
  */
 typedef struct CrtPixelWork {
@@ -215,6 +237,8 @@ CRT_FN void crt_add_sample(const CrtContext *ctx, CrtPixelWork *work, vec4 xyz) 
             if (work->primitive != 0 && work->valid == 0u && *work->count == 0u)
                 *work->primitive = work->path.first.primitive;
         }
+        if (CRT_HAS(SPECTRAL_FILM) && scene->spectral_film.count != 0u)
+            crt_add_spectrum(ctx, &work->path, pairs);
         work->valid += 1u;
     }
     work->done += 1u;

@@ -63,12 +63,16 @@ CRT_FN f32 crt_lookup(CRT_GLOBAL const f32 *table, f32 position) {
     return crt_fma(position - (f32)i, table[i + 1u] - a, a);
 }
 
-/* A tabulated spectrum of the scene at the path's wavelengths, linear between nanometres. */
-CRT_FN vec4 crt_spectrum(const CrtContext *ctx, u32 index, vec4 position) {
-    CRT_GLOBAL const f32 *table =
-        CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) + index * CRT_SPECTRUM_STRIDE;
+/* A table at the path's wavelengths, linear between nanometres. */
+CRT_FN vec4 crt_lookup4(CRT_GLOBAL const f32 *table, vec4 position) {
     return make_vec4(crt_lookup(table, V4X(position)), crt_lookup(table, V4Y(position)),
                      crt_lookup(table, V4Z(position)), crt_lookup(table, V4W(position)));
+}
+
+/* A tabulated spectrum of the scene. */
+CRT_FN vec4 crt_spectrum(const CrtContext *ctx, u32 index, vec4 position) {
+    return crt_lookup4(CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) + index * CRT_SPECTRUM_STRIDE,
+                       position);
 }
 
 /* ½ + x / (2√(1 + x²)). 1 / (2h(h + |x|)), with h = √(1 + x²), is the smaller of that and 1 minus

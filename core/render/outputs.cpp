@@ -72,7 +72,9 @@ Image developedImage(const Output& output, const Film& film, const FilmIdentity&
     const Development& wanted = record.development;
     const bool floats = output.format == OutputFormat::Exr || output.format == OutputFormat::Pfm;
     const Development applied = floats ? wanted.forFloats() : wanted;
-    Image image = resolveImage(film, applied, output.aovs);
+    const bool spectral = output.format == OutputFormat::Exr;
+    Image image =
+        resolveImage(film, applied, output.aovs, spectral ? record.spectral : SpectralChannels{});
 
     const auto add = [&image](const char* key, std::string value) {
         if (!value.empty()) image.metadata.emplace_back(key, std::move(value));

@@ -56,7 +56,8 @@ Film renderFilm(Session& session, const Scene& scene, const FilmRequest& request
 }
 
 FilmShape filmShapeOf(const CompiledScene& compiled) {
-    return {compiled.width, compiled.height, compiled.channels, compiled.aovs};
+    return {compiled.width, compiled.height, compiled.channels, compiled.aovs,
+            compiled.spectral_channels};
 }
 
 }  // namespace crt

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "kernel/features.h"
 #include "scene/aov.h"
+#include "scene/spectral_film.h"
 #include "scene/texture.h"
 #include "spectra/spectra.h"
 
@@ -52,6 +53,7 @@ struct FilmSettings {
     std::optional<Spectrum> white_balance;  ///< Adapt from this illuminant's white to the colour space's.
     double exposure_ev = 0;                 ///< The image is multiplied by 2^ev.
     bool apply_to_float = false;            ///< EXR and PFM get white balance and exposure too.
+    SpectralFilm spectral;                  ///< Beside X, Y and Z.
 };
 
 enum class IntegratorType { Path, Normals, Aabb };
@@ -255,6 +257,16 @@ struct Scene {
     std::uint64_t input_bytes = 0;        ///< Of all of them; 0 for a scene made in memory.
     double parse_seconds = 0;
 };
+
+/// The channels of its film beside those of kernel/channels.h. Views show no spectrum.
+inline SpectralChannels spectralChannelsOf(const Scene& scene) {
+    SpectralChannels channels;
+    if (scene.integrator.type != IntegratorType::Path) return channels;
+    channels.bins = scene.film.spectral.bins;
+    for (const SensorResponse& response : scene.film.spectral.responses)
+        channels.responses.push_back(response.name);
+    return channels;
+}
 
 /// How many independent sequences the samples of a pixel are of (layout.h: CRT_REPLICATES_MAX); 1: the film
 /// keeps no sums of replicates. By default as few as give the image's error a thousand degrees of freedom,

@@ -367,6 +367,22 @@ def scene_cases():
         HEAD + "environment: {radiance: 1e-50}\n",
         words="single precision carries light from 1e-25",
     )
+    for text, words in (
+        ("spectral: 7", "expected a map"),
+        ("spectral: {}", "'from_nm' is missing"),
+        ("spectral: {from_nm: 400, to_nm: 700, bins: 1e9}", "1 to 1024"),
+        ("spectral: {from_nm: 400, to_nm: 700, bins: 2.5}", "whole number"),
+        ("spectral: {from_nm: nan, to_nm: 700, bins: 3}", "NaN"),
+        ("spectral: {from_nm: 700, to_nm: 400, bins: 3}", "exchange 'from_nm' and 'to_nm'"),
+        ("spectral: {from_nm: 500, to_nm: 500.05, bins: 1}", "narrower than 0.1 nm"),
+        ("responses: {a: 0}", "0 at all wavelengths"),
+        ("responses: {a: -1}", "must be"),
+        ("responses: {a: {file: missing.csv}}", "missing.csv"),
+        ("responses: {'../a': 1}", "letters, digits"),
+        ("responses: 3", "expected a map"),
+    ):
+        film = HEAD.replace("resolution: [8, 8]", "resolution: [8, 8], " + text)
+        scene(f"film: {{{text}}}", GOOD.replace(HEAD, film), words=words)
     bulb = "{type: point, position: [0, 0, 1], power_w: 1}"
     for text, words in (
         ("7", "expected a list"),

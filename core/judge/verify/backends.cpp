@@ -78,7 +78,7 @@ void lostDevices(Context& context) {
     const CompiledScene compiled = compileScene(scene, 0);
     const Film expected = context.render(scene, {.samples = 8});
     const auto filmOf = [&](Integrator& integrator) {
-        Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+        Film film(filmShapeOf(compiled));
         integrator.readFilm(film);
         return film;
     };
@@ -148,7 +148,7 @@ void hostsEnvironment(Context& context) {
         Integrator integrator(context.backend(), options);
         integrator.setScene(compiled);
         integrator.render({.sample_count = 8});
-        Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+        Film film(filmShapeOf(compiled));
         integrator.readFilm(film);
         return film;
     };

@@ -94,6 +94,7 @@ std::vector<Case> rayCases();            ///< D
 std::vector<Case> lightCases();          ///< E
 std::vector<Case> pointLightCases();     ///< E, the part about lights without a surface
 std::vector<Case> environmentCases();    ///< E, the part about images and skies around a scene
+std::vector<Case> spectralFilmCases();   ///< E, the part about bins and sensors
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> scatteringCases();     ///< G
 std::vector<Case> glasswareCases();      ///< G, rough glass and panes

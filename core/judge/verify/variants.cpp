@@ -153,6 +153,9 @@ std::vector<Variant> variants(int resolution) {
         s.environment->sky = sky;
         s.environment->light_sampling = true;
     });
+    add("a spectral film", [](Scene& s) {
+        s.film.spectral = {{380, 780, 16}, {{"flint", flint()}, {"flat", constantSpectrum(1)}}, false};
+    });
     add("view of the normals", [](Scene& s) { s.integrator.type = IntegratorType::Normals; });
     add("view of the boxes", [](Scene& s) { s.integrator.type = IntegratorType::Aabb; });
     return all;
@@ -170,7 +173,7 @@ void forEachVariant(Context& context, int resolution, void (*ask)(Context&, cons
 
 Film portableFilm(const Scene& scene, const Render& how) {
     const CompiledScene compiled = compileScene(scene, how.aovs);
-    Film film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+    Film film(filmShapeOf(compiled));
     kernel::CrtContext context{};
     context.blob = compiled.data();
     context.scene = reinterpret_cast<const kernel::CrtScene*>(compiled.data());

@@ -239,6 +239,55 @@ SectionSchema film() {
                  .fallback = yaml(d.apply_to_float),
                  .doc = "EXR and PFM get `white_balance` and `exposure_ev` too. Without it they hold the "
                         "radiance of the scene, in `color_space`."},
+                {.name = "spectral",
+                 .kind = Kind::Section,
+                 .section = "spectral_film",
+                 .fallback = "null",
+                 .nullable = true,
+                 .doc = "Bins of wavelengths, which EXR files have beside the image."},
+                {.name = "responses",
+                 .kind = Kind::Spectrum,
+                 .shape = Shape::Map,
+                 .range = kRadiance,
+                 .doc = fmt::format(
+                     "The channels of a camera or an instrument: what its sensor answers to each "
+                     "wavelength. EXR files have `Response.NAME` beside the image: ∫ L r dλ / ∫ r dλ, "
+                     "so that radiance 1 at all wavelengths gives 1, as it does for Y. Up to {}; names are "
+                     "letters, digits, `_` and `-`.",
+                     kMostSensorResponses)},
+                {.name = "normalise_responses",
+                 .kind = Kind::Boolean,
+                 .fallback = yaml(d.spectral.normalise),
+                 .doc = "Without it a response is ∫ L r dλ, in W·m⁻²·sr⁻¹ times its unit."},
+            }};
+}
+
+SectionSchema spectralFilm() {
+    const ValueRange wavelength{kWavelengthMin_nm, kWavelengthMax_nm, false, false};
+    return {"spectral_film",
+            "a spectral film",
+            "The spectrum of each pixel, in equal bins: mean radiance in W·m⁻²·sr⁻¹·nm⁻¹. "
+            "EXR files have a channel a bin, named by its middle as Fichet et al. (2021) and pbrt-v4 do "
+            "(`S0.550,000000nm`), beside the image and its error. Exposure, white balance and colour space "
+            "do not change them. A bin takes 16 bytes of memory a pixel.",
+            {
+                {.name = "from_nm",
+                 .kind = Kind::Number,
+                 .range = wavelength,
+                 .unit = "nm",
+                 .required = true,
+                 .doc = "Where the first bin begins."},
+                {.name = "to_nm",
+                 .kind = Kind::Number,
+                 .range = wavelength,
+                 .unit = "nm",
+                 .required = true,
+                 .doc = "Where the last one ends."},
+                {.name = "bins",
+                 .kind = Kind::Integer,
+                 .range = {1, kMostSpectralBins, false, false},
+                 .required = true,
+                 .doc = fmt::format("Their number. Each is at least {} nm wide.", kNarrowestBin_nm)},
             }};
 }
 
@@ -859,7 +908,8 @@ std::vector<std::string> SectionSchema::keyNames() const {
 
 const std::vector<SectionSchema>& sceneSchema() {
     static const std::vector<SectionSchema> schema = [] {
-        std::vector<SectionSchema> all{topLevel(), camera(), film(), filter(), integrator(), sampler()};
+        std::vector<SectionSchema> all{topLevel(), camera(),     film(),   spectralFilm(),
+                                       filter(),   integrator(), sampler()};
         addSpectra(all);
         addTextures(all);
         addMaterials(all);

@@ -252,6 +252,10 @@ std::optional<Spectrum> SpectrumReader::rgb(const SectionReader& form, SpectrumU
                    "sellmeier coefficients");
         return std::nullopt;
     }
+    if (use == SpectrumUse::Response) {
+        form.error("rgb", "a sensor's response is not a colour; give a table, a file or named data");
+        return std::nullopt;
+    }
     const double brightest = *std::max_element(color.begin(), color.end());
     if (brightest > 1 && use == SpectrumUse::Absorption) {
         form.error("rgb", fmt::format("a component of this absorption is {}, beyond 1", brightest),

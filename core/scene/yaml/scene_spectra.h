@@ -14,7 +14,7 @@
 namespace crt {
 
 /// What a spectrum is for. An rgb colour means another spectrum as a reflectance than as a light.
-enum class SpectrumUse { Reflectance, Emission, Index, White, Absorption };
+enum class SpectrumUse { Reflectance, Emission, Index, White, Absorption, Response };
 
 class SpectrumReader {
 public:

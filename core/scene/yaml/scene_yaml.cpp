@@ -10,6 +10,7 @@
 #include "scene/yaml/scene_reader.h"
 #include "scene/yaml/scene_schema.h"
 #include "scene/yaml/scene_spectra.h"
+#include "scene/yaml/scene_spectral_film.h"
 #include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
@@ -200,6 +201,7 @@ void readFilm(const SectionReader& section, SpectrumReader& spectra, FilmSetting
         section.error("white_balance", "this spectrum has no luminance, so it has no white");
     section.read("exposure_ev", film.exposure_ev);
     section.read("apply_to_float", film.apply_to_float);
+    film.spectral = readSpectralFilm(section, spectra);
 }
 
 double length(const Vec3d& v) { return std::hypot(v[0], v[1], v[2]); }

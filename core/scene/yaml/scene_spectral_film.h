@@ -1,0 +1,12 @@
+/// What a film keeps of the spectrum: film.spectral and film.responses.
+#pragma once
+
+#include "scene/spectral_film.h"
+#include "scene/yaml/scene_spectra.h"
+
+namespace crt {
+
+/// `film` is the section of that name.
+SpectralFilm readSpectralFilm(const SectionReader& film, SpectrumReader& spectra);
+
+}  // namespace crt
