@@ -44,7 +44,7 @@ const std::vector<MtlKey>& mtlKeys() {
         {"d",
          {},
          "opacity",
-         "Below 1, and with `Ni` above 1: clear glass. Without `Ni` it is opacity, which crt does not have: "
+         "Below 1, and with `Ni` above 1: clear glass. Without `Ni` it is opacity, which is the scene's to say: "
          "the surface is opaque, with a warning."},
         {"Tr",
          {},
