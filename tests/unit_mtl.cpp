@@ -299,9 +299,9 @@ TEST_CASE("one line says what the materials of a file became and lost", "[mesh_i
     CHECK(log.warnings() == 1);
     CHECK_THAT(log.text(),
                Contains("mesh.obj: 27 materials: 23 diffuse, 1 mirror, 3 glass, 1 of them emitting; d below "
-                        "1 without Ni above 1 read as opaque (crt has no opacity) (22), d between 0 and 1 "
-                        "with Ni above 1 read as clear glass (3), Pm from 0.5 to 1 read as 1 (1); dropped: "
-                        "Ks (22), Ns (22), map_Kd (22), Tf (3), Pc (1), Pr (1)\n"));
+                        "1 without Ni above 1 read as opaque (opacity is not read from MTL) (22), d between "
+                        "0 and 1 with Ni above 1 read as clear glass (3), Pm from 0.5 to 1 read as 1 (1); "
+                        "dropped: Ks (22), Ns (22), map_Kd (22), Tf (3), Pc (1), Pr (1)\n"));
 }
 
 TEST_CASE("every documented keyword of an MTL is known and every other is said to be unknown",

@@ -64,7 +64,7 @@ class Meshes(CliTest):
             [
                 "crt: warning: mesh.obj: 2 materials: 1 diffuse, 1 glass; d below 1 without Ni above 1 read "
                 "as opaque "
-                "(crt has no opacity) (1); dropped: Ks (1)"
+                "(opacity is not read from MTL) (1); dropped: Ks (1)"
             ],
         )
 

@@ -44,8 +44,8 @@ const std::vector<MtlKey>& mtlKeys() {
         {"d",
          {},
          "opacity",
-         "Below 1, and with `Ni` above 1: clear glass. Without `Ni` it is opacity, which crt does not have: "
-         "the surface is opaque, with a warning."},
+         "Below 1, and with `Ni` above 1: clear glass. Without `Ni` it is opacity, which is the scene's to "
+         "say: the surface is opaque, with a warning."},
         {"Tr",
          {},
          "1 − opacity",

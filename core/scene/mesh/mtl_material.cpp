@@ -192,7 +192,8 @@ private:
     /// What says that light passes, where it does not.
     void opaque() const {
         if (opacity_.value_or(1.0) < 1.0)
-            summary_.decided(fmt::format("{} without Ni above 1 read as opaque (crt has no opacity)",
+            summary_.decided(fmt::format("{} without Ni above 1 read as opaque (opacity is not read from "
+                                         "MTL)",
                                          has("d") ? "d below 1" : "Tr above 0"));
         else if (illumIs({4, 6, 7, 9}))
             summary_.decided(fmt::format("illum {} {} read as opaque", *illum_,

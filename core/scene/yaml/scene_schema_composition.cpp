@@ -29,7 +29,7 @@ void addCompositions(std::vector<SectionSchema>& all) {
                    "a mix material",
                    "Two materials, of which each has a share of the surface, too fine to be seen: as in "
                    "pbrt-v4, each sample takes one of them by chance. They may be mixes themselves, up to 8 "
-                   "deep.",
+                   "deep, but have no opacity: give it to the whole.",
                    {typeKey("mix", "material"),
                     {.name = "materials",
                      .shape = Shape::List,
@@ -60,10 +60,8 @@ void addCompositions(std::vector<SectionSchema>& all) {
                  .range = {.min = 0, .max = 1},
                  .section = "texture",
                  .fallback = "1",
-                 .doc = "Share of the surface that is there, as of leaves cut out by an image. The rest "
-                        "is a hole, which light passes unchanged, shadow rays too; that is no scattering "
-                        "event. What emits through holes is not sampled as a light. Parts of a mix have "
-                        "none, but the mix may."});
+                 .doc = "Share of the surface that is there, as of leaves cut out by an image; light "
+                        "passes the rest unchanged, shadow rays too."});
     SectionSchema map{
         "normal_map",
         "a normal map",
