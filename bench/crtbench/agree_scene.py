@@ -65,6 +65,14 @@ def texture(given, folder):
     return spectrum(given)
 
 
+def number(given, folder):
+    """A number, or a texture of numbers."""
+    made = texture(given, folder)
+    if made["type"] == "checkerboard":  # Mitsuba has its numbers in the other order than its colours.
+        made["color0"], made["color1"] = made["color1"], made["color0"]
+    return made | {"raw": True} if made["type"] == "bitmap" else made
+
+
 def alpha(roughness):
     """Width of GGX."""
     return roughness**2
@@ -136,7 +144,7 @@ def plastic(given, folder):
 def mix(given, folder, materials):
     refuse_all_but("a mix", given, {"type", "materials", "amount"})
     first, second = (plain(materials[name], folder, materials) for name in given["materials"])
-    amount = texture(given.get("amount", 0.5), folder)
+    amount = number(given.get("amount", 0.5), folder)
     return {"type": "blendbsdf", "weight": amount, "a": first, "b": second}
 
 
@@ -184,7 +192,7 @@ def material(given, folder, materials):
     if not made["type"].endswith("dielectric") and made["type"] != "twosided":
         made = two_sided(made)
     if "opacity" in given:
-        made = {"type": "mask", "opacity": texture(given["opacity"], folder), "bsdf": made}
+        made = {"type": "mask", "opacity": number(given["opacity"], folder), "bsdf": made}
     return made
 
 
