@@ -121,6 +121,7 @@ struct Case {
     bool glassware = false;
     bool textured = false;
     bool sky = false;
+    bool films = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -196,6 +197,18 @@ void addTextures(crt::Scene& scene) {
     }
 }
 
+/// Films on all that may have one, each of another thickness; of a texture on smooth metal, if there is one.
+void addFilms(crt::Scene& scene) {
+    double thickness_nm = 250;
+    for (crt::Material& m : scene.materials) {
+        using enum crt::MaterialType;
+        if (m.type == Diffuse || m.type == Mirror || m.type == Plastic) continue;
+        m.film_thickness_nm = thickness_nm += 60;
+        m.film_index = crt::constantSpectrum(1.4);
+        if (m.type == Conductor && !scene.textures.empty()) m.film_texture = 0;
+    }
+}
+
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
     {"{max_depth: 12}", "{type: sobol}", "", "box"},
@@ -215,6 +228,9 @@ const Case kCases[] = {
     {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", false, "", false, true},
     {"{max_depth: 12}", "{type: sobol}", "", "box", true, "", false, false, true},
     {"{max_depth: 4, accelerator: bvh}", "{type: xorshift}", "", "box", true, kPointLights, false, false,
+     true},
+    {"{max_depth: 12}", "{type: sobol}", "", "box", false, "", true, false, false, true},
+    {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", true, "", true, true, false,
      true},
 };
 
@@ -253,6 +269,7 @@ crt::Scene sceneOf(const Case& c) {
         sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter, c.glassware) + c.more);
     scene.environment->light_sampling = c.sampled_environment;
     if (c.textured) addTextures(scene);
+    if (c.films) addFilms(scene);
     if (c.sky)
         scene.environment->sky =
             crt::CieSky{.towards_sun = {0.36, 0.8, -0.48}, .amount = 4, .rows = 32};
@@ -274,7 +291,9 @@ std::vector<Named> allScenes() {
                                  "textures",
                                  "textures, tree, independent",
                                  "sky",
-                                 "sky and point lights, tree, xorshift"};
+                                 "sky and point lights, tree, xorshift",
+                                 "films",
+                                 "films, textures, tree, independent, sampled environment"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

@@ -87,6 +87,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_DISPERSION))
         left_out("hero wavelength selection", "no index of refraction depends on wavelength");
     if (!has(CRT_FEATURE_ABSORPTION)) left_out("absorption", "no body absorbs");
+    if (!has(CRT_FEATURE_THIN_FILM)) left_out("thin films", "no surface has one");
     if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
     if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
     if (!has(CRT_FEATURE_NEE))

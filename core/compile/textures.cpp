@@ -45,6 +45,7 @@ std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<con
         if (material) {
             use(material->reflectance_texture);
             use(material->roughness_texture);
+            use(material->film_texture);
         }
     // From the last on: what a checker is made of comes before it.
     std::vector<TextureIndex> all;

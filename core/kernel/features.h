@@ -50,7 +50,8 @@
     F(26, ABSORPTION, "absorption inside dielectrics")                                       \
     F(27, TEXTURE, "values that depend on the place: images, checkers, colours of vertices") \
     F(28, POINT_LIGHT, "point, spot, directional and sun lights")                            \
-    F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")
+    F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")                    \
+    F(30, THIN_FILM, "thin films")
 
 #define CRT_FEATURE_NUMBER(bit, name, text) CRT_BIT_##name = bit,
 enum CrtFeatureNumber { CRT_FEATURE_LIST(CRT_FEATURE_NUMBER) };

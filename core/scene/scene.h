@@ -101,8 +101,11 @@ struct Material {
     Spectrum k;            ///< Conductors: extinction.
     std::optional<Spectrum> absorption;  ///< Dielectric, RoughDielectric. Per scene unit, at least 0.
     double roughness = 0;  ///< Rough kinds, and the coat of Plastic. In [0,1].
+    double film_thickness_nm = 0;  ///< Metals and dielectrics; 0: there is no film.
+    Spectrum film_index;           ///< Relative to the outside.
     TextureIndex reflectance_texture = kNoTexture;  ///< In place of the reflectance.
     TextureIndex roughness_texture = kNoTexture;    ///< In place of the roughness.
+    TextureIndex film_texture = kNoTexture;         ///< Factor on the thickness of the film.
     SourcePlace place;
 };
 

@@ -77,9 +77,9 @@ const std::vector<Case>& registry() {
         std::vector<Case> all;
         for (const auto group :
              {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases, pointLightCases,
-              environmentCases, stiffCases, scatteringCases, glasswareCases, colourCases, textureCases,
-              accumulationCases, imageCases, inputCases, backendCases, exactRelationCases, mutantCases,
-              contactCases})
+              environmentCases, stiffCases, scatteringCases, glasswareCases, thinFilmCases, colourCases,
+              textureCases, accumulationCases, imageCases, inputCases, backendCases, exactRelationCases,
+              mutantCases, contactCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

@@ -97,6 +97,7 @@ std::vector<Case> environmentCases();    ///< E, the part about images and skies
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> scatteringCases();     ///< G
 std::vector<Case> glasswareCases();      ///< G, rough glass and panes
+std::vector<Case> thinFilmCases();       ///< G, thin films
 std::vector<Case> colourCases();         ///< H
 std::vector<Case> textureCases();        ///< H, the part about textures
 std::vector<Case> accumulationCases();   ///< I

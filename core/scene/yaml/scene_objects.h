@@ -41,6 +41,7 @@ private:
     };
 
     void readMaterial(const YamlEntry& entry);
+    void readThinFilm(const SectionReader& section, Material& material);
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
     ObjUse readObjUse(const SectionReader& object, const std::string& material);
     void refuseObjKeys(const SectionReader& object) const;
