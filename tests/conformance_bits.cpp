@@ -125,6 +125,7 @@ struct Case {
     bool composed = false;
     bool mapped = false;
     bool instruments = false;
+    bool films = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -275,6 +276,18 @@ void addInstruments(crt::Scene& scene) {
     }
 }
 
+/// Films on all that may have one, each of another thickness; of a texture on smooth metal, if there is one.
+void addFilms(crt::Scene& scene) {
+    double thickness_nm = 250;
+    for (crt::Material& m : scene.materials) {
+        using enum crt::MaterialType;
+        if (m.type == Diffuse || m.type == Mirror || m.type == Plastic) continue;
+        m.film_thickness_nm = thickness_nm += 60;
+        m.film_index = crt::constantSpectrum(1.4);
+        if (m.type == Conductor && !scene.textures.empty()) m.film_texture = 0;
+    }
+}
+
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
     {"{max_depth: 12}", "{type: sobol}", "", "box"},
@@ -305,6 +318,10 @@ const Case kCases[] = {
      true},
     {"{max_depth: 12}", "{type: sobol}", "", "box", false, "", false, false, false, false, false,
      true},
+    {"{max_depth: 12}", "{type: sobol}", "", "box", false, "", true, false, false, false, false, false,
+     true},
+    {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", true, "", true, true, false,
+     false, false, false, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -344,6 +361,7 @@ crt::Scene sceneOf(const Case& c) {
     if (c.textured) addTextures(scene);
     if (c.composed) addCompositions(scene);
     if (c.mapped) addNormalMaps(scene);
+    if (c.films) addFilms(scene);
     if (c.sky)
         scene.environment->sky =
             crt::CieSky{.towards_sun = {0.36, 0.8, -0.48}, .amount = 4, .rows = 32};
@@ -372,7 +390,9 @@ std::vector<Named> allScenes() {
                                  "mixes and holes, tree, independent, light sampling alone",
                                  "normal maps",
                                  "normal maps, glassware, tree, xorshift",
-                                 "spectral film"};
+                                 "spectral film",
+                                 "films",
+                                 "films, textures, tree, independent, sampled environment"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

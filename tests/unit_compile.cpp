@@ -202,6 +202,18 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         other(crt::MaterialType::Dielectric)(s);
         s.materials[1].absorption = crt::constantSpectrum(0);
     });
+    const auto film = [](Scene& s, double thickness_nm) {
+        s.materials[1].film_thickness_nm = thickness_nm;
+        s.materials[1].film_index = crt::constantSpectrum(1.3);
+    };
+    seen |= differs(CRT_FEATURE_CONDUCTOR | CRT_FEATURE_THIN_FILM, 0, [&](Scene& s) {
+        other(crt::MaterialType::Conductor)(s);
+        film(s, 300);
+    });
+    differs(CRT_FEATURE_DIELECTRIC, 0, [&](Scene& s) {
+        other(crt::MaterialType::Dielectric)(s);
+        film(s, 0);
+    });
     // A pane bends nothing, whatever its index.
     differs(CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
         other(crt::MaterialType::ThinDielectric)(s);
@@ -978,6 +990,16 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     glassware("glass that absorbs", crt::MaterialType::Dielectric, 0, 1);
     glassware("glass that absorbs more", crt::MaterialType::Dielectric, 0, 2);
     glassware("a pane", crt::MaterialType::ThinDielectric, 0, 0);
+    const auto filmed = [&](const char* what, double thickness_nm, double index) {
+        differs(what, [=](Scene& s) {
+            makeGlass(s);
+            s.materials[0].film_thickness_nm = thickness_nm;
+            s.materials[0].film_index = crt::constantSpectrum(index);
+        });
+    };
+    filmed("a film on glass", 300, 1.4);
+    filmed("its thickness", 301, 1.4);
+    filmed("its index", 300, 1.5);
     glassware("plastic", crt::MaterialType::Plastic, 0, 0);
     glassware("rough plastic", crt::MaterialType::Plastic, 0.5, 0);
     differs("radiance", [](Scene& s) { s.emissions[0].radiance[100] = 3; });

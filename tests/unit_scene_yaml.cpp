@@ -319,6 +319,12 @@ TEST_CASE("spectra in all their forms", "[scene_yaml]") {
     CHECK(*material("{type: dielectric, ior: 1.5, absorption: 2}").absorption == constantSpectrum(2));
     CHECK(material("{type: thin_dielectric, ior: 1.5}").eta == constantSpectrum(1.5));
     CHECK(material("{type: plastic, reflectance: 0.5}").eta == constantSpectrum(1.5));
+    const Material bubble = material(
+        "{type: thin_dielectric, ior: 1, "
+        "thin_film: {thickness_nm: 400, ior: 1.33, relative_thickness: 0.5}}");
+    CHECK(bubble.film_thickness_nm == 200);
+    CHECK(bubble.film_index[0] == 1.33);
+    CHECK(material("{type: thin_dielectric, ior: 1}").film_thickness_nm == 0);
     CHECK(material("{type: plastic, reflectance: 0.5}").roughness == 0);
     const Material tile = material("{type: plastic, reflectance: 0.5, ior: 1.7, roughness: 0.2}");
     CHECK(tile.eta == constantSpectrum(1.7));
@@ -802,6 +808,16 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
                Contains("unknown key 'absorption'"));
     CHECK_THAT(refusedMaterial("{type: dielectric, ior: 1.5, roughness: 0.1}"),
                Contains("unknown key 'roughness'"));
+    CHECK_THAT(refusedMaterial("{type: dielectric, ior: 1.5, thin_film: {thickness: 300, ior: 1.3}}"),
+               Contains("unknown key 'thickness'") && Contains("did you mean 'thickness_nm'?"));
+    CHECK_THAT(refusedMaterial("{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 300}}"),
+               Contains("'ior' is missing"));
+    CHECK_THAT(refusedMaterial("{type: diffuse, reflectance: 1, thin_film: {thickness_nm: 300, ior: 1.3}}"),
+               Contains("unknown key 'thin_film'"));
+    CHECK_THAT(refusedMaterial("{type: rough_dielectric, ior: 1.5, roughness: 0.5, "
+                               "thin_film: {thickness_nm: 300, ior: 1.3, "
+                               "relative_thickness: {checker: [0, 1]}}}"),
+               Contains("equally thick everywhere") && Contains("take a dielectric"));
     CHECK_THAT(refusedMaterial("{type: plastic, reflectance: 0.5, ior: 0.9}"),
                Contains("'ior' is 0.9; it must be 1 to 10"));
     CHECK_THAT(refusedMaterial("{type: plastic}"), Contains("'reflectance' is missing"));

@@ -39,11 +39,12 @@ std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelera
 
 std::vector<const Spectrum*> spectraOf(const Scene& scene, const FlatScene& flat,
                                        const std::vector<std::uint32_t>& emitting,
-                                       const std::vector<const Material*>& materials, const Coats& coats,
+                                       const std::vector<const Material*>& materials,
+                                       const MaterialTables& tables,
                                        const std::vector<TextureIndex>& textures) {
     std::vector<const Spectrum*> all = spectraOfLights(scene, flat, emitting);
     for (const Spectrum* spectrum : spectraOfTextures(scene, textures)) all.push_back(spectrum);
-    for (const Spectrum* spectrum : spectraOfMaterials(materials, coats)) all.push_back(spectrum);
+    for (const Spectrum* spectrum : spectraOfMaterials(materials, tables)) all.push_back(spectrum);
     if (const Spectrum* environment = spectrumOfEnvironment(scene)) all.push_back(environment);
     return all;
 }
@@ -92,8 +93,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
         header.objects = blob.append(compileObjects(flat));
 
     const std::vector<std::uint32_t> emitting = emittingTriangles(scene, flat);
-    const Coats coats = coatsOf(used);
-    const SpectrumTable spectra(spectraOf(scene, flat, emitting, used, coats, textures));
+    const MaterialTables tables = materialTablesOf(used);
+    const SpectrumTable spectra(spectraOf(scene, flat, emitting, used, tables, textures));
 
     std::optional<EnvironmentTexels> around;
     if (spectrumOfEnvironment(scene) && scene.environment->dependsOnDirection()) {
@@ -118,13 +119,14 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
         header.uvs = blob.append(flat.uvs);
         header.vertex_colors = blob.append(flat.colors);
     }
-    const MaterialPart materials = compileMaterials(used, coats, spectra, texture_part);
+    const MaterialPart materials = compileMaterials(used, tables, spectra, texture_part);
     header.primitives = blob.appendFilled<kernel::CrtPrimitive>(count, [&](auto primitives) {
         compilePrimitives(flat, scene.materials.size(), lights.light_of, primitives);
     });
     header.normals = blob.append(flat.normals);
     header.materials = blob.append(materials.records);
     header.compositions = blob.append(compileCompositions(used, texture_part));
+    header.losses = appendLosses(blob, tables.compensations);
 
     header.spectra = blob.append(spectra.floats());
     header.spectra.count = spectra.count();

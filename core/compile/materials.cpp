@@ -24,14 +24,16 @@ bool isKnown(const FlatTriangle& triangle, std::size_t scene_materials) {
     return triangle.material >= 0 && static_cast<std::size_t>(triangle.material) < scene_materials;
 }
 
-std::vector<const Spectrum*> spectraOf(const Material& material, const Coats& coats) {
+std::vector<const Spectrum*> spectraOfSurface(const Material& material, const MaterialTables& tables) {
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror:
             if (material.reflectance_texture != kNoTexture) return {};
             return {&material.reflectance};
-        case MaterialType::Conductor:
-        case MaterialType::RoughConductor: return {&material.eta, &material.k};
+        case MaterialType::Conductor: return {&material.eta, &material.k};
+        case MaterialType::RoughConductor:
+            if (hasThinFilm(material)) return {&material.eta, &material.k};
+            return {&material.eta, &material.k, &tables.compensations.mean_reflectance.at(&material)};
         case MaterialType::Dielectric:
         case MaterialType::RoughDielectric:
             if (material.absorption) return {&material.eta, &*material.absorption};
@@ -41,14 +43,20 @@ std::vector<const Spectrum*> spectraOf(const Material& material, const Coats& co
         case MaterialType::TwoSided: return {};
         case MaterialType::Plastic:
             if (material.reflectance_texture != kNoTexture)
-                return {&material.eta, &coatOf(coats, material).albedo};
-            return {&material.reflectance, &material.eta, &coatOf(coats, material).albedo};
+                return {&material.eta, &coatOf(tables.coats, material).albedo};
+            return {&material.reflectance, &material.eta, &coatOf(tables.coats, material).albedo};
     }
     return {};
 }
 
-kernel::CrtMaterial recordOf(const Material& material, const Coats& coats, const SpectrumTable& spectra,
-                             const TexturePart& textures) {
+std::vector<const Spectrum*> spectraOf(const Material& material, const MaterialTables& tables) {
+    std::vector<const Spectrum*> all = spectraOfSurface(material, tables);
+    if (hasThinFilm(material)) all.push_back(&material.film_index);
+    return all;
+}
+
+kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tables,
+                             const SpectrumTable& spectra, const TexturePart& textures) {
     const auto reflectance = [&] {
         return material.reflectance_texture != kNoTexture ? textures.valueOf(material.reflectance_texture)
                                                           : spectra.valueOf(material.reflectance);
@@ -59,10 +67,22 @@ kernel::CrtMaterial recordOf(const Material& material, const Coats& coats, const
     };
     kernel::CrtMaterial record{};
     record.type = static_cast<std::uint32_t>(material.type);
+    const auto losses = tables.compensations.table_of.find(&material);
+    if (losses != tables.compensations.table_of.end()) record.loss = losses->second;
+    if (hasThinFilm(material)) {
+        record.film_scale = static_cast<float>(material.film_thickness_nm);
+        record.film_thickness =
+            material.film_texture != kNoTexture ? textures.valueOf(material.film_texture) : valueOf(1);
+        record.film_index = spectra.valueOf(material.film_index);
+    }
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror: record.reflectance = reflectance(); break;
-        case MaterialType::RoughConductor: record.roughness = roughness(); [[fallthrough]];
+        case MaterialType::RoughConductor:
+            record.roughness = roughness();
+            if (!hasThinFilm(material))
+                record.reflectance = spectra.valueOf(tables.compensations.mean_reflectance.at(&material));
+            [[fallthrough]];
         case MaterialType::Conductor:
             record.eta = spectra.valueOf(material.eta);
             record.k = spectra.valueOf(material.k);
@@ -77,7 +97,7 @@ kernel::CrtMaterial recordOf(const Material& material, const Coats& coats, const
         case MaterialType::Mix:
         case MaterialType::TwoSided: return {};
         case MaterialType::Plastic: {
-            const Coat& coat = coatOf(coats, material);
+            const Coat& coat = coatOf(tables.coats, material);
             record.reflectance = reflectance();
             record.eta = spectra.valueOf(material.eta);
             record.roughness = valueOf(material.roughness);
@@ -110,20 +130,24 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
     return materials;
 }
 
+MaterialTables materialTablesOf(const std::vector<const Material*>& materials) {
+    return {coatsOf(materials), compensationsOf(materials)};
+}
+
 std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials,
-                                                const Coats& coats) {
+                                                const MaterialTables& tables) {
     std::vector<const Spectrum*> all;
     for (const Material* material : materials)
         if (material)
-            for (const Spectrum* spectrum : spectraOf(*material, coats)) all.push_back(spectrum);
+            for (const Spectrum* spectrum : spectraOf(*material, tables)) all.push_back(spectrum);
     return all;
 }
 
-MaterialPart compileMaterials(const std::vector<const Material*>& materials, const Coats& coats,
+MaterialPart compileMaterials(const std::vector<const Material*>& materials, const MaterialTables& tables,
                               const SpectrumTable& spectra, const TexturePart& textures) {
     MaterialPart part;
     for (const Material* material : materials) {
-        part.records.push_back(material ? recordOf(*material, coats, spectra, textures)
+        part.records.push_back(material ? recordOf(*material, tables, spectra, textures)
                                         : kernel::CrtMaterial{});
         if (!material) continue;
         const kernel::CrtMaterial& record = part.records.back();
@@ -136,6 +160,7 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         part.features |= 1ul << record.type;
         if ((record.flags & CRT_MATERIAL_DISPERSIVE) != 0) part.features |= CRT_FEATURE_DISPERSION;
         if (record.absorption != 0) part.features |= CRT_FEATURE_ABSORPTION;
+        if (record.film_thickness != 0) part.features |= CRT_FEATURE_THIN_FILM;
     }
     return part;
 }

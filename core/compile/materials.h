@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compile/coat.h"
+#include "compile/compensation.h"
 #include "compile/flatten.h"
 #include "compile/spectrum_table.h"
 #include "compile/textures.h"
@@ -19,15 +20,22 @@ namespace crt {
 /// none, where there are such faces. Null where no triangle has it, or nothing is scattered in this view.
 std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& flat);
 
+/// What is worked out for materials before rendering.
+struct MaterialTables {
+    Coats coats;
+    Compensations compensations;
+};
+MaterialTables materialTablesOf(const std::vector<const Material*>& materials);
+
 /// The spectra that compileMaterials asks the table for.
 std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials,
-                                                const Coats& coats);
+                                                const MaterialTables& tables);
 
 struct MaterialPart {
     std::vector<kernel::CrtMaterial> records;
     std::uint64_t features = 0;  ///< Of the materials that are used.
 };
-MaterialPart compileMaterials(const std::vector<const Material*>& materials, const Coats& coats,
+MaterialPart compileMaterials(const std::vector<const Material*>& materials, const MaterialTables& tables,
                               const SpectrumTable& spectra, const TexturePart& textures);
 
 /// How the materials are composed, in their order; none where all are plain and opaque.

@@ -47,8 +47,8 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
          {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
           &header.normals, &header.textures, &header.uvs, &header.vertex_colors, &header.nodes,
           &header.objects, &header.materials, &header.compositions, &header.lights, &header.point_lights,
-          &header.environment_image, &header.spectral_film, &header.spectra, &header.observer,
-          &header.wavelengths, &header.filter})
+          &header.environment_image, &header.spectral_film, &header.losses, &header.spectra,
+          &header.observer, &header.wavelengths, &header.filter})
         *span = {};
     return header;
 }
@@ -79,6 +79,10 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
         texture.texels = {};
         hash.add(&texture, 1, sizeof texture);
     }
+    // What is lost follows from the materials; a record names its rows by their place in the blob.
+    const CrtLoss* losses = CRT_ARRAY(CrtLoss, blob, header.losses);
+    for (std::uint32_t i = 0; i < header.losses.count; ++i)
+        hash.add(CRT_ARRAY(f32, blob, losses[i].rows), losses[i].rows.count, sizeof(f32));
     hash.add(CRT_ARRAY(CrtUvs, blob, header.uvs), header.uvs.count, sizeof(CrtUvs));
     hash.add(CRT_ARRAY(CrtVertexColors, blob, header.vertex_colors), header.vertex_colors.count,
              sizeof(CrtVertexColors));

@@ -10,10 +10,11 @@
  *   1   what carries no version
  *   2   the first version that plugins and films carry
  *   3   materials as BSDFs, eight dimensions a vertex
+ *   4   rough_conductor and rough_dielectric give back what their microfacets lose
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 3u
+#define CRT_BITS_VERSION 4u
 
 #endif

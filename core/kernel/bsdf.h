@@ -51,11 +51,12 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
             break;
         case CRT_MATERIAL_CONDUCTOR:
             if (CRT_HAS(CONDUCTOR)) {
-                const vec4 n = crt_value(ctx, material.eta, surface, position);
-                const vec4 k = crt_value(ctx, material.k, surface, position);
+                b->eta = crt_value(ctx, material.eta, surface, position);
+                b->k = crt_value(ctx, material.k, surface, position);
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
-                b->reflectance = crt_fresnel_conductor(crt_min(dot3(wo, b->ns), 1.0f), n, k);
-                if (albedo) b->albedo = crt_fresnel_conductor(1.0f, n, k);
+                if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
+                b->reflectance = crt_metal_reflectance(b, crt_min(dot3(wo, b->ns), 1.0f));
+                if (albedo) b->albedo = crt_metal_reflectance(b, 1.0f);
             }
             break;
         case CRT_MATERIAL_ROUGH_CONDUCTOR:
@@ -65,11 +66,17 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->eta = crt_value(ctx, material.eta, surface, position);
                 b->k = crt_value(ctx, material.k, surface, position);
                 b->alpha = roughness * roughness;
-                if (!(b->alpha >= CRT_ALPHA_MIN)) {
-                    b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
-                    b->reflectance = crt_fresnel_conductor(crt_min(dot3(wo, b->ns), 1.0f), b->eta, b->k);
+                if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
+                if (b->alpha >= CRT_ALPHA_MIN) {
+                    b->losses = crt_losses(ctx, material.loss, roughness, splat4(0.0f), 0u);
+                    crt_prepare_metal_loss(b, crt_has_film(b) ? crt_film_mean(b)
+                                                              : crt_value(ctx, material.reflectance, surface,
+                                                                          position));
+                } else {
+                    b->flags |= CRT_BSDF_DELTA;
+                    b->reflectance = crt_metal_reflectance(b, crt_min(dot3(wo, b->ns), 1.0f));
                 }
-                if (albedo) b->albedo = crt_fresnel_conductor(1.0f, b->eta, b->k);
+                if (albedo) b->albedo = crt_metal_reflectance(b, 1.0f);
             }
             break;
         case CRT_MATERIAL_DIELECTRIC:
@@ -79,6 +86,11 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
                 b->eta = outside ? eta : splat4(1.0f) / eta;
                 b->absorption = material.absorption;
+                if (CRT_HAS(THIN_FILM)) {
+                    b->k = splat4(0.0f);
+                    b->lanes = carried / sum4(carried);
+                    crt_prepare_film(ctx, b, &material, surface, position, outside ? splat4(1.0f) : eta);
+                }
             }
             break;
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
@@ -91,7 +103,18 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->absorption = material.absorption;
                 b->alpha = roughness * roughness;
                 b->lanes = carried / sum4(carried);
-                b->flags |= crt_is_rough(b->alpha, eta) ? CRT_BSDF_CHOOSES : CRT_BSDF_DELTA;
+                if (CRT_HAS(THIN_FILM)) {
+                    b->k = splat4(0.0f);
+                    crt_prepare_film(ctx, b, &material, surface, position, outside ? splat4(1.0f) : eta);
+                }
+                if (crt_is_rough(b->alpha, eta)) {
+                    b->flags |= CRT_BSDF_CHOOSES;
+                    b->losses = crt_losses(ctx, material.loss, roughness, crt_has_film(b) ? position : eta,
+                                           outside ? 0u : 1u);
+                    crt_prepare_glass_loss(b);
+                } else {
+                    b->flags |= CRT_BSDF_DELTA;
+                }
             }
             break;
         case CRT_MATERIAL_THIN_DIELECTRIC:
@@ -99,6 +122,10 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA;
                 b->eta = crt_value(ctx, material.eta, surface, position);
                 b->lanes = carried / sum4(carried);
+                if (CRT_HAS(THIN_FILM)) {
+                    b->k = splat4(0.0f);
+                    crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
+                }
             }
             break;
         case CRT_MATERIAL_PLASTIC:
@@ -130,6 +157,13 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
     }
 }
 
+/* Smooth dielectric, with or without a film. */
+CRT_FN CrtScatter crt_sample_smooth(const CrtBsdf *b, vec4 hero, int alone, f32 u) {
+    if (crt_has_film(b)) return crt_sample_filmed_dielectric(b, hero, alone, u);
+    return crt_sample_dielectric(b->eta, b->wo, b->ns, b->ng, hero, (b->flags & CRT_BSDF_DISPERSIVE) != 0u,
+                                 alone, u);
+}
+
 /* A direction w_i, distributed as crt_bsdf_pdf or a delta. `choice`: two more random numbers, where the
    flags ask for them. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`: only the hero is alive. */
 CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero, int alone) {
@@ -151,15 +185,12 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 cho
             }
             break;
         case CRT_MATERIAL_DIELECTRIC:
-            if (CRT_HAS(DIELECTRIC))
-                return crt_sample_dielectric(b->eta, b->wo, b->ns, b->ng, hero,
-                                             (b->flags & CRT_BSDF_DISPERSIVE) != 0u, alone, u.x);
+            if (CRT_HAS(DIELECTRIC)) return crt_sample_smooth(b, hero, alone, u.x);
             break;
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
             if (CRT_HAS(ROUGH_DIELECTRIC)) {
                 if ((b->flags & CRT_BSDF_DELTA) == 0u) return crt_sample_rough_dielectric(b, u, choice);
-                return crt_sample_dielectric(b->eta, b->wo, b->ns, b->ng, hero,
-                                             (b->flags & CRT_BSDF_DISPERSIVE) != 0u, alone, u.x);
+                return crt_sample_smooth(b, hero, alone, u.x);
             }
             break;
         case CRT_MATERIAL_THIN_DIELECTRIC:
@@ -180,8 +211,10 @@ CRT_FN vec4 crt_bsdf_eval(const CrtBsdf *b, vec3 wi) {
             if (CRT_HAS(DIFFUSE)) return b->reflectance * crt_lambert(dot3(wi, b->ns));
             break;
         case CRT_MATERIAL_ROUGH_CONDUCTOR:
-            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u)
-                return crt_rough_conductor(b, wi);
+            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u) {
+                f32 unused;
+                return crt_rough_conductor(b, wi, &unused);
+            }
             break;
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
             if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u) {
@@ -207,8 +240,11 @@ CRT_FN f32 crt_bsdf_pdf(const CrtBsdf *b, vec3 wi) {
             if (CRT_HAS(DIFFUSE)) return crt_lambert(dot3(wi, b->ns));
             break;
         case CRT_MATERIAL_ROUGH_CONDUCTOR:
-            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u)
-                return crt_rough_conductor_pdf(b, wi);
+            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u) {
+                f32 pdf;
+                (void)crt_rough_conductor(b, wi, &pdf);
+                return pdf;
+            }
             break;
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
             if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u) {

@@ -51,6 +51,7 @@
     F(27, TEXTURE, "values that depend on the place: images, checkers, colours of vertices") \
     F(28, POINT_LIGHT, "point, spot, directional and sun lights")                            \
     F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")                    \
+    F(30, THIN_FILM, "thin films")                                                           \
     F(32, MIX, "mixes of materials, a material for each side")                               \
     F(33, OPACITY, "surfaces that rays may pass")                                            \
     F(34, NORMAL_MAP, "normal maps")                                                         \

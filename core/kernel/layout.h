@@ -154,18 +154,44 @@ CRT_ASSERT_SIZE(CrtTexture, 64);
 /* Steps between the cosines 0 and 1 of a coat's table, which is as long as a spectrum's. */
 #define CRT_COAT_STEPS 470.0f
 
+/* What microfacets lose of light towards a view, at steps of the root of its cosine, and behind that of
+   cosine 1, which comes twice, the mean over the cosine and the share of diffuse light that the interface
+   lets in from outside. Then, at the same steps, the share of all losses, weighed by the cosine, that is
+   nearer to the surface. */
+#define CRT_LOSS_STEPS 123.0f
+#define CRT_LOSS_MEAN 125.0f
+#define CRT_LOSS_PASSED 126.0f
+#define CRT_LOSS_SHARES 128u
+#define CRT_LOSS_STRIDE 256u
+
+/* Rows of losses, of CRT_LOSS_STRIDE floats: by index, within that by roughness, within that of the outside
+   and, of dielectrics, the inside. */
+typedef struct CrtLoss {
+    CrtSpan rows;
+    u32 indices, roughnesses, sides;
+    f32 first_index, index_scale; /* a row is at (index − first) · scale; of roughnesses, evenly from 0 to
+                                     1 */
+    u32 reserved;
+} CrtLoss;
+CRT_ASSERT_SIZE(CrtLoss, 32);
+
 /* What a kind does not have is 0. */
 typedef struct CrtMaterial {
     u32 type; /* CRT_MATERIAL_… of features.h */
     u32 flags;
-    CrtValue reflectance;
+    CrtValue reflectance; /* rough conductors: its mean over the cosine */
     CrtValue eta; /* conductors: real part of the index; dielectrics: index inside / outside */
     CrtValue k;   /* conductors: extinction; plastic: share that the coat sends back from below */
     CrtValue roughness; /* square root of the width α of GGX */
     CrtValue coat; /* plastic: share that a rough coat reflects, by the cosine: a table; 0: smooth */
     CrtValue absorption; /* dielectrics: of their inside, per scene unit */
+    u32 loss; /* rough conductors and dielectrics: index of their CrtLoss */
+    CrtValue film_thickness; /* nm, or of film_scale nm; 0: there is no film */
+    f32 film_scale;
+    CrtValue film_index; /* relative to the outside */
+    u32 reserved0, reserved1, reserved2, reserved3;
 } CrtMaterial;
-CRT_ASSERT_SIZE(CrtMaterial, 32);
+CRT_ASSERT_SIZE(CrtMaterial, 64);
 
 #define CRT_COMPOSED_PLAIN 0u
 #define CRT_COMPOSED_MIX 1u   /* of two materials, one by chance */
@@ -350,7 +376,7 @@ typedef struct CrtScene {
     CrtSpan environment_image;   /* CrtEnvironmentImage, 1 or none */
     CrtSpan compositions;        /* CrtComposition, as many as materials; or none */
     CrtSpan spectral_film;       /* CrtSpectralFilm, 1 or none */
-    u32 padding2[2];
+    CrtSpan losses;              /* CrtLoss */
     CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
     CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
     CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */

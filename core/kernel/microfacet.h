@@ -5,7 +5,7 @@
 #ifndef CRT_MICROFACET_H
 #define CRT_MICROFACET_H
 
-#include "scatter.h"
+#include "compensation.h"
 
 CRT_KERNEL_BEGIN
 
@@ -44,20 +44,23 @@ CRT_FN CrtMicrofacet crt_microfacet(const CrtBsdf *b, vec3 wi) {
     return m;
 }
 
-/* f·cos = F D G₂ / (4 cos_o), G₂ = 1 / (1 + Λ_o + Λ_i): shadowing and masking correlated by height.
-   */
-CRT_FN vec4 crt_rough_conductor(const CrtBsdf *b, vec3 wi) {
-    const CrtMicrofacet m = crt_microfacet(b, wi);
-    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return splat4(0.0f);
-    return crt_fresnel_conductor(m.cos_m, b->eta, b->k) *
-           (m.density * m.cos_i / (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
+/* What a metal gives back of what its microfacets lose, f·cos. */
+CRT_FN vec4 crt_metal_returned(const CrtBsdf *b, f32 cos_i) {
+    return b->reflectance * (crt_loss_lane(b, 0u, crt_loss_place(cos_i), 0.0f) * crt_lambert(cos_i));
 }
 
-/* The visible normals' density G₁ D cos_m / cos_o, turned into that of directions by 1 / (4 cos_m). */
-CRT_FN f32 crt_rough_conductor_pdf(const CrtBsdf *b, vec3 wi) {
+/* f·cos = F D G₂ / (4 cos_o), G₂ = 1 / (1 + Λ_o + Λ_i): shadowing and masking correlated by height;
+   and what is given back. The density is that of the visible normals, G₁ D cos_m / cos_o, turned into that
+   of directions by 1 / (4 cos_m), together with that of what is given back. */
+CRT_FN vec4 crt_rough_conductor(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     const CrtMicrofacet m = crt_microfacet(b, wi);
-    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return 0.0f;
-    return m.density / (2.0f * (m.cos_o + m.root_o));
+    *pdf = 0.0f;
+    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return splat4(0.0f);
+    *pdf = b->lost_chance * crt_given_back_pdf(b, 0u, m.cos_i) +
+           (1.0f - b->lost_chance) * (m.density / (2.0f * (m.cos_o + m.root_o)));
+    return crt_metal_returned(b, m.cos_i) +
+           crt_metal_reflectance(b, m.cos_m) *
+               (m.density * m.cos_i / (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
 }
 
 /* One of the normals that w_o sees (Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical
@@ -75,16 +78,20 @@ CRT_FN vec3 crt_visible_normal(const CrtBsdf *b, CrtRandom2 u) {
         frame, normalize3(make_vec3(b->alpha * V3X(cap), b->alpha * V3Y(cap), crt_max(V3Z(cap), 0.0f))));
 }
 
+/* A number below `chance`, or the rest, as one in [0, 1) again. */
+CRT_FN f32 crt_rescaled(f32 u, f32 chance) {
+    return crt_min(u < chance ? u / chance : (u - chance) / (1.0f - chance), 1.0f - CRT_EPSILON);
+}
+
 CRT_FN CrtScatter crt_sample_rough_conductor(const CrtBsdf *b, CrtRandom2 u) {
-    const vec3 normal = crt_visible_normal(b, u);
     CrtScatter s = crt_no_scatter();
-    s.wi = normalize3(crt_reflect(b->wo, normal));
-    const CrtMicrofacet m = crt_microfacet(b, s.wi);
-    if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return s;
-    s.pdf = m.density / (2.0f * (m.cos_o + m.root_o));
-    s.weight = crt_fresnel_conductor(m.cos_m, b->eta, b->k) *
-               (m.cos_i * (m.cos_o + m.root_o) / (m.root_o * m.cos_i + m.root_i * m.cos_o));
+    const int given_back = u.x < b->lost_chance;
+    u.x = crt_rescaled(u.x, b->lost_chance);
+    s.wi = given_back ? crt_given_back_direction(b, 0u, b->ns, u)
+                      : normalize3(crt_reflect(b->wo, crt_visible_normal(b, u)));
+    const vec4 value = crt_rough_conductor(b, s.wi, &s.pdf);
     s.valid = dot3(s.wi, b->ng) > 0.0f && s.pdf > 0.0f;
+    if (s.valid) s.weight = value / s.pdf;
     return s;
 }
 
@@ -97,7 +104,7 @@ CRT_FN CrtScatter crt_sample_rough_conductor(const CrtBsdf *b, CrtRandom2 u) {
  * over that choice. All four wavelengths live on, weighted: the balance heuristic over the wavelengths at
  * each vertex (compare Wilkie et al. 2014, who choose one for a whole path). */
 
-/* What one microfacet refracts from w_i to w_o at one index. */
+/* What one microfacet refracts from w_i to w_o at one wavelength. */
 typedef struct CrtRefracted {
     f32 value; /* f·|cos| */
     f32 pdf;
@@ -115,7 +122,8 @@ CRT_FN int crt_is_rough(f32 alpha, vec4 eta) {
     return alpha >= CRT_ALPHA_MIN && alpha * least >= CRT_BEND_MIN;
 }
 
-CRT_FN CrtRefracted crt_rough_refraction(const CrtBsdf *b, vec3 wi, f32 eta) {
+CRT_FN CrtRefracted crt_rough_refraction(const CrtBsdf *b, vec3 wi, u32 lane) {
+    const f32 eta = crt_lane(b->eta, lane);
     CrtRefracted r;
     r.value = r.pdf = 0.0f;
     const CrtFrame frame = crt_frame(b->ns);
@@ -130,7 +138,12 @@ CRT_FN CrtRefracted crt_rough_refraction(const CrtBsdf *b, vec3 wi, f32 eta) {
     const f32 root_o = crt_smith_root(cos_o, b->alpha), root_i = crt_smith_root(cos_i, b->alpha);
     const f32 spread = (x * x + y * y + b->alpha * b->alpha * (z * z)) / hh;
     const f32 density = CRT_INV_PI * (b->alpha / spread) * (b->alpha / spread);
-    const f32 passed = 1.0f - crt_fresnel_dielectric(crt_min(h_o / crt_sqrt(hh), 1.0f), eta);
+    const f32 cos_m = crt_min(h_o / crt_sqrt(hh), 1.0f);
+    const f32 passed =
+        1.0f - (crt_has_film(b)
+                    ? crt_film_reflectance_lane(cos_m, crt_lane(b->film_eta, lane),
+                                                crt_lane(b->film_rounds, lane), eta, 0.0f)
+                    : crt_fresnel_dielectric(cos_m, eta));
     /* |w_i·m| |w_o·m| / (w_o·m + η w_i·m)², with m = h/√hh, is h_i h_o / hh². The density of
        normals becomes that of directions by dm/dw_i = η² |w_i·m| / (w_o·m + η w_i·m)² (Walter,
        equation 17). */
@@ -146,55 +159,80 @@ CRT_FN vec4 crt_rough_dielectric(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     *pdf = 0.0f;
     const int mirrored = dot3(wi, b->ns) > 0.0f;
     if (mirrored != (dot3(wi, b->ng) > 0.0f)) return splat4(0.0f);
-    const int dispersive = CRT_HAS(DISPERSION) && (b->flags & CRT_BSDF_DISPERSIVE) != 0u;
+    const int divided = crt_is_divided(b);
     if (mirrored) {
         const CrtMicrofacet m = crt_microfacet(b, wi);
         if (!(m.cos_o > 0.0f)) return splat4(0.0f);
-        const vec4 fresnel = dispersive ? crt_fresnel_dielectric4(m.cos_m, b->eta)
+        const vec4 fresnel = divided ? crt_dielectric_reflectance(b, m.cos_m)
                                         : splat4(crt_fresnel_dielectric(m.cos_m, V4X(b->eta)));
-        *pdf = (dispersive ? sum4(b->lanes * fresnel) : V4X(fresnel)) *
-               (m.density / (2.0f * (m.cos_o + m.root_o)));
-        return fresnel * (m.density * m.cos_i / (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
+        const u32 side = b->losses.side;
+        const vec4 given_back = b->reflectance * crt_loss(b, side, crt_loss_place(m.cos_i));
+        *pdf = b->lost_chance * b->back_share * crt_given_back_pdf(b, side, m.cos_i) +
+               (1.0f - b->lost_chance) * (divided ? sum4(b->lanes * fresnel) : V4X(fresnel)) *
+                   (m.density / (2.0f * (m.cos_o + m.root_o)));
+        return given_back * crt_lambert(m.cos_i) +
+               fresnel * (m.density * m.cos_i / (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
     }
-    const u32 lanes = dispersive ? 4u : 1u;
+    const f32 cos_i = -dot3(wi, b->ns);
+    const u32 beyond = 1u - b->losses.side;
+    const vec4 given_back = b->through * crt_loss(b, beyond, crt_loss_place(cos_i));
+    const u32 lanes = divided ? 4u : 1u;
     vec4 value = splat4(0.0f), density = splat4(0.0f);
     CRT_ROLLED for (u32 lane = 0u; lane < lanes; ++lane) {
-        const CrtRefracted r = crt_rough_refraction(b, wi, crt_lane(b->eta, lane));
+        const CrtRefracted r = crt_rough_refraction(b, wi, lane);
         value = crt_with_lane(value, lane, r.value);
         density = crt_with_lane(density, lane, r.pdf);
     }
-    *pdf = dispersive ? sum4(b->lanes * density) : V4X(density);
-    return dispersive ? value : splat4(V4X(value));
+    *pdf = b->lost_chance * (1.0f - b->back_share) * crt_given_back_pdf(b, beyond, cos_i) +
+           (1.0f - b->lost_chance) * (divided ? sum4(b->lanes * density) : V4X(density));
+    return given_back * crt_lambert(cos_i) + (divided ? value : splat4(V4X(value)));
 }
 
-/* `choice`: of mirroring and refracting, and of the wavelength by whose index. */
-CRT_FN CrtScatter crt_sample_rough_dielectric(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice) {
-    CrtScatter s = crt_no_scatter();
+/* A direction by one of the visible normals. `choice`: of mirroring and refracting, and of the wavelength
+   by whose index. Of length 0 where there is none. */
+CRT_FN vec3 crt_rough_dielectric_direction(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice,
+                                           f32 *eta_square) {
+    const vec3 none = make_vec3(0.0f, 0.0f, 0.0f);
     const vec3 normal = crt_visible_normal(b, u);
     const f32 cos_m = crt_min(dot3(b->wo, normal), 1.0f);
-    if (!(cos_m > 0.0f)) return s;
-    const int dispersive = CRT_HAS(DISPERSION) && (b->flags & CRT_BSDF_DISPERSIVE) != 0u;
+    if (!(cos_m > 0.0f)) return none;
+    const int divided = crt_is_divided(b);
     f32 eta = V4X(b->eta);
     f32 reflect = crt_fresnel_dielectric(cos_m, eta);
-    if (dispersive) {
+    if (divided) {
         /* Shares of the four wavelengths in what is refracted, one after another. */
-        const vec4 fresnel = crt_fresnel_dielectric4(cos_m, b->eta);
+        const vec4 fresnel = crt_dielectric_reflectance(b, cos_m);
         const vec4 passed = b->lanes * (splat4(1.0f) - fresnel);
         reflect = sum4(b->lanes * fresnel);
         const f32 at = choice.y * sum4(passed);
         const f32 one = V4X(passed), two = one + V4Y(passed), three = two + V4Z(passed);
         eta = at < one ? V4X(b->eta) : (at < two ? V4Y(b->eta) : (at < three ? V4Z(b->eta) : V4W(b->eta)));
     }
-    const int mirrored = choice.x < reflect;
-    if (mirrored) {
-        s.wi = normalize3(crt_reflect(b->wo, normal));
-    } else {
-        const f32 refraction = crt_refraction(cos_m, eta);
-        if (!(refraction > 0.0f)) return s;
-        s.wi = normalize3((normal * (cos_m - crt_sqrt(refraction)) - b->wo) * (1.0f / eta));
-        s.eta_square = eta * eta;
+    vec3 wi;
+    if (choice.x < reflect) {
+        wi = normalize3(crt_reflect(b->wo, normal));
+        return dot3(wi, b->ns) > 0.0f ? wi : none;
     }
-    if (mirrored != (dot3(s.wi, b->ng) > 0.0f)) return s;
+    const f32 refraction = crt_refraction(cos_m, eta);
+    if (!(refraction > 0.0f)) return none;
+    *eta_square = eta * eta;
+    wi = normalize3((normal * (cos_m - crt_sqrt(refraction)) - b->wo) * (1.0f / eta));
+    return dot3(wi, b->ns) < 0.0f ? wi : none;
+}
+
+/* `choice`: of what is given back and the rest, and within them. */
+CRT_FN CrtScatter crt_sample_rough_dielectric(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice) {
+    CrtScatter s = crt_no_scatter();
+    const int given_back = choice.x < b->lost_chance;
+    choice.x = crt_rescaled(choice.x, b->lost_chance);
+    if (given_back) {
+        const int back = choice.x < b->back_share;
+        s.wi = crt_given_back_direction(b, back ? b->losses.side : 1u - b->losses.side,
+                                        back ? b->ns : -b->ns, u);
+        if (!back) s.eta_square = V4X(b->eta) * V4X(b->eta);
+    } else {
+        s.wi = crt_rough_dielectric_direction(b, u, choice, &s.eta_square);
+    }
     const vec4 value = crt_rough_dielectric(b, s.wi, &s.pdf);
     s.valid = s.pdf > 0.0f;
     if (s.valid) s.weight = value / s.pdf;

@@ -18,9 +18,19 @@ CRT_KERNEL_BEGIN
 #define CRT_BSDF_DISPERSIVE 8u /* directions depend on the wavelength */
 #define CRT_BSDF_CHOOSES 16u   /* crt_bsdf_sample needs its second pair of random numbers */
 #define CRT_BSDF_BOUNDS 32u    /* the surface of a body: what lies behind it is another medium */
+#define CRT_BSDF_FILM 64u      /* under a thin film: reflectances are thin_film.h's */
 
 /* A BSDF without CRT_BSDF_DELTA may still have single directions beside its lobe: crt_bsdf_sample gives
    those the pdf 0, crt_bsdf_eval and crt_bsdf_pdf are of the lobe alone. */
+
+/* Where the losses of a rough material are looked up (compensation.h). */
+typedef struct CrtLosses {
+    CRT_GLOBAL const f32 *rows; /* of the outside, at the roughness at or below, at the first index */
+    u32 side;                   /* of w_o: 0 outside, 1 inside */
+    u32 roughness_step, index_step; /* floats to the next row; 0 where there is one */
+    f32 between;                /* how far on to the row of the next roughness */
+    vec4 index;                 /* rows from the first index to those of the path's wavelengths */
+} CrtLosses;
 
 /* A material at one vertex. What its kind does not have is not set. */
 typedef struct CrtBsdf {
@@ -28,12 +38,20 @@ typedef struct CrtBsdf {
     u32 flags;        /* CRT_BSDF_…; 0: everything is absorbed */
     vec3 wo;          /* unit */
     vec3 ns, ng;      /* on the side of w_o, the shading normal nearly so */
-    vec4 reflectance; /* diffuse, and what mirrors as a whole; plastic: of the base, seen through the coat */
-    vec4 eta;         /* dielectrics: index beyond the surface / index on w_o's side; rough conductor: real
-                         part of the index */
-    vec4 k;           /* rough conductor: extinction */
+    vec4 reflectance; /* diffuse, and what mirrors as a whole; plastic: of the base, seen through the coat;
+                         rough: what is given back to this side of what microfacets lose */
+    vec4 eta;         /* dielectrics: index beyond the surface / index on w_o's side; conductors: real part
+                         of the index */
+    vec4 k;           /* conductors: extinction; 0 of dielectrics with a film */
+    vec4 film_eta;    /* thin film: its index / that on w_o's side */
+    vec4 film_rounds; /* thin film: 2 n d / λ, n on w_o's side */
     f32 alpha;        /* rough surfaces: width of GGX */
-    vec4 lanes;       /* rough and thin dielectric: share of what the path carries in each wavelength */
+    vec4 lanes;       /* dielectrics that are rough, thin or under a film: share of what the path carries in
+                         each wavelength */
+    vec4 through;     /* rough dielectric: what is given back to the other side */
+    f32 lost_chance;  /* rough: of sampling what is given back */
+    f32 back_share;   /* rough dielectric: of that, this side's */
+    CrtLosses losses; /* rough */
     CrtValue absorption; /* where it bounds a body: of the inside */
     f32 coat_chance;  /* plastic: of sampling the coat */
     CRT_GLOBAL const f32 *coat; /* plastic: table of what it reflects by the cosine; 0: it is smooth */
@@ -139,35 +157,11 @@ CRT_FN CrtScatter crt_sample_mirror(vec4 reflectance, vec3 wo, vec3 ns, vec3 ng)
     return s;
 }
 
-/* A thin pane: two parallel interfaces, their reflections to and fro summed: R + T²R/(1 − R²) = 2R/(1 +
-   R). What passes is not bent. */
-CRT_FN CrtScatter crt_sample_thin_dielectric(const CrtBsdf *b, f32 u) {
-    const vec4 single = crt_fresnel_dielectric4(crt_min(dot3(b->wo, b->ns), 1.0f), b->eta);
-    const vec4 fresnel = single * 2.0f / (single + splat4(1.0f));
-    const f32 reflect = sum4(b->lanes * fresnel);
-    if (u < reflect) return crt_sample_mirror(fresnel / reflect, b->wo, b->ns, b->ng);
-    CrtScatter s = crt_no_scatter();
-    s.wi = -b->wo;
-    s.weight = (splat4(1.0f) - fresnel) / (1.0f - reflect);
-    s.valid = 1;
-    return s;
-}
-
-/* Smooth dielectric. `eta`: index beyond the surface / index on w_o's side. `hero`: 1 in the hero's lane, 0
-   elsewhere. `dispersive`: the index differs between the path's living wavelengths. `alone`: only the hero
-   is alive. */
-CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec4 hero, int dispersive,
-                                        int alone, f32 u) {
+/* At an interface as much is mirrored as `fresnel` says of each wavelength, with the chance `reflect`; the
+   rest is refracted by `eta`. `alone`: that is right for the hero only. */
+CRT_FN CrtScatter crt_reflect_or_refract(vec3 wo, vec3 ns, vec3 ng, f32 cos_i, f32 eta, vec4 fresnel,
+                                         vec4 passed, f32 reflect, int alone, f32 u) {
     CrtScatter s;
-    const f32 cos_i = crt_min(dot3(wo, ns), 1.0f);
-    const f32 eta_hero = CRT_HAS(DISPERSION) ? sum4(eta * hero) : V4X(eta);
-    const f32 fresnel_hero = crt_fresnel_dielectric(cos_i, eta_hero);
-    vec4 fresnel = splat4(fresnel_hero);
-    f32 reflect = fresnel_hero;
-    if (CRT_HAS(DISPERSION) && dispersive && !alone) {
-        fresnel = crt_fresnel_dielectric4(cos_i, eta);
-        reflect = 0.25f * sum4(fresnel);
-    }
     s.pdf = 0.0f;
     s.eta_square = 1.0f;
     s.hero_only = 0;
@@ -177,17 +171,36 @@ CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec
         s.valid = dot3(s.wi, ng) > 0.0f;
         return s;
     }
-    const f32 inverse_eta = 1.0f / eta_hero;
-    const f32 refraction = crt_refraction(cos_i, eta_hero);
-    s.hero_only = CRT_HAS(DISPERSION) && dispersive && !alone;
-    s.eta_square = eta_hero * eta_hero;
-    s.weight = splat4((1.0f - fresnel_hero) / (1.0f - reflect) * (inverse_eta * inverse_eta));
+    const f32 inverse_eta = 1.0f / eta;
+    const f32 refraction = crt_refraction(cos_i, eta);
+    s.hero_only = alone;
+    s.eta_square = eta * eta;
+    s.weight = passed / (1.0f - reflect) * (inverse_eta * inverse_eta);
     /* An index of exactly 1 is no surface: the direction passes unrounded. */
-    s.wi = eta_hero == 1.0f ? -wo
-                            : normalize3(wo * -inverse_eta +
-                                         ns * (cos_i - crt_sqrt(crt_max(refraction, 0.0f))) * inverse_eta);
+    s.wi = eta == 1.0f ? -wo
+                       : normalize3(wo * -inverse_eta +
+                                    ns * (cos_i - crt_sqrt(crt_max(refraction, 0.0f))) * inverse_eta);
     s.valid = refraction > 0.0f && dot3(s.wi, ng) < 0.0f;
     return s;
+}
+
+/* Smooth dielectric. `eta`: index beyond the surface / index on w_o's side. `hero`: 1 in the hero's lane, 0
+   elsewhere. `dispersive`: the index differs between the path's living wavelengths. `alone`: only the hero
+   is alive. */
+CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec4 hero, int dispersive,
+                                        int alone, f32 u) {
+    const f32 cos_i = crt_min(dot3(wo, ns), 1.0f);
+    const f32 eta_hero = CRT_HAS(DISPERSION) ? sum4(eta * hero) : V4X(eta);
+    const f32 fresnel_hero = crt_fresnel_dielectric(cos_i, eta_hero);
+    const int divided = CRT_HAS(DISPERSION) && dispersive && !alone;
+    vec4 fresnel = splat4(fresnel_hero);
+    f32 reflect = fresnel_hero;
+    if (divided) {
+        fresnel = crt_fresnel_dielectric4(cos_i, eta);
+        reflect = 0.25f * sum4(fresnel);
+    }
+    return crt_reflect_or_refract(wo, ns, ng, cos_i, eta_hero, fresnel, splat4(1.0f - fresnel_hero), reflect,
+                                  divided, u);
 }
 
 CRT_KERNEL_END

@@ -109,8 +109,11 @@ struct Material {
     Spectrum k;            ///< Conductors: extinction.
     std::optional<Spectrum> absorption;  ///< Dielectric, RoughDielectric. Per scene unit, at least 0.
     double roughness = 0;  ///< Rough kinds, and the coat of Plastic. In [0,1].
+    double film_thickness_nm = 0;  ///< Metals and dielectrics; 0: there is no film.
+    Spectrum film_index;           ///< Relative to the outside.
     TextureIndex reflectance_texture = kNoTexture;  ///< In place of the reflectance.
     TextureIndex roughness_texture = kNoTexture;    ///< In place of the roughness.
+    TextureIndex film_texture = kNoTexture;         ///< Factor on the thickness of the film.
     SourcePlace place;
     double opacity = 1;  ///< Share of the surface that is there. In [0,1].
     TextureIndex opacity_texture = kNoTexture;  ///< In place of the opacity.
@@ -125,8 +128,9 @@ struct Material {
     bool isComposed() const { return type == MaterialType::Mix || type == MaterialType::TwoSided; }
     bool isOpaque() const { return opacity >= 1 && opacity_texture == kNoTexture; }
     /// The textures that it names itself; kNoTexture among them.
-    std::array<TextureIndex, 5> textures() const {
-        return {reflectance_texture, roughness_texture, opacity_texture, amount_texture, normal_texture};
+    std::array<TextureIndex, 6> textures() const {
+        return {reflectance_texture, roughness_texture, film_texture,
+                opacity_texture,     amount_texture,    normal_texture};
     }
     /// Whether light comes out on the other side.
     bool transmits() const {

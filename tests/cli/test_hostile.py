@@ -217,6 +217,10 @@ def scene_cases():
         ("{type: mirror, reflectance: 1, normal_map: {texture: a.png, strength: -1}}", "'strength'"),
         ("{type: mirror, reflectance: 1, normal_map: a.png}", "expected"),
         ("{type: plastic, reflectance: 0.5, ior: 0}", "'ior'"),
+        ("{type: dielectric, ior: 1.5, thin_film: {thickness_nm: -1, ior: 1.3}}", "'thickness_nm'"),
+        ("{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 1e9, ior: 1.3}}", "'thickness_nm'"),
+        ("{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 300, ior: 0}}", "'ior'"),
+        ("{type: dielectric, ior: 1.5, thin_film: 300}", "'thin_film'"),
     ):
         key(f"the material {text}", f"materials: {{m: {text}}}", word)
     for text in (
@@ -225,6 +229,9 @@ def scene_cases():
         "{type: rough_dielectric, ior: 0.001, roughness: 0.04}",
         "{type: dielectric, ior: 1.5, absorption: 1e25}",
         "{type: plastic, reflectance: 1, ior: 10, roughness: 1}",
+        "{type: rough_dielectric, ior: 0.001, roughness: 1, thin_film: {thickness_nm: 20000, ior: 10}}",
+        "{type: dielectric, ior: 1000, thin_film: {thickness_nm: 1e-30, ior: 0.1}}",
+        "{type: rough_conductor, eta: 1, k: 0, roughness: 1, thin_film: {thickness_nm: 99, ior: 1}}",
     ):
         spectrum_of = f"materials: {{m: {text}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n"
         scene(f"the material {text}", HEAD + spectrum_of, 0)

@@ -3,6 +3,7 @@
 
 #include "spectra/spectra.h"
 
+#include <complex>
 #include <functional>
 #include <vector>
 
@@ -43,14 +44,21 @@ double fresnelConductor(double cosine, double n, double k);
 /// α = roughness² scatters towards a view at `cosine`, each ray mirrored once: quadrature over the normals
 /// of Fresnel's reflectance times Smith's height-correlated shadowing (Heitz 2014), in double. 1 bounce
 /// loses light: even of a perfect metal it is below 1.
+double microfacetAlbedo(double cosine, double n, double k, double roughness);
+
+/// The same with what is lost given back: what is mirrored twice, three times, … by Kulla and Conty
+/// (2017), the series summed term by term. 1 for a perfect metal.
 double roughConductorAlbedo(double cosine, double n, double k, double roughness);
 
 /// Of light from everywhere, the shares that rough glass sends towards a view at `cosine`; eta is the index
-/// beyond over the index on the side of the view. Microfacets as of roughConductorAlbedo, each of which
+/// beyond over the index on the side of the view. Microfacets as of microfacetAlbedo, each of which
 /// reflects what Fresnel's equations say and refracts the rest by Snell's law about its normal.
 struct ScatteredShares {
     double reflected, transmitted;
 };
+ScatteredShares microfacetShares(double cosine, double eta, double roughness);
+
+/// The same with what is lost given back, to both sides in the ratio that reciprocity allows: in sum 1.
 ScatteredShares roughDielectricShares(double cosine, double eta, double roughness);
 
 /// Of light from everywhere, the share that a diffuse base of albedo `base` under a coat of index `eta`
@@ -58,6 +66,12 @@ ScatteredShares roughDielectricShares(double cosine, double eta, double roughnes
 /// and coat as a geometric series. What the coat sends back from below follows from what it lets in: diffuse
 /// light through it is η² times as much one way as the other.
 double plasticAlbedo(double cosine, double base, double eta, double roughness);
+
+/// Unpolarised reflectance of a film of real index on something of index `under`, both relative to the
+/// medium before, where light has the wavelength: by the film's characteristic matrix (Abelès 1950; Born
+/// and Wolf, 1.6), for light across and in the plane of incidence.
+double filmReflectance(double cosine, double film, double thickness_nm, double wavelength_nm,
+                       std::complex<double> under);
 
 /// Planck's law in W·m⁻³·sr⁻¹ (CODATA 2018, exact constants).
 double planck_W_m3_sr(double wavelength_nm, double temperature_K);

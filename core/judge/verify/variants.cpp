@@ -77,6 +77,14 @@ std::vector<Variant> variants(int resolution) {
                 material.roughness = 0.3;
             }
     });
+    add("films on metal, glass and panes", [](Scene& s) {
+        for (Material& material : s.materials) {
+            if (material.type == MaterialType::Dielectric && material.eta.isConstant())
+                material.type = MaterialType::ThinDielectric;
+            material.film_index = constantSpectrum(1.4);
+            material.film_thickness_nm = 450;
+        }
+    });
     add("boxes of objects, xorshift, Blackman-Harris filter, no light sampling", [](Scene& s) {
         s.integrator.accelerator = Accelerator::Aabb;
         s.integrator.nee = false;

@@ -194,8 +194,32 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
                        "a body that absorbs is closed: where its surface is not there, light would enter it "
                        "unseen",
                        "leave 'opacity' or 'absorption' out");
+    if (section->schema().find("thin_film") != nullptr) readThinFilm(*section, material);
     named.index = static_cast<std::int32_t>(scene_.materials.size());
     scene_.materials.push_back(std::move(material));
+}
+
+void ObjectReader::readThinFilm(const SectionReader& section, Material& material) {
+    if (!section.has("thin_film")) return;
+    const std::optional<SectionReader> film =
+        section.section("thin_film", fmt::format("the film of material '{}'", material.name));
+    if (!film) return;
+    film->read("thickness_nm", material.film_thickness_nm);
+    if (std::optional<Spectrum> index = spectra_.read(*film, "ior", SpectrumUse::Index))
+        material.film_index = *std::move(index);
+    if (!TextureReader::isTexture(*film, "relative_thickness")) {
+        double relative = 1;
+        film->read("relative_thickness", relative);
+        material.film_thickness_nm *= relative;
+    } else if (material.type == MaterialType::RoughDielectric) {
+        film->error("relative_thickness",
+                    "a film on a rough_dielectric is equally thick everywhere: what its microfacets lose is "
+                    "tabulated for one thickness",
+                    "leave 'relative_thickness' out, give a number, or take a dielectric");
+    } else {
+        material.film_texture =
+            textures_.read(*film, "relative_thickness", TexelKind::Numbers).value_or(kNoTexture);
+    }
 }
 
 std::optional<std::int32_t> ObjectReader::findMaterial(const std::string& name, const YamlPlace& place,

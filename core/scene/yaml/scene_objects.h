@@ -45,6 +45,7 @@ private:
     void readParts(const SectionReader& material);
     void resolveParts();
     void checkParts(const std::vector<std::int32_t>& way);
+    void readThinFilm(const SectionReader& section, Material& material);
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
     ObjUse readObjUse(const SectionReader& object, const std::string& material);
     void refuseObjKeys(const SectionReader& object) const;

@@ -4,6 +4,7 @@
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_schema_composition.h"
+#include "scene/yaml/scene_schema_films.h"
 #include "scene/yaml/scene_schema_lights.h"
 #include "scene/yaml/scene_schema_textures.h"
 #include "scene/yaml/scene_schema_values.h"
@@ -583,21 +584,24 @@ void addDielectrics(std::vector<SectionSchema>& all) {
     all.push_back({"material/dielectric",
                    "a dielectric material",
                    "Smooth glass or water: reflects and refracts, and may absorb.",
-                   {typeKey("dielectric"), ior, absorption}});
+                   {typeKey("dielectric"), ior, absorption, thinFilmKey()}});
     all.push_back({"material/rough_dielectric",
                    "a rough_dielectric material",
                    "Frosted glass: microfacets as of `rough_conductor`, each of which reflects and "
-                   "refracts. Light that meets the surface twice at once is left out. Where it would blur "
-                   "what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), it is taken "
-                   "for smooth.",
-                   {typeKey("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption}});
+                   "refracts; clear glass in light from everywhere cannot be seen, however rough. Where it "
+                   "would blur what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), it "
+                   "is taken for smooth.",
+                   {typeKey("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption,
+                    thinFilmKey()}});
     all.push_back({"material/thin_dielectric",
                    "a thin_dielectric material",
                    "A window pane made of one sheet of faces: two parallel surfaces, between which light "
                    "is reflected to and fro. What passes is not bent. As behind all glass, lamps light "
-                   "what is behind it by the paths that happen to meet them: shadow rays do not pass.",
+                   "what is behind it by the paths that happen to meet them: shadow rays do not pass. A "
+                   "film is on one of the two surfaces.",
                    {typeKey("thin_dielectric"), index("Refractive index of the pane relative to what is "
-                                                      "around it.")}});
+                                                      "around it."),
+                    thinFilmKey()}});
 }
 
 void addMaterials(std::vector<SectionSchema>& all) {
@@ -627,14 +631,16 @@ void addMaterials(std::vector<SectionSchema>& all) {
                    "a conductor material",
                    "A smooth metal: Fresnel's equations with a complex index. Give "
                    "`metal`, or `eta` with `k`.",
-                   {typeKey("conductor"), metal, eta, k},
+                   {typeKey("conductor"), metal, eta, k, thinFilmKey()},
                    metal_or_index});
     all.push_back({"material/rough_conductor",
                    "a rough_conductor material",
                    "A rough metal: microfacets of GGX's distribution, shadowed as Smith's heights "
-                   "are. Light that meets it twice is left out, up to two thirds of it where it is "
-                   "roughest. Give `metal`, or `eta` with `k`.",
-                   {typeKey("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror"))},
+                   "are. Light that meets more than one of them, up to two thirds of it where it is "
+                   "roughest, comes back diffusely and in deeper colours (Kulla and Conty 2017). Give "
+                   "`metal`, or `eta` with `k`.",
+                   {typeKey("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror")),
+                    thinFilmKey()},
                    metal_or_index});
     addDielectrics(all);
     all.push_back({"material/plastic",
@@ -914,6 +920,7 @@ const std::vector<SectionSchema>& sceneSchema() {
         addTextures(all);
         addMaterials(all);
         addCompositions(all);
+        addThinFilm(all);
         addObjects(all);
         addLights(all);
         addOutside(all);
