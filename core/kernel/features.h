@@ -49,9 +49,10 @@
     F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
     F(26, ABSORPTION, "absorption inside dielectrics")                                       \
     F(27, TEXTURE, "values that depend on the place: images, checkers, colours of vertices") \
-    F(28, POINT_LIGHT, "point, spot, directional and sun lights")                            \
+    F(28, POINT_LIGHT, "points, spots, directional lights, suns, IES lamps, beams")        \
     F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")                    \
-    F(35, SPECTRAL_FILM, "spectral film: bins of wavelengths, responses of sensors")
+    F(35, SPECTRAL_FILM, "spectral film: bins of wavelengths, responses of sensors")         \
+    F(36, LIGHT_TREE, "a tree of lights: their choice depends on the shaded point")
 
 #define CRT_FEATURE_NUMBER(bit, name, text) CRT_BIT_##name = bit,
 enum CrtFeatureNumber { CRT_FEATURE_LIST(CRT_FEATURE_NUMBER) };
