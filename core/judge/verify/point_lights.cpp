@@ -465,10 +465,12 @@ void manyLights(Context& context) {
             const std::vector<Vec3d> quad = up ? std::vector<Vec3d>{at, at + b, at + a + b, at + a}
                                                : std::vector<Vec3d>{at, at + a, at + a + b, at + b};
             quads.push_back(quad);
-            const double brings = up ? 0 : kPi * radiance * polygonFormFactor({x, 0, z}, {0, 1, 0}, quad);
+            const bool both = i % 14 == 0;
+            const double brings =
+                up && !both ? 0 : kPi * radiance * polygonFormFactor({x, 0, z}, {0, 1, 0}, quad);
             sum += brings;
             brightest = std::max(brightest, brings);
-            lamps.emplace_back("", radiance);
+            lamps.emplace_back(both ? ", two_sided: true" : "", radiance);
         }
         for (int i = 0; i < 20 && !chance; ++i) {
             const Vec3d at{dice.uniform(-2, 2), 0.75 + 0.01 * i, dice.uniform(-2, 2)};
@@ -493,7 +495,7 @@ void manyLights(Context& context) {
                 corners += fmt::format("{}[{:.9g}, {:.9g}, {:.9g}]", corners.empty() ? "" : ", ", v[0],
                                        v[1], v[2]);
             stage.quad(fmt::format("lamp {}", i), "[" + corners + "]", "black",
-                       fmt::format("{:.9g}", lamps[i].second));
+                       fmt::format("{:.9g}{}", lamps[i].second, lamps[i].first));
         }
         context.estimate(fmt::format("many lights, {}", integrator), stage.yaml(), meanRadiance, sum / kPi,
                          0.004, {.samples = 1024, .most = 65536},
