@@ -126,6 +126,8 @@ struct Case {
     bool mapped = false;
     bool instruments = false;
     bool films = false;
+    bool lamps = false;
+    bool many_lights = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -134,6 +136,60 @@ const char* const kPointLights = R"(lights:
   - {type: directional, direction: [0.2, -1, 0.3], irradiance: {blackbody: 4000}}
   - {type: sun, direction: [0.3, -1, 0.1], angular_diameter_deg: 10, radiance: 40}
 )";
+
+/// IES lamps, all round and with sides, a disk of collimated light and a slit of it.
+void addLamps(crt::Scene& scene) {
+    crt::PointLight lamp;
+    lamp.spectrum = crt::constantSpectrum(1);
+    const auto add = [&](crt::PointLightType type, const crt::Vec3d& position, double strength) {
+        lamp.type = type;
+        lamp.position = position;
+        lamp.strength = strength;
+        scene.point_lights.push_back(lamp);
+    };
+    lamp.ies = std::make_shared<crt::IesProfile>(crt::IesProfile{{0, 30, 90}, {0}, {3, 2, 0}});
+    add(crt::PointLightType::Ies, {0.4, 0.9, 0.4}, 0.5);
+    lamp.direction = {0, 0, 1};
+    lamp.ies = std::make_shared<crt::IesProfile>(
+        crt::IesProfile{{0, 45, 90, 180},
+                        {0, 70, 180, 290, 360},
+                        {4, 3, 2, 1, 4, 1, 0, 2, 4, 2, 6, 1, 4, 0, 1, 3, 4, 3, 2, 1}});
+    add(crt::PointLightType::Ies, {0.6, 0.5, 0.3}, 0.2);
+    lamp.radius = 0.2;
+    add(crt::PointLightType::Beam, {0.5, 0.6, -0.2}, 3);
+    lamp.direction = {0.6, 0, 0.8};
+    lamp.across = {0.8, 0, -0.6};
+    lamp.radius = 0;
+    lamp.width = 0.3;
+    lamp.height = 0.15;
+    add(crt::PointLightType::Beam, {0.2, 0.4, 0.1}, 5);
+}
+
+/// Enough lights for a tree, of all kinds that it holds.
+void addManyLights(crt::Scene& scene) {
+    for (int i = 0; i < 24; ++i) {
+        const double x = 0.1 + 0.15 * (i % 6), z = 0.1 + 0.2 * (i / 6), y = 0.6 + 0.013 * i;
+        if (i % 4 == 3) {
+            crt::PointLight light;
+            light.type = i % 8 == 3 ? crt::PointLightType::Point : crt::PointLightType::Spot;
+            light.spectrum = crt::constantSpectrum(1);
+            light.strength = 0.01 * i;
+            light.position = {x, y, z};
+            scene.point_lights.push_back(light);
+            continue;
+        }
+        crt::Mesh mesh;
+        mesh.positions = {{x, y, z}, {x + 0.02, y, z}, {x, y + 0.01 * (i % 3), z + 0.03}};
+        mesh.triangles = {{0, 1, 2}};
+        crt::Object object;
+        object.mesh = static_cast<std::uint32_t>(scene.meshes.size());
+        object.material = 0;
+        object.emission = static_cast<std::int32_t>(scene.emissions.size());
+        scene.emissions.push_back({crt::constantSpectrum(2.0 + i), i % 2 == 0});
+        scene.meshes.push_back(mesh);
+        scene.objects.push_back(object);
+    }
+}
 
 /// Of random words, made anew for each compilation: any texel is a value.
 std::shared_ptr<const crt::TextureImage> randomImage(std::uint32_t width, std::uint32_t height,
@@ -322,6 +378,10 @@ const Case kCases[] = {
      true},
     {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", true, "", true, true, false,
      false, false, false, true},
+    {"{max_depth: 6}", "{type: sobol}", "", "box", false, kPointLights, false, false, false, false, false,
+     false, false, true},
+    {"{max_depth: 6}", "{type: sobol}", "", "box", true, kPointLights, true, false, false, false, false,
+     false, false, false, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -366,6 +426,8 @@ crt::Scene sceneOf(const Case& c) {
         scene.environment->sky =
             crt::CieSky{.towards_sun = {0.36, 0.8, -0.48}, .amount = 4, .rows = 32};
     if (c.instruments) addInstruments(scene);
+    if (c.lamps) addLamps(scene);
+    if (c.many_lights) addManyLights(scene);
     return scene;
 }
 
@@ -392,7 +454,9 @@ std::vector<Named> allScenes() {
                                  "normal maps, glassware, tree, xorshift",
                                  "spectral film",
                                  "films",
-                                 "films, textures, tree, independent, sampled environment"};
+                                 "films, textures, tree, independent, sampled environment",
+                                 "IES lamps and beams",
+                                 "many lights"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

@@ -61,6 +61,7 @@ std::map<std::uint64_t, std::string> representativeMasks() {
          "a mesh, environment image"},
         {mesh | CRT_FEATURE_POINT_LIGHT, "a mesh, lights without a surface"},
         {mesh | CRT_FEATURE_SPECTRAL_FILM, "a mesh, spectral film"},
+        {mesh | CRT_FEATURE_LIGHT_TREE, "a mesh, a tree of lights"},
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "a mesh, environment, lens and filter"},
         {mesh | CRT_FEATURE_AOV, "a mesh with AOVs"},

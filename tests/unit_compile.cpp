@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "compile/distributions.h"
+#include "compile/light_tree.h"
 #include "compile/scene_identity.h"
 #include "render/session.h"
 
@@ -238,6 +239,8 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
             s.point_lights.resize(1);
             s.point_lights[0].type = type;
             s.point_lights[0].spectrum = crt::constantSpectrum(1);
+            s.point_lights[0].ies = std::make_shared<crt::IesProfile>(
+                crt::IesProfile{{0, 90}, {0}, {2, 1}});
         };
     };
     seen |= differs(CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_IMAGE | CRT_FEATURE_TABLE, 0,
@@ -272,6 +275,17 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         differs(CRT_FEATURE_VIEW, light, [](Scene& s) { s.integrator.type = crt::IntegratorType::Normals; });
     seen |= differs(CRT_FEATURE_VIEW, light | CRT_FEATURE_BRUTE_FORCE,
                     [](Scene& s) { s.integrator.type = crt::IntegratorType::Aabb; });
+    const auto many = [](Scene& s) {  // each quad in a place of its own
+        s.objects[1].transforms.resize(crt::kLightTreeLights, crt::kIdentity4d);
+        for (std::size_t i = 0; i < crt::kLightTreeLights; ++i)
+            s.objects[1].transforms[i][3] = 3.0 * static_cast<double>(i);
+        s.integrator.accelerator = crt::Accelerator::None;
+    };
+    seen |= differs(CRT_FEATURE_LIGHT_TREE, 0, many);
+    differs(0, CRT_FEATURE_NEE, [&](Scene& s) {
+        many(s);
+        s.integrator.nee = false;
+    });
     seen |= differs(CRT_FEATURE_SPECTRAL_FILM, 0, [](Scene& s) { s.film.spectral.bins = {400, 700, 30}; });
     differs(CRT_FEATURE_SPECTRAL_FILM, 0, [](Scene& s) {
         s.film.spectral.responses = {{"flat", crt::constantSpectrum(1)}};
@@ -1039,6 +1053,31 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     differs("its strength", lamp([](crt::PointLight& l) { l.strength = 2; }));
     differs("its colour", lamp([](crt::PointLight& l) { l.spectrum[3] = 2; }));
     differs("its cone", lamp([](crt::PointLight& l) { l.cone_angle_deg = 31; }));
+    const auto ies = [&](const crt::IesProfile& profile, double across = 0) {
+        return lamp([=](crt::PointLight& l) {
+            l.type = crt::PointLightType::Ies;
+            l.ies = std::make_shared<crt::IesProfile>(profile);
+            l.across = {std::cos(across), 0, std::sin(across)};
+        });
+    };
+    differs("an IES lamp", ies({{0, 90}, {0}, {2, 1}}));
+    differs("its candelas", ies({{0, 90}, {0}, {2, 1.5}}));
+    differs("its angles", ies({{0, 180}, {0}, {2, 1}}));
+    differs("its sides", ies({{0, 90}, {0, 360}, {2, 1, 2, 1}}));
+    differs("how it is turned", ies({{0, 90}, {0}, {2, 1}}, 1));
+    const auto beam = [&](double radius, double width, double height) {
+        return lamp([=](crt::PointLight& l) {
+            l.type = crt::PointLightType::Beam;
+            l.radius = radius;
+            l.width = width;
+            l.height = height;
+        });
+    };
+    differs("a beam", beam(1, 0, 0));
+    differs("its radius", beam(2, 0, 0));
+    differs("a slit", beam(0, 2, 2));
+    differs("its width", beam(0, 3, 2));
+    differs("its height", beam(0, 2, 3));
     differs("its penumbra", lamp([](crt::PointLight& l) { l.penumbra_deg = 4; }));
     const auto instrument = [](const std::function<void(crt::SpectralFilm&)>& change) {
         return [change](Scene& s) {

@@ -59,7 +59,7 @@ TEST_CASE("every case of the suite says what is asked, what is expected and from
                                        {'B', 10},
                                        {'C', 16},
                                        {'D', 10},
-                                       {'E', 23},
+                                       {'E', 26},
                                        {'F', 10},
                                        {'G', 11},
                                        {'H', 13},

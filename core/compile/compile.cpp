@@ -13,6 +13,7 @@
 #include "compile/near_scene.h"
 #include "compile/near_surfaces.h"
 #include "compile/needs.h"
+#include "compile/point_lights.h"
 #include "compile/scene_identity.h"
 #include "compile/settings.h"
 #include "compile/spectral_film.h"
@@ -101,9 +102,11 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
         around = environmentTexels(*scene.environment);
         header.environment_image = appendEnvironmentImage(blob, *scene.environment, *around);
     }
-    const LightPart lights =
+    LightPart lights =
         compileLights(scene, flat, emitting, accelerator, spectra, around ? &*around : nullptr);
-    header.lights = blob.append(lights.lights);
+    appendForms(scene, flat, blob, lights.point_lights);
+    header.lights = appendLights(lights, blob);
+    header.tree_lights = lights.tree_lights;
     header.environment_light = lights.environment;
     header.point_lights = blob.append(lights.point_lights);
     if (lights.lights.empty() && !scene.environment && scene.integrator.type == IntegratorType::Path)

@@ -3,11 +3,14 @@
 #include "base/vec3d.h"
 #include "compile/distributions.h"
 #include "compile/geometry.h"
+#include "compile/light_tree.h"
 #include "compile/point_lights.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
+#include <numeric>
 #include <optional>
 
 namespace crt {
@@ -71,6 +74,84 @@ double areaAround(const FlatScene& flat) {
     return std::max(std::numbers::pi * dot(diagonal, diagonal), 1e-12);
 }
 
+/// Of a triangle, or of two that make a parallelogram.
+LightBounds boundsOfEmitter(const FlatScene& flat, std::size_t triangle, std::size_t triangles,
+                            bool two_sided, double power) {
+    LightBounds bounds;
+    bounds.lower = bounds.upper = vertexOf(flat, triangle, 0);
+    for (std::size_t i = triangle; i < triangle + triangles; ++i)
+        for (std::size_t corner = 0; corner < 3; ++corner) {
+            const Vec3d v = vertexOf(flat, i, corner);
+            for (std::size_t k = 0; k < 3; ++k) {
+                bounds.lower[k] = std::min(bounds.lower[k], v[k]);
+                bounds.upper[k] = std::max(bounds.upper[k], v[k]);
+            }
+        }
+    const Vec3d o = vertexOf(flat, triangle, 0);
+    const Vec3d normal = cross(vertexOf(flat, triangle, 1) - o, vertexOf(flat, triangle, 2) - o);
+    const double length2 = dot(normal, normal);
+    // A sliver's normal is rounding: it may shine anywhere.
+    if (length2 > 0)
+        bounds.axis = normal * (1 / std::sqrt(length2));
+    else
+        bounds.theta_o = std::numbers::pi;
+    bounds.theta_e = std::numbers::pi / 2;
+    bounds.two_sided = two_sided;
+    bounds.power = power;
+    return bounds;
+}
+
+/// Nothing for lights that lie nowhere, and beams, which light what is in them alone.
+std::optional<LightBounds> boundsOfPoint(const PointLight& light, const kernel::CrtPointLight& compiled,
+                                         double power) {
+    const bool spot = light.type == PointLightType::Spot;
+    if (!spot && light.type != PointLightType::Point && light.type != PointLightType::Ies)
+        return std::nullopt;
+    constexpr double kDegree = std::numbers::pi / 180;
+    LightBounds bounds;
+    for (std::size_t k = 0; k < 3; ++k)
+        bounds.lower[k] = bounds.upper[k] = static_cast<double>(compiled.position[k]);
+    bounds.axis = light.direction;
+    bounds.theta_o = spot ? (light.cone_angle_deg - light.penumbra_deg) * kDegree : std::numbers::pi;
+    bounds.theta_e = spot ? light.penumbra_deg * kDegree : std::numbers::pi / 2;
+    bounds.power = power;
+    return bounds;
+}
+
+/// Puts the lights that lie at a place first, if they are many, and a tree over them. `power` and `bounds`
+/// are theirs, and change with them.
+void growTree(const std::vector<std::optional<LightBounds>>& bounds, LightPart& part,
+              std::vector<double>& power) {
+    std::vector<std::uint32_t> order(part.lights.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const auto others = std::stable_partition(order.begin(), order.end(),
+                                              [&](std::uint32_t i) { return bounds[i].has_value(); });
+    const auto placed = static_cast<std::size_t>(others - order.begin());
+    if (placed < kLightTreeLights) return;
+    std::vector<LightBounds> own;
+    std::vector<kernel::CrtLight> lights;
+    std::vector<double> powers{0};  // Of the tree, then of the others.
+    std::vector<std::uint32_t> now(order.size());
+    for (const std::uint32_t i : order) {
+        now[i] = static_cast<std::uint32_t>(lights.size());
+        if (now[i] < placed) {
+            own.push_back(*bounds[i]);
+            powers[0] += power[i];
+        } else {
+            powers.push_back(power[i]);
+        }
+        lights.push_back(part.lights[i]);
+    }
+    LightTree tree = buildLightTree(own);
+    for (std::size_t i = 0; i < placed; ++i) lights[i].choice = tree.leaf_of[i];
+    part.lights = std::move(lights);
+    part.tree = std::move(tree.nodes);
+    part.tree_lights = static_cast<std::uint32_t>(placed);
+    if (part.environment > 0) part.environment = now[part.environment - 1] + 1;
+    for (kernel::CrtPointLight& light : part.point_lights) light.light = now[light.light];
+    power = std::move(powers);
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> emittingTriangles(const Scene& scene, const FlatScene& flat) {
@@ -110,6 +191,7 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
     };
     std::vector<std::optional<Shared>> shared(scene.emissions.size());  // made once an emission
     std::vector<double> power;
+    std::vector<std::optional<LightBounds>> bounds;
     for (const std::uint32_t i : emitting) {
         if (part.light_of[i] != CRT_NONE) continue;  // the other half of a parallelogram
         const Emission& emission = emissionOf(scene, flat.triangles[i]);
@@ -134,6 +216,8 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         constexpr double kHardlyEver = 1e-6;
         if (passable) area *= kHardlyEver;
         power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
+        bounds.push_back(boundsOfEmitter(flat, i, light.kind == CRT_LIGHT_PARALLELOGRAM ? 2 : 1,
+                                         emission.two_sided, power.back()));
     }
     part.emitters = static_cast<std::uint32_t>(part.lights.size());
     if (samplesEnvironment(scene) && (around == nullptr || around->mean_brightness > 0)) {
@@ -144,26 +228,48 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         part.environment = static_cast<std::uint32_t>(part.lights.size());
         power.push_back(areaAround(flat) *
                         (around ? around->mean_brightness : brightness(scene.environment->radiance)));
+        bounds.emplace_back();
     }
     const std::vector<const PointLight*> point_lights = shiningPointLights(scene);
     const double area_around = point_lights.empty() ? 0 : areaAround(flat);
     for (const PointLight* own : point_lights) {
         kernel::CrtLight light{};
-        light.kind = kindOf(own->type);
+        light.kind = kindOf(*own);
         light.radiance = spectra.valueOf(own->spectrum);
         light.slot = static_cast<std::uint32_t>(part.point_lights.size());
         part.point_lights.push_back(compilePointLight(*own, flat));
         part.point_lights.back().light = static_cast<std::uint32_t>(part.lights.size());
         part.lights.push_back(light);
-        power.push_back(powerOf(*own, part.point_lights.back(), area_around) * brightness(own->spectrum));
+        power.push_back(powerOf(*own, part.point_lights.back(), area_around, flat.scale_exponent) *
+                        brightness(own->spectrum));
+        bounds.push_back(boundsOfPoint(*own, part.point_lights.back(), power.back()));
     }
+    growTree(bounds, part, power);
     const std::vector<std::uint64_t> first = choiceTable(power);
     for (std::size_t i = 0; i < part.lights.size(); ++i) {
-        part.lights[i].choice = static_cast<std::uint32_t>(first[i]);
+        // The lights of the tree have one share together.
+        const std::size_t share = part.tree.empty()      ? i
+                                  : i < part.tree_lights ? 0
+                                                         : i - part.tree_lights + 1;
+        if (part.tree.empty() || share > 0)
+            part.lights[i].choice = static_cast<std::uint32_t>(first[share]);
         part.lights[i].choice_probability =
-            static_cast<float>(std::ldexp(static_cast<double>(first[i + 1] - first[i]), -32));
+            static_cast<float>(std::ldexp(static_cast<double>(first[share + 1] - first[share]), -32));
     }
     return part;
+}
+
+kernel::CrtSpan appendLights(const LightPart& part, BlobWriter& blob) {
+    constexpr std::size_t kRows = sizeof(kernel::CrtLightNode) / sizeof(kernel::CrtLight);
+    static_assert(kRows * sizeof(kernel::CrtLight) == sizeof(kernel::CrtLightNode));
+    std::vector<kernel::CrtLight> rows = part.lights;
+    rows.resize(part.lights.size() + kRows * part.tree.size());
+    if (!part.tree.empty())
+        std::memcpy(static_cast<void*>(rows.data() + part.lights.size()), part.tree.data(),
+                    part.tree.size() * sizeof part.tree[0]);
+    kernel::CrtSpan span = blob.append(rows);
+    span.count = static_cast<std::uint32_t>(part.lights.size());
+    return span;
 }
 
 bool shadowRaysLeave(const Scene& scene) {

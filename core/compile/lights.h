@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compile/accelerator.h"
+#include "compile/blob_writer.h"
 #include "compile/environment_image.h"
 #include "compile/flatten.h"
 #include "compile/spectrum_table.h"
@@ -26,6 +27,8 @@ struct LightPart {
     std::vector<kernel::CrtLight> lights;
     std::vector<std::uint32_t> light_of;  ///< By primitive id: index of its light, or CRT_NONE.
     std::uint32_t environment = 0;        ///< 1 + the index of its light; 0: it has none.
+    std::vector<kernel::CrtLightNode> tree;  ///< Of the first `tree_lights` lights; empty: there is none.
+    std::uint32_t tree_lights = 0;
     std::vector<kernel::CrtPointLight> point_lights;
     std::uint32_t emitters = 0;           ///< Lights that are triangles or parallelograms: the first ones.
 };
@@ -33,6 +36,9 @@ struct LightPart {
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
                         const SpectrumTable& spectra, const EnvironmentTexels* around);
+
+/// The lights, and behind them the tree.
+kernel::CrtSpan appendLights(const LightPart& part, BlobWriter& blob);
 
 /// Whether the environment is among the lights.
 bool samplesEnvironment(const Scene& scene);

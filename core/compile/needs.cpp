@@ -1,6 +1,7 @@
 #include "compile/needs.h"
 
 #include "compile/accelerator.h"
+#include "compile/light_tree.h"
 #include "compile/point_lights.h"
 #include "kernel/features.h"
 #include "scene/aov.h"
@@ -54,6 +55,7 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(!lights.empty() &&
              ((f & CRT_FEATURE_NEE) != 0 || lights.front()->type == PointLightType::Sun),
          CRT_FEATURE_POINT_LIGHT);
+    need((f & CRT_FEATURE_NEE) != 0 && header.tree_lights != 0, CRT_FEATURE_LIGHT_TREE);
     need(header.spectra.count > 0, CRT_FEATURE_TABLE);
     need(header.textures.count > 0, CRT_FEATURE_TEXTURE);
     need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
@@ -107,9 +109,11 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
                  header.environment_light == 0 ? "environment.light_sampling is false"
                                                : "nothing that light sampling could light");
     if (!has(CRT_FEATURE_POINT_LIGHT))
-        left_out("point, spot, directional and sun lights",
+        left_out("lights without a surface",
                  header.point_lights.count == 0 ? "there are none"
                                                 : "nothing that light sampling could light");
+    if (!has(CRT_FEATURE_LIGHT_TREE))
+        left_out("a tree of lights", fmt::format("fewer than {} lights lie at a place", kLightTreeLights));
     if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
     if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
     if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");

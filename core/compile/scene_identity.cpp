@@ -99,8 +99,19 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
         if (light.kind == CRT_LIGHT_TRIANGLE || light.kind == CRT_LIGHT_PARALLELOGRAM)
             light.slot = triangles[light.slot].id;
     hash.add(by_id.data(), by_id.size(), sizeof(CrtLight));
-    hash.add(CRT_ARRAY(CrtPointLight, blob, header.point_lights), header.point_lights.count,
-             sizeof(CrtPointLight));
+    const CrtPointLight* point_lights = CRT_ARRAY(CrtPointLight, blob, header.point_lights);
+    std::vector<CrtPointLight> without_places(point_lights, point_lights + header.point_lights.count);
+    for (CrtPointLight& light : without_places) light.form = {};
+    hash.add(without_places.data(), without_places.size(), sizeof(CrtPointLight));
+    for (std::uint32_t i = 0; i < header.point_lights.count; ++i) {
+        if (point_lights[i].form.count == 0) continue;
+        CrtLightForm form = *CRT_ARRAY(CrtLightForm, blob, point_lights[i].form);
+        for (CrtSpan* span : {&form.vertical, &form.horizontal, &form.shares}) {
+            hash.add(CRT_ARRAY(f32, blob, *span), span->count, sizeof(f32));
+            *span = {};
+        }
+        hash.add(&form, 1, sizeof form);
+    }
     if (header.environment_image.count > 0) {
         CrtEnvironmentImage image = *CRT_ARRAY(CrtEnvironmentImage, blob, header.environment_image);
         hash.add(CRT_ARRAY(CrtEnvironmentTexel, blob, image.texels), image.texels.count,

@@ -203,6 +203,14 @@ SceneTrait lightsTrait(const Scene& scene) {
                                light.direction[1], light.direction[2], light.cone_angle_deg,
                                light.penumbra_deg, light.angular_diameter_deg})
             digest.add(x);
+        if (light.type == PointLightType::Ies)
+            for (const std::vector<double>* values :
+                 {&light.ies->vertical_deg, &light.ies->horizontal_deg, &light.ies->candela})
+                digest.add(*values);
+        if (light.type == PointLightType::Ies || light.type == PointLightType::Beam)
+            for (const double x : {light.across[0], light.across[1], light.across[2], light.radius,
+                                   light.width, light.height})
+                digest.add(x);
     }
     const std::string without_surface =
         scene.point_lights.empty()

@@ -49,9 +49,10 @@
     F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
     F(26, ABSORPTION, "absorption inside dielectrics")                                       \
     F(27, TEXTURE, "values that depend on the place: images, checkers, colours of vertices") \
-    F(28, POINT_LIGHT, "point, spot, directional and sun lights")                            \
+    F(28, POINT_LIGHT, "points, spots, directional lights, suns, IES lamps, beams")        \
     F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")                    \
     F(30, THIN_FILM, "thin films")                                                           \
+    F(31, LIGHT_TREE, "a tree of lights: their choice depends on the shaded point")          \
     F(32, MIX, "mixes of materials, a material for each side")                               \
     F(33, OPACITY, "surfaces that rays may pass")                                            \
     F(34, NORMAL_MAP, "normal maps")                                                         \

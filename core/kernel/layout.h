@@ -219,6 +219,9 @@ CRT_ASSERT_SIZE(CrtComposition, 32);
 #define CRT_LIGHT_SPOT 4u
 #define CRT_LIGHT_DIRECTIONAL 5u
 #define CRT_LIGHT_SUN 6u
+#define CRT_LIGHT_IES 7u
+#define CRT_LIGHT_DISK_BEAM 8u
+#define CRT_LIGHT_SLIT_BEAM 9u
 
 #define CRT_LIGHT_TWO_SIDED 1u
 #define CRT_LIGHT_UNSAMPLED 2u /* left to scattered rays: its surface is not all there */
@@ -227,25 +230,58 @@ typedef struct CrtLight {
     u32 kind; /* CRT_LIGHT_… */
     u32 flags;
     CrtValue radiance;
-    u32 choice;             /* a 32-bit number u chooses the last light with choice ≤ u */
-    f32 choice_probability; /* exactly the share of 2³² that chooses it */
+    u32 choice;             /* a 32-bit number u chooses the last light with choice ≤ u; of a light in the
+                               tree: its leaf */
+    f32 choice_probability; /* exactly the share of 2³² that chooses it, or the tree that it is in */
     u32 slot;   /* in the triangle array */
     u32 corner; /* which vertex of the triangle the parallelogram's two edges leave from */
     f32 area;
 } CrtLight;
 CRT_ASSERT_SIZE(CrtLight, 32);
 
+/* A node of the tree of lights, the root first; the left child is the next one. What lights it holds: where
+   they are, and which way they shine: within acos(cos_o) + acos(cos_e) of the axis. */
+typedef struct CrtLightNode {
+    f32 centre[3];  /* of a sphere around them */
+    f32 radius;
+    f32 axis[3];    /* unit */
+    f32 power;      /* share of that of all */
+    f32 cos_o, sin_o; /* spread of their normals around the axis */
+    f32 cos_e;      /* how far from its normal each shines */
+    u32 two_sided;
+    u32 parent;     /* the root's: itself */
+    u32 right;      /* child; 0: a leaf, of */
+    u32 light;      /* this row of the light table */
+    u32 reserved;
+} CrtLightNode;
+CRT_ASSERT_SIZE(CrtLightNode, 64);
+
+/* How the light of an IES file is distributed, or what a beam's section is. */
+typedef struct CrtLightForm {
+    f32 u[3];           /* IES: where the horizontal angle 0 is; slit: across; unit, like v perpendicular to
+                           the light's direction */
+    f32 half_u;         /* slit: half its width; disk: its radius */
+    f32 v[3];           /* IES: where the horizontal angle 90 is; slit: along */
+    f32 half_v;         /* slit: half its height */
+    CrtSpan vertical;   /* IES: f32, angles from the light's direction, radians */
+    CrtSpan horizontal; /* IES: f32, 0 to 2π; or 0 alone: the same all round */
+    CrtSpan shares;     /* IES: f32, of the greatest intensity: all vertical angles of a horizontal one */
+    u32 reserved[2];
+} CrtLightForm;
+CRT_ASSERT_SIZE(CrtLightForm, 64);
+
 /* What a light without a surface has besides its CrtLight, whose `radiance` is a spectrum that `strength`
    multiplies. Suns come first. */
 typedef struct CrtPointLight {
-    f32 position[3];      /* point, spot */
-    f32 strength;         /* point, spot (on its axis): radiant intensity, by squared length here;
-                             directional: irradiance of a plane that faces it; sun: radiance */
+    f32 position[3];      /* point, spot, IES; beam: middle of the section that it begins with */
+    f32 strength;         /* point, spot (on its axis), IES (where it is greatest): radiant intensity, by
+                             squared length here; directional, beam: irradiance of a plane that faces it;
+                             sun: radiance */
     f32 direction[3];     /* unit, the way that the light goes; not of a point */
     f32 cone;             /* spot, sun: 1 − cos of the angle from the axis to the edge */
     f32 inverse_penumbra; /* spot: 1 / (cone − (1 − cos) where the penumbra begins) */
     u32 light;            /* index of its CrtLight */
-    u32 reserved0, reserved1;
+    CrtSpan form;         /* IES, beam: CrtLightForm, 1 */
 } CrtPointLight;
 CRT_ASSERT_SIZE(CrtPointLight, 48);
 
@@ -357,7 +393,7 @@ typedef struct CrtScene {
     CrtSeed seed;
 
     u32 triangle_count;
-    u32 padding;
+    u32 tree_lights; /* the first of the lights, between which the tree chooses; 0: there is none */
 
     CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
     CrtSpan faces;               /* CrtFace, by slot */
@@ -368,7 +404,7 @@ typedef struct CrtScene {
     CrtSpan nodes;               /* CrtNode4, root first; only for BVH */
     CrtSpan objects;             /* CrtObject */
     CrtSpan materials;           /* CrtMaterial */
-    CrtSpan lights;              /* CrtLight */
+    CrtSpan lights;              /* CrtLight; behind them the CrtLightNode of the tree, if there is one */
     CrtSpan textures;            /* CrtTexture */
     CrtSpan uvs;                 /* CrtUvs, by id; only where a texture asks */
     CrtSpan vertex_colors;       /* CrtVertexColors, by id; only where a value asks */

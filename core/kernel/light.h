@@ -207,20 +207,22 @@ CRT_FN vec3 crt_sample_spherical_triangle(vec3 a, vec3 b, vec3 c, f32 triple, f3
     return length > 0.0f ? normalize3(q * cos_theta + towards * (sin_theta / length)) : q;
 }
 
+/* Of the lights index … end − 1 the last with a choice of at most `choice`, or the first. */
+CRT_FN u32 crt_light_search(CRT_GLOBAL const CrtLight *lights, u32 index, u32 end, u32 choice) {
+    while (end - index > 1u) {
+        const u32 middle = (index + end) >> 1;
+        if (lights[middle].choice <= choice) index = middle;
+        else end = middle;
+    }
+    return index;
+}
+
 /* Which light to sample, by power. There must be one. */
 CRT_FN u32 crt_light_choose(const CrtContext *ctx, CrtSampler *sampler, u32 dimension) {
     CRT_GLOBAL const CrtLight *lights = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights);
-    u32 index = 0u;
-    u32 end = ctx->scene->lights.count;
-    if (end > 1u) {
-        const u32 choice = crt_sample_bits(sampler, dimension + CRT_DIM_LIGHT_CHOICE);
-        while (end - index > 1u) {
-            const u32 middle = (index + end) >> 1;
-            if (lights[middle].choice <= choice) index = middle;
-            else end = middle;
-        }
-    }
-    return index;
+    const u32 end = ctx->scene->lights.count;
+    if (end <= 1u) return 0u;
+    return crt_light_search(lights, 0u, end, crt_sample_bits(sampler, dimension + CRT_DIM_LIGHT_CHOICE));
 }
 
 /* The emitter as seen from p. */

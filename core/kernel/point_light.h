@@ -1,7 +1,7 @@
 /*
- * point_light.h: lights without a surface. Points, spots and directional lights lie in single directions, so
- * that light sampling alone finds them; a sun is a cone of directions, which rays that meet nothing find
- * too.
+ * point_light.h: lights without a surface. Points, spots, directional lights, IES lamps and beams lie in
+ * single directions, so that light sampling alone finds them; a sun is a cone of directions, which rays that
+ * meet nothing find too.
  */
 #ifndef CRT_POINT_LIGHT_H
 #define CRT_POINT_LIGHT_H
@@ -34,6 +34,61 @@ CRT_FN f32 crt_spot_falloff(CRT_GLOBAL const CrtPointLight *spot, vec3 away) {
     const f32 inside = spot->cone - crt_one_minus_cos(crt_load3(spot->direction), away);
     const f32 t = crt_clamp(inside * spot->inverse_penumbra, 0.0f, 1.0f);
     return t * t * (3.0f - 2.0f * t);
+}
+
+CRT_FN CRT_GLOBAL const CrtLightForm *crt_light_form(const CrtContext *ctx,
+                                                     CRT_GLOBAL const CrtPointLight *own) {
+    return CRT_ARRAY(CrtLightForm, ctx->blob, own->form);
+}
+
+/* The last but one of the increasing `angles`, or the last that is at most x; at least the first. There are
+   two or more. */
+CRT_FN u32 crt_interval(CRT_GLOBAL const f32 *angles, u32 count, f32 x) {
+    u32 index = 0u;
+    u32 end = count - 1u;
+    while (end - index > 1u) {
+        const u32 middle = (index + end) >> 1;
+        if (angles[middle] <= x) index = middle;
+        else end = middle;
+    }
+    return index;
+}
+
+/* Share of the greatest intensity that an IES lamp sends in a direction: linear in both angles between those
+   of its file, 0 beyond its vertical ones. */
+CRT_FN f32 crt_ies_share(const CrtContext *ctx, CRT_GLOBAL const CrtPointLight *own, vec3 away) {
+    CRT_GLOBAL const CrtLightForm *form = crt_light_form(ctx, own);
+    CRT_GLOBAL const f32 *vertical = CRT_ARRAY(f32, ctx->blob, form->vertical);
+    CRT_GLOBAL const f32 *horizontal = CRT_ARRAY(f32, ctx->blob, form->horizontal);
+    CRT_GLOBAL const f32 *shares = CRT_ARRAY(f32, ctx->blob, form->shares);
+    const u32 rows = form->vertical.count;
+    const f32 x = dot3(away, crt_load3(form->u)), y = dot3(away, crt_load3(form->v));
+    const f32 theta = crt_atan2(crt_sqrt(x * x + y * y), dot3(away, crt_load3(own->direction)));
+    if (theta < vertical[0] || theta > vertical[rows - 1u]) return 0.0f;
+    const u32 row = crt_interval(vertical, rows, theta);
+    const f32 t = (theta - vertical[row]) / (vertical[row + 1u] - vertical[row]);
+    u32 column = 0u, next = 0u;
+    f32 s = 0.0f;
+    if (form->horizontal.count > 1u) {
+        const f32 angle = crt_atan2(y, x);
+        const f32 phi = angle < 0.0f ? angle + 2.0f * CRT_PI : angle;
+        column = crt_interval(horizontal, form->horizontal.count, phi);
+        next = column + 1u;
+        s = crt_min((phi - horizontal[column]) / (horizontal[next] - horizontal[column]), 1.0f);
+    }
+    const f32 lower = shares[column * rows + row] * (1.0f - s) + shares[next * rows + row] * s;
+    const f32 upper = shares[column * rows + row + 1u] * (1.0f - s) + shares[next * rows + row + 1u] * s;
+    return lower * (1.0f - t) + upper * t;
+}
+
+/* How far along a beam p lies; 0 or less where it is not in it. */
+CRT_FN f32 crt_beam_distance(const CrtContext *ctx, CRT_GLOBAL const CrtPointLight *own, int disk, vec3 p) {
+    CRT_GLOBAL const CrtLightForm *form = crt_light_form(ctx, own);
+    const vec3 d = p - crt_load3(own->position);
+    const f32 x = dot3(d, crt_load3(form->u)), y = dot3(d, crt_load3(form->v));
+    const int inside = disk ? x * x + y * y <= form->half_u * form->half_u
+                            : crt_abs(x) <= form->half_u && crt_abs(y) <= form->half_v;
+    return inside ? dot3(d, crt_load3(own->direction)) : 0.0f;
 }
 
 /* pdf of the directions of a sun, all of which are equally likely. */
@@ -69,6 +124,13 @@ CRT_FN CrtPointLightSample crt_point_light_sample(const CrtContext *ctx, u32 ind
     s.pdf = 0.0f;
     s.far = light->kind == CRT_LIGHT_DIRECTIONAL || light->kind == CRT_LIGHT_SUN;
     s.distance = CRT_INFINITY;
+    if (light->kind >= CRT_LIGHT_DISK_BEAM) {
+        s.wi = -crt_load3(own->direction);
+        s.distance = crt_beam_distance(ctx, own, light->kind == CRT_LIGHT_DISK_BEAM, p);
+        s.point = crt_fma3(s.wi, s.distance, p);
+        if (!(s.distance > 0.0f)) s.irradiance = 0.0f;
+        return s;
+    }
     if (s.far) {
         s.wi = -crt_load3(own->direction);
         if (light->kind == CRT_LIGHT_SUN) {
@@ -90,6 +152,7 @@ CRT_FN CrtPointLightSample crt_point_light_sample(const CrtContext *ctx, u32 ind
     s.wi = d * (1.0f / s.distance);
     s.irradiance = s.irradiance / squared;
     if (light->kind == CRT_LIGHT_SPOT) s.irradiance = s.irradiance * crt_spot_falloff(own, -s.wi);
+    if (light->kind == CRT_LIGHT_IES) s.irradiance = s.irradiance * crt_ies_share(ctx, own, -s.wi);
     return s;
 }
 

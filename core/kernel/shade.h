@@ -5,6 +5,7 @@
 #ifndef CRT_SHADE_H
 #define CRT_SHADE_H
 
+#include "light_tree.h"
 #include "normal_map.h"
 #include "point_light.h"
 
@@ -29,6 +30,7 @@ typedef struct CrtPath {
     f32 scatter_cosine; /* of that direction with the shading normal on the side of w_o, where scatter_pdf is
                            above 0 */
     vec3 p;           /* where it was scattered: a clearance off the ray's origin */
+    vec3 side;        /* for the tree of lights: the normal there (crt_scattering_side) */
     f32 eta_square;   /* product of squared relative indices crossed: roulette must not see the n² of being
                          inside glass */
     u32 depth;        /* scattering events so far */
@@ -57,6 +59,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     path->scatter_pdf = 0.0f;
     path->scatter_cosine = 0.0f;
     path->p = path->ray.o;
+    if (CRT_HAS(LIGHT_TREE)) path->side = make_vec3(0.0f, 0.0f, 0.0f);
     path->eta_square = 1.0f;
     path->depth = 0u;
     path->alone = 0;
@@ -76,7 +79,9 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
     f32 weight = 1.0f;
     if (CRT_HAS(NEE) && ctx->scene->nee != CRT_NEE_NONE && path->scatter_pdf > 0.0f) {
         const f32 distance = length3(crt_fma3(path->ray.d, t, path->ray.o) - path->p);
-        const CrtLightSeen light = crt_light_pdf(ctx, surface->light, path->p, distance);
+        CrtLightSeen light = crt_light_pdf(ctx, surface->light, path->p, distance);
+        if (crt_has_light_tree(ctx))
+            light.pdf = light.pdf * crt_light_tree_probability(ctx, surface->light, path->p, path->side);
         if (light.pdf > 0.0f) {
             /* The ray starts a clearance off p, from which lights are sampled. Close to a light that is
                another direction: both techniques estimate what arrives at p, and are weighed by the area of
@@ -157,10 +162,10 @@ typedef struct CrtOffer {
     CrtEnvironmentPlace place;
 } CrtOffer;
 
-CRT_FN CrtOffer crt_offer(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, vec3 p,
-                          const CrtBsdf *bsdf) {
+CRT_FN CrtOffer crt_offer_of(const CrtContext *ctx, u32 light, CrtSampler *sampler, u32 dimension, vec3 p,
+                             const CrtBsdf *bsdf) {
     CrtOffer offer;
-    offer.light = crt_light_choose(ctx, sampler, dimension);
+    offer.light = light;
     offer.distance = CRT_INFINITY;
     offer.point = p;
     offer.normal = bsdf->ns;
@@ -200,6 +205,30 @@ CRT_FN CrtOffer crt_offer(const CrtContext *ctx, CrtSampler *sampler, u32 dimens
     offer.reach = s.reach;
     offer.normal = s.normal;
     offer.cosine = s.cosine;
+    return offer;
+}
+
+/* The normal of a surface that scatters nothing to its other side; otherwise of length 0. */
+CRT_FN vec3 crt_scattering_side(const CrtBsdf *bsdf) {
+    return (bsdf->flags & CRT_BSDF_TRANSMITS) == 0u ? bsdf->ng : make_vec3(0.0f, 0.0f, 0.0f);
+}
+
+CRT_FN CrtOffer crt_offer(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, vec3 p,
+                          const CrtBsdf *bsdf) {
+    u32 light, none = 0u;
+    f32 probability = 1.0f;
+    if (crt_has_light_tree(ctx)) {
+        light = crt_light_tree_choose(ctx, sampler, dimension, p, crt_scattering_side(bsdf), &probability);
+        none = light == CRT_NONE;
+        if (none) light = 0u;
+    } else {
+        light = crt_light_choose(ctx, sampler, dimension);
+    }
+    CrtOffer offer = crt_offer_of(ctx, light, sampler, dimension, p, bsdf);
+    if (crt_has_light_tree(ctx)) {
+        offer.irradiance = none ? 0.0f : offer.irradiance / probability;
+        offer.pdf = offer.pdf * probability;
+    }
     return offer;
 }
 
@@ -300,6 +329,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     path->scatter_pdf = scatter.pdf;
     path->scatter_cosine = dot3(scatter.wi, crt_base(&bsdf));
     path->p = surface.p;
+    if (CRT_HAS(LIGHT_TREE)) path->side = crt_scattering_side(&bsdf);
     if (CRT_HAS(ABSORPTION))
         path->absorption = crt_medium_behind(&surface, &bsdf, scatter.wi, path->absorption);
     path->ray.o = crt_offset_origin(surface.p, surface.clearance, surface.ng, scatter.wi);

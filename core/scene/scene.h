@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "kernel/features.h"
 #include "scene/aov.h"
+#include "scene/ies_file.h"
 #include "scene/spectral_film.h"
 #include "scene/texture.h"
 #include "spectra/spectra.h"
@@ -13,6 +14,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -175,28 +177,36 @@ struct Object {
     SourcePlace place;
 };
 
-enum class PointLightType { Point, Spot, Directional, Sun };
+enum class PointLightType { Point, Spot, Directional, Sun, Ies, Beam };
 /// Their names in scene files.
 inline constexpr std::pair<PointLightType, const char*> kPointLightNames[] = {
     {PointLightType::Point, "point"},
     {PointLightType::Spot, "spot"},
     {PointLightType::Directional, "directional"},
-    {PointLightType::Sun, "sun"}};
+    {PointLightType::Sun, "sun"},
+    {PointLightType::Ies, "ies"},
+    {PointLightType::Beam, "beam"}};
 
 /// A light without a surface.
 struct PointLight {
     std::string name;
     PointLightType type = PointLightType::Point;
     Spectrum spectrum;    ///< Times `strength`.
-    /// Radiant intensity (Point; Spot, on its axis), W·sr⁻¹·nm⁻¹; irradiance of a plane that faces
-    /// it (Directional), W·m⁻²·nm⁻¹; or radiance (Sun), W·m⁻²·sr⁻¹·nm⁻¹: per unit of the
-    /// spectrum.
+    /// Radiant intensity (Point; Spot, on its axis; Ies, where it is greatest), W·sr⁻¹·nm⁻¹;
+    /// irradiance of a plane that faces it (Directional, Beam), W·m⁻²·nm⁻¹; or radiance (Sun),
+    /// W·m⁻²·sr⁻¹·nm⁻¹: per unit of the spectrum.
     double strength = 1;
-    Vec3d position{};                 ///< Point, Spot.
+    Vec3d position{};                 ///< Point, Spot, Ies; Beam: middle of the section it begins with.
     Vec3d direction{0, -1, 0};        ///< Unit, the way that the light goes. All but Point.
     double cone_angle_deg = 30;       ///< Spot: from the axis to the edge.
     double penumbra_deg = 5;          ///< Spot: the outer part of that angle, where the light falls to 0.
     double angular_diameter_deg = 0.53;  ///< Sun.
+    std::shared_ptr<const IesProfile> ies{};  ///< Ies. Not black.
+    /// Ies: where the horizontal angle 0 is; Beam: along the slit's width. Unit, perpendicular to the
+    /// direction.
+    Vec3d across{1, 0, 0};
+    double radius = 1;             ///< Beam: of its disk; or 0: a slit of
+    double width = 0, height = 0;  ///< this size.
     SourcePlace place;
 };
 

@@ -52,7 +52,9 @@ std::vector<Light> lightsOf(const Scene& scene) {
         if (const double brightest = light.strength * light.spectrum.max(); brightest > 0)
             lights.push_back({brightest, fmt::format("'{}'", light.name), light.place,
                               light.type == PointLightType::Sun           ? "radiance"
-                              : light.type == PointLightType::Directional ? "irradiance"
+                              : light.type == PointLightType::Directional ||
+                                      light.type == PointLightType::Beam
+                                  ? "irradiance"
                                                                           : "radiant intensity"});
     if (scene.environment) add(scene.environment->radiance.max(), "the environment", {scene.file});
     return lights;

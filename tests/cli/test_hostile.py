@@ -408,6 +408,34 @@ def scene_cases():
         (f"[{bulb}]\nintegrator: {{nee: false}}", "found by light sampling alone"),
     ):
         scene(f"lights: {text}".replace("\n", ", "), GOOD + f"lights: {text}\n", words=words)
+    ies = "IESNA91\nTILT=NONE\n1 1 1 2 1 1 1 0 0 0\n1 1 1\n0 90\n0\n2 1\n"
+    for asked, data, words in (
+        ("an empty IES file", "", "no line 'TILT='"),
+        ("an IES file that is a picture", "\x89PNG" * 99, "no line 'TILT='"),
+        ("an IES file cut short", ies[:-4], ("lamp.ies:6", "the file ends where")),
+        ("an IES file of a thousand million values", ies.replace("2 1 1 1", "9999 9999 1 1"), "too short"),
+        ("an IES file with a negative count", ies.replace("2 1 1 1", "-2 1 1 1"), "whole number"),
+        ("an IES file of type B", ies.replace("2 1 1 1", "2 1 2 1"), "type B"),
+        ("an IES file with angles that fall", ies.replace("0 90", "90 0"), ("lamp.ies:5", "must increase")),
+        ("an IES file with an infinite candela", ies.replace("2 1\n", "2 inf\n"), "found 'inf'"),
+        ("an IES file without light", ies.replace("0\n2 1\n", "0\n0 0\n"), "no light in any direction"),
+    ):
+        scene(
+            asked,
+            GOOD + "lights: [{type: ies, position: [0, 0, 1], file: lamp.ies}]\n",
+            words=words,
+            files={"lamp.ies": data.encode("latin-1")},
+        )
+    for light, words in (
+        ("{type: ies, position: [0, 0, 1]}", "'file' is missing"),
+        ("{type: ies, position: [0, 0, 1], file: missing.ies}", "missing.ies"),
+        ("{type: ies, position: [0, 0, 1], file: .}", "directory"),
+        ("{type: beam, position: [0, 0, 1], direction: [0, 0, -1], irradiance: 1}", "needs radius or size"),
+        ("{type: beam, position: [0, 0, 1], direction: [0, 0, -1], radius: 1e30, irradiance: 1}", "wide"),
+        ("{type: beam, position: [0, 0, 1], direction: [0, 0, -1], size: [1, 0], power_w: 1}", "above 0"),
+        ("{type: beam, position: [0, 0, 1], direction: [0, 0, 0], radius: 1, power_w: 1}", "length 0"),
+    ):
+        scene(f"lights: [{light}]", GOOD + f"lights: [{light}]\n", words=words)
     scene(
         "a light at 1e30 scene units",
         GOOD + f"lights: [{bulb.replace('[0, 0, 1]', '[1e30, 0, 0]')}]\n",

@@ -69,7 +69,7 @@ def main() -> int:
             # Twice, so that a missing include guard shows.
             unit = pathlib.Path(scratch) / (header.stem + suffix)
             unit.write_text(f'#include "kernel/{header.name}"\n#include "kernel/{header.name}"\n')
-            for mask in ([], ["-DCRT_FEATURES=0u"]):
+            for mask in ([], ["-DCRT_FEATURES=0ul"]):
                 command = [compiler, *options, *mask, "-I", str(folder.parent), str(unit)]
                 result = subprocess.run(command, capture_output=True, text=True, check=False)
                 ok = result.returncode == 0

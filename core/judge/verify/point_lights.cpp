@@ -1,14 +1,21 @@
 // Group E, the part about lights without a surface: points, spots, directional lights and suns.
+#include "base/temporary_folder.h"
+#include "base/vec3d.h"
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
+#include "judge/verify/shapes.h"
 
 #include "kernel/features.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
+#include <fstream>
 #include <numbers>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 namespace crt::verify {
 namespace {
@@ -251,6 +258,251 @@ void allTogether(Context& context) {
     }
 }
 
+/// ∫ȳ dλ, nm, and what it makes of watts.
+constexpr double kLumens_W = 683.002 * 106.857;
+
+std::string listed(const std::vector<double>& values) {
+    std::string text;
+    for (const double value : values) text += fmt::format("{:.9g}\n", value);
+    return text;
+}
+
+/// An LM-63 file.
+std::string iesFile(const std::vector<double>& vertical, const std::vector<double>& horizontal,
+                    const std::vector<double>& candela, const std::string& tilt = "NONE") {
+    return fmt::format(
+        "IESNA:LM-63-2002\n[TEST] none\nTILT={}\n1 -1 2 {} {} 1 2 0 0 0\n0.5 1 20\n{}{}{}", tilt,
+        vertical.size(), horizontal.size(), listed(vertical), listed(horizontal), listed(candela));
+}
+
+/// Between the angles of a file that goes all round, in degrees.
+double candelaAt(const std::vector<double>& vertical, const std::vector<double>& horizontal,
+                 const std::vector<double>& candela, double theta, double phi) {
+    const auto before = [](const std::vector<double>& angles, double x) {
+        std::size_t i = 0;
+        while (i + 2 < angles.size() && angles[i + 1] <= x) ++i;
+        return i;
+    };
+    const std::size_t v = before(vertical, theta), h = before(horizontal, phi);
+    const double t = (theta - vertical[v]) / (vertical[v + 1] - vertical[v]),
+                 s = (phi - horizontal[h]) / (horizontal[h + 1] - horizontal[h]);
+    const auto at = [&](std::size_t column, std::size_t row) {
+        return candela[column * vertical.size() + row];
+    };
+    return (1 - s) * ((1 - t) * at(h, v) + t * at(h, v + 1)) +
+           s * ((1 - t) * at(h + 1, v) + t * at(h + 1, v + 1));
+}
+
+void iesLamps(Context& context) {
+    const TemporaryFolder folder;
+    const auto lamp = [&](const std::string& text, const std::string& more) {
+        static int number = 0;
+        const std::string path = fmt::format("{}/{}.ies", folder.path(), number++);
+        std::ofstream(path) << text;
+        return fmt::format("{{type: ies, file: '{}', spectrum: 1, {}}}", path, more);
+    };
+    constexpr double h = 1.5;
+    const std::string above = fmt::format("position: [0, {}, 0]", h);
+    // One that has no symmetry, hanging: c0 is +z and, counter-clockwise from above, c90 is +x.
+    const std::vector<double> vertical{0, 20, 55, 90}, round{0, 80, 190, 250, 360},
+        candela{900, 500, 300, 20, 900, 800, 100, 10, 900, 100, 700, 50, 900, 300, 200, 90,
+                900, 500, 300, 20};
+    const std::string turned = lamp(iesFile(vertical, round, candela), above + ", c0: [0.2, 5, 3]");
+    for (const auto& [x, z] :
+         {std::pair{0.7, -0.4}, {-0.3, 1.1}, {1.9, 0.2}, {-1.0, -1.3}, {0.01, 0.02}}) {
+        const double d2 = h * h + x * x + z * z;
+        const double theta = std::atan2(std::hypot(x, z), h) / radians(1);
+        const double zero = std::atan2(0.2, 3);  // of +x from +z: the part of c0 across
+        const auto phi = [&](double sense) {
+            const double angle = sense * (std::atan2(x, z) - zero) / radians(1);
+            return std::fmod(angle + 720, 360);
+        };
+        const auto expected = [&](double sense) {
+            return candelaAt(vertical, round, candela, theta, phi(sense)) / kLumens_W * h /
+                   (d2 * std::sqrt(d2));
+        };
+        irradiance(context, fmt::format("a lamp without symmetry, at ({}, {})", x, z),
+                   floorUnder(turned, x, z), expected(1), 2e-5,
+                   {{expected(-1), "horizontal angles go the other way round"},
+                    {expected(1) * 2, "the ballast factor is not applied"}});
+    }
+    // What is left out because it is symmetric, and what it stands for.
+    const std::vector<double> q{500, 400, 300, 500, 200, 100, 500, 50, 20};  // 0, 30 and 90 degrees
+    const auto column = [&q](std::size_t i) {
+        return std::vector<double>{q[3 * i], q[3 * i + 1], q[3 * i + 2]};
+    };
+    const auto columns = [&](const std::vector<std::size_t>& which) {
+        std::vector<double> all;
+        for (const std::size_t i : which)
+            for (const double value : column(i)) all.push_back(value);
+        return all;
+    };
+    const std::vector<double> three{0, 45, 90};
+    const std::vector<double> whole_angles{0, 30, 90, 150, 180, 210, 270, 330, 360};
+    const std::vector<double> whole = columns({0, 1, 2, 1, 0, 1, 2, 1, 0});
+    const struct {
+        const char* name;
+        std::vector<double> angles, values;
+    } symmetric[] = {{"a quadrant", {0, 30, 90}, columns({0, 1, 2})},
+                     {"a half", {0, 30, 90, 150, 180}, columns({0, 1, 2, 1, 0})},
+                     {"a half across", {90, 150, 180, 210, 270}, columns({2, 1, 0, 1, 2})}};
+    for (const auto& [x, z] : {std::pair{0.7, -0.4}, {-0.8, 0.3}, {-0.2, -0.9}}) {
+        const Film expected =
+            context.render(floorUnder(lamp(iesFile(three, whole_angles, whole), above), x, z).yaml());
+        for (const auto& file : symmetric)
+            context.sameBits(
+                fmt::format("{}, written out, at ({}, {})", file.name, x, z),
+                context.render(
+                    floorUnder(lamp(iesFile(three, file.angles, file.values), above), x, z).yaml()),
+                expected, "lateral symmetry is taken for another");
+    }
+    irradiance(context, "beyond the last vertical angle",
+               floorUnder(lamp(iesFile({90, 180}, {0}, {100, 100}), above), 0.5, 0), 0, 0);
+    irradiance(context, "upside down, it shines there",
+               floorUnder(lamp(iesFile({90, 180}, {0}, {100, 100}), above + ", direction: [0, 1, 0]"), 0.5,
+                          0),
+               100 / kLumens_W * h / std::pow(h * h + 0.25, 1.5), 2e-5);
+
+    // All of it falls on the square: 40 degrees at most.
+    const std::vector<double> narrow{0, 10, 40, 90}, sides{0, 90, 360};
+    const std::vector<double> aslant{700, 500, 0, 0, 700, 900, 0, 0, 700, 500, 0, 0};
+    const std::string text = iesFile(narrow, sides, aslant, "INCLUDE\n1\n2\n0 90\n1 0.9");
+    constexpr double kArea = 16;
+    for (const auto& [what, key, lumens] :
+         {std::tuple{"800 lm asked for", ", luminous_flux_lm: 800", 800.0},
+          std::tuple{"10 W of a flat spectrum", ", power_w: 10", 10.0 / 470 * kLumens_W}})
+        context.estimate(fmt::format("a lamp of {}", what),
+                         squareUnder(lamp(text, fmt::format("position: [0, 2, 0]{}", key))), luminance,
+                         lumens / (kLumens_W * kPi * kArea), 0.003,
+                         {.samples = 64, .most = 16384});
+    // ∫∫ I sin θ dθ dφ, by midpoints.
+    double flux = 0;
+    constexpr int kSteps = 720;
+    for (int i = 0; i < kSteps; ++i)
+        for (int k = 0; k < kSteps; ++k) {
+            const double theta = (i + 0.5) * 90 / kSteps, phi = (k + 0.5) * 360 / kSteps;
+            flux += candelaAt(narrow, sides, aslant, theta, phi) * std::sin(radians(theta)) *
+                    radians(90.0 / kSteps) * radians(360.0 / kSteps);
+        }
+    context.estimate("a lamp as its file has it, halved",
+                     squareUnder(lamp(text, "position: [0, 2, 0], scale: 0.5")), luminance,
+                     flux / 2 / (kLumens_W * kPi * kArea), 0.003, {.samples = 64, .most = 16384});
+}
+
+void beams(Context& context) {
+    // Down, aslant; the middle meets the floor at (0.6, 0.3).
+    const Vec3d way = Vec3d{0.3, -1, 0.15} * (1 / std::sqrt(0.09 + 1 + 0.0225));
+    const double cosine = -way[1];
+    const std::string aslant = "type: beam, position: [0, 2, 0], direction: [0.3, -1, 0.15], irradiance: 2";
+    // Along x a floor's point is nearer to the axis than it is from the middle.
+    const auto off = [&](double x, double z) {
+        const Vec3d d{x, -2, z};
+        const double along = d[0] * way[0] + d[1] * way[1] + d[2] * way[2];
+        return std::sqrt(std::max(0.0, d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along));
+    };
+    const std::string disk = "{" + aslant + ", radius: 0.25}";
+    for (const auto& [x, z] : {std::pair{0.6, 0.3},
+                               {0.7, 0.2},
+                               {0.6, 0.54},
+                               {0.6, 0.56},
+                               {0.35, 0.3},
+                               {0.33, 0.3},
+                               {-0.6, -0.3}}) {
+        const bool inside = off(x, z) < 0.25;
+        irradiance(context, fmt::format("a disk, at ({}, {}), {}", x, z, inside ? "within" : "out"),
+                   floorUnder(disk, x, z), inside ? 2 * cosine : 0, inside ? 1e-5 : 0,
+                   {{2, "the cosine is missing"}, {2 * cosine / 5, "it falls off with distance"}});
+    }
+    irradiance(context, "before it begins",
+               floorUnder("{type: beam, position: [0, -1, 0], direction: [0, -1, 0], irradiance: 2, "
+                          "radius: 1}",
+                          0.2, 0),
+               0, 0);
+    irradiance(context, "behind a screen",
+               floorUnder(disk, 0.6, 0.3).quad("screen", "[[0,1,-1],[1,1,-1],[1,1,1],[0,1,1]]", "white"), 0,
+               0);
+    irradiance(context, "before a screen",
+               floorUnder(disk, 0.6, 0.3).quad("screen", "[[-1,3,-1],[1,3,-1],[1,3,1],[-1,3,1]]", "white"),
+               2 * cosine, 1e-5);
+    const std::string slit =
+        "{type: beam, position: [0.1, 2, 0], direction: [0, -1, 0], up: [0, 0.3, 1], size: [0.04, 0.5], "
+        "irradiance: 3}";
+    for (const auto& [x, z] : {std::pair{0.1, 0.0}, {0.119, 0.249}, {0.081, -0.249}})
+        irradiance(context, fmt::format("a slit, at ({}, {}), within", x, z), floorUnder(slit, x, z), 3,
+                   1e-5);
+    for (const auto& [x, z] : {std::pair{0.121, 0.0}, {0.1, 0.251}, {0.079, -0.1}})
+        irradiance(context, fmt::format("a slit, at ({}, {}), out", x, z), floorUnder(slit, x, z), 0, 0,
+                   {{3, "width and height are exchanged"}});
+    context.estimate("a disk of 470 W, all of it on the floor",
+                     squareUnder("{type: beam, position: [0.1, 1, 0], direction: [0.1, -1, 0.2], "
+                                 "radius: 0.7, power_w: 470, spectrum: 1}"),
+                     meanRadiance, 1 / (kPi * 16), 0.003, {.samples = 256, .most = 16384});
+    context.estimate("a slit of 900 lm of 2700 K, all of it on the floor",
+                     squareUnder("{type: beam, position: [0.1, 1, 0], direction: [0.1, -1, 0.2], "
+                                 "size: [0.5, 1.3], luminous_flux_lm: 900, spectrum: {blackbody: 2700}}"),
+                     luminance, 900 / (kLumens_W * kPi * 16), 0.003, {.samples = 256, .most = 16384});
+}
+
+/// Sixty lamps, twenty points and a directional light over a floor: what each brings, added up.
+void manyLights(Context& context) {
+    Dice dice(26);
+    constexpr double x = 0.2, z = -0.3;
+    constexpr const char* kChance = "{max_depth: 1, roulette: false, nee: false}";
+    for (const char* const integrator : {kDirect, "{max_depth: 1, roulette: false, mis: false}", kChance}) {
+        const bool chance = integrator == kChance;
+        std::string points = "{type: directional, direction: [0.3, -1, 0.2], irradiance: 0.5}";
+        double sum = 0.5 / std::sqrt(1.13), brightest = 0;
+        std::vector<std::pair<std::string, double>> lamps;
+        std::vector<std::vector<Vec3d>> quads;
+        for (int i = 0; i < 60; ++i) {
+            // In a layer, so that none hides another; of all sizes, and turned away a little or wholly.
+            const Vec3d at{-1.75 + 0.5 * (i % 8), 1 + 0.001 * i, -1.75 + 0.5 * (i / 8)};
+            const double side = chance ? 0.2 : std::pow(10, dice.uniform(-2.5, -0.8));
+            const Vec3d a = unit(Vec3d{1, dice.uniform(-0.3, 0.3), 0}) * side,
+                        b = unit(Vec3d{0, dice.uniform(-0.3, 0.3), 1}) * side;
+            const double power = std::pow(10, dice.uniform(-1, 1)), radiance = power / (side * side);
+            const bool up = i % 7 == 0;
+            const std::vector<Vec3d> quad = up ? std::vector<Vec3d>{at, at + b, at + a + b, at + a}
+                                               : std::vector<Vec3d>{at, at + a, at + a + b, at + b};
+            quads.push_back(quad);
+            const bool both = i % 14 == 0;
+            const double brings =
+                up && !both ? 0 : kPi * radiance * polygonFormFactor({x, 0, z}, {0, 1, 0}, quad);
+            sum += brings;
+            brightest = std::max(brightest, brings);
+            lamps.emplace_back(both ? ", two_sided: true" : "", radiance);
+        }
+        for (int i = 0; i < 20 && !chance; ++i) {
+            const Vec3d at{dice.uniform(-2, 2), 0.75 + 0.01 * i, dice.uniform(-2, 2)};
+            const double intensity = std::pow(10, dice.uniform(-1, 0.5));
+            points += fmt::format(", {{type: point, position: [{}, {}, {}], radiant_intensity: {}}}", at[0],
+                                  at[1], at[2], intensity);
+            const Vec3d d = at - Vec3d{x, 0, z};
+            sum += intensity * d[1] / std::pow(dot(d, d), 1.5);
+        }
+        if (chance) sum -= 0.5 / std::sqrt(1.13);
+        // From below the lamps, lest they hide the floor.
+        Stage stage(fmt::format("{{position: [{}, 0.5, {}], target: [{}, 0, {}], fov: 0.0001}}", x + 0.4, z,
+                                x, z),
+                    integrator);
+        if (!chance) stage.set("lights", "[" + points + "]");
+        stage.material("white", "{type: diffuse, reflectance: 1}")
+            .material("black", "{type: diffuse, reflectance: 0}")
+            .quad("floor", "[[-4,0,-4.1],[-4,0,3.9],[4,0,3.9],[4,0,-4.1]]", "white");
+        for (std::size_t i = 0; i < quads.size(); ++i) {
+            std::string corners;
+            for (const Vec3d& v : quads[i])
+                corners += fmt::format("{}[{:.9g}, {:.9g}, {:.9g}]", corners.empty() ? "" : ", ", v[0],
+                                       v[1], v[2]);
+            stage.quad(fmt::format("lamp {}", i), "[" + corners + "]", "black",
+                       fmt::format("{:.9g}{}", lamps[i].second, lamps[i].first));
+        }
+        context.estimate(fmt::format("many lights, {}", integrator), stage.yaml(), meanRadiance, sum / kPi,
+                         0.004, {.samples = 1024, .most = 65536},
+                         {{(sum - brightest) / kPi, "the brightest lamp is never chosen"}});
+    }
+}
+
 }  // namespace
 
 std::vector<Case> pointLightCases() {
@@ -277,6 +529,20 @@ std::vector<Case> pointLightCases() {
             "the sum of what each brings", "linearity of light, closed forms", "± 0.3 %", Level::Commit,
             kLit | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT,
             allTogether),
+        row("E24", "ies",
+            "Lamps of IES files: without symmetry, quadrants and halves, by candelas, lumens and watts",
+            "I(θ, φ) cos θ / d², linear in both angles; the flux",
+            "bilinear interpolation, ∫∫ I sin θ dθ dφ",
+            "2e-5; same bits; ± 0.3 %", Level::Commit, kLit, iesLamps),
+        row("E26", "light-tree",
+            "Sixty lamps, twenty points and a directional light over a floor: with light sampling, with it "
+            "alone, and by chance",
+            "the sum of what each brings", "linearity of light, closed forms", "± 0.4 %", Level::Commit,
+            kLit | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_LIGHT_TREE, manyLights),
+        row("E25", "beam",
+            "Disks and slits of collimated light: within, out, behind screens and before they begin",
+            "E cos θ within, 0 without; the flux", "closed forms", "1e-5; ± 0.3 %", Level::Commit, kLit,
+            beams),
     };
 }
 

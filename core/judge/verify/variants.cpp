@@ -109,8 +109,28 @@ std::vector<Variant> variants(int resolution) {
             light.type = type;
             s.point_lights.push_back(light);
         }
-        s.point_lights.back().angular_diameter_deg = 10;
-        s.point_lights.back().strength = 8;
+        PointLight& sun = s.point_lights.back();
+        sun.angular_diameter_deg = 10;
+        sun.strength = 8;
+    });
+    add("IES lamps and beams", [](Scene& s) {
+        PointLight light;
+        light.spectrum = constantSpectrum(1);
+        light.position = {0.5, 0.5, 0.125};
+        light.direction = {0, 0, 1};
+        light.strength = 0.5;
+        light.type = PointLightType::Ies;
+        light.ies = std::make_shared<IesProfile>(
+            IesProfile{{0, 45, 90}, {0, 90, 180, 360}, {2, 1, 0, 2, 2, 0, 2, 0, 0, 2, 1, 0}});
+        s.point_lights.push_back(light);
+        light.type = PointLightType::Beam;
+        light.radius = 0.125;
+        light.strength = 2;
+        s.point_lights.push_back(light);
+        light.radius = 0;
+        light.width = light.height = 0.25;
+        light.position = {0.25, 0.75, 0.125};
+        s.point_lights.push_back(light);
     });
     add("textures", [](Scene& s) {
         Texture checker;
@@ -160,6 +180,15 @@ std::vector<Variant> variants(int resolution) {
         sky.rows = 32;
         s.environment->sky = sky;
         s.environment->light_sampling = true;
+    });
+    add("many lights", [](Scene& s) {
+        for (int i = 0; i < 24; ++i) {
+            const double x = 0.125 + 0.125 * (i % 6), z = 0.125 + 0.1875 * (i / 6);
+            Mesh mesh;
+            addTriangle(mesh, {x, 0.75, z}, {x + 0.03125, 0.75, z},
+                        {x, 0.75 + 0.015625 * (i % 3), z + 0.0625});
+            addObject(s, std::move(mesh), diffuse(0.5), 1.0 + i, i % 2 == 0);
+        }
     });
     add("a spectral film", [](Scene& s) {
         s.film.spectral = {{380, 780, 16}, {{"flint", flint()}, {"flat", constantSpectrum(1)}}, false};

@@ -6,7 +6,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <memory>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 namespace crt {
@@ -39,11 +42,92 @@ void readCone(const SectionReader& section, PointLight& light) {
     light.penumbra_deg = light.cone_angle_deg;
 }
 
+/// The part of `wanted` across the direction: where an IES lamp's horizontal angle 0 is, or a slit's height.
+std::optional<Vec3d> acrossDirection(const Vec3d& wanted, const Vec3d& direction) {
+    constexpr double kParallel = 1e-6;  // Sine of the angle below which what is left is rounding.
+    const std::optional<Vec3d> unit = unitVector(wanted);
+    if (!unit) return std::nullopt;
+    const Vec3d across = *unit - direction * dot(*unit, direction);
+    return dot(across, across) > kParallel * kParallel ? unitVector(across) : std::nullopt;
+}
+
+/// Of the key, or the first of two defaults that is not along the direction.
+Vec3d readAcross(const SectionReader& section, std::string_view key, const Vec3d& usual,
+                 const Vec3d& direction) {
+    Vec3d wanted{};
+    if (section.read(key, wanted)) {
+        if (const std::optional<Vec3d> across = acrossDirection(wanted, direction)) return *across;
+        section.error(key, fmt::format("'{}' has no part across the direction of the light", key));
+    }
+    const std::optional<Vec3d> across = acrossDirection(usual, direction);
+    return across ? *across : *acrossDirection({0, 0, 1}, direction);
+}
+
+void readIes(const SectionReader& section, SceneFiles& files, PointLight& light) {
+    readDirection(section, light);
+    light.across = readAcross(section, "c0", {1, 0, 0}, light.direction);
+    // Something to go on with, where the file is wrong.
+    light.ies = std::make_shared<IesProfile>(IesProfile{{0, 180}, {0}, {1, 1}});
+    std::string name;
+    if (!section.read("file", name)) return;
+    const std::optional<std::string> path = files.locate(name, section.place("file"), section.diagnostics());
+    if (!path) return;
+    files.note(*path);
+    try {
+        auto profile = std::make_shared<IesProfile>(readIesFile(*path));
+        if (luminousFlux_lm(*profile) > 0)
+            light.ies = std::move(profile);
+        else
+            section.error("file", fmt::format("'{}' has no light in any direction", name));
+    } catch (const Error& error) {
+        if (error.kind() == ErrorKind::Internal) throw;
+        section.error("file", sentenceWithPlace(error));
+    }
+}
+
+void readBeam(const SectionReader& section, PointLight& light) {
+    readDirection(section, light);
+    std::vector<double> size;
+    if (section.read("size", size)) {
+        light.radius = 0;
+        light.width = size[0];
+        light.height = size[1];
+    } else {
+        section.read("radius", light.radius);
+    }
+    if (section.has("up") && light.radius > 0)
+        section.error("up", "a disk has no height; 'up' is of a slit, which has a 'size'");
+    light.across = cross(light.direction, readAcross(section, "up", {0, 1, 0}, light.direction));
+}
+
+double beamArea(const PointLight& light) {
+    return light.radius > 0 ? std::numbers::pi * light.radius * light.radius : light.width * light.height;
+}
+
+/// An IES lamp's brightness is that of its file, but for what the scene says.
+void readIesBrightness(const SectionReader& section, PointLight& light) {
+    const double lumens = photometric(light.spectrum);
+    if (!(lumens > 0))
+        return section.error(section.has("spectrum") ? "spectrum" : "file",
+                             "this spectrum has no light that candelas measure");
+    double scale = 1, amount = 0;
+    section.read("scale", scale);
+    const double flux_lm = luminousFlux_lm(*light.ies);
+    if (section.read("luminous_flux_lm", amount)) scale = amount / flux_lm;
+    if (section.read("power_w", amount))
+        scale = amount * lumens / (integralOverWavelengths(light.spectrum) * flux_lm);
+    light.strength =
+        scale * *std::max_element(light.ies->candela.begin(), light.ies->candela.end()) / lumens;
+}
+
 /// What the amounts of a light measure: `flux_sr` is radiant flux over radiant intensity.
 double unitOf(const PointLight& light, std::string_view key) {
     const double flux_sr = light.type == PointLightType::Spot
                                ? spotSolidAngle_sr(light.cone_angle_deg, light.penumbra_deg)
                                : 4 * std::numbers::pi;
+    if (light.type == PointLightType::Beam)
+        return (key == "power_w" ? integralOverWavelengths(light.spectrum) : photometric(light.spectrum)) *
+               (key == "illuminance_lx" ? 1 : beamArea(light));
     if (key == "power_w") return flux_sr * integralOverWavelengths(light.spectrum);
     if (key == "luminous_flux_lm") return flux_sr * photometric(light.spectrum);
     if (key == "luminous_intensity_cd" || light.type == PointLightType::Directional)
@@ -64,6 +148,7 @@ void readBrightness(const SectionReader& section, SpectrumReader& spectra, Point
     if (std::optional<Spectrum> spectrum = spectra.read(section, "spectrum", SpectrumUse::Emission))
         light.spectrum = *std::move(spectrum);
     if (section.diagnostics().count() != errors) return;
+    if (light.type == PointLightType::Ies) return readIesBrightness(section, light);
     for (const char* key : {"power_w", "luminous_flux_lm", "luminous_intensity_cd", "illuminance_lx"}) {
         double amount = 0;
         if (section.schema().find(key) == nullptr || !section.read(key, amount)) continue;
@@ -89,7 +174,8 @@ void checkFound(const SectionReader& section, const PointLight& light,
 
 }  // namespace
 
-void readLights(const YamlNode& list, Diagnostics& out, SpectrumReader& spectra, Scene& scene) {
+void readLights(const YamlNode& list, Diagnostics& out, SceneFiles& files, SpectrumReader& spectra,
+                Scene& scene) {
     for (std::size_t i = 0; i < list.items.size(); ++i) {
         const YamlNode& node = *list.items[i];
         const YamlEntry* name = node.find("name");
@@ -109,6 +195,8 @@ void readLights(const YamlNode& list, Diagnostics& out, SpectrumReader& spectra,
         if (light.type == PointLightType::Spot || light.type == PointLightType::Directional)
             readDirection(*section, light);
         if (light.type == PointLightType::Spot) readCone(*section, light);
+        if (light.type == PointLightType::Ies) readIes(*section, files, light);
+        if (light.type == PointLightType::Beam) readBeam(*section, light);
         if (light.type == PointLightType::Sun) {
             section->read("angular_diameter_deg", light.angular_diameter_deg);
             if (const std::optional<Vec3d> sun = readTowardsSun(*section, light.angular_diameter_deg))

@@ -7,6 +7,7 @@
 namespace crt {
 
 /// Reads the list `lights`. The scene's integrator must have been read: it decides what can shine.
-void readLights(const YamlNode& list, Diagnostics& out, SpectrumReader& spectra, Scene& scene);
+void readLights(const YamlNode& list, Diagnostics& out, SceneFiles& files, SpectrumReader& spectra,
+                Scene& scene);
 
 }  // namespace crt

@@ -127,6 +127,66 @@ void addLights(std::vector<SectionSchema>& all) {
           {KeyRule::Kind::ExactlyOne, kIntensities},
           noSpectrumBeside("radiant_intensity")}});
     all.push_back(
+        {"light/ies",
+         "an IES light",
+         "A lamp as measured: a point whose intensity by direction is that of an IES file (LM-63 of 1986 to "
+         "2019, photometry of type C, TILT=NONE or INCLUDE, which is not applied), linear in both angles "
+         "between those of the file. Candelas are those of the file with its multiplier and ballast "
+         "factors.",
+         {nameKey(), typeKey("ies"), positionKey(),
+          {.name = "file",
+           .required = true,
+           .doc = "The IES file; looked up beside the scene, then in CRT_MESH_PATH."},
+          vectorKey("direction",
+                    "Where the vertical angle 0 is: down, for a lamp that hangs as measured; any length but "
+                    "0. `[0, -1, 0]` when left out."),
+          vectorKey("target", "Or a point there.", "scene units"),
+          vectorKey("c0",
+                    "Where the horizontal angle 0 is; what goes along the direction does not count. Further "
+                    "angles go counter-clockwise as seen from behind the lamp. `[1, 0, 0]`, or `[0, 0, 1]` "
+                    "where that is the direction, when left out."),
+          amountKey("scale", "", "Times the candelas of the file; 1 when left out."),
+          amountKey("luminous_flux_lm", "lm", "Or what all of the light is to be."),
+          amountKey("power_w", "W", "Or its radiant flux, from 360 to 830 nm."), spectrumKey()},
+         {{KeyRule::Kind::AtMostOne, {"direction", "target"}},
+          {KeyRule::Kind::AtMostOne, {"scale", "luminous_flux_lm"}},
+          {KeyRule::Kind::AtMostOne, {"scale", "power_w"}},
+          {KeyRule::Kind::AtMostOne, {"luminous_flux_lm", "power_w"}}}});
+    all.push_back(
+        {"light/beam",
+         "a beam",
+         "Collimated light: all of it in one direction, from a disk or a slit on, even across it. What lies "
+         "behind where it begins is dark. Light sampling alone finds it, where nothing is in between: glass "
+         "is, and so are mirrors.",
+         {nameKey(), typeKey("beam"),
+          vectorKey("position", "The middle of the disk or slit.", "scene units", true),
+          vectorKey("direction", "The way that the light goes; any length but 0."),
+          vectorKey("target", "Or a point on its axis.", "scene units"),
+          {.name = "radius",
+           .kind = Kind::Number,
+           .range = kPositive,
+           .unit = "scene units",
+           .doc = "Of a disk."},
+          {.name = "size",
+           .kind = Kind::Number,
+           .shape = Shape::List,
+           .count_min = 2,
+           .count_max = 2,
+           .range = kPositive,
+           .unit = "scene units",
+           .doc = "Width and height of a slit."},
+          vectorKey("up",
+                    "The way of a slit's height; what goes along the direction does not count. `[0, 1, 0]`, "
+                    "or `[0, 0, 1]` where that is the direction, when left out."),
+          spectralKey("irradiance", "W·m⁻²·nm⁻¹", "Irradiance of a plane across it."),
+          amountKey("illuminance_lx", "lx", "Illuminance of a plane across it."),
+          amountKey("power_w", "W", "Radiant flux through it, from 360 to 830 nm."),
+          amountKey("luminous_flux_lm", "lm", "Luminous flux through it."), spectrumKey()},
+         {{KeyRule::Kind::ExactlyOne, {"direction", "target"}},
+          {KeyRule::Kind::ExactlyOne, {"radius", "size"}},
+          {KeyRule::Kind::ExactlyOne, {"irradiance", "illuminance_lx", "power_w", "luminous_flux_lm"}},
+          noSpectrumBeside("irradiance")}});
+    all.push_back(
         {"light/directional",
          "a directional light",
          "From infinitely far away, all of it in one direction.",

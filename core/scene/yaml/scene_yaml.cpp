@@ -352,7 +352,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
     ObjectReader objects(out, files, spectra, textures, scene);
     if (const YamlNode* map = top.map("materials")) objects.readMaterials(*map);
     if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
-    if (const YamlNode* list = top.list("lights")) readLights(*list, out, spectra, scene);
+    if (const YamlNode* list = top.list("lights")) readLights(*list, out, files, spectra, scene);
     if (const auto section = top.section("environment", "environment"))
         scene.environment = readEnvironment(*section, spectra, files);
     if (const YamlNode* list = top.list("outputs"))
