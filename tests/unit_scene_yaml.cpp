@@ -818,6 +818,11 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
                                "thin_film: {thickness_nm: 300, ior: 1.3, "
                                "relative_thickness: {checker: [0, 1]}}}"),
                Contains("equally thick everywhere") && Contains("take a dielectric"));
+    CHECK_THAT(refused("materials: {m: {type: dielectric, ior: 1.5, thin_film: {thickness_nm: 300, "
+                       "ior: 1.3, relative_thickness: {checker: [0, 1]}}}}\n"
+                       "objects: [{mesh: {positions: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "
+                       "faces: [[0, 1, 2]]}, material: m}]\n"),
+               Contains("has a texture, but the mesh of object 0 has no texture coordinates"));
     CHECK_THAT(refusedMaterial("{type: plastic, reflectance: 0.5, ior: 0.9}"),
                Contains("'ior' is 0.9; it must be 1 to 10"));
     CHECK_THAT(refusedMaterial("{type: plastic}"), Contains("'reflectance' is missing"));
