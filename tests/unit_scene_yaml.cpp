@@ -114,7 +114,7 @@ TEST_CASE("writing every default of the schema out changes nothing", "[scene_yam
     }
     for (const KeySchema& key : schemaSection("").keys)
         if (!key.fallback.empty()) text += key.name + ": " + key.fallback + "\n", ++written;
-    CHECK(written == 27);
+    CHECK(written == 29);
 
     const Scene a = parse(""), b = parse(text);
     CHECK(a.camera.position == b.camera.position);
@@ -621,7 +621,7 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
           "scene.yaml:3:26: error: unknown key 'reflectence' in material 'white'\n"
           "    3 |   white: {type: diffuse, reflectence: 0.5}\n"
           "      |                          ^~~~~~~~~~~ did you mean 'reflectance'?\n"
-          "      = keys of a diffuse material: type, reflectance");
+          "      = keys of a diffuse material: type, reflectance, normal_map, opacity");
     CHECK_THAT(refused("flim: {}\n"), Contains("scene.yaml:2:1: error: unknown key 'flim' in the scene") &&
                                           Contains("did you mean 'film'?"));
     CHECK_THAT(refused("nee: false\n"),
@@ -631,8 +631,8 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
                Contains("scene.yaml:3:1: error: duplicate key 'title', already given in line 2"));
     CHECK_THAT(refused("materials: {a: {type: difuse}}\n"),
                Contains("scene.yaml:2:23: error: expected one of diffuse, mirror, conductor, "
-                        "rough_conductor, dielectric, rough_dielectric, thin_dielectric, plastic "
-                        "for 'type'") &&
+                        "rough_conductor, dielectric, rough_dielectric, thin_dielectric, plastic, "
+                        "mix, two_sided for 'type'") &&
                    Contains("did you mean 'diffuse'?"));
     CHECK_THAT(refused("materials: {a: {typ: diffuse}}\n"),
                Contains("scene.yaml:2:17: error: unknown key 'typ' in material 'a'") &&
@@ -651,7 +651,7 @@ TEST_CASE("columns count characters, not bytes", "[scene_yaml][refused]") {
     const Error e = refusal("crt: 1\nmaterials: {grün: {refl: 1}}\n");
     CHECK_THAT(e.what(), Contains("scene.yaml:2:19: error: 'type' is missing in material 'grün': one of "
                                   "diffuse, mirror, conductor, rough_conductor, dielectric, "
-                                  "rough_dielectric, thin_dielectric, plastic\n"
+                                  "rough_dielectric, thin_dielectric, plastic, mix, two_sided\n"
                                   "    2 | materials: {grün: {refl: 1}}\n"
                                   "      |                   ^"));
     CHECK(e.place().file == "scene.yaml");
@@ -960,7 +960,7 @@ TEST_CASE("errors in overrides name the argument", "[scene_yaml][override][refus
           "      | film.resolutoin=[1,1]\n"
           "      |      ^~~~~~~~~~ did you mean 'resolution'?\n"
           "      = keys of film: resolution, crop, filter, color_space, "
-          "white_balance, exposure_ev, apply_to_float");
+          "white_balance, exposure_ev, apply_to_float, spectral, responses, normalise_responses");
     CHECK_THAT(refusedOverride(body, "flim.resolution=[1,1]"),
                Contains("--set flim.resolution: error: unknown key 'flim' in the scene") &&
                    Contains("did you mean 'film'?"));
