@@ -1,12 +1,11 @@
 # The rooms of core/: one folder, one target, and the arrows between them.
 #
-#   crt_room(<folder> [COLD] [SOURCES <file>…] [USES <folder>…] [LIBRARIES <target>…]
-#            [HEADERS <file of core/>…])
+#   crt_room(<folder> [SOURCES <file>…] [USES <folder>…] [LIBRARIES <target>…]
+#            [HEADERS <file of core/>…] [COLD <file>…|ALL])
 #
 # makes the static library crt_<folder> (a '/' becomes '_') of core/<folder>, or an interface library where
-# it has headers alone. COLD: nothing in it takes time, and it is compiled for size. HEADERS are further ones
-# that it shows. Its headers are included as
-# "<folder>/<name>.h". Each room has an include root of its own, build/rooms/<target>, which holds links to
+# it has headers alone. HEADERS are further ones that it shows. COLD: files in which nothing takes time; they
+# are compiled for size. Its headers are included as "<folder>/<name>.h". Each room has an include root of its own, build/rooms/<target>, which holds links to
 # its headers and to nothing else: a file sees the headers of the rooms that its own room USES, and of those
 # that these use. So an include against the arrows does not compile. tests/rooms/check_rooms.py draws the
 # arrows, and fails when there is a cycle.
@@ -34,7 +33,7 @@ function(_crt_link_headers target folder)
 endfunction()
 
 function(crt_room folder)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "COLD" "" "SOURCES;USES;LIBRARIES;HEADERS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;USES;LIBRARIES;HEADERS;COLD")
   string(REPLACE "/" "_" name ${folder})
   set(target crt_${name})
   _crt_link_headers(${target} ${folder} ${arg_HEADERS})
@@ -51,8 +50,11 @@ function(crt_room folder)
     add_library(${target} STATIC ${arg_SOURCES})
     target_include_directories(${target} PUBLIC ${PROJECT_BINARY_DIR}/rooms/${target})
     target_link_libraries(${target} PUBLIC ${used} ${arg_LIBRARIES} PRIVATE crt_flags)
-    if(arg_COLD)
+    if(arg_COLD STREQUAL "ALL")
       target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-Os>)
+    elseif(arg_COLD)
+      list(TRANSFORM arg_COLD PREPEND ${PROJECT_SOURCE_DIR}/core/${folder}/)
+      set_source_files_properties(${arg_COLD} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-Os>)
     endif()
   else()
     add_library(${target} INTERFACE)
