@@ -5,10 +5,10 @@
 #
 # makes the static library crt_<folder> (a '/' becomes '_') of core/<folder>, or an interface library where
 # it has headers alone. HEADERS are further ones that it shows. COLD: files in which nothing takes time; they
-# are compiled for size. Its headers are included as "<folder>/<name>.h". Each room has an include root of its own, build/rooms/<target>, which holds links to
-# its headers and to nothing else: a file sees the headers of the rooms that its own room USES, and of those
-# that these use. So an include against the arrows does not compile. tests/rooms/check_rooms.py draws the
-# arrows, and fails when there is a cycle.
+# are compiled for size. Its headers are included as "<folder>/<name>.h". Each room has an include root of
+# its own, build/rooms/<target>, which holds links to its headers and to nothing else: a file sees the
+# headers of the rooms that its own room USES, and of those that these use. So an include against the arrows
+# does not compile. tests/rooms/check_rooms.py draws the arrows, and fails when there is a cycle.
 
 set_property(GLOBAL PROPERTY CRT_ROOMS "")
 
