@@ -15,6 +15,16 @@ typedef struct CrtRayCount {
     u32 closest, shadow;
 } CrtRayCount;
 
+/* Answers what a vertex asked: adds the light that waits where nothing stops its ray. */
+CRT_FN void crt_answer(const CrtContext *ctx, CrtPath *path, const CrtShadow *shadow, CrtRayCount *rays) {
+    int blocked = 0;
+    if (shadow->ray.reach > 0.0f) {
+        rays->shadow += 1u;
+        blocked = crt_trace_any(ctx, shadow->ray);
+    }
+    if (!blocked) path->radiance = path->radiance + shadow->radiance;
+}
+
 /* crt_path_vertex where rays may pass surfaces. One loop traces the path's ray, then the shadow ray: both go
    on until something stops them, and so a shadow ray has to know what it meets first. */
 CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
@@ -42,12 +52,7 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
         alive = crt_shade(ctx, path, hit, &shadow);
         if (!(CRT_HAS(NEE) && shadow.asked)) return alive;
         if (!passable || !(shadow.ray.reach > 0.0f)) {
-            int blocked = 0;
-            if (shadow.ray.reach > 0.0f) {
-                rays->shadow += 1u;
-                blocked = crt_trace_any(ctx, shadow.ray);
-            }
-            if (!blocked) path->radiance = path->radiance + shadow.radiance;
+            crt_answer(ctx, path, &shadow, rays);
             return alive;
         }
         rays->shadow += 1u;
@@ -65,14 +70,7 @@ CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *ra
     CrtShadow shadow;
     rays->closest += 1u;
     const int alive = crt_shade(ctx, path, crt_trace_closest(ctx, path->ray), &shadow);
-    if (CRT_HAS(NEE) && shadow.asked) {
-        int blocked = 0;
-        if (shadow.ray.reach > 0.0f) {
-            rays->shadow += 1u;
-            blocked = crt_trace_any(ctx, shadow.ray);
-        }
-        if (!blocked) path->radiance = path->radiance + shadow.radiance;
-    }
+    if (CRT_HAS(NEE) && shadow.asked) crt_answer(ctx, path, &shadow, rays);
     return alive;
 }
 
