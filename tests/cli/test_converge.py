@@ -33,32 +33,33 @@ class Converging(CliTest):
             return [json.loads(line) for line in file]
 
     def test_a_run_writes_its_files_and_keeps_to_its_time(self):
-        start = time.monotonic()
-        self.crt(
-            "converge",
-            "scene.yaml",
-            "--backends",
-            f"{self.backend},nosuch",
-            "--time",
-            "3s",
-            "--max-spp",
-            "64",
-            "-o",
-            "out",
-            *SMALL,
-        )
-        seconds = time.monotonic() - start
-        for name in ("report.html", "results.jsonl", "results.csv", "summary.json", "manifest.json"):
-            self.assertTrue(os.path.getsize(self.path(f"out/{name}")) > 0, name)
-        rows = self.rows("out")
-        # A slow machine, or a sanitizer, may not reach all in that time.
-        reached = sorted({row["samples_per_pixel"] for row in rows})
-        self.assertEqual(reached, [1, 2, 4, 8, 16, 32, 64][:len(reached)])
-        if len(reached) < 7:
-            self.assertGreater(seconds, 3)
+        # A slow machine, or a sanitizer, may not reach all in the shorter time.
+        for seconds in ("3s", "60s"):
+            folder = f"out_{seconds}"
+            self.crt(
+                "converge",
+                "scene.yaml",
+                "--backends",
+                f"{self.backend},nosuch",
+                "--time",
+                seconds,
+                "--max-spp",
+                "64",
+                "-o",
+                folder,
+                *SMALL,
+            )
+            for name in ("report.html", "results.jsonl", "results.csv", "summary.json", "manifest.json"):
+                self.assertTrue(os.path.getsize(self.path(f"{folder}/{name}")) > 0, name)
+            rows = self.rows(folder)
+            reached = sorted({row["samples_per_pixel"] for row in rows})
+            self.assertEqual(reached, [1, 2, 4, 8, 16, 32, 64][:len(reached)])
+            if len(reached) == 7:
+                break
+        self.assertEqual(len(reached), 7)
         self.assertGreaterEqual(len({row["replicate"] for row in rows}), 16)
         self.assertEqual(len({row["seed"] for row in rows}), len({row["replicate"] for row in rows}))
-        with open(self.path("out/report.html"), encoding="utf-8") as file:
+        with open(self.path(f"{folder}/report.html"), encoding="utf-8") as file:
             self.assertIn("nosuch", file.read())  # What was left out is said.
 
     def test_a_reference_judges_its_own_scene_only(self):
