@@ -1,4 +1,6 @@
 // Checkpoint files: bit for bit there and back, and every kind of damage its own sentence.
+//
+// Over 450 lines: one kind of file, and every kind of damage to it.
 #include "base/log.h"
 #include "catch.h"
 #include "film/checkpoint.h"

@@ -1,5 +1,7 @@
 // Files and report of `crt converge`, on a run that never was: 3 scenes, 2 backends, 2 variants, and
 // everything that can be wrong with them.
+//
+// Over 450 lines: one imagined run, and everything that is written of it.
 #include "base/error.h"
 #include "base/unit_text.h"
 #include "catch.h"

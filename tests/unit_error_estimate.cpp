@@ -1,5 +1,7 @@
 // error_estimate.h: variances against the textbook, intervals against their promised coverage, and the
 // replicates of the Sobol sampler, which must be sequences of their own.
+//
+// Over 450 lines: one estimate, asked for bias, coverage and independence with the same noise.
 #include "film/error_estimate.h"
 #include "film/error_text.h"
 #include "kernel_test.h"

@@ -1,6 +1,8 @@
 // How surfaces scatter and lights are sampled, and which wavelengths a path carries: closed forms, complex
 // arithmetic in long double, chi-squared against the density that is claimed, and expectations that must
 // come out whatever the density.
+//
+// Over 450 lines: densities of many kinds, judged by the same tests of distribution.
 #include "kernel_test.h"
 
 #include <algorithm>

@@ -1,6 +1,8 @@
 // Rays against triangles, alone, eight at a time, through boxes and trees: nothing leaks through an edge,
 // nothing is culled that would be hit, and a ray that leaves a surface meets neither it nor the world behind
 // the wall. An executable of its own, compiled for AVX2 like the kernels of the Embree backend.
+//
+// Over 450 lines: an executable of its own, since it is compiled for another processor.
 #include "kernel_test.h"
 
 #include "compile/bvh_build.h"

@@ -1,5 +1,7 @@
 // Textures: texels against the colours they hold, look-ups against double arithmetic, orientation, what a
 // scene file may say of them, and what OBJ and MTL files bring.
+//
+// Over 450 lines: one scene with a texture, seen by look-ups, files and readers.
 #include "file_bytes.h"
 #include "kernel_test.h"
 

@@ -1,4 +1,7 @@
-"""The page, the plot and the pictures of bench/peers."""
+"""The page, the plot and the pictures of bench/peers.
+
+Over 450 lines: the parts of one page, in the order in which they are read.
+"""
 import math
 import statistics
 

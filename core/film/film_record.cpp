@@ -1,3 +1,4 @@
+// Over 450 lines: what is written of each part stands beside what is read of it.
 #include "film/film_record.h"
 
 #include "base/error.h"

@@ -1,3 +1,4 @@
+// Over 450 lines: short functions, one for each source of a spectrum and each step to a colour.
 #include "spectra/spectra.h"
 
 #include "base/error.h"

@@ -8,14 +8,11 @@ import json
 import os
 import re
 import shutil
-import struct
 import subprocess
-import sys
-import tempfile
 import unittest
 
-import test_cli
-from test_cli import CliTest, read_bytes
+import harness
+from harness import CliTest, read_bytes
 
 BASH, ZSH, FISH, GROFF = (shutil.which(name) for name in ("bash", "zsh", "fish", "groff"))
 COMMANDS = (
@@ -78,7 +75,7 @@ class Completion(CliTest):
         run = subprocess.run(
             [BASH, "-c", program, "bash", "crt", *words],
             cwd=self.directory,
-            env={**test_cli.environment(), "PATH": os.path.dirname(test_cli.CRT) + ":" + os.environ["PATH"]},
+            env={**harness.environment(), "PATH": os.path.dirname(harness.CRT) + ":" + os.environ["PATH"]},
             capture_output=True,
             text=True,
             timeout=60,
@@ -173,7 +170,7 @@ class Plugins(CliTest):
             self.assertFalse(backend["refused"], backend)
 
     def test_json_names_what_was_not_opened(self):
-        plugin = shutil.copy(os.path.join(test_cli.FAKE_DIR, "crt_backend_fake.so"), self.directory)
+        plugin = shutil.copy(os.path.join(harness.FAKE_DIR, "crt_backend_fake.so"), self.directory)
         os.chmod(plugin, 0o777)  # Others could have written it.
         run = self.crt("plugins", "--json", CRT_BACKEND_PATH=self.directory)
         (fake,) = (b for b in json.loads(run.stdout)["backends"] if b["name"] == "fake")
@@ -272,7 +269,7 @@ class Include(CliTest):
             self.assertIn(words, run.stderr)
 
     def test_scenes_that_share_a_room_are_what_they_were_in_one_file(self):
-        self.write("room.yaml", test_cli.SCENE)
+        self.write("room.yaml", harness.SCENE)
         self.write("s.yaml", "crt: 1\ninclude: room.yaml\n")
         for scene in ("scene.yaml", "s.yaml"):
             self.crt(scene, "--backend", "fake", "--report", "none", "-o", scene + ".pfm")
@@ -285,7 +282,7 @@ class Include(CliTest):
 
     def test_no_shipped_scene_repeats_a_table(self):
         seen = {}
-        for folder, _, names in os.walk(test_cli.CONFIG_DIR):
+        for folder, _, names in os.walk(harness.CONFIG_DIR):
             for name in names:
                 if not name.endswith(".yaml"):
                     continue
@@ -299,9 +296,9 @@ class Include(CliTest):
 class StandardStreams(CliTest):
     def stream(self, *arguments, stdin=None, expect=0, **options):
         run = subprocess.run(
-            [test_cli.CRT, *arguments],
+            [harness.CRT, *arguments],
             cwd=self.directory,
-            env=test_cli.environment(),
+            env=harness.environment(),
             input=stdin,
             stdout=options.pop("stdout", subprocess.PIPE),
             stderr=subprocess.PIPE,
@@ -331,13 +328,13 @@ class StandardStreams(CliTest):
             )
 
     def test_a_scene_on_standard_input(self):
-        scene = test_cli.SCENE.encode()
+        scene = harness.SCENE.encode()
         run = self.stream("-", "--backend", "fake", "-o", "-.pfm", stdin=scene)
         self.crt("scene.yaml", "--backend", "fake", "--report", "none", "-o", "a.pfm")
         self.assertEqual(run.stdout, read_bytes(self.path("a.pfm")))
         self.assertIn(b"2 objects", self.stream("info", "-", stdin=scene).stdout)
         # What it includes lies beside the working directory.
-        self.write("room.yaml", test_cli.SCENE)
+        self.write("room.yaml", harness.SCENE)
         run = self.stream("info", "-", stdin=b"crt: 1\ninclude: room.yaml\n")
         self.assertIn(b"2 objects", run.stdout)
 
@@ -376,12 +373,5 @@ class StandardStreams(CliTest):
         self.assertEqual(run.stdout, b"")
 
 
-def main():
-    if len(sys.argv) < 4:
-        sys.exit(__doc__)
-    test_cli.CRT, test_cli.CONFIG_DIR, test_cli.FAKE_DIR = (os.path.abspath(a) for a in sys.argv[1:4])
-    unittest.main(argv=[sys.argv[0], *sys.argv[4:]])
-
-
 if __name__ == "__main__":
-    main()
+    harness.main(__doc__)

@@ -7,12 +7,9 @@ test_converge.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 
 import json
 import os
-import sys
-import time
-import unittest
 
-import test_cli
-from test_cli import CliTest, first_real_backend
+import harness
+from harness import CliTest, first_real_backend
 
 SMALL = ["--set", "film.resolution=[16,16]", "--set", "sampler.type=independent"]
 
@@ -398,7 +395,4 @@ class Converging(CliTest):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 4:
-        sys.exit(__doc__)
-    test_cli.CRT, test_cli.CONFIG_DIR, test_cli.FAKE_DIR = map(os.path.abspath, sys.argv[1:4])
-    unittest.main(argv=sys.argv[:1] + sys.argv[4:])
+    harness.main(__doc__)

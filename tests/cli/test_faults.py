@@ -6,6 +6,8 @@ stays, and the exit code and one sentence say what happened (docs/architecture.m
     test_faults.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 
 Tests that mount a small disk need root and are skipped by name without it. Python's standard library only.
+
+Over 450 lines: one demand, made of one fault after another.
 """
 
 import glob
@@ -14,12 +16,11 @@ import random
 import shutil
 import signal
 import subprocess
-import sys
 import time
 import unittest
 
-import test_cli
-from test_cli import CliTest, environment, read_bytes
+import harness
+from harness import CliTest, read_bytes
 
 
 class KilledAtAnyMoment(CliTest):
@@ -348,7 +349,7 @@ class LostGpu(CliTest):
 
     def setUp(self):
         super().setUp()
-        build = os.path.dirname(os.path.dirname(test_cli.FAKE_DIR.rstrip("/")))
+        build = os.path.dirname(os.path.dirname(harness.FAKE_DIR.rstrip("/")))
         self.driver = os.path.join(build, "tests", "fake_cuda")
         plugins = os.path.join(build, "lib", "crt")
         if not os.path.exists(os.path.join(self.driver, "libcuda.so.1")) or not os.path.exists(
@@ -404,7 +405,7 @@ class Radiance(CliTest):
     rounded in the middle."""
 
     def test_powers_of_two_round_nothing(self):
-        backend = test_cli.first_real_backend()
+        backend = harness.first_real_backend()
         if backend is None:
             self.skipTest("no backend can render light here")
         glass = "materials:\n  glass: {type: dielectric, ior: 1.5}\n"
@@ -413,12 +414,12 @@ class Radiance(CliTest):
             "faces: [[0, 1, 2, 3]]}\n    material: glass\n"
         )
         lamp = "emission: {radiance: {blackbody: 4000, scale: 5}}"
-        self.assertIn(lamp, test_cli.SCENE)
+        self.assertIn(lamp, harness.SCENE)
         images = {}
         for exponent in (0, 83, -83):
             light = f"emission: {{radiance: {2.0 ** exponent!r}}}"
             self.write(
-                "scene.yaml", test_cli.SCENE.replace("materials:\n", glass).replace(lamp, light) + pane
+                "scene.yaml", harness.SCENE.replace("materials:\n", glass).replace(lamp, light) + pane
             )
             self.crt(
                 "scene.yaml",
@@ -432,7 +433,7 @@ class Radiance(CliTest):
                 "none",
                 CRT_BACKEND_PATH="",
             )
-            images[exponent] = test_cli.read_pfm(self.path("a.pfm"))[2]
+            images[exponent] = harness.read_pfm(self.path("a.pfm"))[2]
         self.assertGreater(max(images[0]), 0)
         for exponent in (83, -83):
             self.assertEqual(images[exponent], tuple(value * 2.0 ** exponent for value in images[0]))
@@ -499,5 +500,4 @@ class SignalStorm(CliTest):
 
 
 if __name__ == "__main__":
-    test_cli.CRT, test_cli.CONFIG_DIR, test_cli.FAKE_DIR = map(os.path.abspath, sys.argv[1:4])
-    unittest.main(argv=sys.argv[:1] + sys.argv[4:], verbosity=1)
+    harness.main(__doc__)

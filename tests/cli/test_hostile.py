@@ -6,6 +6,8 @@ memory that the input does not account for, and every file that was there still 
     test_hostile.py CRT FAKE_PLUGIN_DIR [--write docs/results/hostile.md] [--only TEXT] [--slower FACTOR]
 
 The inputs are made here. Python's standard library only.
+
+Over 450 lines: one list of inputs, which docs/results/hostile.md shows in the same order.
 """
 
 import argparse

@@ -7,13 +7,10 @@ the library that wrote them.
 Python's standard library only.
 """
 
-import os
-import sys
-import unittest
 
-import test_cli
+import harness
 from image_headers import exr_header, png_chunks, png_texts
-from test_cli import LIT, CliTest
+from harness import LIT, CliTest
 
 
 class Headers(CliTest):
@@ -128,5 +125,4 @@ class Headers(CliTest):
 
 
 if __name__ == "__main__":
-    test_cli.CRT, test_cli.CONFIG_DIR, test_cli.FAKE_DIR = map(os.path.abspath, sys.argv[1:4])
-    unittest.main(argv=sys.argv[:1] + sys.argv[4:], verbosity=1)
+    harness.main(__doc__)

@@ -15,8 +15,8 @@ import struct
 import sys
 import unittest
 
-import test_cli
-from test_cli import CliTest
+import harness
+from harness import CliTest
 
 SCENE = """crt: 1
 camera: {position: [0, 0, 4], target: [0, 0, 0], fov: 40}
@@ -140,6 +140,6 @@ class CornellBox(CliTest):
 
 
 if __name__ == "__main__":
-    test_cli.CRT, test_cli.CONFIG_DIR, test_cli.FAKE_DIR, REPOSITORY = map(os.path.abspath, sys.argv[1:5])
+    harness.CRT, harness.CONFIG_DIR, harness.FAKE_DIR, REPOSITORY = map(os.path.abspath, sys.argv[1:5])
     BACKEND = sys.argv[5]
     unittest.main(argv=sys.argv[:1] + sys.argv[6:], verbosity=1)

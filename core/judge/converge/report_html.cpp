@@ -1,3 +1,4 @@
+// Over 450 lines: the parts of one page, in the order in which they are read.
 #include "film/error_text.h"
 #include "judge/converge/report_html.h"
 

@@ -1,4 +1,6 @@
 // Group A: scenes whose radiance is known in closed form, or by deterministic quadrature.
+//
+// Over 450 lines: cases, each a scene and its answer, that share nothing with their neighbours.
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"

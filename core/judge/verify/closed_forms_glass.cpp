@@ -1,4 +1,6 @@
 // Group A, the part about smooth interfaces: Fresnel, Snell, the scaling of radiance by n², dispersion.
+//
+// Over 450 lines: cases, each a scene and its answer, that share nothing with their neighbours.
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"

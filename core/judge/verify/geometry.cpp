@@ -1,5 +1,7 @@
 // Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a
 // ray that leaks, or meets what it should not, shows.
+//
+// Over 450 lines: cases, each a scene and its answer, that share nothing with their neighbours.
 #include "judge/verify/probes.h"
 #include "judge/verify/references.h"
 

@@ -1,4 +1,6 @@
 // Group E: lights that are bright, dim, tiny, near, edge-on, many, or nothing.
+//
+// Over 450 lines: cases, each a scene and its answer, that share nothing with their neighbours.
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"

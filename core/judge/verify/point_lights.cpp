@@ -1,4 +1,6 @@
 // Group E, the part about lights without a surface: points, spots, directional lights and suns.
+//
+// Over 450 lines: cases, each a scene and its answer, that share nothing with their neighbours.
 #include "base/temporary_folder.h"
 #include "base/vec3d.h"
 #include "judge/verify/context.h"

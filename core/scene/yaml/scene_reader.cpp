@@ -1,3 +1,4 @@
+// Over 450 lines: one class, with a short function for each kind of value that a key can have.
 #include "base/modules.h"
 #include "scene/yaml/scene_reader.h"
 

@@ -1,0 +1,43 @@
+/// crt-meshgen OUTDIR: writes the meshes that the scenes in this folder use: sphere.obj, ball.obj,
+/// figure.obj, dragon.obj, prism.obj.
+///
+/// They are made rather than shipped: the source says what they are, nothing is downloaded, and every run
+/// writes the same bytes. Sphere and prism are written down directly. Figure and dragon are modelled as
+/// signed distance fields (round bones, joined by a smooth minimum), polygonised by marching tetrahedra,
+/// which always gives a closed surface, and simplified by quadric error to an exact number of triangles. So
+/// triangles are small where the shape is fine and large where it is flat, as in a scan, which is what a BVH
+/// has to be good at.
+///
+/// Every object stands on y = 0, is centred in x and z, has height 1, and faces −z.
+#include "shapes.h"
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <string>
+
+using namespace crt::meshgen;
+
+int main(int argc, char** argv) {
+    const std::string argument = argc == 2 ? argv[1] : "";
+    const bool asks_for_help = argument == "--help" || argument == "-h";
+    if (argument.empty() || argument[0] == '-') {
+        std::fprintf(asks_for_help ? stdout : stderr,
+                     "usage: crt-meshgen OUTDIR\nWrites sphere.obj, ball.obj, figure.obj, dragon.obj and "
+                     "prism.obj into the folder OUTDIR, which is made if need be.\n");
+        return asks_for_help ? 0 : 2;
+    }
+    try {
+        const std::filesystem::path folder = argument;
+        std::filesystem::create_directories(folder);
+        writeObj(sphere(32, 16), folder / "sphere.obj", "sphere of 32 segments and 16 rings");
+        writeObj(sphere(128, 64), folder / "ball.obj", "sphere of 128 segments and 64 rings");
+        writeObj(prism(), folder / "prism.obj", "60 degree prism");
+        writeObj(figure(), folder / "figure.obj", "ape, thinking");
+        writeObj(dragon(), folder / "dragon.obj", "dragon");
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "crt-meshgen: %s\n", error.what());
+        return 6;
+    }
+    return 0;
+}

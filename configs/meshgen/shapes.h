@@ -1,0 +1,25 @@
+/// The meshes that crt-meshgen writes. Each stands on y = 0, is centred in x and z, has height 1 and
+/// faces −z.
+#pragma once
+
+#include "mesh.h"
+
+#include <cstdint>
+
+namespace crt::meshgen {
+
+Mesh sphere(std::uint32_t segments, std::uint32_t rings);
+
+/// A dispersing prism: equilateral section of height 1 in the xy plane, apex up, two units long in z. Its
+/// faces are flat, so it has no normals of its own.
+Mesh prism();
+
+/// An ape sitting on a block of stone and thinking, chin on hand, after the bronze that Hugo Rheinhold made
+/// in 1892.
+Mesh figure();
+
+/// A winged dragon, half coiled, head turned to the viewer. Long and thin in every direction, and as fine in
+/// its scales as it is coarse on its wings.
+Mesh dragon();
+
+}  // namespace crt::meshgen
