@@ -128,6 +128,7 @@ struct Case {
     bool films = false;
     bool lamps = false;
     bool many_lights = false;
+    bool brushed = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -344,6 +345,18 @@ void addFilms(crt::Scene& scene) {
     }
 }
 
+/// Rough surfaces that are rougher one way, each by its own: about coordinates on every other mesh.
+void addBrushes(crt::Scene& scene) {
+    addUvs(scene);
+    for (std::size_t i = 0; i < scene.meshes.size(); i += 2) scene.meshes[i].uv_index.clear();
+    double anisotropy = 0.5;
+    for (crt::Material& m : scene.materials) {
+        m.anisotropy = anisotropy;
+        m.anisotropy_rotation_deg = 100 * anisotropy;
+        anisotropy = anisotropy < 0.9 ? anisotropy + 0.125 : 0.25;
+    }
+}
+
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
     {"{max_depth: 12}", "{type: sobol}", "", "box"},
@@ -382,6 +395,8 @@ const Case kCases[] = {
      false, false, true},
     {"{max_depth: 6}", "{type: sobol}", "", "box", true, kPointLights, true, false, false, false, false,
      false, false, false, true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", false, "", true, false, false, false, false, false, false,
+     false, false, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -428,6 +443,7 @@ crt::Scene sceneOf(const Case& c) {
     if (c.instruments) addInstruments(scene);
     if (c.lamps) addLamps(scene);
     if (c.many_lights) addManyLights(scene);
+    if (c.brushed) addBrushes(scene);
     return scene;
 }
 
@@ -456,7 +472,8 @@ std::vector<Named> allScenes() {
                                  "films",
                                  "films, textures, tree, independent, sampled environment",
                                  "IES lamps and beams",
-                                 "many lights"};
+                                 "many lights",
+                                 "brushed"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

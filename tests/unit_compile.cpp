@@ -215,6 +215,15 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         other(crt::MaterialType::Dielectric)(s);
         film(s, 0);
     });
+    const auto brushed = [&](double roughness) {
+        return [=](Scene& s) {
+            other(crt::MaterialType::RoughConductor)(s);
+            s.materials[1].roughness = roughness;
+            s.materials[1].anisotropy = 0.5;
+        };
+    };
+    seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_ANISOTROPY, 0, brushed(0.5));
+    differs(CRT_FEATURE_ROUGH_CONDUCTOR, 0, brushed(0.01));  // a mirror
     // A pane bends nothing, whatever its index.
     differs(CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
         other(crt::MaterialType::ThinDielectric)(s);
@@ -1014,6 +1023,18 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     filmed("a film on glass", 300, 1.4);
     filmed("its thickness", 301, 1.4);
     filmed("its index", 300, 1.5);
+    const auto brush = [&](const char* what, double anisotropy, double rotation_deg) {
+        differs(what, [=](Scene& s) {
+            makeGlass(s);
+            s.materials[0].type = crt::MaterialType::RoughDielectric;
+            s.materials[0].roughness = 0.5;
+            s.materials[0].anisotropy = anisotropy;
+            s.materials[0].anisotropy_rotation_deg = rotation_deg;
+        });
+    };
+    brush("brushed glass", 0.5, 0);
+    brush("its anisotropy", 0.25, 0);
+    brush("its direction", 0.5, 1);
     glassware("plastic", crt::MaterialType::Plastic, 0, 0);
     glassware("rough plastic", crt::MaterialType::Plastic, 0.5, 0);
     differs("radiance", [](Scene& s) { s.emissions[0].radiance[100] = 3; });

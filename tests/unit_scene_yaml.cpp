@@ -326,6 +326,12 @@ TEST_CASE("spectra in all their forms", "[scene_yaml]") {
     CHECK(bubble.film_index[0] == 1.33);
     CHECK(material("{type: thin_dielectric, ior: 1}").film_thickness_nm == 0);
     CHECK(material("{type: plastic, reflectance: 0.5}").roughness == 0);
+    const Material pan = material(
+        "{type: rough_conductor, metal: Al, roughness: 0.4, roughness_anisotropy: 0.7, "
+        "anisotropy_rotation_deg: 45}");
+    CHECK(pan.anisotropy == 0.7);
+    CHECK(pan.anisotropy_rotation_deg == 45);
+    CHECK(frosted.anisotropy == 0);
     const Material tile = material("{type: plastic, reflectance: 0.5, ior: 1.7, roughness: 0.2}");
     CHECK(tile.eta == constantSpectrum(1.7));
     CHECK(tile.roughness == 0.2);
@@ -823,6 +829,14 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
                        "objects: [{mesh: {positions: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "
                        "faces: [[0, 1, 2]]}, material: m}]\n"),
                Contains("has a texture, but the mesh of object 0 has no texture coordinates"));
+    CHECK_THAT(refusedMaterial("{type: rough_conductor, metal: Al, roughness: 0.5, anisotropy: 0.5}"),
+               Contains("unknown key 'anisotropy'"));
+    CHECK_THAT(refusedMaterial("{type: rough_conductor, metal: Al, roughness: {checker: [0, 1]}, "
+                               "roughness_anisotropy: 0.5}"),
+               Contains("equally rough everywhere") && Contains("give 'roughness' a number"));
+    CHECK_THAT(refusedMaterial("{type: rough_dielectric, ior: 1.5, roughness: 0.5, "
+                               "roughness_anisotropy: 0.5, thin_film: {thickness_nm: 300, ior: 1.3}}"),
+               Contains("as rough in every direction") && Contains("leave 'thin_film'"));
     CHECK_THAT(refusedMaterial("{type: plastic, reflectance: 0.5, ior: 0.9}"),
                Contains("'ior' is 0.9; it must be 1 to 10"));
     CHECK_THAT(refusedMaterial("{type: plastic}"), Contains("'reflectance' is missing"));

@@ -4,6 +4,8 @@
 #include "kernel/features.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace crt {
@@ -74,6 +76,13 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
         record.film_thickness =
             material.film_texture != kNoTexture ? textures.valueOf(material.film_texture) : valueOf(1);
         record.film_index = spectra.valueOf(material.film_index);
+    }
+    if (const Anisotropy a = anisotropyOf(material); a.narrowing > 0) {
+        const double turn = material.anisotropy_rotation_deg * (std::numbers::pi / 180);
+        record.widening = static_cast<float>(a.widening);
+        record.narrowing = static_cast<float>(a.narrowing);
+        record.turn_cos = static_cast<float>(std::cos(turn));
+        record.turn_sin = static_cast<float>(std::sin(turn));
     }
     switch (material.type) {
         case MaterialType::Diffuse:
@@ -161,6 +170,7 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if ((record.flags & CRT_MATERIAL_DISPERSIVE) != 0) part.features |= CRT_FEATURE_DISPERSION;
         if (record.absorption != 0) part.features |= CRT_FEATURE_ABSORPTION;
         if (record.film_thickness != 0) part.features |= CRT_FEATURE_THIN_FILM;
+        if (record.narrowing > 0) part.features |= CRT_FEATURE_ANISOTROPY;
     }
     return part;
 }

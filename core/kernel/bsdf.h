@@ -66,6 +66,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->eta = crt_value(ctx, material.eta, surface, position);
                 b->k = crt_value(ctx, material.k, surface, position);
                 b->alpha = roughness * roughness;
+                if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
                 if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
                 if (b->alpha >= CRT_ALPHA_MIN) {
                     b->losses = crt_losses(ctx, material.loss, roughness, splat4(0.0f), 0u);
@@ -102,6 +103,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->eta = outside ? eta : splat4(1.0f) / eta;
                 b->absorption = material.absorption;
                 b->alpha = roughness * roughness;
+                if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
                 b->lanes = carried / sum4(carried);
                 if (CRT_HAS(THIN_FILM)) {
                     b->k = splat4(0.0f);

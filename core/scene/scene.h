@@ -111,6 +111,9 @@ struct Material {
     Spectrum k;            ///< Conductors: extinction.
     std::optional<Spectrum> absorption;  ///< Dielectric, RoughDielectric. Per scene unit, at least 0.
     double roughness = 0;  ///< Rough kinds, and the coat of Plastic. In [0,1].
+    double anisotropy = 0;  ///< Rough kinds. In [0,1]: how much narrower GGX is across the tangent.
+    double anisotropy_rotation_deg = 0;  ///< From the coordinates' tangent, counter-clockwise seen from
+                                         ///< the outside.
     double film_thickness_nm = 0;  ///< Metals and dielectrics; 0: there is no film.
     Spectrum film_index;           ///< Relative to the outside.
     TextureIndex reflectance_texture = kNoTexture;  ///< In place of the reflectance.

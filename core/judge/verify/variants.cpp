@@ -85,6 +85,15 @@ std::vector<Variant> variants(int resolution) {
             material.film_thickness_nm = 450;
         }
     });
+    add("brushed metal and glass", [](Scene& s) {
+        for (Material& material : s.materials) {
+            if (material.type == MaterialType::Conductor) material.type = MaterialType::RoughConductor;
+            if (material.type == MaterialType::Dielectric) material.type = MaterialType::RoughDielectric;
+            material.roughness = 0.4;
+            material.anisotropy = 0.8;
+            material.anisotropy_rotation_deg = 20;
+        }
+    });
     add("boxes of objects, xorshift, Blackman-Harris filter, no light sampling", [](Scene& s) {
         s.integrator.accelerator = Accelerator::Aabb;
         s.integrator.nee = false;

@@ -195,6 +195,7 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
                        "unseen",
                        "leave 'opacity' or 'absorption' out");
     if (section->schema().find("thin_film") != nullptr) readThinFilm(*section, material);
+    if (section->schema().find("roughness_anisotropy") != nullptr) readAnisotropy(*section, material);
     named.index = static_cast<std::int32_t>(scene_.materials.size());
     scene_.materials.push_back(std::move(material));
 }

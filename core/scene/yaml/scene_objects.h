@@ -46,6 +46,7 @@ private:
     void resolveParts();
     void checkParts(const std::vector<std::int32_t>& way);
     void readThinFilm(const SectionReader& section, Material& material);
+    void readAnisotropy(const SectionReader& section, Material& material) const;
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
     ObjUse readObjUse(const SectionReader& object, const std::string& material);
     void refuseObjKeys(const SectionReader& object) const;

@@ -6,6 +6,7 @@
 #include "scene/yaml/scene_schema_composition.h"
 #include "scene/yaml/scene_schema_films.h"
 #include "scene/yaml/scene_schema_lights.h"
+#include "scene/yaml/scene_schema_surfaces.h"
 #include "scene/yaml/scene_schema_textures.h"
 #include "scene/yaml/scene_schema_values.h"
 
@@ -921,6 +922,7 @@ const std::vector<SectionSchema>& sceneSchema() {
         addMaterials(all);
         addCompositions(all);
         addThinFilm(all);
+        addAnisotropy(all);
         addObjects(all);
         addLights(all);
         addOutside(all);
