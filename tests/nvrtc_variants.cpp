@@ -49,6 +49,8 @@ std::map<std::uint64_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_CONDUCTOR, "a mesh of metal"},
         {mesh | CRT_FEATURE_ROUGH_CONDUCTOR, "a mesh of rough metal"},
         {mesh | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_ANISOTROPY, "a mesh of brushed metal"},
+        {mesh | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_PLASTIC | CRT_FEATURE_OPENPBR,
+         "a mesh of openpbr"},
         {mesh | CRT_FEATURE_DIELECTRIC, "a mesh of glass"},
         {mesh | CRT_FEATURE_TEXTURE, "a mesh with textures"},
         {mesh | glass, "a mesh of dispersive glass"},

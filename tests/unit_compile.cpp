@@ -224,6 +224,15 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     };
     seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_ANISOTROPY, 0, brushed(0.5));
     differs(CRT_FEATURE_ROUGH_CONDUCTOR, 0, brushed(0.01));  // a mirror
+    const auto colored = [&](crt::MaterialType type) {
+        return [=](Scene& s) {
+            other(type)(s);
+            s.materials[1].by_color = true;
+        };
+    };
+    seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_OPENPBR, 0,
+                    colored(crt::MaterialType::RoughConductor));
+    differs(CRT_FEATURE_PLASTIC | CRT_FEATURE_OPENPBR, 0, colored(crt::MaterialType::Plastic));
     // A pane bends nothing, whatever its index.
     differs(CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
         other(crt::MaterialType::ThinDielectric)(s);
@@ -1035,6 +1044,25 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     brush("brushed glass", 0.5, 0);
     brush("its anisotropy", 0.25, 0);
     brush("its direction", 0.5, 1);
+    const auto color = [&](const char* what, double f0, double tint, double weight) {
+        differs(what, [=](Scene& s) {
+            s.materials[0].type = crt::MaterialType::RoughConductor;
+            s.materials[0].roughness = 0.5;
+            s.materials[0].by_color = true;
+            s.materials[0].reflectance = crt::constantSpectrum(f0);
+            s.materials[0].edge_tint = crt::constantSpectrum(tint);
+            s.materials[0].weight = weight;
+        });
+    };
+    color("metal by its colours", 0.5, 0.5, 1);
+    color("its colour", 0.75, 0.5, 1);
+    color("its tint", 0.5, 0.75, 1);
+    color("its weight", 0.5, 0.5, 0.5);
+    differs("a glossy base", [](Scene& s) {
+        s.materials[0].type = crt::MaterialType::Plastic;
+        s.materials[0].eta = crt::constantSpectrum(1.5);
+        s.materials[0].by_color = true;
+    });
     glassware("plastic", crt::MaterialType::Plastic, 0, 0);
     glassware("rough plastic", crt::MaterialType::Plastic, 0.5, 0);
     differs("radiance", [](Scene& s) { s.emissions[0].radiance[100] = 3; });

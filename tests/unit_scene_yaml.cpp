@@ -337,6 +337,67 @@ TEST_CASE("spectra in all their forms", "[scene_yaml]") {
     CHECK(tile.roughness == 0.2);
 }
 
+TEST_CASE("openpbr becomes crt's own materials, mixed", "[scene_yaml]") {
+    const auto materials = [](const std::string& keys) {
+        return parse("materials: {m: {type: openpbr, " + keys + "}}\n").materials;
+    };
+    // The defaults are the specification's.
+    const std::vector<Material> plain = materials("base_metalness: 0");
+    REQUIRE(plain.size() == 1);
+    CHECK(plain[0].name == "m");
+    CHECK(plain[0].type == MaterialType::Plastic);
+    CHECK(plain[0].by_color);
+    CHECK(plain[0].reflectance == constantSpectrum(0.8));
+    CHECK(plain[0].eta[0] == Approx(1.5));
+    CHECK(plain[0].roughness == 0.3);
+    // Parts come first; the opacity is the whole's.
+    const std::vector<Material> mixed = materials(
+        "base_weight: 0.5, base_metalness: 0.25, transmission_weight: 0.75, specular_weight: 0.5, "
+        "geometry_opacity: 0.4");
+    REQUIRE(mixed.size() == 5);
+    const Material& whole = mixed[4];
+    CHECK(whole.name == "m");
+    CHECK(whole.type == MaterialType::Mix);
+    CHECK(whole.amount == 0.25);
+    CHECK(whole.opacity == 0.4);
+    const Material& metal = mixed[static_cast<std::size_t>(whole.parts[1])];
+    CHECK(metal.type == MaterialType::RoughConductor);
+    CHECK(metal.by_color);
+    CHECK(metal.reflectance == constantSpectrum(0.4));
+    CHECK(metal.weight == 0.5);
+    CHECK(metal.opacity == 1);
+    const Material& dielectric = mixed[static_cast<std::size_t>(whole.parts[0])];
+    CHECK(dielectric.type == MaterialType::Mix);
+    CHECK(dielectric.amount == 0.75);
+    const Material& clear = mixed[static_cast<std::size_t>(dielectric.parts[1])];
+    CHECK(clear.type == MaterialType::RoughDielectric);
+    CHECK_FALSE(clear.absorption);
+    const double n = clear.eta[0];
+    CHECK((n - 1) * (n - 1) / ((n + 1) * (n + 1)) == Approx(0.02));
+    CHECK(mixed[static_cast<std::size_t>(dielectric.parts[0])].eta[0] == n);
+    CHECK(materials("specular_weight: 0")[0].type == MaterialType::Diffuse);
+    CHECK(materials("transmission_weight: 1, specular_roughness: 0")[0].type == MaterialType::Dielectric);
+    const Material wine = materials(
+        "transmission_weight: 1, transmission_color: 0.5, transmission_depth: 3")[0];
+    CHECK((*wine.absorption)[7] == Approx(std::log(2.0) / 3));
+    // Abbe's number, between the Fraunhofer lines.
+    const Material prism = materials("transmission_weight: 1, specular_roughness: 0, specular_ior: 1.7, "
+                                     "transmission_dispersion_scale: 0.5")[0];
+    const auto at = [&](double nm) {
+        const double place = nm - 360;
+        const auto i = static_cast<std::size_t>(place);
+        return prism.eta[i] + (place - static_cast<double>(i)) * (prism.eta[i + 1] - prism.eta[i]);
+    };
+    CHECK(at(587.6) == Approx(1.7).epsilon(1e-6));
+    CHECK((at(587.6) - 1) / (at(486.1) - at(656.3)) == Approx(40).epsilon(1e-4));
+    const std::vector<Material> film = materials(
+        "transmission_weight: 1, thin_film_weight: 0.5, thin_film_thickness: 0.25, thin_film_ior: 1.6");
+    REQUIRE(film.size() == 3);
+    CHECK(film[0].film_thickness_nm == 0);
+    CHECK(film[1].film_thickness_nm == 250);
+    CHECK(film[1].film_index == constantSpectrum(1.6));
+}
+
 TEST_CASE("one name means a reflectance to a wall and a light to a lamp", "[scene_yaml]") {
     const Scene scene = parse(
         "spectra: {c: {rgb: [0.5, 0.25, 0.75], space: linear}}\n"
@@ -638,7 +699,7 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
     CHECK_THAT(refused("materials: {a: {type: difuse}}\n"),
                Contains("scene.yaml:2:23: error: expected one of diffuse, mirror, conductor, "
                         "rough_conductor, dielectric, rough_dielectric, thin_dielectric, plastic, "
-                        "mix, two_sided for 'type'") &&
+                        "openpbr, mix, two_sided for 'type'") &&
                    Contains("did you mean 'diffuse'?"));
     CHECK_THAT(refused("materials: {a: {typ: diffuse}}\n"),
                Contains("scene.yaml:2:17: error: unknown key 'typ' in material 'a'") &&
@@ -657,7 +718,7 @@ TEST_CASE("columns count characters, not bytes", "[scene_yaml][refused]") {
     const Error e = refusal("crt: 1\nmaterials: {grün: {refl: 1}}\n");
     CHECK_THAT(e.what(), Contains("scene.yaml:2:19: error: 'type' is missing in material 'grün': one of "
                                   "diffuse, mirror, conductor, rough_conductor, dielectric, "
-                                  "rough_dielectric, thin_dielectric, plastic, mix, two_sided\n"
+                                  "rough_dielectric, thin_dielectric, plastic, openpbr, mix, two_sided\n"
                                   "    2 | materials: {grün: {refl: 1}}\n"
                                   "      |                   ^"));
     CHECK(e.place().file == "scene.yaml");
@@ -837,6 +898,42 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     CHECK_THAT(refusedMaterial("{type: rough_dielectric, ior: 1.5, roughness: 0.5, "
                                "roughness_anisotropy: 0.5, thin_film: {thickness_nm: 300, ior: 1.3}}"),
                Contains("as rough in every direction") && Contains("leave 'thin_film'"));
+    const auto refusedOpenPbr = [&](const std::string& keys) {
+        return refusedMaterial("{type: openpbr, " + keys + "}");
+    };
+    for (const auto& [keys, why, instead] :
+         {std::tuple{"subsurface_weight: 1", "wanders below a surface", "leave 'subsurface_weight' out"},
+          std::tuple{"coat_weight: 1", "no coats on openpbr", "take a plastic"},
+          std::tuple{"fuzz_weight: 1", "no fuzz", "leave 'fuzz_weight' out"},
+          std::tuple{"emission_luminance: 1", "emission from objects", "give the object 'emission'"},
+          std::tuple{"geometry_thin_walled: true", "no thin walls", "take a thin_dielectric"},
+          std::tuple{"base_diffuse_roughness: 1", "no rough diffuse bases", "leave"},
+          std::tuple{"base_metalness: 1, specular_weight: 2", "more light than there is", "1 or less"},
+          std::tuple{"specular_color: 0.5", "no dielectric tints", "'base_metalness' 1"},
+          std::tuple{"specular_roughness_anisotropy: 0.5", "as rough in every direction", "leave it out"},
+          std::tuple{"specular_roughness: {checker: [0, 1]}", "equally rough everywhere", "a number"},
+          std::tuple{"specular_ior: 0.9", "an index of 1 to 10", "from 1 on"},
+          std::tuple{"transmission_weight: 1, transmission_color: 0.5", "tint the surface itself",
+                     "give 'transmission_depth'"},
+          std::tuple{"transmission_weight: 1, transmission_color: 0, transmission_depth: 1", "opaque",
+                     "above 0"},
+          std::tuple{"thin_film_weight: 1", "films on clear dielectrics", "'transmission_weight' 1"},
+          std::tuple{"base_metalness: 1, specular_roughness: {checker: [0, 1]}, "
+                     "specular_roughness_anisotropy: 1",
+                     "equally rough everywhere", "a number"},
+          std::tuple{"transmission_weight: 1, transmission_color: 0.5, transmission_depth: 1, "
+                     "geometry_opacity: 0.5",
+                     "closed", "leave 'geometry_opacity'"}}) {
+        INFO(keys);
+        CHECK_THAT(refusedOpenPbr(keys), Contains(why) && Contains(instead));
+    }
+    // Of slabs that are not there keys may say anything.
+    CHECK_NOTHROW(parse("materials: {m: {type: openpbr, base_metalness: 1, base_diffuse_roughness: 1, "
+                       "transmission_color: 0.5, specular_color: 0.5}}\n"));
+    CHECK_THAT(refusedOpenPbr("coat_color: 1"), Contains("unknown key 'coat_color'"));
+    CHECK_THAT(refused("materials: {m: {type: openpbr, transmission_weight: 0.5}, "
+                       "t: {type: two_sided, front: m, back: m}}\n"),
+               Contains("lets light through"));
     CHECK_THAT(refusedMaterial("{type: plastic, reflectance: 0.5, ior: 0.9}"),
                Contains("'ior' is 0.9; it must be 1 to 10"));
     CHECK_THAT(refusedMaterial("{type: plastic}"), Contains("'reflectance' is missing"));

@@ -286,7 +286,9 @@ double microfacetLoss(double cosine, double eta, double alpha) {
 Anisotropy anisotropyOf(const Material& material) {
     Anisotropy a;
     const double width = material.roughness * material.roughness, across = 1 - material.anisotropy;
-    if (!(material.anisotropy > 0) || isSmooth(material.roughness)) return a;
+    const bool rough = material.type == MaterialType::RoughConductor ||
+                       material.type == MaterialType::RoughDielectric;
+    if (!rough || !(material.anisotropy > 0) || isSmooth(material.roughness)) return a;
     a.widening = std::sqrt(2 / (1 + across * across));
     double least = CRT_ALPHA_MIN;
     if (material.type == MaterialType::RoughDielectric) {
@@ -304,7 +306,7 @@ Compensations compensationsOf(const std::vector<const Material*>& materials) {
         if (!material || (material->type != MaterialType::RoughConductor &&
                           material->type != MaterialType::RoughDielectric))
             continue;
-        if (material->type == MaterialType::RoughConductor && !hasThinFilm(*material))
+        if (material->type == MaterialType::RoughConductor && !hasThinFilm(*material) && !material->by_color)
             all.mean_reflectance[material] = meanReflectance(*material);
         if (material->roughness_texture == kNoTexture && isSmooth(material->roughness)) continue;
         const Key key = keyOf(*material);

@@ -150,6 +150,7 @@ typedef struct CrtTexture {
 CRT_ASSERT_SIZE(CrtTexture, 64);
 
 #define CRT_MATERIAL_DISPERSIVE 1u
+#define CRT_MATERIAL_OPENPBR 2u /* rough conductors and plastic: by the colours that are seen (openpbr.h) */
 
 /* Steps between the cosines 0 and 1 of a coat's table, which is as long as a spectrum's. */
 #define CRT_COAT_STEPS 470.0f
@@ -181,10 +182,13 @@ typedef struct CrtMaterial {
     u32 type; /* CRT_MATERIAL_… of features.h */
     u32 flags;
     CrtValue reflectance; /* rough conductors: its mean over the cosine */
-    CrtValue eta; /* conductors: real part of the index; dielectrics: index inside / outside */
-    CrtValue k;   /* conductors: extinction; plastic: share that the coat sends back from below */
+    CrtValue eta; /* conductors: real part of the index; dielectrics: index inside / outside. OpenPBR's
+                     metals: colour seen straight on */
+    CrtValue k;   /* conductors: extinction; plastic: share that the coat sends back from below. OpenPBR's
+                     metals: tint near the edge */
     CrtValue roughness; /* square root of the width α of GGX */
-    CrtValue coat; /* plastic: share that a rough coat reflects, by the cosine: a table; 0: smooth */
+    CrtValue coat; /* plastic: share that a rough coat reflects, by the cosine: a table; 0: smooth. OpenPBR's
+                      metals: factor on their reflectance */
     CrtValue absorption; /* dielectrics: of their inside, per scene unit */
     u32 loss; /* rough conductors and dielectrics: index of their CrtLoss */
     CrtValue film_thickness; /* nm, or of film_scale nm; 0: there is no film */

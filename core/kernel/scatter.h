@@ -19,6 +19,7 @@ CRT_KERNEL_BEGIN
 #define CRT_BSDF_CHOOSES 16u   /* crt_bsdf_sample needs its second pair of random numbers */
 #define CRT_BSDF_BOUNDS 32u    /* the surface of a body: what lies behind it is another medium */
 #define CRT_BSDF_FILM 64u      /* under a thin film: reflectances are thin_film.h's */
+#define CRT_BSDF_COLORED 256u  /* a metal of OpenPBR's: reflectances are openpbr.h's */
 #define CRT_BSDF_ANISOTROPIC 128u /* wider along its tangent than across it */
 
 /* A BSDF without CRT_BSDF_DELTA may still have single directions beside its lobe: crt_bsdf_sample gives
@@ -44,7 +45,8 @@ typedef struct CrtBsdf {
                          rough: what is given back to this side of what microfacets lose */
     vec4 eta;         /* dielectrics: index beyond the surface / index on w_o's side; conductors: real part
                          of the index */
-    vec4 k;           /* conductors: extinction; 0 of dielectrics with a film */
+    vec4 k;           /* conductors: extinction; 0 of dielectrics with a film; OpenPBR's: the dip */
+    f32 edge;         /* OpenPBR's metals: reflectance along the surface; eta: straight on */
     vec4 film_eta;    /* thin film: its index / that on w_o's side */
     vec4 film_rounds; /* thin film: 2 n d / λ, n on w_o's side */
     f32 alpha;        /* rough surfaces: width of GGX; anisotropic: along the tangent */

@@ -78,7 +78,7 @@ const std::vector<Case>& registry() {
         for (const auto group :
              {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases, pointLightCases,
               environmentCases, spectralFilmCases, stiffCases, scatteringCases, glasswareCases,
-              thinFilmCases, anisotropyCases, compositionCases, colourCases, textureCases,
+              thinFilmCases, anisotropyCases, openPbrCases, compositionCases, colourCases, textureCases,
               accumulationCases, imageCases, inputCases, backendCases, exactRelationCases, mutantCases,
               contactCases})
             for (Case& c : group()) all.push_back(std::move(c));

@@ -192,15 +192,19 @@ double meanOverCosine(const std::function<double(double)>& f) {
         [&](double t) { return 4 * t * t * t * f(t * t); }, 0.0, 1.0);
 }
 
-double onceConductorAlbedo(double cosine, double n, double k, double alpha, int panels = 24) {
+double onceMirrored(double cosine, double alpha, const std::function<double(double)>& reflectance,
+                    int panels = 24) {
     return overNormals(
         cosine, alpha,
         [&](const Facet& m) {
             const double cos_i = 2 * m.between * m.cos_m - cosine;
-            return cos_i > 0 ? fresnelConductor(m.between, n, k) * smithShadowing(cosine, cos_i, alpha)
-                             : 0.0;
+            return cos_i > 0 ? reflectance(m.between) * smithShadowing(cosine, cos_i, alpha) : 0.0;
         },
         panels);
+}
+
+double onceConductorAlbedo(double cosine, double n, double k, double alpha, int panels = 24) {
+    return onceMirrored(cosine, alpha, [&](double c) { return fresnelConductor(c, n, k); }, panels);
 }
 
 constexpr double kPerfect = 1e9;  ///< Extinction of a metal that absorbs nothing.
@@ -245,14 +249,33 @@ double microfacetAlbedo(double cosine, double n, double k, double roughness) {
     return alpha < 1e-3 ? fresnelConductor(cosine, n, k) : onceConductorAlbedo(cosine, n, k, alpha);
 }
 
-double roughConductorAlbedo(double cosine, double n, double k, double roughness) {
+namespace {
+
+double roughMetalAlbedo(double cosine, double roughness, const std::function<double(double)>& reflectance) {
     const double alpha = roughness * roughness;
-    if (alpha < 1e-3) return fresnelConductor(cosine, n, k);  // the kernel's limit of the smooth metal
-    const double mean = meanOverCosine([&](double c) { return fresnelConductor(c, n, k); });
+    if (alpha < 1e-3) return reflectance(cosine);  // the kernel's limit of the smooth metal
     const double lost =
         1 - meanOverCosine([&](double c) { return onceConductorAlbedo(c, 1, kPerfect, alpha, kFew); });
-    return onceConductorAlbedo(cosine, n, k, alpha) +
-           (1 - onceConductorAlbedo(cosine, 1, kPerfect, alpha)) * returnedShare(mean, lost);
+    return onceMirrored(cosine, alpha, reflectance) +
+           (1 - onceConductorAlbedo(cosine, 1, kPerfect, alpha)) *
+               returnedShare(meanOverCosine(reflectance), lost);
+}
+
+}  // namespace
+
+double roughConductorAlbedo(double cosine, double n, double k, double roughness) {
+    return roughMetalAlbedo(cosine, roughness, [&](double c) { return fresnelConductor(c, n, k); });
+}
+
+double f82Tint(double cosine, double f0, double tint) {
+    const auto schlick = [&](double c) { return f0 + (1 - f0) * std::pow(1 - c, 5); };
+    const auto dip = [](double c) { return c * std::pow(1 - c, 6); };
+    const double edge = 1.0 / 7;
+    return schlick(cosine) - dip(cosine) / dip(edge) * (1 - tint) * schlick(edge);
+}
+
+double tintedMetalAlbedo(double cosine, double f0, double tint, double weight, double roughness) {
+    return roughMetalAlbedo(cosine, roughness, [&](double c) { return weight * f82Tint(c, f0, tint); });
 }
 
 ScatteredShares microfacetShares(double cosine, double eta, double roughness) {

@@ -923,6 +923,7 @@ const std::vector<SectionSchema>& sceneSchema() {
         addCompositions(all);
         addThinFilm(all);
         addAnisotropy(all);
+        addOpenPbr(all);
         addObjects(all);
         addLights(all);
         addOutside(all);

@@ -10,4 +10,7 @@ namespace crt {
 /// Adds the keys of anisotropy to the materials that may have it.
 void addAnisotropy(std::vector<SectionSchema>& all);
 
+/// Adds the openpbr material, before those that are made of others.
+void addOpenPbr(std::vector<SectionSchema>& all);
+
 }  // namespace crt
