@@ -130,6 +130,8 @@ struct Case {
     bool films = false;
     bool lamps = false;
     bool many_lights = false;
+    bool brushed = false;
+    bool colored = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -346,6 +348,38 @@ void addFilms(crt::Scene& scene) {
     }
 }
 
+/// Rough surfaces that are rougher one way, each by its own: about coordinates on every other mesh.
+void addBrushes(crt::Scene& scene) {
+    addUvs(scene);
+    for (std::size_t i = 0; i < scene.meshes.size(); i += 2) scene.meshes[i].uv_index.clear();
+    double anisotropy = 0.5;
+    for (crt::Material& m : scene.materials) {
+        m.anisotropy = anisotropy;
+        m.anisotropy_rotation_deg = 100 * anisotropy;
+        anisotropy = anisotropy < 0.9 ? anisotropy + 0.125 : 0.25;
+    }
+}
+
+/// Metals and gloss by their colours, of a table and of a texture.
+void addColors(crt::Scene& scene) {
+    addUvs(scene);
+    crt::Texture colors;
+    colors.image = randomImage(5, 7, crt::TexelKind::Spectra);
+    scene.textures.push_back(colors);
+    for (crt::Material& m : scene.materials) {
+        using enum crt::MaterialType;
+        if (m.type != Conductor && m.type != RoughConductor && m.type != Diffuse) continue;
+        if (m.type == RoughConductor) m.reflectance_texture = 0;
+        m.reflectance = scene.materials[1].reflectance;
+        m.type = m.type == Diffuse ? Plastic : RoughConductor;
+        m.edge_tint = m.reflectance;
+        m.eta = crt::constantSpectrum(1.4);
+        m.weight = 0.875;
+        m.roughness = 0.3;
+        m.by_color = true;
+    }
+}
+
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
     {"{max_depth: 12}", "{type: sobol}", "", "box"},
@@ -384,6 +418,10 @@ const Case kCases[] = {
      false, false, true},
     {"{max_depth: 6}", "{type: sobol}", "", "box", true, kPointLights, true, false, false, false, false,
      false, false, false, true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", false, "", true, false, false, false, false, false, false,
+     false, false, true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", false, "", false, false, false, false, false, false,
+     false, false, false, false, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -430,6 +468,8 @@ crt::Scene sceneOf(const Case& c) {
     if (c.instruments) addInstruments(scene);
     if (c.lamps) addLamps(scene);
     if (c.many_lights) addManyLights(scene);
+    if (c.brushed) addBrushes(scene);
+    if (c.colored) addColors(scene);
     return scene;
 }
 
@@ -458,7 +498,9 @@ std::vector<Named> allScenes() {
                                  "films",
                                  "films, textures, tree, independent, sampled environment",
                                  "IES lamps and beams",
-                                 "many lights"};
+                                 "many lights",
+                                 "brushed",
+                                 "metals and gloss by their colours"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

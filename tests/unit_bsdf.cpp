@@ -70,10 +70,31 @@ Material roughGlass(double first, double last, double roughness) {
     return m;
 }
 
+Material colored(double f0, double tint, double weight, double roughness) {
+    Material m = reflecting(MaterialType::RoughConductor, f0);
+    m.by_color = true;
+    m.edge_tint = crt::constantSpectrum(tint);
+    m.weight = weight;
+    m.roughness = roughness;
+    return m;
+}
+
+Material brushed(Material m, double anisotropy, double rotation_deg = 0) {
+    m.anisotropy = anisotropy;
+    m.anisotropy_rotation_deg = rotation_deg;
+    return m;
+}
+
 Material plastic(double reflectance, double roughness, double ior = 1.5) {
     Material m = reflecting(MaterialType::Plastic, reflectance);
     m.eta = crt::constantSpectrum(ior);
     m.roughness = roughness;
+    return m;
+}
+
+Material glossy(double color, double roughness) {
+    Material m = plastic(color, roughness);
+    m.by_color = true;
     return m;
 }
 
@@ -124,6 +145,21 @@ std::vector<Subject> subjects() {
         };
     };
     const auto coat = [](double cosine) { return fresnel(std::abs(cosine), 1.5); };
+    const auto of_gloss = [](double color, double roughness) {
+        return [=](double cosine) {
+            const double gloss =
+                crt::verify::microfacetShares(std::abs(cosine), 1.5, roughness).reflected;
+            return gloss + (1 - gloss) * color;
+        };
+    };
+    // The views are at azimuth 0.7, and the bench's tangent is x.
+    const auto of_brushed = [](double n, double k, double roughness, double anisotropy, double turn_deg) {
+        return [=](double cosine) {
+            const double sine = std::sqrt(1 - cosine * cosine), phi = 0.7 - turn_deg * kPi / 180;
+            return crt::verify::brushedAlbedo({sine * std::cos(phi), sine * std::sin(phi), std::abs(cosine)},
+                                              n, k, roughness, anisotropy);
+        };
+    };
     return {
         {"diffuse", reflecting(MaterialType::Diffuse, 0.7), constant(0.7)},
         {"white diffuse", reflecting(MaterialType::Diffuse, 1), constant(1)},
@@ -135,6 +171,22 @@ std::vector<Subject> subjects() {
         {"rough conductor of roughness 0.5", roughMetal(0.2, 3, 0.5), rough(0.2, 3, 0.5)},
         {"rough conductor of roughness 1", roughMetal(0.2, 3, 1), rough(0.2, 3, 1)},
         {"rough perfect metal", roughMetal(1, 1e6, 1), constant(1)},
+        {"brushed metal", brushed(roughMetal(0.2, 3, 0.6), 0.7), of_brushed(0.2, 3, 0.6, 0.7, 0)},
+        {"brushed metal, turned", brushed(roughMetal(0.2, 3, 1), 0.8, 65),
+         of_brushed(0.2, 3, 1, 0.8, 65)},
+        {"brushed perfect metal", brushed(roughMetal(1, 1e6, 1), 0.9), constant(1)},
+        {"brushed glass", brushed(roughGlass(1.5, 1.5, 0.8), 0.6, 25), constant(1)},
+        {"brushed dispersive glass", brushed(roughGlass(1.7, 1.6, 0.7), 0.5), constant(1)},
+        {"a film on brushed perfect metal", filmed(brushed(roughMetal(1, 1e6, 0.6), 0.8), 500, 1.5),
+         constant(1)},
+        {"polished metal by its colours", colored(0.6, 0.3, 0.8, 0),
+         [](double cosine) { return 0.8 * crt::verify::f82Tint(std::abs(cosine), 0.6, 0.3); }},
+        {"rough metal by its colours", colored(0.6, 0.3, 0.8, 0.7),
+         [](double cosine) {
+             return crt::verify::tintedMetalAlbedo(std::abs(cosine), 0.6, 0.3, 0.8, 0.7);
+         }},
+        {"white brushed metal by its colours", brushed(colored(1, 1, 1, 0.8), 0.7), constant(1)},
+        {"glossy", glossy(0.6, 0.5), of_gloss(0.6, 0.5)},
         {"glass", glass(1.5, 1.5), constant(1)},
         {"dispersive glass", glass(1.7, 1.6), constant(1)},
         {"rough glass of roughness 0", roughGlass(1.5, 1.5, 0), constant(1)},

@@ -132,6 +132,24 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         other(crt::MaterialType::Dielectric)(s);
         film(s, 0);
     });
+    const auto brushed = [&](double roughness) {
+        return [=](Scene& s) {
+            other(crt::MaterialType::RoughConductor)(s);
+            s.materials[1].roughness = roughness;
+            s.materials[1].anisotropy = 0.5;
+        };
+    };
+    seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_ANISOTROPY, 0, brushed(0.5));
+    differs(CRT_FEATURE_ROUGH_CONDUCTOR, 0, brushed(0.01));  // a mirror
+    const auto colored = [&](crt::MaterialType type) {
+        return [=](Scene& s) {
+            other(type)(s);
+            s.materials[1].by_color = true;
+        };
+    };
+    seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_OPENPBR, 0,
+                    colored(crt::MaterialType::RoughConductor));
+    differs(CRT_FEATURE_PLASTIC | CRT_FEATURE_OPENPBR, 0, colored(crt::MaterialType::Plastic));
     // A pane bends nothing, whatever its index.
     differs(CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
         other(crt::MaterialType::ThinDielectric)(s);

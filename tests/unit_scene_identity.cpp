@@ -106,6 +106,37 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     filmed("a film on glass", 300, 1.4);
     filmed("its thickness", 301, 1.4);
     filmed("its index", 300, 1.5);
+    const auto brush = [&](const char* what, double anisotropy, double rotation_deg) {
+        differs(what, [=](Scene& s) {
+            makeGlass(s);
+            s.materials[0].type = crt::MaterialType::RoughDielectric;
+            s.materials[0].roughness = 0.5;
+            s.materials[0].anisotropy = anisotropy;
+            s.materials[0].anisotropy_rotation_deg = rotation_deg;
+        });
+    };
+    brush("brushed glass", 0.5, 0);
+    brush("its anisotropy", 0.25, 0);
+    brush("its direction", 0.5, 1);
+    const auto color = [&](const char* what, double f0, double tint, double weight) {
+        differs(what, [=](Scene& s) {
+            s.materials[0].type = crt::MaterialType::RoughConductor;
+            s.materials[0].roughness = 0.5;
+            s.materials[0].by_color = true;
+            s.materials[0].reflectance = crt::constantSpectrum(f0);
+            s.materials[0].edge_tint = crt::constantSpectrum(tint);
+            s.materials[0].weight = weight;
+        });
+    };
+    color("metal by its colours", 0.5, 0.5, 1);
+    color("its colour", 0.75, 0.5, 1);
+    color("its tint", 0.5, 0.75, 1);
+    color("its weight", 0.5, 0.5, 0.5);
+    differs("a glossy base", [](Scene& s) {
+        s.materials[0].type = crt::MaterialType::Plastic;
+        s.materials[0].eta = crt::constantSpectrum(1.5);
+        s.materials[0].by_color = true;
+    });
     glassware("plastic", crt::MaterialType::Plastic, 0, 0);
     glassware("rough plastic", crt::MaterialType::Plastic, 0.5, 0);
     differs("radiance", [](Scene& s) { s.emissions[0].radiance[100] = 3; });

@@ -84,7 +84,7 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
     CHECK_THAT(refused("materials: {a: {type: difuse}}\n"),
                Contains("scene.yaml:2:23: error: expected one of diffuse, mirror, conductor, "
                         "rough_conductor, dielectric, rough_dielectric, thin_dielectric, plastic, "
-                        "mix, two_sided for 'type'") &&
+                        "openpbr, mix, two_sided for 'type'") &&
                    Contains("did you mean 'diffuse'?"));
     CHECK_THAT(refused("materials: {a: {typ: diffuse}}\n"),
                Contains("scene.yaml:2:17: error: unknown key 'typ' in material 'a'") &&
@@ -103,7 +103,7 @@ TEST_CASE("columns count characters, not bytes", "[scene_yaml][refused]") {
     const Error e = refusal("crt: 1\nmaterials: {grün: {refl: 1}}\n");
     CHECK_THAT(e.what(), Contains("scene.yaml:2:19: error: 'type' is missing in material 'grün': one of "
                                   "diffuse, mirror, conductor, rough_conductor, dielectric, "
-                                  "rough_dielectric, thin_dielectric, plastic, mix, two_sided\n"
+                                  "rough_dielectric, thin_dielectric, plastic, openpbr, mix, two_sided\n"
                                   "    2 | materials: {grün: {refl: 1}}\n"
                                   "      |                   ^"));
     CHECK(e.place().file == "scene.yaml");
@@ -275,6 +275,50 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
                        "objects: [{mesh: {positions: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "
                        "faces: [[0, 1, 2]]}, material: m}]\n"),
                Contains("has a texture, but the mesh of object 0 has no texture coordinates"));
+    CHECK_THAT(refusedMaterial("{type: rough_conductor, metal: Al, roughness: 0.5, anisotropy: 0.5}"),
+               Contains("unknown key 'anisotropy'"));
+    CHECK_THAT(refusedMaterial("{type: rough_conductor, metal: Al, roughness: {checker: [0, 1]}, "
+                               "roughness_anisotropy: 0.5}"),
+               Contains("equally rough everywhere") && Contains("give 'roughness' a number"));
+    CHECK_THAT(refusedMaterial("{type: rough_dielectric, ior: 1.5, roughness: 0.5, "
+                               "roughness_anisotropy: 0.5, thin_film: {thickness_nm: 300, ior: 1.3}}"),
+               Contains("as rough in every direction") && Contains("leave 'thin_film'"));
+    const auto refusedOpenPbr = [&](const std::string& keys) {
+        return refusedMaterial("{type: openpbr, " + keys + "}");
+    };
+    for (const auto& [keys, why, instead] :
+         {std::tuple{"subsurface_weight: 1", "wanders below a surface", "leave 'subsurface_weight' out"},
+          std::tuple{"coat_weight: 1", "no coats on openpbr", "take a plastic"},
+          std::tuple{"fuzz_weight: 1", "no fuzz", "leave 'fuzz_weight' out"},
+          std::tuple{"emission_luminance: 1", "emission from objects", "give the object 'emission'"},
+          std::tuple{"geometry_thin_walled: true", "no thin walls", "take a thin_dielectric"},
+          std::tuple{"base_diffuse_roughness: 1", "no rough diffuse bases", "leave"},
+          std::tuple{"base_metalness: 1, specular_weight: 2", "more light than there is", "1 or less"},
+          std::tuple{"specular_color: 0.5", "no dielectric tints", "'base_metalness' 1"},
+          std::tuple{"specular_roughness_anisotropy: 0.5", "as rough in every direction", "leave it out"},
+          std::tuple{"specular_roughness: {checker: [0, 1]}", "equally rough everywhere", "a number"},
+          std::tuple{"specular_ior: 0.9", "an index of 1 to 10", "from 1 on"},
+          std::tuple{"transmission_weight: 1, transmission_color: 0.5", "tint the surface itself",
+                     "give 'transmission_depth'"},
+          std::tuple{"transmission_weight: 1, transmission_color: 0, transmission_depth: 1", "opaque",
+                     "above 0"},
+          std::tuple{"thin_film_weight: 1", "films on clear dielectrics", "'transmission_weight' 1"},
+          std::tuple{"base_metalness: 1, specular_roughness: {checker: [0, 1]}, "
+                     "specular_roughness_anisotropy: 1",
+                     "equally rough everywhere", "a number"},
+          std::tuple{"transmission_weight: 1, transmission_color: 0.5, transmission_depth: 1, "
+                     "geometry_opacity: 0.5",
+                     "closed", "leave 'geometry_opacity'"}}) {
+        INFO(keys);
+        CHECK_THAT(refusedOpenPbr(keys), Contains(why) && Contains(instead));
+    }
+    // Of slabs that are not there keys may say anything.
+    CHECK_NOTHROW(parse("materials: {m: {type: openpbr, base_metalness: 1, base_diffuse_roughness: 1, "
+                       "transmission_color: 0.5, specular_color: 0.5}}\n"));
+    CHECK_THAT(refusedOpenPbr("coat_color: 1"), Contains("unknown key 'coat_color'"));
+    CHECK_THAT(refused("materials: {m: {type: openpbr, transmission_weight: 0.5}, "
+                       "t: {type: two_sided, front: m, back: m}}\n"),
+               Contains("lets light through"));
     CHECK_THAT(refusedMaterial("{type: plastic, reflectance: 0.5, ior: 0.9}"),
                Contains("'ior' is 0.9; it must be 1 to 10"));
     CHECK_THAT(refusedMaterial("{type: plastic}"), Contains("'reflectance' is missing"));

@@ -40,9 +40,10 @@ std::pair<double, double> keyOf(const Material& plastic) { return {plastic.eta[0
 }  // namespace
 
 double coatAlbedo(double cosine, double eta, double alpha) {
-    return meanOverVisibleNormals<32>(cosine, alpha, [&](double cos_m, double m_z) {
-        return dielectricReflectance(cos_m, eta) * unshadowed(cosine, 2 * cos_m * m_z - cosine, alpha);
-    });
+    return meanOverVisibleNormals<32, 128>(
+        atCosine(cosine), {alpha, alpha}, [&](double cos_m, const Vec3d& m) {
+            return dielectricReflectance(cos_m, eta) * unshadowed(cosine, 2 * cos_m * m[2] - cosine, alpha);
+        });
 }
 
 const Coat& coatOf(const Coats& coats, const Material& plastic) { return coats.at(keyOf(plastic)); }

@@ -6,6 +6,7 @@
 #include "kernel/bsdf.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <functional>
@@ -24,11 +25,13 @@ static_assert(kSteps + 2 == static_cast<std::size_t>(CRT_LOSS_MEAN) &&
 /// 0.02 of it.
 constexpr std::uint32_t kRoughnesses = 33, kMostIndices = 33;
 constexpr double kIndexStep = 0.02;
+/// The same of anisotropic ones, of which each index has as many rows as there are azimuths.
+constexpr double kWideIndexStep = 0.1;
 
 /// Sets the mean of a row, 2 ∫ L c dc of what the kernel reads between its nodes: linear in t = √c,
 /// where it is 4 ∫ L t³ dt. And the shares of the steps in it.
 void integrate(float* row) {
-    double below[kSteps + 1] = {};
+    std::array<double, kSteps + 1> below{};
     for (std::size_t cell = 0; cell < kSteps; ++cell) {
         const double i = static_cast<double>(cell), first = row[cell], step = row[cell + 1] - first;
         below[cell + 1] = below[cell] + first * (((i + 1.5) * i + 1) * i + 0.25) +
@@ -38,6 +41,45 @@ void integrate(float* row) {
     row[kSteps + 2] = static_cast<float>(4 * below[kSteps] / (n * n * n * n));
     for (std::size_t i = 0; i <= kSteps; ++i)
         row[CRT_LOSS_SHARES + i] = static_cast<float>(below[i] / below[kSteps]);
+}
+
+/// Direction of the azimuth that crt_azimuth takes for `at`, at a cosine.
+Vec3d atAzimuth(double at, double cosine, double narrowing) {
+    const double x = 1 - at, y = at / std::sqrt(narrowing), size = std::sqrt(x * x + y * y);
+    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+    return {sine * x / size, sine * y / size, cosine};
+}
+
+/// The share of all azimuths that each row stands for, of what is linear between them.
+std::array<double, CRT_LOSS_AZIMUTHS> azimuthShares(double narrowing) {
+    static const auto azimuths = halfCircle<4096>();
+    std::array<double, CRT_LOSS_AZIMUTHS> shares{};
+    for (const auto& [x, y] : azimuths) {
+        const double across = std::sqrt(narrowing) * y, along = std::abs(x);
+        const double at = across / (along + across) * (CRT_LOSS_AZIMUTHS - 1.0);
+        const std::size_t i = std::min<std::size_t>(static_cast<std::size_t>(at), CRT_LOSS_AZIMUTHS - 2);
+        const double f = at - static_cast<double>(i);
+        shares[i] += (1 - f) / static_cast<double>(azimuths.size());
+        shares[i + 1] += f / static_cast<double>(azimuths.size());
+    }
+    return shares;
+}
+
+/// Gives the rows of all azimuths, `step` apart, the mean and the shares of the whole.
+void integrateAzimuths(float* rows, std::size_t step, double narrowing) {
+    const auto azimuths = azimuthShares(narrowing);
+    std::array<float, kStride> mean{};
+    for (std::size_t i = 0; i <= kSteps + 1; ++i) {
+        double sum = 0;
+        for (std::size_t a = 0; a < azimuths.size(); ++a)
+            sum += azimuths[a] * static_cast<double>(rows[a * step + i]);
+        mean[i] = static_cast<float>(sum);
+    }
+    integrate(mean.data());
+    for (std::size_t a = 0; a < azimuths.size(); ++a) {
+        rows[a * step + kSteps + 2] = mean[kSteps + 2];
+        std::copy(mean.begin() + CRT_LOSS_SHARES, mean.end(), rows + a * step + CRT_LOSS_SHARES);
+    }
 }
 
 /// As the kernel decides it.
@@ -52,6 +94,7 @@ struct Key {
     double least, most;  ///< Index, inside over outside.
     bool textured;
     double roughness;
+    double narrowing;  ///< 0: isotropic; else `roughness` is the root of the width along the tangent.
     auto operator<=>(const Key&) const = default;
 };
 
@@ -62,6 +105,10 @@ Key keyOf(const Material& material) {
         std::tie(key.least, key.most) = std::pair(material.eta.min(), material.eta.max());
     key.textured = material.roughness_texture != kNoTexture;
     if (!key.textured) key.roughness = material.roughness;
+    if (const Anisotropy a = anisotropyOf(material); a.narrowing > 0) {
+        key.narrowing = a.narrowing;
+        key.roughness = material.roughness * std::sqrt(a.widening);
+    }
     return key;
 }
 
@@ -79,8 +126,8 @@ struct Across {
 
 Across acrossIndices(const Key& key) {
     Across across;
-    const double range = key.most - key.least;
-    const auto steps = static_cast<std::size_t>(std::min(kMostIndices - 1.0, std::ceil(range / kIndexStep)));
+    const double range = key.most - key.least, step = key.narrowing > 0 ? kWideIndexStep : kIndexStep;
+    const auto steps = static_cast<std::size_t>(std::min(kMostIndices - 1.0, std::ceil(range / step)));
     across.first = key.least;
     if (steps > 0) across.step = range / static_cast<double>(steps);
     across.interfaces.resize(steps + 1);
@@ -132,33 +179,47 @@ private:
     std::vector<double> values_;
 };
 
-/// As of compensation.h; `reflectance` is that of the interface.
-template <class F>
-double microfacetLoss(double cosine, double eta, double alpha, const F& reflectance) {
-    const auto lost = [&](double cos_m, double m_z) {
-        const double mirrored = 1 - unshadowed(cosine, 2 * cos_m * m_z - cosine, alpha);
+/// As of compensation.h; `reflectance` is that of the interface, `open` the share of light towards a
+/// direction, turned to this side of the surface, that nothing is in the way of. `kFineness`: of the rule.
+template <std::size_t kFineness, class F, class G>
+double microfacetLoss(const Vec3d& w, double eta, const Widths& alpha, const F& reflectance, const G& open) {
+    const auto lost = [&](double cos_m, const Vec3d& m) {
+        const double mirrored = 1 - open(m * (2 * cos_m) - w);
         if (eta == 0) return mirrored;
         const double refraction = (eta - 1) * (eta + 1) + cos_m * cos_m;
         if (!(refraction > 0)) return mirrored;
         const double reflected = reflectance(cos_m);
-        const double cos_i = (cosine - (cos_m - std::sqrt(refraction)) * m_z) / eta;
-        return reflected * mirrored + (1 - reflected) * (1 - unshadowed(cosine, cos_i, alpha));
+        const Vec3d bent = w - m * (cos_m - std::sqrt(refraction));
+        return reflected * mirrored +
+               (1 - reflected) * (1 - open({bent[0] / eta, bent[1] / eta, bent[2] / eta}));
     };
-    return eta > 0 && eta < 1 ? meanOverVisibleNormals<128>(cosine, alpha, lost)
-                              : meanOverVisibleNormals<32>(cosine, alpha, lost);
+    return eta > 0 && eta < 1 ? meanOverVisibleNormals<kFineness, kFineness>(w, alpha, lost)
+                              : meanOverVisibleNormals<32, kFineness>(w, alpha, lost);
 }
 
 /// What one row is made by.
 struct Row {
     double index, alpha;
     std::function<double(double)> reflectance;
+    double narrowing = 0, azimuth = 0;  ///< As of crt_azimuth.
+
+    double loss(double cosine) const {
+        if (narrowing == 0)
+            return microfacetLoss<128>(atCosine(cosine), index, {alpha, alpha}, reflectance,
+                                       [&](const Vec3d& w) { return unshadowed(cosine, w[2], alpha); });
+        const Vec3d w_o = atAzimuth(azimuth, cosine, narrowing);
+        const Widths widths{alpha, narrowing * alpha};
+        return microfacetLoss<64>(w_o, index, widths, reflectance,
+                                  [&](const Vec3d& w) { return unshadowed(w_o, w, widths); });
+    }
 };
 
 Compensations::Table makeTable(const Key& key, const Across& across) {
     Compensations::Table table;
     kernel::CrtLoss& record = table.record;
     record.sides = key.refracts ? 2 : 1;
-    record.roughnesses = key.textured ? kRoughnesses : 1;
+    record.by_azimuth = key.narrowing > 0;
+    record.roughnesses = record.by_azimuth ? CRT_LOSS_AZIMUTHS : key.textured ? kRoughnesses : 1;
     record.indices = static_cast<std::uint32_t>(across.interfaces.size());
     record.first_index = static_cast<float>(across.first);
     record.index_scale = static_cast<float>(1 / across.step);
@@ -177,14 +238,17 @@ Compensations::Table makeTable(const Key& key, const Across& across) {
                 else
                     rows.push_back(
                         {index, alpha, [index](double c) { return dielectricReflectance(c, index); }});
+                if (!record.by_azimuth) continue;
+                rows.back().narrowing = key.narrowing;
+                rows.back().azimuth = static_cast<double>(r) / (CRT_LOSS_AZIMUTHS - 1.0);
             }
     table.rows.assign(rows.size() * kStride, 0);
     parallelFor(rows.size() * (kSteps + 1), 8, [&](std::size_t first, std::size_t end) {
         for (std::size_t n = first; n < end; ++n) {
             const Row& row = rows[n / (kSteps + 1)];
             const double t = static_cast<double>(n % (kSteps + 1)) / kSteps;
-            table.rows[n / (kSteps + 1) * kStride + n % (kSteps + 1)] = static_cast<float>(
-                microfacetLoss(std::max(t * t, 1e-6), row.index, row.alpha, row.reflectance));
+            table.rows[n / (kSteps + 1) * kStride + n % (kSteps + 1)] =
+                static_cast<float>(row.loss(std::max(t * t, 1e-6)));
         }
     });
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -192,6 +256,13 @@ Compensations::Table makeTable(const Key& key, const Across& across) {
         values[kSteps + 1] = values[kSteps];
         integrate(values);
         if (key.refracts) values[kSteps + 3] = static_cast<float>(1 - cosineMean(1024, rows[i].reflectance));
+    }
+    if (record.by_azimuth) {
+        const std::size_t step = record.sides * kStride;
+        for (std::size_t i = 0; i < record.indices; ++i)
+            for (std::size_t side = 0; side < record.sides; ++side)
+                integrateAzimuths(table.rows.data() + i * CRT_LOSS_AZIMUTHS * step + side * kStride, step,
+                                  key.narrowing);
     }
     return table;
 }
@@ -209,7 +280,23 @@ Spectrum meanReflectance(const Material& metal) {
 }  // namespace
 
 double microfacetLoss(double cosine, double eta, double alpha) {
-    return microfacetLoss(cosine, eta, alpha, [eta](double c) { return dielectricReflectance(c, eta); });
+    return Row{eta, alpha, [eta](double c) { return dielectricReflectance(c, eta); }}.loss(cosine);
+}
+
+Anisotropy anisotropyOf(const Material& material) {
+    Anisotropy a;
+    const double width = material.roughness * material.roughness, across = 1 - material.anisotropy;
+    const bool rough = material.type == MaterialType::RoughConductor ||
+                       material.type == MaterialType::RoughDielectric;
+    if (!rough || !(material.anisotropy > 0) || isSmooth(material.roughness)) return a;
+    a.widening = std::sqrt(2 / (1 + across * across));
+    double least = CRT_ALPHA_MIN;
+    if (material.type == MaterialType::RoughDielectric) {
+        const double bend = std::min(std::abs(material.eta.min() - 1), std::abs(material.eta.max() - 1));
+        if (bend > 0) least = std::max(least, static_cast<double>(CRT_BEND_MIN) / bend);
+    }
+    a.narrowing = std::min(1.0, std::max({across, kLeastNarrowing, least / (width * a.widening)}));
+    return a;
 }
 
 Compensations compensationsOf(const std::vector<const Material*>& materials) {
@@ -219,7 +306,7 @@ Compensations compensationsOf(const std::vector<const Material*>& materials) {
         if (!material || (material->type != MaterialType::RoughConductor &&
                           material->type != MaterialType::RoughDielectric))
             continue;
-        if (material->type == MaterialType::RoughConductor && !hasThinFilm(*material))
+        if (material->type == MaterialType::RoughConductor && !hasThinFilm(*material) && !material->by_color)
             all.mean_reflectance[material] = meanReflectance(*material);
         if (material->roughness_texture == kNoTexture && isSmooth(material->roughness)) continue;
         const Key key = keyOf(*material);

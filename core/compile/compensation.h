@@ -14,6 +14,16 @@ namespace crt {
 
 inline bool hasThinFilm(const Material& material) { return material.film_thickness_nm > 0; }
 
+/// The narrower width of GGX is at least this share of the wider one.
+inline constexpr double kLeastNarrowing = 0.02;
+
+/// Widths of GGX as OpenPBR Surface 1.1 says: along the tangent `widening` times the roughness squared,
+/// across it `narrowing` times that. 0: the surface is isotropic, or smooth.
+struct Anisotropy {
+    double widening = 1, narrowing = 0;
+};
+Anisotropy anisotropyOf(const Material& material);
+
 struct Compensations {
     /// Rows by roughness, of which equal ones are shared.
     struct Table {

@@ -19,6 +19,7 @@
 #include "compile/spectral_film.h"
 #include "compile/spectrum_table.h"
 #include "compile/textures.h"
+#include "kernel/features.h"
 #include "kernel/layout.h"
 
 #include <chrono>
@@ -118,11 +119,10 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 
     TexturePart texture_part = compileTextures(scene, textures, spectra, blob);
     header.textures = blob.append(texture_part.records);
-    if (header.textures.count > 0) {
-        header.uvs = blob.append(flat.uvs);
-        header.vertex_colors = blob.append(flat.colors);
-    }
     const MaterialPart materials = compileMaterials(used, tables, spectra, texture_part);
+    if (header.textures.count > 0 || (materials.features & CRT_FEATURE_ANISOTROPY) != 0)
+        header.uvs = blob.append(flat.uvs);
+    if (header.textures.count > 0) header.vertex_colors = blob.append(flat.colors);
     header.primitives = blob.appendFilled<kernel::CrtPrimitive>(count, [&](auto primitives) {
         compilePrimitives(flat, scene.materials.size(), lights.light_of, primitives);
     });

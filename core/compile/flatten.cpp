@@ -95,6 +95,12 @@ bool hasTexture(const Scene& scene, bool of_vertices) {
     });
 }
 
+/// Whether texture coordinates say which way a surface is rougher.
+bool hasTangents(const Scene& scene) {
+    return std::any_of(scene.materials.begin(), scene.materials.end(),
+                       [](const Material& m) { return m.anisotropy > 0; });
+}
+
 struct Bounds {
     static constexpr double kInf = std::numeric_limits<double>::infinity();
     Vec3d lower{kInf, kInf, kInf}, upper{-kInf, -kInf, -kInf};
@@ -146,7 +152,7 @@ public:
           stage_("placing triangles", 2 * static_cast<double>(count)) {
         flat_.triangles.resize(count);
         flat_.positions.resize(count);
-        if (hasTexture(scene, false)) flat_.uvs.resize(count);
+        if (hasTexture(scene, false) || hasTangents(scene)) flat_.uvs.resize(count);
         if (hasTexture(scene, true)) flat_.colors.resize(count);
         flat_.placements = static_cast<std::uint32_t>(placements_.size());
     }

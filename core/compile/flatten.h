@@ -27,7 +27,7 @@ struct FlatScene {
     /// without area are one point.
     std::vector<std::array<float, 9>> positions;
     std::vector<kernel::CrtNormals> normals;  ///< Of the smooth triangles, in their order.
-    std::vector<kernel::CrtUvs> uvs;          ///< Of all triangles, where the scene has textures.
+    std::vector<kernel::CrtUvs> uvs;          ///< Of all triangles, where a texture or tangent asks.
     std::vector<kernel::CrtVertexColors> colors;  ///< Of all triangles, where a value asks for them.
     Vec3d centre{};                           ///< In the author's units.
     int scale_exponent = 0;  ///< Lengths were multiplied by 2^scale_exponent after centring.

@@ -4,6 +4,8 @@
 #include "kernel/features.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace crt {
@@ -32,6 +34,10 @@ std::vector<const Spectrum*> spectraOfSurface(const Material& material, const Ma
             return {&material.reflectance};
         case MaterialType::Conductor: return {&material.eta, &material.k};
         case MaterialType::RoughConductor:
+            if (material.by_color) {
+                if (material.reflectance_texture != kNoTexture) return {&material.edge_tint};
+                return {&material.reflectance, &material.edge_tint};
+            }
             if (hasThinFilm(material)) return {&material.eta, &material.k};
             return {&material.eta, &material.k, &tables.compensations.mean_reflectance.at(&material)};
         case MaterialType::Dielectric:
@@ -75,11 +81,25 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
             material.film_texture != kNoTexture ? textures.valueOf(material.film_texture) : valueOf(1);
         record.film_index = spectra.valueOf(material.film_index);
     }
+    if (const Anisotropy a = anisotropyOf(material); a.narrowing > 0) {
+        const double turn = material.anisotropy_rotation_deg * (std::numbers::pi / 180);
+        record.widening = static_cast<float>(a.widening);
+        record.narrowing = static_cast<float>(a.narrowing);
+        record.turn_cos = static_cast<float>(std::cos(turn));
+        record.turn_sin = static_cast<float>(std::sin(turn));
+    }
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror: record.reflectance = reflectance(); break;
         case MaterialType::RoughConductor:
             record.roughness = roughness();
+            if (material.by_color) {
+                record.flags = CRT_MATERIAL_OPENPBR;
+                record.eta = reflectance();
+                record.k = spectra.valueOf(material.edge_tint);
+                record.coat = valueOf(material.weight);
+                break;
+            }
             if (!hasThinFilm(material))
                 record.reflectance = spectra.valueOf(tables.compensations.mean_reflectance.at(&material));
             [[fallthrough]];
@@ -103,6 +123,7 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
             record.roughness = valueOf(material.roughness);
             record.k = valueOf(coat.internal_reflectance);
             record.coat = spectra.valueOf(coat.albedo);
+            if (material.by_color) record.flags = CRT_MATERIAL_OPENPBR;
             break;
         }
     }
@@ -117,7 +138,7 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
     for (const FlatTriangle& t : flat.triangles)
         used[isKnown(t, count) ? static_cast<std::size_t>(t.material) : count] = true;
     // What is made of others comes in any order.
-    for (int depth = 0; depth < kDeepestComposition; ++depth)
+    for (int depth = 0; depth < kDeepestComposition + kDeepestOpenPbr; ++depth)
         for (std::size_t i = 0; i < count; ++i)
             if (used[i] && scene.materials[i].isComposed())
                 for (const std::int32_t part : scene.materials[i].parts)
@@ -161,6 +182,8 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if ((record.flags & CRT_MATERIAL_DISPERSIVE) != 0) part.features |= CRT_FEATURE_DISPERSION;
         if (record.absorption != 0) part.features |= CRT_FEATURE_ABSORPTION;
         if (record.film_thickness != 0) part.features |= CRT_FEATURE_THIN_FILM;
+        if (record.narrowing > 0) part.features |= CRT_FEATURE_ANISOTROPY;
+        if ((record.flags & CRT_MATERIAL_OPENPBR) != 0) part.features |= CRT_FEATURE_OPENPBR;
     }
     return part;
 }

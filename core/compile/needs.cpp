@@ -95,6 +95,8 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_OPACITY)) left_out("surfaces that rays may pass", "all materials are opaque");
     if (!has(CRT_FEATURE_NORMAL_MAP)) left_out("normal maps", "no material has one");
     if (!has(CRT_FEATURE_THIN_FILM)) left_out("thin films", "no surface has one");
+    if (!has(CRT_FEATURE_OPENPBR)) left_out("OpenPBR's colours", "no material is said by them");
+    if (!has(CRT_FEATURE_ANISOTROPY)) left_out("anisotropy", "all surfaces are as rough in every direction");
     if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
     if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
     if (!has(CRT_FEATURE_NEE))

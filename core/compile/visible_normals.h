@@ -1,6 +1,8 @@
 /// Means over the normals of GGX that a direction sees: what the tables of rough surfaces are made of.
 #pragma once
 
+#include "base/vec3d.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,6 +31,11 @@ std::array<std::array<double, 2>, parts> halfCircle() {
     return points;
 }
 
+/// Of GGX: along the tangent, which is x, and across it.
+struct Widths {
+    double along, across;
+};
+
 /// The root of Smith's shadowing, a = √(cos² + α² sin²), of which Λ = (a/cos − 1)/2.
 inline double smithRoot(double cosine, double alpha) {
     return std::sqrt(cosine * cosine + alpha * alpha * (1 - cosine * cosine));
@@ -42,16 +49,33 @@ inline double unshadowed(double cos_o, double cos_i, double alpha) {
     return cos_i * (cos_o + root_o) / (root_o * cos_i + smithRoot(cos_i, alpha) * cos_o);
 }
 
-/// Mean of f(cos_m, m_z) over the normals m that w_o at `cosine` sees: cos_m with w_o, m_z with the surface.
-/// Midpoint rule over spherical caps (Dupuy and Benyoub 2023), `kAzimuths` times 128 points; what has a kink
-/// at the critical angle wants more of them than 32.
-template <std::size_t kAzimuths, class F>
-double meanOverVisibleNormals(double cosine, double alpha, const F& f) {
-    constexpr std::size_t kHeights = 128;
+/// The same of directions whose azimuth counts.
+inline double smithRoot(const Vec3d& w, const Widths& alpha) {
+    const double x = alpha.along * w[0], y = alpha.across * w[1];
+    return std::sqrt(w[2] * w[2] + x * x + y * y);
+}
+inline double unshadowed(const Vec3d& w_o, const Vec3d& w_i, const Widths& alpha) {
+    if (!(w_i[2] > 0)) return 0;
+    const double root_o = smithRoot(w_o, alpha);
+    return w_i[2] * (w_o[2] + root_o) / (root_o * w_i[2] + smithRoot(w_i, alpha) * w_o[2]);
+}
+
+/// Unit, in the plane of x and z.
+inline Vec3d atCosine(double cosine) {
+    return {std::sqrt(std::max(0.0, 1 - cosine * cosine)), 0, cosine};
+}
+
+/// Mean of f(cos_m, m) over the normals m that w_o sees: cos_m with w_o. Midpoint rule over spherical caps
+/// (Dupuy and Benyoub 2023), `kAzimuths` times `kHeights` points of half of each; what has a kink at the
+/// critical angle wants more of them than 32.
+template <std::size_t kAzimuths, std::size_t kHeights, class F>
+double meanOverVisibleNormals(const Vec3d& w_o, const Widths& alpha, const F& f) {
     static const auto azimuths = halfCircle<kAzimuths>();
-    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
-    const double stretch = std::sqrt(alpha * sine * alpha * sine + cosine * cosine);
-    const double x = alpha * sine / stretch, z = cosine / stretch;  // w_o, stretched
+    const bool symmetric = w_o[1] == 0;  // one half of the azimuths is as the other
+    const double a = alpha.along * w_o[0], b = alpha.across * w_o[1];
+    // In this order isotropic surfaces keep the bits of their tables.
+    const double stretch = std::sqrt(a * alpha.along * w_o[0] + b * b + w_o[2] * w_o[2]);
+    const double x = a / stretch, y = b / stretch, z = w_o[2] / stretch;  // w_o, stretched
     double sum = 0;
     for (std::size_t i = 0; i < kHeights; ++i) {
         // Closer together towards normals along the surface, where what they mirror ends at the horizon.
@@ -59,16 +83,20 @@ double meanOverVisibleNormals(double cosine, double alpha, const F& f) {
         const double height = rest * rest * (1 + z) - z;
         const double radius = std::sqrt(std::max(0.0, 1 - height * height));
         double row = 0;
-        for (const auto& [cos_phi, sin_phi] : azimuths) {  // the other half of them is the same
-            const double m_x = alpha * (radius * cos_phi + x), m_y = alpha * radius * sin_phi;
-            const double m_z = std::max(0.0, height + z);
-            const double length = std::sqrt(m_x * m_x + m_y * m_y + m_z * m_z);
-            const double cos_m = std::min(1.0, (sine * m_x + cosine * m_z) / length);
-            if (cos_m > 0) row += f(cos_m, m_z / length);
+        const auto add = [&](double cos_phi, double sin_phi) {
+            const Vec3d m{alpha.along * (radius * cos_phi + x),
+                          alpha.across * radius * sin_phi + alpha.across * y, std::max(0.0, height + z)};
+            const double size = std::sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
+            const double cos_m = std::min(1.0, (w_o[0] * m[0] + w_o[1] * m[1] + w_o[2] * m[2]) / size);
+            if (cos_m > 0) row += f(cos_m, Vec3d{m[0] / size, m[1] / size, m[2] / size});
+        };
+        for (const auto& [cos_phi, sin_phi] : azimuths) {
+            add(cos_phi, sin_phi);
+            if (!symmetric) add(cos_phi, -sin_phi);
         }
         sum += 2 * rest * row;
     }
-    return sum / (kHeights * kAzimuths);
+    return sum / (kHeights * kAzimuths * (symmetric ? 1.0 : 2.0));
 }
 
 }  // namespace crt

@@ -66,12 +66,16 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->eta = crt_value(ctx, material.eta, surface, position);
                 b->k = crt_value(ctx, material.k, surface, position);
                 b->alpha = roughness * roughness;
+                if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
+                if (CRT_HAS(OPENPBR) && (material.flags & CRT_MATERIAL_OPENPBR) != 0u)
+                    crt_prepare_colors(b, V4X(crt_value(ctx, material.coat, surface, position)));
                 if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
                 if (b->alpha >= CRT_ALPHA_MIN) {
                     b->losses = crt_losses(ctx, material.loss, roughness, splat4(0.0f), 0u);
-                    crt_prepare_metal_loss(b, crt_has_film(b) ? crt_film_mean(b)
-                                                              : crt_value(ctx, material.reflectance, surface,
-                                                                          position));
+                    crt_prepare_metal_loss(b, crt_has_film(b)     ? crt_film_mean(b)
+                                              : crt_is_colored(b) ? crt_colored_mean(b)
+                                                                  : crt_value(ctx, material.reflectance,
+                                                                              surface, position));
                 } else {
                     b->flags |= CRT_BSDF_DELTA;
                     b->reflectance = crt_metal_reflectance(b, crt_min(dot3(wo, b->ns), 1.0f));
@@ -102,6 +106,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->eta = outside ? eta : splat4(1.0f) / eta;
                 b->absorption = material.absorption;
                 b->alpha = roughness * roughness;
+                if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
                 b->lanes = carried / sum4(carried);
                 if (CRT_HAS(THIN_FILM)) {
                     b->k = splat4(0.0f);
@@ -142,7 +147,8 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                     b->coat = CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) +
                               (material.coat & CRT_VALUE_INDEX) * CRT_SPECTRUM_STRIDE;
                 /* Of what enters, the base sends this much back through the coat. */
-                const vec4 returned = base * (1.0f - k) / (splat4(1.0f) - base * k);
+                vec4 returned = base * (1.0f - k) / (splat4(1.0f) - base * k);
+                if (CRT_HAS(OPENPBR) && (material.flags & CRT_MATERIAL_OPENPBR) != 0u) returned = base;
                 const f32 mirrored = crt_coat_albedo(b, dot3(wo, b->ns));
                 const f32 scattered = 0.25f * sum4(returned) * (1.0f - mirrored);
                 b->reflectance = returned * ((1.0f - mirrored) / ((1.0f - k) * eta * eta));

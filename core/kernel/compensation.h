@@ -18,6 +18,7 @@
 #ifndef CRT_COMPENSATION_H
 #define CRT_COMPENSATION_H
 
+#include "anisotropy.h"
 #include "thin_film.h"
 
 CRT_KERNEL_BEGIN
@@ -27,30 +28,60 @@ CRT_KERNEL_BEGIN
 
 #define CRT_LOST_AGAIN 0.76f /* M / L̄; tests/unit_microfacets.cpp */
 
-/* Where a row of losses is read for one cosine. */
-CRT_FN f32 crt_loss_place(f32 cosine) {
-    return crt_sqrt(crt_clamp(cosine, 0.0f, 1.0f)) * CRT_LOSS_STEPS;
+/* Which losses are read, and where: between two roughnesses where it is textured, or two azimuths. */
+typedef struct CrtLossPlace {
+    f32 at;      /* along a row */
+    u32 row;     /* floats from the first row to the one at or before the azimuth */
+    f32 between; /* how far on to the next one */
+} CrtLossPlace;
+
+#define CRT_LOSS_BY_ROW (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY))
+
+/* What does not depend on a direction: CRT_LOSS_MEAN, CRT_LOSS_PASSED. */
+CRT_FN CrtLossPlace crt_loss_constant(const CrtBsdf *b, f32 at) {
+    CrtLossPlace place;
+    place.at = at;
+    place.row = 0u;
+    place.between = b->losses.between;
+    return place;
 }
 
-/* At one place of the rows, between those of two roughnesses where it is textured, and of two indices where
-   what is reflected depends on the wavelength. */
-CRT_FN f32 crt_loss_lane(const CrtBsdf *b, u32 side, f32 place, f32 index) {
+CRT_FN f32 crt_loss_along(f32 cosine) { return crt_sqrt(crt_clamp(cosine, 0.0f, 1.0f)) * CRT_LOSS_STEPS; }
+
+/* Of the direction w, at `cosine` to the normal on its side. */
+CRT_FN CrtLossPlace crt_loss_place(const CrtBsdf *b, vec3 w, f32 cosine) {
+    CrtLossPlace place = crt_loss_constant(b, crt_loss_along(cosine));
+    if (CRT_HAS(ANISOTROPY) && crt_is_anisotropic(b)) {
+        const f32 at = crt_azimuth(b, w) * (f32)(CRT_LOSS_AZIMUTHS - 1u);
+        const u32 last = CRT_LOSS_AZIMUTHS - 2u;
+        const u32 i = (u32)at < last ? (u32)at : last;
+        place.row = i * b->losses.roughness_step;
+        place.between = at - (f32)i;
+    }
+    return place;
+}
+
+CRT_FN f32 crt_loss_of_rows(const CrtBsdf *b, CRT_GLOBAL const f32 *row, CrtLossPlace place) {
+    const f32 loss = crt_lookup(row, place.at);
+    if (!CRT_LOSS_BY_ROW) return loss;
+    return crt_fma(place.between, crt_lookup(row + b->losses.roughness_step, place.at) - loss, loss);
+}
+
+/* At one place of the rows, and between those of two indices where what is reflected depends on the
+   wavelength. */
+CRT_FN f32 crt_loss_lane(const CrtBsdf *b, u32 side, CrtLossPlace place, f32 index) {
     CRT_GLOBAL const f32 *row = b->losses.rows + side * CRT_LOSS_STRIDE;
     const u32 i = CRT_DIVIDES ? (u32)index : 0u;
     row += i * b->losses.index_step;
-    f32 loss = crt_lookup(row, place);
-    if (CRT_HAS(TEXTURE))
-        loss = crt_fma(b->losses.between, crt_lookup(row + b->losses.roughness_step, place) - loss, loss);
+    if (CRT_HAS(ANISOTROPY)) row += place.row;
+    const f32 loss = crt_loss_of_rows(b, row, place);
     if (!CRT_DIVIDES) return loss;
-    row += b->losses.index_step;
-    f32 next = crt_lookup(row, place);
-    if (CRT_HAS(TEXTURE))
-        next = crt_fma(b->losses.between, crt_lookup(row + b->losses.roughness_step, place) - next, next);
+    const f32 next = crt_loss_of_rows(b, row + b->losses.index_step, place);
     return crt_fma(index - (f32)i, next - loss, loss);
 }
 
 /* At the path's wavelengths. */
-CRT_FN vec4 crt_loss(const CrtBsdf *b, u32 side, f32 place) {
+CRT_FN vec4 crt_loss(const CrtBsdf *b, u32 side, CrtLossPlace place) {
     const u32 lanes = CRT_DIVIDES && b->losses.index_step != 0u ? 4u : 1u;
     vec4 loss = splat4(0.0f);
     CRT_ROLLED for (u32 lane = 0u; lane < lanes; ++lane)
@@ -60,7 +91,8 @@ CRT_FN vec4 crt_loss(const CrtBsdf *b, u32 side, f32 place) {
 }
 
 /* Directions are given back by the steps of the rows, each with its share, in each by the cosine: nearly as
-   light is. Of a textured roughness the next larger row's, of several indices the first one's shares. */
+   light is. Of a textured roughness the next larger row's, of several indices the first one's shares; of
+   azimuths all have those of their mean. */
 CRT_FN CRT_GLOBAL const f32 *crt_loss_shares(const CrtBsdf *b, u32 side) {
     return b->losses.rows + b->losses.roughness_step + side * CRT_LOSS_STRIDE + CRT_LOSS_SHARES;
 }
@@ -75,7 +107,7 @@ CRT_FN f32 crt_loss_step(u32 i) {
 CRT_FN f32 crt_given_back_pdf(const CrtBsdf *b, u32 side, f32 cosine) {
     CRT_GLOBAL const f32 *shares = crt_loss_shares(b, side);
     const u32 last = (u32)CRT_LOSS_STEPS - 1u;
-    const u32 at = (u32)crt_loss_place(cosine);
+    const u32 at = (u32)crt_loss_along(cosine);
     const u32 i = at < last ? at : last;
     return (shares[i + 1u] - shares[i]) / (crt_loss_step(i + 1u) - crt_loss_step(i)) * crt_lambert(cosine);
 }
@@ -105,7 +137,9 @@ CRT_FN CrtLosses crt_losses(const CrtContext *ctx, u32 loss, f32 roughness, vec4
     l.between = 0.0f;
     l.roughness_step = l.index_step = 0u;
     l.index = splat4(0.0f);
-    if (CRT_HAS(TEXTURE) && record->roughnesses > 1u) {
+    if (CRT_HAS(ANISOTROPY) && record->by_azimuth != 0u) {
+        l.roughness_step = record->sides * CRT_LOSS_STRIDE;
+    } else if (CRT_HAS(TEXTURE) && record->roughnesses > 1u) {
         const f32 at = crt_clamp(roughness, 0.0f, 1.0f) * (f32)(record->roughnesses - 1u);
         const u32 last = record->roughnesses - 2u;
         const u32 i = (u32)at < last ? (u32)at : last;
@@ -125,8 +159,8 @@ CRT_FN CrtLosses crt_losses(const CrtContext *ctx, u32 loss, f32 roughness, vec4
 
 /* Sets what a metal gives back: b->reflectance times L(θ_i). `mean`: F̄. */
 CRT_FN void crt_prepare_metal_loss(CrtBsdf *b, vec4 mean) {
-    const f32 lost = crt_loss_lane(b, 0u, crt_loss_place(dot3(b->wo, b->ns)), 0.0f);
-    const f32 lost_mean = crt_loss_lane(b, 0u, CRT_LOSS_MEAN, 0.0f);
+    const f32 lost = crt_loss_lane(b, 0u, crt_loss_place(b, b->wo, dot3(b->wo, b->ns)), 0.0f);
+    const f32 lost_mean = crt_loss_lane(b, 0u, crt_loss_constant(b, CRT_LOSS_MEAN), 0.0f);
     const f32 again = CRT_LOST_AGAIN * lost_mean;
     b->reflectance = mean * mean * ((1.0f - again) * lost / lost_mean) / (splat4(1.0f) - mean * again);
     b->lost_chance = lost;
@@ -137,9 +171,10 @@ CRT_FN void crt_prepare_metal_loss(CrtBsdf *b, vec4 mean) {
 CRT_FN void crt_prepare_glass_loss(CrtBsdf *b) {
     const u32 side = b->losses.side;
     const vec4 square = b->eta * b->eta;
-    const vec4 lost = crt_loss(b, side, crt_loss_place(dot3(b->wo, b->ns)));
-    const vec4 mean = crt_loss(b, side, CRT_LOSS_MEAN), beyond = crt_loss(b, 1u - side, CRT_LOSS_MEAN);
-    vec4 through = crt_loss(b, 0u, CRT_LOSS_PASSED);
+    const CrtLossPlace of_mean = crt_loss_constant(b, CRT_LOSS_MEAN);
+    const vec4 lost = crt_loss(b, side, crt_loss_place(b, b->wo, dot3(b->wo, b->ns)));
+    const vec4 mean = crt_loss(b, side, of_mean), beyond = crt_loss(b, 1u - side, of_mean);
+    vec4 through = crt_loss(b, 0u, crt_loss_constant(b, CRT_LOSS_PASSED));
     if (side != 0u) through = through * square;
     through = through * crt_min4(mean, beyond) / mean;
     b->reflectance = lost * (splat4(1.0f) - through) / mean;

@@ -56,7 +56,9 @@
     F(32, MIX, "mixes of materials, a material for each side")                               \
     F(33, OPACITY, "surfaces that rays may pass")                                            \
     F(34, NORMAL_MAP, "normal maps")                                                         \
-    F(35, SPECTRAL_FILM, "spectral film: bins of wavelengths, responses of sensors")
+    F(35, SPECTRAL_FILM, "spectral film: bins of wavelengths, responses of sensors")         \
+    F(36, ANISOTROPY, "roughness that differs along the surface")                            \
+    F(37, OPENPBR, "metals and glossy surfaces by their colours, as in OpenPBR")
 
 #define CRT_FEATURE_NUMBER(bit, name, text) CRT_BIT_##name = bit,
 enum CrtFeatureNumber { CRT_FEATURE_LIST(CRT_FEATURE_NUMBER) };

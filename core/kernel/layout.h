@@ -150,6 +150,7 @@ typedef struct CrtTexture {
 CRT_ASSERT_SIZE(CrtTexture, 64);
 
 #define CRT_MATERIAL_DISPERSIVE 1u
+#define CRT_MATERIAL_OPENPBR 2u /* rough conductors and plastic: by the colours that are seen (openpbr.h) */
 
 /* Steps between the cosines 0 and 1 of a coat's table, which is as long as a spectrum's. */
 #define CRT_COAT_STEPS 470.0f
@@ -163,15 +164,16 @@ CRT_ASSERT_SIZE(CrtTexture, 64);
 #define CRT_LOSS_PASSED 126.0f
 #define CRT_LOSS_SHARES 128u
 #define CRT_LOSS_STRIDE 256u
+#define CRT_LOSS_AZIMUTHS 17u /* rows of anisotropic microfacets, from along the tangent to across it */
 
-/* Rows of losses, of CRT_LOSS_STRIDE floats: by index, within that by roughness, within that of the outside
-   and, of dielectrics, the inside. */
+/* Rows of losses, of CRT_LOSS_STRIDE floats: by index, within that by roughness or azimuth, within that of
+   the outside and, of dielectrics, the inside. */
 typedef struct CrtLoss {
     CrtSpan rows;
     u32 indices, roughnesses, sides;
     f32 first_index, index_scale; /* a row is at (index − first) · scale; of roughnesses, evenly from 0 to
                                      1 */
-    u32 reserved;
+    u32 by_azimuth; /* 1: in place of the roughnesses, azimuths of anisotropic microfacets (anisotropy.h) */
 } CrtLoss;
 CRT_ASSERT_SIZE(CrtLoss, 32);
 
@@ -180,16 +182,21 @@ typedef struct CrtMaterial {
     u32 type; /* CRT_MATERIAL_… of features.h */
     u32 flags;
     CrtValue reflectance; /* rough conductors: its mean over the cosine */
-    CrtValue eta; /* conductors: real part of the index; dielectrics: index inside / outside */
-    CrtValue k;   /* conductors: extinction; plastic: share that the coat sends back from below */
+    CrtValue eta; /* conductors: real part of the index; dielectrics: index inside / outside. OpenPBR's
+                     metals: colour seen straight on */
+    CrtValue k;   /* conductors: extinction; plastic: share that the coat sends back from below. OpenPBR's
+                     metals: tint near the edge */
     CrtValue roughness; /* square root of the width α of GGX */
-    CrtValue coat; /* plastic: share that a rough coat reflects, by the cosine: a table; 0: smooth */
+    CrtValue coat; /* plastic: share that a rough coat reflects, by the cosine: a table; 0: smooth. OpenPBR's
+                      metals: factor on their reflectance */
     CrtValue absorption; /* dielectrics: of their inside, per scene unit */
     u32 loss; /* rough conductors and dielectrics: index of their CrtLoss */
     CrtValue film_thickness; /* nm, or of film_scale nm; 0: there is no film */
     f32 film_scale;
     CrtValue film_index; /* relative to the outside */
-    u32 reserved0, reserved1, reserved2, reserved3;
+    f32 widening;  /* anisotropic: the width of GGX along the tangent, over the roughness squared */
+    f32 narrowing; /* anisotropic: the width across the tangent over that along it; 0: isotropic */
+    f32 turn_cos, turn_sin; /* anisotropic: of the angle from the coordinates' tangent to the material's */
 } CrtMaterial;
 CRT_ASSERT_SIZE(CrtMaterial, 64);
 
@@ -406,7 +413,7 @@ typedef struct CrtScene {
     CrtSpan materials;           /* CrtMaterial */
     CrtSpan lights;              /* CrtLight; behind them the CrtLightNode of the tree, if there is one */
     CrtSpan textures;            /* CrtTexture */
-    CrtSpan uvs;                 /* CrtUvs, by id; only where a texture asks */
+    CrtSpan uvs;                 /* CrtUvs, by id; only where a texture or a tangent asks */
     CrtSpan vertex_colors;       /* CrtVertexColors, by id; only where a value asks */
     CrtSpan point_lights;        /* CrtPointLight */
     CrtSpan environment_image;   /* CrtEnvironmentImage, 1 or none */

@@ -1,6 +1,6 @@
 /*
- * microfacet.h: rough metals and rough glass: GGX's distribution of normals, Smith's shadowing correlated by
- * height, and normals sampled as w_o sees them.
+ * microfacet.h: rough metals and rough glass: GGX's distribution of normals, isotropic or wider along a
+ * tangent (anisotropy.h), Smith's shadowing correlated by height, and normals sampled as w_o sees them.
  */
 #ifndef CRT_MICROFACET_H
 #define CRT_MICROFACET_H
@@ -22,13 +22,30 @@ typedef struct CrtMicrofacet {
     f32 density;
 } CrtMicrofacet;
 
-CRT_FN f32 crt_smith_root(f32 cosine, f32 alpha) {
+/* Of the direction w, at `cosine` to the normal. */
+CRT_FN f32 crt_smith_root(const CrtBsdf *b, vec3 w, f32 cosine) {
     const f32 cos2 = cosine * cosine;
-    return crt_sqrt(crt_max(cos2 + alpha * alpha * (1.0f - cos2), 0.0f));
+    if (CRT_HAS(ANISOTROPY) && crt_is_anisotropic(b)) {
+        const f32 x = b->alpha * dot3(w, b->tangent);
+        const f32 y = b->alpha * b->narrowing * dot3(w, cross3(b->ns, b->tangent));
+        return crt_sqrt(cos2 + x * x + y * y);
+    }
+    return crt_sqrt(crt_max(cos2 + b->alpha * b->alpha * (1.0f - cos2), 0.0f));
+}
+
+/* GGX's density of the normal (x, y, z)/√hh in the facets' frame: α²/π / (sin² + α² cos²)²; where
+   it is narrower across, 1 / (π α_t α_b (x²/α_t² + y²/α_b² + z²)²). */
+CRT_FN f32 crt_normal_density(const CrtBsdf *b, f32 x, f32 y, f32 z, f32 hh) {
+    f32 narrowing = 1.0f;
+    if (CRT_HAS(ANISOTROPY) && crt_is_anisotropic(b)) narrowing = b->narrowing;
+    if (CRT_HAS(ANISOTROPY)) y = y / narrowing;
+    const f32 spread = (x * x + y * y + b->alpha * b->alpha * (z * z)) / hh;
+    const f32 density = CRT_INV_PI * (b->alpha / spread) * (b->alpha / spread);
+    return CRT_HAS(ANISOTROPY) ? density / narrowing : density;
 }
 
 CRT_FN CrtMicrofacet crt_microfacet(const CrtBsdf *b, vec3 wi) {
-    const CrtFrame frame = crt_frame(b->ns);
+    const CrtFrame frame = crt_facet_frame(b);
     const vec3 h = b->wo + wi;
     const f32 x = dot3(frame.s, h), y = dot3(frame.t, h), z = dot3(frame.n, h);
     const f32 hh = x * x + y * y + z * z;
@@ -36,17 +53,16 @@ CRT_FN CrtMicrofacet crt_microfacet(const CrtBsdf *b, vec3 wi) {
     m.cos_o = dot3(b->wo, b->ns);
     m.cos_i = dot3(wi, b->ns);
     m.cos_m = crt_min(dot3(b->wo, h) / crt_sqrt(hh), 1.0f);
-    m.root_o = crt_smith_root(m.cos_o, b->alpha);
-    m.root_i = crt_smith_root(m.cos_i, b->alpha);
-    /* D = α²/π / (sin² + α² cos²)², with the sines and cosines of h, which is not of unit length. */
-    const f32 spread = (x * x + y * y + b->alpha * b->alpha * (z * z)) / hh;
-    m.density = CRT_INV_PI * (b->alpha / spread) * (b->alpha / spread);
+    m.root_o = crt_smith_root(b, b->wo, m.cos_o);
+    m.root_i = crt_smith_root(b, wi, m.cos_i);
+    m.density = crt_normal_density(b, x, y, z, hh);
     return m;
 }
 
 /* What a metal gives back of what its microfacets lose, f·cos. */
-CRT_FN vec4 crt_metal_returned(const CrtBsdf *b, f32 cos_i) {
-    return b->reflectance * (crt_loss_lane(b, 0u, crt_loss_place(cos_i), 0.0f) * crt_lambert(cos_i));
+CRT_FN vec4 crt_metal_returned(const CrtBsdf *b, vec3 wi, f32 cos_i) {
+    return b->reflectance *
+           (crt_loss_lane(b, 0u, crt_loss_place(b, wi, cos_i), 0.0f) * crt_lambert(cos_i));
 }
 
 /* f·cos = F D G₂ / (4 cos_o), G₂ = 1 / (1 + Λ_o + Λ_i): shadowing and masking correlated by height;
@@ -58,7 +74,7 @@ CRT_FN vec4 crt_rough_conductor(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     if (!(m.cos_o > 0.0f) || !(m.cos_i > 0.0f)) return splat4(0.0f);
     *pdf = b->lost_chance * crt_given_back_pdf(b, 0u, m.cos_i) +
            (1.0f - b->lost_chance) * (m.density / (2.0f * (m.cos_o + m.root_o)));
-    return crt_metal_returned(b, m.cos_i) +
+    return crt_metal_returned(b, wi, m.cos_i) +
            crt_metal_reflectance(b, m.cos_m) *
                (m.density * m.cos_i / (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
 }
@@ -66,16 +82,18 @@ CRT_FN vec4 crt_rough_conductor(const CrtBsdf *b, vec3 wi, f32 *pdf) {
 /* One of the normals that w_o sees (Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical
    Caps"): stretched by α, they are those halfway to a cap of the sphere. */
 CRT_FN vec3 crt_visible_normal(const CrtBsdf *b, CrtRandom2 u) {
-    const CrtFrame frame = crt_frame(b->ns);
+    const CrtFrame frame = crt_facet_frame(b);
+    f32 across = b->alpha;
+    if (CRT_HAS(ANISOTROPY) && crt_is_anisotropic(b)) across = b->alpha * b->narrowing;
     const vec3 stretched = normalize3(make_vec3(b->alpha * dot3(b->wo, frame.s),
-                                                b->alpha * dot3(b->wo, frame.t), dot3(b->wo, frame.n)));
+                                                across * dot3(b->wo, frame.t), dot3(b->wo, frame.n)));
     f32 cos_phi;
     const f32 sin_phi = crt_sincos(2.0f * CRT_PI * u.x, &cos_phi);
     const f32 z = crt_fma(1.0f - u.y, 1.0f + V3Z(stretched), -V3Z(stretched));
     const f32 sine = crt_sqrt(crt_max(0.0f, 1.0f - z * z));
     const vec3 cap = make_vec3(sine * cos_phi, sine * sin_phi, z) + stretched;
     return crt_to_world(
-        frame, normalize3(make_vec3(b->alpha * V3X(cap), b->alpha * V3Y(cap), crt_max(V3Z(cap), 0.0f))));
+        frame, normalize3(make_vec3(b->alpha * V3X(cap), across * V3Y(cap), crt_max(V3Z(cap), 0.0f))));
 }
 
 /* A number below `chance`, or the rest, as one in [0, 1) again. */
@@ -126,7 +144,7 @@ CRT_FN CrtRefracted crt_rough_refraction(const CrtBsdf *b, vec3 wi, u32 lane) {
     const f32 eta = crt_lane(b->eta, lane);
     CrtRefracted r;
     r.value = r.pdf = 0.0f;
-    const CrtFrame frame = crt_frame(b->ns);
+    const CrtFrame frame = crt_facet_frame(b);
     const vec3 h = b->wo + wi * eta; /* along the microfacet's normal, of either sense, of length √hh */
     const f32 x = dot3(frame.s, h), y = dot3(frame.t, h), z = dot3(frame.n, h);
     const f32 hh = x * x + y * y + z * z;
@@ -135,9 +153,8 @@ CRT_FN CrtRefracted crt_rough_refraction(const CrtBsdf *b, vec3 wi, u32 lane) {
     if (!(h_o > 0.0f) || !(h_i > 0.0f)) return r; /* the microfacet is seen from behind */
     const f32 cos_o = dot3(b->wo, b->ns), cos_i = -dot3(wi, b->ns);
     if (!(cos_o > 0.0f) || !(cos_i > 0.0f)) return r;
-    const f32 root_o = crt_smith_root(cos_o, b->alpha), root_i = crt_smith_root(cos_i, b->alpha);
-    const f32 spread = (x * x + y * y + b->alpha * b->alpha * (z * z)) / hh;
-    const f32 density = CRT_INV_PI * (b->alpha / spread) * (b->alpha / spread);
+    const f32 root_o = crt_smith_root(b, b->wo, cos_o), root_i = crt_smith_root(b, wi, cos_i);
+    const f32 density = crt_normal_density(b, x, y, z, hh);
     const f32 cos_m = crt_min(h_o / crt_sqrt(hh), 1.0f);
     const f32 passed =
         1.0f - (crt_has_film(b)
@@ -166,7 +183,7 @@ CRT_FN vec4 crt_rough_dielectric(const CrtBsdf *b, vec3 wi, f32 *pdf) {
         const vec4 fresnel = divided ? crt_dielectric_reflectance(b, m.cos_m)
                                         : splat4(crt_fresnel_dielectric(m.cos_m, V4X(b->eta)));
         const u32 side = b->losses.side;
-        const vec4 given_back = b->reflectance * crt_loss(b, side, crt_loss_place(m.cos_i));
+        const vec4 given_back = b->reflectance * crt_loss(b, side, crt_loss_place(b, wi, m.cos_i));
         *pdf = b->lost_chance * b->back_share * crt_given_back_pdf(b, side, m.cos_i) +
                (1.0f - b->lost_chance) * (divided ? sum4(b->lanes * fresnel) : V4X(fresnel)) *
                    (m.density / (2.0f * (m.cos_o + m.root_o)));
@@ -175,7 +192,7 @@ CRT_FN vec4 crt_rough_dielectric(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     }
     const f32 cos_i = -dot3(wi, b->ns);
     const u32 beyond = 1u - b->losses.side;
-    const vec4 given_back = b->through * crt_loss(b, beyond, crt_loss_place(cos_i));
+    const vec4 given_back = b->through * crt_loss(b, beyond, crt_loss_place(b, wi, cos_i));
     const u32 lanes = divided ? 4u : 1u;
     vec4 value = splat4(0.0f), density = splat4(0.0f);
     CRT_ROLLED for (u32 lane = 0u; lane < lanes; ++lane) {

@@ -19,6 +19,8 @@ CRT_KERNEL_BEGIN
 #define CRT_BSDF_CHOOSES 16u   /* crt_bsdf_sample needs its second pair of random numbers */
 #define CRT_BSDF_BOUNDS 32u    /* the surface of a body: what lies behind it is another medium */
 #define CRT_BSDF_FILM 64u      /* under a thin film: reflectances are thin_film.h's */
+#define CRT_BSDF_COLORED 256u  /* a metal of OpenPBR's: reflectances are openpbr.h's */
+#define CRT_BSDF_ANISOTROPIC 128u /* wider along its tangent than across it */
 
 /* A BSDF without CRT_BSDF_DELTA may still have single directions beside its lobe: crt_bsdf_sample gives
    those the pdf 0, crt_bsdf_eval and crt_bsdf_pdf are of the lobe alone. */
@@ -27,7 +29,8 @@ CRT_KERNEL_BEGIN
 typedef struct CrtLosses {
     CRT_GLOBAL const f32 *rows; /* of the outside, at the roughness at or below, at the first index */
     u32 side;                   /* of w_o: 0 outside, 1 inside */
-    u32 roughness_step, index_step; /* floats to the next row; 0 where there is one */
+    u32 roughness_step, index_step; /* floats to the next row; 0 where there is one. Of anisotropic
+                                       surfaces the first is that between azimuths */
     f32 between;                /* how far on to the row of the next roughness */
     vec4 index;                 /* rows from the first index to those of the path's wavelengths */
 } CrtLosses;
@@ -42,10 +45,13 @@ typedef struct CrtBsdf {
                          rough: what is given back to this side of what microfacets lose */
     vec4 eta;         /* dielectrics: index beyond the surface / index on w_o's side; conductors: real part
                          of the index */
-    vec4 k;           /* conductors: extinction; 0 of dielectrics with a film */
+    vec4 k;           /* conductors: extinction; 0 of dielectrics with a film; OpenPBR's: the dip */
+    f32 edge;         /* OpenPBR's metals: reflectance along the surface; eta: straight on */
     vec4 film_eta;    /* thin film: its index / that on w_o's side */
     vec4 film_rounds; /* thin film: 2 n d / λ, n on w_o's side */
-    f32 alpha;        /* rough surfaces: width of GGX */
+    f32 alpha;        /* rough surfaces: width of GGX; anisotropic: along the tangent */
+    f32 narrowing;    /* anisotropic: the width across the tangent over that along it */
+    vec3 tangent;     /* anisotropic: unit, perpendicular to ns */
     vec4 lanes;       /* dielectrics that are rough, thin or under a film: share of what the path carries in
                          each wavelength */
     vec4 through;     /* rough dielectric: what is given back to the other side */

@@ -16,8 +16,9 @@ typedef struct CrtSurface {
     f32 clearance; /* how far along ng a ray must start from p to be sure of its side */
     u32 material;
     u32 light;     /* CRT_NONE: it does not emit */
-    u32 id;        /* primitive id; this and what follows for textures only */
-    f32 b1, b2;    /* barycentrics of the second and third vertex, of p */
+    u32 slot;      /* in the triangle array; for tangents only */
+    u32 id;        /* primitive id; for tangents and textures only */
+    f32 b1, b2;    /* barycentrics of the second and third vertex, of p; from here on for textures only */
     f32 u, v;      /* texture coordinates; 0 where the mesh has none */
 } CrtSurface;
 
@@ -86,8 +87,9 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     s.ns = s.ng;
     s.material = primitive->material;
     s.light = primitive->light;
+    if (CRT_HAS(ANISOTROPY)) s.slot = hit.slot;
+    if (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY)) s.id = hit.id;
     if (CRT_HAS(TEXTURE)) {
-        s.id = hit.id;
         s.b1 = b1;
         s.b2 = b2;
         s.u = s.v = 0.0f;

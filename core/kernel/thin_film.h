@@ -11,7 +11,7 @@
 #ifndef CRT_THIN_FILM_H
 #define CRT_THIN_FILM_H
 
-#include "scatter.h"
+#include "openpbr.h"
 
 CRT_KERNEL_BEGIN
 
@@ -116,6 +116,7 @@ CRT_FN int crt_has_film(const CrtBsdf *b) {
 /* Unpolarised reflectance of a metal, with or without a film. */
 CRT_FN vec4 crt_metal_reflectance(const CrtBsdf *b, f32 cos_i) {
     if (crt_has_film(b)) return crt_film_reflectance(b, cos_i);
+    if (crt_is_colored(b)) return crt_colored_reflectance(b, cos_i);
     return crt_fresnel_conductor(cos_i, b->eta, b->k);
 }
 

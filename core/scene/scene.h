@@ -101,6 +101,8 @@ inline constexpr std::pair<MaterialType, const char*> kComposedNames[] = {
     {MaterialType::Mix, "mix"}, {MaterialType::TwoSided, "two_sided"}};
 /// How deep mixes and two-sided materials may be made of one another.
 inline constexpr int kDeepestComposition = 8;
+/// How deep the mixes are that an openpbr material becomes.
+inline constexpr int kDeepestOpenPbr = 3;
 
 struct Material {
     std::string name;
@@ -111,6 +113,15 @@ struct Material {
     Spectrum k;            ///< Conductors: extinction.
     std::optional<Spectrum> absorption;  ///< Dielectric, RoughDielectric. Per scene unit, at least 0.
     double roughness = 0;  ///< Rough kinds, and the coat of Plastic. In [0,1].
+    /// By OpenPBR's colours. Plastic: the reflectance is the share of what enters that comes out again.
+    /// RoughConductor: the reflectance is F₀, straight on, and there are `edge_tint`, of Schlick's curve
+    /// at 82°, and `weight` in place of eta and k; no film.
+    bool by_color = false;
+    Spectrum edge_tint;
+    double weight = 1;
+    double anisotropy = 0;  ///< Rough kinds. In [0,1]: how much narrower GGX is across the tangent.
+    double anisotropy_rotation_deg = 0;  ///< From the coordinates' tangent, counter-clockwise seen from
+                                         ///< the outside.
     double film_thickness_nm = 0;  ///< Metals and dielectrics; 0: there is no film.
     Spectrum film_index;           ///< Relative to the outside.
     TextureIndex reflectance_texture = kNoTexture;  ///< In place of the reflectance.

@@ -223,6 +223,15 @@ def scene_cases():
         ("{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 1e9, ior: 1.3}}", "'thickness_nm'"),
         ("{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 300, ior: 0}}", "'ior'"),
         ("{type: dielectric, ior: 1.5, thin_film: 300}", "expected a map"),
+        ("{type: openpbr, subsurface_weight: 1}", "wanders below"),
+        ("{type: openpbr, coat_weight: nan}", "NaN"),
+        ("{type: openpbr, base_metalness: 2}", "'base_metalness'"),
+        ("{type: openpbr, base_color: {texture: /nowhere.png}}", "/nowhere.png"),
+        ("{type: openpbr, specular_weight: 1e300}", "an index of 1 to 10"),
+        ("{type: rough_conductor, metal: Al, roughness: 1, roughness_anisotropy: 1.01}",
+         "'roughness_anisotropy'"),
+        ("{type: rough_conductor, metal: Al, roughness: 1, anisotropy_rotation_deg: .inf}",
+         "'anisotropy_rotation_deg'"),
     ):
         key(f"the material {text}", f"materials: {{m: {text}}}", word)
     for text in (
@@ -234,6 +243,10 @@ def scene_cases():
         "{type: rough_dielectric, ior: 0.001, roughness: 1, thin_film: {thickness_nm: 20000, ior: 10}}",
         "{type: dielectric, ior: 1000, thin_film: {thickness_nm: 1e-30, ior: 0.1}}",
         "{type: rough_conductor, eta: 1, k: 0, roughness: 1, thin_film: {thickness_nm: 99, ior: 1}}",
+        "{type: openpbr, transmission_weight: 1, transmission_dispersion_scale: 1}",
+        "{type: openpbr, base_metalness: 1, base_color: 0, specular_color: 0, specular_roughness: 1}",
+        "{type: rough_conductor, eta: 1, k: 9, roughness: 0.04, roughness_anisotropy: 1}",
+        "{type: rough_dielectric, ior: 1.000001, roughness: 1, roughness_anisotropy: 1}",
     ):
         spectrum_of = f"materials: {{m: {text}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n"
         scene(f"the material {text}", HEAD + spectrum_of, 0)

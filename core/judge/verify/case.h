@@ -100,6 +100,8 @@ std::vector<Case> scatteringCases();     ///< G
 std::vector<Case> glasswareCases();      ///< G, rough glass and panes
 std::vector<Case> compositionCases();    ///< G, opacity, mixes and normal maps
 std::vector<Case> thinFilmCases();       ///< G, thin films
+std::vector<Case> anisotropyCases();     ///< G, brushed surfaces
+std::vector<Case> openPbrCases();        ///< G, openpbr
 std::vector<Case> colourCases();         ///< H
 std::vector<Case> textureCases();        ///< H, the part about textures
 std::vector<Case> accumulationCases();   ///< I

@@ -138,25 +138,31 @@ double smithLambda(double cosine, double alpha) {
     return (std::sqrt(1 + alpha * alpha * tan2) - 1) / 2;
 }
 
-/// A microfacet's normal at `cos_m` to the surface's, seen at `between`, and the height-correlated shadowing
-/// of what it sends on at `cos_i`.
+/// A microfacet of unit normal m, at `cos_m` to the surface's, seen at `between`.
 struct Facet {
     double cos_m, between;
+    Vec3d m;
 };
 
 /// Mean of f(m) over the normals of GGX as visible from `cosine`, but for G₁: the density D cos_m dm is
 /// dx dφ / 2π with tan²(m) = α² x / (1 − x), and half of φ is enough. With x = 1 − y² the facets
 /// that stand on edge, seen as 1/y, are integrated as exactly as others.
+/// Where the widths along and across differ, φ is the azimuth before they stretch the normals, all of it.
+double overNormals(const Vec3d& view, double along, double across,
+                   const std::function<double(const Facet&)>& f, int panels) {
+    const auto integrand = [&](double y, double phi) {
+        const double slope = std::sqrt(1 - y * y);
+        const Vec3d n{along * slope * std::cos(phi), across * slope * std::sin(phi), y};
+        const Vec3d m = n * (1 / length(n));
+        const double between = dot(view, m);
+        return between > 0 ? 2 * y * f({m[2], between, m}) * between / (view[2] * m[2]) : 0.0;
+    };
+    const double first = along == across && view[1] == 0 ? 0 : -kPi;
+    return rectangleIntegral(integrand, 0, 1, first, kPi, panels) / (kPi - first);
+}
 double overNormals(double cosine, double alpha, const std::function<double(const Facet&)>& f,
                    int panels = 24) {
-    const double sine = std::sqrt(1 - cosine * cosine);
-    const auto integrand = [&](double y, double phi) {
-        const double cos_m = y / std::sqrt(y * y + alpha * alpha * (1 - y * y));
-        const double sin_m = std::sqrt(std::max(0.0, 1 - cos_m * cos_m));
-        const double between = sine * sin_m * std::cos(phi) + cosine * cos_m;
-        return between > 0 ? 2 * y * f({cos_m, between}) * between / (cosine * cos_m) : 0.0;
-    };
-    return rectangleIntegral(integrand, 0, 1, 0, kPi, panels) / kPi;
+    return overNormals({std::sqrt(1 - cosine * cosine), 0, cosine}, alpha, alpha, f, panels);
 }
 
 double smithShadowing(double cos_o, double cos_i, double alpha) {
@@ -186,19 +192,33 @@ double meanOverCosine(const std::function<double(double)>& f) {
         [&](double t) { return 4 * t * t * t * f(t * t); }, 0.0, 1.0);
 }
 
-double onceConductorAlbedo(double cosine, double n, double k, double alpha, int panels = 24) {
+double onceMirrored(double cosine, double alpha, const std::function<double(double)>& reflectance,
+                    int panels = 24) {
     return overNormals(
         cosine, alpha,
         [&](const Facet& m) {
             const double cos_i = 2 * m.between * m.cos_m - cosine;
-            return cos_i > 0 ? fresnelConductor(m.between, n, k) * smithShadowing(cosine, cos_i, alpha)
-                             : 0.0;
+            return cos_i > 0 ? reflectance(m.between) * smithShadowing(cosine, cos_i, alpha) : 0.0;
         },
         panels);
 }
 
+double onceConductorAlbedo(double cosine, double n, double k, double alpha, int panels = 24) {
+    return onceMirrored(cosine, alpha, [&](double c) { return fresnelConductor(c, n, k); }, panels);
+}
+
 constexpr double kPerfect = 1e9;  ///< Extinction of a metal that absorbs nothing.
 constexpr int kFew = 4;           ///< Panels of what is a mean of means.
+
+/// Of what was lost of a reflectance with this mean, the share that comes back: mirrored a second time it
+/// does, or a third time, …
+double returnedShare(double mean, double lost) {
+    const double escapes = 1 - 0.76 * lost;  // by random walks, tests/unit_microfacets.cpp
+    double returned = 0, left = mean;
+    for (int i = 0; i < 100000 && left > 1e-12; ++i, left *= mean * (1 - escapes))
+        returned += left * mean * escapes;
+    return returned;
+}
 
 double onceTransmitted(double cosine, double eta, double alpha, int panels = 24) {
     return overNormals(
@@ -229,19 +249,33 @@ double microfacetAlbedo(double cosine, double n, double k, double roughness) {
     return alpha < 1e-3 ? fresnelConductor(cosine, n, k) : onceConductorAlbedo(cosine, n, k, alpha);
 }
 
-double roughConductorAlbedo(double cosine, double n, double k, double roughness) {
+namespace {
+
+double roughMetalAlbedo(double cosine, double roughness, const std::function<double(double)>& reflectance) {
     const double alpha = roughness * roughness;
-    if (alpha < 1e-3) return fresnelConductor(cosine, n, k);  // the kernel's limit of the smooth metal
-    const double mean = meanOverCosine([&](double c) { return fresnelConductor(c, n, k); });
+    if (alpha < 1e-3) return reflectance(cosine);  // the kernel's limit of the smooth metal
     const double lost =
         1 - meanOverCosine([&](double c) { return onceConductorAlbedo(c, 1, kPerfect, alpha, kFew); });
-    const double escapes = 1 - 0.76 * lost;  // by random walks, tests/unit_microfacets.cpp
-    // Of what did not get away at once: mirrored a second time it does, or a third time, …
-    double returned = 0, left = mean;
-    for (int i = 0; i < 100000 && left > 1e-12; ++i, left *= mean * (1 - escapes))
-        returned += left * mean * escapes;
-    return onceConductorAlbedo(cosine, n, k, alpha) +
-           (1 - onceConductorAlbedo(cosine, 1, kPerfect, alpha)) * returned;
+    return onceMirrored(cosine, alpha, reflectance) +
+           (1 - onceConductorAlbedo(cosine, 1, kPerfect, alpha)) *
+               returnedShare(meanOverCosine(reflectance), lost);
+}
+
+}  // namespace
+
+double roughConductorAlbedo(double cosine, double n, double k, double roughness) {
+    return roughMetalAlbedo(cosine, roughness, [&](double c) { return fresnelConductor(c, n, k); });
+}
+
+double f82Tint(double cosine, double f0, double tint) {
+    const auto schlick = [&](double c) { return f0 + (1 - f0) * std::pow(1 - c, 5); };
+    const auto dip = [](double c) { return c * std::pow(1 - c, 6); };
+    const double edge = 1.0 / 7;
+    return schlick(cosine) - dip(cosine) / dip(edge) * (1 - tint) * schlick(edge);
+}
+
+double tintedMetalAlbedo(double cosine, double f0, double tint, double weight, double roughness) {
+    return roughMetalAlbedo(cosine, roughness, [&](double c) { return weight * f82Tint(c, f0, tint); });
 }
 
 ScatteredShares microfacetShares(double cosine, double eta, double roughness) {
@@ -264,6 +298,66 @@ ScatteredShares roughDielectricShares(double cosine, double eta, double roughnes
     const double here = mean_loss(eta), beyond = mean_loss(1 / eta);
     const double through = diffuseTransmittance(eta) * std::min(here, beyond) / here;
     return {once.reflected + lost * (1 - through), once.transmitted + lost * through};
+}
+
+namespace {
+
+/// GGX of two widths, OpenPBR's.
+struct Brushed {
+    double along, across;
+
+    Brushed(double roughness, double anisotropy)
+        : along(roughness * roughness * std::sqrt(2 / (1 + (1 - anisotropy) * (1 - anisotropy)))),
+          across((1 - anisotropy) * along) {}
+
+    double lambda(const Vec3d& w) const {
+        const double x = along * w[0], y = across * w[1];
+        return (std::sqrt(1 + (x * x + y * y) / (w[2] * w[2])) - 1) / 2;
+    }
+    double shadowing(const Vec3d& a, const Vec3d& b) const { return 1 / (1 + lambda(a) + lambda(b)); }
+    double density(const Vec3d& m) const {
+        const double x = m[0] / along, y = m[1] / across, sum = x * x + y * y + m[2] * m[2];
+        return 1 / (kPi * along * across * sum * sum);
+    }
+    /// The share that is mirrored once.
+    double once(const Vec3d& view, double n, double k, int panels = 24) const {
+        return overNormals(
+            view, along, across,
+            [&](const Facet& facet) {
+                const Vec3d w = facet.m * (2 * facet.between) - view;
+                return w[2] > 0 ? fresnelConductor(facet.between, n, k) * shadowing(view, w) : 0.0;
+            },
+            panels);
+    }
+    /// Of light from everywhere, what a perfect metal loses: over a quarter turn, of which all are alike.
+    double meanLoss() const {
+        return 1 - meanOverCosine([&](double c) {
+                   return boost::math::quadrature::gauss<double, 10>::integrate(
+                       [&](double turn) {
+                           const double phi = turn * kPi / 2, sine = std::sqrt(1 - c * c);
+                           return once({sine * std::cos(phi), sine * std::sin(phi), c}, 1, kPerfect, kFew);
+                       },
+                       0.0, 1.0);
+               });
+    }
+};
+
+}  // namespace
+
+double brushedAlbedo(const Vec3d& view, double n, double k, double roughness, double anisotropy) {
+    const Brushed it(roughness, anisotropy);
+    const double mean = meanOverCosine([&](double c) { return fresnelConductor(c, n, k); });
+    return it.once(view, n, k) +
+           (1 - it.once(view, 1, kPerfect)) * returnedShare(mean, it.meanLoss());
+}
+
+double brushedReflection(const Vec3d& view, const Vec3d& light, double roughness, double anisotropy) {
+    const Brushed it(roughness, anisotropy);
+    const Vec3d h = view + light;
+    const double once = it.density(h * (1 / length(h))) * it.shadowing(view, light) /
+                        (4 * view[2] * light[2]);
+    const double lost = (1 - it.once(view, 1, kPerfect)) * (1 - it.once(light, 1, kPerfect));
+    return (once + lost / (kPi * it.meanLoss())) * light[2];
 }
 
 double plasticAlbedo(double cosine, double base, double eta, double roughness) {

@@ -50,6 +50,21 @@ double microfacetAlbedo(double cosine, double n, double k, double roughness);
 /// (2017), the series summed term by term. 1 for a perfect metal.
 double roughConductorAlbedo(double cosine, double n, double k, double roughness);
 
+/// "F82-tint" (Kutz, Hasan and Edmondson 2021), as OpenPBR Surface 1.1 has it: Schlick's curve from f0, less
+/// a dip that leaves `tint` of it at the cosine 1/7.
+double f82Tint(double cosine, double f0, double tint);
+
+/// As roughConductorAlbedo, of a metal that reflects `weight` times that.
+double tintedMetalAlbedo(double cosine, double f0, double tint, double weight, double roughness);
+
+/// As roughConductorAlbedo of a metal whose microfacets are wider along x than along y, as OpenPBR Surface
+/// 1.1 says: α_x = r² √(2 / (1 + (1 − a)²)), α_y = (1 − a) α_x. `view`: unit, z along the normal.
+double brushedAlbedo(const Vec3d& view, double n, double k, double roughness, double anisotropy);
+
+/// Radiance towards `view` of such a surface of perfect metal, lit by a beam from `light` that brings
+/// irradiance 1 to a plane that faces it.
+double brushedReflection(const Vec3d& view, const Vec3d& light, double roughness, double anisotropy);
+
 /// Of light from everywhere, the shares that rough glass sends towards a view at `cosine`; eta is the index
 /// beyond over the index on the side of the view. Microfacets as of microfacetAlbedo, each of which
 /// reflects what Fresnel's equations say and refracts the rest by Snell's law about its normal.

@@ -85,6 +85,28 @@ std::vector<Variant> variants(int resolution) {
             material.film_thickness_nm = 450;
         }
     });
+    add("brushed metal and glass", [](Scene& s) {
+        for (Material& material : s.materials) {
+            if (material.type == MaterialType::Conductor) material.type = MaterialType::RoughConductor;
+            if (material.type == MaterialType::Dielectric) material.type = MaterialType::RoughDielectric;
+            material.roughness = 0.4;
+            material.anisotropy = 0.8;
+            material.anisotropy_rotation_deg = 20;
+        }
+    });
+    add("metals and gloss by their colours", [](Scene& s) {
+        for (Material& material : s.materials)
+            if (material.type == MaterialType::Conductor || material.type == MaterialType::Dielectric) {
+                const bool metal = material.type == MaterialType::Conductor;
+                material.type = metal ? MaterialType::RoughConductor : MaterialType::Plastic;
+                material.reflectance = constantSpectrum(0.7);
+                material.edge_tint = constantSpectrum(0.4);
+                material.eta = constantSpectrum(1.5);
+                material.weight = 0.9;
+                material.roughness = 0.4;
+                material.by_color = true;
+            }
+    });
     add("boxes of objects, xorshift, Blackman-Harris filter, no light sampling", [](Scene& s) {
         s.integrator.accelerator = Accelerator::Aabb;
         s.integrator.nee = false;

@@ -50,6 +50,15 @@ void ObjectReader::resolveParts() {
     }
 }
 
+/// Of what an openpbr material is mixed of, too, which has no names.
+bool ObjectReader::transmits(const Material& part) const {
+    const auto index = static_cast<std::int32_t>(&part - scene_.materials.data());
+    if (part.type != MaterialType::Mix || parts_.contains(index)) return part.transmits();
+    return std::any_of(part.parts.begin(), part.parts.end(), [&](std::int32_t i) {
+        return transmits(scene_.materials[static_cast<std::size_t>(i)]);
+    });
+}
+
 /// `way`: from a material to one that it is made of, by way of others.
 void ObjectReader::checkParts(const std::vector<std::int32_t>& way) {
     const auto found = parts_.find(way.back());
@@ -85,7 +94,7 @@ void ObjectReader::checkParts(const std::vector<std::int32_t>& way) {
         const bool one_side = std::any_of(way.begin(), way.end(), [&](std::int32_t index) {
             return at(index).type == MaterialType::TwoSided;
         });
-        if (one_side && at(part).transmits())
+        if (one_side && transmits(at(part)))
             out_.error(place, fmt::format("material '{}' lets light through: it has both sides itself, and "
                                           "cannot be one of a two_sided material",
                                           at(part).name));

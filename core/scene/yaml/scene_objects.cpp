@@ -153,13 +153,23 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
         if (kind == word) material.type = type;
     for (const auto& [type, word] : kComposedNames)
         if (kind == word) material.type = type;
-    takeNumber("opacity", material.opacity, material.opacity_texture);
+    const bool open_pbr = kind == "openpbr";
+    takeNumber(open_pbr ? "geometry_opacity" : "opacity", material.opacity, material.opacity_texture);
     if (section->schema().find("normal_map") != nullptr)
         if (const auto map =
                 section->section("normal_map", fmt::format("the normal map of {}", section->subject()))) {
             material.normal_texture = textures_.readNormalMap(*map);
             map->read("strength", material.normal_strength);
         }
+    const auto add = [&] {
+        named.index = static_cast<std::int32_t>(scene_.materials.size());
+        scene_.materials.push_back(std::move(material));
+    };
+    if (open_pbr) {
+        readOpenPbr(*section, material);
+        add();
+        return;
+    }
     switch (material.type) {
         case MaterialType::Diffuse:
         case MaterialType::Mirror: takeReflectance(); break;
@@ -196,8 +206,8 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
                        "unseen",
                        "leave 'opacity' or 'absorption' out");
     if (section->schema().find("thin_film") != nullptr) readThinFilm(*section, material);
-    named.index = static_cast<std::int32_t>(scene_.materials.size());
-    scene_.materials.push_back(std::move(material));
+    if (section->schema().find("roughness_anisotropy") != nullptr) readAnisotropy(*section, material);
+    add();
 }
 
 void ObjectReader::readThinFilm(const SectionReader& section, Material& material) {

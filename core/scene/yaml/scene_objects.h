@@ -46,6 +46,11 @@ private:
     void resolveParts();
     void checkParts(const std::vector<std::int32_t>& way);
     void readThinFilm(const SectionReader& section, Material& material);
+    void readAnisotropy(const SectionReader& section, Material& material) const;
+    struct OpenPbr;
+    /// Makes the material of what OpenPBR's keys say, and of further ones, which come before it.
+    void readOpenPbr(const SectionReader& section, Material& material);
+    bool transmits(const Material& part) const;
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
     ObjUse readObjUse(const SectionReader& object, const std::string& material);
     void refuseObjKeys(const SectionReader& object) const;

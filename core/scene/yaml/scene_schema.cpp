@@ -7,6 +7,7 @@
 #include "scene/yaml/scene_schema_composition.h"
 #include "scene/yaml/scene_schema_films.h"
 #include "scene/yaml/scene_schema_lights.h"
+#include "scene/yaml/scene_schema_surfaces.h"
 #include "scene/yaml/scene_schema_textures.h"
 #include "scene/yaml/scene_schema_values.h"
 
@@ -922,6 +923,8 @@ const std::vector<SectionSchema>& sceneSchema() {
         addMaterials(all);
         addCompositions(all);
         addThinFilm(all);
+        addAnisotropy(all);
+        addOpenPbr(all);
         addObjects(all);
         addLights(all);
         addOutside(all);

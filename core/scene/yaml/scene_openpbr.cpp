@@ -1,0 +1,273 @@
+// The part of ObjectReader that reads openpbr materials (OpenPBR Surface 1.1): they become crt's own, mixed
+// as the specification says. What crt has not is refused where it would be seen.
+#include "scene/yaml/scene_objects.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace crt {
+namespace {
+
+/// A number, or an image of them.
+struct Weight {
+    double value = 0;
+    TextureIndex texture = kNoTexture;
+
+    bool isTextured() const { return texture != kNoTexture; }
+    bool mayBeAbove0() const { return isTextured() || value > 0; }
+    bool mayBeBelow1() const { return isTextured() || value < 1; }
+};
+
+/// Index that reflects `weight` times as much straight on as `ior` does.
+double modulatedIndex(double ior, double weight) {
+    const double amplitude = std::abs((1 - ior) / (1 + ior));
+    const double changed = std::copysign(std::min(1.0, std::sqrt(weight) * amplitude), ior - 1);
+    return (1 + changed) / (1 - changed);
+}
+
+/// Cauchy's two terms, from the index at Fraunhofer's line d and Abbe's number.
+Spectrum dispersed(double ior, double abbe) {
+    constexpr double d_um = 0.5876, F_um = 0.4861, C_um = 0.6563;
+    const double b = (ior - 1) / (abbe * (1 / (F_um * F_um) - 1 / (C_um * C_um)));
+    return cauchyIndex({ior - b / (d_um * d_um), b});
+}
+
+Spectrum scaled(Spectrum spectrum, double factor) {
+    if (spectrum.isConstant()) return constantSpectrum(spectrum[0] * factor);
+    for (double& value : spectrum.values) value *= factor;
+    return spectrum;
+}
+
+bool isWhite(const Spectrum& s) { return s.min() == 1 && s.max() == 1; }
+
+}  // namespace
+
+/// What the keys say, and materials made of it.
+struct ObjectReader::OpenPbr {
+    ObjectReader& reader;
+    const SectionReader& section;
+    Material like;  ///< What all its parts have in common.
+    double base_weight = 1, diffuse_roughness = 0;
+    Spectrum base_color = constantSpectrum(0.8), specular_color = constantSpectrum(1);
+    TextureIndex base_texture = kNoTexture;
+    Weight metalness, transmission, roughness{0.3};
+    double specular_weight = 1, ior = 1.5;
+    Spectrum transmission_color = constantSpectrum(1);
+    double transmission_depth = 0, dispersion_scale = 0, abbe = 20;
+    double film_weight = 0, film_um = 0.5, film_ior = 1.4;
+
+    void read();
+    void refuse() const;
+    Material make();
+
+private:
+    void number(const char* key, Weight& into) const;
+    void color(const char* key, Spectrum& into) const;
+    bool isMetal() const { return metalness.mayBeAbove0(); }
+    bool isOpaque() const { return metalness.mayBeBelow1() && transmission.mayBeBelow1(); }
+    bool isClear() const { return metalness.mayBeBelow1() && transmission.mayBeAbove0(); }
+    double index() const { return modulatedIndex(ior, specular_weight); }
+    void setColor(Material& part) const;
+    void setRoughness(Material& part) const;
+    Material metal() const;
+    Material glossy() const;
+    Material clear(bool under_film) const;
+    Material mixed(const char* what, Material first, Material second, const Weight& amount) const;
+};
+
+void ObjectReader::OpenPbr::number(const char* key, Weight& into) const {
+    if (TextureReader::isTexture(section, key))
+        into.texture = reader.textures_.read(section, key, TexelKind::Numbers).value_or(kNoTexture);
+    else
+        section.read(key, into.value);
+}
+
+void ObjectReader::OpenPbr::color(const char* key, Spectrum& into) const {
+    if (std::optional<Spectrum> s = reader.spectra_.read(section, key, SpectrumUse::Reflectance))
+        into = *std::move(s);
+}
+
+void ObjectReader::OpenPbr::read() {
+    section.read("base_weight", base_weight);
+    if (TextureReader::isTexture(section, "base_color"))
+        base_texture =
+            reader.textures_.read(section, "base_color", TexelKind::Spectra).value_or(kNoTexture);
+    else
+        color("base_color", base_color);
+    section.read("base_diffuse_roughness", diffuse_roughness);
+    number("base_metalness", metalness);
+    section.read("specular_weight", specular_weight);
+    color("specular_color", specular_color);
+    number("specular_roughness", roughness);
+    section.read("specular_roughness_anisotropy", like.anisotropy);
+    section.read("anisotropy_rotation_deg", like.anisotropy_rotation_deg);
+    section.read("specular_ior", ior);
+    number("transmission_weight", transmission);
+    color("transmission_color", transmission_color);
+    section.read("transmission_depth", transmission_depth);
+    section.read("transmission_dispersion_scale", dispersion_scale);
+    section.read("transmission_dispersion_abbe_number", abbe);
+    section.read("thin_film_weight", film_weight);
+    section.read("thin_film_thickness", film_um);
+    section.read("thin_film_ior", film_ior);
+}
+
+/// Each sentence is about what would be seen: keys of a slab that is not there may say anything.
+void ObjectReader::OpenPbr::refuse() const {
+    const auto no = [&](bool seen, const char* key, const char* why, const char* instead) {
+        if (seen) section.error(key, why, instead);
+    };
+    for (const auto& [key, why, instead] :
+         {std::tuple{"subsurface_weight", "crt has no light that wanders below a surface",
+                     "leave 'subsurface_weight' out: the base is diffuse then"},
+          std::tuple{"coat_weight", "crt has no coats on openpbr materials yet",
+                     "leave 'coat_weight' out, or take a plastic for a coat on a diffuse base"},
+          std::tuple{"fuzz_weight", "crt has no fuzz", "leave 'fuzz_weight' out"},
+          std::tuple{"emission_luminance", "crt has emission from objects, not from materials",
+                     "give the object 'emission'"}}) {
+        double weight = 0;
+        if (section.read(key, weight)) no(weight > 0, key, why, instead);
+    }
+    bool thin_walled = false;
+    if (section.read("geometry_thin_walled", thin_walled))
+        no(thin_walled, "geometry_thin_walled", "crt has no thin walls of openpbr materials",
+           "take a thin_dielectric");
+    const bool coated = isOpaque() && index() != 1;
+    no(isOpaque() && diffuse_roughness > 0, "base_diffuse_roughness",
+       "crt has no rough diffuse bases: its diffuse is Lambert's", "leave 'base_diffuse_roughness' out");
+    no(base_texture != kNoTexture && base_weight != 1, "base_weight",
+       "a texture is the colour itself: crt has no factor on it", "leave 'base_weight' out");
+    no(isMetal() && specular_weight > 1, "specular_weight",
+       "a metal would reflect more light than there is", "give 'specular_weight' 1 or less");
+    no((coated || isClear()) && !isWhite(specular_color), "specular_color",
+       "no dielectric tints what it reflects alone; crt has the colour for metals",
+       "leave 'specular_color' out, or give 'base_metalness' 1");
+    no(coated && like.anisotropy > 0, "specular_roughness_anisotropy",
+       "the gloss on an opaque base is as rough in every direction: what it reflects is tabulated",
+       "leave it out, or give 'base_metalness' or 'transmission_weight' 1");
+    no(coated && roughness.isTextured(), "specular_roughness",
+       "the gloss on an opaque base is equally rough everywhere: what it reflects is tabulated",
+       "give a number, or 'base_metalness' or 'transmission_weight' 1");
+    no(coated && (index() < 1 || index() > 10), "specular_ior",
+       "the gloss on an opaque base has an index of 1 to 10, after 'specular_weight' has changed it",
+       "give 'specular_ior' from 1 on, and a smaller 'specular_weight'");
+    no(isClear() && !(index() <= 1e3 && index() >= 1e-3), "specular_weight",
+       "this changes the index to beyond 0.001 to 1000", "give a smaller 'specular_weight'");
+    no(isClear() && !isWhite(transmission_color) && transmission_depth == 0, "transmission_color",
+       "a depth of 0 would tint the surface itself, not what is below it",
+       "give 'transmission_depth', where light has this colour");
+    no(isClear() && transmission_depth > 0 && !(transmission_color.min() > 0), "transmission_color",
+       "what is black at any depth is opaque, not clear", "give a colour above 0 at every wavelength");
+    no(isClear() && dispersion_scale > 0 && !(dispersed(index(), abbe / dispersion_scale).min() > 1e-3),
+       "transmission_dispersion_abbe_number", "the index would fall below 0.001",
+       "give a larger Abbe number");
+    const bool film = film_weight > 0 && film_um > 0;
+    no((isMetal() || isClear()) && like.anisotropy > 0 && roughness.isTextured(),
+       "specular_roughness_anisotropy",
+       "an anisotropic surface is equally rough everywhere: what its microfacets lose is tabulated for one "
+       "roughness",
+       "give 'specular_roughness' a number, or leave 'specular_roughness_anisotropy' out");
+    no(isClear() && film && like.anisotropy > 0, "specular_roughness_anisotropy",
+       "a clear dielectric under a film is as rough in every direction",
+       "leave 'thin_film_weight' or 'specular_roughness_anisotropy' out");
+    no(film && (isMetal() || coated), "thin_film_weight",
+       "crt has films on clear dielectrics, and on metals by their index, which a colour has not",
+       "give 'transmission_weight' 1, or take a rough_conductor with 'thin_film'");
+    const bool absorbs = isClear() && transmission_depth > 0 && !isWhite(transmission_color);
+    no(absorbs && !like.isOpaque(), "geometry_opacity",
+       "a body that absorbs is closed: where its surface is not there, light would enter it unseen",
+       "leave 'geometry_opacity' or 'transmission_color' out");
+}
+
+void ObjectReader::OpenPbr::setColor(Material& part) const {
+    part.reflectance_texture = base_texture;
+    part.reflectance = scaled(base_color, base_weight);
+}
+
+void ObjectReader::OpenPbr::setRoughness(Material& part) const {
+    part.roughness = roughness.value;
+    part.roughness_texture = roughness.texture;
+}
+
+Material ObjectReader::OpenPbr::metal() const {
+    Material part = like;
+    part.type = MaterialType::RoughConductor;
+    part.by_color = true;
+    part.edge_tint = specular_color;
+    part.weight = specular_weight;
+    setColor(part);
+    setRoughness(part);
+    return part;
+}
+
+Material ObjectReader::OpenPbr::glossy() const {
+    Material part = like;
+    setColor(part);
+    if (index() == 1) return part;  // Lambert's law
+    part.type = MaterialType::Plastic;
+    part.by_color = true;
+    part.eta = constantSpectrum(index());
+    part.roughness = roughness.value;
+    return part;
+}
+
+Material ObjectReader::OpenPbr::clear(bool under_film) const {
+    Material part = like;
+    part.type = MaterialType::RoughDielectric;
+    part.eta = dispersion_scale > 0 ? dispersed(index(), abbe / dispersion_scale)
+                                    : constantSpectrum(index());
+    setRoughness(part);
+    if (!roughness.mayBeAbove0()) part.type = MaterialType::Dielectric;
+    if (transmission_depth > 0 && !isWhite(transmission_color)) {
+        Spectrum absorption;
+        for (std::size_t i = 0; i < kSpectrumSize; ++i)
+            absorption[i] = -std::log(transmission_color[i]) / transmission_depth;
+        part.absorption = transmission_color.isConstant() ? constantSpectrum(absorption[0]) : absorption;
+    }
+    if (under_film) {
+        part.film_thickness_nm = 1000 * film_um;
+        part.film_index = constantSpectrum(film_ior);
+    }
+    return part;
+}
+
+Material ObjectReader::OpenPbr::mixed(const char* what, Material first, Material second,
+                                      const Weight& amount) const {
+    if (!amount.mayBeAbove0()) return first;
+    if (!amount.mayBeBelow1()) return second;
+    Material whole = like;
+    whole.type = MaterialType::Mix;
+    whole.amount = amount.value;
+    whole.amount_texture = amount.texture;
+    for (std::size_t i = 0; i < 2; ++i) {
+        Material& part = i == 0 ? first : second;
+        part.name = fmt::format("{} ({} {})", like.name, what, i);
+        part.opacity = 1;
+        part.opacity_texture = kNoTexture;
+        whole.parts[i] = static_cast<std::int32_t>(reader.scene_.materials.size());
+        reader.scene_.materials.push_back(std::move(part));
+    }
+    return whole;
+}
+
+Material ObjectReader::OpenPbr::make() {
+    Material dielectric = glossy();
+    if (isClear()) {
+        const Weight film{film_um > 0 ? film_weight : 0};
+        Material translucent = film.value > 0
+                                   ? mixed("film", clear(false), clear(true), film) : clear(false);
+        dielectric = mixed("transmission", std::move(dielectric), std::move(translucent), transmission);
+    }
+    return mixed("metalness", std::move(dielectric), metal(), metalness);
+}
+
+void ObjectReader::readOpenPbr(const SectionReader& section, Material& material) {
+    OpenPbr it{.reader = *this, .section = section, .like = material};
+    it.read();
+    it.refuse();
+    material = it.make();
+}
+
+}  // namespace crt

@@ -1,0 +1,134 @@
+#include "scene/yaml/scene_schema_surfaces.h"
+
+#include "scene/yaml/scene_schema_values.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace crt {
+
+using namespace schema;
+
+void addAnisotropy(std::vector<SectionSchema>& all) {
+    for (SectionSchema& section : all) {
+        if (section.name != "material/rough_conductor" && section.name != "material/rough_dielectric")
+            continue;
+        section.keys.push_back(
+            {.name = "roughness_anisotropy",
+             .kind = Kind::Number,
+             .range = {.min = 0, .max = 1},
+             .fallback = "0",
+             .doc = "How much sharper reflections are across the tangent than along it, as of brushed "
+                    "metal. As in OpenPBR Surface 1.1, with a for it and r for `roughness`: GGX's width is "
+                    "r² √(2 / (1 + (1 − a)²)) along the tangent and 1 − a times that across, "
+                    "here at least 1/50 of it, so that above 0.98 nothing changes. The tangent is the "
+                    "direction in which the texture coordinate u grows and v stays. Faces without texture "
+                    "coordinates have the horizontal direction, around the axis y, as turned on a lathe; "
+                    "where they face along that axis, x. `roughness` must be a number then."});
+        section.keys.push_back({.name = "anisotropy_rotation_deg",
+                                .kind = Kind::Number,
+                                .range = {.min = -360, .max = 360},
+                                .unit = "degrees",
+                                .fallback = "0",
+                                .doc = "Turns the tangent, counter-clockwise seen from the outside."});
+    }
+}
+
+namespace {
+
+/// A number from 0 to 1.
+KeySchema weight(std::string name, std::string fallback, std::string doc, bool textured = false) {
+    return {.name = std::move(name),
+            .kind = Kind::Number,
+            .range = {.min = 0, .max = 1},
+            .section = textured ? "texture" : "",
+            .fallback = std::move(fallback),
+            .doc = std::move(doc)};
+}
+
+KeySchema color(std::string name, std::string fallback, std::string doc, bool textured = false) {
+    return {.name = std::move(name),
+            .kind = Kind::Spectrum,
+            .range = {.min = 0, .max = 1},
+            .section = textured ? "texture" : "",
+            .fallback = std::move(fallback),
+            .doc = std::move(doc)};
+}
+
+KeySchema amount(std::string name, ValueRange range, std::string fallback, std::string doc,
+                 std::string unit = "") {
+    return {.name = std::move(name),
+            .kind = Kind::Number,
+            .range = range,
+            .unit = std::move(unit),
+            .fallback = std::move(fallback),
+            .doc = std::move(doc)};
+}
+
+KeySchema refused(std::string name, const char* what) {
+    return amount(std::move(name), kNotNegative, "0", std::string("Above 0 it is refused: ") + what);
+}
+
+}  // namespace
+
+void addOpenPbr(std::vector<SectionSchema>& all) {
+    const auto place = std::find_if(all.begin(), all.end(),
+                                    [](const SectionSchema& s) { return s.name == "material/mix"; });
+    const auto diffuse = std::find_if(all.begin(), all.end(),
+                                      [](const SectionSchema& s) { return s.name == "material/diffuse"; });
+    SectionSchema section{
+        "material/openpbr",
+        "an openpbr material",
+        "A part of [OpenPBR Surface 1.1](https://academysoftwarefoundation.github.io/OpenPBR/), by its "
+        "names: base, specular, transmission, thin film and opacity. It becomes materials of crt, mixed by "
+        "`base_metalness` and `transmission_weight`, and all light is spectral. A metal is a "
+        "`rough_conductor` that reflects F82-tint's curve (below 0 beside the dip of a dark tint: 0). A "
+        "glossy base is a `plastic` in the reciprocal form of the specification, which gives `base_color` "
+        "to what comes out of the gloss; a clear one is a `rough_dielectric`, its `specular_weight` an "
+        "index. Rough surfaces give back what microfacets lose, as elsewhere in crt. Coat, fuzz, "
+        "subsurface, emission, thin walls and rough diffuse bases are refused where they would be seen, and "
+        "so is what the material that it becomes has not; the message says what to write instead. Keys of "
+        "the specification that are not in this table are unknown.",
+        {typeKey("openpbr", "material"), weight("base_weight", "1", "Factor on `base_color`."),
+         color("base_color", "0.8",
+               "Of metals what they reflect straight on, of others what comes out of the base.", true),
+         weight("base_diffuse_roughness", "0", "Above 0 it is refused where an opaque base is seen."),
+         weight("base_metalness", "0", "Share of the surface that is metal.", true),
+         amount("specular_weight", kNotNegative, "1",
+                "Factor on what is reflected straight on: of dielectrics by another index, of metals at all "
+                "angles."),
+         color("specular_color", "1",
+               "Of metals the share of Schlick's reflectance that is left at 82°. Must be 1 for others."),
+         weight("specular_roughness", "0.3", "As `roughness` of `rough_conductor`.", true),
+         weight("specular_roughness_anisotropy", "0", "As `roughness_anisotropy` of `rough_conductor`."),
+         amount("anisotropy_rotation_deg", {.min = -360, .max = 360}, "0",
+                "Turns the tangent, counter-clockwise seen from the outside. Not of the specification, "
+                "which leaves the tangent to others.",
+                "degrees"),
+         amount("specular_ior", {.min = 1e-3, .max = 1e3}, "1.5",
+                "Refractive index of the inside relative to the outside, at 587.6 nm."),
+         weight("transmission_weight", "0", "Share of the dielectric that is clear.", true),
+         color("transmission_color", "1", "What is left of white light after `transmission_depth`."),
+         amount("transmission_depth", kNotNegative, "0", "How far light goes until then.", "scene units"),
+         weight("transmission_dispersion_scale", "0",
+                "0: the index is the same at all wavelengths; 1: Abbe's number is the next key."),
+         amount("transmission_dispersion_abbe_number", kPositive, "20",
+                "Over the scale it is Abbe's number; the index follows Cauchy's two terms."),
+         weight("thin_film_weight", "0", "Share of the surface that has a film."),
+         amount("thin_film_thickness", {.min = 0, .max = 20}, "0.5", "How thick the film is.", "µm"),
+         amount("thin_film_ior", {.min = 0.1, .max = 10}, "1.4", "Its index relative to the outside."),
+         refused("subsurface_weight", "no light wanders below surfaces."),
+         refused("coat_weight", "there are no coats yet."), refused("fuzz_weight", "there is no fuzz."),
+         refused("emission_luminance", "objects have `emission`."),
+         weight("geometry_opacity", "1",
+                "Share of the surface that is there; light passes the rest unchanged, shadow rays too.",
+                true),
+         {.name = "geometry_thin_walled",
+          .kind = Kind::Boolean,
+          .fallback = "false",
+          .doc = "`true` is refused: `thin_dielectric` is a pane."}}};
+    section.keys.push_back(*diffuse->find("normal_map"));
+    all.insert(place, std::move(section));
+}
+
+}  // namespace crt
