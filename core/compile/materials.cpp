@@ -67,6 +67,7 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
     };
     kernel::CrtMaterial record{};
     record.type = static_cast<std::uint32_t>(material.type);
+    if (material.transmits()) record.flags = CRT_MATERIAL_TRANSMITS;
     const auto losses = tables.compensations.table_of.find(&material);
     if (losses != tables.compensations.table_of.end()) record.loss = losses->second;
     if (hasThinFilm(material)) {
@@ -90,7 +91,7 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
         case MaterialType::RoughDielectric: record.roughness = roughness(); [[fallthrough]];
         case MaterialType::Dielectric:
             record.eta = spectra.valueOf(material.eta);
-            if (!material.eta.isConstant()) record.flags = CRT_MATERIAL_DISPERSIVE;
+            if (!material.eta.isConstant()) record.flags |= CRT_MATERIAL_DISPERSIVE;
             if (material.absorption) record.absorption = spectra.valueOf(*material.absorption);
             break;
         case MaterialType::ThinDielectric: record.eta = spectra.valueOf(material.eta); break;
