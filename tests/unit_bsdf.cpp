@@ -216,7 +216,8 @@ std::vector<Subject> subjects() {
 /// A triangle of one material, and its BSDF at a point.
 class Bench {
 public:
-    explicit Bench(const Material& material) {
+    /// `normal`: what is interpolated.
+    explicit Bench(const Material& material, const Vec3d& normal = {0, 0, 1}) {
         crt::Mesh mesh;
         mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}};  // its normal is +z
         mesh.triangles = {{0, 1, 2}};
@@ -229,6 +230,7 @@ public:
         hit.slot = hit.id = 0;
         hit.b1 = hit.b2 = 0.3f;
         surface_ = crt_surface(&ctx_, hit);
+        surface_.ns = toFloat(normal);
     }
     /// Of a path that carries the same at all wavelengths, or nothing but the hero's.
     CrtBsdf prepare(const Vec3d& wo, bool alone = false) const {
@@ -245,6 +247,9 @@ public:
     static constexpr u32 kHero = 2;
     static CrtScatter sample(const CrtBsdf& bsdf, CrtRandom2 u, CrtRandom2 choice, int alone = 0) {
         return crt_bsdf_sample(&bsdf, u, choice, make_vec4(0, 0, 1, 0), alone);
+    }
+    static CrtScatter sampleSurface(const CrtBsdf& bsdf, CrtRandom2 u, CrtRandom2 choice) {
+        return crt_surface_sample(&bsdf, u, choice, make_vec4(0, 0, 1, 0), 0);
     }
 
 private:
@@ -314,6 +319,39 @@ void overNumbers(F&& f) {
         }
 }
 
+/// χ² of directions against their density in each cell.
+void checkDistribution(const std::array<double, kCells>& density,
+                       const std::function<CrtScatter()>& sample) {
+    constexpr std::uint64_t kSamples = 400000;
+    std::array<std::uint64_t, kCells> counts{};
+    std::uint64_t rejected = 0;
+    for (std::uint64_t i = 0; i < kSamples; ++i) {
+        const CrtScatter scatter = sample();
+        if (scatter.valid && scatter.pdf > 0) ++counts[cellOf(toDouble(scatter.wi))];
+        else ++rejected;
+    }
+    // Cells of few samples are taken together, with what is rejected.
+    std::vector<std::uint64_t> observed{rejected};
+    std::vector<double> expected{std::max(0.0, 1 - total(density)) * kSamples};
+    for (std::size_t c = 0; c < kCells; ++c) {
+        const double e = density[c] * kSamples;
+        if (e >= 20) {
+            observed.push_back(counts[c]);
+            expected.push_back(e);
+        } else {
+            observed[0] += counts[c];
+            expected[0] += e;
+        }
+    }
+    if (expected[0] < 20) {
+        CHECK(static_cast<double>(observed[0]) < 60);
+        observed.erase(observed.begin());
+        expected.erase(expected.begin());
+    }
+    REQUIRE(observed.size() > 4);
+    CHECK(std::abs(chiSquaredDeviate(observed, expected)) < 4.4);
+}
+
 }  // namespace
 
 TEST_CASE("BSDF: every kind of material is asked", "[kernel][bsdf][materials]") {
@@ -336,34 +374,78 @@ TEST_CASE("BSDF: directions are distributed as the pdf says", "[kernel][bsdf][ma
             double lobe_chance = 1;
             if (s.single(wo[2]) > 0) lobe_chance = 1 - static_cast<double>(bsdf.coat_chance);
             CHECK(total(density) < lobe_chance + 1e-3);
-            constexpr std::uint64_t kSamples = 400000;
-            std::array<std::uint64_t, kCells> counts{};
-            std::uint64_t rejected = 0;
-            for (std::uint64_t i = 0; i < kSamples; ++i) {
-                const CrtScatter scatter = Bench::sample(bsdf, random.pair(), random.pair());
-                if (scatter.valid && scatter.pdf > 0) ++counts[cellOf(toDouble(scatter.wi))];
-                else ++rejected;
+            checkDistribution(density, [&] { return Bench::sample(bsdf, random.pair(), random.pair()); });
+        }
+    }
+}
+
+TEST_CASE("BSDF: about interpolated normals nothing that is reflected is lost",
+          "[kernel][bsdf][materials]") {
+    Random random(74);
+    for (const Subject& s : subjects()) {
+        if (s.material.transmits()) continue;
+        const Bench flat(s.material);
+        for (const double tilt : {0.35, 1.1})
+            // From before the normal, and from behind it on the other side.
+            for (const Vec3d& wo : {spherical(0.6, 0.7), spherical(-0.2, 0.7)}) {
+                const Vec3d normal = spherical(std::cos(tilt), 0.2);
+                // From behind the normal, of kinds that only mirror it is the face's.
+                const bool face = s.material.type == MaterialType::Conductor && wo[2] < 0;
+                const double cosine = face ? -wo[2] : std::abs(dot(wo, normal));
+                const Bench bench(s.material, normal);
+                const CrtBsdf bsdf = bench.prepare(wo), upright = flat.prepare(spherical(cosine, 0.7));
+                INFO(s.name << " at " << tilt << " from " << wo[2]);
+                double kept = 0, expected = 0, single = 0, worst_pdf = 0;
+                std::uint64_t below = 0;
+                overNumbers([&](CrtRandom2 u, CrtRandom2 choice, double share) {
+                    const CrtScatter there = Bench::sampleSurface(bsdf, u, choice),
+                                     here = Bench::sample(upright, u, choice);
+                    if (here.valid) expected += share * V4X(here.weight);
+                    if (!there.valid) return;
+                    kept += share * V4X(there.weight);
+                    if (there.pdf == 0) single += share * V4X(there.weight);
+                    below += there.wi.z * wo[2] <= 0 || std::abs(length(toDouble(there.wi)) - 1) > 1e-6;
+                    if (there.pdf > 0)
+                        worst_pdf = fartherFrom0(worst_pdf,
+                                                 crt_surface_pdf(&bsdf, there.wi) / double{there.pdf} - 1);
+                });
+                CHECK(kept == Approx(expected).epsilon(1e-3));
+                CHECK(below == 0);
+                CHECK(worst_pdf < 1e-3);
+                if (isDelta(bsdf)) continue;
+                const auto above = [&](const std::function<double(vec3)>& f) {
+                    return overCells([&](const Vec3d& w) { return w[2] * wo[2] > 0 ? f(unitFloat(w)) : 0; });
+                };
+                const auto density = above([&](vec3 w) -> double { return crt_surface_pdf(&bsdf, w); });
+                const double lobe =
+                    total(above([&](vec3 w) -> double { return V4X(crt_surface_eval(&bsdf, w)); }));
+                CHECK(lobe + single == Approx(expected).epsilon(0.01));
+                checkDistribution(density, [&] {
+                    return Bench::sampleSurface(bsdf, random.pair(), random.pair());
+                });
             }
-            // Cells of few samples are taken together, with what is rejected.
-            std::vector<std::uint64_t> observed{rejected};
-            std::vector<double> expected{std::max(0.0, 1 - total(density)) * kSamples};
-            for (std::size_t c = 0; c < kCells; ++c) {
-                const double e = density[c] * kSamples;
-                if (e >= 20) {
-                    observed.push_back(counts[c]);
-                    expected.push_back(e);
-                } else {
-                    observed[0] += counts[c];
-                    expected[0] += e;
-                }
-            }
-            if (expected[0] < 20) {
-                CHECK(static_cast<double>(observed[0]) < 60);
-                observed.erase(observed.begin());
-                expected.erase(expected.begin());
-            }
-            REQUIRE(observed.size() > 4);
-            CHECK(std::abs(chiSquaredDeviate(observed, expected)) < 4.4);
+    }
+}
+
+TEST_CASE("BSDF: Lambert's light is raised without a seam, and where it came from is known",
+          "[kernel][bsdf]") {
+    Random random(75);
+    for (const double tilt : {0.01, 0.2, 1.1}) {
+        const Vec3d normal = spherical(std::cos(tilt), 0.2);
+        const Bench bench(reflecting(MaterialType::Diffuse, 1), normal);
+        const CrtBsdf bsdf = bench.prepare({0, 0, 1});
+        CHECK(crt_below(&bsdf) == Approx((1 - std::cos(tilt)) / 2).epsilon(1e-3));
+        for (int i = 0; i < 2000; ++i) {
+            const double depth = std::sin(tilt) * (i % 2 == 0 ? 1 : 1e-3) * random.uniform();
+            const Vec3d w = spherical(-depth, random.uniform(-kPi, kPi));
+            const double before = dot(w, normal);
+            if (!(before > 1e-3)) continue;
+            const vec3 raised = crt_raised(&bsdf, toFloat(w));
+            CHECK(raised.z >= 0);
+            CHECK(length(toDouble(raised)) == Approx(1).margin(1e-6));
+            CHECK(crt_cosine_before(crt_below(&bsdf), dot3(raised, bsdf.ns), raised.z) ==
+                  Approx(before).margin(2e-3 * std::sin(tilt) + 1e-5 / tilt));
+            if (i % 2 == 1) CHECK(length(minus(toDouble(raised), w)) < 0.2);
         }
     }
 }

@@ -201,8 +201,9 @@ TEST_CASE("materials: the face's own, the object's, or grey, and equal spectra o
     CHECK(m[1].type == CRT_MATERIAL_MIRROR);
     CHECK(m[2].type == CRT_MATERIAL_CONDUCTOR);
     CHECK(m[3].type == CRT_MATERIAL_DIELECTRIC);
-    CHECK(m[3].flags == 0);
-    CHECK(m[4].flags == CRT_MATERIAL_DISPERSIVE);
+    CHECK(m[2].flags == 0);
+    CHECK(m[3].flags == CRT_MATERIAL_TRANSMITS);
+    CHECK(m[4].flags == (CRT_MATERIAL_TRANSMITS | CRT_MATERIAL_DISPERSIVE));
     const CrtContext kinds_ctx = contextOf(kinds);
     CHECK(V4X(crt_value(&kinds_ctx, m[2].eta, nullptr, splat4(7))) == 0.2f);
     CHECK(V4X(crt_value(&kinds_ctx, m[2].k, nullptr, splat4(7))) == 3);

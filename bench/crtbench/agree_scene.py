@@ -2,6 +2,7 @@
 numbers, {rgb: …, space: linear} and tables with every value written out; what has no counterpart is
 refused, so that nothing is compared that was not translated."""
 
+import dataclasses
 import re
 
 import mitsuba as mi
@@ -18,9 +19,21 @@ def refuse_all_but(what, given, known):
         raise Failure(f"{what}: {', '.join(sorted(unknown))} cannot be translated for Mitsuba")
 
 
+def table(nm, value):
+    """Linear between, and 0 outside."""
+    return {
+        "type": "irregular",
+        "wavelengths": ", ".join(map(str, nm)),
+        "values": ", ".join(map(str, value)),
+    }
+
+
 def spectrum(given):
     if isinstance(given, (int, float)):
         return {"type": "uniform", "value": float(given)}
+    if "table" in given:
+        refuse_all_but("a table", given, {"table"})
+        return table(given["table"]["nm"], given["table"]["value"])
     refuse_all_but("a spectrum", given, {"rgb", "space"})
     if given.get("space") != "linear":
         raise Failure("an RGB colour without 'space: linear' cannot be translated for Mitsuba")
@@ -224,7 +237,22 @@ def write_shape(mesh, path):
     return {"type": "ply", "filename": str(path), "face_normals": True}
 
 
-def environment(given):
+def environment_image(file):
+    """Its name, if the scene has one."""
+    return (scene_file.load(file).get("environment") or {}).get("image")
+
+
+def environment(given, folder):
+    if "image" in given:
+        refuse_all_but("an environment image", given, {"image", "scale", "rotation_deg", "light_sampling"})
+        # The middle of crt's image is towards -z, of Mitsuba's towards +z.
+        turn = mi.ScalarTransform4f().rotate([0, 1, 0], 180 + given.get("rotation_deg", 0))
+        return {
+            "type": "envmap",
+            "filename": str(folder / given["image"]),
+            "scale": float(given.get("scale", 1)),
+            "to_world": turn,
+        }
     refuse_all_but("an environment", given, {"radiance", "light_sampling"})
     return {"type": "constant", "radiance": spectrum(given["radiance"])}
 
@@ -270,19 +298,60 @@ def light(given):
     return LIGHTS[given["type"]](given)
 
 
-def translate(file, folder, samples):
-    """The dictionary that mi.load_dict takes. Meshes go to `folder`, where images are."""
+@dataclasses.dataclass
+class Band:
+    """What a spectral film measures: the name of crt's channel, and a sensor's answer in Mitsuba."""
+
+    channel: str
+    nm: list
+    answer: list
+
+    @property
+    def integral(self):
+        """Mitsuba's channels are integrals, crt's are means."""
+        return float(np.trapezoid(self.answer, self.nm))
+
+
+def bands(file):
+    """Bins, then responses; none of a film of colours."""
+    film = scene_file.load(file)["film"]
+    found = []
+    if spectral := film.get("spectral"):
+        width = (spectral["to_nm"] - spectral["from_nm"]) / spectral["bins"]
+        for number in range(spectral["bins"]):
+            first = spectral["from_nm"] + number * width
+            middle = f"{first + width / 2:.6f}".replace(".", ",")
+            found.append(Band(f"S0.{middle}nm", [first, first + width], [1, 1]))
+    for name, given in film.get("responses", {}).items():
+        refuse_all_but("a response", given, {"table", "outside"})
+        if given.get("outside") != "zero":
+            raise Failure("a response without 'outside: zero' cannot be translated for Mitsuba")
+        found.append(Band(f"Response.{name}", given["table"]["nm"], given["table"]["value"]))
+    return found
+
+
+def film_of(given, band):
+    """Of colours, or of one band."""
+    refuse_all_but("the film", given, {"resolution", "spectral", "responses"})
+    width, height = given["resolution"]
+    if width != height:
+        raise Failure("a film that is not square cannot be translated: fields of view differ in their axis")
+    made = {"width": width, "height": height, "component_format": "float32", "rfilter": {"type": "box"}}
+    if band is None:
+        return made | {"type": "hdrfilm", "pixel_format": "xyz"}
+    return made | {"type": "specfilm", "band": table(band.nm, band.answer)}
+
+
+def translate(file, folder, samples, band=None):
+    """The dictionary that mi.load_dict takes. Meshes go to `folder`, where images are. `band`: of a spectral
+    film, the one that is rendered."""
     given = scene_file.load(file)
     known = "crt title camera film integrator sampler materials objects lights environment"
     refuse_all_but("the scene", given, known.split())
     camera, film, integrator = given["camera"], given["film"], given["integrator"]
     refuse_all_but("the camera", camera, {"position", "target", "fov", "up"})
-    refuse_all_but("the film", film, {"resolution"})
     if integrator.get("roulette") is not False:
         raise Failure("a scene without 'roulette: false' cannot be translated: roulettes differ")
-    width, height = film["resolution"]
-    if width != height:
-        raise Failure("a film that is not square cannot be translated: fields of view differ in their axis")
     made = {
         "type": "scene",
         # Mitsuba's depth counts the emitter, max_depth of crt does not.
@@ -295,19 +364,12 @@ def translate(file, folder, samples):
             "to_world": mi.ScalarTransform4f().look_at(
                 origin=camera["position"], target=camera["target"], up=camera.get("up", [0, 1, 0])
             ),
-            "film": {
-                "type": "hdrfilm",
-                "width": width,
-                "height": height,
-                "pixel_format": "xyz",
-                "component_format": "float32",
-                "rfilter": {"type": "box"},
-            },
+            "film": film_of(film, band),
             "sampler": {"type": "independent", "sample_count": samples},
         },
     }
     if "environment" in given:
-        made["environment"] = environment(given["environment"])
+        made["environment"] = environment(given["environment"], folder)
     for number, thing in enumerate(given.get("lights", [])):
         made[f"light{number}"] = light(thing)
     for number, thing in enumerate(given["objects"]):

@@ -53,8 +53,8 @@ class Pool:
 
 def tiles(image):
     y = image[:, :, 1].astype(np.float64)
-    side = y.shape[0] // TILES
-    return y[: side * TILES, : side * TILES].reshape(TILES, side, TILES, side).mean(axis=(1, 3))
+    high, wide = y.shape[0] // TILES, y.shape[1] // TILES
+    return y[: high * TILES, : wide * TILES].reshape(TILES, high, TILES, wide).mean(axis=(1, 3))
 
 
 def ratio(a, b, function):

@@ -9,13 +9,26 @@ import yaml
 from .program import Failure
 
 
+# Of a section, keys that exclude one another: with them go those that belong to them.
+EXCLUSIVE = {"environment": [{"radiance"}, {"image", "scale", "rotation_deg", "up"}, {"sky"}]}
+
+
+def without_excluded(section, below, above):
+    """What is left of an included section beside keys of the including one."""
+    gone = set()
+    for form in EXCLUSIVE.get(section, []):
+        if form & above.keys():
+            gone |= set().union(*(other for other in EXCLUSIVE[section] if other is not form))
+    return {key: value for key, value in below.items() if key not in gone}
+
+
 def merged(below, above):
     """Sections, spectra and materials key by key, objects one after the other, everything else that of
     `above`."""
     scene = {**below, **above}
     for key in below.keys() & above.keys():
         if isinstance(below[key], dict) and isinstance(above[key], dict):
-            scene[key] = {**below[key], **above[key]}
+            scene[key] = {**without_excluded(key, below[key], above[key]), **above[key]}
         elif key in ("objects", "lights"):
             scene[key] = below[key] + above[key]
     return scene

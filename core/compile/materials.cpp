@@ -73,6 +73,7 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
     };
     kernel::CrtMaterial record{};
     record.type = static_cast<std::uint32_t>(material.type);
+    if (material.transmits()) record.flags = CRT_MATERIAL_TRANSMITS;
     const auto losses = tables.compensations.table_of.find(&material);
     if (losses != tables.compensations.table_of.end()) record.loss = losses->second;
     if (hasThinFilm(material)) {
@@ -94,7 +95,7 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
         case MaterialType::RoughConductor:
             record.roughness = roughness();
             if (material.by_color) {
-                record.flags = CRT_MATERIAL_OPENPBR;
+                record.flags |= CRT_MATERIAL_OPENPBR;
                 record.eta = reflectance();
                 record.k = spectra.valueOf(material.edge_tint);
                 record.coat = valueOf(material.weight);
@@ -110,7 +111,7 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
         case MaterialType::RoughDielectric: record.roughness = roughness(); [[fallthrough]];
         case MaterialType::Dielectric:
             record.eta = spectra.valueOf(material.eta);
-            if (!material.eta.isConstant()) record.flags = CRT_MATERIAL_DISPERSIVE;
+            if (!material.eta.isConstant()) record.flags |= CRT_MATERIAL_DISPERSIVE;
             if (material.absorption) record.absorption = spectra.valueOf(*material.absorption);
             break;
         case MaterialType::ThinDielectric: record.eta = spectra.valueOf(material.eta); break;
@@ -123,7 +124,7 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
             record.roughness = valueOf(material.roughness);
             record.k = valueOf(coat.internal_reflectance);
             record.coat = spectra.valueOf(coat.albedo);
-            if (material.by_color) record.flags = CRT_MATERIAL_OPENPBR;
+            if (material.by_color) record.flags |= CRT_MATERIAL_OPENPBR;
             break;
         }
     }

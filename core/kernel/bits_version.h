@@ -11,10 +11,11 @@
  *   2   the first version that plugins and films carry
  *   3   materials as BSDFs, eight dimensions a vertex
  *   4   rough_conductor and rough_dielectric give back what their microfacets lose
+ *   5   interpolated normals keep the light of surfaces that reflect
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 4u
+#define CRT_BITS_VERSION 5u
 
 #endif

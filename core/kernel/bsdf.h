@@ -31,8 +31,10 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
     b->wo = wo;
     b->ng = outside ? surface->ng : -surface->ng;
     b->ns = outside ? surface->ns : -surface->ns;
-    /* A shading normal that turns away from the viewer would reflect light from behind the surface. */
-    if ((CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) && !(dot3(wo, b->ns) > 0.0f)) b->ns = b->ng;
+    if (CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) {
+        crt_face_viewer(b, (material.flags & CRT_MATERIAL_TRANSMITS) != 0u);
+        wo = b->wo;
+    }
     b->albedo = splat4(1.0f);
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
@@ -176,18 +178,18 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 cho
     (void)choice;
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
-            if (CRT_HAS(DIFFUSE)) return crt_sample_diffuse(b->reflectance, b->ns, b->ng, u);
+            if (CRT_HAS(DIFFUSE)) return crt_sample_lambert(b, u);
             break;
         case CRT_MATERIAL_MIRROR:
         case CRT_MATERIAL_CONDUCTOR:
-            if (CRT_HAS(MIRROR) || CRT_HAS(CONDUCTOR))
-                return crt_sample_mirror(b->reflectance, b->wo, b->ns, b->ng);
+            if (CRT_HAS(MIRROR) || CRT_HAS(CONDUCTOR)) return crt_sample_mirror_up(b, b->reflectance);
             break;
         case CRT_MATERIAL_ROUGH_CONDUCTOR:
             if (CRT_HAS(ROUGH_CONDUCTOR)) {
-                if ((b->flags & CRT_BSDF_DELTA) != 0u)
-                    return crt_sample_mirror(b->reflectance, b->wo, b->ns, b->ng);
-                return crt_sample_rough_conductor(b, u);
+                if ((b->flags & CRT_BSDF_DELTA) != 0u) return crt_sample_mirror_up(b, b->reflectance);
+                CrtBsdf about = *b;
+                about.ng = crt_sampled_about(b);
+                return crt_turned_up(b, crt_sample_rough_conductor(&about, u));
             }
             break;
         case CRT_MATERIAL_DIELECTRIC:
@@ -214,7 +216,7 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 cho
 CRT_FN vec4 crt_bsdf_eval(const CrtBsdf *b, vec3 wi) {
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
-            if (CRT_HAS(DIFFUSE)) return b->reflectance * crt_lambert(dot3(wi, b->ns));
+            if (CRT_HAS(DIFFUSE)) return b->reflectance * crt_lambert_pdf(b, wi);
             break;
         case CRT_MATERIAL_ROUGH_CONDUCTOR:
             if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u) {
@@ -243,7 +245,7 @@ CRT_FN vec4 crt_bsdf_eval(const CrtBsdf *b, vec3 wi) {
 CRT_FN f32 crt_bsdf_pdf(const CrtBsdf *b, vec3 wi) {
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
-            if (CRT_HAS(DIFFUSE)) return crt_lambert(dot3(wi, b->ns));
+            if (CRT_HAS(DIFFUSE)) return crt_lambert_pdf(b, wi);
             break;
         case CRT_MATERIAL_ROUGH_CONDUCTOR:
             if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u) {

@@ -150,7 +150,8 @@ typedef struct CrtTexture {
 CRT_ASSERT_SIZE(CrtTexture, 64);
 
 #define CRT_MATERIAL_DISPERSIVE 1u
-#define CRT_MATERIAL_OPENPBR 2u /* rough conductors and plastic: by the colours that are seen (openpbr.h) */
+#define CRT_MATERIAL_TRANSMITS 2u /* light comes out on the other side */
+#define CRT_MATERIAL_OPENPBR 4u /* rough conductors and plastic: by the colours that are seen (openpbr.h) */
 
 /* Steps between the cosines 0 and 1 of a coat's table, which is as long as a spectrum's. */
 #define CRT_COAT_STEPS 470.0f

@@ -5,8 +5,10 @@
  * below the surface, and all that it would send towards a viewer behind it. Here it is, as in Schüßler et
  * al. (2017, "Microfacet-based Normal Mapping for Robust Monte Carlo Path Tracing"), the normal of a facet
  * beside which stands a wall, a mirror upright on the surface: a viewer behind it sees it in the wall. What
- * leaves the facet downwards is mirrored up by the surface. So of light from everywhere a surface sends on
- * what its BSDF does. Why there is no shadowing by the walls: docs/decisions/0024-normal-maps.md.
+ * leaves the facet downwards is mirrored up by the surface: by its interpolated normal, where it has one,
+ * and then by its geometric one, as is what other smooth surfaces send down (shading_normal.h). So of light
+ * from everywhere a surface sends on what its BSDF does. Why there is no shadowing by the walls:
+ * docs/decisions/0024-normal-maps.md.
  *
  * Surfaces that transmit have no walls: there the mapped normal stands in the place of the other.
  */
@@ -20,8 +22,6 @@ CRT_KERNEL_BEGIN
 
 /* Slopes are at most 87°. */
 #define CRT_LEAST_SLOPE_COS 0.05f
-
-CRT_FN vec3 crt_mirrored(vec3 v, vec3 n) { return crt_fma3(n, -2.0f * dot3(v, n), v); }
 
 /* The normal that the map has at a place, about the shading normal; on its side. */
 CRT_FN vec3 crt_mapped_normal(const CrtContext *ctx, const CrtSurface *surface, u32 slot,
@@ -77,8 +77,22 @@ CRT_FN void crt_map_normal(const CrtContext *ctx, CrtSurface *surface, u32 slot,
 }
 
 /* The normal that tells reflection from transmission, and the one that light arrives about by its cosine. */
-CRT_FN vec3 crt_side(const CrtBsdf *b) { return CRT_HAS(NORMAL_MAP) && b->facet ? b->side : b->ng; }
-CRT_FN vec3 crt_base(const CrtBsdf *b) { return CRT_HAS(NORMAL_MAP) && b->facet ? b->base : b->ns; }
+CRT_FN vec3 crt_side(const CrtBsdf *b) { return crt_is_facet(b) ? b->side : b->ng; }
+CRT_FN vec3 crt_base(const CrtBsdf *b) { return crt_is_facet(b) ? b->base : b->ns; }
+
+/* Cosine of a scattered direction with the base; or, where that is below it, less the one with the side. */
+CRT_FN f32 crt_scatter_cosine(const CrtBsdf *b, vec3 wi) {
+    const f32 cosine = dot3(wi, crt_base(b));
+    if (!CRT_HAS(SMOOTH_NORMALS) || cosine > 0.0f) return cosine;
+    const f32 above = dot3(wi, crt_side(b));
+    return above > 0.0f ? -above : cosine;
+}
+
+/* Whether the base of a facet is off its side: an interpolated normal. */
+CRT_FN int crt_is_tilted(const CrtBsdf *b) {
+    const vec3 off = b->base - b->side;
+    return dot3(off, off) > 0.0f;
+}
 
 /* How many directions of a facet end in wi: that itself, and the one that the surface mirrors into it. */
 CRT_FN u32 crt_ways(const CrtBsdf *b, vec3 wi) {
@@ -109,8 +123,12 @@ CRT_FN f32 crt_surface_pdf(const CrtBsdf *b, vec3 wi) {
 CRT_FN CrtScatter crt_surface_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero,
                                      int alone) {
     CrtScatter s = crt_bsdf_sample(b, u, choice, hero, alone);
-    if (!CRT_HAS(NORMAL_MAP) || !b->facet || !s.valid) return s;
+    if (!crt_is_facet(b) || !s.valid) return s;
     if (dot3(s.wi, b->base) < 0.0f) s.wi = crt_mirrored(s.wi, b->base);
+    if (CRT_HAS(SMOOTH_NORMALS) && dot3(s.wi, b->side) < 0.0f && crt_is_tilted(b)) {
+        s.wi = crt_mirrored(s.wi, b->side); /* as crt_turned_up */
+        s.pdf = 0.0f;
+    }
     s.valid = dot3(s.wi, b->side) > 0.0f;
     if (s.valid && s.pdf > 0.0f) s.pdf = crt_surface_pdf(b, s.wi);
     return s;

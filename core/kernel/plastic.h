@@ -15,6 +15,7 @@
 #define CRT_PLASTIC_H
 
 #include "microfacet.h"
+#include "shading_normal.h"
 
 CRT_KERNEL_BEGIN
 
@@ -26,15 +27,24 @@ CRT_FN f32 crt_coat_albedo(const CrtBsdf *b, f32 cosine) {
     return crt_fresnel_dielectric(c, V4X(b->eta));
 }
 
-/* f·|cos| without what a smooth coat mirrors, and its density. */
+/* f·|cos| without what a smooth coat mirrors, and its density. About an interpolated normal, what the base
+   sends below the surface is raised (shading_normal.h). */
 CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
-    *pdf = 0.0f;
     const f32 cos_i = dot3(wi, b->ns);
-    if (!(cos_i > 0.0f)) return splat4(0.0f);
-    const f32 lambert = crt_lambert(cos_i);
-    const vec4 base = b->reflectance * ((1.0f - crt_coat_albedo(b, cos_i)) * lambert);
+    const f32 below = crt_below(b);
+    f32 lambert = crt_lambert(cos_i);
+    f32 entering = cos_i > 0.0f ? (1.0f - crt_coat_albedo(b, cos_i)) * lambert : 0.0f;
+    if (below > 0.0f) {
+        const f32 cos_g = dot3(wi, b->ng);
+        const f32 raised = below * crt_lambert(cos_g);
+        lambert = cos_g > 0.0f ? lambert + raised : 0.0f;
+        entering = cos_g > 0.0f ? entering + (1.0f - crt_coat_albedo(b, crt_cosine_before(below, cos_i,
+                                                                                        cos_g))) * raised
+                                : 0.0f;
+    }
+    const vec4 base = b->reflectance * entering;
     *pdf = (1.0f - b->coat_chance) * lambert;
-    if (!(CRT_HAS(TABLE) && b->coat != 0)) return base;
+    if (!(CRT_HAS(TABLE) && b->coat != 0) || !(cos_i > 0.0f)) return base;
     const CrtMicrofacet m = crt_microfacet(b, wi);
     if (!(m.cos_o > 0.0f)) return base;
     *pdf += b->coat_chance * m.density / (2.0f * (m.cos_o + m.root_o));
@@ -47,18 +57,19 @@ CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
 CRT_FN CrtScatter crt_sample_plastic(const CrtBsdf *b, CrtRandom2 u, f32 choice) {
     CrtScatter s = crt_no_scatter();
     if (choice < b->coat_chance) {
-        if (!(CRT_HAS(TABLE) && b->coat != 0)) {
-            const f32 mirrored = crt_coat_albedo(b, dot3(b->wo, b->ns)) / b->coat_chance;
-            return crt_sample_mirror(splat4(mirrored), b->wo, b->ns, b->ng);
-        }
+        if (!(CRT_HAS(TABLE) && b->coat != 0))
+            return crt_sample_mirror_up(b,
+                                        splat4(crt_coat_albedo(b, dot3(b->wo, b->ns)) / b->coat_chance));
         s.wi = normalize3(crt_reflect(b->wo, crt_visible_normal(b, u)));
+        s.valid = dot3(s.wi, b->ns) > 0.0f;
     } else {
-        s.wi = crt_cosine_direction(b->ns, u);
+        s.wi = crt_raised(b, crt_cosine_direction(b->ns, u));
+        s.valid = dot3(s.wi, b->ng) > 0.0f;
     }
     const vec4 value = crt_plastic(b, s.wi, &s.pdf);
-    s.valid = dot3(s.wi, b->ng) > 0.0f && s.pdf > 0.0f;
+    s.valid = s.valid && s.pdf > 0.0f;
     if (s.valid) s.weight = value / s.pdf;
-    return s;
+    return crt_turned_up(b, s);
 }
 
 CRT_KERNEL_END

@@ -27,8 +27,7 @@ typedef struct CrtPath {
     vec4 throughput;
     vec4 radiance;
     f32 scatter_pdf;  /* of the direction that led here; 0: camera or delta, no light sampling competes */
-    f32 scatter_cosine; /* of that direction with the shading normal on the side of w_o, where scatter_pdf is
-                           above 0 */
+    f32 scatter_cosine; /* crt_scatter_cosine of that direction, where scatter_pdf is above 0 */
     vec3 p;           /* where it was scattered: a clearance off the ray's origin */
     vec3 side;        /* for the tree of lights: the normal there (crt_scattering_side) */
     f32 eta_square;   /* product of squared relative indices crossed: roulette must not see the n² of being
@@ -210,7 +209,7 @@ CRT_FN CrtOffer crt_offer_of(const CrtContext *ctx, u32 light, CrtSampler *sampl
 
 /* The normal of a surface that scatters nothing to its other side; otherwise of length 0. */
 CRT_FN vec3 crt_scattering_side(const CrtBsdf *bsdf) {
-    return (bsdf->flags & CRT_BSDF_TRANSMITS) == 0u ? bsdf->ng : make_vec3(0.0f, 0.0f, 0.0f);
+    return (bsdf->flags & CRT_BSDF_TRANSMITS) == 0u ? crt_side(bsdf) : make_vec3(0.0f, 0.0f, 0.0f);
 }
 
 CRT_FN CrtOffer crt_offer(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, vec3 p,
@@ -327,7 +326,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     }
     path->eta_square = path->eta_square * scatter.eta_square;
     path->scatter_pdf = scatter.pdf;
-    path->scatter_cosine = dot3(scatter.wi, crt_base(&bsdf));
+    path->scatter_cosine = crt_scatter_cosine(&bsdf, scatter.wi);
     path->p = surface.p;
     if (CRT_HAS(LIGHT_TREE)) path->side = crt_scattering_side(&bsdf);
     if (CRT_HAS(ABSORPTION))

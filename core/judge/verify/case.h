@@ -98,7 +98,8 @@ std::vector<Case> spectralFilmCases();   ///< E, the part about bins and sensors
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> scatteringCases();     ///< G
 std::vector<Case> glasswareCases();      ///< G, rough glass and panes
-std::vector<Case> compositionCases();    ///< G, opacity, mixes and normal maps
+std::vector<Case> compositionCases();    ///< G, opacity and mixes
+std::vector<Case> shadingNormalCases();  ///< G, interpolated normals and normal maps
 std::vector<Case> thinFilmCases();       ///< G, thin films
 std::vector<Case> anisotropyCases();     ///< G, brushed surfaces
 std::vector<Case> openPbrCases();        ///< G, openpbr

@@ -1,5 +1,4 @@
-// Group G, the part about surfaces that are there in part, materials made of others, and normal maps.
-#include "base/temporary_folder.h"
+// Group G, the part about surfaces that are there in part, and materials made of others.
 #include "base/vec3d.h"
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
@@ -20,12 +19,6 @@ namespace crt::verify {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-/// Light sampling and scattered rays together, and each alone where it can be.
-constexpr std::pair<const char*, const char*> kTechniques[] = {
-    {"MIS", "{max_depth: 1, roulette: false}"},
-    {"scattered rays", "{max_depth: 1, roulette: false, nee: false}"},
-    {"light sampling", "{max_depth: 1, roulette: false, mis: false}"}};
 
 constexpr const char* kDown = "{position: [0.1, 2, 0.05], target: [0.1, 0, 0.05], up: [0, 0, 1], fov: 0.01}";
 
@@ -58,7 +51,7 @@ void sheets(Context& context) {
                              {{1 - opacity, "one sheet alone stops light, or all decide alike"}});
         }
     // What the rays pass that light a floor: from a lamp, a light without a surface, all around.
-    for (const auto& [name, integrator] : kTechniques)
+    for (const auto& [name, integrator] : kDirectTechniques)
         for (const int count : {3, 1}) {
             constexpr double kOpacity = 0.4;
             if (count == 1 && !context.atLeast(Level::Merge)) continue;
@@ -122,7 +115,7 @@ void texturedOpacity(Context& context) {
 void emittersWithHoles(Context& context) {
     const Effort effort{.samples = 64, .most = 65536};
     constexpr double kOpacity = 0.3;
-    for (const auto& [name, integrator] : kTechniques) {
+    for (const auto& [name, integrator] : kDirectTechniques) {
         const auto lit = [&, integrator = integrator](double opacity) {
             Stage stage("{position: [9, 0.05, 0], target: [0.1, 0, 0], fov: 0.01}", integrator);
             stage.material("floor", "{type: diffuse, reflectance: 1}")
@@ -200,7 +193,7 @@ void mixes(Context& context) {
         context.estimate(fmt::format("{}, in light from everywhere", mix.what),
                          floor(kDirect, mix.material, "radiance: 1"), meanRadiance, mix.albedo, 0.005,
                          effort, mix.mistakes);
-        for (const auto& [name, integrator] : kTechniques)
+        for (const auto& [name, integrator] : kDirectTechniques)
             context.estimate(fmt::format("{}, in a glowing room, {}", mix.what, name),
                              floor(integrator, mix.material), meanRadiance, mix.albedo, 0.01, effort,
                              mix.mistakes);
@@ -211,143 +204,6 @@ void mixes(Context& context) {
                     "made of itself");
     context.refused("a mix of what is not there",
                     "crt: 1\nmaterials: {a: {type: mix, materials: [a1, a2]}}\n", "no material 'a1'");
-}
-
-/// A floor with the normal n, in tangent space, everywhere. (u, v) runs along `right` and `up`.
-Stage mappedFloor(const std::string& path, const Vec3d& n, const std::string& camera,
-                  const char* integrator, const std::string& material, bool mirrored = false,
-                  const char* transform = "") {
-    std::vector<float> rgb;
-    for (int i = 0; i < 4; ++i)
-        for (const double c : n) rgb.push_back(static_cast<float>((c + 1) / 2));
-    writeRgb(path, OutputFormat::Pfm, 2, 2, rgb);
-    Stage stage(camera, integrator);
-    stage.material("it", fmt::format("{{{}, normal_map: {{texture: '{}'{}}}}}", material, path, transform))
-        .mesh("it",
-              fmt::format("[[-8,0,-8],[-8,0,8],[8,0,8],[8,0,-8]], uvs: {}",
-                          mirrored ? "[[0,0],[0,1],[1,1],[1,0]]" : "[[0,1],[0,0],[1,0],[1,1]]"),
-              "[[0,1,2,3]]", "it");
-    return stage;
-}
-
-Vec3d spherical(double degrees, double azimuth) {
-    const double s = std::sin(degrees * kPi / 180);
-    return {s * std::cos(azimuth), std::cos(degrees * kPi / 180), s * std::sin(azimuth)};
-}
-
-std::string seenFrom(const Vec3d& d, double distance = 1) {
-    return fmt::format("{{position: [{:.9g}, {:.9g}, {:.9g}], target: [0, 0, 0], up: [0.3, 0.2, 1], fov: "
-                       "0.001}}",
-                       d[0] * distance, d[1] * distance, d[2] * distance);
-}
-
-void normalMap(Context& context) {
-    const TemporaryFolder folder;
-    const std::string path = folder.path() + "/normals.pfm";
-    constexpr const char* kWhite = "type: diffuse, reflectance: 1";
-    // Its paths have the same wavelengths as those of the floor.
-    const double white = radiance(context.render(
-        Stage(kDown).set("environment", "{radiance: 1}").yaml(), {.samples = 64}));
-    // A light from one direction: the cosine with the facet, and with it in the mirror that the surface is.
-    for (const auto& [slope, azimuth] : {std::pair{25.0, 0.4}, {25.0, 2.5}, {60.0, -1.2}, {60.0, 1.9}})
-        for (const bool mirrored : {false, true}) {
-            const Vec3d n = spherical(slope, azimuth);  // (x, y, z) = right, up the normal, along v
-            // v runs along z where the picture is mirrored, against it otherwise.
-            const double v = mirrored ? 1 : -1;
-            const auto lit = [&](const Vec3d& normal, const Vec3d& light) {
-                const auto positive = [](double x) { return std::max(x, 0.0); };
-                const double level = normal[1] * light[1],
-                             aside = normal[0] * light[0] + normal[2] * light[2];
-                return (positive(aside + level) + positive(aside - level)) / kPi;
-            };
-            for (const double height : {15.0, 60.0}) {
-                const Vec3d towards = spherical(90 - height, 0.7);
-                const auto shown = [&](const char* transform) {
-                    const double seen = radiance(context.render(
-                        mappedFloor(path, {n[0], n[2], n[1]}, seenFrom(spherical(40, -0.5)), kDirect, kWhite,
-                                    mirrored, transform)
-                            .set("lights",
-                                 fmt::format("[{{type: directional, direction: [{:.9g}, {:.9g}, {:.9g}], "
-                                             "irradiance: 1}}]",
-                                             -towards[0], -towards[1], -towards[2]))
-                            .yaml(),
-                        {.samples = 64}));
-                    return seen / white;
-                };
-                const std::string what =
-                    fmt::format("slope {}° towards {}, light at {}°{}", slope, azimuth, height,
-                                mirrored ? ", mirrored picture" : "");
-                const Vec3d world{n[0], n[1], v * n[2]};
-                context.absolute(what, shown(""), lit(world, towards), 1e-4,
-                                 {{lit({n[0], n[1], -v * n[2]}, towards), "green points down the picture"},
-                                  {lit({0, 1, 0}, towards), "the map is not asked"}});
-                // Turned by 90°, the picture's rows run against v.
-                context.absolute(what + ", turned by 90°", shown(", rotation_deg: 90"),
-                                 lit({n[2], n[1], -v * n[0]}, towards), 1e-4,
-                                 {{lit(world, towards), "vectors do not turn with the picture"}});
-                // Twice the slopes.
-                const double steep = std::sqrt(4 * n[0] * n[0] + n[1] * n[1] + 4 * n[2] * n[2]);
-                context.absolute(
-                    what + ", strength 2", shown(", strength: 2"),
-                    lit({2 * n[0] / steep, n[1] / steep, v * 2 * n[2] / steep}, towards), 1e-4,
-                    {{lit(world, towards), "the strength is not asked"}});
-            }
-        }
-    context.refused("a normal map on a mesh without texture coordinates",
-                    Stage(kDown)
-                        .material("it", fmt::format("{{{}, normal_map: {{texture: '{}'}}}}", kWhite, path))
-                        .quad("it", "[[-8,0,-8],[-8,0,8],[8,0,8],[8,0,-8]]", "it")
-                        .yaml(),
-                    "no texture coordinates");
-}
-
-void normalMapEnergy(Context& context) {
-    const TemporaryFolder folder;
-    const std::string path = folder.path() + "/normals.pfm";
-    constexpr std::pair<const char*, const char*> kMaterials[] = {
-        {"Lambert", "type: diffuse, reflectance: 1"},
-        {"mirror", "type: mirror, reflectance: 1"},
-        {"plastic", "type: plastic, reflectance: 1, roughness: 0.3"}};
-    const auto mistakes = [](double slope) {
-        const double kept = (1 + std::cos(slope * kPi / 180)) / 2;
-        return std::vector<Mistake>{{kept, "what is scattered below the surface is lost"},
-                                    {0, "facets that turn away from the viewer are black"}};
-    };
-    for (const auto& [name, material] : kMaterials)
-        for (const double slope : {20.0, 75.0})
-            for (const double view : {0.0, 60.0, 85.0})
-                for (const double azimuth : {0.0, 2.8}) {
-                    const Vec3d n = spherical(slope, azimuth);
-                    context.estimate(
-                        fmt::format("white {}, slope {}° towards {}, seen from {}°", name, slope, azimuth,
-                                    view),
-                        mappedFloor(path, {n[0], n[2], n[1]}, seenFrom(spherical(view, 0)), kDirect,
-                                    material)
-                            .set("environment", "{radiance: 1}")
-                            .yaml(),
-                        meanRadiance, 1, 0.01, {.samples = 64, .most = 65536}, mistakes(slope));
-                }
-    // Light sampling and scattered rays share the work, or one does it alone.
-    for (const auto& [technique, integrator] : kTechniques)
-        for (const double azimuth : {0.0, 2.8}) {
-            const Vec3d n = spherical(50, azimuth);
-            for (const char* lamps : {"room", "sky"}) {
-                Stage stage = mappedFloor(path, {n[0], n[2], n[1]}, seenFrom(spherical(60, 0), 0.5),
-                                          integrator, kMaterials[0].second);
-                if (lamps[0] == 's')
-                    stage.set("environment", "{radiance: 1, light_sampling: true}");
-                else
-                    stage.material("black", "{type: diffuse, reflectance: 0}")
-                        .mesh("room",
-                              "[[-2,0,-2],[2,0,-2],[-2,1,-2],[2,1,-2],[-2,0,2],[2,0,2],[-2,1,2],[2,1,2]]",
-                              "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,2,6,4],[1,5,7,3]]", "black",
-                              "1, two_sided: true");
-                context.estimate(fmt::format("white Lambert in a glowing {}, towards {}, {}", lamps, azimuth,
-                                             technique),
-                                 stage.yaml(), meanRadiance, 1, 0.02, {.samples = 64, .most = 65536},
-                                 mistakes(50));
-            }
-        }
 }
 
 }  // namespace
@@ -376,19 +232,6 @@ std::vector<Case> compositionCases() {
             light | CRT_FEATURE_MIX | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ROUGH_CONDUCTOR |
                 CRT_FEATURE_TEXTURE,
             mixes),
-        row("G28", "normal-map",
-            "A floor whose map has one normal, under a light from one direction: pictures of either "
-            "handedness, turned, and steeper",
-            "1/π of the facet's cosine with the light, and with the light in the mirror of the floor",
-            "vectors in double", "± 1e-4; refused", Level::Commit,
-            light | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_TEXTURE | CRT_FEATURE_POINT_LIGHT, normalMap),
-        row("G29", "normal-map-energy",
-            "White mapped surfaces of slopes up to 75°, seen from 0° to 85°, in light from everywhere; "
-            "and in glowing rooms, by light sampling and without",
-            "1", "conservation of energy", "± 1 %, 2 %", Level::Merge,
-            light | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_TEXTURE | CRT_FEATURE_MIRROR | CRT_FEATURE_PLASTIC |
-                CRT_FEATURE_ENVIRONMENT_LIGHT,
-            normalMapEnergy),
     };
 }
 

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace crt::verify {
@@ -30,6 +31,11 @@ std::string yaml(const Cube& cube);
 
 /// One scattering event: direct light.
 inline constexpr const char* kDirect = "{max_depth: 1, roulette: false}";
+/// Of them, light sampling and scattered rays together, and each alone where it can be.
+inline constexpr std::pair<const char*, const char*> kDirectTechniques[] = {
+    {"MIS", kDirect},
+    {"scattered rays", "{max_depth: 1, roulette: false, nee: false}"},
+    {"light sampling", "{max_depth: 1, roulette: false, mis: false}"}};
 
 /// A square light of side 1 at height 1 over a large Lambertian floor of reflectance 1, seen through a
 /// needle's eye at (x, 0, 0).

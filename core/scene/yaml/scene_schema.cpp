@@ -740,7 +740,8 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .shape = Shape::Lists,
                         .count_min = 3,
                         .count_max = 3,
-                        .doc = "One per vertex, for smooth shading."},
+                        .doc = "One per vertex, for smooth shading. Surfaces that reflect lose no light "
+                               "where they lean away from the faces; glass may."},
                        {.name = "uvs",
                         .kind = Kind::Number,
                         .shape = Shape::Lists,

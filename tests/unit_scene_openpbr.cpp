@@ -1,0 +1,70 @@
+// Scene YAML: the materials that openpbr becomes.
+#include "scene_texts.h"
+
+#include "scene/scene.h"
+
+#include <cmath>
+
+using namespace crt;
+using namespace crt::test;
+
+TEST_CASE("openpbr becomes crt's own materials, mixed", "[scene_yaml]") {
+    const auto materials = [](const std::string& keys) {
+        return parse("materials: {m: {type: openpbr, " + keys + "}}\n").materials;
+    };
+    // The defaults are the specification's.
+    const std::vector<Material> plain = materials("base_metalness: 0");
+    REQUIRE(plain.size() == 1);
+    CHECK(plain[0].name == "m");
+    CHECK(plain[0].type == MaterialType::Plastic);
+    CHECK(plain[0].by_color);
+    CHECK(plain[0].reflectance == constantSpectrum(0.8));
+    CHECK(plain[0].eta[0] == Approx(1.5));
+    CHECK(plain[0].roughness == 0.3);
+    // Parts come first; the opacity is the whole's.
+    const std::vector<Material> mixed = materials(
+        "base_weight: 0.5, base_metalness: 0.25, transmission_weight: 0.75, specular_weight: 0.5, "
+        "geometry_opacity: 0.4");
+    REQUIRE(mixed.size() == 5);
+    const Material& whole = mixed[4];
+    CHECK(whole.name == "m");
+    CHECK(whole.type == MaterialType::Mix);
+    CHECK(whole.amount == 0.25);
+    CHECK(whole.opacity == 0.4);
+    const Material& metal = mixed[static_cast<std::size_t>(whole.parts[1])];
+    CHECK(metal.type == MaterialType::RoughConductor);
+    CHECK(metal.by_color);
+    CHECK(metal.reflectance == constantSpectrum(0.4));
+    CHECK(metal.weight == 0.5);
+    CHECK(metal.opacity == 1);
+    const Material& dielectric = mixed[static_cast<std::size_t>(whole.parts[0])];
+    CHECK(dielectric.type == MaterialType::Mix);
+    CHECK(dielectric.amount == 0.75);
+    const Material& clear = mixed[static_cast<std::size_t>(dielectric.parts[1])];
+    CHECK(clear.type == MaterialType::RoughDielectric);
+    CHECK_FALSE(clear.absorption);
+    const double n = clear.eta[0];
+    CHECK((n - 1) * (n - 1) / ((n + 1) * (n + 1)) == Approx(0.02));
+    CHECK(mixed[static_cast<std::size_t>(dielectric.parts[0])].eta[0] == n);
+    CHECK(materials("specular_weight: 0")[0].type == MaterialType::Diffuse);
+    CHECK(materials("transmission_weight: 1, specular_roughness: 0")[0].type == MaterialType::Dielectric);
+    const Material wine = materials(
+        "transmission_weight: 1, transmission_color: 0.5, transmission_depth: 3")[0];
+    CHECK((*wine.absorption)[7] == Approx(std::log(2.0) / 3));
+    // Abbe's number, between the Fraunhofer lines.
+    const Material prism = materials("transmission_weight: 1, specular_roughness: 0, specular_ior: 1.7, "
+                                     "transmission_dispersion_scale: 0.5")[0];
+    const auto at = [&](double nm) {
+        const double place = nm - 360;
+        const auto i = static_cast<std::size_t>(place);
+        return prism.eta[i] + (place - static_cast<double>(i)) * (prism.eta[i + 1] - prism.eta[i]);
+    };
+    CHECK(at(587.6) == Approx(1.7).epsilon(1e-6));
+    CHECK((at(587.6) - 1) / (at(486.1) - at(656.3)) == Approx(40).epsilon(1e-4));
+    const std::vector<Material> film = materials(
+        "transmission_weight: 1, thin_film_weight: 0.5, thin_film_thickness: 0.25, thin_film_ior: 1.6");
+    REQUIRE(film.size() == 3);
+    CHECK(film[0].film_thickness_nm == 0);
+    CHECK(film[1].film_thickness_nm == 250);
+    CHECK(film[1].film_index == constantSpectrum(1.6));
+}
