@@ -12,9 +12,9 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
-/// Below it a handful of paths makes the estimate, and an interval would not cover what it claims
-/// (docs/results/calibration.md).
-constexpr double kLeastDegreesOfFreedom = 4;
+/// Below it one path makes the estimate. A higher one selects: among images that few paths light, those with
+/// more degrees of freedom have met more than their share (decision 0007).
+constexpr double kLeastDegreesOfFreedom = 2;
 
 /// What the brightest pixel says of pixels as bright that no path has met yet: so many more squares like its
 /// own.
