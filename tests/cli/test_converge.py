@@ -9,18 +9,12 @@ import json
 import os
 
 import harness
-from harness import CliTest, first_real_backend
+from harness import LightTest
 
 SMALL = ["--set", "film.resolution=[16,16]", "--set", "sampler.type=independent"]
 
 
-class Converging(CliTest):
-    def setUp(self):
-        super().setUp()
-        self.backend = first_real_backend()
-        if self.backend is None:
-            self.skipTest("no real backend can run here")
-
+class Converging(LightTest):
     def summary(self, folder):
         with open(self.path(f"{folder}/summary.json"), encoding="utf-8") as file:
             return json.load(file)
@@ -28,6 +22,10 @@ class Converging(CliTest):
     def rows(self, folder):
         with open(self.path(f"{folder}/results.jsonl"), encoding="utf-8") as file:
             return [json.loads(line) for line in file]
+
+    def make_reference(self, spp):
+        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", str(spp), "--same-estimator",
+                 "-b", self.backend, *SMALL)
 
     def test_a_run_writes_its_files_and_keeps_to_its_time(self):
         # A slow machine, or a sanitizer, may not reach all in the shorter time.
@@ -60,18 +58,7 @@ class Converging(CliTest):
             self.assertIn("nosuch", file.read())  # What was left out is said.
 
     def test_a_reference_judges_its_own_scene_only(self):
-        self.crt(
-            "reference",
-            "scene.yaml",
-            "-o",
-            "ref.exr",
-            "--spp",
-            "4096",
-            "--same-estimator",
-            "-b",
-            self.backend,
-            *SMALL,
-        )
+        self.make_reference(4096)
         self.crt(
             "converge",
             "scene.yaml",
@@ -232,18 +219,7 @@ class Converging(CliTest):
         self.assert_one_error(run, "--vary nee", "twice")
 
     def test_a_reference_of_other_colours_is_refused(self):
-        self.crt(
-            "reference",
-            "scene.yaml",
-            "-o",
-            "ref.exr",
-            "--spp",
-            "64",
-            "--same-estimator",
-            "-b",
-            self.backend,
-            *SMALL,
-        )
+        self.make_reference(64)
         for changed in ("film.exposure_ev=1", "film.color_space=acescg",
                         "film.white_balance={illuminant: A}"):
             with self.subTest(changed=changed):
@@ -265,18 +241,7 @@ class Converging(CliTest):
         )
 
     def test_a_reference_of_another_scene_says_what_differs(self):
-        self.crt(
-            "reference",
-            "scene.yaml",
-            "-o",
-            "ref.exr",
-            "--spp",
-            "64",
-            "--same-estimator",
-            "-b",
-            self.backend,
-            *SMALL,
-        )
+        self.make_reference(64)
         for change, words in (
             ("film.resolution=[8,8]", "the resolution is 16 × 16, not 8 × 8"),
             ("integrator.max_depth=3", "max_depth is 16, not 3"),

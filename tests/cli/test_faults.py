@@ -61,24 +61,7 @@ class KilledAtAnyMoment(CliTest):
             for name in leftovers:
                 os.remove(name)
             # A complete run of no further sample reads the whole file, checksum included.
-            self.crt(
-                "scene.yaml",
-                "-b",
-                "fake",
-                "--set",
-                "film.resolution=[128,128]",
-                "-o",
-                "b.pfm",
-                "--spp",
-                "1",
-                "--resume",
-                "c.crtfilm",
-                "--checkpoint",
-                "d.crtfilm",
-                "--report",
-                "r.json",
-            )
-            resumed = self.report("r.json")["samples"]["resumed"]
+            resumed = self.resumed_samples("c.crtfilm", 1, "--set", "film.resolution=[128,128]")
             self.assertGreaterEqual(resumed, resumed_before, "samples that were saved are gone")
             resumed_before = resumed
         self.assertGreater(resumed_before, self.ROUNDS // 2)
@@ -187,22 +170,7 @@ class SmallDisk(CliTest):
                     os.remove(self.path(file))
 
     def test_rendering_goes_on_while_the_disk_is_full(self):
-        process = self.start(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "-o",
-            "a.pfm",
-            "--checkpoint",
-            "disk/c.crtfilm",
-            "--checkpoint-every",
-            "50ms",
-            "--chunk",
-            "1",
-            "--spp",
-            "40",
-            fault="slow",
-        )
+        process = self.start_with_checkpoints("--checkpoint", "disk/c.crtfilm", "--spp", "40")
         self.wait_for_rendering(process)
         self.fill()
         time.sleep(0.4)
@@ -248,20 +216,7 @@ class SmallDisk(CliTest):
         self.assertEqual(process.returncode, 6, messages)
         self.assertIn("Read-only file system", messages)
         self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 30)
-        self.crt(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "-o",
-            "b.pfm",
-            "--spp",
-            "30",
-            "--resume",
-            "disk/c.crtfilm",
-            "--checkpoint",
-            "e.crtfilm",
-        )
-        self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+        self.assertEqual(self.resumed_samples("disk/c.crtfilm", 30), 8)
 
 
 class ReadOnlyDirectory(CliTest):
@@ -309,20 +264,7 @@ class UnsoundBackends(CliTest):
                     expect=1,
                 )
                 self.assert_one_error(run, "broke the contract", words)
-                self.crt(
-                    "scene.yaml",
-                    "-b",
-                    "fake",
-                    "-o",
-                    "b.pfm",
-                    "--spp",
-                    "16",
-                    "--resume",
-                    "c.crtfilm",
-                    "--checkpoint",
-                    "d.crtfilm",
-                )
-                self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+                self.assertEqual(self.resumed_samples("c.crtfilm", 16), 8)
                 self.assertEqual(read_bytes(self.path("b.pfm")), read_bytes(self.path("whole.pfm")))
 
     def test_a_backend_that_throws_keeps_what_was_saved(self):
@@ -340,8 +282,7 @@ class UnsoundBackends(CliTest):
             expect=1,
         )
         self.assert_one_error(run, "broke the contract", "throws_in_render")
-        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "16", "--resume", "c.crtfilm")
-        self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+        self.assertEqual(self.resumed_samples("c.crtfilm", 16), 8)
 
 
 class LostGpu(CliTest):
@@ -457,22 +398,7 @@ class SignalStorm(CliTest):
 
     def test_a_storm_ends_the_program_and_spares_what_was_saved(self):
         self.crt("scene.yaml", "-b", "fake", "--spp", "8", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
-        process = self.start(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "--spp",
-            "100000",
-            "-o",
-            "a.pfm",
-            "--resume",
-            "c.crtfilm",
-            "--checkpoint-every",
-            "1ms",
-            "--chunk",
-            "1",
-            fault="slow",
-        )
+        process = self.start_with_checkpoints("--resume", "c.crtfilm", "--spp", "100000", every="1ms")
         self.assertIn("resuming", process.stderr.readline())
         self.wait_for_rendering(process)
         end = time.monotonic() + 10
@@ -483,20 +409,7 @@ class SignalStorm(CliTest):
         # shell says 128 + n in both cases.
         code = process.returncode if process.returncode >= 0 else 128 - process.returncode
         self.assertIn(code, (130, 143, 129))
-        self.crt(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "--spp",
-            "1",
-            "-o",
-            "b.pfm",
-            "--resume",
-            "c.crtfilm",
-            "--checkpoint",
-            "d.crtfilm",
-        )
-        self.assertGreaterEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+        self.assertGreaterEqual(self.resumed_samples("c.crtfilm", 1), 8)
 
 
 if __name__ == "__main__":
