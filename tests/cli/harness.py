@@ -146,6 +146,9 @@ class CliTest(unittest.TestCase):
             *arguments, fault="slow"
         )
 
+    def save_samples(self, spp, checkpoint):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", str(spp), "--checkpoint", checkpoint)
+
     def resumed_samples(self, checkpoint, spp, *arguments):
         """Samples per pixel that a render to `spp` finds in `checkpoint`, which stays as it is. The image is
         b.pfm, the film d.crtfilm."""
@@ -155,8 +158,10 @@ class CliTest(unittest.TestCase):
         )
         return self.report("b.report.json")["samples"]["resumed"]
 
-    def wait_for_rendering(self, process):
+    def wait_for_rendering(self, process, resumed=False):
         """The line that names the device is the last before the first sample."""
+        if resumed:
+            self.assertIn("resuming", process.stderr.readline())
         line = process.stderr.readline()
         self.assertIn("fake on pattern", line)
         time.sleep(0.15)

@@ -23,6 +23,10 @@ class Converging(LightTest):
         with open(self.path(f"{folder}/results.jsonl"), encoding="utf-8") as file:
             return [json.loads(line) for line in file]
 
+    def converge(self, *arguments, folder="out", expect=0, time="2s", spp="8"):
+        return self.crt("converge", *arguments, "--backends", self.backend, "--time", time, "--max-spp", spp,
+                        "-o", folder, expect=expect)
+
     def make_reference(self, spp):
         self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", str(spp), "--same-estimator",
                  "-b", self.backend, *SMALL)
@@ -59,81 +63,21 @@ class Converging(LightTest):
 
     def test_a_reference_judges_its_own_scene_only(self):
         self.make_reference(4096)
-        self.crt(
-            "converge",
-            "scene.yaml",
-            "--backends",
-            self.backend,
-            "--reference",
-            "ref.exr",
-            "--time",
-            "2s",
-            "--max-spp",
-            "16",
-            "-o",
-            "out",
-            *SMALL,
-        )
-        run = self.crt(
-            "converge",
-            "scene.yaml",
-            "--backends",
-            self.backend,
-            "--reference",
-            "ref.exr",
-            "--time",
-            "2s",
-            "-o",
-            "other",
-            *SMALL,
-            "--set",
-            "camera.fov=20",
-            expect=2,
-        )
+        judged = ["scene.yaml", *SMALL, "--reference"]
+        self.converge(*judged, "ref.exr", spp="16")
+        run = self.converge(*judged, "ref.exr", "--set", "camera.fov=20", folder="other", expect=2)
         self.assert_one_error(run, "another scene")
         # A luminance that it has not fails: exit code 7.
-        self.crt(
-            "converge",
-            "scene.yaml",
-            "--backends",
-            self.backend,
-            "--reference",
-            "12345",
-            "--time",
-            "2s",
-            "--max-spp",
-            "16",
-            "-o",
-            "wrong",
-            *SMALL,
-            expect=7,
-        )
+        self.converge(*judged, "12345", folder="wrong", spp="16", expect=7)
 
     def test_an_earlier_run_is_not_overwritten_but_resumed(self):
-        arguments = [
-            "converge",
-            "scene.yaml",
-            "--backends",
-            self.backend,
-            "--time",
-            "2s",
-            "--max-spp",
-            "8",
-            "-o",
-            "out",
-            *SMALL,
-        ]
-        self.crt(*arguments)
+        self.converge("scene.yaml", *SMALL)
         first = {(row["replicate"], row["samples_per_pixel"]): row["image_mean"] for row in self.rows("out")}
-        self.assert_one_error(self.crt(*arguments, expect=2), "--resume")
-        self.crt(*arguments, "--resume")
+        self.assert_one_error(self.converge("scene.yaml", *SMALL, expect=2), "--resume")
+        self.converge("scene.yaml", *SMALL, "--resume")
         both = {(row["replicate"], row["samples_per_pixel"]): row["image_mean"] for row in self.rows("out")}
         for key, value in first.items():
             self.assertEqual(both[key], value)
-
-    def converge(self, *arguments, folder="out", expect=0, time="2s", spp="8"):
-        return self.crt("converge", *arguments, "--backends", self.backend, "--time", time, "--max-spp", spp,
-                        "-o", folder, expect=expect)
 
     def test_resume_refuses_what_is_not_the_same_experiment(self):
         self.converge("scene.yaml", *SMALL)

@@ -88,7 +88,7 @@ class StoppingAndGoingOn(CliTest):
 
     def test_resume_raises_the_target(self):
         self.crt("scene.yaml", "-b", "fake", "--spp", "40", "-o", "whole.pfm")
-        self.crt("scene.yaml", "-b", "fake", "--spp", "10", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
+        self.save_samples(10, "c.crtfilm")
         self.crt(
             "scene.yaml", "-b", "fake", "--spp", "25", "-o", "a.pfm", "--resume", "c.crtfilm"
         )  # Keeps c.crtfilm up to date.

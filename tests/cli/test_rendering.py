@@ -292,7 +292,7 @@ class DeviceFailures(CliTest):
 
     def test_what_was_there_is_saved(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "whole.pfm", "--spp", "32")
-        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "a.crtfilm")
+        self.save_samples(8, "a.crtfilm")
         os.remove(self.path("a.pfm"))
         run = self.crt(
             "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "32", "--resume", fault="device", expect=5
