@@ -13,16 +13,9 @@
 # built.
 
 if(CMAKE_SCRIPT_MODE_FILE)
+  include(${CMAKE_CURRENT_LIST_DIR}/Run.cmake)
   set(staging ${BUILD_DIR}/portable)
   file(REMOVE_RECURSE ${staging})
-
-  function(run)
-    execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
-    if(NOT result EQUAL 0)
-      string(JOIN " " command ${ARGV})
-      message(FATAL_ERROR "${command}\nended with ${result}:\n${output}")
-    endif()
-  endfunction()
 
   # Packs ${staging}/${name}/crt into ${name}.tar.gz.
   function(pack name)

@@ -1,6 +1,7 @@
 // The border itself: what a host may do wrong, and what it may count on. Runs on the C table, not on its C++
 // face.
 #include "conformance.h"
+#include "render_range.h"
 
 #include "backend/crt_layout_hash.h"
 
@@ -64,14 +65,7 @@ struct Raw {
     }
     CrtStatus render(std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::uint32_t y1,
                      std::uint64_t first, std::uint64_t count) {
-        CrtRenderRange range{};
-        range.struct_size = sizeof(range);
-        range.x0 = x0;
-        range.y0 = y0;
-        range.x1 = x1;
-        range.y1 = y1;
-        range.first_sample = first;
-        range.sample_count = count;
+        const CrtRenderRange range = renderRange(x0, y0, x1, y1, first, count);
         return integrator.render(integrator.state, &range);
     }
 };

@@ -5,15 +5,8 @@
 #   cmake -DMODE=install|portable -DBUILD_DIR=… -DWORK_DIR=… [-DSTRIP=… -DREFERENCE_BACKEND=…
 #   -DPORTABLE_SCRIPT=…] -P installed_tree.cmake
 
-function(run)
-  execute_process(COMMAND ${ARGV} WORKING_DIRECTORY ${WORK_DIR}/elsewhere
-    RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
-  if(NOT result EQUAL 0)
-    string(JOIN " " command ${ARGV})
-    message(FATAL_ERROR "${command}\nended with ${result}:\n${output}")
-  endif()
-  set(output "${output}" PARENT_SCOPE)
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/trees.cmake)
+set(RUN_FOLDER ${WORK_DIR}/elsewhere)
 
 # Renders a scene of the tree into `outputs`, small and with any backend, and looks whether the files are
 # there.
@@ -39,8 +32,7 @@ file(REMOVE_RECURSE ${WORK_DIR})
 file(MAKE_DIRECTORY ${WORK_DIR}/elsewhere)
 
 if(MODE STREQUAL "install")
-  run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/installed)
-  file(RENAME ${WORK_DIR}/installed ${WORK_DIR}/moved)
+  install_and_move()
   render(${WORK_DIR}/moved cornell_box a.pfm a.exr a.png)
   render(${WORK_DIR}/moved cornell_figure b.pfm)  # reads a mesh
 else()

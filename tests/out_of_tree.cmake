@@ -5,14 +5,7 @@
 #   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=…
 #     [-DCXX_FLAGS=…] -P out_of_tree.cmake
 
-function(run)
-  execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
-  if(NOT result EQUAL 0)
-    string(JOIN " " command ${ARGV})
-    message(FATAL_ERROR "${command}\nended with ${result}:\n${output}")
-  endif()
-  set(output "${output}" PARENT_SCOPE)
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/trees.cmake)
 
 # `crt plugins` gives each backend an unindented line with its name, then indented ones about it.
 function(expect_usable listing when)
@@ -26,14 +19,8 @@ function(expect_usable listing when)
 endfunction()
 
 file(REMOVE_RECURSE ${WORK_DIR})
-run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/installed)
-file(RENAME ${WORK_DIR}/installed ${WORK_DIR}/moved)
-file(COPY ${SOURCE_DIR}/docs/example_backend DESTINATION ${WORK_DIR})
-
-run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${WORK_DIR}/example_backend -B ${WORK_DIR}/build
-    -DCMAKE_PREFIX_PATH=${WORK_DIR}/moved -DCMAKE_CXX_COMPILER=${CXX_COMPILER}
-    "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}")
-run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
+install_and_move()
+build_example(example_backend)
 run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${WORK_DIR}/moved/bin/crt plugins)
 expect_usable("${output}" "by CRT_BACKEND_PATH")
 

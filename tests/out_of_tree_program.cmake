@@ -7,15 +7,8 @@
 #     [-DCXX_FLAGS=…]
 #   [-DPKG_CONFIG=…] -P out_of_tree_program.cmake
 
-function(run)
-  execute_process(COMMAND ${ARGV} WORKING_DIRECTORY ${WORK_DIR}/elsewhere
-    RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
-  if(NOT result EQUAL 0)
-    string(JOIN " " command ${ARGV})
-    message(FATAL_ERROR "${command}\nended with ${result}:\n${output}")
-  endif()
-  set(output "${output}" PARENT_SCOPE)
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/trees.cmake)
+set(RUN_FOLDER ${WORK_DIR}/elsewhere)
 
 # Renders, and looks whether all of the image came out: not black, and through the installed codec module.
 function(expect_image program image)
@@ -35,14 +28,8 @@ endfunction()
 
 file(REMOVE_RECURSE ${WORK_DIR})
 file(MAKE_DIRECTORY ${WORK_DIR}/elsewhere)
-run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/installed)
-file(RENAME ${WORK_DIR}/installed ${WORK_DIR}/moved)
-file(COPY ${SOURCE_DIR}/docs/example_program DESTINATION ${WORK_DIR})
-
-run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${WORK_DIR}/example_program -B ${WORK_DIR}/build
-    -DCMAKE_PREFIX_PATH=${WORK_DIR}/moved -DCMAKE_CXX_COMPILER=${CXX_COMPILER}
-    "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}")
-run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
+install_and_move()
+build_example(example_program)
 expect_image(${WORK_DIR}/build/example_program package.png)
 
 # Installed by an account of its own, and used by a program of another: libcrt's owner may also have written

@@ -703,6 +703,13 @@ const Room kRooms[] = {{{1, 1, 1}, 0},      {{1, 1, 1}, 1e3},     {{1, 1, 1}, 1e
                        {{10000, 1, 1}, 0},  {{10000, 1, 1}, 1e5}, {{1e-3, 1, 1}, 0},
                        {{1, 1e-3, 1}, 100}, {{3e7, 2e7, 1e7}, 0}, {{0.7e-5, 1e-5, 2e-5}, 0}};
 
+/// The room as it is (turn 0), or turned by 33 degrees about y (1) or about an axis of no wall (2).
+crt::CompiledScene compiledRoom(const Room& r, int turn) {
+    return crt::compileScene(room(r.scale, turn == 2 ? Vec3d{1, 2, 3} : Vec3d{0, 1, 0},
+                                  turn == 0 ? 0 : 33 * 3.14159265358979 / 180, r.far),
+                             0);
+}
+
 }  // namespace
 
 TEST_CASE("no path leaves a closed room, and none meets the wall that it leaves", "[kernel][rays]") {
@@ -710,11 +717,7 @@ TEST_CASE("no path leaves a closed room, and none meets the wall that it leaves"
     Walk all;
     for (const Room& r : kRooms)
         for (int turn = 0; turn < 3; ++turn) {
-            const crt::CompiledScene compiled =
-                crt::compileScene(room(r.scale, turn == 2 ? Vec3d{1, 2, 3} : Vec3d{0, 1, 0},
-                                       turn == 0 ? 0 : 33 * 3.14159265358979 / 180, r.far),
-                                  0);
-            const Walk walk = walkIn(compiled, 60000, random);
+            const Walk walk = walkIn(compiledRoom(r, turn), 60000, random);
             INFO("room " << r.scale[0] << "×" << r.scale[1] << "×" << r.scale[2] << ""
                          << ", triangle at " << r.far
                          << ", turn " << turn);
@@ -789,11 +792,7 @@ TEST_CASE("a third of the clearance that rays are given would do", "[kernel][ray
     std::uint64_t failures = 0;
     for (const Room& r : kRooms)
         for (int turn = 0; turn < 3; ++turn) {
-            const crt::CompiledScene compiled =
-                crt::compileScene(room(r.scale, turn == 2 ? Vec3d{1, 2, 3} : Vec3d{0, 1, 0},
-                                       turn == 0 ? 0 : 33 * 3.14159265358979 / 180, r.far),
-                                  0);
-            const Walk walk = walkIn(compiled, 60000, random, 1.0f / 3);
+            const Walk walk = walkIn(compiledRoom(r, turn), 60000, random, 1.0f / 3);
             failures += walk.escapes + walk.self_hits;
         }
     CHECK(failures == 0);

@@ -2,6 +2,7 @@
 #include "backend/sdk/launch_pacer.h"
 #include "common/film_slices.h"
 #include "catch.h"
+#include "render_range.h"
 
 #include <cmath>
 #include <random>
@@ -9,23 +10,6 @@
 
 using crt::Launch;
 using crt::LaunchPacer;
-
-namespace {
-
-CrtRenderRange range(std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::uint32_t y1,
-                     std::uint64_t first, std::uint64_t count) {
-    CrtRenderRange r{};
-    r.struct_size = sizeof r;
-    r.x0 = x0;
-    r.y0 = y0;
-    r.x1 = x1;
-    r.y1 = y1;
-    r.first_sample = first;
-    r.sample_count = count;
-    return r;
-}
-
-}  // namespace
 
 TEST_CASE("launches cover a range exactly once, with any tile, at any speed", "[launch_pacer]") {
     std::mt19937 random(1);
@@ -40,7 +24,7 @@ TEST_CASE("launches cover a range exactly once, with any tile, at any speed", "[
         // The same pacer twice: what it has learnt must not show.
         for (int repeat = 0; repeat < 2; ++repeat) {
             std::vector<std::vector<int>> seen(std::size_t{width} * height, std::vector<int>(samples));
-            pacer.begin(range(x0, y0, x0 + width, y0 + height, first, samples), tile);
+            pacer.begin(renderRange(x0, y0, x0 + width, y0 + height, first, samples), tile);
             CHECK(pacer.done() == 0);
             double done = 0;
             for (Launch launch; pacer.next(launch);) {
@@ -68,7 +52,7 @@ TEST_CASE("launches cover a range exactly once, with any tile, at any speed", "[
 TEST_CASE("launches come to take the wanted time", "[launch_pacer]") {
     LaunchPacer pacer(0.02, 1000);
     const double paths_per_second = 3e6;
-    pacer.begin(range(0, 0, 400, 300, 0, 1000), 0);
+    pacer.begin(renderRange(0, 0, 400, 300, 0, 1000), 0);
     std::vector<double> seconds;
     for (Launch launch; seconds.size() < 60 && pacer.next(launch);) {
         seconds.push_back(static_cast<double>(launch.paths()) / paths_per_second);
@@ -91,7 +75,7 @@ TEST_CASE("a device whose clock says nothing does not make launches grow", "[lau
     constexpr double kWanted = 0.02, kPathsPerSecond = 1e6;
     for (const std::uint64_t ticks : {0u, 1u}) {
         LaunchPacer pacer(kWanted, 1000);
-        pacer.begin(range(0, 0, 4000, 3000, 0, 100000), 0);
+        pacer.begin(renderRange(0, 0, 4000, 3000, 0, 100000), 0);
         Launch launch;
         for (int i = 0; i < 200; ++i) {
             REQUIRE(pacer.next(launch));
@@ -102,7 +86,7 @@ TEST_CASE("a device whose clock says nothing does not make launches grow", "[lau
     }
     // And who passes on a time of nothing learns nothing.
     LaunchPacer pacer(kWanted, 1000);
-    pacer.begin(range(0, 0, 4000, 3000, 0, 100000), 0);
+    pacer.begin(renderRange(0, 0, 4000, 3000, 0, 100000), 0);
     Launch launch;
     for (int i = 0; i < 100; ++i) {
         REQUIRE(pacer.next(launch));
@@ -115,7 +99,7 @@ TEST_CASE("an empty range has no launches and is done", "[launch_pacer]") {
     LaunchPacer pacer(0.02, 1000);
     Launch launch;
     for (const CrtRenderRange& empty :
-         {range(0, 0, 10, 10, 5, 0), range(3, 3, 3, 9, 0, 4), range(0, 7, 9, 7, 0, 4)}) {
+         {renderRange(0, 0, 10, 10, 5, 0), renderRange(3, 3, 3, 9, 0, 4), renderRange(0, 7, 9, 7, 0, 4)}) {
         pacer.begin(empty, 0);
         CHECK_FALSE(pacer.next(launch));
         CHECK(pacer.done() == 1);
@@ -124,7 +108,7 @@ TEST_CASE("an empty range has no launches and is done", "[launch_pacer]") {
 
 TEST_CASE("a huge range neither overflows nor is cut into nothing", "[launch_pacer]") {
     LaunchPacer pacer(0.02, 1u << 20);
-    pacer.begin(range(0, 0, 65535, 32767, 0, std::uint64_t{1} << 53), 0);
+    pacer.begin(renderRange(0, 0, 65535, 32767, 0, std::uint64_t{1} << 53), 0);
     Launch launch;
     REQUIRE(pacer.next(launch));
     CHECK(launch.x1 == 65535);

@@ -27,6 +27,12 @@ public:
 
     void add(double blend, Distance distance) { parts_.push_back({blend, false, std::move(distance)}); }
     void carve(double blend, Distance distance) { parts_.push_back({blend, true, std::move(distance)}); }
+    void addBone(Vec a, Vec b, double ra, double rb, double blend) {
+        add(blend, [=](Vec p) { return roundCone(p, a, b, ra, rb); });
+    }
+    void addBall(Vec centre, Vec radii, double blend) {
+        add(blend, [=](Vec p) { return ellipsoid(p, centre, radii); });
+    }
 
     /// Which parts matter within `radius` of `centre`: most of a figure is far from any one place.
     std::vector<std::uint32_t> partsNear(Vec centre, double radius) const {

@@ -63,12 +63,6 @@ double scaleHeight(double around, double along) {
 
 Mesh dragon() {
     Field field;
-    const auto bone = [&](Vec a, Vec b, double ra, double rb, double blend) {
-        field.add(blend, [=](Vec p) { return roundCone(p, a, b, ra, rb); });
-    };
-    const auto ball = [&](Vec centre, Vec radii, double blend) {
-        field.add(blend, [=](Vec p) { return ellipsoid(p, centre, radii); });
-    };
 
     // Body from the nape to the tip of the tail.
     const Spine spine({{{-0.640, 0.800, -0.170}, 0.066},
@@ -121,10 +115,10 @@ Mesh dragon() {
         const Vec up = spine.up(i), back = spine.tangent(i);
         const double size = 0.35 * k.radius + 0.018;
         const Vec root = k.at + (0.92 * k.radius) * up;
-        bone(root - (0.5 * size) * back, root + size * up + (0.9 * size) * back, 0.30 * size,
-             0.06 * size + 0.002, 0.012);
-        bone(root + (0.4 * size) * back, root + size * up + (0.9 * size) * back, 0.26 * size,
-             0.06 * size + 0.002, 0.008);
+        field.addBone(root - (0.5 * size) * back, root + size * up + (0.9 * size) * back, 0.30 * size,
+                      0.06 * size + 0.002, 0.012);
+        field.addBone(root + (0.4 * size) * back, root + size * up + (0.9 * size) * back, 0.26 * size,
+                      0.06 * size + 0.002, 0.008);
     }
     // The tail ends in a blade.
     const Vec tip = spine.knots.back().at;
@@ -138,42 +132,44 @@ Mesh dragon() {
     const auto place = [=](double forward, double up, double side) {
         return head + forward * f + up * u + side * s;
     };
-    bone(place(-0.03, -0.005, 0), place(0.06, 0.0, 0), 0.074, 0.062, 0.05);
-    bone(place(0.05, 0.006, 0), place(0.205, -0.004, 0), 0.050, 0.034, 0.03);   // Upper jaw.
-    bone(place(0.01, -0.050, 0), place(0.180, -0.098, 0), 0.042, 0.022, 0.02);  // Lower jaw, open.
-    ball(place(0.214, 0.006, 0), {0.030, 0.024, 0.032}, 0.025);
-    bone(place(0.09, -0.048, 0), place(0.170, -0.060, 0), 0.012, 0.006, 0.01);  // Tongue.
+    field.addBone(place(-0.03, -0.005, 0), place(0.06, 0.0, 0), 0.074, 0.062, 0.05);
+    field.addBone(place(0.05, 0.006, 0), place(0.205, -0.004, 0), 0.050, 0.034, 0.03);   // Upper jaw.
+    field.addBone(place(0.01, -0.050, 0), place(0.180, -0.098, 0), 0.042, 0.022, 0.02);  // Lower jaw, open.
+    field.addBall(place(0.214, 0.006, 0), {0.030, 0.024, 0.032}, 0.025);
+    field.addBone(place(0.09, -0.048, 0), place(0.170, -0.060, 0), 0.012, 0.006, 0.01);  // Tongue.
     for (const double side : {-1.0, 1.0}) {
-        bone(place(0.02, 0.052, side * 0.036), place(0.105, 0.040, side * 0.030), 0.018, 0.010,
-             0.015);                                                            // Brow.
-        ball(place(0.070, 0.027, side * 0.051), {0.017, 0.017, 0.017}, 0.004);  // Eye.
+        field.addBone(place(0.02, 0.052, side * 0.036), place(0.105, 0.040, side * 0.030), 0.018, 0.010,
+                      0.015);                                                            // Brow.
+        field.addBall(place(0.070, 0.027, side * 0.051), {0.017, 0.017, 0.017}, 0.004);  // Eye.
         const Vec nostril = place(0.234, 0.022, side * 0.016);
         field.carve(0.006, [nostril](Vec p) { return length(p - nostril) - 0.009; });
         // Horns in three pieces that turn back and up, and two smaller ones below.
         const Vec h0 = place(-0.045, 0.045, side * 0.042), h1 = place(-0.125, 0.085, side * 0.074);
         const Vec h2 = place(-0.205, 0.125, side * 0.082), h3 = place(-0.270, 0.195, side * 0.070);
-        bone(h0, h1, 0.024, 0.020, 0.015);
-        bone(h1, h2, 0.020, 0.014, 0.01);
-        bone(h2, h3, 0.014, 0.004, 0.01);
-        bone(place(-0.040, -0.010, side * 0.062), place(-0.120, -0.005, side * 0.120), 0.018, 0.004, 0.012);
-        bone(place(-0.030, -0.045, side * 0.050), place(-0.085, -0.075, side * 0.095), 0.014, 0.004, 0.012);
+        field.addBone(h0, h1, 0.024, 0.020, 0.015);
+        field.addBone(h1, h2, 0.020, 0.014, 0.01);
+        field.addBone(h2, h3, 0.014, 0.004, 0.01);
+        field.addBone(place(-0.040, -0.010, side * 0.062), place(-0.120, -0.005, side * 0.120), 0.018, 0.004,
+                      0.012);
+        field.addBone(place(-0.030, -0.045, side * 0.050), place(-0.085, -0.075, side * 0.095), 0.014, 0.004,
+                      0.012);
         for (int tooth = 0; tooth < 6; ++tooth) {
             const double forward = 0.085 + 0.024 * tooth, out = side * (0.036 - 0.0024 * tooth);
             const double fang = tooth == 4 ? 1.8 : 1.0;
-            bone(place(forward, -0.018, out), place(forward + 0.003, -0.030 - 0.022 * fang, out), 0.0100,
-                 0.0035, 0.004);
+            field.addBone(place(forward, -0.018, out), place(forward + 0.003, -0.030 - 0.022 * fang, out),
+                          0.0100, 0.0035, 0.004);
             const double jaw = -0.052 - 0.29 * (forward - 0.085);
-            bone(place(forward - 0.015, jaw - 0.008, 0.75 * out),
-                 place(forward - 0.013, jaw + 0.026, 0.75 * out), 0.0095, 0.0035, 0.004);
+            field.addBone(place(forward - 0.015, jaw - 0.008, 0.75 * out),
+                          place(forward - 0.013, jaw + 0.026, 0.75 * out), 0.0095, 0.0035, 0.004);
         }
     }
 
     // Legs: shoulder or hip, knee, ankle, foot, four claws.
     const auto leg = [&](Vec hip, Vec knee, Vec ankle, Vec foot, double r) {
-        ball(mix(hip, knee, 0.25), {1.25 * r, 1.5 * r, 1.1 * r}, 0.04);
-        bone(hip, knee, 1.15 * r, 0.72 * r, 0.04);
-        bone(knee, ankle, 0.70 * r, 0.45 * r, 0.02);
-        bone(ankle, foot, 0.46 * r, 0.42 * r, 0.015);
+        field.addBall(mix(hip, knee, 0.25), {1.25 * r, 1.5 * r, 1.1 * r}, 0.04);
+        field.addBone(hip, knee, 1.15 * r, 0.72 * r, 0.04);
+        field.addBone(knee, ankle, 0.70 * r, 0.45 * r, 0.02);
+        field.addBone(ankle, foot, 0.46 * r, 0.42 * r, 0.015);
         const Vec forward = unit(Vec{foot.x - ankle.x, 0, foot.z - ankle.z}),
                   across = cross({0, 1, 0}, forward);
         for (int toe = -1; toe <= 2; ++toe) {
@@ -182,10 +178,10 @@ Mesh dragon() {
             const Vec start = spur ? Vec{ankle.x, 0.03, ankle.z} : foot;
             const Vec knuckle = start + (0.75 * r) * direction + Vec{0, 0.012, 0};
             const Vec end{knuckle.x + 0.55 * r * direction.x, 0.018, knuckle.z + 0.55 * r * direction.z};
-            bone(start, knuckle, 0.30 * r, 0.26 * r, 0.012);
-            bone(knuckle, end, 0.26 * r, 0.20 * r, 0.008);
-            bone(end, {end.x + 0.5 * r * direction.x, 0.004, end.z + 0.5 * r * direction.z}, 0.16 * r,
-                 0.02 * r, 0.006);
+            field.addBone(start, knuckle, 0.30 * r, 0.26 * r, 0.012);
+            field.addBone(knuckle, end, 0.26 * r, 0.20 * r, 0.008);
+            field.addBone(end, {end.x + 0.5 * r * direction.x, 0.004, end.z + 0.5 * r * direction.z},
+                          0.16 * r, 0.02 * r, 0.006);
         }
     };
     leg({-0.270, 0.370, -0.080}, {-0.235, 0.235, -0.235}, {-0.255, 0.075, -0.200}, {-0.320, 0.030, -0.255},
@@ -204,13 +200,13 @@ Mesh dragon() {
         const std::array<Vec, 5> tip_of{w({-0.120, 1.120, -0.560}), w({0.190, 1.090, -0.600}),
                                         w({0.420, 0.915, -0.520}), w({0.500, 0.680, -0.370}),
                                         w({0.330, 0.505, -0.115})};
-        bone(shoulder, elbow, 0.052, 0.030, 0.03);
-        bone(elbow, wrist, 0.032, 0.022, 0.012);
-        bone(wrist, wrist + Vec{-0.055, 0.055, 0.0}, 0.014, 0.003, 0.01);
+        field.addBone(shoulder, elbow, 0.052, 0.030, 0.03);
+        field.addBone(elbow, wrist, 0.032, 0.022, 0.012);
+        field.addBone(wrist, wrist + Vec{-0.055, 0.055, 0.0}, 0.014, 0.003, 0.01);
         for (std::size_t i = 0; i < 4; ++i) {
             const Vec middle = mix(wrist, tip_of[i], 0.5) + Vec{0, 0.030, 0};  // Fingers bend a little.
-            bone(wrist, middle, 0.017, 0.012, 0.008);
-            bone(middle, tip_of[i], 0.012, 0.004, 0.006);
+            field.addBone(wrist, middle, 0.017, 0.012, 0.008);
+            field.addBone(middle, tip_of[i], 0.012, 0.004, 0.006);
         }
         constexpr double kSkin = 0.0075;
         const auto skin = [&](Vec a, Vec b, Vec c) {

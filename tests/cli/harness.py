@@ -4,6 +4,11 @@ to run it there.
 Each of them is started as
 
     test_NAME.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
+
+Where no light transport is needed the backend is `fake` (tests/fake_plugins), which renders a pattern that
+depends on seed, pixel and sample as a real one does, and goes wrong on demand (CRT_FAKE_FAULT). Tests that
+need light use a real backend that can run here and are skipped when there is none. Python's standard library
+only.
 """
 
 import json
@@ -43,19 +48,20 @@ LIT = SCENE.replace("radiance: {blackbody: 4000, scale: 5}", "radiance: glow").r
 
 
 def environment(**changes):
+    """That of a test's crt: this process's without CRT_ variables, with `changes`; None removes one."""
     env = {k: v for k, v in os.environ.items() if not k.startswith("CRT_")}
     env["CRT_BACKEND_PATH"] = FAKE_DIR
     # Addresses compiled in by a sanitizer build need no help from here; a cache in the home of whoever runs
     # the tests does no good.
     env["CRT_CACHE_DIR"] = os.path.join(tempfile.gettempdir(), f"crt-test-cache-{os.getuid()}")
     env.update(changes)
-    return env
+    return {name: value for name, value in env.items() if value is not None}
 
 
-def default_signals():
+def default_signals(*more):
     """A test run in the background of a shell script has SIGINT ignored, and crt would rightly inherit
     that."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, *more):
         signal.signal(number, signal.SIG_DFL)
 
 
@@ -73,21 +79,21 @@ def read_bytes(path):
         return file.read()
 
 
-def first_real_backend():
-    """The first backend installed beside the program that has a device."""
-    name = None
+def real_backends():
+    """The names of the backends installed beside the program that have a device."""
     listing = subprocess.run(
-        [CRT, "plugins"], env=environment(CRT_BACKEND_PATH=""), capture_output=True, text=True
+        [CRT, "plugins", "--json"], env=environment(CRT_BACKEND_PATH=""), capture_output=True, text=True
     ).stdout
-    for line in listing.splitlines():
-        if not line.startswith(" "):
-            name = line.split()[0]
-        elif line.split()[0] == "device":
-            return name
-    return None
+    return [b["name"] for b in json.loads(listing)["backends"] if b["usable"]]
+
+
+def first_real_backend():
+    return next(iter(real_backends()), None)
 
 
 class CliTest(unittest.TestCase):
+    TIMEOUT_SECONDS = 120  # Of one crt.
+
     def setUp(self):
         self.directory = tempfile.mkdtemp(prefix="crt-cli-")
         self.addCleanup(shutil.rmtree, self.directory)
@@ -110,7 +116,7 @@ class CliTest(unittest.TestCase):
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=self.TIMEOUT_SECONDS,
         )
         self.assertEqual(run.returncode, expect, f"crt {' '.join(arguments)}\n{run.stdout}{run.stderr}")
         return run
@@ -133,8 +139,29 @@ class CliTest(unittest.TestCase):
         self.addCleanup(process.kill)
         return process
 
-    def wait_for_rendering(self, process):
+    def start_with_checkpoints(self, *arguments, every="50ms"):
+        """A slow render that offers a checkpoint after each sample, and saves at most one in `every`."""
+        return self.start(
+            "scene.yaml", "-b", "fake", "-o", "a.pfm", "--chunk", "1", "--checkpoint-every", every,
+            *arguments, fault="slow"
+        )
+
+    def save_samples(self, spp, checkpoint):
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", str(spp), "--checkpoint", checkpoint)
+
+    def resumed_samples(self, checkpoint, spp, *arguments):
+        """Samples per pixel that a render to `spp` finds in `checkpoint`, which stays as it is. The image is
+        b.pfm, the film d.crtfilm."""
+        self.crt(
+            "scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", str(spp), "--resume", checkpoint,
+            "--checkpoint", "d.crtfilm", *arguments
+        )
+        return self.report("b.report.json")["samples"]["resumed"]
+
+    def wait_for_rendering(self, process, resumed=False):
         """The line that names the device is the last before the first sample."""
+        if resumed:
+            self.assertIn("resuming", process.stderr.readline())
         line = process.stderr.readline()
         self.assertIn("fake on pattern", line)
         time.sleep(0.15)
@@ -151,10 +178,29 @@ class CliTest(unittest.TestCase):
             self.assertIn(word, run.stderr)
 
 
-def main(documentation):
-    """Runs the tests of the calling program; `documentation` is what it says when it is called wrongly."""
+class LightTest(CliTest):
+    """With the first real backend, as self.backend."""
+
+    def setUp(self):
+        super().setUp()
+        self.backend = first_real_backend()
+        if self.backend is None:
+            self.skipTest("no real backend can run here")
+
+
+def take_arguments(documentation, more=0):
+    """Reads the three folders and returns the `more` arguments that follow them; what is left is for
+    unittest. `documentation` is what a program says that is called wrongly."""
     global CRT, CONFIG_DIR, FAKE_DIR
-    if len(sys.argv) < 4:
+    if len(sys.argv) < 4 + more:
         sys.exit(documentation)
     CRT, CONFIG_DIR, FAKE_DIR = map(os.path.abspath, sys.argv[1:4])
-    unittest.main(argv=sys.argv[:1] + sys.argv[4:])
+    taken = sys.argv[4:4 + more]
+    del sys.argv[1:4 + more]
+    return taken
+
+
+def main(documentation):
+    """Runs the tests of the calling program."""
+    take_arguments(documentation)
+    unittest.main()

@@ -2,11 +2,6 @@
 """`crt compare` from outside.
 
     test_comparing.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
-
-Where no light transport is needed the backend is `fake` (tests/fake_plugins), which renders a pattern that
-depends on seed, pixel and sample as a real one does, and goes wrong on demand (CRT_FAKE_FAULT). Tests that
-need light use the first real backend that can run here and are skipped when there is none. Python's standard
-library only.
 """
 
 import json

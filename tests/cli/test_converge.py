@@ -9,18 +9,12 @@ import json
 import os
 
 import harness
-from harness import CliTest, first_real_backend
+from harness import LightTest
 
 SMALL = ["--set", "film.resolution=[16,16]", "--set", "sampler.type=independent"]
 
 
-class Converging(CliTest):
-    def setUp(self):
-        super().setUp()
-        self.backend = first_real_backend()
-        if self.backend is None:
-            self.skipTest("no real backend can run here")
-
+class Converging(LightTest):
     def summary(self, folder):
         with open(self.path(f"{folder}/summary.json"), encoding="utf-8") as file:
             return json.load(file)
@@ -28,6 +22,14 @@ class Converging(CliTest):
     def rows(self, folder):
         with open(self.path(f"{folder}/results.jsonl"), encoding="utf-8") as file:
             return [json.loads(line) for line in file]
+
+    def converge(self, *arguments, folder="out", expect=0, time="2s", spp="8"):
+        return self.crt("converge", *arguments, "--backends", self.backend, "--time", time, "--max-spp", spp,
+                        "-o", folder, expect=expect)
+
+    def make_reference(self, spp):
+        self.crt("reference", "scene.yaml", "-o", "ref.exr", "--spp", str(spp), "--same-estimator",
+                 "-b", self.backend, *SMALL)
 
     def test_a_run_writes_its_files_and_keeps_to_its_time(self):
         # A slow machine, or a sanitizer, may not reach all in the shorter time.
@@ -60,93 +62,22 @@ class Converging(CliTest):
             self.assertIn("nosuch", file.read())  # What was left out is said.
 
     def test_a_reference_judges_its_own_scene_only(self):
-        self.crt(
-            "reference",
-            "scene.yaml",
-            "-o",
-            "ref.exr",
-            "--spp",
-            "4096",
-            "--same-estimator",
-            "-b",
-            self.backend,
-            *SMALL,
-        )
-        self.crt(
-            "converge",
-            "scene.yaml",
-            "--backends",
-            self.backend,
-            "--reference",
-            "ref.exr",
-            "--time",
-            "2s",
-            "--max-spp",
-            "16",
-            "-o",
-            "out",
-            *SMALL,
-        )
-        run = self.crt(
-            "converge",
-            "scene.yaml",
-            "--backends",
-            self.backend,
-            "--reference",
-            "ref.exr",
-            "--time",
-            "2s",
-            "-o",
-            "other",
-            *SMALL,
-            "--set",
-            "camera.fov=20",
-            expect=2,
-        )
+        self.make_reference(4096)
+        judged = ["scene.yaml", *SMALL, "--reference"]
+        self.converge(*judged, "ref.exr", spp="16")
+        run = self.converge(*judged, "ref.exr", "--set", "camera.fov=20", folder="other", expect=2)
         self.assert_one_error(run, "another scene")
         # A luminance that it has not fails: exit code 7.
-        self.crt(
-            "converge",
-            "scene.yaml",
-            "--backends",
-            self.backend,
-            "--reference",
-            "12345",
-            "--time",
-            "2s",
-            "--max-spp",
-            "16",
-            "-o",
-            "wrong",
-            *SMALL,
-            expect=7,
-        )
+        self.converge(*judged, "12345", folder="wrong", spp="16", expect=7)
 
     def test_an_earlier_run_is_not_overwritten_but_resumed(self):
-        arguments = [
-            "converge",
-            "scene.yaml",
-            "--backends",
-            self.backend,
-            "--time",
-            "2s",
-            "--max-spp",
-            "8",
-            "-o",
-            "out",
-            *SMALL,
-        ]
-        self.crt(*arguments)
+        self.converge("scene.yaml", *SMALL)
         first = {(row["replicate"], row["samples_per_pixel"]): row["image_mean"] for row in self.rows("out")}
-        self.assert_one_error(self.crt(*arguments, expect=2), "--resume")
-        self.crt(*arguments, "--resume")
+        self.assert_one_error(self.converge("scene.yaml", *SMALL, expect=2), "--resume")
+        self.converge("scene.yaml", *SMALL, "--resume")
         both = {(row["replicate"], row["samples_per_pixel"]): row["image_mean"] for row in self.rows("out")}
         for key, value in first.items():
             self.assertEqual(both[key], value)
-
-    def converge(self, *arguments, folder="out", expect=0, time="2s", spp="8"):
-        return self.crt("converge", *arguments, "--backends", self.backend, "--time", time, "--max-spp", spp,
-                        "-o", folder, expect=expect)
 
     def test_resume_refuses_what_is_not_the_same_experiment(self):
         self.converge("scene.yaml", *SMALL)
@@ -232,18 +163,7 @@ class Converging(CliTest):
         self.assert_one_error(run, "--vary nee", "twice")
 
     def test_a_reference_of_other_colours_is_refused(self):
-        self.crt(
-            "reference",
-            "scene.yaml",
-            "-o",
-            "ref.exr",
-            "--spp",
-            "64",
-            "--same-estimator",
-            "-b",
-            self.backend,
-            *SMALL,
-        )
+        self.make_reference(64)
         for changed in ("film.exposure_ev=1", "film.color_space=acescg",
                         "film.white_balance={illuminant: A}"):
             with self.subTest(changed=changed):
@@ -265,18 +185,7 @@ class Converging(CliTest):
         )
 
     def test_a_reference_of_another_scene_says_what_differs(self):
-        self.crt(
-            "reference",
-            "scene.yaml",
-            "-o",
-            "ref.exr",
-            "--spp",
-            "64",
-            "--same-estimator",
-            "-b",
-            self.backend,
-            *SMALL,
-        )
+        self.make_reference(64)
         for change, words in (
             ("film.resolution=[8,8]", "the resolution is 16 × 16, not 8 × 8"),
             ("integrator.max_depth=3", "max_depth is 16, not 3"),

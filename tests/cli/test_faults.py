@@ -61,24 +61,7 @@ class KilledAtAnyMoment(CliTest):
             for name in leftovers:
                 os.remove(name)
             # A complete run of no further sample reads the whole file, checksum included.
-            self.crt(
-                "scene.yaml",
-                "-b",
-                "fake",
-                "--set",
-                "film.resolution=[128,128]",
-                "-o",
-                "b.pfm",
-                "--spp",
-                "1",
-                "--resume",
-                "c.crtfilm",
-                "--checkpoint",
-                "d.crtfilm",
-                "--report",
-                "r.json",
-            )
-            resumed = self.report("r.json")["samples"]["resumed"]
+            resumed = self.resumed_samples("c.crtfilm", 1, "--set", "film.resolution=[128,128]")
             self.assertGreaterEqual(resumed, resumed_before, "samples that were saved are gone")
             resumed_before = resumed
         self.assertGreater(resumed_before, self.ROUNDS // 2)
@@ -144,7 +127,7 @@ class SmallDisk(CliTest):
                 pass
 
     def test_a_checkpoint_that_does_not_fit_leaves_the_old_one(self):
-        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "disk/c.crtfilm")
+        self.save_samples(8, "disk/c.crtfilm")
         before = read_bytes(self.path("disk/c.crtfilm"))
         self.fill()
         run = self.crt(
@@ -187,22 +170,7 @@ class SmallDisk(CliTest):
                     os.remove(self.path(file))
 
     def test_rendering_goes_on_while_the_disk_is_full(self):
-        process = self.start(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "-o",
-            "a.pfm",
-            "--checkpoint",
-            "disk/c.crtfilm",
-            "--checkpoint-every",
-            "50ms",
-            "--chunk",
-            "1",
-            "--spp",
-            "40",
-            fault="slow",
-        )
+        process = self.start_with_checkpoints("--checkpoint", "disk/c.crtfilm", "--spp", "40")
         self.wait_for_rendering(process)
         self.fill()
         time.sleep(0.4)
@@ -226,42 +194,18 @@ class SmallDisk(CliTest):
                 )
 
     def test_a_disk_that_turns_read_only_keeps_what_it_has(self):
-        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "disk/c.crtfilm")
+        self.save_samples(8, "disk/c.crtfilm")
         process = self.start(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "-o",
-            "a.pfm",
-            "--spp",
-            "30",
-            "--resume",
-            "disk/c.crtfilm",
-            "--chunk",
-            "1",
-            fault="slow",
+            "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "30", "--resume", "disk/c.crtfilm",
+            "--chunk", "1", fault="slow"
         )
-        self.assertIn("resuming", process.stderr.readline())
-        self.wait_for_rendering(process)
+        self.wait_for_rendering(process, resumed=True)
         subprocess.run(["mount", "-o", "remount,ro", self.path("disk")], check=True)
         _, messages = process.communicate(timeout=60)
         self.assertEqual(process.returncode, 6, messages)
         self.assertIn("Read-only file system", messages)
         self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 30)
-        self.crt(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "-o",
-            "b.pfm",
-            "--spp",
-            "30",
-            "--resume",
-            "disk/c.crtfilm",
-            "--checkpoint",
-            "e.crtfilm",
-        )
-        self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+        self.assertEqual(self.resumed_samples("disk/c.crtfilm", 30), 8)
 
 
 class ReadOnlyDirectory(CliTest):
@@ -275,13 +219,12 @@ class ReadOnlyDirectory(CliTest):
 
 class UnsoundBackends(CliTest):
     def test_a_backend_that_hangs_is_left_by_the_second_signal(self):
-        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm")
+        self.save_samples(8, "c.crtfilm")
         saved = read_bytes(self.path("c.crtfilm"))
         process = self.start(
             "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm", fault="hang"
         )
-        self.assertIn("resuming", process.stderr.readline())
-        self.wait_for_rendering(process)
+        self.wait_for_rendering(process, resumed=True)
         process.send_signal(signal.SIGINT)
         time.sleep(0.5)
         self.assertIsNone(process.poll(), "the first signal waits for the chunk")
@@ -292,56 +235,25 @@ class UnsoundBackends(CliTest):
 
     def test_a_film_that_is_no_film_is_refused_and_the_saved_one_kept(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "whole.pfm", "--spp", "16")
-        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm")
+        self.save_samples(8, "c.crtfilm")
         for fault, words in (("nan_film", "is not a number"), ("count_film", "were asked for")):
             with self.subTest(fault=fault):
                 run = self.crt(
-                    "scene.yaml",
-                    "-b",
-                    "fake",
-                    "-o",
-                    "a.pfm",
-                    "--spp",
-                    "16",
-                    "--resume",
-                    "c.crtfilm",
-                    fault=fault,
-                    expect=1,
+                    "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm",
+                    fault=fault, expect=1
                 )
                 self.assert_one_error(run, "broke the contract", words)
-                self.crt(
-                    "scene.yaml",
-                    "-b",
-                    "fake",
-                    "-o",
-                    "b.pfm",
-                    "--spp",
-                    "16",
-                    "--resume",
-                    "c.crtfilm",
-                    "--checkpoint",
-                    "d.crtfilm",
-                )
-                self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+                self.assertEqual(self.resumed_samples("c.crtfilm", 16), 8)
                 self.assertEqual(read_bytes(self.path("b.pfm")), read_bytes(self.path("whole.pfm")))
 
     def test_a_backend_that_throws_keeps_what_was_saved(self):
-        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "c.crtfilm")
+        self.save_samples(8, "c.crtfilm")
         run = self.crt(
-            "scene.yaml",
-            "-b",
-            "throws_in_render",
-            "-o",
-            "a.pfm",
-            "--spp",
-            "16",
-            "--resume",
-            "c.crtfilm",
-            expect=1,
+            "scene.yaml", "-b", "throws_in_render", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm",
+            expect=1
         )
         self.assert_one_error(run, "broke the contract", "throws_in_render")
-        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "16", "--resume", "c.crtfilm")
-        self.assertEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+        self.assertEqual(self.resumed_samples("c.crtfilm", 16), 8)
 
 
 class LostGpu(CliTest):
@@ -456,25 +368,9 @@ class SignalStorm(CliTest):
         self.assertEqual(self.report("b.report.json")["samples"]["resumed"], samples)
 
     def test_a_storm_ends_the_program_and_spares_what_was_saved(self):
-        self.crt("scene.yaml", "-b", "fake", "--spp", "8", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
-        process = self.start(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "--spp",
-            "100000",
-            "-o",
-            "a.pfm",
-            "--resume",
-            "c.crtfilm",
-            "--checkpoint-every",
-            "1ms",
-            "--chunk",
-            "1",
-            fault="slow",
-        )
-        self.assertIn("resuming", process.stderr.readline())
-        self.wait_for_rendering(process)
+        self.save_samples(8, "c.crtfilm")
+        process = self.start_with_checkpoints("--resume", "c.crtfilm", "--spp", "100000", every="1ms")
+        self.wait_for_rendering(process, resumed=True)
         end = time.monotonic() + 10
         while process.poll() is None and time.monotonic() < end:
             process.send_signal(random.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP)))
@@ -483,20 +379,7 @@ class SignalStorm(CliTest):
         # shell says 128 + n in both cases.
         code = process.returncode if process.returncode >= 0 else 128 - process.returncode
         self.assertIn(code, (130, 143, 129))
-        self.crt(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "--spp",
-            "1",
-            "-o",
-            "b.pfm",
-            "--resume",
-            "c.crtfilm",
-            "--checkpoint",
-            "d.crtfilm",
-        )
-        self.assertGreaterEqual(self.report("b.report.json")["samples"]["resumed"], 8)
+        self.assertGreaterEqual(self.resumed_samples("c.crtfilm", 1), 8)
 
 
 if __name__ == "__main__":

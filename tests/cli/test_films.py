@@ -3,11 +3,6 @@
 
     test_films.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 
-Where no light transport is needed the backend is `fake` (tests/fake_plugins), which renders a pattern that
-depends on seed, pixel and sample as a real one does, and goes wrong on demand (CRT_FAKE_FAULT). Tests that
-need light use the first real backend that can run here and are skipped when there is none. Python's standard
-library only.
-
 Over 450 lines: one kind of file, from the moment that a render stops to the images made of it.
 """
 
@@ -93,7 +88,7 @@ class StoppingAndGoingOn(CliTest):
 
     def test_resume_raises_the_target(self):
         self.crt("scene.yaml", "-b", "fake", "--spp", "40", "-o", "whole.pfm")
-        self.crt("scene.yaml", "-b", "fake", "--spp", "10", "-o", "a.pfm", "--checkpoint", "c.crtfilm")
+        self.save_samples(10, "c.crtfilm")
         self.crt(
             "scene.yaml", "-b", "fake", "--spp", "25", "-o", "a.pfm", "--resume", "c.crtfilm"
         )  # Keeps c.crtfilm up to date.
@@ -111,22 +106,7 @@ class StoppingAndGoingOn(CliTest):
         self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("b.pfm")))
 
     def test_checkpoints_are_written_on_the_way(self):
-        process = self.start(
-            "scene.yaml",
-            "-b",
-            "fake",
-            "-o",
-            "a.pfm",
-            "--checkpoint",
-            "c.crtfilm",
-            "--checkpoint-every",
-            "50ms",
-            "--chunk",
-            "1",
-            "--spp",
-            "100",
-            fault="slow",
-        )
+        process = self.start_with_checkpoints("--checkpoint", "c.crtfilm", "--spp", "100")
         self.wait_for_rendering(process)
         time.sleep(0.5)
         process.kill()  # As a power cut would.

@@ -27,6 +27,8 @@ import threading
 import time
 import zlib
 
+import harness
+
 SECONDS = 10            # Of processor time; longer is a hang.
 WAIT_SECONDS = (
     60  # In all: who waits for a pipe takes no processor time. Much longer, for machines that are busy.
@@ -1733,15 +1735,7 @@ def start(case_, folder, env):
                 child.append(descriptor_for(place, number == 0))
 
         def prepare():
-            for number in (
-                signal.SIGINT,
-                signal.SIGTERM,
-                signal.SIGHUP,
-                signal.SIGPIPE,
-                signal.SIGXFSZ,
-                signal.SIGXCPU,
-            ):
-                signal.signal(number, signal.SIG_DFL)
+            harness.default_signals(signal.SIGPIPE, signal.SIGXFSZ, signal.SIGXCPU)
             for what, limit in case_.how.get("limits", {}).items():
                 # Only the soft limit of processor time: the hard one kills.
                 hard = 30 * SLOWER if what == resource.RLIMIT_CPU else limit
@@ -1770,15 +1764,8 @@ def start(case_, folder, env):
 
 
 def environment(case_):
-    env = {k: v for k, v in os.environ.items() if not k.startswith("CRT_")}
-    env["CRT_BACKEND_PATH"] = FAKE
-    env["CRT_CACHE_DIR"] = os.path.join(WORK, "cache")
-    for name, value in case_.env.items():
-        if value is None:
-            env.pop(name, None)
-        else:
-            env[name] = value.replace("FAKE", FAKE)
-    return env
+    changes = {name: value and value.replace("FAKE", FAKE) for name, value in case_.env.items()}
+    return harness.environment(**{"CRT_CACHE_DIR": os.path.join(WORK, "cache"), **changes})
 
 
 def text_of(captured):
@@ -1964,6 +1951,7 @@ def main():
     parser.add_argument("--slower", type=float, default=1)
     options = parser.parse_args()
     CRT, FAKE, SLOWER = os.path.abspath(options.crt), os.path.abspath(options.fake), options.slower
+    harness.FAKE_DIR = FAKE
     WORK = tempfile.mkdtemp(prefix="crt-hostile-")
     os.chmod(WORK, 0o755)
     try:

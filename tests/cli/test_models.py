@@ -12,7 +12,6 @@ import re
 import shutil
 import statistics
 import struct
-import sys
 import unittest
 
 import harness
@@ -140,6 +139,5 @@ class CornellBox(CliTest):
 
 
 if __name__ == "__main__":
-    harness.CRT, harness.CONFIG_DIR, harness.FAKE_DIR, REPOSITORY = map(os.path.abspath, sys.argv[1:5])
-    BACKEND = sys.argv[5]
-    unittest.main(argv=sys.argv[:1] + sys.argv[6:], verbosity=1)
+    REPOSITORY, BACKEND = harness.take_arguments(__doc__, 2)
+    unittest.main()

@@ -2,11 +2,6 @@
 """A render from outside: which files come out, what is said, and what goes wrong on the way.
 
     test_rendering.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
-
-Where no light transport is needed the backend is `fake` (tests/fake_plugins), which renders a pattern that
-depends on seed, pixel and sample as a real one does, and goes wrong on demand (CRT_FAKE_FAULT). Tests that
-need light use the first real backend that can run here and are skipped when there is none. Python's standard
-library only.
 """
 
 import os
@@ -15,7 +10,7 @@ import shutil
 import time
 
 import harness
-from harness import CliTest, SCENE, read_pfm, read_bytes, first_real_backend
+from harness import CliTest, LightTest, SCENE, read_pfm, read_bytes
 
 EMPTY = """\
 crt: 1
@@ -297,7 +292,7 @@ class DeviceFailures(CliTest):
 
     def test_what_was_there_is_saved(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "whole.pfm", "--spp", "32")
-        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "8", "--checkpoint", "a.crtfilm")
+        self.save_samples(8, "a.crtfilm")
         os.remove(self.path("a.pfm"))
         run = self.crt(
             "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "32", "--resume", fault="device", expect=5
@@ -311,15 +306,7 @@ class DeviceFailures(CliTest):
         self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("whole.pfm")))
 
 
-class Light(CliTest):
-    """With the first real backend."""
-
-    def setUp(self):
-        super().setUp()
-        self.backend = first_real_backend()
-        if self.backend is None:
-            self.skipTest("no real backend can run here")
-
+class Light(LightTest):
     def test_an_empty_scene_shows_the_background(self):
         self.write("empty.yaml", EMPTY)
         self.crt("empty.yaml", "-b", self.backend, "-o", "a.pfm")

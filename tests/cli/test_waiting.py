@@ -9,20 +9,15 @@ machine reads at once.
 """
 
 import glob
-import json
 import os
 import pty
 import re
 import select
-import shutil
 import signal
-import subprocess
-import sys
-import tempfile
 import time
-import unittest
 
-CRT = CONFIG_DIR = FAKE_DIR = None  # From the command line.
+import harness
+from harness import CliTest, read_bytes
 
 EMPTY = """\
 crt: 1
@@ -37,20 +32,6 @@ materials: {white: {type: diffuse, reflectance: 0.7}}
 objects: [{name: sheet, obj: sheet.obj, material: white}]
 """
 SUMMARY = "samples per pixel"
-
-
-def environment(**changes):
-    env = {k: v for k, v in os.environ.items() if not k.startswith("CRT_")}
-    env["CRT_BACKEND_PATH"] = FAKE_DIR
-    env["CRT_CACHE_DIR"] = os.path.join(tempfile.gettempdir(), f"crt-test-cache-{os.getuid()}")
-    env["TERM"] = "xterm"
-    env.update(changes)
-    return env
-
-
-def default_signals():
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
 
 
 def write_grid(path, side):
@@ -73,63 +54,33 @@ def write_grid(path, side):
             )
 
 
-class Waiting(unittest.TestCase):
+def has_embree():
+    return "embree" in harness.real_backends()
+
+
+class Waiting(CliTest):
+    TIMEOUT_SECONDS = 280  # Meshes of two million triangles, with a sanitizer.
+
     def setUp(self):
-        self.directory = tempfile.mkdtemp(prefix="crt-waiting-")
-        self.addCleanup(shutil.rmtree, self.directory)
-        self.write("empty.yaml", EMPTY)
-
-    def path(self, name):
-        return os.path.join(self.directory, name)
-
-    def write(self, name, text):
-        with open(self.path(name), "w", encoding="utf-8") as file:
-            file.write(text)
+        super().setUp()
+        self.write("scene.yaml", EMPTY)
 
     def write_mesh_scene(self, side):
         write_grid(self.path("sheet.obj"), side)
         self.write("mesh.yaml", MESH)
 
-    def crt(self, *arguments, expect=0, **changes):
-        run = subprocess.run(
-            [CRT, *arguments],
-            cwd=self.directory,
-            env=environment(**changes),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=280,
-        )
-        self.assertEqual(run.returncode, expect, f"crt {' '.join(arguments)}\n{run.stdout}{run.stderr}")
-        return run
-
     def report(self, name="a.report.json"):
-        with open(self.path(name), encoding="utf-8") as file:
-            return json.load(file)
-
-    def has_embree(self):
-        return "embree" in [s["name"] for s in self.usable()]
-
-    def usable(self):
-        listing = subprocess.run(
-            [CRT, "plugins"], env=environment(CRT_BACKEND_PATH=""), capture_output=True, text=True
-        ).stdout
-        found, name = [], None
-        for line in listing.splitlines():
-            if not line.startswith(" "):
-                name = line.split()[0]
-            elif line.split()[0] == "device":
-                found.append({"name": name})
-        return found
+        return super().report(name)
 
     def on_terminal(self, *arguments, until, timeout=120, **changes):
         """What a terminal of 100 columns shows until `until` is there; then Ctrl-C. Returns (text, exit
         status)."""
         pid, terminal = pty.fork()
         if pid == 0:
-            default_signals()
+            harness.default_signals()
             os.chdir(self.directory)
-            os.execve(CRT, [CRT, *arguments], environment(COLUMNS="100", **changes))
+            terminal_environment = harness.environment(TERM="xterm", COLUMNS="100", **changes)
+            os.execve(harness.CRT, [harness.CRT, *arguments], terminal_environment)
         shown = b""
         deadline = time.monotonic() + timeout
         while until.encode() not in shown and time.monotonic() < deadline:
@@ -155,6 +106,9 @@ class Waiting(unittest.TestCase):
         os.close(terminal)
         return shown.decode(errors="replace"), status
 
+    def samples_of(self, film):
+        return re.search(r"samples +(\S+)", self.crt("info", film).stdout)[1]
+
     # --- E10: something is said
     # -----------------------------------------------------------------------------------------
 
@@ -173,18 +127,18 @@ class Waiting(unittest.TestCase):
         self.assertNotIn("\r", "".join(lines))
 
     def test_a_log_says_how_far_a_slow_device_is(self):
-        lines = self.crt("empty.yaml", "-b", "fake", "-o", "a.pfm", CRT_FAKE_SCENE_SECONDS="4").stderr
+        lines = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", CRT_FAKE_SCENE_SECONDS="4").stderr
         self.assertRegex(lines, r"\d+ %  preparing the scene for fake  0:0\d left")
         # A device that is quick is not worth a line.
-        self.assertNotIn("preparing", self.crt("empty.yaml", "-b", "fake", "-o", "a.pfm").stderr)
+        self.assertNotIn("preparing", self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm").stderr)
 
     def test_quiet_is_quiet(self):
-        run = self.crt("empty.yaml", "-b", "fake", "-o", "a.pfm", "--quiet", CRT_FAKE_SCENE_SECONDS="3")
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--quiet", CRT_FAKE_SCENE_SECONDS="3")
         self.assertEqual(run.stderr, "")
 
     def test_a_terminal_shows_a_bar_and_ctrl_c_ends_it_at_once(self):
         shown, status = self.on_terminal(
-            "empty.yaml",
+            "scene.yaml",
             "-b",
             "fake",
             "-o",
@@ -199,15 +153,15 @@ class Waiting(unittest.TestCase):
             status is not None and os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGINT,
             f"status {status}",
         )
-        self.assertEqual(os.listdir(self.directory), ["empty.yaml"])
+        self.assertEqual(os.listdir(self.directory), ["scene.yaml"])
 
     # --- E12: nothing is built that is not read, and seconds add up
     # ------------------------------------------------------
 
     def test_seconds_add_up(self):
         self.write_mesh_scene(200)
-        for backend in ["fake", *(["embree"] if self.has_embree() else [])]:
-            path = "" if backend == "embree" else FAKE_DIR
+        for backend in ["fake", *(["embree"] if has_embree() else [])]:
+            path = "" if backend == "embree" else harness.FAKE_DIR
             self.crt("mesh.yaml", "-b", backend, "-o", "a.pfm", CRT_BACKEND_PATH=path)
             seconds = self.report()["seconds"]
             stages = ["parse", "build", "compile", "open", "prepare", "sampling", "write", "other"]
@@ -217,7 +171,7 @@ class Waiting(unittest.TestCase):
             self.assertGreater(seconds["build"], 0)
 
     def test_a_slow_device_is_counted_once(self):
-        self.crt("empty.yaml", "-b", "fake", "-o", "a.pfm", CRT_FAKE_SCENE_SECONDS="0.5")
+        self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", CRT_FAKE_SCENE_SECONDS="0.5")
         seconds = self.report()["seconds"]
         self.assertGreater(seconds["prepare"], 0.5)
         self.assertLess(seconds["other"], 0.4)
@@ -226,7 +180,7 @@ class Waiting(unittest.TestCase):
         )  # Counted twice, it would be half a second less than nothing.
 
     def test_no_bvh_for_a_backend_that_brings_its_own(self):
-        if not self.has_embree():
+        if not has_embree():
             self.skipTest("embree cannot run here")
         self.write_mesh_scene(30)
         self.crt("mesh.yaml", "-b", "embree", "-o", "a.pfm", CRT_BACKEND_PATH="")
@@ -249,26 +203,24 @@ class Waiting(unittest.TestCase):
                 self.report(f"{name}_example.report.json")["scene"]["hash"],
                 self.report(f"{name}.report.json")["scene"]["hash"],
             )
-            with open(self.path(f"{name}.pfm"), "rb") as one, open(
-                self.path(f"{name}_example.pfm"), "rb"
-            ) as other:
-                self.assertEqual(one.read(), other.read())
+            self.assertEqual(
+                read_bytes(self.path(f"{name}.pfm")), read_bytes(self.path(f"{name}_example.pfm"))
+            )
 
     def test_nothing_is_built_when_nothing_is_missing(self):
         self.write_mesh_scene(30)
         self.crt("mesh.yaml", "-b", "fake", "-o", "a.crtfilm", "-o", "a.pfm")
         self.crt("mesh.yaml", "-b", "no_such_backend", "-o", "b.pfm", "--resume", "a.crtfilm")
         self.assertEqual(self.report("b.report.json")["scene"]["nodes"], 0)
-        with open(self.path("a.pfm"), "rb") as one, open(self.path("b.pfm"), "rb") as other:
-            self.assertEqual(one.read(), other.read())
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("b.pfm")))
 
     # --- checkpoints
     # ----------------------------------------------------------------------------------------------------
 
     def test_films_of_the_scenes_take_little_space(self):
-        if not self.has_embree():
+        if not has_embree():
             self.skipTest("embree cannot run here")
-        for scene in sorted(glob.glob(os.path.join(CONFIG_DIR, "*.yaml"))):
+        for scene in sorted(glob.glob(os.path.join(harness.CONFIG_DIR, "*.yaml"))):
             with self.subTest(scene=os.path.basename(scene)):
                 self.crt(
                     scene,
@@ -295,56 +247,20 @@ class Waiting(unittest.TestCase):
 
     def test_a_checkpoint_is_written_while_the_render_goes_on(self):
         # The copy has the samples of its time, and the render ends with all of them.
-        process = subprocess.Popen(
-            [
-                CRT,
-                "empty.yaml",
-                "-b",
-                "fake",
-                "-o",
-                "a.pfm",
-                "--checkpoint",
-                "c.crtfilm",
-                "--checkpoint-every",
-                "0.01s",
-                "--spp",
-                "40",
-                "--chunk",
-                "1",
-                "-v",
-            ],
-            cwd=self.directory,
-            env=environment(CRT_FAKE_FAULT="slow"),
-            stdin=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            preexec_fn=default_signals,
-        )
+        process = self.start_with_checkpoints(
+            "--checkpoint", "c.crtfilm", "--spp", "40", "-v", every="0.01s")
         seen = set()
         while process.poll() is None:
             if os.path.exists(self.path("c.crtfilm")):
                 # Whenever it is looked at, it is whole: it is renamed into its place.
-                listing = subprocess.run(
-                    [CRT, "info", "c.crtfilm"],
-                    cwd=self.directory,
-                    capture_output=True,
-                    text=True,
-                    timeout=60,
-                )
-                self.assertEqual(listing.returncode, 0, listing.stderr)
-                seen.add(re.search(r"samples +(\S+)", listing.stdout)[1])
+                seen.add(self.samples_of("c.crtfilm"))
             time.sleep(0.02)
-        log = process.stderr.read()
-        process.stderr.close()
+        _, log = process.communicate()
         self.assertEqual(process.returncode, 0, log)
         self.assertIn("checkpoint: the device waited for", log)
         self.assertGreater(len(seen), 1, log)
-        final = subprocess.run(
-            [CRT, "info", "c.crtfilm"], cwd=self.directory, capture_output=True, text=True, timeout=60
-        ).stdout
-        self.assertRegex(final, r"samples +40\b")
+        self.assertEqual(self.samples_of("c.crtfilm"), "40")
 
 
 if __name__ == "__main__":
-    CRT, CONFIG_DIR, FAKE_DIR = map(os.path.abspath, sys.argv[1:4])
-    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)
+    harness.main(__doc__)
