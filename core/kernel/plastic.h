@@ -40,14 +40,16 @@ CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     if (below > 0.0f) {
         const f32 cos_g = dot3(wi, b->ng);
         const f32 raised = below * crt_lambert(cos_g);
-        const f32 before = crt_cosine_before(below, cos_i, cos_g);
-        const f32 more = (1.0f - crt_coat_albedo(b, before)) * raised;
         lambert = cos_g > 0.0f ? lambert + raised : 0.0f;
-        entering = cos_g > 0.0f ? entering + more : 0.0f;
-        if (crt_has_rough_base(b))
-            rough = cos_g > 0.0f
-                        ? rough + crt_rough_base(b, crt_before_raised(b, below, wi, before), before) * more
-                        : splat4(0.0f);
+        const f32 direct = entering;
+        entering = cos_g > 0.0f ? entering + (1.0f - crt_coat_albedo(b, crt_cosine_before(below, cos_i,
+                                                                                        cos_g))) * raised
+                                : 0.0f;
+        if (crt_has_rough_base(b)) {
+            const f32 before = crt_cosine_before(below, cos_i, cos_g);
+            const vec4 shape = crt_rough_base(b, crt_before_raised(b, below, wi, before), before);
+            rough = cos_g > 0.0f ? rough + shape * (entering - direct) : splat4(0.0f);
+        }
     }
     const vec4 base = crt_has_rough_base(b) ? rough : b->reflectance * entering;
     *pdf = (1.0f - b->coat_chance) * lambert;
