@@ -252,7 +252,7 @@ def scene_cases():
         "{type: openpbr, base_metalness: 1, base_color: 0, specular_color: 0, specular_roughness: 1}",
         "{type: openpbr, fuzz_weight: 1, fuzz_roughness: 0, fuzz_color: 0, base_diffuse_roughness: 1e-6}",
         "{type: diffuse, reflectance: 1, roughness: 1e-300}",
-        "{type: openpbr, base_diffuse_roughness: 1, specular_ior: 10, specular_roughness: 1}",
+        "{type: openpbr, base_diffuse_roughness: 1, specular_ior: 9.5, specular_roughness: 1}",
         "{type: rough_conductor, eta: 1, k: 9, roughness: 0.04, roughness_anisotropy: 1}",
         "{type: rough_dielectric, ior: 1.000001, roughness: 1, roughness_anisotropy: 1}",
     ):
