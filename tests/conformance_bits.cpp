@@ -132,6 +132,8 @@ struct Case {
     bool many_lights = false;
     bool brushed = false;
     bool colored = false;
+    bool rough_bases = false;
+    bool fuzzy = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -380,6 +382,31 @@ void addColors(crt::Scene& scene) {
     }
 }
 
+/// Fuzz on every material, each by its own.
+void addFuzz(crt::Scene& scene) {
+    double share = 0.25;
+    for (crt::Material& m : scene.materials) {
+        m.fuzz = share;
+        m.fuzz_roughness = 1.25 - share;
+        m.fuzz_color = share < 0.5 ? crt::constantSpectrum(1) : scene.materials[1].reflectance;
+        share = share < 1 ? share + 0.25 : 0.25;
+    }
+}
+
+/// Rough diffuse surfaces, bare and glossy, in turn; some about interpolated normals.
+void addRoughBases(crt::Scene& scene) {
+    double eta = 1;
+    for (crt::Material& m : scene.materials) {
+        if (m.type != crt::MaterialType::Diffuse && m.type != crt::MaterialType::Plastic) continue;
+        m.type = crt::MaterialType::Plastic;
+        m.eta = crt::constantSpectrum(eta);
+        m.roughness = eta > 1.3 ? 0.4 : 0;
+        m.by_color = eta > 1;
+        m.diffuse_roughness = eta < 1.7 ? eta / 2 : 1;
+        eta = eta < 1.5 ? eta + 0.25 : 1;
+    }
+}
+
 // Together every feature bit, sampler, accelerator and view: asserted below.
 const Case kCases[] = {
     {"{max_depth: 12}", "{type: sobol}", "", "box"},
@@ -422,6 +449,10 @@ const Case kCases[] = {
      false, false, true},
     {"{max_depth: 8}", "{type: sobol}", "", "box", false, "", false, false, false, false, false, false,
      false, false, false, false, true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", false, kPointLights, true, false, false, false, false,
+     false, false, false, false, false, false, true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, true, false, false, false, false,
+     false, false, false, false, false, false, false, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -470,6 +501,8 @@ crt::Scene sceneOf(const Case& c) {
     if (c.many_lights) addManyLights(scene);
     if (c.brushed) addBrushes(scene);
     if (c.colored) addColors(scene);
+    if (c.rough_bases) addRoughBases(scene);
+    if (c.fuzzy) addFuzz(scene);
     return scene;
 }
 
@@ -500,7 +533,9 @@ std::vector<Named> allScenes() {
                                  "IES lamps and beams",
                                  "many lights",
                                  "brushed",
-                                 "metals and gloss by their colours"};
+                                 "metals and gloss by their colours",
+                                 "rough bases",
+                                 "fuzz"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

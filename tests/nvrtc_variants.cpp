@@ -51,6 +51,8 @@ std::map<std::uint64_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_ANISOTROPY, "a mesh of brushed metal"},
         {mesh | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_PLASTIC | CRT_FEATURE_OPENPBR,
          "a mesh of openpbr"},
+        {mesh | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_BASE, "a mesh of clay"},
+        {mesh | CRT_FEATURE_FUZZ, "a mesh of velvet"},
         {mesh | CRT_FEATURE_DIELECTRIC, "a mesh of glass"},
         {mesh | CRT_FEATURE_TEXTURE, "a mesh with textures"},
         {mesh | glass, "a mesh of dispersive glass"},

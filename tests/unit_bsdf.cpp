@@ -1,5 +1,5 @@
-// What every material must keep, whatever it is: asked of crt_bsdf_prepare, _sample, _eval and _pdf of each
-// kind in CRT_MATERIAL_LIST. A new material is a line in kSubjects. Backends are held to the same bits
+// What every material must keep, whatever it is: asked of crt_layered_prepare, _sample, _eval and _pdf of
+// each kind in CRT_MATERIAL_LIST. A new material is a line in kSubjects. Backends are held to the same bits
 // elsewhere.
 //
 // Over 450 lines: one list of materials, and the laws that each of them is asked for.
@@ -98,6 +98,18 @@ Material glossy(double color, double roughness) {
     return m;
 }
 
+Material clay(Material m, double roughness) {
+    m.diffuse_roughness = roughness;
+    return m;
+}
+
+Material fuzzy(Material m, double weight, double color, double roughness) {
+    m.fuzz = weight;
+    m.fuzz_color = crt::constantSpectrum(color);
+    m.fuzz_roughness = roughness;
+    return m;
+}
+
 Material filmed(Material m, double thickness_nm, double index) {
     m.film_thickness_nm = thickness_nm;
     m.film_index = crt::constantSpectrum(index);
@@ -121,6 +133,8 @@ struct Subject {
     std::function<double(double)> albedo;
     /// The share of it that goes into single directions, beside a lobe.
     std::function<double(double)> single = [](double) { return 0.0; };
+    bool reciprocal = true;
+    u32 numbers = 512;  ///< The square of so many makes its means: more where weights differ much.
 };
 
 /// All that the tests ask of, one line each.
@@ -145,6 +159,15 @@ std::vector<Subject> subjects() {
         };
     };
     const auto coat = [](double cosine) { return fresnel(std::abs(cosine), 1.5); };
+    const auto none = [](double) { return 0.0; };
+    const auto passed = [](double cosine, double weight, double roughness) {
+        return 1 - weight * crt::verify::sheenAlbedo(std::abs(cosine), roughness);
+    };
+    const auto mirrored = [=](double cosine) { return 0.9 * passed(cosine, 0.5, 1); };
+    const auto on_mirror = [=](double cosine) {
+        return mirrored(cosine) + 0.7 * (1 - passed(cosine, 0.5, 1));
+    };
+    const auto under_fuzz = [=](double cosine) { return coat(cosine) * passed(cosine, 1, 0.7); };
     const auto of_gloss = [](double color, double roughness) {
         return [=](double cosine) {
             const double gloss =
@@ -187,6 +210,20 @@ std::vector<Subject> subjects() {
          }},
         {"white brushed metal by its colours", brushed(colored(1, 1, 1, 0.8), 0.7), constant(1)},
         {"glossy", glossy(0.6, 0.5), of_gloss(0.6, 0.5)},
+        {"clay", clay(plastic(0.7, 0, 1), 0.6),
+         [](double cosine) { return crt::verify::eonAlbedo(std::abs(cosine), 0.7, 0.6); }, none, true, 2048},
+        {"white clay", clay(plastic(1, 0, 1), 1), constant(1), none, true, 2048},
+        {"nearly smooth white clay", clay(plastic(1, 0, 1), 2e-6), constant(1)},
+        {"glazed clay", clay(glossy(0.6, 0), 0.8),
+         [](double cosine) { return crt::verify::glossyEonAlbedo(std::abs(cosine), 0.6, 0.8, 1.5); }, coat},
+        {"white clay under satin", clay(glossy(1, 0.5), 1), constant(1), none, true, 2048},
+        {"white fuzz on white", fuzzy(reflecting(MaterialType::Diffuse, 1), 1, 1, 0.5), constant(1), none,
+         false},
+        {"dust on a mirror", fuzzy(reflecting(MaterialType::Mirror, 0.9), 0.5, 0.7, 1), on_mirror, mirrored,
+         false},
+        {"fuzz on rough metal", fuzzy(roughMetal(1, 1e6, 0.6), 1, 1, 0.4), constant(1), none, false},
+        {"fuzz on plastic", fuzzy(plastic(1, 0), 1, 1, 0.7), constant(1), under_fuzz, false},
+        {"fuzz on rough glass", fuzzy(roughGlass(1.5, 1.5, 0.5), 1, 1, 0.6), constant(1), none, false},
         {"glass", glass(1.5, 1.5), constant(1)},
         {"dispersive glass", glass(1.7, 1.6), constant(1)},
         {"rough glass of roughness 0", roughGlass(1.5, 1.5, 0), constant(1)},
@@ -241,12 +278,12 @@ public:
         const vec4 positions =
             make_vec4(static_cast<f32>(kPositions[0]), static_cast<f32>(kPositions[1]),
                       static_cast<f32>(kPositions[2]), static_cast<f32>(kPositions[3]));
-        crt_bsdf_prepare(&ctx_, &bsdf, &surface_, unitFloat(wo), positions, carried, 1);
+        crt_layered_prepare(&ctx_, &bsdf, &surface_, unitFloat(wo), positions, carried, 1);
         return bsdf;
     }
     static constexpr u32 kHero = 2;
     static CrtScatter sample(const CrtBsdf& bsdf, CrtRandom2 u, CrtRandom2 choice, int alone = 0) {
-        return crt_bsdf_sample(&bsdf, u, choice, make_vec4(0, 0, 1, 0), alone);
+        return crt_layered_sample(&bsdf, u, choice, make_vec4(0, 0, 1, 0), alone);
     }
     static CrtScatter sampleSurface(const CrtBsdf& bsdf, CrtRandom2 u, CrtRandom2 choice) {
         return crt_surface_sample(&bsdf, u, choice, make_vec4(0, 0, 1, 0), 0);
@@ -274,7 +311,7 @@ std::vector<Vec3d> views() {
 /// Of two errors the worse, and NaN where one is none.
 double fartherFrom0(double a, double b) { return std::abs(b) <= a ? a : std::abs(b); }
 
-bool isDelta(const CrtBsdf& bsdf) { return (bsdf.flags & CRT_BSDF_DELTA) != 0; }
+bool isDelta(const CrtBsdf& bsdf) { return crt_is_delta(&bsdf) != 0; }
 
 /// Integrals over cells of the sphere, equal in solid angle: cosine by azimuth.
 constexpr std::size_t kRows = 32, kColumns = 32, kCells = kRows * kColumns, kSteps = 24;
@@ -305,17 +342,16 @@ double total(const std::array<double, kCells>& cells) {
 /// Over the whole square of random numbers; the second pair along with it, by the sequence R₂ (Roberts
 /// 2018).
 template <class F>
-void overNumbers(F&& f) {
-    constexpr u32 kSide = 512;
-    for (u32 i = 0; i < kSide; ++i)
-        for (u32 j = 0; j < kSide; ++j) {
-            const double n = i * kSide + (j * 197 + i * 61) % kSide;
+void overNumbers(F&& f, u32 side = 512) {
+    for (u32 i = 0; i < side; ++i)
+        for (u32 j = 0; j < side; ++j) {
+            const double n = i * side + (j * 197 + i * 61) % side;
             CrtRandom2 u, choice;
-            u.x = (static_cast<f32>(i) + 0.5f) / kSide;
-            u.y = (static_cast<f32>(j) + 0.5f) / kSide;
+            u.x = (static_cast<f32>(i) + 0.5f) / static_cast<f32>(side);
+            u.y = (static_cast<f32>(j) + 0.5f) / static_cast<f32>(side);
             choice.x = static_cast<f32>(std::fmod(n * 0.7548776662466927, 1.0));
             choice.y = static_cast<f32>(std::fmod(n * 0.5698402909980532, 1.0));
-            f(u, choice, 1.0 / (static_cast<double>(kSide) * kSide));
+            f(u, choice, 1.0 / (static_cast<double>(side) * side));
         }
 }
 
@@ -369,10 +405,13 @@ TEST_CASE("BSDF: directions are distributed as the pdf says", "[kernel][bsdf][ma
             if (isDelta(bsdf)) continue;
             INFO(s.name << " from " << wo[2]);
             const auto density =
-                overCells([&](const Vec3d& w) { return crt_bsdf_pdf(&bsdf, unitFloat(w)); });
+                overCells([&](const Vec3d& w) { return crt_layered_pdf(&bsdf, unitFloat(w)); });
             // Together with the chance of a single direction.
             double lobe_chance = 1;
-            if (s.single(wo[2]) > 0) lobe_chance = 1 - static_cast<double>(bsdf.coat_chance);
+            const double below = crt_is_fuzzy(&bsdf) ? 1 - static_cast<double>(bsdf.fuzz_chance) : 1;
+            const bool coated = s.material.type == MaterialType::Plastic;
+            if (s.single(wo[2]) > 0)
+                lobe_chance = 1 - below * (coated ? static_cast<double>(bsdf.coat_chance) : 1);
             CHECK(total(density) < lobe_chance + 1e-3);
             checkDistribution(density, [&] { return Bench::sample(bsdf, random.pair(), random.pair()); });
         }
@@ -390,7 +429,9 @@ TEST_CASE("BSDF: about interpolated normals nothing that is reflected is lost",
             for (const Vec3d& wo : {spherical(0.6, 0.7), spherical(-0.2, 0.7)}) {
                 const Vec3d normal = spherical(std::cos(tilt), 0.2);
                 // From behind the normal, of kinds that only mirror it is the face's.
-                const bool face = s.material.type == MaterialType::Conductor && wo[2] < 0;
+                const bool mirrors = s.material.type == MaterialType::Conductor ||
+                                     s.material.type == MaterialType::Mirror;
+                const bool face = mirrors && wo[2] < 0;
                 const double cosine = face ? -wo[2] : std::abs(dot(wo, normal));
                 const Bench bench(s.material, normal);
                 const CrtBsdf bsdf = bench.prepare(wo), upright = flat.prepare(spherical(cosine, 0.7));
@@ -408,7 +449,7 @@ TEST_CASE("BSDF: about interpolated normals nothing that is reflected is lost",
                     if (there.pdf > 0)
                         worst_pdf = fartherFrom0(worst_pdf,
                                                  crt_surface_pdf(&bsdf, there.wi) / double{there.pdf} - 1);
-                });
+                }, s.numbers);
                 CHECK(kept == Approx(expected).epsilon(1e-3));
                 CHECK(below == 0);
                 CHECK(worst_pdf < 1e-3);
@@ -467,8 +508,8 @@ TEST_CASE("BSDF: a sample's weight is the value over the density of its directio
                 const u32 side =
                     (scatter.wi.z > 0) == (wo[2] > 0) ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS;
                 wrong_side += (bsdf.flags & side) == 0 || std::abs(length(toDouble(scatter.wi)) - 1) > 1e-6;
-                const double pdf = crt_bsdf_pdf(&bsdf, scatter.wi);
-                const vec4 value = crt_bsdf_eval(&bsdf, scatter.wi);
+                const double pdf = crt_layered_pdf(&bsdf, scatter.wi);
+                const vec4 value = crt_layered_eval(&bsdf, scatter.wi);
                 if (isDelta(bsdf)) {
                     wrong_delta += scatter.pdf != 0 || pdf != 0 || max4(value) != 0 ||
                                    (scatter.hero_only && (bsdf.flags & CRT_BSDF_DISPERSIVE) == 0);
@@ -499,6 +540,7 @@ TEST_CASE("BSDF: a sample's weight is the value over the density of its directio
 TEST_CASE("BSDF: the way back is as bright as the way there", "[kernel][bsdf][materials]") {
     Random random(73);
     for (const Subject& s : subjects()) {
+        if (!s.reciprocal) continue;
         const Bench bench(s.material);
         INFO(s.name);
         double worst = 0;
@@ -532,9 +574,9 @@ TEST_CASE("BSDF: the way back is as bright as the way there", "[kernel][bsdf][ma
             for (u32 l = 0; l < 4; ++l) {
                 // What arrives is compressed by the index on its side, squared.
                 const double square = indexSquare(s.material, l);
-                const double a = lane(crt_bsdf_eval(&there, unitFloat(wi)), l) / std::abs(wi[2]) *
+                const double a = lane(crt_layered_eval(&there, unitFloat(wi)), l) / std::abs(wi[2]) *
                                  (wi[2] < 0 ? square : 1),
-                             b = lane(crt_bsdf_eval(&back, unitFloat(wo)), l) / std::abs(wo[2]) *
+                             b = lane(crt_layered_eval(&back, unitFloat(wo)), l) / std::abs(wo[2]) *
                                  (wo[2] < 0 ? square : 1);
                 if (a == 0 && b == 0) continue;
                 // Fresnel's transmittance rises from the critical angle like a root, so that rounding is
@@ -573,7 +615,7 @@ TEST_CASE("BSDF: in white light everything is as bright as its albedo says, and 
             if (isDelta(bsdf)) continue;
             const double integral = total(overCells([&](const Vec3d& w) {
                 const vec3 wi = unitFloat(w);
-                return lane(crt_bsdf_eval(&bsdf, wi), Bench::kHero) * kept(wi);
+                return lane(crt_layered_eval(&bsdf, wi), Bench::kHero) * kept(wi);
             }));
             CHECK(integral < 1 + 2e-3);  // by cells, as the next line
             CHECK(integral == Approx(expected - s.single(wo[2])).margin(2e-3));
@@ -589,7 +631,7 @@ TEST_CASE("BSDF: directions follow the wavelengths that the path carries", "[ker
     const vec4 carried[3] = {splat4(1), make_vec4(0.1f, 2, 0.5f, 1), make_vec4(0, 0, 4, 0)};
     for (std::size_t c = 0; c < 3; ++c) {
         const CrtBsdf bsdf = bench.prepare(wo, carried[c]);
-        const auto density = overCells([&](const Vec3d& w) { return crt_bsdf_pdf(&bsdf, unitFloat(w)); });
+        const auto density = overCells([&](const Vec3d& w) { return crt_layered_pdf(&bsdf, unitFloat(w)); });
         CHECK(total(density) < 1 + 1e-3);
         overNumbers([&](CrtRandom2 u, CrtRandom2 choice, double share) {
             const CrtScatter scatter = Bench::sample(bsdf, u, choice);

@@ -150,6 +150,27 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_OPENPBR, 0,
                     colored(crt::MaterialType::RoughConductor));
     differs(CRT_FEATURE_PLASTIC | CRT_FEATURE_OPENPBR, 0, colored(crt::MaterialType::Plastic));
+    const auto fuzzy = [&](double weight) {
+        return [=](Scene& s) {
+            s.materials[0].fuzz = weight;
+            s.materials[0].fuzz_color = crt::constantSpectrum(0.5);
+        };
+    };
+    seen |= differs(CRT_FEATURE_FUZZ, 0, fuzzy(0.5));
+    differs(0, 0, fuzzy(0));
+    // Fuzz on mirrors is worth sampling lights for.
+    differs(CRT_FEATURE_FUZZ | CRT_FEATURE_MIRROR, CRT_FEATURE_DIFFUSE, [&](Scene& s) {
+        fuzzy(1)(s);
+        for (crt::Material& m : s.materials) m.type = crt::MaterialType::Mirror;
+    });
+    const auto rough_base = [&](double roughness) {
+        return [=](Scene& s) {
+            other(crt::MaterialType::Plastic)(s);
+            s.materials[1].diffuse_roughness = roughness;
+        };
+    };
+    seen |= differs(CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_BASE | CRT_FEATURE_TABLE, 0, rough_base(0.5));
+    differs(CRT_FEATURE_PLASTIC, 0, rough_base(1e-7));  // Lambert's, in single precision
     // A pane bends nothing, whatever its index.
     differs(CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_TABLE, 0, [&](Scene& s) {
         other(crt::MaterialType::ThinDielectric)(s);

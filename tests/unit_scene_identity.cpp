@@ -132,6 +132,23 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     color("its colour", 0.75, 0.5, 1);
     color("its tint", 0.5, 0.75, 1);
     color("its weight", 0.5, 0.5, 0.5);
+    const auto fuzz = [&](const char* what, double weight, double color, double roughness) {
+        differs(what, [=](Scene& s) {
+            s.materials[0].fuzz = weight;
+            s.materials[0].fuzz_color = crt::constantSpectrum(color);
+            s.materials[0].fuzz_roughness = roughness;
+        });
+    };
+    fuzz("fuzz", 0.5, 0.5, 0.5);
+    fuzz("its weight", 0.75, 0.5, 0.5);
+    fuzz("its colour", 0.5, 0.75, 0.5);
+    fuzz("its roughness", 0.5, 0.5, 0.75);
+    for (const double roughness : {0.5, 0.75})
+        differs("a rough base", [=](Scene& s) {
+            s.materials[0].type = crt::MaterialType::Plastic;
+            s.materials[0].eta = crt::constantSpectrum(1);
+            s.materials[0].diffuse_roughness = roughness;
+        });
     differs("a glossy base", [](Scene& s) {
         s.materials[0].type = crt::MaterialType::Plastic;
         s.materials[0].eta = crt::constantSpectrum(1.5);

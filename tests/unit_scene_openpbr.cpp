@@ -1,12 +1,25 @@
 // Scene YAML: the materials that openpbr becomes.
 #include "scene_texts.h"
 
+#include "scene/light_units.h"
 #include "scene/scene.h"
 
 #include <cmath>
 
 using namespace crt;
 using namespace crt::test;
+
+TEST_CASE("openpbr emits by its luminance, and mixes as a whole", "[scene_yaml]") {
+    const Scene scene = parse("materials: {m: {type: openpbr, base_metalness: 0.5, emission_luminance: 500, "
+                              "emission_color: {rgb: [0.25, 0.25, 0.25], space: linear}}, "
+                              "dark: {type: openpbr, emission_color: {blackbody: 3000}}, "
+                              "black: {type: openpbr, emission_luminance: 1, emission_color: 0}}\n");
+    REQUIRE(scene.emissions.size() == 1);
+    CHECK(photometric(scene.emissions[0].radiance) == Approx(125).epsilon(1e-4));
+    CHECK_FALSE(scene.emissions[0].two_sided);
+    REQUIRE(scene.materials.size() == 5);
+    for (std::size_t i = 0; i < 5; ++i) CHECK(scene.materials[i].emission == (i == 2 ? 0 : -1));
+}
 
 TEST_CASE("openpbr becomes crt's own materials, mixed", "[scene_yaml]") {
     const auto materials = [](const std::string& keys) {
@@ -46,6 +59,20 @@ TEST_CASE("openpbr becomes crt's own materials, mixed", "[scene_yaml]") {
     const double n = clear.eta[0];
     CHECK((n - 1) * (n - 1) / ((n + 1) * (n + 1)) == Approx(0.02));
     CHECK(mixed[static_cast<std::size_t>(dielectric.parts[0])].eta[0] == n);
+    CHECK(materials("base_diffuse_roughness: 0.5")[0].diffuse_roughness == 0.5);
+    const Material clay = materials("specular_weight: 0, base_diffuse_roughness: 0.5")[0];
+    CHECK(clay.type == MaterialType::Plastic);
+    CHECK(clay.eta == constantSpectrum(1));
+    CHECK(clay.diffuse_roughness == 0.5);
+    CHECK_FALSE(clay.by_color);
+    const Material plain_clay =
+        parse("materials: {m: {type: diffuse, reflectance: 0.8, roughness: 0.5}}\n").materials[0];
+    CHECK(plain_clay.type == clay.type);
+    CHECK(plain_clay.diffuse_roughness == 0.5);
+    // Fuzz lies on each of the parts.
+    for (const Material& part : materials("base_metalness: 0.5, fuzz_weight: 0.25, fuzz_color: 0.75"))
+        CHECK((part.fuzz == 0.25 && part.fuzz_roughness == 0.5 &&
+               part.fuzz_color == constantSpectrum(0.75)));
     CHECK(materials("specular_weight: 0")[0].type == MaterialType::Diffuse);
     CHECK(materials("transmission_weight: 1, specular_roughness: 0")[0].type == MaterialType::Dielectric);
     const Material wine = materials(

@@ -73,7 +73,8 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
           "scene.yaml:3:26: error: unknown key 'reflectence' in material 'white'\n"
           "    3 |   white: {type: diffuse, reflectence: 0.5}\n"
           "      |                          ^~~~~~~~~~~ did you mean 'reflectance'?\n"
-          "      = keys of a diffuse material: type, reflectance, normal_map, opacity");
+          "      = keys of a diffuse material: type, reflectance, roughness, normal_map, "
+          "opacity");
     CHECK_THAT(refused("flim: {}\n"), Contains("scene.yaml:2:1: error: unknown key 'flim' in the scene") &&
                                           Contains("did you mean 'film'?"));
     CHECK_THAT(refused("nee: false\n"),
@@ -289,10 +290,9 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     for (const auto& [keys, why, instead] :
          {std::tuple{"subsurface_weight: 1", "wanders below a surface", "leave 'subsurface_weight' out"},
           std::tuple{"coat_weight: 1", "no coats on openpbr", "take a plastic"},
-          std::tuple{"fuzz_weight: 1", "no fuzz", "leave 'fuzz_weight' out"},
-          std::tuple{"emission_luminance: 1", "emission from objects", "give the object 'emission'"},
+          std::tuple{"fuzz_weight: 1, emission_luminance: 1", "take some of the light",
+                     "leave 'fuzz_weight'"},
           std::tuple{"geometry_thin_walled: true", "no thin walls", "take a thin_dielectric"},
-          std::tuple{"base_diffuse_roughness: 1", "no rough diffuse bases", "leave"},
           std::tuple{"base_metalness: 1, specular_weight: 2", "more light than there is", "1 or less"},
           std::tuple{"specular_color: 0.5", "no dielectric tints", "'base_metalness' 1"},
           std::tuple{"specular_roughness_anisotropy: 0.5", "as rough in every direction", "leave it out"},
@@ -315,6 +315,14 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     // Of slabs that are not there keys may say anything.
     CHECK_NOTHROW(parse("materials: {m: {type: openpbr, base_metalness: 1, base_diffuse_roughness: 1, "
                        "transmission_color: 0.5, specular_color: 0.5}}\n"));
+    const std::string lamp = "materials: {m: {type: openpbr, emission_luminance: 1}, "
+                             "t: {type: two_sided, front: m, back: m}}\n";
+    CHECK_THAT(refused(lamp), Contains("material 'm' emits light") && Contains("give the object"));
+    CHECK_THAT(refused("materials: {m: {type: openpbr, emission_luminance: 1}}\nobjects:\n"
+                       "  - {mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}, material: m,"
+                       " emission: {radiance: 1}}\n"),
+               Contains("emits light already") && Contains("leave 'emission'"));
+    CHECK_THAT(refusedOpenPbr("emission_luminance: -1"), Contains("'emission_luminance'"));
     CHECK_THAT(refusedOpenPbr("coat_color: 1"), Contains("unknown key 'coat_color'"));
     CHECK_THAT(refused("materials: {m: {type: openpbr, transmission_weight: 0.5}, "
                        "t: {type: two_sided, front: m, back: m}}\n"),

@@ -147,7 +147,8 @@ bool hasArea(const std::array<Vec3d, 3>& p) {
 class Flattener {
 public:
     Flattener(const Scene& scene, std::size_t count)
-        : placements_(placementsOf(scene)),
+        : scene_(scene),
+          placements_(placementsOf(scene)),
           parts_(partsOf(count, kPart)),
           stage_("placing triangles", 2 * static_cast<double>(count)) {
         flat_.triangles.resize(count);
@@ -225,8 +226,7 @@ private:
             t.object = static_cast<std::uint32_t>(&placement - placements_.data());
             t.material = !mesh.material.empty() && mesh.material[triangle] >= 0 ? mesh.material[triangle]
                                                                                 : object.material;
-            t.emission = !mesh.emission.empty() && mesh.emission[triangle] >= 0 ? mesh.emission[triangle]
-                                                                                : object.emission;
+            t.emission = emissionIndexOf(scene_, object, triangle);
             for (const Vec3d& p : placement.corners(triangle)) {
                 if (!isFinite(p) && !part.infinite) part.infinite = &placement;
                 part.bounds.add(p);
@@ -311,6 +311,7 @@ private:
         });
     }
 
+    const Scene& scene_;
     const std::vector<Placement> placements_;
     std::vector<Part> parts_;
     FlatScene flat_;

@@ -21,6 +21,9 @@ const Material& fallbackMaterial() {
     return grey;
 }
 
+/// What a material is made of has the fuzz, where it is made of others.
+bool hasFuzz(const Material& material) { return material.fuzz > 0 && !material.isComposed(); }
+
 /// Whether the scene has the material that a triangle names.
 bool isKnown(const FlatTriangle& triangle, std::size_t scene_materials) {
     return triangle.material >= 0 && static_cast<std::size_t>(triangle.material) < scene_materials;
@@ -58,6 +61,8 @@ std::vector<const Spectrum*> spectraOfSurface(const Material& material, const Ma
 std::vector<const Spectrum*> spectraOf(const Material& material, const MaterialTables& tables) {
     std::vector<const Spectrum*> all = spectraOfSurface(material, tables);
     if (hasThinFilm(material)) all.push_back(&material.film_index);
+    if (hasFuzz(material)) all.push_back(&material.fuzz_color);
+    if (hasRoughBase(material)) all.push_back(&tables.rough_bases.at(&material).loss);
     return all;
 }
 
@@ -153,7 +158,9 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
 }
 
 MaterialTables materialTablesOf(const std::vector<const Material*>& materials) {
-    return {coatsOf(materials), compensationsOf(materials)};
+    Coats coats = coatsOf(materials);
+    RoughBases rough_bases = roughBasesOf(materials, coats);
+    return {std::move(coats), compensationsOf(materials), std::move(rough_bases)};
 }
 
 std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials,
@@ -184,6 +191,8 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (record.absorption != 0) part.features |= CRT_FEATURE_ABSORPTION;
         if (record.film_thickness != 0) part.features |= CRT_FEATURE_THIN_FILM;
         if (record.narrowing > 0) part.features |= CRT_FEATURE_ANISOTROPY;
+        if (hasFuzz(*material)) part.features |= CRT_FEATURE_FUZZ;
+        if (hasRoughBase(*material)) part.features |= CRT_FEATURE_ROUGH_BASE;
         if ((record.flags & CRT_MATERIAL_OPENPBR) != 0) part.features |= CRT_FEATURE_OPENPBR;
     }
     return part;
@@ -215,6 +224,32 @@ std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const 
                 record.walled = !material->transmits();
             }
             needed |= mapped || material->isComposed() || !material->isOpaque();
+        }
+        records.push_back(record);
+    }
+    if (!needed) records.clear();
+    return records;
+}
+
+std::vector<kernel::CrtLayers> compileLayers(const std::vector<const Material*>& materials,
+                                             const MaterialTables& tables, const SpectrumTable& spectra) {
+    std::vector<kernel::CrtLayers> records;
+    bool needed = false;
+    for (const Material* material : materials) {
+        kernel::CrtLayers record{};
+        if (material && hasRoughBase(*material)) {
+            const RoughBase& base = tables.rough_bases.at(material);
+            record.base_loss = spectra.valueOf(base.loss);
+            record.base_roughness = static_cast<float>(material->diffuse_roughness);
+            record.base_scale = static_cast<float>(1 / base.most);
+            record.base_mean = static_cast<float>(base.mean);
+            needed = true;
+        }
+        if (material && hasFuzz(*material)) {
+            record.fuzz_weight = static_cast<float>(material->fuzz);
+            record.fuzz_roughness = static_cast<float>(material->fuzz_roughness);
+            record.fuzz_color = spectra.valueOf(material->fuzz_color);
+            needed = true;
         }
         records.push_back(record);
     }

@@ -4,6 +4,7 @@
 #include "compile/coat.h"
 #include "compile/compensation.h"
 #include "compile/flatten.h"
+#include "compile/rough_base.h"
 #include "compile/spectrum_table.h"
 #include "compile/textures.h"
 #include "kernel/layout.h"
@@ -24,6 +25,7 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
 struct MaterialTables {
     Coats coats;
     Compensations compensations;
+    RoughBases rough_bases;
 };
 MaterialTables materialTablesOf(const std::vector<const Material*>& materials);
 
@@ -41,6 +43,10 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
 /// How the materials are composed, in their order; none where all are plain and opaque.
 std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const Material*>& materials,
                                                         const TexturePart& textures);
+
+/// What they have besides, in their order; none where no material has anything.
+std::vector<kernel::CrtLayers> compileLayers(const std::vector<const Material*>& materials,
+                                             const MaterialTables& tables, const SpectrumTable& spectra);
 
 /// Fills in one a triangle, by primitive id. `light_of` as of LightPart.
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,

@@ -46,9 +46,9 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
     for (kernel::CrtSpan* span :
          {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
           &header.normals, &header.textures, &header.uvs, &header.vertex_colors, &header.nodes,
-          &header.objects, &header.materials, &header.compositions, &header.lights, &header.point_lights,
-          &header.environment_image, &header.spectral_film, &header.losses, &header.spectra,
-          &header.observer, &header.wavelengths, &header.filter})
+          &header.objects, &header.materials, &header.compositions, &header.layers, &header.lights,
+          &header.point_lights, &header.environment_image, &header.spectral_film, &header.losses,
+          &header.spectra, &header.observer, &header.wavelengths, &header.filter})
         *span = {};
     return header;
 }
@@ -71,6 +71,8 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
     if (header.compositions.count > 0)
         hash.add(CRT_ARRAY(CrtComposition, blob, header.compositions), header.compositions.count,
                  sizeof(CrtComposition));
+    if (header.layers.count > 0)
+        hash.add(CRT_ARRAY(CrtLayers, blob, header.layers), header.layers.count, sizeof(CrtLayers));
     // A texture names its texels by their place in the blob.
     const CrtTexture* textures = CRT_ARRAY(CrtTexture, blob, header.textures);
     for (std::uint32_t i = 0; i < header.textures.count; ++i) {

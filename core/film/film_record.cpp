@@ -164,6 +164,10 @@ SceneTrait materialsTrait(const Scene& scene) {
     Digest digest;
     for (const Material& material : scene.materials) {
         digest.add(material.type);
+        digest.add(material.emission);
+        for (const double number : {material.diffuse_roughness, material.fuzz, material.fuzz_roughness})
+            digest.add(number);
+        digest.add(material.fuzz_color);
         for (const Spectrum* spectrum : {&material.reflectance, &material.eta, &material.k})
             digest.add(*spectrum);
     }

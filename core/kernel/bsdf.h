@@ -154,6 +154,9 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 const f32 mirrored = crt_coat_albedo(b, dot3(wo, b->ns));
                 const f32 scattered = 0.25f * sum4(returned) * (1.0f - mirrored);
                 b->reflectance = returned * ((1.0f - mirrored) / ((1.0f - k) * eta * eta));
+                if (CRT_HAS(ROUGH_BASE))
+                    returned = crt_prepare_rough_base(ctx, b, surface->material, returned,
+                                                      (1.0f - k) * eta * eta);
                 b->coat_chance = mirrored > 0.0f ? mirrored / (mirrored + scattered) : 0.0f;
                 if (albedo) {
                     const f32 facing = crt_coat_albedo(b, 1.0f);

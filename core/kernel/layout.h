@@ -219,6 +219,20 @@ typedef struct CrtComposition {
 } CrtComposition;
 CRT_ASSERT_SIZE(CrtComposition, 32);
 
+/* What a material has besides its CrtMaterial, by its number. Only in scenes in which one has something. */
+typedef struct CrtLayers {
+    CrtValue base_loss;  /* plastic with a rough base: what one reflection by it loses, by the cosine, of
+                            what it would send back where that is most: a table; 0: Lambert's law */
+    f32 base_roughness;
+    f32 base_scale;      /* of one reflection: 1 over what it would send back where that is most */
+    f32 base_mean;       /* of the table, over the cosine and what the coat lets in */
+    f32 fuzz_weight;     /* share of the surface that fuzz lies on */
+    f32 fuzz_roughness;
+    CrtValue fuzz_color;
+    u32 reserved;
+} CrtLayers;
+CRT_ASSERT_SIZE(CrtLayers, 32);
+
 #define CRT_LIGHT_TRIANGLE 0u
 #define CRT_LIGHT_PARALLELOGRAM 1u /* two triangles */
 #define CRT_LIGHT_ENVIRONMENT 2u   /* from far away: no slot, no area */
@@ -419,6 +433,7 @@ typedef struct CrtScene {
     CrtSpan point_lights;        /* CrtPointLight */
     CrtSpan environment_image;   /* CrtEnvironmentImage, 1 or none */
     CrtSpan compositions;        /* CrtComposition, as many as materials; or none */
+    CrtSpan layers;              /* CrtLayers, as many as materials; or none */
     CrtSpan spectral_film;       /* CrtSpectralFilm, 1 or none */
     CrtSpan losses;              /* CrtLoss */
     CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
@@ -428,7 +443,7 @@ typedef struct CrtScene {
 
     CrtCamera camera;
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 400);
+CRT_ASSERT_SIZE(CrtScene, 408);
 
 CRT_KERNEL_END
 

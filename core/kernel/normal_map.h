@@ -15,8 +15,8 @@
 #ifndef CRT_NORMAL_MAP_H
 #define CRT_NORMAL_MAP_H
 
-#include "bsdf.h"
 #include "composition.h"
+#include "layers.h"
 
 CRT_KERNEL_BEGIN
 
@@ -100,29 +100,29 @@ CRT_FN u32 crt_ways(const CrtBsdf *b, vec3 wi) {
     return dot3(wi, b->base) > 0.0f ? 2u : 0u;
 }
 
-/* crt_bsdf_eval, _pdf and _sample of the surface, whose facet `b` may be. */
+/* crt_layered_eval, _pdf and _sample of the surface, whose facet `b` may be. */
 CRT_FN vec4 crt_surface_eval(const CrtBsdf *b, vec3 wi) {
-    if (!CRT_HAS(NORMAL_MAP)) return crt_bsdf_eval(b, wi);
+    if (!CRT_HAS(NORMAL_MAP)) return crt_layered_eval(b, wi);
     vec4 sum = splat4(0.0f);
     const u32 ways = crt_ways(b, wi);
     CRT_ROLLED for (u32 way = 0u; way < ways; ++way)
-        sum = sum + crt_bsdf_eval(b, way == 0u ? wi : crt_mirrored(wi, b->base));
+        sum = sum + crt_layered_eval(b, way == 0u ? wi : crt_mirrored(wi, b->base));
     return sum;
 }
 
 CRT_FN f32 crt_surface_pdf(const CrtBsdf *b, vec3 wi) {
-    if (!CRT_HAS(NORMAL_MAP)) return crt_bsdf_pdf(b, wi);
+    if (!CRT_HAS(NORMAL_MAP)) return crt_layered_pdf(b, wi);
     f32 sum = 0.0f;
     const u32 ways = crt_ways(b, wi);
     CRT_ROLLED for (u32 way = 0u; way < ways; ++way)
-        sum = sum + crt_bsdf_pdf(b, way == 0u ? wi : crt_mirrored(wi, b->base));
+        sum = sum + crt_layered_pdf(b, way == 0u ? wi : crt_mirrored(wi, b->base));
     return sum;
 }
 
 /* The weight is of the way that was taken; the density, which light sampling competes with, of both. */
 CRT_FN CrtScatter crt_surface_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero,
                                      int alone) {
-    CrtScatter s = crt_bsdf_sample(b, u, choice, hero, alone);
+    CrtScatter s = crt_layered_sample(b, u, choice, hero, alone);
     if (!crt_is_facet(b) || !s.valid) return s;
     if (dot3(s.wi, b->base) < 0.0f) s.wi = crt_mirrored(s.wi, b->base);
     if (CRT_HAS(SMOOTH_NORMALS) && dot3(s.wi, b->side) < 0.0f && crt_is_tilted(b)) {

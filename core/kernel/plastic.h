@@ -15,6 +15,7 @@
 #define CRT_PLASTIC_H
 
 #include "microfacet.h"
+#include "rough_base.h"
 #include "shading_normal.h"
 
 CRT_KERNEL_BEGIN
@@ -34,15 +35,23 @@ CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     const f32 below = crt_below(b);
     f32 lambert = crt_lambert(cos_i);
     f32 entering = cos_i > 0.0f ? (1.0f - crt_coat_albedo(b, cos_i)) * lambert : 0.0f;
+    vec4 rough = splat4(0.0f);
+    if (crt_has_rough_base(b) && cos_i > 0.0f) rough = crt_rough_base(b, wi, cos_i) * entering;
     if (below > 0.0f) {
         const f32 cos_g = dot3(wi, b->ng);
         const f32 raised = below * crt_lambert(cos_g);
         lambert = cos_g > 0.0f ? lambert + raised : 0.0f;
+        const f32 direct = entering;
         entering = cos_g > 0.0f ? entering + (1.0f - crt_coat_albedo(b, crt_cosine_before(below, cos_i,
                                                                                         cos_g))) * raised
                                 : 0.0f;
+        if (crt_has_rough_base(b)) {
+            const f32 before = crt_cosine_before(below, cos_i, cos_g);
+            const vec4 shape = crt_rough_base(b, crt_before_raised(b, below, wi, before), before);
+            rough = cos_g > 0.0f ? rough + shape * (entering - direct) : splat4(0.0f);
+        }
     }
-    const vec4 base = b->reflectance * entering;
+    const vec4 base = crt_has_rough_base(b) ? rough : b->reflectance * entering;
     *pdf = (1.0f - b->coat_chance) * lambert;
     if (!(CRT_HAS(TABLE) && b->coat != 0) || !(cos_i > 0.0f)) return base;
     const CrtMicrofacet m = crt_microfacet(b, wi);

@@ -61,6 +61,13 @@ typedef struct CrtBsdf {
     CrtValue absorption; /* where it bounds a body: of the inside */
     f32 coat_chance;  /* plastic: of sampling the coat */
     CRT_GLOBAL const f32 *coat; /* plastic: table of what it reflects by the cosine; 0: it is smooth */
+    CRT_GLOBAL const f32 *base_loss; /* plastic: table of its rough base; 0: Lambert's; otherwise: */
+    f32 base_roughness;
+    f32 fuzz_albedo;  /* what the fuzz takes of light towards w_o; 0: there is none; otherwise: */
+    f32 fuzz_chance;  /* of sampling it */
+    vec4 fuzz_color;  /* times what it takes */
+    f32 fuzz_width, fuzz_lean; /* of its lobe (fuzz.h) */
+    vec4 again;       /* of what is reflected more than once, to be multiplied with the loss towards w_i */
     vec4 albedo;      /* for the first-hit output; only where it is asked for */
     int facet;        /* it is of a mapped surface (normal_map.h); then: */
     vec3 base;        /* unit, the surface's own shading normal, on the side of w_o */

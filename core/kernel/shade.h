@@ -299,7 +299,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     vec3 wo = -path->ray.d;
     const vec3 ng = surface.ng;
     if (CRT_HAS(NORMAL_MAP)) crt_map_normal(ctx, &surface, hit.slot, &wo, &bsdf);
-    crt_bsdf_prepare(ctx, &bsdf, &surface, wo, path->wavelengths.position, path->throughput, first);
+    crt_layered_prepare(ctx, &bsdf, &surface, wo, path->wavelengths.position, path->throughput, first);
     surface.ng = ng;
     if (first) {
         path->first.normal = bsdf.ns;
@@ -310,7 +310,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     }
 
     if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->lights.count != 0u &&
-        (bsdf.flags & CRT_BSDF_DELTA) == 0u)
+        !crt_is_delta(&bsdf))
         crt_ask_light(ctx, path, &surface, &bsdf, dimension, shadow);
     const CrtRandom2 u = crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF);
     CrtRandom2 choice = u;

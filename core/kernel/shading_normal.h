@@ -80,6 +80,15 @@ CRT_FN f32 crt_cosine_before(f32 below, f32 cos_s, f32 cos_g) {
     return crt_sqrt(crt_max(square - before * before, 0.0f));
 }
 
+/* That direction, at the cosine cos_s with n_s, of one that was raised to wi. */
+CRT_FN vec3 crt_before_raised(const CrtBsdf *b, f32 below, vec3 wi, f32 cos_s) {
+    const f32 cosine = 1.0f - 2.0f * below;
+    const vec3 away = (b->ns * cosine - b->ng) * (0.5f / crt_sqrt(below * (1.0f - below)));
+    const f32 x = dot3(wi, away), z = dot3(wi, b->ns);
+    const f32 before = crt_sqrt(crt_max(x * x + z * z - cos_s * cos_s, 0.0f));
+    return wi + away * (before - x) + b->ns * (cos_s - z);
+}
+
 CRT_FN CrtScatter crt_sample_lambert(const CrtBsdf *b, CrtRandom2 u) {
     if (!CRT_HAS(SMOOTH_NORMALS)) return crt_sample_diffuse(b->reflectance, b->ns, b->ng, u);
     CrtScatter s = crt_no_scatter();

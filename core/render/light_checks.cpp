@@ -28,10 +28,8 @@ struct Face {
 };
 
 /// Emission of a triangle; null when it emits nothing.
-const Emission* emissionOf(const Scene& scene, const Object& object, const Mesh& mesh,
-                           std::size_t triangle) {
-    const std::int32_t own = mesh.emission.empty() ? -1 : mesh.emission[triangle];
-    const std::int32_t index = own >= 0 ? own : object.emission;
+const Emission* emissionOf(const Scene& scene, const Object& object, std::size_t triangle) {
+    const std::int32_t index = emissionIndexOf(scene, object, triangle);
     if (index < 0) return nullptr;
     const Emission& emission = scene.emissions[static_cast<std::size_t>(index)];
     return emission.radiance.max() > 0 ? &emission : nullptr;
@@ -42,7 +40,7 @@ std::vector<Face> oneSidedFaces(const Scene& scene, const Object& object) {
     const Mesh& mesh = scene.meshes[object.mesh];
     std::vector<Face> faces;
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-        const Emission* emission = emissionOf(scene, object, mesh, t);
+        const Emission* emission = emissionOf(scene, object, t);
         if (emission == nullptr) continue;
         if (emission->two_sided) return {};
         for (const Matrix4d& transform : object.transforms) {
@@ -108,7 +106,7 @@ std::vector<std::string> reasonsForBlack(const Scene& scene) {
         const Mesh& mesh = scene.meshes[object.mesh];
         bool emits = false;
         for (std::size_t t = 0; t < mesh.triangles.size() && !emits; ++t)
-            emits = emissionOf(scene, object, mesh, t) != nullptr;
+            emits = emissionOf(scene, object, t) != nullptr;
         if (!emits) continue;
         lamps.push_back(nameOf(object));
         if (!oneSidedFaces(scene, object).empty()) one_sided.push_back(nameOf(object));

@@ -137,6 +137,13 @@ struct Material {
     double normal_strength = 1;                 ///< Of its slopes. At least 0.
     double amount = 0.5;                        ///< Mix: share of the second. In [0,1].
     TextureIndex amount_texture = kNoTexture;   ///< In place of the amount.
+    /// Index into Scene::emissions: what faces emit that name this material; −1 nothing. Not of parts.
+    std::int32_t emission = -1;
+    /// Plastic by its colours, and one of index 1: how rough the diffuse base is. In [0,1].
+    double diffuse_roughness = 0;
+    double fuzz = 0;            ///< Share of the surface that fuzz lies on. In [0,1].
+    Spectrum fuzz_color;        ///< In [0,1].
+    double fuzz_roughness = 0;  ///< In [0,1].
 
     bool isComposed() const { return type == MaterialType::Mix || type == MaterialType::TwoSided; }
     bool isOpaque() const { return opacity >= 1 && opacity_texture == kNoTexture; }
@@ -291,6 +298,20 @@ inline SpectralChannels spectralChannelsOf(const Scene& scene) {
     for (const SensorResponse& response : scene.film.spectral.responses)
         channels.responses.push_back(response.name);
     return channels;
+}
+
+/// Emission of a triangle of the object's mesh, an index into Scene::emissions: of the file's material, of
+/// the scene's, or of the object; −1: it emits nothing.
+inline std::int32_t emissionIndexOf(const Scene& scene, const Object& object, std::size_t triangle) {
+    const Mesh& mesh = scene.meshes[object.mesh];
+    if (!mesh.emission.empty() && mesh.emission[triangle] >= 0) return mesh.emission[triangle];
+    const std::int32_t own = mesh.material.empty() ? -1 : mesh.material[triangle];
+    const std::int32_t material = own >= 0 ? own : object.material;
+    if (material >= 0 && static_cast<std::size_t>(material) < scene.materials.size())
+        if (const std::int32_t shines = scene.materials[static_cast<std::size_t>(material)].emission;
+            shines >= 0)
+            return shines;
+    return object.emission;
 }
 
 /// How many independent sequences the samples of a pixel are of (layout.h: CRT_REPLICATES_MAX); 1: the film

@@ -48,6 +48,10 @@ std::vector<Light> lightsOf(const Scene& scene) {
                 fmt::format("a material (Ke) of '{}'", object.name), object.place);
         }
     }
+    for (const Material& material : scene.materials)
+        if (material.emission >= 0)
+            add(scene.emissions[static_cast<std::size_t>(material.emission)].radiance.max(),
+                fmt::format("material '{}'", material.name), material.place);
     for (const PointLight& light : scene.point_lights)
         if (const double brightest = light.strength * light.spectrum.max(); brightest > 0)
             lights.push_back({brightest, fmt::format("'{}'", light.name), light.place,

@@ -19,12 +19,6 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-std::string point(const Vec3d& v) { return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", v[0], v[1], v[2]); }
-
-std::string eyeAt(const Vec3d& position, const char* up) {
-    return fmt::format("{{position: {}, target: [0, 0, 0], up: {}, fov: 0.001}}", point(position), up);
-}
-
 void furnace(Context& context) {
     // Its tangent is the axis x, turned away from the view.
     const auto floor = [](double degrees, double turn, const std::string& metal, double roughness,

@@ -3,6 +3,7 @@
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
+#include "judge/verify/shapes.h"
 
 #include "kernel/features.h"
 
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <string_view>
 
 namespace crt::verify {
 namespace {
@@ -19,13 +21,29 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 /// A floor of the material, seen at an angle in light 1 from everywhere.
 std::string floorOf(const std::string& material, double degrees) {
-    return Stage(fmt::format("{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], "
-                             "fov: 0.001}}",
-                             std::sin(degrees * kDegree), std::cos(degrees * kDegree)))
+    return Stage(eyeAt({std::sin(degrees * kDegree), std::cos(degrees * kDegree), 0}, "[0, 0, 1]"))
         .material("it", material)
         .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
         .set("environment", "{radiance: 1}")
         .yaml();
+}
+
+/// The same, lit by a beam that brings irradiance 1 to a plane that faces it. z is along the normal.
+std::string floorInBeam(const std::string& material, const Vec3d& view, const Vec3d& light) {
+    return Stage(eyeAt({view[1], view[2], view[0]}, "[0.6, 0.3, 0.1]"))
+        .material("it", material)
+        .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
+        .set("lights", fmt::format("[{{type: directional, direction: {}, irradiance: 1}}]",
+                                   point({-light[1], -light[2], -light[0]})))
+        .yaml();
+}
+
+/// Radiance of that, over what the wavelengths of these few samples make of radiance 1.
+double inBeam(Context& context, const std::string& material, const Vec3d& view, const Vec3d& light) {
+    const auto seen = [&](const std::string& of) {
+        return radiance(context.render(floorInBeam(of, view, light), {.samples = 16}));
+    };
+    return seen(material) / seen("{type: diffuse, reflectance: 1}") * light[2] / std::numbers::pi;
 }
 
 void metals(Context& context) {
@@ -145,9 +163,169 @@ void limits(Context& context) {
          "{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 300, ior: 1.3}}");
     for (const auto& [key, word] : {std::pair{"subsurface_weight: 0.5", "wanders below"},
                                     std::pair{"coat_weight: 1", "no coats"},
-                                    std::pair{"fuzz_weight: 1", "no fuzz"},
-                                    std::pair{"emission_luminance: 10", "emission from objects"}})
+                                    std::pair{"fuzz_weight: 1, emission_luminance: 1", "the fuzz would"}})
         context.refused(key, fmt::format("crt: 1\nmaterials: {{it: {{type: openpbr, {}}}}}\n", key), word);
+}
+
+/// Luminance that a number of the film is of, cd/m²: Y is in units of 683 lm/W · ∫ȳ dλ.
+constexpr double kUnitLuminance = 683.002 * 106.856895;
+
+void emission(Context& context) {
+    const auto lamp = [](const std::string& keys) {
+        return "{type: openpbr, base_color: 0, specular_weight: 0, " + keys + "}";
+    };
+    const auto sheet = [&](const std::string& material, const char* camera) {
+        return Stage(camera)
+            .material("it", material)
+            .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
+            .yaml();
+    };
+    constexpr const char* above = "{position: [0, 3, 1], target: [0, 0, 0], fov: 1}";
+    constexpr const char* below = "{position: [0, -3, 1], target: [0, 0, 0], fov: 1}";
+    const Render how{.samples = 1u << 12};
+    const auto candela_m2 = [&](const std::string& yaml) {
+        return luminance(context.render(yaml, how)) * kUnitLuminance;
+    };
+    context.relative("300 cd/m² of white, seen from the front",
+                     candela_m2(sheet(lamp("emission_luminance: 300"), above)), 300, 2e-3,
+                     {{300 * kUnitLuminance, "the luminance is taken for the radiance"}});
+    context.relative(
+        "an emission_color of Y 0.3",
+        candela_m2(sheet(lamp("emission_luminance: 300, "
+                             "emission_color: {rgb: [0.3, 0.3, 0.3], space: linear}"),
+                         above)),
+        90, 2e-3, {{300, "the luminance is that of the colour, whatever it is"}});
+    context.absolute("from behind", candela_m2(sheet(lamp("emission_luminance: 300"), below)), 0, 0);
+    // A lamp of the material is one of the object: light sampling finds it.
+    for (const auto& [technique, integrator] : kDirectTechniques) {
+        Stage stage("{position: [0, 1, 3], target: [0, 0, 0], fov: 0.01}", integrator);
+        stage.material("it", lamp("emission_luminance: 300"))
+            .material("floor", "{type: diffuse, reflectance: 1}")
+            .quad("it", "[[-0.5,1,-0.5],[0.5,1,-0.5],[0.5,1,0.5],[-0.5,1,0.5]]", "it")
+            .quad("floor", "[[-9,0,-9],[-9,0,9],[9,0,9],[9,0,-9]]", "floor");
+        context.estimate(fmt::format("a floor under it, {}", technique), stage.yaml(),
+                         [](const Film& film) { return luminance(film); },
+                         300 / kUnitLuminance * squareFormFactor(0, 0.5), 2e-3,
+                         {.samples = 256, .most = 65536});
+    }
+    context.refused("emission twice",
+                    "crt: 1\nmaterials: {it: {type: openpbr, emission_luminance: 1}}\nobjects:\n"
+                    "  - {mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}, material: it, "
+                    "emission: {radiance: 1}}\n",
+                    "emits light already");
+}
+
+void roughDiffuse(Context& context) {
+    const Render how{.samples = 1u << 12};
+    const Vec3d view = unit({0.6, 0.2, 0.5});
+    // From where the viewer is, beside him, and from the other side.
+    for (const Vec3d& light : {unit({0.5, 0.3, 0.4}), unit({-0.3, 0.5, 1}), unit({-0.9, -0.2, 0.3})})
+        for (const auto& [rho, r] : {std::pair{0.8, 1.0}, std::pair{1.0, 0.3}}) {
+            const auto floor = [&](const std::string& material) {
+                return inBeam(context, material, view, light);
+            };
+            const double expected = eonReflection(view, light, rho, r);
+            context.relative(
+                fmt::format("reflectance {}, roughness {}, a beam {:.0f}° from the view", rho, r,
+                            std::acos(dot(view, light)) / kDegree),
+                floor(fmt::format("{{type: diffuse, reflectance: {}, roughness: {}}}", rho, r)), expected,
+                2e-4, {{rho * light[2] / std::numbers::pi, "the surface is Lambert's"}});
+            context.relative(
+                "the same by openpbr",
+                floor(fmt::format("{{type: openpbr, specular_weight: 0, base_color: {}, "
+                                  "base_diffuse_roughness: {}}}",
+                                  rho, r)),
+                expected, 2e-4);
+        }
+    for (const double r : {0.2, 1.0})
+        for (const double degrees : {0.0, 60.0, 85.0}) {
+            const double cosine = std::cos(degrees * kDegree);
+            const auto seen = [&](const char* material, double rho) {
+                return radiance(
+                    context.render(floorOf(fmt::format(fmt::runtime(material), rho, r), degrees), how));
+            };
+            constexpr const char* bare = "{{type: diffuse, reflectance: {}, roughness: {}}}";
+            constexpr const char* gloss = "{{type: openpbr, base_color: {}, base_diffuse_roughness: {}, "
+                                          "specular_roughness: 0}}";
+            constexpr const char* satin = "{{type: openpbr, base_color: {}, base_diffuse_roughness: {}, "
+                                          "specular_roughness: 0.5}}";
+            context.relative(fmt::format("roughness {}, white, at {}°", r, degrees), seen(bare, 1), 1,
+                             2e-3);
+            context.relative(fmt::format("roughness {}, 0.5, at {}°", r, degrees), seen(bare, 0.5),
+                             eonAlbedo(cosine, 0.5, r), 2e-3);
+            context.relative(fmt::format("roughness {} under a gloss, white, at {}°", r, degrees),
+                             seen(gloss, 1), 1, 2e-3);
+            context.relative(fmt::format("roughness {} under satin, white, at {}°", r, degrees),
+                             seen(satin, 1), 1, 2e-3);
+            context.relative(fmt::format("roughness {} under a gloss, 0.5, at {}°", r, degrees),
+                             seen(gloss, 0.5), glossyEonAlbedo(cosine, 0.5, r, 1.5), 2e-3);
+        }
+    context.refused("roughness 2",
+                    "crt: 1\nmaterials: {it: {type: diffuse, reflectance: 1, roughness: 2}}\n",
+                    "roughness");
+}
+
+void fuzz(Context& context) {
+    const Vec3d view = unit({0.6, 0.2, 0.5});
+    const double weight = 0.75, color = 0.8;
+    const auto on = [&](const char* base, double w, double c, double roughness) {
+        return fmt::format("{{type: openpbr, {}, fuzz_weight: {}, fuzz_color: {}, fuzz_roughness: {}}}",
+                           base, w, c, roughness);
+    };
+    constexpr const char* black = "base_color: 0, specular_weight: 0";
+    constexpr const char* white = "base_color: 1, specular_weight: 0";
+    for (const double roughness : {0.2, 0.5, 1.0})
+        for (const Vec3d& light : {unit({0.5, 0.3, 0.4}), unit({-0.3, 0.5, 1}), unit({-0.9, -0.2, 0.3})}) {
+            const double angle = std::acos(dot(view, light)) / kDegree;
+            const double taken = weight * sheenAlbedo(view[2], roughness);
+            const double sheen = color * taken * sheenDensity(view, light, roughness);
+            const auto seen = [&](const char* base) {
+                return inBeam(context, on(base, weight, color, roughness), view, light);
+            };
+            context.relative(fmt::format("on black, roughness {}, a beam {:.0f}° from the view", roughness,
+                                         angle),
+                             seen(black), sheen, 2e-4,
+                             {{sheen / weight, "fuzz_weight is left out"}});
+            context.relative(fmt::format("on white, roughness {}, a beam {:.0f}° from the view", roughness,
+                                         angle),
+                             seen(white), sheen + (1 - taken) * light[2] / std::numbers::pi, 2e-4,
+                             {{sheen + light[2] / std::numbers::pi, "the base is not darkened"}});
+        }
+    const Render how{.samples = 1u << 12};
+    constexpr const char* kBases[] = {"base_color: 1", white,
+                                      "base_metalness: 1, base_color: 1, specular_roughness: 0",
+                                      "base_metalness: 1, base_color: 1, specular_roughness: 0.6",
+                                      "transmission_weight: 1, specular_roughness: 0",
+                                      "transmission_weight: 1, specular_roughness: 0.5"};
+    for (const double degrees : {0.0, 60.0, 85.0})
+        for (const double roughness : {0.3, 1.0}) {
+            for (const char* base : kBases) {
+                const bool clear = std::string_view(base).starts_with("transmission");
+                const double angle = degrees * kDegree;
+                Stage stage(eyeAt({std::sin(angle), std::cos(angle), 0}, "[0, 0, 1]"),
+                            clear ? "{max_depth: 400, roulette: false}" : kDirect);
+                stage.set("environment", "{radiance: 1, light_sampling: true}")
+                    .material("it", on(base, 1, 1, roughness));
+                if (clear && !context.atLeast(Level::Merge)) continue;
+                if (clear) stage.box("it", {-2, -1, -2}, {2, 0, 2}, "it");
+                else stage.quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it");
+                context.estimate(fmt::format("white on {}, roughness {}, at {}°", base, roughness, degrees),
+                                 stage.yaml(), meanRadiance, 1, 5e-3, {.samples = 1024, .most = 65536});
+            }
+            context.relative(fmt::format("grey on black, roughness {}, at {}°", roughness, degrees),
+                             radiance(context.render(floorOf(on(black, weight, color, roughness), degrees),
+                                                     how)),
+                             weight * color * sheenAlbedo(std::cos(degrees * kDegree), roughness), 2e-3);
+        }
+    // A mirror under fuzz is seen by light sampling, too.
+    for (const auto& [technique, integrator] : kDirectTechniques) {
+        Stage stage(eyeAt({view[1], view[2], view[0]}, "[0.6, 0.3, 0.1]"), integrator);
+        stage.material("it", on("base_metalness: 1, base_color: 1, specular_roughness: 0", 1, 1, 0.5))
+            .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
+            .set("environment", "{radiance: 1, light_sampling: true}");
+        context.estimate(fmt::format("on a mirror, {}", technique), stage.yaml(), meanRadiance, 1, 5e-3,
+                         {.samples = 1024, .most = 65536});
+    }
 }
 
 }  // namespace
@@ -171,6 +349,30 @@ std::vector<Case> openPbrCases() {
                 CRT_FEATURE_ANISOTROPY | CRT_FEATURE_ABSORPTION | CRT_FEATURE_THIN_FILM |
                 CRT_FEATURE_TABLE,
             limits),
+        row("G36", "openpbr-emission",
+            "A sheet of emission_luminance 300 seen from both sides, white and of a darker emission_color; "
+            "a floor under it, by light sampling, scattered rays and both; emission said twice",
+            "cd/m² over 683 lm/W and the integral of ȳ; the form factor of a square; a refusal",
+            "OpenPBR Surface 1.1; CIE 15:2018", "± 0.2 %; 0", Level::Commit,
+            CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, emission),
+        row("G37", "rough-diffuse",
+            "Rough diffuse floors under beams from three directions; bare, under a gloss and under satin at "
+            "three angles in light from everywhere, white and grey",
+            "EON's closed forms; 1 for white; quadrature over directions under a gloss",
+            "Portsmouth, Kutz and Hill (2025)", "± 0.02 %, ± 0.2 %", Level::Commit,
+            CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_BASE | CRT_FEATURE_OPENPBR |
+                CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_TABLE,
+            roughDiffuse),
+        row("G38", "fuzz",
+            "Fuzz on black and white floors under beams from three directions; on what is diffuse, glossy, "
+            "metal and before a merge clear, at three angles in light from everywhere; on a mirror, by "
+            "light sampling, scattered rays and both",
+            "the linearly transformed cosine and its albedo; what is below times 1 less that; 1",
+            "Zeltner, Burley and Chiang (2022); OpenPBR Surface 1.1", "± 0.02 %, ± 0.2 %, ± 0.5 %",
+            Level::Commit,
+            CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT | CRT_FEATURE_FUZZ |
+                CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_DIFFUSE | CRT_FEATURE_ROUGH_CONDUCTOR,
+            fuzz),
     };
 }
 

@@ -82,6 +82,23 @@ ScatteredShares roughDielectricShares(double cosine, double eta, double roughnes
 /// light through it is η² times as much one way as the other.
 double plasticAlbedo(double cosine, double base, double eta, double roughness);
 
+/// EON (Portsmouth, Kutz and Hill 2025) of reflectance `rho` and roughness r, by the closed forms of the
+/// paper: radiance towards `view` of a surface lit by a beam from `light` that brings irradiance 1 to a
+/// plane that faces it (z along the normal); and of light from everywhere the share towards `cosine`.
+double eonReflection(const Vec3d& view, const Vec3d& light, double rho, double r);
+double eonAlbedo(double cosine, double rho, double r);
+
+/// Of light from everywhere, the share that a smooth gloss of index `eta` on a rough base sends towards a
+/// view at `cosine`: what the gloss mirrors, and what one reflection by the base sends on, by quadrature
+/// over directions, scaled to lose nothing where it loses least, and all further ones.
+double glossyEonAlbedo(double cosine, double rho, double r, double eta);
+
+/// The sheen of Zeltner, Burley and Chiang (2022), by the fits of MaterialX 1.39: of light towards a view at
+/// `cosine` the share that it takes; and the density, per steradian, with which that comes from `light`: the
+/// linearly transformed cosine, by its matrix. z is along the normal.
+double sheenAlbedo(double cosine, double roughness);
+double sheenDensity(const Vec3d& view, const Vec3d& light, double roughness);
+
 /// Unpolarised reflectance of a film of real index on something of index `under`, both relative to the
 /// medium before, where light has the wavelength: by the film's characteristic matrix (Abelès 1950; Born
 /// and Wolf, 1.6), for light across and in the plane of incidence.

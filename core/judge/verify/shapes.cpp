@@ -1,5 +1,7 @@
 #include "judge/verify/shapes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +13,12 @@
 namespace crt::verify {
 
 Vec3d unit(const Vec3d& a) { return a * (1 / length(a)); }
+std::string point(const Vec3d& v) { return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", v[0], v[1], v[2]); }
+
+std::string eyeAt(const Vec3d& position, const char* up) {
+    return fmt::format("{{position: {}, target: [0, 0, 0], up: {}, fov: 0.001}}", point(position), up);
+}
+
 Vec3d roundToFloat(const Vec3d& a) {
     return {static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2])};
 }

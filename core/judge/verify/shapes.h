@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <random>
+#include <string>
 
 namespace crt::verify {
 
@@ -15,6 +16,9 @@ using crt::operator+;
 using crt::operator-;
 using crt::operator*;
 Vec3d unit(const Vec3d& a);
+/// "[x, y, z]", as scene files have it; and a camera there that sees the origin through a needle's eye.
+std::string point(const Vec3d& v);
+std::string eyeAt(const Vec3d& position, const char* up);
 /// Each coordinate rounded to float, as the kernel will see it.
 Vec3d roundToFloat(const Vec3d& a);
 

@@ -94,6 +94,22 @@ std::vector<Variant> variants(int resolution) {
             material.anisotropy_rotation_deg = 20;
         }
     });
+    add("fuzz", [](Scene& s) {
+        for (Material& material : s.materials) {
+            material.fuzz = 0.5;
+            material.fuzz_color = constantSpectrum(0.9);
+            material.fuzz_roughness = 0.4;
+        }
+    });
+    add("rough diffuse bases", [](Scene& s) {
+        for (Material& material : s.materials)
+            if (material.type == MaterialType::Diffuse) {
+                material.type = MaterialType::Plastic;
+                material.eta = constantSpectrum(1.4);
+                material.diffuse_roughness = 0.7;
+                material.by_color = true;
+            }
+    });
     add("metals and gloss by their colours", [](Scene& s) {
         for (Material& material : s.materials)
             if (material.type == MaterialType::Conductor || material.type == MaterialType::Dielectric) {

@@ -91,6 +91,11 @@ void ObjectReader::checkParts(const std::vector<std::int32_t>& way) {
                        fmt::format("material '{}' has an opacity, which a part of another cannot have",
                                    at(part).name),
                        fmt::format("give the opacity to '{}'", at(way.front()).name));
+        if (at(part).emission >= 0)
+            out_.error(place,
+                       fmt::format("material '{}' emits light, which a part of another cannot do",
+                                   at(part).name),
+                       "leave its 'emission_luminance' out, and give the object 'emission'");
         const bool one_side = std::any_of(way.begin(), way.end(), [&](std::int32_t index) {
             return at(index).type == MaterialType::TwoSided;
         });

@@ -172,6 +172,10 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
     }
     switch (material.type) {
         case MaterialType::Diffuse:
+            section->read("roughness", material.diffuse_roughness);
+            takeReflectance();
+            makeRoughDiffuse(material);
+            break;
         case MaterialType::Mirror: takeReflectance(); break;
         case MaterialType::RoughConductor: takeRoughness(); [[fallthrough]];
         case MaterialType::Conductor: {
@@ -478,6 +482,10 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
         light->read("two_sided", emission.two_sided);
         if (std::optional<Spectrum> radiance = spectra_.read(*light, "radiance", SpectrumUse::Emission))
             emission.radiance = *std::move(radiance);
+        if (object.material >= 0 &&
+            scene_.materials[static_cast<std::size_t>(object.material)].emission >= 0)
+            section.error("emission", fmt::format("material '{}' emits light already", material_name),
+                          "leave 'emission' or the material's 'emission_luminance' out");
         object.emission = static_cast<std::int32_t>(scene_.emissions.size());
         scene_.emissions.push_back(std::move(emission));
     }

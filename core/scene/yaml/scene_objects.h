@@ -46,6 +46,8 @@ private:
     void resolveParts();
     void checkParts(const std::vector<std::int32_t>& way);
     void readThinFilm(const SectionReader& section, Material& material);
+    /// A diffuse material that is rough is a plastic without a coat.
+    static void makeRoughDiffuse(Material& material);
     void readAnisotropy(const SectionReader& section, Material& material) const;
     struct OpenPbr;
     /// Makes the material of what OpenPBR's keys say, and of further ones, which come before it.

@@ -1,5 +1,6 @@
 // The part of ObjectReader that reads openpbr materials (OpenPBR Surface 1.1): they become crt's own, mixed
 // as the specification says. What crt has not is refused where it would be seen.
+#include "scene/light_units.h"
 #include "scene/yaml/scene_objects.h"
 
 #include <fmt/format.h>
@@ -58,9 +59,13 @@ struct ObjectReader::OpenPbr {
     double transmission_depth = 0, dispersion_scale = 0, abbe = 20;
     double film_weight = 0, film_um = 0.5, film_ior = 1.4;
 
+    double emission_luminance = 0;
+    Spectrum emission_color = rgbEmission({1, 1, 1});
+
     void read();
     void refuse() const;
     Material make();
+    std::int32_t emission() const;
 
 private:
     void number(const char* key, Weight& into) const;
@@ -109,6 +114,15 @@ void ObjectReader::OpenPbr::read() {
     section.read("transmission_depth", transmission_depth);
     section.read("transmission_dispersion_scale", dispersion_scale);
     section.read("transmission_dispersion_abbe_number", abbe);
+    section.read("fuzz_weight", like.fuzz);
+    like.fuzz_color = constantSpectrum(1);
+    color("fuzz_color", like.fuzz_color);
+    like.fuzz_roughness = 0.5;
+    section.read("fuzz_roughness", like.fuzz_roughness);
+    section.read("emission_luminance", emission_luminance);
+    if (std::optional<Spectrum> s =
+            reader.spectra_.read(section, "emission_color", SpectrumUse::Emission))
+        emission_color = *std::move(s);
     section.read("thin_film_weight", film_weight);
     section.read("thin_film_thickness", film_um);
     section.read("thin_film_ior", film_ior);
@@ -123,20 +137,18 @@ void ObjectReader::OpenPbr::refuse() const {
          {std::tuple{"subsurface_weight", "crt has no light that wanders below a surface",
                      "leave 'subsurface_weight' out: the base is diffuse then"},
           std::tuple{"coat_weight", "crt has no coats on openpbr materials yet",
-                     "leave 'coat_weight' out, or take a plastic for a coat on a diffuse base"},
-          std::tuple{"fuzz_weight", "crt has no fuzz", "leave 'fuzz_weight' out"},
-          std::tuple{"emission_luminance", "crt has emission from objects, not from materials",
-                     "give the object 'emission'"}}) {
+                     "leave 'coat_weight' out, or take a plastic for a coat on a diffuse base"}}) {
         double weight = 0;
         if (section.read(key, weight)) no(weight > 0, key, why, instead);
     }
+    no(emission_luminance > 0 && like.fuzz > 0, "emission_luminance",
+       "the fuzz would take some of the light, and crt's lamps lie on top",
+       "leave 'fuzz_weight' or 'emission_luminance' out");
     bool thin_walled = false;
     if (section.read("geometry_thin_walled", thin_walled))
         no(thin_walled, "geometry_thin_walled", "crt has no thin walls of openpbr materials",
            "take a thin_dielectric");
     const bool coated = isOpaque() && index() != 1;
-    no(isOpaque() && diffuse_roughness > 0, "base_diffuse_roughness",
-       "crt has no rough diffuse bases: its diffuse is Lambert's", "leave 'base_diffuse_roughness' out");
     no(base_texture != kNoTexture && base_weight != 1, "base_weight",
        "a texture is the colour itself: crt has no factor on it", "leave 'base_weight' out");
     no(isMetal() && specular_weight > 1, "specular_weight",
@@ -205,7 +217,11 @@ Material ObjectReader::OpenPbr::metal() const {
 Material ObjectReader::OpenPbr::glossy() const {
     Material part = like;
     setColor(part);
-    if (index() == 1) return part;  // Lambert's law
+    part.diffuse_roughness = diffuse_roughness;
+    if (index() == 1) {
+        makeRoughDiffuse(part);
+        return part;
+    }
     part.type = MaterialType::Plastic;
     part.by_color = true;
     part.eta = constantSpectrum(index());
@@ -263,11 +279,27 @@ Material ObjectReader::OpenPbr::make() {
     return mixed("metalness", std::move(dielectric), metal(), metalness);
 }
 
+void ObjectReader::makeRoughDiffuse(Material& material) {
+    if (!(material.diffuse_roughness > 0)) return;
+    material.type = MaterialType::Plastic;
+    material.eta = constantSpectrum(1);
+}
+
+/// The luminance is that of a colour of luminance 1, as white is.
+std::int32_t ObjectReader::OpenPbr::emission() const {
+    if (!(emission_luminance > 0) || !(emission_color.max() > 0)) return -1;
+    const double unit_cd_m2 = kLuminousEfficacy_lm_W * cieYIntegral();
+    const double factor = emission_luminance / unit_cd_m2;
+    reader.scene_.emissions.push_back({scaled(emission_color, factor), false});
+    return static_cast<std::int32_t>(reader.scene_.emissions.size()) - 1;
+}
+
 void ObjectReader::readOpenPbr(const SectionReader& section, Material& material) {
     OpenPbr it{.reader = *this, .section = section, .like = material};
     it.read();
     it.refuse();
     material = it.make();
+    material.emission = it.emission();
 }
 
 }  // namespace crt

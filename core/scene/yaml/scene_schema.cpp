@@ -614,7 +614,16 @@ void addMaterials(std::vector<SectionSchema>& all) {
                                 .required = true,
                                 .doc = "Fraction of light sent back, at every wavelength."};
     all.push_back(
-        {"material/diffuse", "a diffuse material", "Lambert's law.", {typeKey("diffuse"), reflectance}});
+        {"material/diffuse", "a diffuse material", "Lambert's law, or EON where it is rough.",
+         {typeKey("diffuse"), reflectance,
+          {.name = "roughness",
+           .kind = Kind::Number,
+           .range = {.min = 0, .max = 1},
+           .fallback = "0",
+           .doc = "0: Lambert's law. Above, EON (Portsmouth, Kutz and Hill 2025), as "
+                  "`base_diffuse_roughness` of OpenPBR Surface 1.1: like clay or the full moon, as bright "
+                  "towards the light's edges as in the middle. No light is lost: 1 is white in a white "
+                  "room; other colours get deeper, since light is reflected more than once."}}});
     all.push_back(
         {"material/mirror", "a mirror material", "Perfect reflection.", {typeKey("mirror"), reflectance}});
     const KeySchema metal{

@@ -80,19 +80,20 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
         "material/openpbr",
         "an openpbr material",
         "A part of [OpenPBR Surface 1.1](https://academysoftwarefoundation.github.io/OpenPBR/), by its "
-        "names: base, specular, transmission, thin film and opacity. It becomes materials of crt, mixed by "
-        "`base_metalness` and `transmission_weight`, and all light is spectral. A metal is a "
-        "`rough_conductor` that reflects F82-tint's curve (below 0 beside the dip of a dark tint: 0). A "
+        "names: base, specular, transmission, thin film, fuzz, emission and opacity. It becomes materials "
+        "of crt, mixed by `base_metalness` and `transmission_weight`, and all light is spectral. A metal is "
+        "a `rough_conductor` that reflects F82-tint's curve (below 0 beside the dip of a dark tint: 0). A "
         "glossy base is a `plastic` in the reciprocal form of the specification, which gives `base_color` "
         "to what comes out of the gloss; a clear one is a `rough_dielectric`, its `specular_weight` an "
-        "index. Rough surfaces give back what microfacets lose, as elsewhere in crt. Coat, fuzz, "
-        "subsurface, emission, thin walls and rough diffuse bases are refused where they would be seen, and "
-        "so is what the material that it becomes has not; the message says what to write instead. Keys of "
-        "the specification that are not in this table are unknown.",
+        "index. Rough surfaces give back what microfacets lose, as elsewhere in crt. Coat, subsurface "
+        "and thin walls are refused where they would be seen, and so is what the material that it becomes "
+        "has not; the message says what to write instead. Keys of the specification that are not in this "
+        "table are unknown.",
         {typeKey("openpbr", "material"), weight("base_weight", "1", "Factor on `base_color`."),
          color("base_color", "0.8",
                "Of metals what they reflect straight on, of others what comes out of the base.", true),
-         weight("base_diffuse_roughness", "0", "Above 0 it is refused where an opaque base is seen."),
+         weight("base_diffuse_roughness", "0",
+                "As `roughness` of `diffuse`, of what comes out of the gloss."),
          weight("base_metalness", "0", "Share of the surface that is metal.", true),
          amount("specular_weight", kNotNegative, "1",
                 "Factor on what is reflected straight on: of dielectrics by another index, of metals at all "
@@ -118,8 +119,26 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
          amount("thin_film_thickness", {.min = 0, .max = 20}, "0.5", "How thick the film is.", "µm"),
          amount("thin_film_ior", {.min = 0.1, .max = 10}, "1.4", "Its index relative to the outside."),
          refused("subsurface_weight", "no light wanders below surfaces."),
-         refused("coat_weight", "there are no coats yet."), refused("fuzz_weight", "there is no fuzz."),
-         refused("emission_luminance", "objects have `emission`."),
+         refused("coat_weight", "there are no coats yet."),
+         weight("fuzz_weight", "0",
+                "Share of the surface that fibres stand on, like velvet or dust: bright along the surface "
+                "(Zeltner, Burley and Chiang 2022). What they take of light towards the viewer, whatever "
+                "their colour, is missing from what lies below. Seen from inside a clear body there are "
+                "none."),
+         color("fuzz_color", "1", "Of what the fibres take, the share that they send on."),
+         weight("fuzz_roughness", "0.5",
+                "How much the fibres lean apart: 0 is a thin rim, 1 dust. Below 0.01 it is 0.01."),
+         amount("emission_luminance", kNotNegative, "0",
+                "Light that the front side emits, equally in all directions, on top of what it scatters. "
+                "`geometry_opacity` takes its share. An object of this material has no `emission` then, and "
+                "the material no fuzz.",
+                "cd/m²"),
+         {.name = "emission_color",
+          .kind = Kind::Spectrum,
+          .range = kNotNegative,
+          .fallback = "{rgb: [1, 1, 1]}",
+          .doc = "Its spectrum, times that. An `rgb` of 1 is D65 of luminance 1; a darker or brighter "
+                 "colour makes a darker or brighter light."},
          weight("geometry_opacity", "1",
                 "Share of the surface that is there; light passes the rest unchanged, shadow rays too.",
                 true),
