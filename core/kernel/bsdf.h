@@ -1,6 +1,6 @@
 /*
  * bsdf.h: how surfaces scatter. crt_bsdf_prepare reads what a material is made of, once a vertex; then
- * crt_bsdf_sample, crt_bsdf_eval and crt_bsdf_pdf and the flags are all that path.h knows. A material is a
+ * crt_bsdf_sample, crt_bsdf and the flags are all that layers.h and path.h know. A material is a
  * row of CRT_MATERIAL_LIST (features.h) and a case in each of the four; deltas, which can only be sampled,
  * need none in eval and pdf.
  */
@@ -215,65 +215,43 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 cho
     return crt_no_scatter();
 }
 
-/* f(w_o, w_i)·|cos w_i|; 0 for deltas. */
-CRT_FN vec4 crt_bsdf_eval(const CrtBsdf *b, vec3 wi) {
+/* f(w_o, w_i)·|cos w_i|, and the density per steradian with which crt_bsdf_sample finds w_i; both 0 for
+   deltas. */
+CRT_FN vec4 crt_bsdf(const CrtBsdf *b, vec3 wi, f32 *pdf) {
+    *pdf = 0.0f;
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
-            if (CRT_HAS(DIFFUSE)) return b->reflectance * crt_lambert_pdf(b, wi);
+            if (CRT_HAS(DIFFUSE)) {
+                const f32 lambert = crt_lambert_pdf(b, wi);
+                *pdf = lambert;
+                return b->reflectance * lambert;
+            }
             break;
         case CRT_MATERIAL_ROUGH_CONDUCTOR:
-            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u) {
-                f32 unused;
-                return crt_rough_conductor(b, wi, &unused);
-            }
+            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u)
+                return crt_rough_conductor(b, wi, pdf);
             break;
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
-            if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u) {
-                f32 unused;
-                return crt_rough_dielectric(b, wi, &unused);
-            }
+            if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u)
+                return crt_rough_dielectric(b, wi, pdf);
             break;
         case CRT_MATERIAL_PLASTIC:
-            if (CRT_HAS(PLASTIC)) {
-                f32 unused;
-                return crt_plastic(b, wi, &unused);
-            }
+            if (CRT_HAS(PLASTIC)) return crt_plastic(b, wi, pdf);
             break;
         default: break;
     }
     return splat4(0.0f);
 }
 
-/* Density per steradian with which crt_bsdf_sample finds w_i; 0 for deltas. */
+CRT_FN vec4 crt_bsdf_eval(const CrtBsdf *b, vec3 wi) {
+    f32 unused;
+    return crt_bsdf(b, wi, &unused);
+}
+
 CRT_FN f32 crt_bsdf_pdf(const CrtBsdf *b, vec3 wi) {
-    switch (b->type) {
-        case CRT_MATERIAL_DIFFUSE:
-            if (CRT_HAS(DIFFUSE)) return crt_lambert_pdf(b, wi);
-            break;
-        case CRT_MATERIAL_ROUGH_CONDUCTOR:
-            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u) {
-                f32 pdf;
-                (void)crt_rough_conductor(b, wi, &pdf);
-                return pdf;
-            }
-            break;
-        case CRT_MATERIAL_ROUGH_DIELECTRIC:
-            if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u) {
-                f32 pdf;
-                (void)crt_rough_dielectric(b, wi, &pdf);
-                return pdf;
-            }
-            break;
-        case CRT_MATERIAL_PLASTIC:
-            if (CRT_HAS(PLASTIC)) {
-                f32 pdf;
-                (void)crt_plastic(b, wi, &pdf);
-                return pdf;
-            }
-            break;
-        default: break;
-    }
-    return 0.0f;
+    f32 pdf;
+    (void)crt_bsdf(b, wi, &pdf);
+    return pdf;
 }
 
 CRT_KERNEL_END

@@ -20,32 +20,39 @@ CRT_FN void crt_layered_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurf
     if (CRT_HAS(FUZZ)) crt_prepare_fuzz(ctx, b, surface, position, albedo);
 }
 
+/* Of `below`, the value of what lies under the fuzz, and *pdf, its density: those of both. */
+CRT_FN vec4 crt_add_fuzz(const CrtBsdf *b, vec3 wi, vec4 below, f32 *pdf) {
+    f32 pdf_fuzz;
+    const vec4 fuzz = crt_fuzz(b, wi, &pdf_fuzz);
+    *pdf = (1.0f - b->fuzz_chance) * *pdf + b->fuzz_chance * pdf_fuzz;
+    return below * (1.0f - b->fuzz_albedo) + fuzz;
+}
+
 CRT_FN vec4 crt_layered_eval(const CrtBsdf *b, vec3 wi) {
-    const vec4 below = crt_bsdf_eval(b, wi);
-    if (!crt_is_fuzzy(b)) return below;
-    f32 unused;
-    return below * (1.0f - b->fuzz_albedo) + crt_fuzz(b, wi, &unused);
+    f32 pdf;
+    const vec4 below = crt_bsdf(b, wi, &pdf);
+    return crt_is_fuzzy(b) ? crt_add_fuzz(b, wi, below, &pdf) : below;
 }
 
 CRT_FN f32 crt_layered_pdf(const CrtBsdf *b, vec3 wi) {
-    const f32 below = crt_bsdf_pdf(b, wi);
-    if (!crt_is_fuzzy(b)) return below;
     f32 pdf;
-    (void)crt_fuzz(b, wi, &pdf);
-    return (1.0f - b->fuzz_chance) * below + b->fuzz_chance * pdf;
+    const vec4 below = crt_bsdf(b, wi, &pdf);
+    if (crt_is_fuzzy(b)) (void)crt_add_fuzz(b, wi, below, &pdf);
+    return pdf;
 }
 
 /* The fuzz or what lies below it by chance, for which u.x is used twice; but for single directions, weighed
    by the density of both. */
 CRT_FN CrtScatter crt_layered_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero,
                                      int alone) {
-    if (!crt_is_fuzzy(b)) return crt_bsdf_sample(b, u, choice, hero, alone);
-    const f32 chance = b->fuzz_chance;
-    const int of_fuzz = u.x < chance;
-    u.x = crt_min(of_fuzz ? u.x / chance : (u.x - chance) / (1.0f - chance), 1.0f - CRT_EPSILON);
+    const int fuzzy = crt_is_fuzzy(b);
+    const f32 chance = fuzzy ? b->fuzz_chance : 0.0f;
+    const int of_fuzz = fuzzy && u.x < chance;
+    if (fuzzy)
+        u.x = crt_min(of_fuzz ? u.x / chance : (u.x - chance) / (1.0f - chance), 1.0f - CRT_EPSILON);
     CrtScatter s;
     vec4 below;
-    f32 pdf_below, pdf;
+    f32 pdf;
     if (of_fuzz) {
         s = crt_no_scatter();
         s.wi = crt_fuzz_direction(b, u);
@@ -55,22 +62,21 @@ CRT_FN CrtScatter crt_layered_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 
             s.valid = CRT_HAS(SMOOTH_NORMALS);
             return crt_turned_up(b, s);
         }
-        below = crt_bsdf_eval(b, s.wi);
-        pdf_below = crt_bsdf_pdf(b, s.wi);
+        below = crt_bsdf(b, s.wi, &pdf);
     } else {
         s = crt_bsdf_sample(b, u, choice, hero, alone);
-        if (!s.valid) return s;
+        if (!fuzzy || !s.valid) return s;
         if (s.pdf == 0.0f) {
             s.weight = s.weight * ((1.0f - b->fuzz_albedo) / (1.0f - chance));
             return s;
         }
         below = s.weight * s.pdf;
-        pdf_below = s.pdf;
+        pdf = s.pdf;
     }
-    const vec4 fuzz = crt_fuzz(b, s.wi, &pdf);
-    s.pdf = (1.0f - chance) * pdf_below + chance * pdf;
+    const vec4 both = crt_add_fuzz(b, s.wi, below, &pdf);
+    s.pdf = pdf;
     s.valid = s.pdf > 0.0f;
-    if (s.valid) s.weight = (below * (1.0f - b->fuzz_albedo) + fuzz) / s.pdf;
+    if (s.valid) s.weight = both / s.pdf;
     return s;
 }
 

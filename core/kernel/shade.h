@@ -235,11 +235,12 @@ CRT_FN CrtOffer crt_offer(const CrtContext *ctx, CrtSampler *sampler, u32 dimens
    area (crt_add_emission): of a ray scattered at the shadow ray's origin pdf·|n·d|/|d|³, of light
    sampling pdf·cos/distance². */
 CRT_FN f32 crt_offer_ratio(const CrtOffer *offer, const CrtBsdf *bsdf, CrtRay ray) {
-    if (!offer->area) return crt_surface_pdf(bsdf, offer->wi) / offer->pdf;
     const f32 squared = dot3(ray.d, ray.d);
-    const vec3 towards = ray.d * (1.0f / crt_sqrt(squared));
-    return crt_surface_pdf(bsdf, towards) * crt_abs(dot3(offer->normal, towards)) * offer->distance *
-           offer->distance / (offer->pdf * offer->cosine * squared);
+    const vec3 towards = offer->area ? ray.d * (1.0f / crt_sqrt(squared)) : offer->wi;
+    const f32 pdf = crt_surface_pdf(bsdf, towards);
+    if (!offer->area) return pdf / offer->pdf;
+    return pdf * crt_abs(dot3(offer->normal, towards)) * offer->distance * offer->distance /
+           (offer->pdf * offer->cosine * squared);
 }
 
 /* Next event estimation: a light, and a ray towards it. */

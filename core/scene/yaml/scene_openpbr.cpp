@@ -53,7 +53,7 @@ struct ObjectReader::OpenPbr {
     double base_weight = 1, diffuse_roughness = 0;
     Spectrum base_color = constantSpectrum(0.8), specular_color = constantSpectrum(1);
     TextureIndex base_texture = kNoTexture;
-    Weight metalness, transmission, roughness{0.3};
+    Weight metalness{}, transmission{}, roughness{0.3};
     double specular_weight = 1, ior = 1.5;
     Spectrum transmission_color = constantSpectrum(1);
     double transmission_depth = 0, dispersion_scale = 0, abbe = 20;
