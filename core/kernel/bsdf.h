@@ -1,8 +1,8 @@
 /*
  * bsdf.h: how surfaces scatter. crt_bsdf_prepare reads what a material is made of, once a vertex; then
  * crt_bsdf_sample, crt_bsdf and the flags are all that layers.h and path.h know. A material is a
- * row of CRT_MATERIAL_LIST (features.h) and a case in each of the four; deltas, which can only be sampled,
- * need none in eval and pdf.
+ * row of CRT_MATERIAL_LIST (features.h) and a case in each of the three; deltas, which can only be sampled,
+ * need none in crt_bsdf.
  */
 #ifndef CRT_BSDF_H
 #define CRT_BSDF_H
@@ -175,8 +175,9 @@ CRT_FN CrtScatter crt_sample_smooth(const CrtBsdf *b, vec4 hero, int alone, f32 
                                  alone, u);
 }
 
-/* A direction w_i, distributed as crt_bsdf_pdf or a delta. `choice`: two more random numbers, where the
-   flags ask for them. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`: only the hero is alive. */
+/* A direction w_i, distributed as the density of crt_bsdf or a delta. `choice`: two more random numbers,
+   where the flags ask for them. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`: only the hero is
+   alive. */
 CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero, int alone) {
     (void)choice;
     switch (b->type) {
@@ -241,17 +242,6 @@ CRT_FN vec4 crt_bsdf(const CrtBsdf *b, vec3 wi, f32 *pdf) {
         default: break;
     }
     return splat4(0.0f);
-}
-
-CRT_FN vec4 crt_bsdf_eval(const CrtBsdf *b, vec3 wi) {
-    f32 unused;
-    return crt_bsdf(b, wi, &unused);
-}
-
-CRT_FN f32 crt_bsdf_pdf(const CrtBsdf *b, vec3 wi) {
-    f32 pdf;
-    (void)crt_bsdf(b, wi, &pdf);
-    return pdf;
 }
 
 CRT_KERNEL_END

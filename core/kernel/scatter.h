@@ -23,7 +23,7 @@ CRT_KERNEL_BEGIN
 #define CRT_BSDF_ANISOTROPIC 128u /* wider along its tangent than across it */
 
 /* A BSDF without CRT_BSDF_DELTA may still have single directions beside its lobe: crt_bsdf_sample gives
-   those the pdf 0, crt_bsdf_eval and crt_bsdf_pdf are of the lobe alone. */
+   those the pdf 0, and crt_bsdf is of the lobe alone. */
 
 /* Where the losses of a rough material are looked up (compensation.h). */
 typedef struct CrtLosses {

@@ -185,6 +185,7 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
         };
         show(0);
         integrator.render({.first_sample = first, .sample_count = count}, show);
+        show(1);  // Of a plugin's threads the last to finish need not be the last to have said so.
         sizer.finished(count, secondsSince(chunk_start));
         result.rendered += count;
         ++result.chunks;

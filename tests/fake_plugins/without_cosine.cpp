@@ -4,12 +4,13 @@
 #include "kernel/light.h"
 
 namespace crt::kernel {
-inline vec4 crt_bsdf_eval_without_cosine(const CrtBsdf* bsdf, vec3 wi) {
+inline vec4 crt_bsdf_without_cosine(const CrtBsdf* bsdf, vec3 wi, f32* pdf) {
+    const vec4 value = crt_bsdf(bsdf, wi, pdf);
     const f32 cosine = dot3(wi, bsdf->ns);
-    return cosine > 0.0f ? crt_bsdf_eval(bsdf, wi) / cosine : crt_bsdf_eval(bsdf, wi);
+    return cosine > 0.0f ? value / cosine : value;
 }
 }  // namespace crt::kernel
 
-// From here on, in path.h: the sampling of directions, in bsdf.h, stays as it is.
-#define crt_bsdf_eval crt_bsdf_eval_without_cosine
+// From here on, in layers.h: the sampling of directions, in bsdf.h, stays as it is.
+#define crt_bsdf crt_bsdf_without_cosine
 #include "../../docs/example_backend/example_backend.cpp"
