@@ -48,8 +48,7 @@ CRT_FN CrtScatter crt_layered_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 
     const int fuzzy = crt_is_fuzzy(b);
     const f32 chance = fuzzy ? b->fuzz_chance : 0.0f;
     const int of_fuzz = fuzzy && u.x < chance;
-    if (fuzzy)
-        u.x = crt_min(of_fuzz ? u.x / chance : (u.x - chance) / (1.0f - chance), 1.0f - CRT_EPSILON);
+    if (fuzzy) u.x = crt_rescaled(u.x, chance);
     CrtScatter s;
     vec4 below;
     f32 pdf;

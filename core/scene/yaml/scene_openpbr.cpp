@@ -35,12 +35,6 @@ Spectrum dispersed(double ior, double abbe) {
     return cauchyIndex({ior - b / (d_um * d_um), b});
 }
 
-Spectrum scaled(Spectrum spectrum, double factor) {
-    if (spectrum.isConstant()) return constantSpectrum(spectrum[0] * factor);
-    for (double& value : spectrum.values) value *= factor;
-    return spectrum;
-}
-
 bool isWhite(const Spectrum& s) { return s.min() == 1 && s.max() == 1; }
 
 }  // namespace

@@ -11,12 +11,12 @@
 #include <cmath>
 
 namespace crt {
-namespace {
-
 Spectrum scaled(Spectrum spectrum, double factor) {
     for (double& value : spectrum.values) value *= factor;
     return spectrum;
 }
+
+namespace {
 
 /// The wavelength where a spectrum is worst: first where it is not finite, else farthest outside `range`.
 std::optional<std::size_t> worstWavelength(const Spectrum& spectrum, const ValueRange& range) {
