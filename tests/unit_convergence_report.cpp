@@ -12,6 +12,7 @@
 #include "judge/converge/svg_plot.h"
 #include "base/temporary_folder.h"
 #include "file_bytes.h"
+#include "hostile_numbers.h"
 #include "synthetic_run.h"
 
 #include <fmt/format.h>
@@ -282,6 +283,17 @@ TEST_CASE("a torn last line is left out, and cut off before the next row", "[con
     CHECK(sameRow(read[1], rows[1]));
     spit(path, whole + "{\"scene\":1}\n");
     CHECK_THROWS_WITH(readResults(path), Contains("not a row"));
+}
+
+TEST_CASE("a number of a row is read as it stands, or refused", "[converge]") {
+    const TemporaryFolder folder;
+    { ResultsLog(folder / "whole.jsonl").append(fewRows()[0]); }
+    requireNumbersReadOrRefused(slurp(folder / "whole.jsonl"), [&](const std::string& text) {
+        spit(folder / "hostile.jsonl", text + '\n');
+        std::filesystem::remove(folder / "again.jsonl");
+        { ResultsLog(folder / "again.jsonl").append(readResults(folder / "hostile.jsonl").at(0)); }
+        return slurp(folder / "again.jsonl");
+    });
 }
 
 TEST_CASE("numbers that are none survive as null, and void their row", "[converge]") {

@@ -4,6 +4,7 @@
 #include "film/checkpoint.h"
 #include "film/film_record.h"
 #include "film/resolve.h"
+#include "hostile_numbers.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
 #include "render/light_checks.h"
@@ -89,6 +90,13 @@ TEST_CASE("a record comes back from its text with every bit", "[develop]") {
     CHECK(back.independent_samples == record.independent_samples);
     CHECK(readRecord(recordText(recordOf(parsed({{"sampler.type", "independent"}})))).independent_samples);
     CHECK(recordText(back) == recordText(record));
+}
+
+TEST_CASE("a number of a record is read as it stands, or refused", "[develop]") {
+    Scene scene = parsed();
+    scene.film.spectral.bins = {400, 700, 30};
+    requireNumbersReadOrRefused(recordText(recordOf(scene)),
+                                [](const std::string& text) { return recordText(readRecord(text)); });
 }
 
 TEST_CASE("a text that is no record is refused, whatever of it is missing or wrong", "[develop]") {

@@ -2,6 +2,7 @@
 #include "film/film_record.h"
 
 #include "base/error.h"
+#include "base/json_integer.h"
 #include "base/vec3d.h"
 #include "base/words.h"
 #include "scene/aov.h"
@@ -17,6 +18,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <ctime>
+#include <limits>
 #include <memory>
 #include <new>
 #include <set>
@@ -27,7 +29,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kRecordVersion = 1;
+constexpr std::uint64_t kRecordVersion = 1;
 constexpr int kSideMax = 65535;  // Of a film, as scene files have it.
 
 // ---- Camera ---------------------------------------------------------------------------------------------
@@ -314,7 +316,7 @@ SpectralChannels spectralFrom(const Json& json) {
     SpectralChannels channels;
     channels.bins = {inRange(json.at("from_nm"), 0, kWavelengthMax_nm),
                      inRange(json.at("to_nm"), 0, kWavelengthMax_nm),
-                     static_cast<std::uint32_t>(inRange(json.at("bins"), 0, kMostSpectralBins))};
+                     static_cast<std::uint32_t>(wholeNumber(json.at("bins"), kMostSpectralBins))};
     channels.responses = json.at("responses").get<std::vector<std::string>>();
     if (!areSpectralBins(channels.bins) || channels.responses.size() > kMostSensorResponses ||
         !std::all_of(channels.responses.begin(), channels.responses.end(), isResponseName))
@@ -344,14 +346,23 @@ std::string joinNames(const std::string& a, const std::string& b) {
     return fmt::format("{}", fmt::join(names, kBetween));
 }
 
+/// Of a film's sides and of corners in it.
+int pixelsFrom(const Json& json) {
+    return static_cast<int>(wholeNumber(json, std::numeric_limits<int>::max()));
+}
+
 FilmRecord recordFrom(const Json& json) {
+    if (const std::uint64_t version = wholeNumber(json.at("record")); version != kRecordVersion)
+        throw Error(ErrorKind::Usage, fmt::format("has a record of version {}, and this crt reads {}",
+                                                  version, kRecordVersion));
     FilmRecord record;
     record.title = json.at("title").get<std::string>();
-    record.seed = json.at("seed").get<std::uint64_t>();
+    record.seed = wholeNumber(json.at("seed"));
     record.independent_samples = json.at("independent_samples").get<bool>();
-    record.width = json.at("resolution").at(0).get<int>();
-    record.height = json.at("resolution").at(1).get<int>();
-    record.window = json.at("window").get<std::array<int, 4>>();
+    record.width = pixelsFrom(json.at("resolution").at(0));
+    record.height = pixelsFrom(json.at("resolution").at(1));
+    for (std::size_t i = 0; i < record.window.size(); ++i)
+        record.window[i] = pixelsFrom(json.at("window").at(i));
     for (const Json& name : json.at("aovs")) record.aovs |= aovNamed(name.get<std::string>());
     if (json.contains("spectral")) record.spectral = spectralFrom(json.at("spectral"));
     record.development = developmentFrom(json.at("development"));
@@ -372,7 +383,7 @@ FilmRecord recordFrom(const Json& json) {
                                  record.width,
                                 record.height, kSideMax));
     const auto& [x0, y0, x1, y1] = record.window;
-    if (x0 < 0 || y0 < 0 || x0 >= x1 || y0 >= y1 || x1 > record.width || y1 > record.height)
+    if (x0 >= x1 || y0 >= y1 || x1 > record.width || y1 > record.height)
         throw Error(ErrorKind::Usage, "has a window that is none of its film");
     return record;
 }

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/input_file.h"
+#include "base/json_integer.h"
 #include "judge/converge/json_parts.h"
 
 #include <fmt/format.h>
@@ -102,15 +103,16 @@ Row rowOf(const Json& json) {
     Row row;
     row.key = {json.at("scene").get<std::string>(), json.at("backend").get<std::string>(),
                json.at("variant").get<std::string>()};
-    row.seed = json.at("seed").get<std::uint64_t>();
-    row.replicate = json.at("replicate").get<std::uint32_t>();
-    row.samples = json.at("samples_per_pixel").get<std::uint64_t>();
+    row.seed = wholeNumber(json.at("seed"));
+    row.replicate = static_cast<std::uint32_t>(
+        wholeNumber(json.at("replicate"), std::numeric_limits<std::uint32_t>::max()));
+    row.samples = wholeNumber(json.at("samples_per_pixel"));
     row.render_wall_seconds = numberIn(json.at("render_wall_seconds"));
     row.render_device_seconds = knownNumberIn(json.at("render_device_seconds"));
     row.seconds_before_first_sample = numberIn(json.at("seconds_before_first_sample"));
-    row.paths = json.at("paths").get<std::uint64_t>();
-    row.closest_rays = json.at("closest_rays").get<std::uint64_t>();
-    row.shadow_rays = json.at("shadow_rays").get<std::uint64_t>();
+    row.paths = wholeNumber(json.at("paths"));
+    row.closest_rays = wholeNumber(json.at("closest_rays"));
+    row.shadow_rays = wholeNumber(json.at("shadow_rays"));
     if (const Json& error = json.at("error"); !error.is_null()) row.error = errorOf(error);
     for (const Json& mse : json.at("fold_mse")) row.fold_mse.push_back(numberIn(mse));
     row.between_replicates_mse = knownNumberIn(json.at("between_replicates_mse"));
@@ -122,7 +124,7 @@ Row rowOf(const Json& json) {
     row.image_mean = numbersIn(json.at("image_mean"));
     if (const Json& error = json.at("image_mean_standard_error"); !error.is_null())
         row.image_mean_standard_error = numbersIn(error);
-    row.invalid_samples = json.at("invalid_samples").get<std::uint64_t>();
+    row.invalid_samples = wholeNumber(json.at("invalid_samples"));
     row.cpu_clock_mhz = knownNumberIn(json.at("cpu_clock_mhz"));
     row.load_average = knownNumberIn(json.at("load_average"));
     row.stop_reason = json.at("stop_reason").get<std::string>();
@@ -270,6 +272,13 @@ std::vector<Row> readResults(const std::string& path) {
     for (std::string line; std::getline(file, line);) {
         ++line_number;
         if (file.eof()) break;  // No end of line: torn.
+        const auto refuse = [&](const char* why) {
+            throw Error(ErrorKind::Usage,
+                        fmt::format("this line is not a row of 'crt converge' ({}); remove it, or write to "
+                                    "a new folder",
+                                    why),
+                        {path, line_number});
+        };
         try {
             Row row = rowOf(Json::parse(line));
             const auto [found, is_new] =
@@ -279,12 +288,9 @@ std::vector<Row> readResults(const std::string& path) {
             else
                 rows[found->second] = std::move(row);
         } catch (const nlohmann::json::exception& e) {
-            throw Error(
-                ErrorKind::Usage,
-                fmt::format(
-                    "this line is not a row of 'crt converge' ({}); remove it, or write to a new folder",
-                    e.what()),
-                {path, line_number});
+            refuse(e.what());
+        } catch (const Error& e) {
+            refuse(e.what());
         }
     }
     if (file.bad() || !file.eof())
