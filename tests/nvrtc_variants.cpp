@@ -22,6 +22,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace {
@@ -80,9 +81,12 @@ std::map<std::uint64_t, std::string> representativeMasks() {
     };
 }
 
-/// Of the last number of blocks that is tried, which the backend does not judge: openpbr's scene with every
-/// lobe and AOVs spills 176. An array of a vertex's, which does not belong into memory, has more.
-constexpr std::uint32_t kMostSpillBytes = 192;
+/// What the backend allows; the last number of blocks that it tries it takes as it is. There openpbr's
+/// scene, with every lobe and AOVs, spills 176: it alone may. An array of a vertex's, which does not belong
+/// into memory, has more.
+std::uint32_t mostSpillBytes(std::string_view variant) {
+    return variant.ends_with("openpbr.yaml") ? 192 : crt::cuda::kSpillBytesAllowed;
+}
 
 int run(int argc, char** argv) {
     int arch = 90;
@@ -129,10 +133,10 @@ int run(int argc, char** argv) {
         // An entry that is not in the log would pass for one that spills nothing.
         if (use.registers == 0)
             std::printf("FAILED: the assembler's log says nothing of crt_render:\n%s\n", cubin.log.c_str());
-        const bool spills = use.spill_bytes > kMostSpillBytes;
+        const std::uint32_t allowed = mostSpillBytes(name);
+        const bool spills = use.spill_bytes > allowed;
         if (spills)
-            std::printf("FAILED: %u bytes are spilled, and %u are allowed\n", use.spill_bytes,
-                        kMostSpillBytes);
+            std::printf("FAILED: %u bytes are spilled, and %u are allowed\n", use.spill_bytes, allowed);
         // The only array that a thread may keep in memory is the BVH's traversal stack. Spilled values are
         // there, too, and each is stored and loaded at least once.
         const bool array = (mask & CRT_FEATURE_BVH) == 0 && use.stack_bytes > use.spill_bytes;

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <string>
 
 namespace crt {
 
@@ -19,7 +20,8 @@ std::uint64_t wholeNumber(const Json& json,
     const auto* const value = json.template get_ptr<const typename Json::number_unsigned_t*>();
     if (value == nullptr || *value > most)
         throw Error(ErrorKind::Usage,
-                    fmt::format("has {} for a whole number from 0 to {}", json.dump(), most));
+                    fmt::format("has {} for a whole number from 0 to {}",
+                                json.is_number() ? json.dump() : json.type_name(), most));
     return *value;
 }
 
