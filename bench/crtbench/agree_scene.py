@@ -237,6 +237,32 @@ def write_shape(mesh, path):
     return {"type": "ply", "filename": str(path), "face_normals": True}
 
 
+def to_world(steps):
+    """One step after the other."""
+    made = mi.ScalarTransform4f()
+    for step in steps:
+        refuse_all_but("a step of a transform", step, {"scale", "rotate", "translate"})
+        if "scale" in step:
+            made = mi.ScalarTransform4f().scale(step["scale"]) @ made
+        elif "rotate" in step:
+            turn = step["rotate"]
+            made = mi.ScalarTransform4f().rotate(turn["axis"], turn["angle_deg"]) @ made
+        else:
+            made = mi.ScalarTransform4f().translate(step["translate"]) @ made
+    return made
+
+
+def loaded_shape(thing, meshes):
+    """An OBJ file with its own normals."""
+    if meshes is None:
+        raise Failure("an object of an OBJ file cannot be translated for Mitsuba here")
+    return {
+        "type": "obj",
+        "filename": str(meshes / thing["obj"]),
+        "to_world": to_world(thing.get("transform", [])),
+    }
+
+
 def environment_image(file):
     """Its name, if the scene has one."""
     return (scene_file.load(file).get("environment") or {}).get("image")
@@ -342,9 +368,9 @@ def film_of(given, band):
     return made | {"type": "specfilm", "band": table(band.nm, band.answer)}
 
 
-def translate(file, folder, samples, band=None):
+def translate(file, folder, samples, band=None, meshes=None):
     """The dictionary that mi.load_dict takes. Meshes go to `folder`, where images are. `band`: of a spectral
-    film, the one that is rendered."""
+    film, the one that is rendered. `meshes`: where OBJ files are, if objects may be such."""
     given = scene_file.load(file)
     known = "crt title camera film integrator sampler materials objects lights environment"
     refuse_all_but("the scene", given, known.split())
@@ -373,8 +399,12 @@ def translate(file, folder, samples, band=None):
     for number, thing in enumerate(given.get("lights", [])):
         made[f"light{number}"] = light(thing)
     for number, thing in enumerate(given["objects"]):
-        refuse_all_but("an object", thing, {"name", "mesh", "material", "emission"})
-        part = write_shape(thing["mesh"], folder / f"{number}.ply")
+        if "obj" in thing:
+            refuse_all_but("an object", thing, {"name", "obj", "transform", "material"})
+            part = loaded_shape(thing, meshes)
+        else:
+            refuse_all_but("an object", thing, {"name", "mesh", "material", "emission"})
+            part = write_shape(thing["mesh"], folder / f"{number}.ply")
         part["bsdf"] = material(given["materials"][thing["material"]], folder, given["materials"])
         if "emission" in thing:
             refuse_all_but("an emission", thing["emission"], {"radiance"})

@@ -1,0 +1,64 @@
+"""How long do crt and Mitsuba 3 take to an error of 1 %? Scenes of bench/scenes/race, translated as for
+bench/agree, are rendered by both in turn with growing numbers of samples until the error of the image is
+below the target; the time between the last two numbers is interpolated, never extrapolated. Times are those
+of rendering alone: scenes are loaded and kernels compiled before.
+
+The error is the root of the mean over pixels and renders of the squared difference in luminance from the
+program's own converged image, over the mean luminance; the variance of that image is taken off. Each program
+is measured against itself, so that differences between the models cost nobody.
+
+Needs a Python with mitsuba, numpy and PyYAML (--python), and an LLVM for Mitsuba's llvm variant."""
+
+from .command import exit_code, program_for
+from .peer_environment import mitsuba_parser, under_mitsuba
+
+
+def main():
+    parser = mitsuba_parser("bench/race", __doc__, busy="the page marks the run")
+    parser.add_argument(
+        "--backends",
+        nargs="+",
+        default=["embree", "opencl"],
+        help="of crt; each is a contestant (embree opencl)",
+    )
+    parser.add_argument(
+        "--replicates",
+        nargs="+",
+        type=int,
+        default=[2, 1],
+        help="of crt's sampler; each is a contestant (2 1)",
+    )
+    parser.add_argument(
+        "--variants",
+        nargs="+",
+        default=["llvm_ad_spectral"],
+        help="of Mitsuba, spectral ones (llvm_ad_spectral; cuda_ad_spectral with a GPU)",
+    )
+    parser.add_argument(
+        "--samplers",
+        nargs="+",
+        default=["independent", "multijitter", "ldsampler"],
+        help="of Mitsuba; each is a contestant (independent multijitter ldsampler)",
+    )
+    parser.add_argument("--size", type=int, default=96, help="of the images, in pixels a side (96)")
+    parser.add_argument("--renders", type=int, default=4, help="with seeds of their own a point (4)")
+    parser.add_argument("--target", type=float, default=0.01, help="error to reach, of the mean (0.01)")
+    parser.add_argument(
+        "--most", type=int, default=16384, help="samples a pixel after which a contestant gives up (16384)"
+    )
+    parser.add_argument(
+        "--reference-samples",
+        type=int,
+        default=1024,
+        help="of each of the eight renders of a converged image (1024)",
+    )
+    parser.add_argument("--name", default="race", help="of the page in --results (race)")
+    parser.add_argument("--scenes", nargs="*", help="only these, by name without .yaml")
+    arguments = parser.parse_args()
+
+    def measure():
+        under_mitsuba("race", arguments.python)
+        from . import race  # Needs what only the right Python has.
+        return race.measure(program_for(arguments), arguments)
+
+    return exit_code("bench/race", arguments, measure)
