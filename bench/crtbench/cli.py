@@ -73,6 +73,10 @@ def main():
             )
         if name in ("calibration", "figure2", "stability"):
             command.add_argument("--rows", help="measurements made on another machine, JSON Lines")
+        if name == "leave-out":
+            command.add_argument(
+                "--quick", action="store_true", help="three runs, and no registers from NVRTC"
+            )
         if name == "meshes":
             command.add_argument("folders", nargs="+", type=pathlib.Path, metavar="FOLDER",
                                  help="looked through for *.obj; named REPOSITORY@COMMIT")

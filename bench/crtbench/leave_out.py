@@ -18,10 +18,14 @@ def gain(more, lean):
 def measure(program, arguments):
     size = 32 if arguments.tiny else 400
     spp = {"cornell_box": 16, "cornell_dragon": 8, "cornell_glass": 8}
-    runs = 2 if arguments.tiny else 5
+    runs = 2 if arguments.tiny else 3 if arguments.quick else 5
     scenes = [s for s in SCENES if not arguments.scenes or s in arguments.scenes]
-    settings = [f"film.resolution=[{size},{size}]", NO_AOVS]
     usable, absent = program.backends(["cuda", "opencl", "embree"])
+    # By which features are timed one by one: a GPU where there is one, with an image that fills it.
+    timed = "cuda" if "cuda" in usable else "opencl"
+    if timed == "cuda" and not arguments.tiny:
+        size, spp = 1440, {scene: 64 for scene in SCENES}
+    settings = [f"film.resolution=[{size},{size}]", NO_AOVS]
     results = Results(program, arguments, "leave-out", "What leaving out saves")
     data = {"scenes": {}}
     masks = {scene: scene_mask(program, scene) for scene in scenes}
@@ -90,7 +94,7 @@ def measure(program, arguments):
 
     # Registers.
     results.heading("CUDA kernels: registers and sizes")
-    compiler, base = variants(program, scenes)
+    compiler, base = ("left out (--quick)", None) if arguments.quick else variants(program, scenes)
     if base is None:
         results.paragraph(f"Not measured: {compiler}.")
     else:
@@ -118,7 +122,7 @@ def measure(program, arguments):
     results.heading("Each feature alone")
     results.paragraph(
         "The scene's own kernel with one feature more that the scene does not use: what every feature would "
-        "cost those who do not need it. OpenCL: render "
+        f"cost those who do not need it. `{timed}`: render "
         f"seconds with the feature : without, median of {runs} interleaved runs, run by run, in brackets "
         f"the "
         f"least and the most. CUDA with "
@@ -137,11 +141,11 @@ def measure(program, arguments):
             if masks[scene] & 1 << bit:
                 entry["scenes"][scene] = None  # The scene needs it.
                 continue
-            if "opencl" in usable:
+            if timed in usable:
                 kept = program.interleaved(
                     {
-                        "lean": lambda: render(scene, "opencl"),
-                        "more": lambda: render(scene, "opencl", environment=environment),
+                        "lean": lambda: render(scene, timed),
+                        "more": lambda: render(scene, timed, environment=environment),
                     },
                     runs,
                 )
@@ -172,7 +176,7 @@ def measure(program, arguments):
 
 
 def scene_mask(program, scene):
-    run = program.render(scene, "opencl", ["--spp", 1], settings=["film.resolution=[8,8]", NO_AOVS])
+    run = program.render(scene, "auto", ["--spp", 1], settings=["film.resolution=[8,8]", NO_AOVS])
     return int(run.value("features", "mask"), 16)
 
 
