@@ -152,7 +152,7 @@ TEST_CASE("opacity: a shadow ray goes on to where it went", "[composition]") {
         ray.o = surface.p + (surface.p - end) * static_cast<f32>(random.uniform(0.1, 3));
         ray.d = end - ray.o;
         ray.reach = 0.9999f;
-        const CrtRay behind = crt_ray_behind(ray, &surface);
+        const CrtRay behind = crt_ray_behind(ray, surface.p, surface.clearance, surface.ng);
         const vec3 stop = ray.o + ray.d * ray.reach, also = behind.o + behind.d * behind.reach;
         CHECK(behind.o.z < 0);
         CHECK(length(minus(toDouble(stop), toDouble(also))) < 2e-6);
@@ -163,7 +163,7 @@ TEST_CASE("opacity: a shadow ray goes on to where it went", "[composition]") {
     ray.o = surface.p + make_vec3(0, 0, 1);
     ray.d = make_vec3(0, 0, -1 - 0.25f * surface.clearance);
     ray.reach = 1;
-    CHECK(crt_ray_behind(ray, &surface).reach <= 0);
+    CHECK(crt_ray_behind(ray, surface.p, surface.clearance, surface.ng).reach <= 0);
 }
 
 TEST_CASE("mix: what a scene may not say", "[composition][yaml]") {

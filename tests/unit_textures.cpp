@@ -97,8 +97,8 @@ public:
     Color color(double u, double v) const { return color(at(u, v)); }
     static CrtSurface at(double u, double v) {
         CrtSurface surface{};
-        surface.u = static_cast<f32>(u);
-        surface.v = static_cast<f32>(v);
+        surface.at.u = static_cast<f32>(u);
+        surface.at.v = static_cast<f32>(v);
         return surface;
     }
     /// Hit of a triangle.
@@ -290,8 +290,8 @@ TEST_CASE("texture coordinates follow the surface, also where it is mirrored", "
             const double b1 = random.uniform(0.1, 0.4), b2 = random.uniform(0.1, 0.4);
             const CrtSurface s = probe.hit(random.below(2), b1, b2);
             const double x = s.p.x / scale + centre[0], z = s.p.z / scale + centre[2];
-            CHECK(s.u == Approx(x / factor).margin(1e-5));
-            CHECK(s.v == Approx(z / depth).margin(1e-5));
+            CHECK(s.at.u == Approx(x / factor).margin(1e-5));
+            CHECK(s.at.v == Approx(z / depth).margin(1e-5));
         }
     }
 }
@@ -318,7 +318,7 @@ TEST_CASE("colours of vertices, linear in between at every wavelength", "[textur
                                  "color_space: linear,"));
     const Color corner[3] = {{0.8, 0.1, 0.1}, {0.1, 0.8, 0.1}, {0.1, 0.1, 0.8}};
     std::uint32_t slot = 0;
-    if (probe.hit(0, 0.2, 0.2).id != 0) slot = 1;
+    if (probe.hit(0, 0.2, 0.2).at.id != 0) slot = 1;
     Random random(8);
     for (int i = 0; i < 30; ++i) {
         const double b1 = random.uniform(0.05, 0.45), b2 = random.uniform(0.05, 0.45);

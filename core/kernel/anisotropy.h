@@ -21,7 +21,7 @@ CRT_FN int crt_is_anisotropic(const CrtBsdf *b) { return (b->flags & CRT_BSDF_AN
 /* Unit, perpendicular to n, the surface's normal there. */
 CRT_FN vec3 crt_tangent(const CrtContext *ctx, const CrtSurface *surface, vec3 n) {
     if (ctx->scene->uvs.count != 0u) {
-        CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[surface->id].uv;
+        CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[surface->at.id].uv;
         CRT_GLOBAL const CrtTriangle *triangle =
             CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + surface->slot;
         const vec3 o = crt_triangle_vertex(triangle, 0u);

@@ -40,10 +40,11 @@ CRT_FN u32 crt_chosen_material(const CrtContext *ctx, const CrtSurface *surface,
     return material;
 }
 
-/* The ray from behind `surface`, which it passes at p. It ends where `ray` does. */
-CRT_FN CrtRay crt_ray_behind(CrtRay ray, const CrtSurface *surface) {
+/* The ray from behind the surface that it passes at p. It ends where `ray` does. Called: NVIDIA's OpenCL
+   compiler (driver 580.159) never ends where this is inlined into the loop over passed surfaces. */
+CRT_CALLED_FN CrtRay crt_ray_behind(CrtRay ray, vec3 p, f32 clearance, vec3 ng) {
     CrtRay behind = ray;
-    behind.o = crt_offset_origin(surface->p, surface->clearance, surface->ng, ray.d);
+    behind.o = crt_offset_origin(p, clearance, ng, ray.d);
     if (ray.reach < CRT_INFINITY) {
         behind.d = ray.o + ray.d - behind.o;
         const f32 left = dot3(behind.d, ray.d) / dot3(ray.d, ray.d);
@@ -59,7 +60,7 @@ CRT_FN int crt_passes(const CrtContext *ctx, CrtHit hit, CrtSampler *sampler, u3
     if (opacity == CRT_OPAQUE) return 0;
     const CrtSurface surface = crt_surface(ctx, hit);
     if (crt_sample_1d(sampler, dimension) < V4X(crt_value(ctx, opacity, &surface, splat4(0.0f)))) return 0;
-    *ray = crt_ray_behind(*ray, &surface);
+    *ray = crt_ray_behind(*ray, surface.p, surface.clearance, surface.ng);
     return 1;
 }
 

@@ -30,8 +30,8 @@ CRT_FN vec3 crt_mapped_normal(const CrtContext *ctx, const CrtSurface *surface, 
         CRT_ARRAY(CrtTexture, ctx->blob, ctx->scene->textures)[c->normal_map & CRT_VALUE_INDEX];
     CRT_GLOBAL const CrtTriangle *triangle =
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + slot;
-    CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[surface->id].uv;
-    const vec4 texel = crt_image(ctx, &map, surface, splat4(0.0f));
+    CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[surface->at.id].uv;
+    const vec4 texel = crt_image(ctx, &map, &surface->at, splat4(0.0f));
     /* Along the picture's rows to the right, and up its columns. */
     const vec3 o = crt_triangle_vertex(triangle, 0u);
     const vec3 e1 = crt_triangle_vertex(triangle, 1u) - o, e2 = crt_triangle_vertex(triangle, 2u) - o;

@@ -9,6 +9,13 @@
 
 CRT_KERNEL_BEGIN
 
+/* A place on a triangle, as textures are asked for it. */
+typedef struct CrtFacePlace {
+    u32 id;     /* primitive id; for tangents, too */
+    f32 b1, b2; /* barycentrics of the second and third vertex */
+    f32 u, v;   /* texture coordinates; 0 where the mesh has none */
+} CrtFacePlace;
+
 typedef struct CrtSurface {
     vec3 p;
     vec3 ng;       /* unit geometric normal, by the order of the vertices */
@@ -17,9 +24,7 @@ typedef struct CrtSurface {
     u32 material;
     u32 light;     /* CRT_NONE: it does not emit */
     u32 slot;      /* in the triangle array; for tangents only */
-    u32 id;        /* primitive id; for tangents and textures only */
-    f32 b1, b2;    /* barycentrics of the second and third vertex, of p; from here on for textures only */
-    f32 u, v;      /* texture coordinates; 0 where the mesh has none */
+    CrtFacePlace at; /* of p; for tangents and textures only */
 } CrtSurface;
 
 CRT_FN vec3 crt_triangle_vertex(CRT_GLOBAL const CrtTriangle *triangle, u32 i) {
@@ -88,15 +93,15 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     s.material = primitive->material;
     s.light = primitive->light;
     if (CRT_HAS(ANISOTROPY)) s.slot = hit.slot;
-    if (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY)) s.id = hit.id;
+    if (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY)) s.at.id = hit.id;
     if (CRT_HAS(TEXTURE)) {
-        s.b1 = b1;
-        s.b2 = b2;
-        s.u = s.v = 0.0f;
+        s.at.b1 = b1;
+        s.at.b2 = b2;
+        s.at.u = s.at.v = 0.0f;
         if (ctx->scene->uvs.count != 0u) {
             CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[hit.id].uv;
-            s.u = crt_fma(uv[0], b0, crt_fma(uv[1], b1, uv[2] * b2));
-            s.v = crt_fma(uv[3], b0, crt_fma(uv[4], b1, uv[5] * b2));
+            s.at.u = crt_fma(uv[0], b0, crt_fma(uv[1], b1, uv[2] * b2));
+            s.at.v = crt_fma(uv[3], b0, crt_fma(uv[4], b1, uv[5] * b2));
         }
     }
     if (CRT_HAS(SMOOTH_NORMALS) && primitive->normals != CRT_NONE) {

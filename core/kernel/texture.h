@@ -77,18 +77,18 @@ typedef struct CrtTexturePlace {
     f32 s, t;
 } CrtTexturePlace;
 
-CRT_FN CrtTexturePlace crt_texture_place(const CrtTexture *texture, const CrtSurface *surface) {
+CRT_FN CrtTexturePlace crt_texture_place(const CrtTexture *texture, const CrtFacePlace *at) {
     CrtTexturePlace place;
-    place.s = crt_fma(texture->from_uv[0], surface->u,
-                      crt_fma(texture->from_uv[1], surface->v, texture->from_uv[2]));
-    place.t = crt_fma(texture->from_uv[3], surface->u,
-                      crt_fma(texture->from_uv[4], surface->v, texture->from_uv[5]));
+    place.s = crt_fma(texture->from_uv[0], at->u,
+                      crt_fma(texture->from_uv[1], at->v, texture->from_uv[2]));
+    place.t = crt_fma(texture->from_uv[3], at->u,
+                      crt_fma(texture->from_uv[4], at->v, texture->from_uv[5]));
     return place;
 }
 
-CRT_FN vec4 crt_image(const CrtContext *ctx, const CrtTexture *texture, const CrtSurface *surface,
+CRT_FN vec4 crt_image(const CrtContext *ctx, const CrtTexture *texture, const CrtFacePlace *at,
                       vec4 position) {
-    const CrtTexturePlace place = crt_texture_place(texture, surface);
+    const CrtTexturePlace place = crt_texture_place(texture, at);
     const CrtTexelPair x = crt_texel_pair(place.s, texture->width, texture->wrap, texture->nearest);
     const CrtTexelPair y = crt_texel_pair(place.t, texture->height, texture->wrap, texture->nearest);
     const vec4 upper_left = crt_texel(ctx, texture, x.first, y.first, position);
@@ -101,37 +101,39 @@ CRT_FN vec4 crt_image(const CrtContext *ctx, const CrtTexture *texture, const Cr
 }
 
 /* The value of the square: those whose numbers add up to something even, counted from that at (0, 0). */
-CRT_FN CrtValue crt_checker(const CrtTexture *texture, const CrtSurface *surface) {
-    const CrtTexturePlace place = crt_texture_place(texture, surface);
+CRT_FN CrtValue crt_checker(const CrtTexture *texture, const CrtFacePlace *at) {
+    const CrtTexturePlace place = crt_texture_place(texture, at);
     const f32 half_sum = 0.5f * (crt_floor(place.s) + crt_floor(place.t));
     return crt_floor(half_sum) == half_sum ? texture->even : texture->odd;
 }
 
-CRT_FN vec4 crt_vertex_color(const CrtContext *ctx, const CrtSurface *surface, vec4 position) {
+CRT_FN vec4 crt_vertex_color(const CrtContext *ctx, const CrtFacePlace *at, vec4 position) {
     CRT_GLOBAL const f32 *c =
-        CRT_ARRAY(CrtVertexColors, ctx->blob, ctx->scene->vertex_colors)[surface->id].c;
-    return crt_sigmoid(c[0], c[1], c[2], position) * (1.0f - surface->b1 - surface->b2) +
-           crt_sigmoid(c[3], c[4], c[5], position) * surface->b1 +
-           crt_sigmoid(c[6], c[7], c[8], position) * surface->b2;
+        CRT_ARRAY(CrtVertexColors, ctx->blob, ctx->scene->vertex_colors)[at->id].c;
+    return crt_sigmoid(c[0], c[1], c[2], position) * (1.0f - at->b1 - at->b2) +
+           crt_sigmoid(c[3], c[4], c[5], position) * at->b1 +
+           crt_sigmoid(c[6], c[7], c[8], position) * at->b2;
 }
 
 CRT_FN int crt_is_texture(CrtValue value) { return (value & CRT_VALUE_KIND) == CRT_VALUE_TEXTURE; }
 
 /* What a checker, or a checker of checkers, has at the place. */
-CRT_FN CrtValue crt_unchecked(const CrtContext *ctx, CrtValue value, const CrtSurface *surface) {
+CRT_FN CrtValue crt_unchecked(const CrtContext *ctx, CrtValue value, const CrtFacePlace *at) {
     while (crt_is_texture(value)) {
         const CrtTexture texture =
             CRT_ARRAY(CrtTexture, ctx->blob, ctx->scene->textures)[value & CRT_VALUE_INDEX];
         if (texture.kind != CRT_TEXTURE_CHECKER) break;
-        value = crt_checker(&texture, surface);
+        value = crt_checker(&texture, at);
     }
     return value;
 }
 
-CRT_FN vec4 crt_texture(const CrtContext *ctx, u32 index, const CrtSurface *surface, vec4 position) {
-    const CrtTexture texture = CRT_ARRAY(CrtTexture, ctx->blob, ctx->scene->textures)[index];
-    if (texture.kind == CRT_TEXTURE_VERTICES) return crt_vertex_color(ctx, surface, position);
-    return crt_image(ctx, &texture, surface, position);
+/* Neither number, nor table, nor checker. Called from wherever a material has a value; everything by value,
+   so that none of it has to lie in memory. */
+CRT_CALLED_FN vec4 crt_texture(CrtContext ctx, u32 index, CrtFacePlace at, vec4 position) {
+    const CrtTexture texture = CRT_ARRAY(CrtTexture, ctx.blob, ctx.scene->textures)[index];
+    if (texture.kind == CRT_TEXTURE_VERTICES) return crt_vertex_color(&ctx, &at, position);
+    return crt_image(&ctx, &texture, &at, position);
 }
 
 CRT_KERNEL_END
