@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/error.h"
+#include "base/huge_pages.h"
 #include "base/parallel.h"
 #include "compile/compile.h"
 #include "kernel/layout.h"
@@ -29,6 +30,7 @@ public:
         auto* const first = reinterpret_cast<unsigned char*>(lines_.data() + lines_.size());
         const std::size_t room = (lines_.capacity() - lines_.size()) * sizeof(Line);
         if (room < 16 * kPart) return;
+        adviseHugePages(first, room);
         parallelFor(room, kPart, [first](std::size_t begin, std::size_t end) {
             for (std::size_t at = begin; at < end; at += kPage) first[at] = 0;
         });

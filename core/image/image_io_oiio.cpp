@@ -1,11 +1,12 @@
-// The image codec module: EXR, PNG and HDR through OpenImageIO, JPEG through libjpeg-turbo, behind
-// image_module.h. Built as a library of its
-// own; nothing else in crt includes OpenImageIO.
+// The image codec module: EXR, PNG and HDR through OpenImageIO, JPEG through libjpeg-turbo, sound PNG
+// files that are textures through libdeflate, behind image_module.h. Built as a library of its own; nothing
+// else in crt includes OpenImageIO.
 //
 // Over 450 lines: it is all of the module, and all that knows OpenImageIO.
 #include "image/image_headers.h"
 #include "image/image_module.h"
 #include "image/jpeg_reader.h"
+#include "image/png_reader.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -446,12 +447,15 @@ std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std
                                                                 : TypeDesc(TypeDesc::FLOAT);
         const std::size_t pixel = channels.size() * type.size();
         if (width * height * pixel != buffer_bytes) throw Failure{"it has changed while it was read"};
+        auto* const bytes = static_cast<unsigned char*>(buffer);
+        if (std::strcmp(input->format_name(), "png") == 0 &&
+            crt::image::readPng(path, *info, bytes, buffer_bytes))
+            return;
         for (std::size_t c = 0; c < channels.size();) {
             std::size_t end = c + 1;
             while (end < channels.size() && channels[end] == channels[end - 1] + 1) ++end;
             if (!input->read_image(0, 0, channels[c], channels[end - 1] + 1, type,
-                                   static_cast<unsigned char*>(buffer) + c * type.size(),
-                                   static_cast<OIIO::stride_t>(pixel)))
+                                   bytes + c * type.size(), static_cast<OIIO::stride_t>(pixel)))
                 throw Failure{wordsOr(input->geterror(), "its pixels cannot be read")};
             c = end;
         }

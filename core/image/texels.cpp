@@ -1,6 +1,7 @@
 #include "image/texels.h"
 
 #include "base/error.h"
+#include "base/huge_pages.h"
 #include "base/input_file.h"
 #include "image/image_io.h"
 #include "image/open_module.h"
@@ -118,6 +119,8 @@ Texels readTexels(const std::string& path) {
     if (isPfm(path)) return readPfm(path);
     Texels texels;
     texels.info = readWithModule(path, nullptr, 0);
+    texels.bytes.reserve(texels.info.bytes());
+    adviseHugePages(texels.bytes.data(), texels.bytes.capacity());
     texels.bytes.resize(texels.info.bytes());
     readWithModule(path, texels.bytes.data(), texels.bytes.size());
     return texels;

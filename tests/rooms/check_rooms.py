@@ -26,6 +26,7 @@ OTHER_TARGETS = {
     "image/image_io_oiio.cpp",
     "image/image_headers.cpp",
     "image/jpeg_reader.cpp",
+    "image/png_reader.cpp",
     "backend/sdk/kernel_cache.cpp",
     "cli/main.cpp",
 }
