@@ -81,6 +81,43 @@ bool lights(const Tree& tree, u32 index, vec3 p, vec3 n) {
     return false;
 }
 
+/// What a node says of one of its children.
+struct Child {
+    Vec3d centre, axis;
+    double radius, power, theta_o, cos_e;
+    bool two_sided;
+};
+Child childOf(const CrtLightNode& node, u32 lane) {
+    const auto of = [lane](const f32(&values)[4]) { return static_cast<double>(values[lane]); };
+    return {{of(node.centre_x), of(node.centre_y), of(node.centre_z)},
+            {of(node.axis_x), of(node.axis_y), of(node.axis_z)},
+            of(node.radius),
+            of(node.power),
+            std::atan2(of(node.sin_o), of(node.cos_o)),
+            of(node.cos_e),
+            node.back[lane] < 0};
+}
+
+/// By angles, in double precision (pbrt-v4, 12.6.3), without power and distance; below 0: dark, by a cosine
+/// that is missed by that much.
+double importanceByAngles(const Child& child, const Vec3d& p, const Vec3d& n) {
+    const Vec3d d = minus(child.centre, p);
+    const double distance = length(d);
+    if (distance <= child.radius) return 1;
+    const double b = std::asin(child.radius / distance), towards = -dot(child.axis, d) / distance;
+    const auto angle = [](double cosine) { return std::acos(std::clamp(cosine, -1.0, 1.0)); };
+    const double emission =
+        std::cos(std::max(angle(child.two_sided ? std::abs(towards) : towards) - child.theta_o - b, 0.0));
+    if (emission < child.cos_e) return emission - child.cos_e;
+    double importance = std::max(emission, 0.01);
+    if (dot(n, n) > 0) {
+        const double receiver = std::cos(std::max(angle(dot(d, n) / distance) - b, 0.0));
+        if (receiver < 0) return receiver;
+        importance *= std::max(receiver, 0.01);
+    }
+    return importance;
+}
+
 }  // namespace
 
 TEST_CASE("few lights have no tree, and many that lie at a place have one", "[light tree]") {
@@ -109,29 +146,74 @@ TEST_CASE("the tree holds every light once, and a node all that is below it", "[
     REQUIRE(tree.lights() == 375);
     const CrtLightNode* nodes = crt_light_nodes(&tree.ctx);
     std::vector<int> seen(tree.lights(), 0);
-    for (u32 i = 0; i < 2 * tree.lights() - 1; ++i) {
-        const CrtLightNode& node = nodes[i];
-        if (node.right == 0) {
-            ++seen.at(node.light);
-            CHECK(tree.light(node.light).choice == i);
+    std::vector<u32> open{0};
+    while (!open.empty()) {
+        const u32 i = open.back();
+        open.pop_back();
+        for (u32 lane = 0; lane < 4; ++lane) {
+            const Child child = childOf(nodes[i], lane);
+            if (child.power == 0) continue;
+            const bool leaf = nodes[i].child[lane] >= CRT_LIGHT_LEAF;
+            if (leaf) {
+                const u32 light = nodes[i].child[lane] - CRT_LIGHT_LEAF;
+                ++seen.at(light);
+                CHECK(tree.light(light).choice == 4 * i + lane);
+            } else {
+                CHECK(nodes[nodes[i].child[lane]].parent == 4 * i + lane);
+                open.push_back(nodes[i].child[lane]);
+            }
+            for (u32 above = i; above != 0; above = nodes[above].parent / 4) {
+                const Child outer = childOf(nodes[nodes[above].parent / 4], nodes[above].parent % 4);
+                if (leaf) CHECK(length(minus(child.centre, outer.centre)) <= outer.radius);
+                const double between = std::acos(std::clamp(dot(child.axis, outer.axis), -1.0, 1.0));
+                CHECK(std::min(between + child.theta_o, 3.1415) <= outer.theta_o + 2e-3);
+                CHECK(child.cos_e >= outer.cos_e);
+                CHECK(outer.power > 0.999999 * child.power);
+                CHECK((outer.two_sided || !child.two_sided));
+            }
         }
-        if (i == 0) continue;
-        const CrtLightNode& parent = nodes[node.parent];
-        for (u32 around = node.parent; node.right == 0; around = nodes[around].parent) {
-            const CrtLightNode& outer = nodes[around];
-            const double away = length(minus(toDouble(crt_load3(node.centre)),
-                                             toDouble(crt_load3(outer.centre))));
-            CHECK(away <= static_cast<double>(outer.radius));
-            if (around == 0) break;
-        }
-        CHECK((i == node.parent + 1 || i == parent.right));
-        const double between = std::acos(std::clamp(
-            dot(toDouble(crt_load3(node.axis)), toDouble(crt_load3(parent.axis))), -1.0, 1.0));
-        CHECK(std::min(between + std::acos(static_cast<double>(node.cos_o)), 3.1415) <=
-              std::acos(static_cast<double>(parent.cos_o)) + 2e-3);
-        CHECK(node.cos_e >= parent.cos_e);
     }
     CHECK(std::count(seen.begin(), seen.end(), 1) == static_cast<std::ptrdiff_t>(seen.size()));
+}
+
+TEST_CASE("four children are weighed at once as each by its angles", "[light tree]") {
+    Random random(6);
+    const Tree tree(lamps(random, 300, false));
+    const CrtLightNode* nodes = crt_light_nodes(&tree.ctx);
+    u32 inner = 0;
+    for (u32 i = 0; i < tree.lights(); ++i) inner = std::max(inner, tree.light(i).choice / 4);
+    int dark = 0, bright = 0, within = 0, raised = 0;
+    for (int k = 0; k < 20000; ++k) {
+        const CrtLightNode& node = nodes[static_cast<u32>(random.uniform() * (inner + 1))];
+        const vec3 p = Tree::somewhere(random);
+        const vec3 n = k % 3 != 0 ? unitFloat(random.direction()) : make_vec3(0, 0, 0);
+        const vec4 importances = crt_light_importances(&node, p, n), shares = crt_light_shares(&node, p, n);
+        const double least = 0.999 * 0x1p-20 * static_cast<double>(sum4(importances));
+        for (u32 lane = 0; lane < 4; ++lane) {
+            const Child child = childOf(node, lane);
+            const auto found = static_cast<double>(crt_lane(importances, lane)),
+                       share = static_cast<double>(crt_lane(shares, lane));
+            CHECK((found > 0 ? share >= std::max(found, least) : share == 0));
+            raised += share > found ? 1 : 0;
+            const double expected = importanceByAngles(child, toDouble(p), toDouble(n));
+            const Vec3d d = minus(child.centre, toDouble(p));
+            const double nearest = std::max(dot(d, d), child.radius * child.radius);
+            if (child.power == 0) {
+                CHECK(found == 0);
+            } else if (expected < -2e-3) {
+                CHECK(found == 0);
+                ++dark;
+            } else if (expected > 0) {
+                CHECK(std::abs(found * nearest / child.power - expected) < 2e-3);
+                ++bright;
+                within += dot(d, d) < child.radius * child.radius ? 1 : 0;
+            }
+        }
+    }
+    CHECK(dark > 1000);
+    CHECK(bright > 1000);
+    CHECK(within > 100);
+    CHECK(raised > 10);
 }
 
 TEST_CASE("what lights a point can be chosen there, and probabilities add up to 1", "[light tree]") {
@@ -203,25 +285,27 @@ TEST_CASE("the tree of the same lights is the same, and of lights in one place n
         b.power = random.uniform(0.1, 1);
     }
     const crt::LightTree one = crt::buildLightTree(bounds), two = crt::buildLightTree(bounds);
-    REQUIRE(one.nodes.size() == 5999);
+    // Of nodes that are full, 1000 would do.
+    CHECK(one.nodes.size() < 1600);
+    REQUIRE(one.nodes.size() == two.nodes.size());
     CHECK(std::memcmp(one.nodes.data(), two.nodes.data(), one.nodes.size() * sizeof one.nodes[0]) == 0);
     CHECK(one.leaf_of == two.leaf_of);
     const auto depthOf = [](const crt::LightTree& tree) {
         int deepest = 0;
         for (const std::uint32_t leaf : tree.leaf_of) {
-            int depth = 0;
-            for (std::uint32_t node = leaf; node != 0; node = tree.nodes[node].parent) ++depth;
+            int depth = 1;
+            for (std::uint32_t node = leaf / 4; node != 0; node = tree.nodes[node].parent / 4) ++depth;
             deepest = std::max(deepest, depth);
         }
         return deepest;
     };
-    CHECK(depthOf(one) < 40);
+    CHECK(depthOf(one) < 12);
     for (crt::LightBounds& b : bounds) b.lower = b.upper = {1, 2, 3};
-    CHECK(depthOf(crt::buildLightTree(bounds)) <= 12);
+    CHECK(depthOf(crt::buildLightTree(bounds)) == 6);  // 4^6 is 4096.
     // Each ten times as far as the one before: the worst for buckets of equal width.
     bounds.resize(200);
     for (std::size_t i = 0; i < bounds.size(); ++i)
         bounds[i].lower = bounds[i].upper = {std::pow(10, static_cast<double>(i)), 0, 0};
-    CHECK(depthOf(crt::buildLightTree(bounds)) <= 56);
+    CHECK(depthOf(crt::buildLightTree(bounds)) <= 24);
     CHECK(crt::buildLightTree({bounds[0]}).nodes.size() == 1);
 }

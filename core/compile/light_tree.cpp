@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -62,58 +63,102 @@ double costOf(const LightBounds& b) { return b.power * orientationOf(b) * surfac
 
 Vec3d middleOf(const LightBounds& b) { return (b.lower + b.upper) * 0.5; }
 
+/// Halves lights until they are alone; of that binary tree nodes of four children are made.
 class Builder {
 public:
     explicit Builder(const std::vector<LightBounds>& lights) : lights_(lights), order_(lights.size()) {
         std::iota(order_.begin(), order_.end(), 0u);
-        tree_.leaf_of.resize(lights.size());
-        tree_.nodes.reserve(2 * lights.size() - 1);
+        halves_.reserve(2 * lights.size() - 1);
         for (const LightBounds& light : lights) whole_ += light.power;
-        build(0, lights.size(), 0, 0);
+        halve(0, lights.size(), 0);
+        tree_.leaf_of.resize(lights.size());
+        join(0, 0);
     }
     LightTree take() { return std::move(tree_); }
 
 private:
-    LightBounds build(std::size_t first, std::size_t end, std::uint32_t parent, int depth) {
-        const auto self = static_cast<std::uint32_t>(tree_.nodes.size());
-        tree_.nodes.emplace_back();
+    /// Of the binary tree.
+    struct Half {
         LightBounds bounds;
-        std::uint32_t right = 0, light = CRT_NONE;
-        if (end - first == 1) {
-            light = order_[first];
-            bounds = lights_[light];
-            tree_.leaf_of[light] = self;
+        std::uint32_t left = 0, right = 0;  ///< 0: one light alone.
+        std::uint32_t light = 0;
+        std::size_t lights = 1;
+    };
+
+    std::uint32_t halve(std::size_t first, std::size_t end, int depth) {
+        const auto self = static_cast<std::uint32_t>(halves_.size());
+        halves_.emplace_back();
+        Half half;
+        half.lights = end - first;
+        if (half.lights == 1) {
+            half.light = order_[first];
+            half.bounds = lights_[half.light];
         } else {
             const std::size_t middle = split(first, end, depth);
-            bounds = build(first, middle, self, depth + 1);
-            right = static_cast<std::uint32_t>(tree_.nodes.size());
-            bounds = boundsOfBoth(bounds, build(middle, end, self, depth + 1));
+            half.left = halve(first, middle, depth + 1);
+            half.right = halve(middle, end, depth + 1);
+            half.bounds = boundsOfBoth(halves_[half.left].bounds, halves_[half.right].bounds);
         }
-        tree_.nodes[self] = record(bounds, parent, right, light);
-        return bounds;
+        halves_[self] = half;
+        return self;
     }
 
-    kernel::CrtLightNode record(const LightBounds& bounds, std::uint32_t parent, std::uint32_t right,
-                                std::uint32_t light) const {
-        kernel::CrtLightNode node{};
+    /// Up to four of the halves below one: again and again that is opened which costs most.
+    std::vector<std::uint32_t> childrenOf(std::uint32_t half) const {
+        std::vector<std::uint32_t> children{half};
+        while (children.size() < 4) {
+            auto most = children.end();
+            for (auto i = children.begin(); i != children.end(); ++i) {
+                if (halves_[*i].left == 0) continue;
+                // Lights on a line, or in a point, have no surface, and cost nothing.
+                const auto cost = [&](auto at) {
+                    return std::pair(costOf(halves_[*at].bounds), halves_[*at].lights);
+                };
+                if (most == children.end() || cost(i) > cost(most)) most = i;
+            }
+            if (most == children.end()) break;
+            const Half& opened = halves_[*most];
+            *most = opened.left;
+            children.insert(most + 1, opened.right);
+        }
+        return children;
+    }
+
+    void join(std::uint32_t half, std::uint32_t parent) {
+        const auto self = static_cast<std::uint32_t>(tree_.nodes.size());
+        tree_.nodes.emplace_back();
+        tree_.nodes[self].parent = parent;
+        const std::vector<std::uint32_t> children = childrenOf(half);
+        for (std::uint32_t lane = 0; lane < children.size(); ++lane) {
+            const Half& child = halves_[children[lane]];
+            setChild(child.bounds, lane, tree_.nodes[self]);
+            if (child.left == 0) {
+                tree_.nodes[self].child[lane] = CRT_LIGHT_LEAF + child.light;
+                tree_.leaf_of[child.light] = 4 * self + lane;
+            } else {
+                tree_.nodes[self].child[lane] = static_cast<std::uint32_t>(tree_.nodes.size());
+                join(children[lane], 4 * self + lane);
+            }
+        }
+    }
+
+    void setChild(const LightBounds& bounds, std::uint32_t lane, kernel::CrtLightNode& node) const {
         const Vec3d centre = middleOf(bounds), half = (bounds.upper - bounds.lower) * 0.5;
+        float* const centres[] = {node.centre_x, node.centre_y, node.centre_z};
+        float* const axes[] = {node.axis_x, node.axis_y, node.axis_z};
         for (std::size_t k = 0; k < 3; ++k) {
-            node.centre[k] = static_cast<float>(centre[k]);
-            node.axis[k] = static_cast<float>(bounds.axis[k]);
+            centres[k][lane] = static_cast<float>(centre[k]);
+            axes[k][lane] = static_cast<float>(bounds.axis[k]);
         }
         // And the rounding of both.
         const double size = std::sqrt(dot(half, half)), far = std::sqrt(dot(centre, centre));
-        node.radius = static_cast<float>(size * (1 + 0x1p-20) + (size > 0 ? far * 0x1p-22 : 0));
+        node.radius[lane] = static_cast<float>(size * (1 + 0x1p-20) + (size > 0 ? far * 0x1p-22 : 0));
         // A light as dim as can be is a light.
-        node.power = std::max(static_cast<float>(bounds.power / whole_), 1e-30f);
-        node.cos_o = static_cast<float>(std::cos(bounds.theta_o));
-        node.sin_o = static_cast<float>(std::sin(bounds.theta_o));
-        node.cos_e = static_cast<float>(std::cos(bounds.theta_e));
-        node.two_sided = bounds.two_sided ? 1 : 0;
-        node.parent = parent;
-        node.right = right;
-        node.light = light;
-        return node;
+        node.power[lane] = std::max(static_cast<float>(bounds.power / whole_), 1e-30f);
+        node.cos_o[lane] = static_cast<float>(std::cos(bounds.theta_o));
+        node.sin_o[lane] = static_cast<float>(std::sin(bounds.theta_o));
+        node.cos_e[lane] = static_cast<float>(std::cos(bounds.theta_e));
+        node.back[lane] = bounds.two_sided ? -1.0f : 1.0f;
     }
 
     struct Split {
@@ -180,6 +225,7 @@ private:
 
     const std::vector<LightBounds>& lights_;
     std::vector<std::uint32_t> order_;
+    std::vector<Half> halves_;  ///< The whole first.
     LightTree tree_;
     double whole_ = 0;
 };

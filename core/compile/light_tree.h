@@ -26,8 +26,8 @@ struct LightBounds {
 LightBounds boundsOfBoth(const LightBounds& a, const LightBounds& b);
 
 struct LightTree {
-    std::vector<kernel::CrtLightNode> nodes;  ///< The root first; a left child follows its parent.
-    std::vector<std::uint32_t> leaf_of;       ///< By light.
+    std::vector<kernel::CrtLightNode> nodes;  ///< The root first; parents before children.
+    std::vector<std::uint32_t> leaf_of;       ///< By light: 4 times the node + which of its children.
 };
 
 /// Of one light or more. The same for the same lights, whatever the number of threads.

@@ -12,10 +12,11 @@
  *   3   materials as BSDFs, eight dimensions a vertex
  *   4   rough_conductor and rough_dielectric give back what their microfacets lose
  *   5   interpolated normals keep the light of surfaces that reflect
+ *   6   nodes of the tree of lights have four children
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 5u
+#define CRT_BITS_VERSION 6u
 
 #endif

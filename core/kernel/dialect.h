@@ -63,6 +63,9 @@ CRT_FN u32 crt_reverse_bits(u32 x) {
 /* min, max and select lane by lane; a < b ? a : b, so that a NaN in `a` yields b. */
 CRT_FN vec4 crt_min4(vec4 a, vec4 b) { return select(b, a, a < b); }
 CRT_FN vec4 crt_max4(vec4 a, vec4 b) { return select(b, a, a > b); }
+#define crt_fma4(a, b, c) fma((float4)(a), (float4)(b), (float4)(c))
+/* Lane by lane a < b ? x : y. */
+CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) { return select(y, x, a < b); }
 #define CRT_ROLLED _Pragma("unroll 1")
 #ifndef CRT_SIMD8
 #define CRT_SIMD8 1
@@ -168,6 +171,14 @@ CRT_FN vec4 crt_max4(vec4 a, vec4 b) {
     return make_vec4(a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z,
                      a.w > b.w ? a.w : b.w);
 }
+CRT_FN vec4 crt_fma4(vec4 a, vec4 b, vec4 c) {
+    return make_vec4(crt_fma(a.x, b.x, c.x), crt_fma(a.y, b.y, c.y), crt_fma(a.z, b.z, c.z),
+                     crt_fma(a.w, b.w, c.w));
+}
+CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) {
+    return make_vec4(a.x < b.x ? x.x : y.x, a.y < b.y ? x.y : y.y, a.z < b.z ? x.z : y.z,
+                     a.w < b.w ? x.w : y.w);
+}
 #ifdef CRT_CUDA_ON_HOST
 #define CRT_ROLLED _Pragma("GCC unroll 1")
 #else
@@ -248,11 +259,23 @@ CRT_FN u32 crt_reverse_bits(u32 x) {
     return __builtin_bswap32(x);
 }
 CRT_FN vec4 crt_load4(const f32 *p) { vec4 r; std::memcpy(&r, p, 16); return r; }
+CRT_FN vec4 crt_min4(vec4 a, vec4 b) { return vec4{a.v < b.v ? a.v : b.v}; }
+CRT_FN vec4 crt_max4(vec4 a, vec4 b) { return vec4{a.v > b.v ? a.v : b.v}; }
+CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) { return vec4{a.v < b.v ? x.v : y.v}; }
+#if defined(__AVX2__) && defined(__FMA__) /* The compiler would take lane after lane. */
+CRT_FN vec4 crt_sqrt4(vec4 a) { return vec4{(crt_native4)_mm_sqrt_ps((__m128)a.v)}; }
+CRT_FN vec4 crt_fma4(vec4 a, vec4 b, vec4 c) {
+    return vec4{(crt_native4)_mm_fmadd_ps((__m128)a.v, (__m128)b.v, (__m128)c.v)};
+}
+#else
 CRT_FN vec4 crt_sqrt4(vec4 a) {
     return make_vec4(crt_sqrt(V4X(a)), crt_sqrt(V4Y(a)), crt_sqrt(V4Z(a)), crt_sqrt(V4W(a)));
 }
-CRT_FN vec4 crt_min4(vec4 a, vec4 b) { return vec4{a.v < b.v ? a.v : b.v}; }
-CRT_FN vec4 crt_max4(vec4 a, vec4 b) { return vec4{a.v > b.v ? a.v : b.v}; }
+CRT_FN vec4 crt_fma4(vec4 a, vec4 b, vec4 c) {
+    return make_vec4(crt_fma(V4X(a), V4X(b), V4X(c)), crt_fma(V4Y(a), V4Y(b), V4Y(c)),
+                     crt_fma(V4Z(a), V4Z(b), V4Z(c)), crt_fma(V4W(a), V4W(b), V4W(c)));
+}
+#endif
 #if defined(__AVX2__) && defined(__FMA__)
 #define CRT_SIMD8 1
 typedef f32 vec8 __attribute__((vector_size(32)));

@@ -253,7 +253,7 @@ typedef struct CrtLight {
     u32 flags;
     CrtValue radiance;
     u32 choice;             /* a 32-bit number u chooses the last light with choice ≤ u; of a light in the
-                               tree: its leaf */
+                               tree: 4 times the node + which child */
     f32 choice_probability; /* exactly the share of 2³² that chooses it, or the tree that it is in */
     u32 slot;   /* in the triangle array */
     u32 corner; /* which vertex of the triangle the parallelogram's two edges leave from */
@@ -261,22 +261,22 @@ typedef struct CrtLight {
 } CrtLight;
 CRT_ASSERT_SIZE(CrtLight, 32);
 
-/* A node of the tree of lights, the root first; the left child is the next one. What lights it holds: where
-   they are, and which way they shine: within acos(cos_o) + acos(cos_e) of the axis. */
+/* A node of the tree of lights, the root first. Of each of its four children, what lights are below it:
+   where they are, and which way they shine: within acos(cos_o) + acos(cos_e) of the axis. */
 typedef struct CrtLightNode {
-    f32 centre[3];  /* of a sphere around them */
-    f32 radius;
-    f32 axis[3];    /* unit */
-    f32 power;      /* share of that of all */
-    f32 cos_o, sin_o; /* spread of their normals around the axis */
-    f32 cos_e;      /* how far from its normal each shines */
-    u32 two_sided;
-    u32 parent;     /* the root's: itself */
-    u32 right;      /* child; 0: a leaf, of */
-    u32 light;      /* this row of the light table */
-    u32 reserved;
+    f32 centre_x[4], centre_y[4], centre_z[4]; /* of a sphere around them */
+    f32 radius[4];
+    f32 axis_x[4], axis_y[4], axis_z[4]; /* unit */
+    f32 power[4];           /* share of that of all; 0: there is no such child */
+    f32 cos_o[4], sin_o[4]; /* spread of their normals around the axis */
+    f32 cos_e[4];           /* how far from its normal each shines */
+    f32 back[4];            /* -1: some shine on both sides; otherwise 1 */
+    u32 child[4];           /* a node; or CRT_LIGHT_LEAF + a row of the light table */
+    u32 parent;             /* 4 times the node above + which child of that this is; the root's: 0 */
+    u32 reserved[3];
 } CrtLightNode;
-CRT_ASSERT_SIZE(CrtLightNode, 64);
+#define CRT_LIGHT_LEAF 0x80000000u
+CRT_ASSERT_SIZE(CrtLightNode, 224);
 
 /* How the light of an IES file is distributed, or what a beam's section is. */
 typedef struct CrtLightForm {

@@ -1,7 +1,8 @@
 /*
- * light_tree.h: choosing between many lights by what they can send to the shaded point, down a binary tree
- * whose nodes bound them (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive
- * Tree Splitting"; bounds and importance as in pbrt-v4, 12.6.3). docs/decisions/0026-light-tree.md.
+ * light_tree.h: choosing between many lights by what they can send to the shaded point, down a tree whose
+ * nodes bound them, four children each (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights
+ * with Adaptive Tree Splitting"; bounds and importance as in pbrt-v4, 12.6.3).
+ * docs/decisions/0026-light-tree.md.
  */
 #ifndef CRT_LIGHT_TREE_H
 #define CRT_LIGHT_TREE_H
@@ -19,42 +20,56 @@ CRT_KERNEL_BEGIN
    nothing. */
 #define CRT_TREE_LEAST_SHARE 9.5367431640625e-7f
 
-CRT_FN f32 crt_sine_of(f32 cosine) { return crt_sqrt(crt_max(0.0f, 1.0f - cosine * cosine)); }
-
-/* Sine and cosine of max(a − b, 0), of angles from 0 to π. */
-CRT_FN f32 crt_cosine_less(f32 sin_a, f32 cos_a, f32 sin_b, f32 cos_b) {
-    return cos_a > cos_b ? 1.0f : cos_a * cos_b + sin_a * sin_b;
-}
-CRT_FN f32 crt_sine_less(f32 sin_a, f32 cos_a, f32 sin_b, f32 cos_b) {
-    return cos_a > cos_b ? 0.0f : sin_a * cos_b - cos_a * sin_b;
+CRT_FN vec4 crt_sines_of(vec4 cosines) {
+    return crt_sqrt4(crt_max4(splat4(1.0f) - cosines * cosines, splat4(0.0f)));
 }
 
-/* What the lights of a node can send to p at most, but for shadows and a factor; 0: none of them lights it.
-   `n` is the normal of a surface that scatters on its side alone; of length 0: there is none such. */
-CRT_FN f32 crt_light_importance(CRT_GLOBAL const CrtLightNode *node, vec3 p, vec3 n) {
-    const vec3 d = crt_load3(node->centre) - p;
-    const f32 distance2 = dot3(d, d);
-    const f32 radius2 = node->radius * node->radius;
-    /* The angle b at which the sphere is seen: within it, every direction. */
-    const int outside = distance2 > radius2;
-    const f32 inverse = distance2 > 0.0f ? 1.0f / crt_sqrt(distance2) : 0.0f;
-    const f32 sin_b = outside ? node->radius * inverse : 0.0f;
-    const f32 cos_b = outside ? crt_sqrt(crt_max(0.0f, 1.0f - sin_b * sin_b)) : -1.0f;
-    const f32 towards = -dot3(crt_load3(node->axis), d) * inverse;
-    const f32 cos_w = node->two_sided != 0u ? crt_abs(towards) : towards;
-    const f32 sin_w = crt_sine_of(cos_w);
-    /* From the axis, less the spread of the normals, less b. */
-    const f32 cos_emission =
-        crt_cosine_less(crt_sine_less(sin_w, cos_w, node->sin_o, node->cos_o),
-                        crt_cosine_less(sin_w, cos_w, node->sin_o, node->cos_o), sin_b, cos_b);
-    if (cos_emission < node->cos_e - CRT_TREE_SLACK) return 0.0f;
-    const f32 nearness = outside ? inverse * inverse : 1.0f / crt_max(radius2, 1e-30f);
-    const f32 importance = node->power * crt_max(cos_emission, CRT_TREE_LEAST_COSINE) * nearness;
+CRT_FN vec4 crt_dots(vec4 x, vec4 y, vec4 z, vec4 u, vec4 v, vec4 w) {
+    return crt_fma4(x, u, crt_fma4(y, v, z * w));
+}
+
+/* What the lights of each child of a node can send to p at most, but for shadows and a factor; 0: none of
+   them lights it. `n` is the normal of a surface that scatters on its side alone; of length 0: there is none
+   such. */
+CRT_FN vec4 crt_light_importances(CRT_GLOBAL const CrtLightNode *node, vec3 p, vec3 n) {
+    const vec4 zero = splat4(0.0f), one = splat4(1.0f);
+    const vec4 dx = crt_load4(node->centre_x) - splat4(V3X(p)),
+               dy = crt_load4(node->centre_y) - splat4(V3Y(p)),
+               dz = crt_load4(node->centre_z) - splat4(V3Z(p)), radius = crt_load4(node->radius);
+    const vec4 distance2 = crt_dots(dx, dy, dz, dx, dy, dz), radius2 = radius * radius;
+    /* From within the sphere, as from its edge. */
+    const vec4 inverse = one / crt_sqrt4(crt_max4(crt_max4(distance2, radius2), splat4(1e-30f)));
+    /* The angle b at which the sphere is seen; x: of its normals, too. Within it, every direction. */
+    const vec4 sin_b = radius * inverse, cos_b = crt_sines_of(sin_b);
+    const vec4 cos_o = crt_load4(node->cos_o), sin_o = crt_load4(node->sin_o);
+    const vec4 sin_x = crt_fma4(sin_o, cos_b, cos_o * sin_b), cos_x = cos_o * cos_b - sin_o * sin_b;
+    const vec4 whole = splat4(-1.0f);
+    const vec4 below_pi = crt_where_less4(radius2, distance2, sin_x, whole);
+    const vec4 bound_x = crt_where_less4(below_pi, zero, whole, cos_x);
+    /* From the axis w, less x. */
+    const vec4 towards = crt_dots(dx, dy, dz, crt_load4(node->axis_x), crt_load4(node->axis_y),
+                                  crt_load4(node->axis_z)) * (inverse * -1.0f);
+    const vec4 cos_w = crt_max4(towards, towards * crt_load4(node->back));
+    const vec4 cos_emission =
+        crt_where_less4(cos_w, bound_x, crt_fma4(cos_w, cos_x, crt_sines_of(cos_w) * sin_x), one);
+    const vec4 sent = crt_load4(node->power) * crt_max4(cos_emission, splat4(CRT_TREE_LEAST_COSINE)) *
+                      (inverse * inverse);
+    const vec4 importance =
+        crt_where_less4(cos_emission, crt_load4(node->cos_e) - splat4(CRT_TREE_SLACK), zero, sent);
     if (!(dot3(n, n) > 0.0f)) return importance;
-    const f32 cos_i = dot3(d, n) * inverse;
-    const f32 cos_receiver = crt_cosine_less(crt_sine_of(cos_i), cos_i, sin_b, cos_b);
-    if (cos_receiver < -CRT_TREE_SLACK) return 0.0f;
-    return importance * crt_max(cos_receiver, CRT_TREE_LEAST_COSINE);
+    const vec4 cos_i = crt_dots(dx, dy, dz, splat4(V3X(n)), splat4(V3Y(n)), splat4(V3Z(n))) * inverse;
+    const vec4 bound_b = crt_where_less4(radius2, distance2, cos_b, whole);
+    const vec4 cos_receiver =
+        crt_where_less4(cos_i, bound_b, crt_fma4(cos_i, cos_b, crt_sines_of(cos_i) * sin_b), one);
+    return crt_where_less4(cos_receiver, splat4(-CRT_TREE_SLACK), zero,
+                           importance * crt_max4(cos_receiver, splat4(CRT_TREE_LEAST_COSINE)));
+}
+
+/* In proportion to which the children of a node are chosen. Their sum is 0 where none of them lights p. */
+CRT_FN vec4 crt_light_shares(CRT_GLOBAL const CrtLightNode *node, vec3 p, vec3 n) {
+    const vec4 importance = crt_light_importances(node, p, n);
+    const vec4 least = splat4(sum4(importance) * CRT_TREE_LEAST_SHARE);
+    return crt_where_less4(splat4(0.0f), importance, crt_max4(importance, least), splat4(0.0f));
 }
 
 CRT_FN CRT_GLOBAL const CrtLightNode *crt_light_nodes(const CrtContext *ctx) {
@@ -66,30 +81,20 @@ CRT_FN int crt_has_light_tree(const CrtContext *ctx) {
     return CRT_HAS(LIGHT_TREE) && ctx->scene->tree_lights != 0u;
 }
 
-/* Probability of the left child of `parent`, from p; that of the right one is what is missing to 1. Below 0:
-   neither of them lights p. */
-CRT_FN f32 crt_light_split(CRT_GLOBAL const CrtLightNode *nodes, u32 parent, vec3 p, vec3 n) {
-    const f32 left = crt_light_importance(nodes + parent + 1u, p, n);
-    const f32 right = crt_light_importance(nodes + nodes[parent].right, p, n);
-    const f32 sum = left + right;
-    if (!(sum > 0.0f)) return -1.0f;
-    if (left == 0.0f || right == 0.0f) return left > 0.0f ? 1.0f : 0.0f;
-    return crt_clamp(left / sum, CRT_TREE_LEAST_SHARE, 1.0f - CRT_TREE_LEAST_SHARE);
-}
-
 /* Of the lights in the tree that one is chosen, given that the tree is. */
 CRT_FN f32 crt_light_tree_probability(const CrtContext *ctx, u32 light, vec3 p, vec3 n) {
     CRT_GLOBAL const CrtLightNode *nodes = crt_light_nodes(ctx);
-    u32 node = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[light].choice;
+    u32 at = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[light].choice;
     f32 probability = 1.0f;
-    while (node != 0u) {
-        const u32 parent = nodes[node].parent;
-        const f32 left = crt_light_split(nodes, parent, p, n);
-        if (left < 0.0f) return 0.0f;
-        probability = probability * (node == parent + 1u ? left : 1.0f - left);
-        node = parent;
+    for (;;) {
+        const u32 node = at >> 2;
+        const vec4 shares = crt_light_shares(nodes + node, p, n);
+        const f32 share = crt_lane(shares, at & 3u);
+        if (!(share > 0.0f)) return 0.0f;
+        probability = probability * (share / sum4(shares));
+        if (node == 0u) return probability;
+        at = nodes[node].parent;
     }
-    return probability;
 }
 
 /* Which light to sample; CRT_NONE: none lights p. *probability is what its own is to be multiplied by. */
@@ -108,17 +113,25 @@ CRT_FN u32 crt_light_tree_choose(const CrtContext *ctx, CrtSampler *sampler, u32
     }
     /* Digits below those of the sampler's, which a tree of many lights would use up. */
     f64 u = ((f64)choice + (f64)crt_hash(choice) * 2.3283064365386963e-10) / end;
-    u32 node = 0u;
-    while (nodes[node].right != 0u) {
-        const f32 left = crt_light_split(nodes, node, p, n);
-        if (left < 0.0f) return CRT_NONE;
-        const f64 share = (f64)left;
-        const int goes_left = u < share;
-        u = goes_left ? u / share : (u - share) / (1.0 - share);
-        *probability = *probability * (goes_left ? left : 1.0f - left);
-        node = goes_left ? node + 1u : nodes[node].right;
-    }
-    return *probability > 0.0f ? nodes[node].light : CRT_NONE;
+    u32 child = 0u;
+    do {
+        const vec4 shares = crt_light_shares(nodes + child, p, n);
+        /* Exact: the least is a millionth of the sum. */
+        const f64 first = (f64)V4X(shares), second = first + (f64)V4Y(shares),
+                  third = second + (f64)V4Z(shares), all = third + (f64)V4W(shares);
+        if (!(all > 0.0)) return CRT_NONE;
+        /* Less than `all` however it rounds, lest a child is chosen that has no share. */
+        const f64 last = all * 0.9999999999999998;
+        const f64 place = u * all < last ? u * all : last;
+        const u32 lane =
+            (place >= first ? 1u : 0u) + (place >= second ? 1u : 0u) + (place >= third ? 1u : 0u);
+        const f64 before = lane == 0u ? 0.0 : (lane == 1u ? first : (lane == 2u ? second : third));
+        const f32 share = crt_lane(shares, lane);
+        u = (place - before) / (f64)share;
+        *probability = *probability * (share / sum4(shares));
+        child = nodes[child].child[lane];
+    } while (child < CRT_LIGHT_LEAF);
+    return child - CRT_LIGHT_LEAF;
 }
 
 CRT_KERNEL_END
