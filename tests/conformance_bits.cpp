@@ -134,6 +134,7 @@ struct Case {
     bool colored = false;
     bool rough_bases = false;
     bool fuzzy = false;
+    bool coated = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -393,6 +394,32 @@ void addFuzz(crt::Scene& scene) {
     }
 }
 
+/// Coats on every material that reflects, each its own: smooth and rough, clear and tinted, under fuzz; some
+/// about interpolated normals.
+void addCoats(crt::Scene& scene) {
+    double share = 0;
+    for (crt::Material& m : scene.materials) {
+        if (m.name == "flint") {
+            m.type = crt::MaterialType::Plastic;
+            m.eta = crt::constantSpectrum(1.25);
+            m.reflectance = scene.materials[1].reflectance;
+        }
+        if (m.transmits()) continue;
+        crt::Clearcoat& coat = m.clearcoat.emplace();
+        coat.ior = 1.25 + share;
+        coat.roughness = share;
+        coat.depth = share < 0.5 ? crt::constantSpectrum(0) : scene.materials[1].reflectance;
+        coat.darkening = 1 - share;
+        coat.base_roughness = share;
+        if (share == 0.5) {
+            m.fuzz = 0.5;
+            m.fuzz_roughness = 0.5;
+            m.fuzz_color = crt::constantSpectrum(0.75);
+        }
+        share = share < 1 ? share + 0.25 : 0;
+    }
+}
+
 /// Rough diffuse surfaces, bare and glossy, in turn; some about interpolated normals.
 void addRoughBases(crt::Scene& scene) {
     double eta = 1;
@@ -453,6 +480,8 @@ const Case kCases[] = {
      false, false, false, false, false, false, true},
     {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, true, false, false, false, false,
      false, false, false, false, false, false, false, true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, true, false, false, false, true,
+     false, false, false, false, false, false, false, false, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -503,6 +532,7 @@ crt::Scene sceneOf(const Case& c) {
     if (c.colored) addColors(scene);
     if (c.rough_bases) addRoughBases(scene);
     if (c.fuzzy) addFuzz(scene);
+    if (c.coated) addCoats(scene);
     return scene;
 }
 
@@ -535,7 +565,8 @@ std::vector<Named> allScenes() {
                                  "brushed",
                                  "metals and gloss by their colours",
                                  "rough bases",
-                                 "fuzz"};
+                                 "fuzz",
+                                 "coats"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

@@ -54,6 +54,9 @@ std::map<std::uint64_t, std::string> representativeMasks() {
          "a mesh of openpbr"},
         {mesh | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_BASE, "a mesh of clay"},
         {mesh | CRT_FEATURE_FUZZ, "a mesh of velvet"},
+        {mesh | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_PLASTIC | CRT_FEATURE_OPENPBR |
+             CRT_FEATURE_CLEARCOAT | CRT_FEATURE_MIX,
+         "a mesh of car paint"},
         {mesh | CRT_FEATURE_DIELECTRIC, "a mesh of glass"},
         {mesh | CRT_FEATURE_TEXTURE, "a mesh with textures"},
         {mesh | glass, "a mesh of dispersive glass"},

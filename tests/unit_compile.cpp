@@ -163,6 +163,25 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         fuzzy(1)(s);
         for (crt::Material& m : s.materials) m.type = crt::MaterialType::Mirror;
     });
+    const auto coated = [&](double roughness, double index) {
+        return [=](Scene& s) {
+            s.materials[0].clearcoat = crt::Clearcoat{
+                .ior = index, .roughness = roughness, .depth = crt::constantSpectrum(0.5)};
+        };
+    };
+    seen |= differs(CRT_FEATURE_CLEARCOAT, 0, coated(0, 1.5));
+    differs(CRT_FEATURE_CLEARCOAT | CRT_FEATURE_TABLE, 0, coated(0.5, 1.5));
+    differs(CRT_FEATURE_CLEARCOAT, 0, coated(0.5, 1));  // its microfacets reflect nothing
+    differs(CRT_FEATURE_CLEARCOAT | CRT_FEATURE_MIRROR, CRT_FEATURE_DIFFUSE, [&](Scene& s) {
+        coated(0, 1.5)(s);
+        for (crt::Material& m : s.materials) m.type = crt::MaterialType::Mirror;
+    });
+    // What transmits has none.
+    differs(CRT_FEATURE_DIELECTRIC, 0, [&](Scene& s) {
+        other(crt::MaterialType::Dielectric)(s);
+        coated(0, 1.5)(s);
+        s.materials[1].clearcoat = std::exchange(s.materials[0].clearcoat, std::nullopt);
+    });
     const auto rough_base = [&](double roughness) {
         return [=](Scene& s) {
             other(crt::MaterialType::Plastic)(s);

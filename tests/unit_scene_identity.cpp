@@ -143,6 +143,22 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
     fuzz("its weight", 0.75, 0.5, 0.5);
     fuzz("its colour", 0.5, 0.75, 0.5);
     fuzz("its roughness", 0.5, 0.5, 0.75);
+    const auto coat = [&](const char* what, double ior, double roughness, double depth, double darkening,
+                          double base) {
+        differs(what, [=](Scene& s) {
+            s.materials[0].clearcoat = crt::Clearcoat{.ior = ior,
+                                                      .roughness = roughness,
+                                                      .depth = crt::constantSpectrum(depth),
+                                                      .darkening = darkening,
+                                                      .base_roughness = base};
+        });
+    };
+    coat("a coat", 1.5, 0.5, 0.5, 0.5, 0.5);
+    coat("its index", 1.75, 0.5, 0.5, 0.5, 0.5);
+    coat("its roughness", 1.5, 0.75, 0.5, 0.5, 0.5);
+    coat("its colour", 1.5, 0.5, 0.75, 0.5, 0.5);
+    coat("its darkening", 1.5, 0.5, 0.5, 0.75, 0.5);
+    coat("the roughness below it", 1.5, 0.5, 0.5, 0.5, 0.75);
     for (const double roughness : {0.5, 0.75})
         differs("a rough base", [=](Scene& s) {
             s.materials[0].type = crt::MaterialType::Plastic;

@@ -74,6 +74,7 @@ TEST_CASE("openpbr becomes crt's own materials, mixed", "[scene_yaml]") {
         CHECK((part.fuzz == 0.25 && part.fuzz_roughness == 0.5 &&
                part.fuzz_color == constantSpectrum(0.75)));
     CHECK(materials("specular_weight: 0")[0].type == MaterialType::Diffuse);
+    CHECK_FALSE(plain[0].clearcoat);
     CHECK(materials("transmission_weight: 1, specular_roughness: 0")[0].type == MaterialType::Dielectric);
     const Material wine = materials(
         "transmission_weight: 1, transmission_color: 0.5, transmission_depth: 3")[0];
@@ -94,4 +95,68 @@ TEST_CASE("openpbr becomes crt's own materials, mixed", "[scene_yaml]") {
     CHECK(film[0].film_thickness_nm == 0);
     CHECK(film[1].film_thickness_nm == 250);
     CHECK(film[1].film_index == constantSpectrum(1.6));
+}
+
+TEST_CASE("openpbr's coat lies on each of its parts, which are others below it", "[scene_yaml]") {
+    const auto materials = [](const std::string& keys) {
+        return parse("materials: {m: {type: openpbr, " + keys + "}}\n").materials;
+    };
+    const std::vector<Material> plain = materials("coat_weight: 1");
+    REQUIRE(plain.size() == 1);
+    REQUIRE(plain[0].clearcoat);
+    CHECK(plain[0].clearcoat->ior == 1.6);
+    CHECK(plain[0].clearcoat->roughness == 0);
+    CHECK(plain[0].clearcoat->depth == constantSpectrum(0));
+    CHECK(plain[0].clearcoat->darkening == 1);
+    // Of the two indices the one above 1.
+    CHECK(plain[0].type == MaterialType::Plastic);
+    CHECK(plain[0].eta[0] == Approx(1.6 / 1.5));
+    CHECK(materials("coat_weight: 1, specular_ior: 2, coat_ior: 1.25")[0].eta[0] == Approx(1.6));
+    CHECK(materials("coat_weight: 1, coat_ior: 1.5")[0].type == MaterialType::Diffuse);
+    CHECK(plain[0].roughness == 0.3);
+    // How rough it is below: diffuse, but for what the gloss reflects straight on.
+    const double reflected = std::pow(0.1 / 3.1, 2);
+    CHECK(plain[0].clearcoat->base_roughness == Approx(1 - 0.7 * reflected));
+    CHECK(materials("coat_weight: 1, coat_ior: 1.5")[0].clearcoat->base_roughness == 1);
+    const Material metal = materials("coat_weight: 1, base_metalness: 1, coat_roughness: 0.5, "
+                                     "specular_roughness: 0.25, coat_color: 0.25, coat_darkening: 0.5")[0];
+    CHECK(metal.type == MaterialType::RoughConductor);
+    CHECK(metal.roughness == Approx(std::pow(std::pow(0.25, 4) + 2 * std::pow(0.5, 4), 0.25)));
+    CHECK(metal.clearcoat->roughness == 0.5);
+    CHECK(metal.clearcoat->base_roughness == 0.25);
+    CHECK(metal.clearcoat->darkening == 0.5);
+    CHECK(metal.clearcoat->depth.isConstant());
+    CHECK(metal.clearcoat->depth[0] == Approx(std::log(2.0)));  // half of the way
+    CHECK(materials("coat_weight: 1, base_metalness: 1, coat_roughness: 1")[0].roughness == 1);
+    const Material red =
+        materials("coat_weight: 1, coat_color: {rgb: [0.8, 0.2, 0.1], space: linear}")[0];
+    CHECK_FALSE(red.clearcoat->depth.isConstant());
+    CHECK(red.clearcoat->depth[100] > 2 * red.clearcoat->depth[280]);
+    CHECK(materials("coat_weight: 1, coat_color: 0")[0].clearcoat->depth.max() < 1e3);
+    // In part: the bare base and the coated one, each as it is.
+    const std::vector<Material> mixed =
+        materials("coat_weight: 0.25, base_metalness: 0.5, coat_roughness: 0.5, specular_roughness: 0");
+    REQUIRE(mixed.size() == 7);
+    const auto part = [&](const Material& of, std::size_t i) -> const Material& {
+        return mixed[static_cast<std::size_t>(of.parts[i])];
+    };
+    const Material& whole = mixed[6];
+    CHECK(whole.type == MaterialType::Mix);
+    CHECK(whole.amount == 0.25);
+    for (const std::size_t i : {0u, 1u}) {
+        CHECK_FALSE(part(part(whole, 0), i).clearcoat);
+        CHECK(part(part(whole, 0), i).roughness == 0);
+        CHECK(part(part(whole, 1), i).clearcoat);
+        CHECK(part(part(whole, 1), i).roughness == Approx(std::pow(0.125, 0.25)));
+    }
+    CHECK(part(part(whole, 0), 0).eta[0] == Approx(1.5));
+    CHECK(part(part(whole, 1), 0).eta[0] == Approx(1.6 / 1.5));
+    const std::vector<Material> worn = materials("coat_weight: {checker: [0, 1]}");
+    REQUIRE(worn.size() == 3);
+    CHECK(worn[2].amount_texture != kNoTexture);
+    // Of a coat that is not there keys say nothing.
+    const Material bare = materials("coat_roughness: 1, coat_color: 0, coat_ior: 3")[0];
+    CHECK_FALSE(bare.clearcoat);
+    CHECK(bare.roughness == 0.3);
+    CHECK(bare.eta[0] == Approx(1.5));
 }

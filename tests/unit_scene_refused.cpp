@@ -289,7 +289,18 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     };
     for (const auto& [keys, why, instead] :
          {std::tuple{"subsurface_weight: 1", "wanders below a surface", "leave 'subsurface_weight' out"},
-          std::tuple{"coat_weight: 1", "no coats on openpbr", "take a plastic"},
+          std::tuple{"coat_weight: 0.5, transmission_weight: 0.5", "coats lie on what is opaque",
+                     "leave 'coat_weight'"},
+          std::tuple{"coat_weight: {checker: [0, 1]}, coat_ior: 0.9", "an index of 1 to 10", "from 1 to 10"},
+          std::tuple{"coat_weight: 1, coat_ior: 11", "an index of 1 to 10", "from 1 to 10"},
+          std::tuple{"coat_weight: 1, coat_roughness: 0.5, coat_roughness_anisotropy: 0.5",
+                     "as rough in every direction", "leave 'coat_roughness_anisotropy'"},
+          std::tuple{"coat_weight: 1, coat_roughness: 0.5, base_metalness: 1, "
+                     "specular_roughness: {checker: [0, 1]}",
+                     "worked out for one roughness", "'coat_roughness' 0"},
+          std::tuple{"coat_weight: 1, emission_luminance: 1", "the coat would take",
+                     "leave 'coat_weight'"},
+          std::tuple{"coat_weight: 1, specular_ior: 17", "an index of 1 to 10", "from 1 on"},
           std::tuple{"fuzz_weight: 1, emission_luminance: 1", "take some of the light",
                      "leave 'fuzz_weight'"},
           std::tuple{"geometry_thin_walled: true", "no thin walls", "take a thin_dielectric"},
@@ -315,6 +326,16 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     // Of slabs that are not there keys may say anything.
     CHECK_NOTHROW(parse("materials: {m: {type: openpbr, base_metalness: 1, base_diffuse_roughness: 1, "
                        "transmission_color: 0.5, specular_color: 0.5}}\n"));
+    CHECK_NOTHROW(parse("materials: {m: {type: openpbr, transmission_weight: 1, emission_luminance: 1, "
+                       "coat_ior: 0.5, coat_roughness: 1, coat_roughness_anisotropy: 1}}\n"));
+    CHECK_NOTHROW(parse("materials: {m: {type: openpbr, coat_weight: 1, coat_roughness_anisotropy: 1, "
+                       "base_metalness: 1, specular_roughness: {checker: [0, 1]}, "
+                       "transmission_weight: 1}}\n"));
+    // Under a coat of its own index there is no gloss, whose roughness would be seen.
+    CHECK_NOTHROW(parse("materials: {m: {type: openpbr, coat_weight: 1, coat_ior: 1.5, "
+                       "specular_roughness: {checker: [0, 1]}}}\n"));
+    CHECK_THAT(refusedOpenPbr("coat_weight: 0.5, coat_ior: 1.5, specular_roughness: {checker: [0, 1]}"),
+               Contains("equally rough everywhere"));
     const std::string lamp = "materials: {m: {type: openpbr, emission_luminance: 1}, "
                              "t: {type: two_sided, front: m, back: m}}\n";
     CHECK_THAT(refused(lamp), Contains("material 'm' emits light") && Contains("give the object"));
@@ -323,7 +344,9 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
                        " emission: {radiance: 1}}\n"),
                Contains("emits light already") && Contains("leave 'emission'"));
     CHECK_THAT(refusedOpenPbr("emission_luminance: -1"), Contains("'emission_luminance'"));
-    CHECK_THAT(refusedOpenPbr("coat_color: 1"), Contains("unknown key 'coat_color'"));
+    CHECK_THAT(refusedOpenPbr("coat_colour: 1"), Contains("unknown key 'coat_colour'"));
+    CHECK_THAT(refusedOpenPbr("coat_weight: 1.5"), Contains("'coat_weight'"));
+    CHECK_THAT(refusedOpenPbr("coat_color: 2"), Contains("'coat_color'"));
     CHECK_THAT(refused("materials: {m: {type: openpbr, transmission_weight: 0.5}, "
                        "t: {type: two_sided, front: m, back: m}}\n"),
                Contains("lets light through"));

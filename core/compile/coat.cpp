@@ -35,7 +35,10 @@ Coat makeCoat(double eta, double roughness) {
     return coat;
 }
 
-std::pair<double, double> keyOf(const Material& plastic) { return {plastic.eta[0], plastic.roughness}; }
+using Key = std::pair<double, double>;
+
+Key keyOf(const Material& plastic) { return {plastic.eta[0], plastic.roughness}; }
+Key keyOf(const Clearcoat& coat) { return {coat.ior, coat.roughness}; }
 
 }  // namespace
 
@@ -48,11 +51,17 @@ double coatAlbedo(double cosine, double eta, double alpha) {
 
 const Coat& coatOf(const Coats& coats, const Material& plastic) { return coats.at(keyOf(plastic)); }
 
+const Coat& coatOf(const Coats& coats, const Clearcoat& clearcoat) { return coats.at(keyOf(clearcoat)); }
+
 Coats coatsOf(const std::vector<const Material*>& materials) {
     Coats coats;
-    for (const Material* material : materials)
-        if (material && material->type == MaterialType::Plastic && !coats.contains(keyOf(*material)))
-            coats.emplace(keyOf(*material), makeCoat(material->eta[0], material->roughness));
+    const auto add = [&](const Key& key) {
+        if (!coats.contains(key)) coats.emplace(key, makeCoat(key.first, key.second));
+    };
+    for (const Material* material : materials) {
+        if (material && material->type == MaterialType::Plastic) add(keyOf(*material));
+        if (material && hasClearcoat(*material)) add(keyOf(*material->clearcoat));
+    }
     return coats;
 }
 

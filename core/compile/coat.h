@@ -1,4 +1,5 @@
-/// The clear coats of plastics: what they reflect from above and from below, worked out before rendering.
+/// The clear coats of plastics, and those that lie on any material: what they reflect from above and from
+/// below, worked out before rendering.
 #pragma once
 
 #include "scene/scene.h"
@@ -21,8 +22,15 @@ struct Coat {
 using Coats = std::map<std::pair<double, double>, Coat>;
 
 const Coat& coatOf(const Coats& coats, const Material& plastic);
+const Coat& coatOf(const Coats& coats, const Clearcoat& clearcoat);
 
-/// Those of all plastics among the materials, each worked out once. Null materials are skipped.
+/// Whether a coat lies on it itself; what a material is made of has the coat, where it is made of others.
+inline bool hasClearcoat(const Material& material) {
+    return material.clearcoat && !material.isComposed() && !material.transmits();
+}
+
+/// Those of all plastics among the materials, and of what lies on any of them, each worked out once. Null
+/// materials are skipped.
 Coats coatsOf(const std::vector<const Material*>& materials);
 
 /// E(θ): the share that GGX microfacets of width `alpha` on an interface of relative index `eta` mirror

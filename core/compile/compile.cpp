@@ -129,7 +129,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.normals = blob.append(flat.normals);
     header.materials = blob.append(materials.records);
     header.compositions = blob.append(compileCompositions(used, texture_part));
-    header.layers = blob.append(compileLayers(used, tables, spectra));
+    header.layers = blob.append(compileLayers(used, tables, spectra, texture_part));
     header.losses = appendLosses(blob, tables.compensations);
 
     header.spectra = blob.append(spectra.floats());

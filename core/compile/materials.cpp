@@ -62,6 +62,10 @@ std::vector<const Spectrum*> spectraOf(const Material& material, const MaterialT
     std::vector<const Spectrum*> all = spectraOfSurface(material, tables);
     if (hasThinFilm(material)) all.push_back(&material.film_index);
     if (hasFuzz(material)) all.push_back(&material.fuzz_color);
+    if (hasClearcoat(material)) {
+        all.push_back(&material.clearcoat->depth);
+        all.push_back(&coatOf(tables.coats, *material.clearcoat).albedo);
+    }
     if (hasRoughBase(material)) all.push_back(&tables.rough_bases.at(&material).loss);
     return all;
 }
@@ -192,6 +196,7 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (record.film_thickness != 0) part.features |= CRT_FEATURE_THIN_FILM;
         if (record.narrowing > 0) part.features |= CRT_FEATURE_ANISOTROPY;
         if (hasFuzz(*material)) part.features |= CRT_FEATURE_FUZZ;
+        if (hasClearcoat(*material)) part.features |= CRT_FEATURE_CLEARCOAT;
         if (hasRoughBase(*material)) part.features |= CRT_FEATURE_ROUGH_BASE;
         if ((record.flags & CRT_MATERIAL_OPENPBR) != 0) part.features |= CRT_FEATURE_OPENPBR;
     }
@@ -232,7 +237,8 @@ std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const 
 }
 
 std::vector<kernel::CrtLayers> compileLayers(const std::vector<const Material*>& materials,
-                                             const MaterialTables& tables, const SpectrumTable& spectra) {
+                                             const MaterialTables& tables, const SpectrumTable& spectra,
+                                             const TexturePart& textures) {
     std::vector<kernel::CrtLayers> records;
     bool needed = false;
     for (const Material* material : materials) {
@@ -249,6 +255,20 @@ std::vector<kernel::CrtLayers> compileLayers(const std::vector<const Material*>&
             record.fuzz_weight = static_cast<float>(material->fuzz);
             record.fuzz_roughness = static_cast<float>(material->fuzz_roughness);
             record.fuzz_color = spectra.valueOf(material->fuzz_color);
+            needed = true;
+        }
+        if (material && hasClearcoat(*material)) {
+            const Clearcoat& coat = *material->clearcoat;
+            const Coat& table = coatOf(tables.coats, coat);
+            record.clear_ior = static_cast<float>(coat.ior);
+            record.clear_roughness = static_cast<float>(coat.roughness);
+            record.clear_albedo = spectra.valueOf(table.albedo);
+            record.clear_depth = spectra.valueOf(coat.depth);
+            record.clear_internal = static_cast<float>(table.internal_reflectance);
+            record.clear_darkening = static_cast<float>(coat.darkening);
+            record.clear_base = material->roughness_texture != kNoTexture
+                                    ? textures.valueOf(material->roughness_texture)
+                                    : valueOf(coat.base_roughness);
             needed = true;
         }
         records.push_back(record);

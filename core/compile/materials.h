@@ -46,7 +46,8 @@ std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const 
 
 /// What they have besides, in their order; none where no material has anything.
 std::vector<kernel::CrtLayers> compileLayers(const std::vector<const Material*>& materials,
-                                             const MaterialTables& tables, const SpectrumTable& spectra);
+                                             const MaterialTables& tables, const SpectrumTable& spectra,
+                                             const TexturePart& textures);
 
 /// Fills in one a triangle, by primitive id. `light_of` as of LightPart.
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,

@@ -45,7 +45,7 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(header.lights.count > header.point_lights.count + (samples_environment ? 1u : 0u),
          CRT_FEATURE_AREA_LIGHT);
     need(scatters(scene) && header.lights.count > 0 && header.nee &&
-             (materials.features & (CRT_FEATURES_LOBE | CRT_FEATURE_FUZZ)) != 0,
+             (materials.features & (CRT_FEATURES_LOBE | CRT_FEATURE_FUZZ | CRT_FEATURE_CLEARCOAT)) != 0,
          CRT_FEATURE_NEE);
     need(header.environment != CRT_NONE, CRT_FEATURE_ENVIRONMENT);
     need(header.environment_image.count > 0, CRT_FEATURE_ENVIRONMENT_IMAGE);
@@ -96,6 +96,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_NORMAL_MAP)) left_out("normal maps", "no material has one");
     if (!has(CRT_FEATURE_THIN_FILM)) left_out("thin films", "no surface has one");
     if (!has(CRT_FEATURE_OPENPBR)) left_out("OpenPBR's colours", "no material is said by them");
+    if (!has(CRT_FEATURE_CLEARCOAT)) left_out("coats", "no surface has one on top");
     if (!has(CRT_FEATURE_FUZZ)) left_out("fuzz", "no surface has any");
     if (!has(CRT_FEATURE_ROUGH_BASE)) left_out("rough diffuse bases", "all are Lambert's");
     if (!has(CRT_FEATURE_ANISOTROPY)) left_out("anisotropy", "all surfaces are as rough in every direction");

@@ -170,6 +170,12 @@ SceneTrait materialsTrait(const Scene& scene) {
         for (const double number : {material.diffuse_roughness, material.fuzz, material.fuzz_roughness})
             digest.add(number);
         digest.add(material.fuzz_color);
+        if (material.clearcoat) {
+            const Clearcoat& coat = *material.clearcoat;
+            for (const double number : {coat.ior, coat.roughness, coat.darkening, coat.base_roughness})
+                digest.add(number);
+            digest.add(coat.depth);
+        }
         for (const Spectrum* spectrum : {&material.reflectance, &material.eta, &material.k})
             digest.add(*spectrum);
     }

@@ -85,6 +85,14 @@ CRT_FN vec3 crt_fuzz_direction(const CrtBsdf *b, CrtRandom2 u) {
     return normalize3(axis * x + cross3(b->ns, axis) * (disk.y / b->fuzz_width) + b->ns * z);
 }
 
+/* Of `below`, the value of what lies under the fuzz, and *pdf, its density: those of both. */
+CRT_FN vec4 crt_add_fuzz(const CrtBsdf *b, vec3 wi, vec4 below, f32 *pdf) {
+    f32 pdf_fuzz;
+    const vec4 fuzz = crt_fuzz(b, wi, &pdf_fuzz);
+    *pdf = (1.0f - b->fuzz_chance) * *pdf + b->fuzz_chance * pdf_fuzz;
+    return below * (1.0f - b->fuzz_albedo) + fuzz;
+}
+
 CRT_KERNEL_END
 
 #endif

@@ -4,6 +4,8 @@
  * every struct a multiple of 16 bytes, sizes asserted. A change here changes CRT_LAYOUT_HASH, and plugins
  * built with another hash are refused.
  *
+ * Over 450 lines: one layout, which is hashed as it lies here.
+ *
  * Units: the scene is moved to its centre and scaled by a power of two at load (lengths here are in these
  * units); radiance in W·m⁻²·sr⁻¹·nm⁻¹; wavelengths in nm.
  */
@@ -229,9 +231,16 @@ typedef struct CrtLayers {
     f32 fuzz_weight;     /* share of the surface that fuzz lies on */
     f32 fuzz_roughness;
     CrtValue fuzz_color;
-    u32 reserved;
+    f32 clear_ior;          /* coat: its index; 0: there is none; otherwise: */
+    f32 clear_roughness;
+    CrtValue clear_albedo;  /* a table of what it mirrors by the cosine; 0: it is smooth */
+    CrtValue clear_depth;   /* what is left of light that crosses it straight on is exp(−depth) */
+    f32 clear_internal;     /* share of diffuse light from below that it sends back */
+    f32 clear_darkening;    /* how much of what is lost by that is lost */
+    CrtValue clear_base;    /* how rough what lies below is, to that end */
+    u32 reserved[2];
 } CrtLayers;
-CRT_ASSERT_SIZE(CrtLayers, 32);
+CRT_ASSERT_SIZE(CrtLayers, 64);
 
 #define CRT_LIGHT_TRIANGLE 0u
 #define CRT_LIGHT_PARALLELOGRAM 1u /* two triangles */

@@ -67,6 +67,12 @@ typedef struct CrtBsdf {
     f32 fuzz_chance;  /* of sampling it */
     vec4 fuzz_color;  /* times what it takes */
     f32 fuzz_width, fuzz_lean; /* of its lobe (fuzz.h) */
+    f32 clear_eta;    /* index of the coat (clearcoat.h); 0: there is none; otherwise: */
+    f32 clear_alpha;  /* width of its GGX; 0: it is smooth */
+    f32 clear_albedo; /* what it mirrors of light towards w_o */
+    f32 clear_chance; /* of sampling it */
+    vec4 clear_below; /* what is left of what lies below, but for the way in */
+    vec4 clear_depth; /* of which exp(−depth) is left straight on */
     vec4 again;       /* of what is reflected more than once, to be multiplied with the loss towards w_i */
     vec4 albedo;      /* for the first-hit output; only where it is asked for */
     int facet;        /* it is of a mapped surface (normal_map.h); then: */

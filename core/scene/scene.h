@@ -104,6 +104,17 @@ inline constexpr int kDeepestComposition = 8;
 /// How deep the mixes are that an openpbr material becomes.
 inline constexpr int kDeepestOpenPbr = 3;
 
+/// The coat of OpenPBR Surface 1.1 (kernel/clearcoat.h), on what reflects alone.
+struct Clearcoat {
+    double ior = 1.6;       ///< At least 1.
+    double roughness = 0;   ///< In [0,1].
+    Spectrum depth;         ///< What is left of light that crosses it straight on is exp(−depth).
+    double darkening = 1;   ///< How much of what it sends back to the base, and the base absorbs, is lost.
+    /// How rough what lies below is, as the darkening sees it. In [0,1]; of a material with a textured
+    /// roughness that is in its place.
+    double base_roughness = 1;
+};
+
 struct Material {
     std::string name;
     MaterialType type = MaterialType::Diffuse;
@@ -144,6 +155,7 @@ struct Material {
     double fuzz = 0;            ///< Share of the surface that fuzz lies on. In [0,1].
     Spectrum fuzz_color;        ///< In [0,1].
     double fuzz_roughness = 0;  ///< In [0,1].
+    std::optional<Clearcoat> clearcoat;  ///< Below the fuzz. Not of what transmits.
 
     bool isComposed() const { return type == MaterialType::Mix || type == MaterialType::TwoSided; }
     bool isOpaque() const { return opacity >= 1 && opacity_texture == kNoTexture; }

@@ -78,9 +78,9 @@ const std::vector<Case>& registry() {
         for (const auto group :
              {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases, pointLightCases,
               environmentCases, spectralFilmCases, stiffCases, scatteringCases, glasswareCases,
-              thinFilmCases, anisotropyCases, openPbrCases, compositionCases, shadingNormalCases,
-              colourCases, textureCases, accumulationCases, imageCases, inputCases, backendCases,
-              exactRelationCases, mutantCases, contactCases})
+              thinFilmCases, anisotropyCases, openPbrCases, openPbrCoatCases, compositionCases,
+              shadingNormalCases, colourCases, textureCases, accumulationCases, imageCases, inputCases,
+              backendCases, exactRelationCases, mutantCases, contactCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

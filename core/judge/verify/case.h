@@ -103,6 +103,7 @@ std::vector<Case> shadingNormalCases();  ///< G, interpolated normals and normal
 std::vector<Case> thinFilmCases();       ///< G, thin films
 std::vector<Case> anisotropyCases();     ///< G, brushed surfaces
 std::vector<Case> openPbrCases();        ///< G, openpbr
+std::vector<Case> openPbrCoatCases();    ///< G, coats
 std::vector<Case> colourCases();         ///< H
 std::vector<Case> textureCases();        ///< H, the part about textures
 std::vector<Case> accumulationCases();   ///< I

@@ -1,6 +1,7 @@
 // Group G, the part about openpbr materials: metals by their colours, glossy bases, and that what is left
 // when weights are 0 or 1 is crt's own material.
 #include "judge/verify/context.h"
+#include "judge/verify/floors.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
 #include "judge/verify/shapes.h"
@@ -18,33 +19,6 @@ namespace crt::verify {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-
-/// A floor of the material, seen at an angle in light 1 from everywhere.
-std::string floorOf(const std::string& material, double degrees) {
-    return Stage(eyeAt({std::sin(degrees * kDegree), std::cos(degrees * kDegree), 0}, "[0, 0, 1]"))
-        .material("it", material)
-        .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
-        .set("environment", "{radiance: 1}")
-        .yaml();
-}
-
-/// The same, lit by a beam that brings irradiance 1 to a plane that faces it. z is along the normal.
-std::string floorInBeam(const std::string& material, const Vec3d& view, const Vec3d& light) {
-    return Stage(eyeAt({view[1], view[2], view[0]}, "[0.6, 0.3, 0.1]"))
-        .material("it", material)
-        .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
-        .set("lights", fmt::format("[{{type: directional, direction: {}, irradiance: 1}}]",
-                                   point({-light[1], -light[2], -light[0]})))
-        .yaml();
-}
-
-/// Radiance of that, over what the wavelengths of these few samples make of radiance 1.
-double inBeam(Context& context, const std::string& material, const Vec3d& view, const Vec3d& light) {
-    const auto seen = [&](const std::string& of) {
-        return radiance(context.render(floorInBeam(of, view, light), {.samples = 16}));
-    };
-    return seen(material) / seen("{type: diffuse, reflectance: 1}") * light[2] / std::numbers::pi;
-}
 
 void metals(Context& context) {
     const Render how{.samples = 1u << 12};
@@ -162,7 +136,6 @@ void limits(Context& context) {
          "thin_film_ior: 1.3",
          "{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 300, ior: 1.3}}");
     for (const auto& [key, word] : {std::pair{"subsurface_weight: 0.5", "wanders below"},
-                                    std::pair{"coat_weight: 1", "no coats"},
                                     std::pair{"fuzz_weight: 1, emission_luminance: 1", "the fuzz would"}})
         context.refused(key, fmt::format("crt: 1\nmaterials: {{it: {{type: openpbr, {}}}}}\n", key), word);
 }

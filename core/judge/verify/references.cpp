@@ -360,10 +360,15 @@ double brushedReflection(const Vec3d& view, const Vec3d& light, double roughness
     return (once + lost / (kPi * it.meanLoss())) * light[2];
 }
 
-double plasticAlbedo(double cosine, double base, double eta, double roughness) {
+double internalReflectance(double eta, double roughness) {
     const double mean = boost::math::quadrature::gauss<double, 20>::integrate(
         [&](double c) { return 2 * c * roughReflectance(c, eta, roughness, 6); }, 0.0, 1.0);
-    const double below = 1 - (1 - mean) / (eta * eta), above = roughReflectance(cosine, eta, roughness);
+    return 1 - (1 - mean) / (eta * eta);
+}
+
+double plasticAlbedo(double cosine, double base, double eta, double roughness) {
+    const double below = internalReflectance(eta, roughness);
+    const double above = roughReflectance(cosine, eta, roughness);
     double sum = above, round = (1 - above) * base;  // the share that leaves the base for the first time
     for (int i = 0; i < 10000 && round > 1e-12; ++i, round *= below * base) sum += round * (1 - below);
     return sum;

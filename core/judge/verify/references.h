@@ -82,6 +82,28 @@ ScatteredShares roughDielectricShares(double cosine, double eta, double roughnes
 /// light through it is η² times as much one way as the other.
 double plasticAlbedo(double cosine, double base, double eta, double roughness);
 
+/// Of diffuse light from below, the share that such a coat sends back.
+double internalReflectance(double eta, double roughness);
+
+/// The coat of OpenPBR Surface 1.1, by the formulas of its section on coats, on a base that is said to be
+/// so rough.
+struct Lacquer {
+    double ior = 1.6, roughness = 0, color = 1, darkening = 1, base_roughness = 1;
+
+    /// Of light from everywhere the share that it mirrors towards a view; what is left of the rest of what
+    /// the base, of such an albedo straight on, loses by reflections inside; what is left of light that
+    /// crosses it once, on its way to a direction outside.
+    double mirrored(double cosine) const;
+    double darkened(double cosine, double base) const;
+    double passed(double cosine) const;
+    /// Radiance towards `view` of what it mirrors, where it is rough, of a beam from `light` that brings
+    /// irradiance 1 to a plane that faces it (z along the normal); and factor on that of what lies below.
+    double reflection(const Vec3d& view, const Vec3d& light) const;
+    double below(const Vec3d& view, const Vec3d& light, double base) const;
+    /// Of light from everywhere, the share that is sent towards a view by the coat and a Lambertian base.
+    double albedo(double cosine, double base) const;
+};
+
 /// EON (Portsmouth, Kutz and Hill 2025) of reflectance `rho` and roughness r, by the closed forms of the
 /// paper: radiance towards `view` of a surface lit by a beam from `light` that brings irradiance 1 to a
 /// plane that faces it (z along the normal); and of light from everywhere the share towards `cosine`.

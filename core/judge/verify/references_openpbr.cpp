@@ -70,6 +70,44 @@ double glossyEonAlbedo(double cosine, double rho, double r, double eta) {
     return gloss + (1 - gloss) * (rho * here + eonRounds(rho, lost) * (1 - here));
 }
 
+double Lacquer::mirrored(double cosine) const { return microfacetShares(cosine, ior, roughness).reflected; }
+
+double Lacquer::darkened(double cosine, double base) const {
+    const double specular = fresnelDielectric(cosine, ior);
+    const double k = std::lerp(specular, internalReflectance(ior, roughness), base_roughness);
+    return std::lerp(1.0, (1 - k) / (1 - base * k), darkening);
+}
+
+double Lacquer::passed(double cosine) const {
+    const double inside = std::sqrt(1 - (1 - cosine * cosine) / (ior * ior));
+    return std::pow(std::sqrt(color), 1 / inside);
+}
+
+double Lacquer::reflection(const Vec3d& view, const Vec3d& light) const {
+    const double a2 = std::pow(roughness, 4);
+    const Vec3d h = unit(view + light);
+    const auto lambda = [&](double c) { return (std::sqrt(1 + a2 * (1 - c * c) / (c * c)) - 1) / 2; };
+    const double spread = h[2] * h[2] * (a2 - 1) + 1;
+    const double density = a2 / (kPi * spread * spread);
+    return fresnelDielectric(dot(view, h), ior) * density /
+           ((1 + lambda(view[2]) + lambda(light[2])) * 4 * view[2]);
+}
+
+double Lacquer::below(const Vec3d& view, const Vec3d& light, double base) const {
+    return (1 - mirrored(view[2])) * darkened(view[2], base) * passed(view[2]) * passed(light[2]);
+}
+
+double Lacquer::albedo(double cosine, double base) const {
+    constexpr int kSteps = 4096;
+    double sum = 0;
+    for (int i = 0; i < kSteps; ++i) {
+        const double c = (i + 0.5) / kSteps;
+        sum += 2 * c * passed(c) / kSteps;
+    }
+    const double gloss = mirrored(cosine);
+    return gloss + (1 - gloss) * darkened(cosine, base) * passed(cosine) * base * sum;
+}
+
 double sheenAlbedo(double x, double y) {
     const double width = y * (0.0206607 + 1.58491 * y) / (0.0379424 + 1.32227 * y + y * y);
     const double middle =

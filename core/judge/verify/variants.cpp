@@ -101,6 +101,11 @@ std::vector<Variant> variants(int resolution) {
             material.fuzz_roughness = 0.4;
         }
     });
+    add("coats, tinted", [](Scene& s) {
+        for (Material& material : s.materials)
+            if (!material.transmits())
+                material.clearcoat = Clearcoat{.ior = 1.5, .roughness = 0.3, .depth = constantSpectrum(0.2)};
+    });
     add("rough diffuse bases", [](Scene& s) {
         for (Material& material : s.materials)
             if (material.type == MaterialType::Diffuse) {

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -26,6 +28,14 @@ double modulatedIndex(double ior, double weight) {
     const double amplitude = std::abs((1 - ior) / (1 + ior));
     const double changed = std::copysign(std::min(1.0, std::sqrt(weight) * amplitude), ior - 1);
     return (1 + changed) / (1 - changed);
+}
+
+double reflectedStraightOn(double index) { return (1 - index) * (1 - index) / ((1 + index) * (1 + index)); }
+
+/// −ln of what is left.
+double opticalDepth(double left) {
+    constexpr double kLeast = 1e-30;  // single precision has next to nothing below
+    return left < 1 ? -std::log(std::max(left, kLeast)) : 0.0;
 }
 
 /// Cauchy's two terms, from the index at Fraunhofer's line d and Abbe's number.
@@ -52,12 +62,17 @@ struct ObjectReader::OpenPbr {
     Spectrum transmission_color = constantSpectrum(1);
     double transmission_depth = 0, dispersion_scale = 0, abbe = 20;
     double film_weight = 0, film_um = 0.5, film_ior = 1.4;
+    Weight coat{};
+    Spectrum coat_color = constantSpectrum(1);
+    double coat_roughness = 0, coat_anisotropy = 0, coat_ior = 1.6, coat_darkening = 1;
 
     double emission_luminance = 0;
     Spectrum emission_color = rgbEmission({1, 1, 1});
 
     void read();
     void refuse() const;
+    template <class No>
+    void refuseCoat(const No& no) const;
     Material make();
     std::int32_t emission() const;
 
@@ -67,12 +82,19 @@ private:
     bool isMetal() const { return metalness.mayBeAbove0(); }
     bool isOpaque() const { return metalness.mayBeBelow1() && transmission.mayBeBelow1(); }
     bool isClear() const { return metalness.mayBeBelow1() && transmission.mayBeAbove0(); }
-    double index() const { return modulatedIndex(ior, specular_weight); }
+    /// Under a coat, of the two indices that is above 1 which says how they differ: light that comes through
+    /// the coat is never reflected totally by what lies below.
+    double index(bool coated = false) const {
+        const double ratio = coated ? std::max(ior / coat_ior, coat_ior / ior) : ior;
+        return modulatedIndex(ratio, specular_weight);
+    }
     void setColor(Material& part) const;
-    void setRoughness(Material& part) const;
-    Material metal() const;
-    Material glossy() const;
+    void setRoughness(Material& part, bool coated) const;
+    void setCoat(Material& part, double base_roughness) const;
+    Material metal(bool coated) const;
+    Material glossy(bool coated) const;
     Material clear(bool under_film) const;
+    Material base(bool coated) const;
     Material mixed(const char* what, Material first, Material second, const Weight& amount) const;
 };
 
@@ -117,9 +139,34 @@ void ObjectReader::OpenPbr::read() {
     if (std::optional<Spectrum> s =
             reader.spectra_.read(section, "emission_color", SpectrumUse::Emission))
         emission_color = *std::move(s);
+    number("coat_weight", coat);
+    color("coat_color", coat_color);
+    section.read("coat_roughness", coat_roughness);
+    section.read("coat_roughness_anisotropy", coat_anisotropy);
+    section.read("coat_ior", coat_ior);
+    section.read("coat_darkening", coat_darkening);
     section.read("thin_film_weight", film_weight);
     section.read("thin_film_thickness", film_um);
     section.read("thin_film_ior", film_ior);
+}
+
+template <class No>
+void ObjectReader::OpenPbr::refuseCoat(const No& no) const {
+    const bool has = coat.mayBeAbove0();
+    no(has && isClear(), "coat_weight",
+       "light would be bent by the coat and by what lies below, and crt's coats lie on what is opaque",
+       "leave 'coat_weight' or 'transmission_weight' out");
+    no(has && (coat_ior < 1 || coat_ior > 10), "coat_ior", "a coat has an index of 1 to 10",
+       "give 'coat_ior' from 1 to 10");
+    no(has && coat_roughness > 0 && coat_anisotropy > 0, "coat_roughness_anisotropy",
+       "a coat is as rough in every direction: what it reflects is tabulated",
+       "leave 'coat_roughness_anisotropy' out");
+    no(has && coat_roughness > 0 && isMetal() && roughness.isTextured(), "specular_roughness",
+       "under a rough coat the metal is rougher, which is worked out for one roughness",
+       "give 'specular_roughness' a number, or 'coat_roughness' 0");
+    no(has && emission_luminance > 0, "emission_luminance",
+       "the coat would take some of the light, and crt's lamps lie on top",
+       "leave 'coat_weight' or 'emission_luminance' out");
 }
 
 /// Each sentence is about what would be seen: keys of a slab that is not there may say anything.
@@ -127,22 +174,22 @@ void ObjectReader::OpenPbr::refuse() const {
     const auto no = [&](bool seen, const char* key, const char* why, const char* instead) {
         if (seen) section.error(key, why, instead);
     };
-    for (const auto& [key, why, instead] :
-         {std::tuple{"subsurface_weight", "crt has no light that wanders below a surface",
-                     "leave 'subsurface_weight' out: the base is diffuse then"},
-          std::tuple{"coat_weight", "crt has no coats on openpbr materials yet",
-                     "leave 'coat_weight' out, or take a plastic for a coat on a diffuse base"}}) {
-        double weight = 0;
-        if (section.read(key, weight)) no(weight > 0, key, why, instead);
-    }
+    double subsurface = 0;
+    if (section.read("subsurface_weight", subsurface))
+        no(subsurface > 0, "subsurface_weight", "crt has no light that wanders below a surface",
+           "leave 'subsurface_weight' out: the base is diffuse then");
     no(emission_luminance > 0 && like.fuzz > 0, "emission_luminance",
        "the fuzz would take some of the light, and crt's lamps lie on top",
        "leave 'fuzz_weight' or 'emission_luminance' out");
+    refuseCoat(no);
     bool thin_walled = false;
     if (section.read("geometry_thin_walled", thin_walled))
         no(thin_walled, "geometry_thin_walled", "crt has no thin walls of openpbr materials",
            "take a thin_dielectric");
-    const bool coated = isOpaque() && index() != 1;
+    const auto indices = [&](auto&& are) {
+        return (coat.mayBeBelow1() && are(index())) || (coat.mayBeAbove0() && are(index(true)));
+    };
+    const bool coated = isOpaque() && indices([](double n) { return n != 1; });
     no(base_texture != kNoTexture && base_weight != 1, "base_weight",
        "a texture is the colour itself: crt has no factor on it", "leave 'base_weight' out");
     no(isMetal() && specular_weight > 1, "specular_weight",
@@ -156,7 +203,7 @@ void ObjectReader::OpenPbr::refuse() const {
     no(coated && roughness.isTextured(), "specular_roughness",
        "the gloss on an opaque base is equally rough everywhere: what it reflects is tabulated",
        "give a number, or 'base_metalness' or 'transmission_weight' 1");
-    no(coated && (index() < 1 || index() > 10), "specular_ior",
+    no(coated && indices([](double n) { return n < 1 || n > 10; }), "specular_ior",
        "the gloss on an opaque base has an index of 1 to 10, after 'specular_weight' has changed it",
        "give 'specular_ior' from 1 on, and a smaller 'specular_weight'");
     no(isClear() && !(index() <= 1e3 && index() >= 1e-3), "specular_weight",
@@ -192,34 +239,53 @@ void ObjectReader::OpenPbr::setColor(Material& part) const {
     part.reflectance = scaled(base_color, base_weight);
 }
 
-void ObjectReader::OpenPbr::setRoughness(Material& part) const {
+/// What is seen through a rough coat is seen through it twice.
+void ObjectReader::OpenPbr::setRoughness(Material& part, bool coated) const {
     part.roughness = roughness.value;
     part.roughness_texture = roughness.texture;
+    if (coated && coat_roughness > 0)
+        part.roughness = std::min(1.0, std::sqrt(std::hypot(roughness.value * roughness.value,
+                                                            std::numbers::sqrt2 * coat_roughness *
+                                                                coat_roughness)));
 }
 
-Material ObjectReader::OpenPbr::metal() const {
+void ObjectReader::OpenPbr::setCoat(Material& part, double base_roughness) const {
+    Clearcoat& it = part.clearcoat.emplace();
+    it.ior = coat_ior;
+    it.roughness = coat_roughness;
+    it.depth = coat_color.isConstant() ? constantSpectrum(opticalDepth(coat_color[0]) / 2) : coat_color;
+    if (!coat_color.isConstant())
+        for (double& depth : it.depth.values) depth = opticalDepth(depth) / 2;
+    it.darkening = coat_darkening;
+    it.base_roughness = base_roughness;
+}
+
+Material ObjectReader::OpenPbr::metal(bool coated) const {
     Material part = like;
     part.type = MaterialType::RoughConductor;
     part.by_color = true;
     part.edge_tint = specular_color;
     part.weight = specular_weight;
     setColor(part);
-    setRoughness(part);
+    setRoughness(part, coated);
+    if (coated) setCoat(part, roughness.value);
     return part;
 }
 
-Material ObjectReader::OpenPbr::glossy() const {
+Material ObjectReader::OpenPbr::glossy(bool coated) const {
     Material part = like;
     setColor(part);
     part.diffuse_roughness = diffuse_roughness;
-    if (index() == 1) {
+    const double n = index(coated);
+    if (coated) setCoat(part, std::lerp(1.0, roughness.value, reflectedStraightOn(n)));
+    if (n == 1) {
         makeRoughDiffuse(part);
         return part;
     }
     part.type = MaterialType::Plastic;
     part.by_color = true;
-    part.eta = constantSpectrum(index());
-    part.roughness = roughness.value;
+    part.eta = constantSpectrum(n);
+    setRoughness(part, coated);
     return part;
 }
 
@@ -228,7 +294,7 @@ Material ObjectReader::OpenPbr::clear(bool under_film) const {
     part.type = MaterialType::RoughDielectric;
     part.eta = dispersion_scale > 0 ? dispersed(index(), abbe / dispersion_scale)
                                     : constantSpectrum(index());
-    setRoughness(part);
+    setRoughness(part, false);
     if (!roughness.mayBeAbove0()) part.type = MaterialType::Dielectric;
     if (transmission_depth > 0 && !isWhite(transmission_color)) {
         Spectrum absorption;
@@ -262,15 +328,22 @@ Material ObjectReader::OpenPbr::mixed(const char* what, Material first, Material
     return whole;
 }
 
-Material ObjectReader::OpenPbr::make() {
-    Material dielectric = glossy();
+Material ObjectReader::OpenPbr::base(bool coated) const {
+    Material dielectric = glossy(coated);
     if (isClear()) {
         const Weight film{film_um > 0 ? film_weight : 0};
         Material translucent = film.value > 0
                                    ? mixed("film", clear(false), clear(true), film) : clear(false);
         dielectric = mixed("transmission", std::move(dielectric), std::move(translucent), transmission);
     }
-    return mixed("metalness", std::move(dielectric), metal(), metalness);
+    return mixed(coated ? "coated metalness" : "metalness", std::move(dielectric), metal(coated), metalness);
+}
+
+Material ObjectReader::OpenPbr::make() {
+    if (!coat.mayBeAbove0()) return base(false);
+    if (!coat.mayBeBelow1()) return base(true);
+    Material bare = base(false);
+    return mixed("coat", std::move(bare), base(true), coat);
 }
 
 void ObjectReader::makeRoughDiffuse(Material& material) {

@@ -80,15 +80,15 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
         "material/openpbr",
         "an openpbr material",
         "A part of [OpenPBR Surface 1.1](https://academysoftwarefoundation.github.io/OpenPBR/), by its "
-        "names: base, specular, transmission, thin film, fuzz, emission and opacity. It becomes materials "
-        "of crt, mixed by `base_metalness` and `transmission_weight`, and all light is spectral. A metal is "
-        "a `rough_conductor` that reflects F82-tint's curve (below 0 beside the dip of a dark tint: 0). A "
-        "glossy base is a `plastic` in the reciprocal form of the specification, which gives `base_color` "
-        "to what comes out of the gloss; a clear one is a `rough_dielectric`, its `specular_weight` an "
-        "index. Rough surfaces give back what microfacets lose, as elsewhere in crt. Coat, subsurface "
-        "and thin walls are refused where they would be seen, and so is what the material that it becomes "
-        "has not; the message says what to write instead. Keys of the specification that are not in this "
-        "table are unknown.",
+        "names: base, specular, transmission, coat, thin film, fuzz, emission and opacity. It becomes "
+        "materials of crt, mixed by `base_metalness`, `transmission_weight` and `coat_weight`, and all "
+        "light is spectral. A metal is a `rough_conductor` that reflects F82-tint's curve (below 0 beside "
+        "the dip of a dark tint: 0). A glossy base is a `plastic` in the reciprocal form of the "
+        "specification, which gives `base_color` to what comes out of the gloss; a clear one is a "
+        "`rough_dielectric`, its `specular_weight` an index. Rough surfaces give back what microfacets "
+        "lose, as elsewhere in crt. Subsurface and thin walls are refused where they would be seen, and so "
+        "is what the material that it becomes has not; the message says what to write instead. Keys of the "
+        "specification that are not in this table are unknown.",
         {typeKey("openpbr", "material"), weight("base_weight", "1", "Factor on `base_color`."),
          color("base_color", "0.8",
                "Of metals what they reflect straight on, of others what comes out of the base.", true),
@@ -119,7 +119,23 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
          amount("thin_film_thickness", {.min = 0, .max = 20}, "0.5", "How thick the film is.", "µm"),
          amount("thin_film_ior", {.min = 0.1, .max = 10}, "1.4", "Its index relative to the outside."),
          refused("subsurface_weight", "no light wanders below surfaces."),
-         refused("coat_weight", "there are no coats yet."),
+         weight("coat_weight", "0",
+                "Share of the surface that a coat lies on: a clear or tinted dielectric, like lacquer. It "
+                "mirrors white; what lies below gets the rest, and has the index `specular_ior` relative to "
+                "the coat's (or the inverse, where that is above 1). A clear base has no coat.",
+                true),
+         color("coat_color", "1",
+               "What is left of white light that crosses the coat straight on, in and out. Along the "
+               "surface its way is longer, and the colour deeper."),
+         weight("coat_roughness", "0",
+                "As `roughness` of `plastic`. What is seen through a rough coat is rougher: "
+                "(`specular_roughness`⁴ + 2 `coat_roughness`⁴)^¼, at most 1."),
+         weight("coat_roughness_anisotropy", "0", "Above 0 it is refused where the coat is rough."),
+         amount("coat_ior", {.min = 1e-3, .max = 1e3}, "1.6",
+                "Its index relative to the outside. Below 1 and above 10 it is refused."),
+         weight("coat_darkening", "1",
+                "1: the base gets darker and more saturated under the coat, which sends light back to it; "
+                "0: it keeps its colour."),
          weight("fuzz_weight", "0",
                 "Share of the surface that fibres stand on, like velvet or dust: bright along the surface "
                 "(Zeltner, Burley and Chiang 2022). What they take of light towards the viewer, whatever "
@@ -131,7 +147,7 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
          amount("emission_luminance", kNotNegative, "0",
                 "Light that the front side emits, equally in all directions, on top of what it scatters. "
                 "`geometry_opacity` takes its share. An object of this material has no `emission` then, and "
-                "the material no fuzz.",
+                "the material no fuzz and no coat.",
                 "cd/m²"),
          {.name = "emission_color",
           .kind = Kind::Spectrum,
