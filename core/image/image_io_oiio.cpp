@@ -414,14 +414,24 @@ std::uint32_t texelType(const ImageSpec& spec) {
     }
 }
 
-std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
-                        char* reason, std::uint32_t reason_size) {
+enum class Part { Color, Alpha };
+
+std::vector<int> channelsOf(const ImageSpec& spec, Part part) {
+    if (part == Part::Color) return colorChannels(spec);
+    return spec.alpha_channel >= 0 ? std::vector<int>{spec.alpha_channel} : std::vector<int>{};
+}
+
+std::int32_t readPart(Part part, const char* path, CrtTexelsInfo* info, void* buffer,
+                      std::uint64_t buffer_bytes, char* reason, std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
         *info = {};
         if (beginningOf(path).compare(0, 3, "\xff\xd8\xff") == 0) {
             const std::string why =
-                crt::image::readJpeg(path, info, static_cast<unsigned char*>(buffer), buffer_bytes);
+                crt::image::readJpeg(path, info,
+                                     part == Part::Color ? static_cast<unsigned char*>(buffer) : nullptr,
+                                     buffer_bytes);
             if (!why.empty()) throw Failure{why};
+            if (part == Part::Alpha) info->channels = 0;
             return;
         }
         ImageSpec spec, wishes;
@@ -433,7 +443,7 @@ std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std
         crt::image::checkPixels(path, width, height,
                                 static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
         crt::image::checkRows(width, height, spec.pixel_bytes(true));
-        const std::vector<int> channels = colorChannels(spec);
+        const std::vector<int> channels = channelsOf(spec, part);
         info->width = static_cast<std::uint32_t>(width);
         info->height = static_cast<std::uint32_t>(height);
         info->channels = static_cast<std::uint32_t>(channels.size());
@@ -448,7 +458,7 @@ std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std
         const std::size_t pixel = channels.size() * type.size();
         if (width * height * pixel != buffer_bytes) throw Failure{"it has changed while it was read"};
         auto* const bytes = static_cast<unsigned char*>(buffer);
-        if (std::strcmp(input->format_name(), "png") == 0 &&
+        if (part == Part::Color && std::strcmp(input->format_name(), "png") == 0 &&
             crt::image::readPng(path, *info, bytes, buffer_bytes))
             return;
         for (std::size_t c = 0; c < channels.size();) {
@@ -460,6 +470,16 @@ std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std
             c = end;
         }
     });
+}
+
+std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
+                        char* reason, std::uint32_t reason_size) {
+    return readPart(Part::Color, path, info, buffer, buffer_bytes, reason, reason_size);
+}
+
+std::int32_t readAlpha(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
+                       char* reason, std::uint32_t reason_size) {
+    return readPart(Part::Alpha, path, info, buffer, buffer_bytes, reason, reason_size);
 }
 
 void freeImage(const CrtImagePlanes* image) { delete static_cast<const OwnedImage*>(image); }
@@ -478,6 +498,7 @@ extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
                                       writePng,
                                       readImage,
                                       freeImage,
-                                      readTexels};
+                                      readTexels,
+                                      readAlpha};
     return &table;
 }

@@ -18,8 +18,8 @@ extern "C" {
 
 #define CRT_IMAGE_MODULE_FILE "crt_image_oiio.so"
 /* The symbol carries the version: a module of another version does not have it. */
-#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v3
-#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v3"
+#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v4
+#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v4"
 
 typedef struct CrtImageText {
     const char *name;
@@ -82,6 +82,9 @@ typedef struct CrtImageModule {
        bytes that an earlier *info says, [height][width][channels], too. */
     int32_t (*read_texels)(const char *path, CrtTexelsInfo *info, void *buffer, uint64_t buffer_bytes,
                            char *reason, uint32_t reason_size);
+    /* The same of alpha: one channel, or none (info->channels is 0) where all of the image is there. */
+    int32_t (*read_alpha)(const char *path, CrtTexelsInfo *info, void *buffer, uint64_t buffer_bytes,
+                          char *reason, uint32_t reason_size);
 } CrtImageModule;
 
 typedef const CrtImageModule *(*CrtImageModuleEntry)(void);

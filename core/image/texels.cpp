@@ -9,7 +9,11 @@
 
 #include <fmt/format.h>
 
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -78,15 +82,71 @@ TexelsInfo infoOf(const CrtTexelsInfo& raw) {
     return info;
 }
 
+enum class Part { Color, Alpha };
+
 /// Header, and pixels where there is a buffer.
-TexelsInfo readWithModule(const std::string& path, void* buffer, std::uint64_t bytes) {
+TexelsInfo readWithModule(const std::string& path, Part part, void* buffer, std::uint64_t bytes) {
     const CrtImageModule& module = imageModule(path, ErrorKind::Scene);
     CrtTexelsInfo raw{};
     std::array<char, 512> reason{};
-    if (module.read_texels(path.c_str(), &raw, buffer, bytes, reason.data(), reason.size()) != 0)
+    const auto read = part == Part::Color ? module.read_texels : module.read_alpha;
+    if (read(path.c_str(), &raw, buffer, bytes, reason.data(), reason.size()) != 0)
         refuse(path, reason.data());
     requireSize(path, raw.width, raw.height);
     return infoOf(raw);
+}
+
+Texels readPart(const std::string& path, Part part) {
+    Texels texels;
+    texels.info = readWithModule(path, part, nullptr, 0);
+    if (texels.info.channels == 0) return texels;
+    texels.bytes.reserve(texels.info.bytes());
+    adviseHugePages(texels.bytes.data(), texels.bytes.capacity());
+    texels.bytes.resize(texels.info.bytes());
+    readWithModule(path, part, texels.bytes.data(), texels.bytes.size());
+    return texels;
+}
+
+/// Bytes under a path, for libraries that open a file by its name. Nothing is written to a disk.
+class MemoryFile {
+public:
+    explicit MemoryFile(const ImageSource& source) : descriptor_(::memfd_create("crt image", MFD_CLOEXEC)) {
+        bool good = descriptor_ >= 0;
+        for (std::size_t at = 0; good && at < source.bytes->size();) {
+            const ssize_t written =
+                ::write(descriptor_, source.bytes->data() + at, source.bytes->size() - at);
+            if (written > 0) at += static_cast<std::size_t>(written);
+            good = written > 0 || (written < 0 && errno == EINTR);
+        }
+        if (good) return;
+        const int why = errno;
+        if (descriptor_ >= 0) ::close(descriptor_);
+        refuse(source.name, fmt::format("there is no memory for it: {}", std::strerror(why)));
+    }
+    ~MemoryFile() { ::close(descriptor_); }
+    MemoryFile(const MemoryFile&) = delete;
+    MemoryFile& operator=(const MemoryFile&) = delete;
+    std::string path() const { return fmt::format("/proc/self/fd/{}", descriptor_); }
+
+private:
+    int descriptor_;
+};
+
+/// What `read` makes of the image's path. Messages name the image.
+template <class Read>
+auto readSource(const ImageSource& source, const Read& read) {
+    if (!source.bytes) return read(source.name);
+    const MemoryFile file(source);
+    const std::string path = file.path();
+    try {
+        return read(path);
+    } catch (const Error& e) {
+        std::string sentence = e.what();
+        for (std::size_t at = 0; (at = sentence.find(path, at)) != std::string::npos;
+             at += source.name.size())
+            sentence.replace(at, path.size(), source.name);
+        throw Error(e.kind(), sentence, {source.name});
+    }
 }
 
 template <class Code>
@@ -111,19 +171,32 @@ std::uint64_t TexelsInfo::bytes() const { return count() * channels * bytesOf(ty
 TexelsInfo texelsInfo(const std::string& path) {
     requireFile(path);
     if (isPfm(path)) return readPfm(path).info;
-    return readWithModule(path, nullptr, 0);
+    return readWithModule(path, Part::Color, nullptr, 0);
 }
 
 Texels readTexels(const std::string& path) {
     requireFile(path);
     if (isPfm(path)) return readPfm(path);
+    return readPart(path, Part::Color);
+}
+
+Texels readAlpha(const std::string& path) {
+    requireFile(path);
+    if (!isPfm(path)) return readPart(path, Part::Alpha);
     Texels texels;
-    texels.info = readWithModule(path, nullptr, 0);
-    texels.bytes.reserve(texels.info.bytes());
-    adviseHugePages(texels.bytes.data(), texels.bytes.capacity());
-    texels.bytes.resize(texels.info.bytes());
-    readWithModule(path, texels.bytes.data(), texels.bytes.size());
+    texels.info = texelsInfo(path);
+    texels.info.channels = 0;
     return texels;
+}
+
+TexelsInfo texelsInfo(const ImageSource& source) {
+    return readSource(source, [](const std::string& path) { return texelsInfo(path); });
+}
+Texels readTexels(const ImageSource& source) {
+    return readSource(source, [](const std::string& path) { return readTexels(path); });
+}
+Texels readAlpha(const ImageSource& source) {
+    return readSource(source, [](const std::string& path) { return readAlpha(path); });
 }
 
 std::vector<float> linearOfCodes(TexelType type, TexelColor color) {

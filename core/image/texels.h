@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,7 +18,7 @@ enum class TexelType { Uint8, Uint16, Float };
 
 struct TexelsInfo {
     std::uint32_t width = 0, height = 0;
-    std::uint32_t channels = 0;  ///< 1: grey; 3: red, green, blue. Alpha is left out.
+    std::uint32_t channels = 0;  ///< 1: grey, or alpha; 3: red, green, blue; 0: there is no alpha.
     TexelType type = TexelType::Uint8;
     std::optional<std::array<double, 8>> chromaticities;  ///< Of floats, where the file says them.
 
@@ -38,6 +39,18 @@ TexelsInfo texelsInfo(const std::string& path);
 
 /// The pixels too. Throws crt::Error(Scene) also for one that is truncated or damaged.
 Texels readTexels(const std::string& path);
+
+/// The alpha of an image's pixels; one that has none has no channels and no bytes. Throws as readTexels().
+Texels readAlpha(const std::string& path);
+
+/// An image in a file of its own, or as bytes in a file of another kind.
+struct ImageSource {
+    std::string name;  ///< For messages: the path, or "a.glb (image 2)".
+    std::shared_ptr<const std::string> bytes{};  ///< Null: `name` is the path of a file.
+};
+TexelsInfo texelsInfo(const ImageSource& source);
+Texels readTexels(const ImageSource& source);
+Texels readAlpha(const ImageSource& source);
 
 /// How the numbers of a file are meant.
 enum class TexelColor {

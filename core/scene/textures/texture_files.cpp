@@ -130,6 +130,33 @@ void encodeShorts(const Texels& texels, TexelColor color, std::span<std::uint16_
     });
 }
 
+/// Codes of 8 or 16 bits times a factor for each channel.
+template <class Code>
+void encodeScaled(const Texels& texels, const TexelUse& use, std::span<std::uint16_t> words) {
+    const SigmoidTable& table = SigmoidTable::get();
+    std::array<std::vector<float>, 3> linear;
+    std::array<std::vector<SigmoidTable::Level>, 3> levels;
+    for (std::size_t k = 0; k < 3; ++k) {
+        linear[k] = linearOfCodes(texels.info.type, use.color);
+        for (float& value : linear[k]) value = static_cast<float>(value * use.factor[k]);
+        levels[k] = levelsOf(linear[k]);
+    }
+    const std::size_t channels = texels.info.channels;
+    parallelFor(texels.info.count(), kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) {
+            std::array<std::size_t, 3> code;
+            std::array<float, 3> color;
+            for (std::size_t k = 0; k < 3; ++k) {
+                code[k] = codeAt<Code>(texels.bytes, i * channels + (channels == 3 ? k : 0));
+                color[k] = linear[k][code[k]];
+            }
+            const std::size_t channel = largestOf(color);
+            const auto texel = texelOf(table.coefficients(color, channel, levels[channel][code[channel]]));
+            std::copy(texel.begin(), texel.end(), &words[3 * i]);
+        }
+    });
+}
+
 /// What floats may hold beyond a reflectance.
 struct Odd {
     std::atomic<std::uint64_t> outside{0};
@@ -158,9 +185,11 @@ struct Odd {
     }
 };
 
-void encodeFloats(const Texels& texels, TexelColor color, const std::string& path,
+void encodeFloats(const Texels& texels, const TexelUse& use, const std::string& path,
                   std::span<std::uint16_t> words) {
-    const std::vector<float> rgb = linearRgb(texels, color, path);
+    std::vector<float> rgb = linearRgb(texels, use.color, path);
+    if (use.hasFactor())
+        for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<float>(rgb[i] * use.factor[i % 3]);
     const SigmoidTable& table = SigmoidTable::get();
     Odd odd(texels.info.count());
     parallelFor(texels.info.count(), kPart, [&](std::size_t first, std::size_t end) {
@@ -175,18 +204,36 @@ void encodeFloats(const Texels& texels, TexelColor color, const std::string& pat
     odd.tell(texels, path);
 }
 
-void encodeSpectra(const Texels& texels, TexelColor color, const std::string& path,
+void encodeSpectra(const Texels& texels, const TexelUse& use, const std::string& path,
                    std::span<std::uint16_t> words) {
+    const bool scaled = use.hasFactor();
     switch (texels.info.type) {
-        case TexelType::Uint8: return encodeBytes(texels, color, words);
-        case TexelType::Uint16: return encodeShorts(texels, color, words);
-        case TexelType::Float: return encodeFloats(texels, color, path, words);
+        case TexelType::Uint8:
+            return scaled ? encodeScaled<std::uint8_t>(texels, use, words)
+                          : encodeBytes(texels, use.color, words);
+        case TexelType::Uint16:
+            return scaled ? encodeScaled<std::uint16_t>(texels, use, words)
+                          : encodeShorts(texels, use.color, words);
+        case TexelType::Float: return encodeFloats(texels, use, path, words);
     }
+}
+
+/// Threshold and factor of numbers, on their words.
+void change(const TexelUse& use, std::span<std::uint16_t> words) {
+    if (use.cutoff < 0 && use.factor[0] == 1) return;
+    parallelFor(words.size(), kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) {
+            double value = words[i] / 65535.0;
+            if (use.cutoff >= 0) value = value >= use.cutoff ? 1 : 0;
+            words[i] = static_cast<std::uint16_t>(value * use.factor[0] * 65535 + 0.5);
+        }
+    });
 }
 
 void encodeNumbers(const Texels& texels, std::size_t channel, const std::string& path,
                    std::span<std::uint16_t> words) {
     const std::size_t channels = texels.info.channels, offset = channels == 3 ? channel : 0;
+    if (channels == 0) return std::fill(words.begin(), words.end(), std::uint16_t{65535});
     Odd odd(texels.info.count());
     parallelFor(texels.info.count(), kPart, [&](std::size_t first, std::size_t end) {
         for (std::size_t i = first; i < end; ++i) {
@@ -243,8 +290,21 @@ std::shared_ptr<const TextureImage> TextureFiles::open(const std::string& path, 
     std::error_code unknown;
     const std::string same = std::filesystem::weakly_canonical(path, unknown).string();
     auto& known = open_[{unknown ? path : same, use}];
-    if (known) return known;
-    const TexelsInfo info = texelsInfo(path);
+    if (!known) known = make({path}, use);
+    return known;
+}
+
+std::shared_ptr<const TextureImage> TextureFiles::open(const ImageSource& source, const TexelUse& use) {
+    if (!source.bytes) return open(source.name, use);
+    auto& known = open_[{source.name, use}];
+    if (!known) known = make(source, use);
+    return known;
+}
+
+std::shared_ptr<const TextureImage> TextureFiles::make(const ImageSource& source,
+                                                       const TexelUse& use) const {
+    const std::string& path = source.name;
+    const TexelsInfo info = texelsInfo(source);
     if (use.kind == TexelKind::Spectra) (void)primariesToSrgb(info, path);  // refuses those it does not know
     if (use.kind == TexelKind::Normals && info.channels != 3)
         throw Error(ErrorKind::Scene,
@@ -257,19 +317,23 @@ std::shared_ptr<const TextureImage> TextureFiles::open(const std::string& path, 
     image->width = info.width;
     image->height = info.height;
     image->kind = use.kind;
-    image->decode = [path, use, width = info.width, height = info.height](std::span<std::uint16_t> words) {
-        const Texels texels = readTexels(path);
+    image->decode = [source, use, width = info.width,
+                     height = info.height](std::span<std::uint16_t> words) {
+        const std::string& file = source.name;
+        const bool alpha = use.kind == TexelKind::Numbers && use.channel == kAlphaChannel;
+        const Texels texels = alpha ? readAlpha(source) : readTexels(source);
         if (texels.info.width != width || texels.info.height != height)
             throw Error(ErrorKind::Scene,
-                        fmt::format("the image '{}' has changed since its header was read", path), {path});
+                        fmt::format("the image '{}' has changed since its header was read", file), {file});
         if (use.kind == TexelKind::Spectra)
-            encodeSpectra(texels, use.color, path, words);
+            encodeSpectra(texels, use, file, words);
         else if (use.kind == TexelKind::Normals)
-            encodeNormals(texels, path, words);
+            encodeNormals(texels, file, words);
         else
-            encodeNumbers(texels, use.channel, path, words);
+            encodeNumbers(texels, alpha ? 0 : use.channel, file, words);
+        if (use.kind == TexelKind::Numbers) change(use, words);
     };
-    return known = std::move(image);
+    return image;
 }
 
 }  // namespace crt

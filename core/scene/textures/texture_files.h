@@ -17,18 +17,28 @@ namespace crt {
 struct TexelUse {
     TexelKind kind = TexelKind::Spectra;
     TexelColor color = TexelColor::Auto;  ///< Spectra. Numbers are taken as they are.
-    std::size_t channel = 0;              ///< Numbers: which of red, green and blue.
+    std::size_t channel = 0;              ///< Numbers: which of red, green, blue and alpha.
+    std::array<double, 3> factor{1, 1, 1};  ///< In [0, 1], on linear colours; of numbers the first.
+    double cutoff = -1;  ///< Numbers: 0 below it, 1 from it on, before the factor; below 0: as they are.
 
     auto operator<=>(const TexelUse&) const = default;
+
+    bool hasFactor() const { return factor != std::array<double, 3>{1, 1, 1}; }
 };
+
+inline constexpr std::size_t kAlphaChannel = 3;
 
 /// The images of a scene. The same file, used in the same way, is one image.
 class TextureFiles {
 public:
     /// Reads the header. Throws crt::Error(Scene) as texelsInfo() does.
     std::shared_ptr<const TextureImage> open(const std::string& path, const TexelUse& use);
+    /// The same of an image that may lie in a file of another kind. Of one name there is one image.
+    std::shared_ptr<const TextureImage> open(const ImageSource& source, const TexelUse& use);
 
 private:
+    std::shared_ptr<const TextureImage> make(const ImageSource& source, const TexelUse& use) const;
+
     std::map<std::pair<std::string, TexelUse>, std::shared_ptr<const TextureImage>> open_;
 };
 
