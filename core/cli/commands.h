@@ -10,6 +10,7 @@ class CommandLine;
 
 Command renderCommand();
 Command infoCommand();
+Command importCommand();
 Command compareCommand();
 Command mergeCommand();
 Command developCommand();

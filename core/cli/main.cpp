@@ -25,8 +25,9 @@ int main(int argc, char** argv) {
     try {
         crt::CommandLine line;
         for (crt::Command (*command)() :
-             {crt::renderCommand, crt::infoCommand, crt::compareCommand, crt::mergeCommand,
-              crt::developCommand, crt::convergeCommand, crt::referenceCommand, crt::verifyCommand,
+             {crt::renderCommand, crt::infoCommand, crt::importCommand, crt::compareCommand,
+              crt::mergeCommand, crt::developCommand, crt::convergeCommand, crt::referenceCommand,
+              crt::verifyCommand,
               crt::pluginsCommand, crt::dataCommand, crt::schemaCommand})
             line.add(command());
         line.add(crt::helpCommand(line));

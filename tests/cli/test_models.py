@@ -27,6 +27,67 @@ environment: {radiance: 1}
 SQUARE = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\n"
 
 
+def glb(mesh=0):
+    """A square, placed twice; a node names mesh `mesh`, of which there is one."""
+    positions = struct.pack("<12f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0)
+    root = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"mesh": mesh}, {"mesh": 0, "translation": [1.5, 0, 0], "rotation": [0, 0.6, 0, 0.8]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 6, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.3, 0, 1], "metallicFactor": 0}}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 4}],
+        "bufferViews": [{"buffer": 0, "byteLength": len(positions)}],
+        "buffers": [{"byteLength": len(positions)}],
+    }
+    text = json.dumps(root).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I", len(text)) + b"JSON" + text
+    chunks += struct.pack("<I", len(positions)) + b"BIN\0" + positions
+    return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+
+
+class Imports(CliTest):
+    def write_glb(self, **what):
+        with open(self.path("a.glb"), "wb") as file:
+            file.write(glb(**what))
+
+    def test_a_model_and_its_import_have_equal_pictures(self):
+        if BACKEND == "none":
+            self.skipTest("there is no backend that renders")
+        self.write_glb()
+        self.crt("import", "a.glb", "-o", "a.yaml")
+        small = ("--spp", "4", "--set", "film.resolution=[48,32]", "-b", BACKEND)
+        self.crt("a.glb", *small, "-o", "model.pfm")
+        self.crt("a.yaml", *small, "-o", "scene.pfm")
+        self.crt("compare", "model.pfm", "scene.pfm", expect=0)
+        with open(self.path("model.pfm"), "rb") as one, open(self.path("scene.pfm"), "rb") as other:
+            self.assertEqual(one.read(), other.read())
+
+    def test_what_was_chosen_is_said_and_written(self):
+        self.write_glb()
+        done = self.crt("import", "a.glb")
+        self.assertIn("# Chosen: the file has no camera.", done.stdout)
+        self.assertIn("a.glb: not in the file, and chosen: a camera that sees all of it; a white sky",
+                      done.stderr)
+
+    def test_a_scene_that_is_there_is_kept(self):
+        self.write_glb()
+        self.write("a.yaml", "mine")
+        self.assertIn("--overwrite", self.crt("import", "a.glb", "-o", "a.yaml", expect=2).stderr)
+        with open(self.path("a.yaml")) as file:
+            self.assertEqual(file.read(), "mine")
+        self.crt("import", "a.glb", "-o", "a.yaml", "--overwrite")
+
+    def test_what_is_wrong_has_a_place_and_ends_with_3(self):
+        self.write_glb(mesh=5)
+        for arguments in (("info", "a.glb"), ("import", "a.glb"), ("a.glb", "-b", "fake", "-o", "a.pfm")):
+            said = self.crt(*arguments, expect=3).stderr
+            self.assertIn("a.glb: /nodes/0/mesh: there is no mesh 5", said)
+        self.crt("import", "none.glb", expect=3)
+        self.crt("import", "a.yaml", expect=2)
+
+
 class Meshes(CliTest):
     def render(self, obj, keys=", material: grey", expect=0, mtl=None):
         self.write("mesh.obj", obj)

@@ -87,11 +87,12 @@ std::optional<std::vector<Vec3d>> readPoints(const SectionReader& mesh, std::str
 }  // namespace
 
 ObjectReader::ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra,
-                           TextureReader& textures, Scene& scene)
+                           TextureReader& textures, GltfFiles& gltf, Scene& scene)
     : out_(out),
       files_(files),
       spectra_(spectra),
       textures_(textures),
+      gltf_(gltf),
       scene_(scene),
       limit_(scene.input_bytes) {}
 
@@ -441,6 +442,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
 
 void ObjectReader::readObjects(const YamlNode& list) {
     for (std::size_t i = 0; i < list.items.size(); ++i) readObject(*list.items[i], list.items[i]->place, i);
+    tellGltf();
 }
 
 void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std::size_t number) {
@@ -465,6 +467,9 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     std::optional<std::uint32_t> mesh;
     if (section.has("obj") && !section.has("mesh")) {
         mesh = readObj(section, readObjUse(section, material_name));
+    } else if (section.has("gltf")) {
+        mesh = readGltf(section);
+        if (!mesh) return;
     } else if (const std::optional<SectionReader> written =
                    section.section("mesh", fmt::format("the mesh of {}", section.subject()))) {
         const auto [known, fresh] = written_meshes_.try_emplace(section.find("mesh")->value.get());

@@ -1,6 +1,7 @@
 /// Materials and objects of a scene: meshes read and checked, names looked up, placements multiplied out.
 #pragma once
 
+#include "scene/gltf/gltf_mesh.h"
 #include "scene/mesh/mesh_io.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
@@ -22,7 +23,7 @@ namespace crt {
 class ObjectReader {
 public:
     ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, TextureReader& textures,
-                 Scene& scene);
+                 GltfFiles& gltf, Scene& scene);
 
     ~ObjectReader();
 
@@ -68,6 +69,9 @@ private:
     void checkMaterials(const SectionReader& object, const LoadedMesh& loaded, const Mesh& mesh,
                         const ObjUse& use) const;
     std::optional<std::uint32_t> readMesh(const SectionReader& mesh);
+    std::optional<std::uint32_t> readGltf(const SectionReader& object);
+    void tellGltf() const;
+    Mesh gltfMesh(const SectionReader& form, const std::string& path, const GltfPrimitive& which);
     std::optional<std::int32_t> findMaterial(const std::string& name, const YamlPlace& place,
                                              bool from_mtl_possible);
     Overrides readOverrides(const SectionReader& object);
@@ -87,6 +91,7 @@ private:
     SceneFiles& files_;
     SpectrumReader& spectra_;
     TextureReader& textures_;
+    GltfFiles& gltf_;
     Scene& scene_;
     std::map<std::string, NamedMaterial> materials_;
     std::vector<std::string> material_names_;  ///< In the order of the file.
@@ -105,6 +110,11 @@ private:
     using FileUse = std::tuple<std::string, bool, MtlColor>;
     std::map<FileUse, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.
     std::map<std::pair<FileUse, Overrides>, std::uint32_t> meshes_;
+    std::map<std::pair<std::string, GltfPrimitive>, std::optional<std::uint32_t>> gltf_meshes_;
+    struct WithoutArea {
+        std::uint64_t triangles = 0, primitives = 0;
+    };
+    std::map<std::string, WithoutArea> without_area_;  ///< By glTF file.
     /// Which mesh of the scene a file's went to, and the materials that it had there.
     struct TakenMesh {
         std::uint32_t mesh;

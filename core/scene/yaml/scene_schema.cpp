@@ -6,6 +6,7 @@
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_schema_composition.h"
 #include "scene/yaml/scene_schema_films.h"
+#include "scene/yaml/scene_schema_gltf.h"
 #include "scene/yaml/scene_schema_lights.h"
 #include "scene/yaml/scene_schema_surfaces.h"
 #include "scene/yaml/scene_schema_textures.h"
@@ -671,11 +672,16 @@ void addMaterials(std::vector<SectionSchema>& all) {
 void addObjects(std::vector<SectionSchema>& all) {
     all.push_back({"object",
                    "an object",
-                   "A mesh, placed once or many times. Give `obj` or `mesh`; `transform` or `transforms`.",
+                   "A mesh, placed once or many times. Give `obj`, `gltf` or `mesh`; `transform` or "
+                   "`transforms`.",
                    {
                        {.name = "name", .doc = "For messages and reports."},
                        {.name = "obj",
                         .doc = "A Wavefront OBJ file, looked up beside the scene, then in CRT_MESH_PATH."},
+                       {.name = "gltf",
+                        .kind = Kind::Section,
+                        .section = "gltf",
+                        .doc = "Or a primitive of a glTF file or GLB; `crt import` writes scenes of them."},
                        {.name = "mesh",
                         .kind = Kind::Section,
                         .section = "mesh",
@@ -712,7 +718,7 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .section = "emission",
                         .doc = "Makes the surface a light."},
                    },
-                   {{KeyRule::Kind::ExactlyOne, {"obj", "mesh"}},
+                   {{KeyRule::Kind::ExactlyOne, {"obj", "gltf", "mesh"}},
                     {KeyRule::Kind::AtMostOne, {"transform", "transforms"}}}});
     all.push_back({"mtl",
                    "an mtl",
@@ -936,6 +942,7 @@ const std::vector<SectionSchema>& sceneSchema() {
         addAnisotropy(all);
         addOpenPbr(all);
         addObjects(all);
+        addGltf(all);
         addLights(all);
         addOutside(all);
         return all;

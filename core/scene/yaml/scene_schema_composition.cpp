@@ -73,14 +73,14 @@ void addCompositions(std::vector<SectionSchema>& all) {
         "wrong side.",
         {{.name = "texture",
           .required = true,
-          .doc = "An image in colours: PNG, JPEG, EXR, Radiance HDR or PFM. Its numbers are taken as they "
-                 "are."},
+          .doc = "An image in colours: PNG, JPEG, EXR, Radiance HDR or PFM, or a glTF file or GLB, with "
+                 "`image`. Its numbers are taken as they are."},
          {.name = "strength",
           .kind = Kind::Number,
           .range = {.min = 0, .max = 100},
           .fallback = "1",
           .doc = "Factor on the slopes: 0 is the surface's own normal."}}};
-    for (const char* name : {"filter", "wrap", "scale", "rotation_deg", "offset"})
+    for (const char* name : {"image", "filter", "wrap", "scale", "rotation_deg", "offset"})
         map.keys.push_back(*schemaOf(all, "texture/texture").find(name));
     all.push_back(std::move(map));
 }

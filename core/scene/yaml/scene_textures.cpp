@@ -23,8 +23,9 @@ double sineOfDegrees(double degrees) {
 
 }  // namespace
 
-TextureReader::TextureReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene)
-    : out_(out), files_(files), spectra_(spectra), scene_(scene) {}
+TextureReader::TextureReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, GltfFiles& gltf,
+                             Scene& scene)
+    : out_(out), files_(files), spectra_(spectra), gltf_(gltf), scene_(scene) {}
 
 bool TextureReader::isTexture(const SectionReader& section, std::string_view key) {
     const YamlEntry* entry = section.find(key);
@@ -91,6 +92,22 @@ void TextureReader::readTransform(const SectionReader& form, Texture& texture) {
     texture.transform = {c * scale[0], -s * scale[1], offset[0], s * scale[0], c * scale[1], offset[1]};
 }
 
+void TextureReader::readFactor(const SectionReader& form, TexelUse& use) const {
+    if (const YamlEntry* given = form.find("factor")) {
+        std::vector<double> factor;
+        if (given->value->kind == YamlKind::List) {
+            if (use.kind == TexelKind::Numbers)
+                form.error("factor", "the texels are numbers here: 'factor' is one number");
+            else if (form.read("factor", factor))
+                use.factor = {factor[0], factor[1], factor[2]};
+        } else if (double all = 1; form.read("factor", all)) {
+            use.factor = {all, all, all};
+        }
+    }
+    if (form.read("cutoff", use.cutoff) && use.kind != TexelKind::Numbers)
+        form.error("cutoff", "the texels are colours here; 'cutoff' is for numbers");
+}
+
 std::optional<Texture> TextureReader::readImage(const SectionReader& form, TexelKind kind) {
     Texture texture;
     form.readEnum("filter", texture.filter);
@@ -110,6 +127,7 @@ std::optional<Texture> TextureReader::readImage(const SectionReader& form, Texel
     } else if (form.has("channel")) {
         form.error("channel", "the texels are colours here; 'channel' picks one for a number");
     }
+    readFactor(form, use);
     texture.image = openImage(form, use);
     if (!texture.image) return std::nullopt;
     return texture;
@@ -123,15 +141,22 @@ std::shared_ptr<const TextureImage> TextureReader::openImage(const SectionReader
     const std::optional<std::string> path = files_.locate(name, form.place("texture"), out_);
     if (!path) return nullptr;
     std::shared_ptr<const TextureImage> image;
+    ImageSource source{*path};
     try {
-        image = images_.open(*path, use);
-        requireRoom(*image, *path);
+        if (std::uint64_t number = 0; form.read("image", number)) {
+            GltfFile& gltf = gltf_.open(*path);
+            GltfFile::Image inside = gltf.image(number);
+            for (const std::string& file : gltf.filesRead()) files_.note(file);
+            source = {inside.file.empty() ? inside.name : inside.file, inside.bytes};
+        }
+        image = images_.open(source, use);
+        requireRoom(*image, source);
     } catch (const Error& e) {
         if (e.kind() == ErrorKind::Internal) throw;
         form.error("texture", e.what());
         return nullptr;
     }
-    files_.note(*path);
+    if (!source.bytes) files_.note(source.name);
     return image;
 }
 
@@ -190,10 +215,11 @@ std::optional<Texture> TextureReader::readChecker(const SectionReader& form, con
 }
 
 /// Stops at the image that makes the scene larger than its files allow (scene_limits.h).
-void TextureReader::requireRoom(const TextureImage& image, const std::string& path) {
+void TextureReader::requireRoom(const TextureImage& image, const ImageSource& source) {
     if (!bytes_of_.try_emplace(&image, image.words()).second) return;
     std::error_code unknown;
-    const std::uintmax_t size = std::filesystem::file_size(path, unknown);
+    const std::uintmax_t size =
+        source.bytes ? source.bytes->size() : std::filesystem::file_size(source.name, unknown);
     bytes_ += 2 * image.words();
     file_bytes_ += unknown ? 0 : size;
     const std::string why =
@@ -205,7 +231,7 @@ TextureIndex TextureReader::addImage(const std::string& path, const std::array<d
                                      TextureWrap wrap, const SourcePlace& place) {
     Texture texture;
     texture.image = images_.open(path, {});
-    requireRoom(*texture.image, path);
+    requireRoom(*texture.image, {path});
     files_.note(path);
     texture.wrap = wrap;
     texture.transform = transform;

@@ -1,6 +1,7 @@
 /// Values of a scene that depend on the place: images, checkers, colours of vertices.
 #pragma once
 
+#include "scene/gltf/gltf_file.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
 #include "scene/textures/texture_files.h"
@@ -19,7 +20,8 @@ namespace crt {
 class TextureReader {
 public:
     /// All references live as long as the reader.
-    TextureReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, Scene& scene);
+    TextureReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, GltfFiles& gltf,
+                  Scene& scene);
 
     /// Whether the value under `key` is written as a texture.
     static bool isTexture(const SectionReader& section, std::string_view key);
@@ -39,16 +41,18 @@ private:
                                          const std::string& what, const KeySchema& row, TexelKind kind);
     std::optional<Texture> readImage(const SectionReader& form, TexelKind kind);
     std::shared_ptr<const TextureImage> openImage(const SectionReader& form, const TexelUse& use);
+    void readFactor(const SectionReader& form, TexelUse& use) const;
     std::optional<Texture> readChecker(const SectionReader& form, const KeySchema& row, TexelKind kind);
     bool readPart(const YamlNode& node, const std::string& what, const KeySchema& row, TexelKind kind,
                   TextureValue& value);
     void readTransform(const SectionReader& form, Texture& texture);
-    void requireRoom(const TextureImage& image, const std::string& path);
+    void requireRoom(const TextureImage& image, const ImageSource& source);
     TextureIndex add(Texture texture);
 
     Diagnostics& out_;
     SceneFiles& files_;
     SpectrumReader& spectra_;
+    GltfFiles& gltf_;
     Scene& scene_;
     TextureFiles images_;
     std::map<std::pair<const YamlNode*, TexelKind>, std::optional<TextureIndex>>

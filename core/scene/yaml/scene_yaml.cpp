@@ -1,7 +1,9 @@
+// Over 450 lines: the top of a scene, its settings, and the ways to its text.
 #include "scene/yaml/scene_yaml.h"
 
 #include "base/input_file.h"
 #include "base/log.h"
+#include "scene/import/import.h"
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_environment.h"
 #include "scene/yaml/scene_include.h"
@@ -330,7 +332,7 @@ void readOutput(const SectionReader& section, std::vector<Output>& outputs) {
     outputs.push_back(std::move(output));
 }
 
-void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene& scene) {
+void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFiles& gltf, Scene& scene) {
     const SectionReader top(out, root, root.place, schemaSection(""), "the scene");
     if (root.kind != YamlKind::Map) return;
     int version = 1;
@@ -348,8 +350,8 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
         readIntegrator(*section, scene.integrator);
     if (const auto section = top.section("sampler", "sampler")) readSampler(*section, scene.sampler);
 
-    TextureReader textures(out, files, spectra, scene);
-    ObjectReader objects(out, files, spectra, textures, scene);
+    TextureReader textures(out, files, spectra, gltf, scene);
+    ObjectReader objects(out, files, spectra, textures, gltf, scene);
     if (const YamlNode* map = top.map("materials")) objects.readMaterials(*map);
     if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
     if (const YamlNode* list = top.list("lights")) readLights(*list, out, files, spectra, scene);
@@ -368,7 +370,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, Scene&
 
 /// `path` is the file of the scene; empty for text of another origin.
 Scene parse(const std::string& yaml, const std::string& name, const std::string& path,
-            const std::vector<SceneOverride>& overrides, SceneFiles files) {
+            const std::vector<SceneOverride>& overrides, SceneFiles files, GltfFiles gltf = {}) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = name;
@@ -378,14 +380,14 @@ Scene parse(const std::string& yaml, const std::string& name, const std::string&
     SceneIncludes includes(out, files);
     if (YamlNodePtr root = includes.read(name, yaml, path)) {
         applyOverrides(root, overrides, override_sources, out);
-        readScene(*root, out, files, scene);
+        readScene(*root, out, files, gltf, scene);
     }
     out.throwIfFailed();
     checkRadiance(scene);
     scene.files_read = files.read();
     std::error_code unknown;
     for (const std::string& file : scene.files_read)
-        if (file != name) scene.input_bytes += std::filesystem::file_size(file, unknown);
+        if (file != name || isModel(name)) scene.input_bytes += std::filesystem::file_size(file, unknown);
     // A scene of a program, which may still put meshes into it.
     if (scene.files_read.empty()) scene.input_bytes = 0;
     scene.parse_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -431,6 +433,17 @@ SceneOverride parseOverride(const std::string& text) {
 }
 
 Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides) {
+    if (isModel(path)) {
+        const auto start = std::chrono::steady_clock::now();
+        GltfFiles gltf;
+        const std::string text = importModel(gltf, path);
+        SceneFiles files(std::filesystem::path(path).parent_path().string());
+        files.note(path);
+        Scene scene = parse(text, path, {}, overrides, std::move(files), std::move(gltf));
+        const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
+        scene.parse_seconds = passed.count();
+        return scene;
+    }
     const std::string text = readSceneText(path);
     SceneFiles files(std::filesystem::path(path).parent_path().string());
     if (path != kStandardInput) files.note(path);

@@ -22,6 +22,7 @@ SceneOverride parseOverride(const std::string& text);
 /// once, each as "file:line:column: error: …" with the line, a caret, and the nearest key. Relative file
 /// names in the scene are looked up beside the scene file, then in the mesh directory (CRT_MESH_PATH, or
 /// share/crt/meshes beside the installed program).
+/// A model (.glb, .gltf, .obj) is read as the scene that `crt import` writes of it.
 /// "-" is standard input, which is beside the current directory.
 Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides = {});
 

@@ -1,0 +1,96 @@
+#include "base/atomic_file.h"
+#include "base/error.h"
+#include "base/standard_output.h"
+#include "cli/commands.h"
+#include "scene/import/import.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <system_error>
+
+namespace crt {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kNotes = R"(
+The scene names the model, whose meshes and images stay where they are: materials, lights and camera are
+there to be changed. What crt does not have, and what it chose, is said in a warning and at the top of the
+scene.
+
+  crt import product.glb -o product.yaml
+  crt product.yaml --spp 256
+  crt product.glb               the same picture, without the scene in between
+)";
+
+struct Request {
+    std::string model, output;
+    bool allow_outside = false, overwrite = false;
+};
+
+void write(const std::string& path, const std::string& text, bool overwrite) {
+    std::error_code unknown;
+    if (!overwrite && fs::exists(path, unknown))
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' is there already, and may have been changed by hand; --overwrite "
+                                "replaces it",
+                                path));
+    AtomicFile file(path);
+    file.write(text.data(), text.size());
+    file.commit();
+}
+
+int import(const Request& request) {
+    if (!isModel(request.model))
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' is no model: crt imports .glb, .gltf and .obj", request.model));
+    const bool to_file = !request.output.empty() && request.output != "-";
+    ImportOptions options;
+    options.allow_outside = request.allow_outside;
+    if (to_file) {
+        options.folder = fs::path(request.output).parent_path().string();
+        if (options.folder.empty()) options.folder = ".";
+    } else {
+        options.folder = ".";
+    }
+    GltfFiles files;
+    const std::string text = importModel(files, request.model, options);
+    if (to_file)
+        write(request.output, text, request.overwrite);
+    else
+        printOut("{}", text);
+    return 0;
+}
+
+}  // namespace
+
+Command importCommand() {
+    const auto request = std::make_shared<Request>();
+    return {.name = "import",
+            .summary = "write a scene that shows a model (glTF, GLB, OBJ)",
+            .arguments = {{.name = "MODEL",
+                           .help = "a .glb, .gltf or .obj file",
+                           .read = [request](const std::string& text) { request->model = text; },
+                           .completion = completeFile({"glb", "gltf", "obj"})}},
+            .groups = {{"Options",
+                        {{.names = "-o,--output",
+                          .placeholder = "SCENE",
+                          .help = "the scene to write; standard output when left out, or -",
+                          .read = [request](const std::string& text) { request->output = text; },
+                          .completion = completeFile({"yaml", "yml"})},
+                         {.names = "--overwrite",
+                          .placeholder = {},
+                          .help = "replace a scene that is there",
+                          .read = [request](const std::string&) { request->overwrite = true; }},
+                         {.names = "--allow-outside",
+                          .placeholder = {},
+                          .help = "a glTF file may name buffers and images outside its folder",
+                          .read = [request](const std::string&) { request->allow_outside = true; }}}}},
+            .notes = kNotes,
+            .run = [request](const std::string&) { return import(*request); }};
+}
+
+}  // namespace crt

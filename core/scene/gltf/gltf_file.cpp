@@ -1,0 +1,336 @@
+#include "scene/gltf/gltf_file.h"
+
+#include "base/error.h"
+#include "base/input_file.h"
+#include "scene/gltf/gltf_json.h"
+#include "scene/gltf/gltf_model.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+namespace crt {
+namespace {
+
+namespace fs = std::filesystem;
+using Value = nlohmann::json;
+
+constexpr std::string_view kMagic = "glTF";
+
+std::uint32_t littleEndian(std::string_view bytes, std::size_t at) {
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+        value |= std::uint32_t{static_cast<unsigned char>(bytes[at + i])} << 8 * i;
+    return value;
+}
+
+int hexDigit(char c) {
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+    return -1;
+}
+
+std::string percentDecoded(std::string_view uri) {
+    std::string text;
+    for (std::size_t i = 0; i < uri.size(); ++i) {
+        const int high = uri[i] == '%' && i + 2 < uri.size() ? hexDigit(uri[i + 1]) : -1;
+        const int low = high >= 0 ? hexDigit(uri[i + 2]) : -1;
+        if (low < 0) {
+            text += uri[i];
+        } else {
+            text += static_cast<char>(16 * high + low);
+            i += 2;
+        }
+    }
+    return text;
+}
+
+/// Nothing where a character is none of base 64.
+std::optional<std::string> base64Decoded(std::string_view text) {
+    const auto digit = [](char c) {
+        if (c >= 'A' && c <= 'Z') return c - 'A';
+        if (c >= 'a' && c <= 'z') return c - 'a' + 26;
+        if (c >= '0' && c <= '9') return c - '0' + 52;
+        return c == '+' || c == '-' ? 62 : c == '/' || c == '_' ? 63 : -1;
+    };
+    while (!text.empty() && text.back() == '=') text.remove_suffix(1);
+    std::string bytes;
+    bytes.reserve(text.size() / 4 * 3 + 3);
+    std::uint32_t bits = 0;
+    int count = 0;
+    for (const char c : text) {
+        const int value = digit(c);
+        if (value < 0) return std::nullopt;
+        bits = bits << 6 | static_cast<std::uint32_t>(value);
+        count += 6;
+        if (count < 8) continue;
+        count -= 8;
+        bytes += static_cast<char>(bits >> count & 0xff);
+    }
+    return bytes;
+}
+
+/// "http", "file", "C": what stands before the first colon of a URI that names no relative file.
+std::string schemeOf(const std::string& uri) {
+    const std::size_t colon = uri.find(':');
+    if (colon == std::string::npos || colon == 0 || uri.find('/') < colon) return {};
+    const auto allowed = [](unsigned char c) { return std::isalnum(c) || c == '+' || c == '-' || c == '.'; };
+    return std::all_of(uri.begin(), uri.begin() + static_cast<std::ptrdiff_t>(colon), allowed)
+               ? uri.substr(0, colon)
+               : std::string();
+}
+
+bool isWithin(const fs::path& file, const fs::path& folder) {
+    std::error_code unknown;
+    const fs::path whole = fs::weakly_canonical(folder.empty() ? "." : folder, unknown),
+                   inner = fs::weakly_canonical(file, unknown);
+    const auto [end, rest] = std::mismatch(whole.begin(), whole.end(), inner.begin(), inner.end());
+    return !unknown && end == whole.end();
+}
+
+/// What refuses to read or write: tinygltf has no business with files.
+tinygltf::FsCallbacks noFiles() {
+    return {[](const std::string&, void*) { return false; },
+            [](const std::string& name, void*) { return name; },
+            [](std::vector<unsigned char>*, std::string*, const std::string&, void*) { return false; },
+            [](std::string*, const std::string&, const std::vector<unsigned char>&, void*) { return false; },
+            nullptr};
+}
+
+}  // namespace
+
+void GltfFile::fail(const std::string& pointer, const std::string& why) const {
+    throw Error(
+        ErrorKind::Scene,
+        pointer.empty() ? fmt::format("{}: {}", path_, why) : fmt::format("{}: {}: {}", path_, pointer, why),
+        {path_});
+}
+
+/// The chunks of a GLB; all of the content is JSON otherwise.
+void GltfFile::split() {
+    const std::string_view content = content_;
+    if (!content.starts_with(kMagic)) {
+        json_ = content;
+        if (json_.starts_with("\xef\xbb\xbf")) json_.remove_prefix(3);
+        return;
+    }
+    constexpr std::size_t kHeader = 12, kChunkHeader = 8;
+    constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
+    if (content.size() < kHeader + kChunkHeader) fail("", "this GLB ends within its header");
+    if (const std::uint32_t version = littleEndian(content, 4); version != 2)
+        fail("", fmt::format("this is a GLB of version {}; crt reads version 2", version));
+    const std::uint32_t length = littleEndian(content, 8);
+    if (length > content.size())
+        fail("", fmt::format("this GLB should have {} bytes and ends after {}", length, content.size()));
+    const std::string_view whole = content.substr(0, length);
+    std::size_t number = 0;
+    for (std::size_t at = kHeader; whole.size() >= at + kChunkHeader; ++number) {
+        const std::uint32_t size = littleEndian(whole, at), type = littleEndian(whole, at + 4);
+        at += kChunkHeader;
+        if (size > whole.size() - at)
+            fail("", fmt::format("chunk {} of this GLB should have {} bytes and has {}", number, size,
+                                 whole.size() - at));
+        if (number == 0 && type != kJsonChunk) fail("", "the first chunk of this GLB is not its JSON");
+        if (number == 0) json_ = whole.substr(at, size);
+        if (number == 1 && type == kBinaryChunk) binary_ = whole.substr(at, size);
+        at += size;
+    }
+    if (number == 0) fail("", "this GLB has no chunk");
+}
+
+/// What readers of JSON do not stand: they recurse.
+void GltfFile::checkText() const {
+    if (json_.size() > kMostSceneBytes)
+        fail("", fmt::format("its JSON has {} bytes; crt reads up to {}", json_.size(), kMostSceneBytes));
+    int depth = 0;
+    bool in_text = false;
+    for (std::size_t i = 0; i < json_.size(); ++i) {
+        const char c = json_[i];
+        if (in_text) {
+            if (c == '\\') ++i;
+            if (c == '"') in_text = false;
+        } else if (c == '"') {
+            in_text = true;
+        } else if (c == '{' || c == '[') {
+            if (++depth > kDeepestGltfJson)
+                fail("", fmt::format("its JSON is nested more than {} deep", kDeepestGltfJson));
+        } else if (c == '}' || c == ']') {
+            --depth;
+        }
+    }
+}
+
+void GltfFile::check(const GltfJson& json) {
+    json.check();
+    const auto text = [](const Value& object, const char* key) {
+        const auto found = object.find(key);
+        return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+    };
+    const Value& buffers = json.list("buffers");
+    for (std::size_t i = 0; i < buffers.size(); ++i) {
+        Buffer& buffer = buffers_.emplace_back();
+        buffer.uri = text(buffers[i], "uri");
+        buffer.bytes =
+            json.member(buffers[i], "byteLength", 0, [&] { return fmt::format("/buffers/{}", i); });
+        buffer.in_container = i == 0 && !buffers[i].contains("uri") && !binary_.empty();
+    }
+    animations_ = json.list("animations").size();
+    const Value& images = json.list("images");
+    for (std::size_t i = 0; i < images.size(); ++i) {
+        const auto at = [&] { return fmt::format("/images/{}", i); };
+        json.index(images[i], "bufferView", json.count("bufferViews"), "buffer view", at);
+        ImageSource& image = images_.emplace_back();
+        image.name = text(images[i], "name");
+        image.uri = text(images[i], "uri");
+        if (images[i].contains("bufferView")) image.view = images[i]["bufferView"].get<int>();
+    }
+}
+
+GltfFile::GltfFile(const std::string& path) : path_(path), model_(std::make_unique<tinygltf::Model>()) {
+    try {
+        content_ = readInput(path, kMostMeshBytes);
+    } catch (const InputRefused& refused) {
+        throw Error(ErrorKind::Scene, fmt::format("the glTF file '{}' {}", path, refused.what()), {path});
+    }
+    files_read_.push_back(path);
+    split();
+    checkText();
+    GltfJson json{*this, {}};
+    try {
+        json.root = Value::parse(json_.begin(), json_.end());
+    } catch (const Value::exception& e) {
+        fail("", fmt::format("its JSON cannot be read: {}", e.what()));
+    }
+    check(json);
+    // What tinygltf would read files and images for, and what crt has no use for.
+    for (const char* unused : {"buffers", "images", "animations", "extras"}) json.root.erase(unused);
+    const std::string text = json.root.dump();
+    std::vector<std::size_t> primitives;
+    for (const Value& mesh : json.list("meshes")) primitives.push_back(mesh.at("primitives").size());
+    json.root = {};
+    tinygltf::TinyGLTF reader;
+    reader.SetFsCallbacks(noFiles());
+    std::string errors, warnings;
+    bool read = false;
+    try {
+        read = reader.LoadASCIIFromString(model_.get(), &errors, &warnings, text.data(),
+                                          static_cast<unsigned>(text.size()), "", tinygltf::NO_REQUIRE);
+    } catch (const std::exception& e) {
+        errors = e.what();
+    }
+    if (!read) {
+        while (!errors.empty() && std::isspace(static_cast<unsigned char>(errors.back()))) errors.pop_back();
+        fail("", errors.empty() ? std::string("tinygltf cannot read it") : errors.substr(0, 400));
+    }
+    // tinygltf leaves out what it cannot read.
+    for (std::size_t i = 0; i < primitives.size(); ++i)
+        if (i >= model_->meshes.size() || model_->meshes[i].primitives.size() != primitives[i])
+            fail(fmt::format("/meshes/{}", i), "a primitive of this mesh cannot be read");
+}
+
+GltfFile::~GltfFile() = default;
+
+std::string GltfFile::pathOf(const std::string& uri, const std::string& pointer) const {
+    const std::string shown = uri.substr(0, 100);
+    if (const std::string scheme = schemeOf(uri); !scheme.empty())
+        fail(pointer, fmt::format("'{}' is no file beside this one: crt follows no '{}:'", shown,
+                                  scheme.substr(0, 20)));
+    std::string name = percentDecoded(uri);
+    if (name.find('\0') != std::string::npos) fail(pointer, "the name of the file has a zero byte");
+    std::replace(name.begin(), name.end(), '\\', '/');
+    const fs::path folder = fs::path(path_).parent_path(), file = folder / name;
+    if (allow_outside_) return file.string();
+    const fs::path wanted(name);
+    const bool up = std::find(wanted.begin(), wanted.end(), "..") != wanted.end();
+    if (wanted.is_absolute() || up || !isWithin(file, folder))
+        fail(pointer, fmt::format("'{}' lies outside the folder of the glTF file; '--allow-outside' of crt "
+                                  "import, or 'allow_outside: true' of an object, allows it",
+                                  shown));
+    return file.string();
+}
+
+std::optional<std::string> GltfFile::dataOf(const std::string& uri, const std::string& pointer) const {
+    if (!uri.starts_with("data:")) return std::nullopt;
+    constexpr std::string_view kBase64 = ";base64";
+    const std::size_t comma = uri.find(',');
+    if (comma == std::string::npos || std::string_view(uri).substr(0, comma).find(kBase64) == uri.npos)
+        fail(pointer, "this data: URI has no ';base64,'");
+    std::optional<std::string> bytes = base64Decoded(std::string_view(uri).substr(comma + 1));
+    if (!bytes) fail(pointer, "this data: URI has a character that is none of base 64");
+    return bytes;
+}
+
+std::string_view GltfFile::buffer(std::size_t index) {
+    Buffer& buffer = buffers_[index];
+    const std::string pointer = fmt::format("/buffers/{}", index);
+    std::string_view bytes = binary_;
+    if (!buffer.in_container) {
+        if (buffer.uri.empty()) fail(pointer, "it has no 'uri', and there is no chunk of bytes for it");
+        if (!buffer.read) buffer.read = dataOf(buffer.uri, pointer + "/uri");
+        if (!buffer.read) {
+            const std::string file = pathOf(buffer.uri, pointer + "/uri");
+            try {
+                buffer.read = readInput(file, kMostMeshBytes);
+            } catch (const InputRefused& refused) {
+                fail(pointer + "/uri", fmt::format("'{}' {}", file, refused.what()));
+            }
+            files_read_.push_back(file);
+        }
+        bytes = *buffer.read;
+    }
+    if (bytes.size() < buffer.bytes)
+        fail(pointer + "/byteLength",
+             fmt::format("it should have {} bytes and has {}", buffer.bytes, bytes.size()));
+    return bytes.substr(0, buffer.bytes);
+}
+
+std::string_view GltfFile::view(int buffer_view, const std::string& pointer) {
+    if (buffer_view < 0 || static_cast<std::size_t>(buffer_view) >= model_->bufferViews.size())
+        fail(pointer, "it names no buffer view");
+    const tinygltf::BufferView& view = model_->bufferViews[static_cast<std::size_t>(buffer_view)];
+    const std::string at = fmt::format("/bufferViews/{}", buffer_view);
+    if (view.buffer < 0 || static_cast<std::size_t>(view.buffer) >= buffers_.size())
+        fail(at + "/buffer", "it names no buffer");
+    const std::string_view bytes = buffer(static_cast<std::size_t>(view.buffer));
+    if (view.byteOffset > bytes.size() || view.byteLength > bytes.size() - view.byteOffset)
+        fail(at, fmt::format("{} bytes from {} on are beyond buffer {}, which has {}", view.byteLength,
+                             view.byteOffset, view.buffer, bytes.size()));
+    return bytes.substr(view.byteOffset, view.byteLength);
+}
+
+GltfFile::Image GltfFile::image(std::size_t index) {
+    const std::string pointer = fmt::format("/images/{}", index);
+    if (index >= images_.size())
+        fail("/images",
+             fmt::format("there is no image {}: the file has {}, counted from 0", index, images_.size()));
+    const ImageSource& source = images_[index];
+    Image image;
+    image.name = fmt::format("{} (image {})", path_, index);
+    if (source.view >= 0) {
+        image.bytes = std::make_shared<const std::string>(view(source.view, pointer + "/bufferView"));
+    } else if (source.uri.empty()) {
+        fail(pointer, "it has neither 'uri' nor 'bufferView'");
+    } else if (std::optional<std::string> data = dataOf(source.uri, pointer + "/uri")) {
+        image.bytes = std::make_shared<const std::string>(*std::move(data));
+    } else {
+        image.file = pathOf(source.uri, pointer + "/uri");
+        image.name = image.file;
+    }
+    return image;
+}
+
+GltfFile& GltfFiles::open(const std::string& path) {
+    std::error_code unknown;
+    const std::string same = fs::weakly_canonical(path, unknown).string();
+    std::unique_ptr<GltfFile>& file = open_[unknown ? path : same];
+    if (!file) file = std::make_unique<GltfFile>(path);
+    return *file;
+}
+
+}  // namespace crt

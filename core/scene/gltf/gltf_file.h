@@ -1,0 +1,101 @@
+/// glTF 2.0 and GLB files: the container, the JSON and its references checked, bytes within bounds. tinygltf
+/// turns the JSON into structures; it is given no bytes and opens no file.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace tinygltf {
+class Model;
+}
+
+namespace crt {
+
+/// JSON deeper than this is refused: readers of JSON call themselves for each level.
+inline constexpr int kDeepestGltfJson = 64;
+
+struct GltfJson;
+
+class GltfFile {
+public:
+    /// Reads a file and checks that everything it names by number is there. Throws crt::Error(Scene),
+    /// "a.glb: /nodes/3/mesh: …" with a JSON pointer, for one that is damaged, no glTF 2.0, or needs what
+    /// crt does not have (Draco, meshopt, morph targets).
+    explicit GltfFile(const std::string& path);
+    ~GltfFile();
+    GltfFile(const GltfFile&) = delete;
+    GltfFile& operator=(const GltfFile&) = delete;
+
+    const std::string& path() const { return path_; }
+    const tinygltf::Model& model() const { return *model_; }
+
+    /// Allows buffers that lie outside the file's folder; else they are refused.
+    void allowOutside() { allow_outside_ = true; }
+
+    /// The bytes of a buffer view. Reads the buffer's file when it is first asked for. `pointer` is what
+    /// names the view, for messages. Throws crt::Error(Scene).
+    std::string_view view(int buffer_view, const std::string& pointer);
+
+    /// An image: a file beside this one, or bytes in it.
+    struct Image {
+        std::string name;
+        std::string file;  ///< A path. Empty where the image is bytes.
+        std::shared_ptr<const std::string> bytes;
+    };
+    std::size_t imageCount() const { return images_.size(); }
+    const std::string& imageName(std::size_t index) const { return images_[index].name; }
+    /// Throws crt::Error(Scene).
+    Image image(std::size_t index);
+
+    std::size_t animationCount() const { return animations_; }
+    /// This file and the buffers' that were read.
+    const std::vector<std::string>& filesRead() const { return files_read_; }
+
+    [[noreturn]] void fail(const std::string& pointer, const std::string& why) const;
+
+private:
+    struct Buffer {
+        std::string uri;
+        std::uint64_t bytes = 0;    ///< That the file says.
+        bool in_container = false;  ///< The GLB's own.
+        std::optional<std::string> read;
+    };
+    struct ImageSource {
+        std::string name, uri;
+        int view = -1;
+    };
+    void split();
+    void checkText() const;
+    void check(const GltfJson& json);
+    std::string_view buffer(std::size_t index);
+    /// The path of a file that a URI names.
+    std::string pathOf(const std::string& uri, const std::string& pointer) const;
+    std::optional<std::string> dataOf(const std::string& uri, const std::string& pointer) const;
+
+    std::string path_, content_;
+    std::string_view json_, binary_;
+    bool allow_outside_ = false;
+    std::vector<Buffer> buffers_;
+    std::vector<ImageSource> images_;
+    std::size_t animations_ = 0;
+    std::vector<std::string> files_read_;
+    std::unique_ptr<tinygltf::Model> model_;
+};
+
+/// The glTF files of a scene, each read once.
+class GltfFiles {
+public:
+    GltfFile& open(const std::string& path);
+
+private:
+    std::map<std::string, std::unique_ptr<GltfFile>> open_;
+};
+
+}  // namespace crt

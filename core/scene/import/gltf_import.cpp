@@ -1,0 +1,290 @@
+#include "scene/import/gltf_import.h"
+
+#include "scene/gltf/gltf_accessor.h"
+#include "scene/gltf/gltf_json.h"
+#include "scene/gltf/gltf_model.h"
+#include "scene/import/gltf_graph.h"
+#include "scene/import/gltf_materials.h"
+#include "scene/light_units.h"
+#include "scene/scene.h"
+#include "spectra/spectra.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace crt {
+namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+std::string steps(const Matrix4d& world) {
+    if (world == kIdentity4d) return "[]";
+    const Vec3d moved{world[3], world[7], world[11]};
+    Matrix4d only_moved = kIdentity4d;
+    for (std::size_t r = 0; r < 3; ++r) only_moved[4 * r + 3] = moved[r];
+    return world == only_moved ? fmt::format("[{{translate: {}}}]", yamlList(moved))
+                               : fmt::format("[{{matrix: {}}}]", yamlList(world));
+}
+
+class Writer {
+public:
+    Writer(GltfFile& file, std::string file_name, std::string folder, bool allow_outside, Losses& losses)
+        : file_(file),
+          model_(file.model()),
+          file_name_(std::move(file_name)),
+          allow_outside_(allow_outside),
+          losses_(losses),
+          graph_(readGltfGraph(file, losses)),
+          textures_(file, file_name_, std::move(folder), losses),
+          nit_(graph_.lights.empty() ? 1 : 1 / (kLuminousEfficacy_lm_W * cieYIntegral())),
+          materials_(file, textures_, nit_, losses) {}
+
+    std::string text() {
+        const std::string objects = objectsText();
+        if (objects.empty())
+            file_.fail("/scenes", "there is nothing to see: no node of the scene has a mesh of triangles");
+        std::string all = cameraText();
+        all += environmentText() + lightsText();
+        all += "\nmaterials:\n" + materials_.text();
+        return all + "\nobjects:\n" + objects;
+    }
+
+private:
+    std::string objectsText();
+    std::string primitiveText(int mesh, std::size_t number, const std::vector<Matrix4d>& worlds,
+                              const std::string& name);
+    std::string cameraText();
+    std::string lightsText() const;
+    std::string environmentText() const;
+    std::string exposureText(double& film_ev) const;
+    double illuminance() const;
+
+    GltfFile& file_;
+    const tinygltf::Model& model_;
+    std::string file_name_;
+    bool allow_outside_;
+    Losses& losses_;
+    GltfGraph graph_;
+    GltfTextures textures_;
+    double nit_;
+    GltfMaterials materials_;
+    UniqueNames names_;
+    Bounds bounds_;
+};
+
+double luminanceOf(const std::vector<double>& c) {
+    return c.size() < 3 ? 1 : 0.2126729 * c[0] + 0.7151522 * c[1] + 0.0721750 * c[2];
+}
+
+std::string colorOfLight(const std::vector<double>& c) {
+    return c.size() < 3 ? "{rgb: [1, 1, 1], space: linear}"
+                        : fmt::format("{{rgb: {}, space: linear}}", yamlList(c.data(), 3));
+}
+
+std::string Writer::primitiveText(int mesh, std::size_t number, const std::vector<Matrix4d>& worlds,
+                                  const std::string& name) {
+    const tinygltf::Primitive& primitive = model_.meshes[static_cast<std::size_t>(mesh)].primitives[number];
+    const std::string pointer = fmt::format("/meshes/{}/primitives/{}", mesh, number);
+    if (primitive.mode < TINYGLTF_MODE_TRIANGLES) {
+        losses_.add("points or lines, which have no surface");
+        return {};
+    }
+    const auto position = primitive.attributes.find("POSITION");
+    if (position == primitive.attributes.end()) {
+        losses_.add("a primitive without positions");
+        return {};
+    }
+    const GltfAccessor positions(file_, position->second, pointer + "/attributes/POSITION");
+    positions.requireComponents(3, 3);
+    Bounds own;
+    for (const Vec3d& p : positions.rows<3>()) own.add(p);
+    for (const Matrix4d& world : worlds)
+        for (int corner = 0; corner < 8; ++corner)
+            bounds_.add(pointAt(
+                world, {corner & 1 ? own.upper[0] : own.lower[0], corner & 2 ? own.upper[1] : own.lower[1],
+                        corner & 4 ? own.upper[2] : own.lower[2]}));
+    GltfMaterialUse use{.material = primitive.material, .colors = primitive.attributes.contains("COLOR_0")};
+    for (unsigned set = 0; set < 8; ++set)
+        if (primitive.attributes.contains(fmt::format("TEXCOORD_{}", set))) use.uv_sets |= 1u << set;
+    const GltfMaterialText& material = materials_.of(use);
+    std::string text =
+        fmt::format("  - name: {}\n    gltf: {{file: {}, mesh: {}, primitive: {}",
+                    yamlText(names_.take(name, "object")), yamlText(file_name_), mesh, number);
+    if (material.uv_set > 0) text += fmt::format(", uv_set: {}", material.uv_set);
+    if (use.colors && material.color_factor != std::array<double, 3>{1, 1, 1})
+        text += ", color_factor: " + yamlList(material.color_factor);
+    if (allow_outside_) text += ", allow_outside: true";
+    text += fmt::format("}}\n    material: {}\n", yamlText(material.name));
+    if (!material.emission.empty()) text += fmt::format("    emission: {}\n", material.emission);
+    if (worlds.size() == 1) {
+        if (worlds[0] != kIdentity4d) text += fmt::format("    transform: {}\n", steps(worlds[0]));
+        return text;
+    }
+    text += "    transforms:\n";
+    for (const Matrix4d& world : worlds) text += fmt::format("      - {}\n", steps(world));
+    return text;
+}
+
+/// An object for each primitive, placed as often as its mesh is.
+std::string Writer::objectsText() {
+    std::vector<std::vector<Matrix4d>> worlds(model_.meshes.size());
+    std::vector<std::string> names(model_.meshes.size());
+    std::vector<int> order;
+    for (const GltfPlaced& placed : graph_.meshes) {
+        const auto mesh = static_cast<std::size_t>(placed.what);
+        const Matrix4d world = gltfBindPose(file_, graph_, placed, losses_);
+        if (flattens(world)) {
+            losses_.add("a node that flattens its mesh");
+            continue;
+        }
+        if (worlds[mesh].empty()) {
+            order.push_back(placed.what);
+            names[mesh] = model_.nodes[static_cast<std::size_t>(placed.node)].name;
+        }
+        worlds[mesh].push_back(world);
+    }
+    std::string text;
+    for (const int mesh : order) {
+        const auto i = static_cast<std::size_t>(mesh);
+        const std::string& own = model_.meshes[i].name;
+        const std::string name = worlds[i].size() == 1 && !names[i].empty() ? names[i]
+                                 : own.empty()                              ? fmt::format("mesh {}", mesh)
+                                                                            : own;
+        for (std::size_t k = 0; k < model_.meshes[i].primitives.size(); ++k)
+            text += primitiveText(mesh, k, worlds[i], name);
+    }
+    return text;
+}
+
+/// Of a surface in the middle that faces the light, roughly: lamps within the model count as if on its edge.
+double Writer::illuminance() const {
+    double sum = 0;
+    const Vec3d centre = bounds_.centre();
+    for (const GltfPlaced& placed : graph_.lights) {
+        const tinygltf::Light& light = model_.lights[static_cast<std::size_t>(placed.what)];
+        const double amount = light.intensity * luminanceOf(light.color);
+        const double distance =
+            std::max(length(pointAt(placed.world, {0, 0, 0}) - centre), bounds_.radius());
+        sum += light.type == "directional" ? amount : distance > 0 ? amount / (distance * distance) : 0;
+    }
+    return sum;
+}
+
+std::string Writer::cameraText() {
+    constexpr int kLonger = 960;
+    double aspect = 1.5;
+    std::string camera;
+    for (const GltfPlaced& placed : graph_.cameras) {
+        const tinygltf::Camera& own = model_.cameras[static_cast<std::size_t>(placed.what)];
+        if (own.type != "perspective") {
+            losses_.add("an orthographic camera, which crt does not have");
+            continue;
+        }
+        if (!camera.empty()) {
+            losses_.add("a camera beside the first");
+            continue;
+        }
+        const double yfov = own.perspective.yfov, given = own.perspective.aspectRatio;
+        const Vec3d position = pointAt(placed.world, {0, 0, 0}),
+                    ahead = directionAt(placed.world, {0, 0, -1}), up = directionAt(placed.world, {0, 1, 0});
+        const double way = length(ahead), steep = length(cross(ahead, up));
+        if (!(yfov > 1e-3 && yfov < 3.1) || !(way > 1e-30 && way < 1e30) ||
+            !(steep > 1e-6 * way * length(up))) {
+            losses_.add("a camera that sees nothing");
+            continue;
+        }
+        if (given > 0.05 && given < 20) aspect = given;
+        const double shorter = aspect >= 1 ? yfov : 2 * std::atan(std::tan(yfov / 2) * aspect);
+        const double far = std::max(length(bounds_.centre() - position), 1e-3 * bounds_.radius());
+        const Vec3d target = position + ahead * ((far > 0 ? far : 1) / way);
+        camera =
+            fmt::format("position: {}, target: {}, up: {}, fov: {}", yamlList(position), yamlList(target),
+                        yamlList(up * (1 / length(up))), yamlNumber(shorter * kDegrees));
+    }
+    const int width = aspect >= 1 ? kLonger : std::max(static_cast<int>(std::lround(kLonger * aspect)), 1),
+              height = aspect >= 1 ? std::max(static_cast<int>(std::lround(kLonger / aspect)), 1) : kLonger;
+    std::string text;
+    if (camera.empty()) {
+        losses_.choose("a camera that sees all of it");
+        text += "\n# Chosen: the file has no camera.";
+        camera = chosenCamera(bounds_, static_cast<double>(width) / height);
+    }
+    text += fmt::format("\ncamera: {{{}}}\n", camera);
+    std::string film = fmt::format("resolution: [{}, {}]", width, height);
+    if (!graph_.lights.empty()) {
+        const double lux = illuminance();
+        const double ev = lux > 0 ? std::log2(0.8 * std::numbers::pi / (lux * nit_)) : std::log2(1 / nit_);
+        text += "# Exposed for a white surface that faces the lights.\n";
+        film += fmt::format(", exposure_ev: {:.2f}", std::clamp(ev, -100.0, 100.0));
+    }
+    text += fmt::format("film: {{{}}}\nsampler: {{samples: 128}}\n", film);
+    return text;
+}
+
+std::string Writer::environmentText() const {
+    if (!graph_.lights.empty()) return {};
+    losses_.choose("a white sky");
+    return "\n# Chosen: the file has no light.\nenvironment: {radiance: {rgb: [0.9, 0.9, 0.9], space: "
+           "linear}}\n";
+}
+
+std::string Writer::lightsText() const {
+    std::string text;
+    UniqueNames names;
+    for (const GltfPlaced& placed : graph_.lights) {
+        const tinygltf::Light& light = model_.lights[static_cast<std::size_t>(placed.what)];
+        const std::string pointer = fmt::format("/extensions/KHR_lights_punctual/lights/{}", placed.what);
+        const Vec3d way = directionAt(placed.world, {0, 0, -1});
+        const double amount = light.intensity * luminanceOf(light.color);
+        if (!std::all_of(light.color.begin(), light.color.end(),
+                         [](double c) { return c >= 0 && c < 1e6; }) ||
+            !(amount >= 0 && amount < 1e20))
+            file_.fail(pointer, "its colour or intensity is below 0, or beyond any use");
+        if (amount == 0) continue;
+        if (light.range > 0) losses_.add("the range of a light: light reaches as far as it goes");
+        std::string keys;
+        const std::string position = "position: " + yamlList(pointAt(placed.world, {0, 0, 0}));
+        if (light.type == "point") {
+            keys = fmt::format("type: point, {}, luminous_intensity_cd: {}", position, yamlNumber(amount));
+        } else if (!(length(way) > 0)) {
+            losses_.add("a light without a direction");
+            continue;
+        } else if (light.type == "directional") {
+            keys = fmt::format("type: directional, direction: {}, illuminance_lx: {}", yamlList(way),
+                               yamlNumber(amount));
+        } else if (light.type == "spot") {
+            const double outer = light.spot.outerConeAngle, inner = light.spot.innerConeAngle;
+            if (!(inner >= 0 && inner <= outer && outer > 0 && outer <= std::numbers::pi))
+                file_.fail(pointer + "/spot", "its angles are not 0 to the outer one, which is at most pi");
+            keys = fmt::format(
+                "type: spot, {}, direction: {}, cone_angle_deg: {}, penumbra_deg: {}, "
+                "luminous_intensity_cd: {}",
+                position, yamlList(way), yamlNumber(outer * kDegrees),
+                yamlNumber((outer - inner) * kDegrees), yamlNumber(amount));
+        } else {
+            losses_.add("a light of an unknown type");
+            continue;
+        }
+        text += fmt::format("  - {{name: {}, {}, spectrum: {}}}\n",
+                            yamlText(names.take(light.name, "light")), keys, colorOfLight(light.color));
+    }
+    return text.empty() ? text : "\nlights:\n" + text;
+}
+
+}  // namespace
+
+std::string gltfScene(GltfFile& file, const std::string& file_name, const std::string& folder,
+                      bool allow_outside, Losses& losses) {
+    const tinygltf::Model& model = file.model();
+    if (file.animationCount() > 0) losses.add("animations: everything stands as before them");
+    for (const std::string& name : model.extensionsUsed)
+        if (!knowsGltfExtension(name)) losses.add(fmt::format("the extension '{}'", name.substr(0, 60)));
+    return Writer(file, file_name, folder, allow_outside, losses).text();
+}
+
+}  // namespace crt

@@ -1,0 +1,498 @@
+// Over 450 lines: one class, with a short function for each part of a material.
+#include "scene/import/gltf_materials.h"
+
+#include "scene/gltf/gltf_model.h"
+#include "spectra/spectra.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace crt {
+namespace {
+
+using tinygltf::Value;
+
+/// An extension's map; one without keys where the material has it not.
+const Value& extensionOf(const tinygltf::Material& material, const char* name) {
+    static const Value nothing;
+    const auto found = material.extensions.find(name);
+    return found == material.extensions.end() ? nothing : found->second;
+}
+
+bool hasExtension(const tinygltf::Material& material, const char* name) {
+    return material.extensions.contains(name);
+}
+
+double numberOf(const Value& object, const char* key, double fallback) {
+    return object.IsObject() && object.Has(key) && object.Get(key).IsNumber()
+               ? object.Get(key).GetNumberAsDouble()
+               : fallback;
+}
+
+std::array<double, 3> colorOf(const Value& object, const char* key, const std::array<double, 3>& fallback) {
+    if (!object.IsObject() || !object.Has(key)) return fallback;
+    const Value& list = object.Get(key);
+    if (!list.IsArray() || list.ArrayLen() != 3) return fallback;
+    std::array<double, 3> color;
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (!list.Get(k).IsNumber()) return fallback;
+        color[k] = std::max(list.Get(k).GetNumberAsDouble(), 0.0);
+    }
+    return color;
+}
+
+double unitOf(double value) { return std::clamp(value, 0.0, 1.0); }
+
+const std::array<double, 3> kWhite{1, 1, 1};
+
+double largestOf(const std::array<double, 3>& c) { return std::max({c[0], c[1], c[2]}); }
+
+std::array<double, 3> bounded(std::array<double, 3> color) {
+    for (double& c : color) c = unitOf(c);
+    return color;
+}
+
+/// A colour as a scene has it: a number where it is grey.
+std::string colorText(const std::array<double, 3>& c) {
+    if (c[0] == c[1] && c[1] == c[2]) return yamlNumber(c[0]);
+    return fmt::format("{{rgb: {}, space: linear}}", yamlList(c));
+}
+
+/// The same of light, which is no reflectance: a number would be the equal-energy spectrum.
+std::string lightText(const std::array<double, 3>& c, double scale) {
+    return fmt::format("{{rgb: {}, space: linear, scale: {}}}", yamlList(c), yamlNumber(scale));
+}
+
+/// glTF's material of primitives without one.
+const tinygltf::Material& standardMaterial() {
+    static const tinygltf::Material material = [] {
+        tinygltf::Material m;
+        m.pbrMetallicRoughness.baseColorFactor = {1, 1, 1, 1};
+        m.pbrMetallicRoughness.metallicFactor = 1;
+        m.pbrMetallicRoughness.roughnessFactor = 1;
+        return m;
+    }();
+    return material;
+}
+
+const Value* transformOf(const tinygltf::ExtensionMap& extensions) {
+    const auto found = extensions.find("KHR_texture_transform");
+    return found == extensions.end() ? nullptr : &found->second;
+}
+
+}  // namespace
+
+/// A material that is read for a use.
+struct GltfMaterials::Source {
+    const tinygltf::Material& material;
+    const GltfMaterialUse& use;
+    GltfMaterialText& text;
+    std::string pointer;
+    std::optional<std::size_t> set;  ///< Of the first texture that could be used; others must have the same.
+};
+
+/// What becomes of it. Texts are values of the scene's keys; empty ones are left out.
+struct GltfMaterials::Surface {
+    std::string color;
+    std::array<double, 3> color_factor{1, 1, 1};  ///< On the texture or the colours of vertices, or alone.
+    double metal = 1, rough = 1;
+    std::string metal_texture, rough_texture;  ///< In place of them; the roughness is the mean then.
+    std::string opacity;
+    std::string normal_map;
+    Keys dielectric;  ///< Keys of what is not metal.
+    Keys layers;      ///< Keys of coat and fuzz.
+    bool rough_coat = false;
+    std::string clear;  ///< Share of the dielectric that is glass; empty: none.
+    bool all_clear = false, absorbs = false;
+    std::string pane;  ///< Share of the surface that is a pane; empty: none.
+    std::string pane_ior;
+};
+
+/// The texture, where the primitive has its coordinates and crt reads its image; else it is a loss.
+std::optional<GltfTexture> GltfMaterials::usable(Source& source, std::optional<GltfTexture> texture,
+                                                 const char* what) {
+    if (!texture) return std::nullopt;
+    const std::string name = source.material.name.empty() ? "a material" : source.material.name;
+    if ((source.use.uv_sets >> texture->set & 1) == 0) {
+        losses_.add(fmt::format("{} of '{}': a mesh has no TEXCOORD_{}", what, name, texture->set));
+        return std::nullopt;
+    }
+    if (source.set && *source.set != texture->set) {
+        losses_.add(
+            fmt::format("{} of '{}': a mesh has one set of coordinates, and it has another", what, name));
+        return std::nullopt;
+    }
+    if (!textures_.canRead(*texture)) return std::nullopt;
+    source.set = texture->set;
+    source.text.uv_set = texture->set;
+    return texture;
+}
+
+/// A factor, or a channel of a texture times it; empty where it is 0 everywhere.
+std::string GltfMaterials::weight(Source& source, const std::optional<GltfTexture>& texture, double factor,
+                                  const char* channel, const char* what) {
+    if (factor <= 0) return {};
+    const std::optional<GltfTexture> image = usable(source, texture, what);
+    if (!image) return yamlNumber(factor);
+    const std::size_t number = channel[0] == 'r' ? 0 : channel[0] == 'g' ? 1 : 2;
+    const TexelStatistics& texels = textures_.statistics(*image);
+    if (texels.most[number] == 0) return {};
+    if (texels.isConstant(number)) return yamlNumber(factor * texels.mean[number]);
+    std::string more = fmt::format(", channel: {}", channel);
+    if (factor != 1) more += ", factor: " + yamlNumber(factor);
+    return textures_.form(*image, more);
+}
+
+void GltfMaterials::readColor(Source& source, Surface& surface) {
+    const tinygltf::PbrMetallicRoughness& pbr = source.material.pbrMetallicRoughness;
+    for (std::size_t k = 0; k < 3 && k < pbr.baseColorFactor.size(); ++k)
+        surface.color_factor[k] = unitOf(pbr.baseColorFactor[k]);
+    const auto texture = usable(source,
+                                textures_.named(pbr.baseColorTexture.index, pbr.baseColorTexture.texCoord,
+                                                transformOf(pbr.baseColorTexture.extensions),
+                                                source.pointer + "/pbrMetallicRoughness/baseColorTexture"),
+                                "the texture of the base colour");
+    if (texture) {
+        const bool plain = surface.color_factor == kWhite;
+        surface.color = textures_.form(*texture, plain ? "" : ", factor: " + yamlList(surface.color_factor));
+        if (source.use.colors)
+            losses_.add("colours of vertices beside a texture, whose product crt has not");
+    } else if (source.use.colors) {
+        surface.color = "{attribute: colors}";
+        source.text.color_factor = surface.color_factor;
+    } else {
+        surface.color = colorText(surface.color_factor);
+    }
+}
+
+void GltfMaterials::readMetal(Source& source, Surface& surface) {
+    const tinygltf::PbrMetallicRoughness& pbr = source.material.pbrMetallicRoughness;
+    surface.metal = unitOf(pbr.metallicFactor);
+    surface.rough = unitOf(pbr.roughnessFactor);
+    const auto texture =
+        usable(source,
+               textures_.named(pbr.metallicRoughnessTexture.index, pbr.metallicRoughnessTexture.texCoord,
+                               transformOf(pbr.metallicRoughnessTexture.extensions),
+                               source.pointer + "/pbrMetallicRoughness/metallicRoughnessTexture"),
+               "the texture of metalness and roughness");
+    if (!texture) return;
+    const TexelStatistics& texels = textures_.statistics(*texture);
+    const auto form = [&](const char* channel, double factor) {
+        const std::string more = factor == 1 ? "" : ", factor: " + yamlNumber(factor);
+        return textures_.form(*texture, fmt::format(", channel: {}{}", channel, more));
+    };
+    if (surface.metal > 0 && !texels.isConstant(2)) surface.metal_texture = form("blue", surface.metal);
+    if (surface.rough > 0 && !texels.isConstant(1)) surface.rough_texture = form("green", surface.rough);
+    surface.metal *= texels.mean[2];
+    surface.rough *= texels.mean[1];
+}
+
+void GltfMaterials::readOpacity(Source& source, Surface& surface) {
+    const tinygltf::Material& material = source.material;
+    const tinygltf::PbrMetallicRoughness& pbr = material.pbrMetallicRoughness;
+    if (material.alphaMode != "MASK" && material.alphaMode != "BLEND") return;
+    const double factor = pbr.baseColorFactor.size() > 3 ? unitOf(pbr.baseColorFactor[3]) : 1;
+    const bool mask = material.alphaMode == "MASK";
+    const auto texture = usable(source,
+                                textures_.named(pbr.baseColorTexture.index, pbr.baseColorTexture.texCoord,
+                                                transformOf(pbr.baseColorTexture.extensions),
+                                                source.pointer + "/pbrMetallicRoughness/baseColorTexture"),
+                                "the texture of the opacity");
+    const double cutoff = std::max(material.alphaCutoff, 0.0);
+    if (!texture || factor == 0 || !textures_.hasHoles(*texture)) {
+        const double there = mask ? (factor >= cutoff ? 1 : 0) : factor;
+        if (there < 1) surface.opacity = yamlNumber(there);
+        return;
+    }
+    std::string more = ", channel: alpha";
+    if (mask && cutoff > factor) {
+        surface.opacity = "0";
+        return;
+    }
+    if (mask) more += ", cutoff: " + yamlNumber(cutoff / factor);
+    if (!mask && factor != 1) more += ", factor: " + yamlNumber(factor);
+    surface.opacity = textures_.form(*texture, more);
+}
+
+void GltfMaterials::readNormals(Source& source, Surface& surface) {
+    const tinygltf::NormalTextureInfo& info = source.material.normalTexture;
+    const auto texture = usable(source,
+                                textures_.named(info.index, info.texCoord, transformOf(info.extensions),
+                                                source.pointer + "/normalTexture"),
+                                "the normal map");
+    if (!texture) return;
+    if (!textures_.hasColors(*texture)) return losses_.add("a normal map that is grey");
+    if (info.scale < 0 || info.scale > 100)
+        losses_.add("the scale of a normal map, which is none of 0 to 100");
+    const double strength = std::clamp(info.scale, 0.0, 100.0);
+    surface.normal_map =
+        textures_.form(*texture, strength == 1 ? "" : ", strength: " + yamlNumber(strength));
+}
+
+/// Index and strength of the reflection of what is not metal.
+void GltfMaterials::readDielectric(Source& source, Surface& surface) {
+    double ior = numberOf(extensionOf(source.material, "KHR_materials_ior"), "ior", 1.5);
+    if (ior < 1 || ior > 10) {
+        losses_.add("an index of refraction that is none of 1 to 10: 1.5");
+        ior = 1.5;
+    }
+    surface.pane_ior = yamlNumber(ior);
+    if (ior != 1.5) surface.dielectric.emplace_back("specular_ior", yamlNumber(ior));
+    const Value& specular = extensionOf(source.material, "KHR_materials_specular");
+    if (!specular.IsObject()) return;
+    const std::array<double, 3> color = colorOf(specular, "specularColorFactor", kWhite);
+    double factor = unitOf(numberOf(specular, "specularFactor", 1));
+    if (color[0] == color[1] && color[1] == color[2])
+        factor = std::min(factor * color[0], 1.0);
+    else
+        losses_.add("the colour of specular reflections of a dielectric");
+    if (specular.Has("specularTexture") || specular.Has("specularColorTexture"))
+        losses_.add("textures of specular reflections");
+    if (factor != 1) surface.dielectric.emplace_back("specular_weight", yamlNumber(factor));
+}
+
+void GltfMaterials::readClear(Source& source, Surface& surface) {
+    const Value& transmission = extensionOf(source.material, "KHR_materials_transmission");
+    const double factor = unitOf(numberOf(transmission, "transmissionFactor", 0));
+    const std::string share =
+        weight(source, textures_.named(transmission, "transmissionTexture", source.pointer), factor, "red",
+               "the texture of the transmission");
+    if (share.empty()) return;
+    const Value& volume = extensionOf(source.material, "KHR_materials_volume");
+    const double thickness = numberOf(volume, "thicknessFactor", 0);
+    if (!(thickness > 0)) {
+        surface.pane = share;
+        if (surface.color_factor != kWhite || surface.color.starts_with("{texture"))
+            losses_.add("the tint of what a pane lets through");
+        return;
+    }
+    surface.clear = share;
+    surface.all_clear = share == "1";
+    if (volume.Has("thicknessTexture")) losses_.add("a texture of thickness: the mesh is the body itself");
+    if (surface.color.starts_with("{texture")) losses_.add("a texture that tints what glass lets through");
+    // What is left after the thickness: of the base colour once, and of the attenuation.
+    const double distance = numberOf(volume, "attenuationDistance", 0);
+    std::array<double, 3> left = surface.color.starts_with("{texture") ? kWhite : surface.color_factor;
+    const std::array<double, 3> attenuation = bounded(colorOf(volume, "attenuationColor", kWhite));
+    const double depth = distance > 0 && left == kWhite ? distance : thickness;
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (distance > 0) left[k] *= std::pow(attenuation[k], depth / distance);
+        left[k] = std::clamp(left[k], 1e-4, 1.0);
+    }
+    surface.dielectric.emplace_back("transmission_weight", share);
+    if (const double dispersion =
+            numberOf(extensionOf(source.material, "KHR_materials_dispersion"), "dispersion", 0);
+        dispersion > 0) {
+        surface.dielectric.emplace_back("transmission_dispersion_scale", yamlNumber(unitOf(dispersion)));
+        if (dispersion > 1) losses_.add("a dispersion above 1: 1");
+    }
+    if (left == kWhite) return;
+    surface.absorbs = true;
+    surface.dielectric.emplace_back("transmission_color", colorText(left));
+    surface.dielectric.emplace_back("transmission_depth", yamlNumber(depth));
+}
+
+void GltfMaterials::readCoat(Source& source, Surface& surface) {
+    const Value& coat = extensionOf(source.material, "KHR_materials_clearcoat");
+    const double factor = unitOf(numberOf(coat, "clearcoatFactor", 0));
+    if (factor == 0) return;
+    if (!surface.clear.empty()) return losses_.add("a clear coat on glass");
+    const std::string share = weight(source, textures_.named(coat, "clearcoatTexture", source.pointer),
+                                     factor, "red", "the texture of the clear coat");
+    if (share.empty()) return;
+    double rough = unitOf(numberOf(coat, "clearcoatRoughnessFactor", 0));
+    if (const auto texture =
+            usable(source, textures_.named(coat, "clearcoatRoughnessTexture", source.pointer),
+                   "the texture of the clear coat's roughness")) {
+        const TexelStatistics& texels = textures_.statistics(*texture);
+        if (!texels.isConstant(1) && rough > 0)
+            losses_.add("the texture of a clear coat's roughness: its mean");
+        rough *= texels.mean[1];
+    }
+    if (coat.Has("clearcoatNormalTexture")) losses_.add("the normal map of a clear coat");
+    surface.layers.emplace_back("coat_weight", share);
+    if (rough > 0) surface.layers.emplace_back("coat_roughness", yamlNumber(rough));
+    surface.layers.emplace_back("coat_ior", "1.5");
+    surface.layers.emplace_back("coat_darkening", "0");
+    surface.rough_coat = rough > 0;
+}
+
+void GltfMaterials::readFuzz(Source& source, Surface& surface) {
+    const Value& sheen = extensionOf(source.material, "KHR_materials_sheen");
+    std::array<double, 3> color = bounded(colorOf(sheen, "sheenColorFactor", {0, 0, 0}));
+    if (largestOf(color) > 0)
+        if (const auto texture = usable(source, textures_.named(sheen, "sheenColorTexture", source.pointer),
+                                        "the texture of the sheen")) {
+            const TexelStatistics& texels = textures_.statistics(*texture);
+            if (!texels.isConstant()) losses_.add("the texture of a sheen: its mean");
+            for (std::size_t k = 0; k < 3; ++k) color[k] *= texels.linear_mean[k];
+        }
+    const double most = largestOf(color);
+    if (most == 0) return;
+    if (sheen.Has("sheenRoughnessTexture")) losses_.add("the texture of a sheen's roughness");
+    losses_.add("sheen: fuzz of OpenPBR, which is another model");
+    for (double& c : color) c /= most;
+    surface.layers.emplace_back("fuzz_weight", yamlNumber(most));
+    surface.layers.emplace_back("fuzz_color", colorText(color));
+    surface.layers.emplace_back("fuzz_roughness",
+                                yamlNumber(unitOf(numberOf(sheen, "sheenRoughnessFactor", 0))));
+}
+
+/// Light of the object: the sum of what a texture of light would vary is no single radiance, so that is
+/// lost.
+void GltfMaterials::readEmission(Source& source) {
+    std::array<double, 3> color{0, 0, 0};
+    for (std::size_t k = 0; k < 3 && k < source.material.emissiveFactor.size(); ++k)
+        color[k] = std::max(source.material.emissiveFactor[k], 0.0);
+    if (largestOf(color) == 0) return;
+    const double strength = std::clamp(
+        numberOf(extensionOf(source.material, "KHR_materials_emissive_strength"), "emissiveStrength", 1),
+        0.0, 1e15);
+    const tinygltf::TextureInfo& info = source.material.emissiveTexture;
+    if (info.index >= 0) {
+        const auto texture = usable(source,
+                                    textures_.named(info.index, info.texCoord, transformOf(info.extensions),
+                                                    source.pointer + "/emissiveTexture"),
+                                    "the texture of the emitted light");
+        if (!texture) return;
+        const TexelStatistics& texels = textures_.statistics(*texture);
+        if (!texels.isConstant())
+            return losses_.add("light that a texture says: crt's lamps are equally bright everywhere");
+        for (std::size_t k = 0; k < 3; ++k) color[k] *= texels.linear_mean[k];
+    }
+    const double most = largestOf(color);
+    if (!(most * strength > 0)) return;
+    for (double& c : color) c /= most;
+    source.text.emission = fmt::format("{{radiance: {}{}}}", lightText(color, most * strength * nit_),
+                                       source.material.doubleSided ? ", two_sided: true" : "");
+}
+
+/// A surface that is seen in its colour whatever the light: it emits that, and reflects nothing.
+bool GltfMaterials::readUnlit(Source& source) {
+    if (!hasExtension(source.material, "KHR_materials_unlit")) return false;
+    if (source.use.colors || source.material.pbrMetallicRoughness.baseColorTexture.index >= 0) {
+        losses_.add("an unlit material of a texture or colours of vertices: it is lit, and diffuse");
+        return false;
+    }
+    Surface surface;
+    readColor(source, surface);
+    if (largestOf(surface.color_factor) > 0)
+        source.text.emission =
+            fmt::format("{{radiance: {}, two_sided: true}}", lightText(surface.color_factor, nit_));
+    add(source.text.name, {{"type", "diffuse"}, {"reflectance", "0"}});
+    return true;
+}
+
+void GltfMaterials::add(const std::string& name, const Keys& keys) {
+    text_ += fmt::format("  {}:\n", yamlText(name));
+    for (const auto& [key, value] : keys)
+        if (!value.empty()) text_ += fmt::format("    {}: {}\n", key, value);
+}
+
+/// One openpbr material, or, where OpenPBR says it of metal or of glass alone, a mix of two.
+void GltfMaterials::write(Source& source, const Surface& s) {
+    const bool metal = s.metal > 0 || !s.metal_texture.empty(), textured = !s.rough_texture.empty();
+    const bool dielectric = s.metal < 1 || !s.metal_texture.empty();
+    const bool weighted = std::any_of(s.dielectric.begin(), s.dielectric.end(),
+                                      [](const auto& key) { return key.first == "specular_weight"; });
+    const bool split = metal && dielectric && (textured || weighted);
+    const bool glossy = dielectric && !s.all_clear;
+    if (textured && glossy)
+        losses_.add(
+            "the texture of a dielectric's roughness: its mean, since crt's gloss is equally rough "
+            "everywhere");
+    if (textured && s.rough_coat && metal)
+        losses_.add("the texture of the roughness under a rough coat: its mean");
+    const auto roughness = [&](bool as_texture) {
+        return as_texture && textured ? s.rough_texture : yamlNumber(s.rough);
+    };
+    const std::string metal_roughness = roughness(!s.rough_coat), clear_roughness = roughness(!glossy);
+    const auto keysOf = [&](const std::string& metalness, const std::string& rough, bool with_dielectric,
+                            bool whole) {
+        Keys keys{{"type", "openpbr"}, {"base_color", s.color}};
+        if (metalness != "0") keys.emplace_back("base_metalness", metalness);
+        keys.emplace_back("specular_roughness", rough);
+        if (with_dielectric) keys.insert(keys.end(), s.dielectric.begin(), s.dielectric.end());
+        keys.insert(keys.end(), s.layers.begin(), s.layers.end());
+        keys.emplace_back("normal_map", s.normal_map);
+        if (whole) keys.emplace_back("geometry_opacity", s.opacity);
+        return keys;
+    };
+    const bool pane = !s.pane.empty();
+    const std::string& name = source.text.name;
+    std::string surface = pane ? names_.take(name + " (surface)", "") : name;
+    if (split) {
+        const std::string below = names_.take(name + " (dielectric)", ""),
+                          above = names_.take(name + " (metal)", "");
+        add(below, keysOf("0", clear_roughness, true, false));
+        add(above, keysOf("1", metal_roughness, false, false));
+        add(surface, {{"type", "mix"},
+                      {"materials", fmt::format("[{}, {}]", yamlText(below), yamlText(above))},
+                      {"amount", s.metal_texture.empty() ? yamlNumber(s.metal) : s.metal_texture},
+                      {"opacity", pane ? "" : s.opacity}});
+    } else {
+        const std::string metalness = s.metal_texture.empty() ? yamlNumber(s.metal) : s.metal_texture;
+        add(surface, keysOf(metalness, dielectric ? clear_roughness : metal_roughness, dielectric, !pane));
+    }
+    if (!pane) return;
+    if (s.rough > 0.1) losses_.add("the roughness of a pane");
+    const std::string glass = names_.take(name + " (pane)", "");
+    add(glass, {{"type", "thin_dielectric"}, {"ior", s.pane_ior}, {"normal_map", s.normal_map}});
+    add(name, {{"type", "mix"},
+               {"materials", fmt::format("[{}, {}]", yamlText(surface), yamlText(glass))},
+               {"amount", s.pane},
+               {"opacity", s.opacity}});
+}
+
+const GltfMaterialText& GltfMaterials::of(const GltfMaterialUse& use) {
+    const auto [found, fresh] = known_.try_emplace(use);
+    GltfMaterialText& text = found->second;
+    if (!fresh) return text;
+    const tinygltf::Model& model = file_.model();
+    const bool own = use.material >= 0 && static_cast<std::size_t>(use.material) < model.materials.size();
+    const tinygltf::Material& material =
+        own ? model.materials[static_cast<std::size_t>(use.material)] : standardMaterial();
+    text.name = names_.take(material.name, own ? fmt::format("material {}", use.material) : "standard");
+    Source source{material, use, text, fmt::format("/materials/{}", use.material), {}};
+    if (material.occlusionTexture.index >= 0)
+        losses_.add("textures of ambient occlusion, which light itself makes here");
+    if (readUnlit(source)) return text;
+    Surface surface;
+    readColor(source, surface);
+    readMetal(source, surface);
+    if (hasExtension(material, "KHR_materials_unlit")) surface.metal = 0, surface.rough = 1;
+    readOpacity(source, surface);
+    readNormals(source, surface);
+    readDielectric(source, surface);
+    readClear(source, surface);
+    readCoat(source, surface);
+    readFuzz(source, surface);
+    readEmission(source);
+    const Value& film = extensionOf(material, "KHR_materials_iridescence");
+    if (const double factor = unitOf(numberOf(film, "iridescenceFactor", 0)); factor > 0) {
+        if (surface.all_clear && surface.metal == 0 && surface.metal_texture.empty()) {
+            const double thickness =
+                std::clamp(numberOf(film, "iridescenceThicknessMaximum", 400), 0.0, 20000.0);
+            surface.dielectric.emplace_back("thin_film_weight", yamlNumber(factor));
+            surface.dielectric.emplace_back("thin_film_thickness", yamlNumber(thickness / 1000));
+            surface.dielectric.emplace_back(
+                "thin_film_ior", yamlNumber(std::clamp(numberOf(film, "iridescenceIor", 1.3), 1.0, 10.0)));
+            if (film.Has("iridescenceTexture") || film.Has("iridescenceThicknessTexture"))
+                losses_.add("textures of iridescence");
+        } else {
+            losses_.add("iridescence of what is not glass");
+        }
+    }
+    if (numberOf(extensionOf(material, "KHR_materials_anisotropy"), "anisotropyStrength", 0) > 0)
+        losses_.add("anisotropy");
+    if (surface.absorbs && !surface.opacity.empty()) {
+        losses_.add("the opacity of glass that absorbs");
+        surface.opacity.clear();
+    }
+    write(source, surface);
+    return text;
+}
+
+}  // namespace crt

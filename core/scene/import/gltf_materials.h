@@ -1,0 +1,74 @@
+/// Materials of a glTF file → those of a scene, as text.
+#pragma once
+
+#include "scene/import/gltf_textures.h"
+
+#include <array>
+#include <compare>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace crt {
+
+/// What a primitive has for its material.
+struct GltfMaterialUse {
+    int material = -1;     ///< −1: glTF's own.
+    bool colors = false;   ///< COLOR_0.
+    unsigned uv_sets = 0;  ///< Bit n: TEXCOORD_n.
+
+    auto operator<=>(const GltfMaterialUse&) const = default;
+};
+
+/// What an object needs to have such a material.
+struct GltfMaterialText {
+    std::string name;
+    std::size_t uv_set = 0;
+    std::array<double, 3> color_factor{1, 1, 1};
+    std::string emission;  ///< Of the object; empty: none.
+};
+
+class GltfMaterials {
+public:
+    /// `nit` is the radiance, over that of an rgb of 1, that a luminance of 1 cd/m² has in this scene. All
+    /// references live as long as this.
+    GltfMaterials(GltfFile& file, GltfTextures& textures, double nit, Losses& losses)
+        : file_(file), textures_(textures), nit_(nit), losses_(losses) {}
+
+    /// The material, whose text is made when it is first asked for.
+    const GltfMaterialText& of(const GltfMaterialUse& use);
+    /// All that were asked for: the lines below `materials:`.
+    const std::string& text() const { return text_; }
+
+private:
+    using Keys = std::vector<std::pair<std::string, std::string>>;
+    struct Source;
+    struct Surface;
+
+    std::optional<GltfTexture> usable(Source& source, std::optional<GltfTexture> texture, const char* what);
+    std::string weight(Source& source, const std::optional<GltfTexture>& texture, double factor,
+                       const char* channel, const char* what);
+    void readColor(Source& source, Surface& surface);
+    void readMetal(Source& source, Surface& surface);
+    void readOpacity(Source& source, Surface& surface);
+    void readNormals(Source& source, Surface& surface);
+    void readDielectric(Source& source, Surface& surface);
+    void readClear(Source& source, Surface& surface);
+    void readCoat(Source& source, Surface& surface);
+    void readFuzz(Source& source, Surface& surface);
+    void readEmission(Source& source);
+    bool readUnlit(Source& source);
+    void add(const std::string& name, const Keys& keys);
+    void write(Source& source, const Surface& surface);
+
+    GltfFile& file_;
+    GltfTextures& textures_;
+    double nit_;
+    Losses& losses_;
+    UniqueNames names_;
+    std::map<GltfMaterialUse, GltfMaterialText> known_;
+    std::string text_;
+};
+
+}  // namespace crt

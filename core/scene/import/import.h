@@ -1,0 +1,23 @@
+/// Models as scenes: a glTF, GLB or OBJ file → the text of a scene that shows it. The one way from such a
+/// file to a picture: `crt import` writes the text, and every command that takes a scene reads it.
+#pragma once
+
+#include "scene/gltf/gltf_file.h"
+
+#include <string>
+
+namespace crt {
+
+/// By the end of the file's name: .glb, .gltf, .obj.
+bool isModel(const std::string& path);
+
+struct ImportOptions {
+    std::string folder;          ///< Of the scene: names of files are relative to it. Empty: the file's own.
+    bool allow_outside = false;  ///< Buffers and images may lie outside the file's folder.
+};
+
+/// The text of a scene of the model, with a camera and light where it has none. What was dropped or
+/// approximated is told in one warning, and written at the top. Throws crt::Error(Scene).
+std::string importModel(GltfFiles& files, const std::string& path, const ImportOptions& options = {});
+
+}  // namespace crt

@@ -1,0 +1,13 @@
+/// An OBJ file → the text of a scene.
+#pragma once
+
+#include "scene/import/scene_text.h"
+
+#include <string>
+
+namespace crt {
+
+/// `file_name` is what the scene calls the file.
+std::string objScene(const std::string& path, const std::string& file_name, Losses& losses);
+
+}  // namespace crt

@@ -1,0 +1,102 @@
+#include "scene/import/scene_text.h"
+
+#include "base/words.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace crt {
+namespace {
+
+bool isPlain(std::string_view name) {
+    const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
+    const auto inside = [&](char c) {
+        return letter(c) || (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '/';
+    };
+    static const std::set<std::string, std::less<>> kWords{
+        "true", "false", "null",  "yes",  "no",  "on", "off", "True", "False", "Null", "Yes", "No", "On",
+        "Off",  "TRUE",  "FALSE", "NULL", "YES", "NO", "ON",  "OFF",  "y",     "n",    "Y",   "N"};
+    return !name.empty() && letter(name.front()) && std::all_of(name.begin(), name.end(), inside) &&
+           !kWords.contains(name) && !looksLikeNumber(name);
+}
+
+}  // namespace
+
+std::string yamlText(std::string_view name) {
+    if (isPlain(name)) return std::string(name);
+    std::string text = "\"";
+    for (const char c : name) {
+        if (c == '"' || c == '\\') text += '\\';
+        text += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '_' : c;
+    }
+    return text + "\"";
+}
+
+std::string yamlNumber(double value) { return fmt::format("{}", value == 0 ? 0.0 : value); }
+
+std::string yamlList(const double* values, std::size_t count) {
+    std::string text = "[";
+    for (std::size_t i = 0; i < count; ++i) text += (i > 0 ? ", " : "") + yamlNumber(values[i]);
+    return text + "]";
+}
+
+std::string UniqueNames::take(const std::string& name, const std::string& fallback) {
+    // Longer names are no names, and each is repeated.
+    std::string wanted = (name.empty() ? fallback : name).substr(0, 200);
+    // A name cut within a letter of UTF-8 loses the whole letter.
+    while (wanted.size() == 200 && (static_cast<unsigned char>(wanted.back()) & 0xc0) == 0x80)
+        wanted.pop_back();
+    if (wanted.size() == 199 && static_cast<unsigned char>(wanted.back()) >= 0xc0) wanted.pop_back();
+    if (looksLikeNumber(wanted)) wanted = "number " + wanted;
+    std::string unique = wanted;
+    for (std::size_t i = 2; !taken_.insert(unique).second; ++i) unique = fmt::format("{} ({})", wanted, i);
+    return unique;
+}
+
+std::vector<std::string> Losses::list() const {
+    std::vector<std::string> all;
+    for (const auto& [what, count] : count_)
+        all.push_back(count == 1 ? what : fmt::format("{} ({} times)", what, count));
+    return all;
+}
+
+void Bounds::add(const Vec3d& point) {
+    for (std::size_t k = 0; k < 3; ++k) {
+        lower[k] = std::min(lower[k], point[k]);
+        upper[k] = std::max(upper[k], point[k]);
+    }
+}
+
+Vec3d Bounds::centre() const { return lower * 0.5 + upper * 0.5; }
+double Bounds::radius() const { return length(upper * 0.5 - lower * 0.5); }
+
+std::string chosenCamera(const Bounds& bounds, double aspect) {
+    constexpr double kTurn_deg = 35, kElevation_deg = 22, kMargin = 1.05;
+    constexpr double kRadian = std::numbers::pi / 180;
+    const double up = std::sin(kElevation_deg * kRadian), flat = std::cos(kElevation_deg * kRadian);
+    const Vec3d back{flat * std::sin(kTurn_deg * kRadian), up, flat * std::cos(kTurn_deg * kRadian)};
+    const Vec3d across = cross({0, 1, 0}, back), right = across * (1 / length(across)),
+                above = cross(back, right);
+    const double shorter = std::tan(kChosenFov_deg / 2 * kRadian);
+    const double half_width = shorter * std::max(aspect, 1.0),
+                 half_height = shorter * std::max(1 / aspect, 1.0);
+    const Vec3d centre = bounds.centre();
+    double distance = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        Vec3d at;
+        for (std::size_t k = 0; k < 3; ++k) at[k] = corner >> k & 1 ? bounds.upper[k] : bounds.lower[k];
+        at = at - centre;
+        const double needed =
+            std::max(std::abs(dot(at, right)) / half_width, std::abs(dot(at, above)) / half_height);
+        distance = std::max(distance, dot(at, back) + kMargin * needed);
+    }
+    if (!(distance > 0)) distance = 1;
+    const Vec3d position = centre + back * distance;
+    return fmt::format("position: {}, target: {}, fov: {}", yamlList(position), yamlList(centre),
+                       yamlNumber(kChosenFov_deg));
+}
+
+}  // namespace crt

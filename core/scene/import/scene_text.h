@@ -1,0 +1,72 @@
+/// The text of a scene, as `crt import` writes it: names and numbers in YAML, what was lost, and a view.
+#pragma once
+
+#include "base/vec3d.h"
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace crt {
+
+/// A name as YAML: plain where it can be, else in double quotes.
+std::string yamlText(std::string_view name);
+/// The shortest decimals that read back as the same double.
+std::string yamlNumber(double value);
+std::string yamlList(const double* values, std::size_t count);
+template <std::size_t kCount>
+std::string yamlList(const std::array<double, kCount>& values) {
+    return yamlList(values.data(), kCount);
+}
+
+/// Names that are given once each, and that no number or word of YAML looks like.
+class UniqueNames {
+public:
+    /// `name`, or `fallback` where it is empty, or one of them with a number behind it.
+    std::string take(const std::string& name, const std::string& fallback);
+
+private:
+    std::set<std::string> taken_{"from_mtl"};
+};
+
+/// What a file has and its scene has not, or not quite, each with how often; and what the scene has that the
+/// file has not.
+class Losses {
+public:
+    void add(const std::string& what) { ++count_[what]; }
+    void choose(const std::string& what) { chosen_.push_back(what); }
+    const std::vector<std::string>& chosen() const { return chosen_; }
+    /// "lines left out (3)", each.
+    std::vector<std::string> list() const;
+
+private:
+    std::map<std::string, std::size_t> count_;
+    std::vector<std::string> chosen_;
+};
+
+/// A box around points.
+struct Bounds {
+    Vec3d lower{kNone, kNone, kNone}, upper{-kNone, -kNone, -kNone};
+
+    void add(const Vec3d& point);
+    bool empty() const { return !(lower[0] <= upper[0]); }
+    Vec3d centre() const;
+    /// Half the diagonal.
+    double radius() const;
+
+private:
+    static constexpr double kNone = std::numeric_limits<double>::infinity();
+};
+
+inline constexpr double kChosenFov_deg = 40;
+
+/// A camera that sees all of the box, from the front, the right and above: the section's keys in one line.
+/// `aspect` is width over height.
+std::string chosenCamera(const Bounds& bounds, double aspect);
+
+}  // namespace crt
