@@ -1,5 +1,5 @@
 /// crt-meshgen OUTDIR: writes the meshes that the scenes in this folder use: sphere.obj, ball.obj,
-/// figure.obj, dragon.obj, prism.obj.
+/// figure.obj, dragon.obj, prism.obj, product.glb.
 ///
 /// They are made rather than shipped: the source says what they are, nothing is downloaded, and every run
 /// writes the same bytes. Sphere and prism are written down directly. Figure and dragon are modelled as
@@ -9,6 +9,7 @@
 /// has to be good at.
 ///
 /// Every object stands on y = 0, is centred in x and z, has height 1, and faces −z.
+#include "product.h"
 #include "shapes.h"
 
 #include <cstdio>
@@ -23,8 +24,8 @@ int main(int argc, char** argv) {
     const bool asks_for_help = argument == "--help" || argument == "-h";
     if (argument.empty() || argument[0] == '-') {
         std::fprintf(asks_for_help ? stdout : stderr,
-                     "usage: crt-meshgen OUTDIR\nWrites sphere.obj, ball.obj, figure.obj, dragon.obj and "
-                     "prism.obj into the folder OUTDIR, which is made if need be.\n");
+                     "usage: crt-meshgen OUTDIR\nWrites sphere.obj, ball.obj, figure.obj, dragon.obj, "
+                     "prism.obj and product.glb into the folder OUTDIR, which is made if need be.\n");
         return asks_for_help ? 0 : 2;
     }
     try {
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
         writeObj(prism(), folder / "prism.obj", "60 degree prism");
         writeObj(figure(), folder / "figure.obj", "ape, thinking");
         writeObj(dragon(), folder / "dragon.obj", "dragon");
+        writeProduct(folder / "product.glb");
     } catch (const std::exception& error) {
         std::fprintf(stderr, "crt-meshgen: %s\n", error.what());
         return 6;
