@@ -243,6 +243,54 @@ TEST_CASE("other materials are mirrors or diffuse", "[mesh_io][mtl]") {
     CHECK_THAT(log.text(), Contains("info: ") && Contains("mesh.obj: 1 material: 1 diffuse\n"));
 }
 
+TEST_CASE("d between 0 and 1 without Ni is opacity, and so is map_d", "[mesh_io][mtl]") {
+    const CapturedLog log;
+    CHECK(loadMaterial("Kd 1 1 1\nd 0.25\n").material.opacity == .25);
+    CHECK(loadMaterial("Kd 1 1 1\nTr 0.25\nNi 1\n").material.opacity == .75);
+    CHECK(loadMaterial("Kd 1 1 1\nPm 1\nd 0.5\n").material.opacity == .5);
+    CHECK(loadMaterial("Kd 1 1 1\nd 1\nTr 0.25\n").material.opacity == 1);
+    CHECK(log.warnings() == 0);
+    // 0 is written for opaque surfaces.
+    for (const char* statements : {"d 0\n", "Tr 1\n", "d -1\n", "Tr 1.0\nNi 1.0\n"}) {
+        CAPTURE(statements);
+        CHECK(loadMaterial(std::string("Kd 1 1 1\n") + statements).material.opacity == 1);
+    }
+    CHECK(log.warnings() == 4);
+    CHECK_THAT(log.text(), Contains("1 diffuse; d 0 without Ni above 1 read as opaque (1)") &&
+                               Contains("1 diffuse; Tr 1 without Ni above 1 read as opaque (1)"));
+    // Of glass it is nothing.
+    CHECK(loadMaterial("Ni 1.5\nd 0.25\n").material.opacity == 1);
+
+    const TemporaryFolder folder;
+    folder.write("leaf.png", "");
+    folder.write("mask.png", "");
+    folder.write("mesh.obj", "mtllib mesh.mtl\n" + kSquare + "usemtl m\nf 1 2 3 4\n");
+    const auto load = [&](const std::string& statements) {
+        folder.write("mesh.mtl", "newmtl m\n" + statements);
+        return *loadObj(folder.path() + "/mesh.obj").materials.at(0).mtl;
+    };
+    // Blender writes its Ni for everything; with images it is a surface.
+    const MtlMaterial leaf = load("Kd 1 1 1\nNi 1.45\nd 0.9\nmap_Kd leaf.png\nmap_d -imfchan g mask.png\n");
+    CHECK(leaf.material.type == MaterialType::Diffuse);
+    REQUIRE(leaf.map_d);
+    CHECK_THAT(leaf.map_d->file, Contains("mask.png"));
+    CHECK(leaf.map_d->channel == 1);
+    CHECK(leaf.material.opacity == .9);  // where the image cannot be read
+    CHECK_FALSE(leaf.norm);
+    CHECK(load("Kd 1 1 1\nNi 1.45\nd 0.9\nmap_Kd leaf.png\n").material.opacity == .9);
+    CHECK(load("map_d mask.png\nd 0\n").material.opacity == 1);
+    CHECK(load("norm -bm 1 mask.png\n").norm);
+    const CapturedLog lost;
+    CHECK_FALSE(load("map_Kd leaf.png\nmap_d leaf.png\n").map_d);
+    CHECK_THAT(lost.text(), Contains("map_d that is the map_Kd left out (alpha is not read) (1)"));
+    CHECK_FALSE(load("map_d gone.png\nnorm away.png\n").map_d);
+    CHECK_THAT(lost.text(), Contains("dropped: map_d (1), norm (1)"));
+    const MtlMaterial glass = load("Ni 1.5\nillum 6\nmap_d mask.png\nnorm mask.png\n");
+    CHECK(glass.material.type == MaterialType::Dielectric);
+    CHECK_FALSE((glass.map_d || glass.norm));
+    CHECK_THAT(lost.text(), Contains("1 glass; dropped: map_d (1), norm (1)"));
+}
+
 TEST_CASE("colours are linear unless they are said to be sRGB", "[mesh_io][mtl]") {
     const CapturedLog log;
     for (const MtlColor color : {MtlColor::Linear, MtlColor::Srgb}) {
@@ -298,9 +346,9 @@ TEST_CASE("one line says what the materials of a file became and lost", "[mesh_i
     loadObj(folder.write("mesh.obj", "mtllib m.mtl\n" + kSquare + faces));
     CHECK(log.warnings() == 1);
     CHECK_THAT(log.text(),
-               Contains("mesh.obj: 27 materials: 23 diffuse, 1 mirror, 3 glass, 1 of them emitting; d below "
-                        "1 without Ni above 1 read as opaque (opacity is not read from MTL) (22), d between "
-                        "0 and 1 with Ni above 1 read as clear glass (3), Pm from 0.5 to 1 read as 1 (1); "
+               Contains("mesh.obj: 27 materials: 23 diffuse, 1 mirror, 3 glass, 1 of them emitting; d 0 "
+                        "without Ni above 1 read as opaque (22), d between 0 and 1 with Ni above 1 read as "
+                        "clear glass (3), Pm from 0.5 to 1 read as 1 (1); "
                         "dropped: Ks (22), Ns (22), map_Kd (22), Tf (3), Pc (1), Pr (1)\n"));
 }
 

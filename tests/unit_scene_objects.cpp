@@ -85,7 +85,7 @@ TEST_CASE("materials of an OBJ can be kept, replaced or ignored", "[scene_yaml][
     CHECK(kept.materials.at(1).name == "two.obj:Lamp.001");
 
     const Scene replaced =
-        parse(kGrey + "objects: [{obj: two.obj, material_overrides: {Lamp.001: grey}}]", {}, folder.path());
+        parse(kGrey + "objects: [{obj: two.obj, parts: {Lamp.001: {material: grey}}}]", {}, folder.path());
     CHECK(replaced.materials.size() == 2);
     CHECK(replaced.meshes.at(0).material == std::vector<std::int32_t>{1, 0});
     CHECK(replaced.meshes[0].emission.empty());
@@ -96,22 +96,101 @@ TEST_CASE("materials of an OBJ can be kept, replaced or ignored", "[scene_yaml][
     CHECK(ignored.materials.size() == 1);
     CHECK(ignored.objects.at(0).material == 0);
 
-    CHECK_THAT(refused(kGrey + "objects: [{obj: two.obj, material_overrides: {Lmap.001: grey}}]", {},
-                       folder.path()),
-               Contains("scene.yaml:3:47: error: no face of 'two.obj' has a material 'Lmap.001'") &&
-                   Contains("did you mean 'Lamp.001'?"));
-    CHECK_THAT(refused(kGrey + "objects: [{obj: two.obj, material: grey, override: true, "
-                               "material_overrides: {body: grey}}]",
-                       {}, folder.path()),
-               Contains("'override: true' replaces all materials of the OBJ; none is left for this"));
+    CHECK_THAT(
+        refused(kGrey + "objects: [{obj: two.obj, parts: {Lmap.001: {material: grey}}}]", {}, folder.path()),
+        Contains("scene.yaml:3:34: error: no face of 'two.obj' belongs to a group, object or material "
+                 "'Lmap.001'") &&
+            Contains("did you mean 'Lamp.001'?") && Contains("its faces have 'body', 'Lamp.001'"));
     CHECK_THAT(refused("objects: [{obj: two.obj, override: true}]", {}, folder.path()),
                Contains("name a material with 'material:'"));
     CHECK_THAT(refused("objects: [{obj: two.obj, material: from_mtl, override: true}]", {}, folder.path()),
                Contains("name a material with 'material:'"));
-    for (const char* key : {"override: true", "mtl: {color: srgb}", "material_overrides: {a: grey}"})
+    for (const char* key : {"override: true", "mtl: {color: srgb}", "parts: {a: {material: grey}}"})
         CHECK_THAT(
             refused(fmt::format("{}objects: [{{mesh: {}, material: grey, {}}}]\n", kGrey, kTriangle, key)),
             Contains("only an OBJ has"));
+}
+
+TEST_CASE("parts of an OBJ have materials and emission by group, object or material",
+          "[scene_yaml][parts]") {
+    const TemporaryFolder folder;
+    folder.write("lamp.mtl", "newmtl brass\nKd 0.5 0.4 0.1\nnewmtl glow\nKd 0 0 0\nKe 2 2 2\n");
+    folder.write("lamp.obj",
+                 "mtllib lamp.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no stand\ng foot\nusemtl brass\nf 1 2 "
+                 "3\ng lamp shade\nf 1 2 3\no bulb\ng\nusemtl glow\nf 1 2 3\ng foot\nf 1 2 3 1\n");
+    const std::string grey =
+        "materials: {a: {type: mirror, reflectance: 0.5}, b: {type: diffuse, reflectance: "
+        "0.5}, c: {type: diffuse, reflectance: 0.1}}\n";
+    // Names of the scene's materials by triangle; those that emit have a mark: *7 by a part, *2 by Ke.
+    const auto partsOf = [&](const std::string& parts, const std::string& keys = "material: c, ") {
+        const Scene scene =
+            parse(fmt::format("{}objects: [{{obj: lamp.obj, {}parts: {{{}}}}}]", grey, keys, parts), {},
+                  folder.path());
+        const Mesh& mesh = scene.meshes.at(0);
+        std::string text;
+        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+            const std::int32_t m =
+                mesh.material.empty() || mesh.material[t] < 0 ? scene.objects[0].material : mesh.material[t];
+            const std::int32_t e = emissionIndexOf(scene, scene.objects[0], t);
+            text += scene.materials.at(static_cast<std::size_t>(m)).name;
+            if (e >= 0)
+                text += scene.emissions.at(static_cast<std::size_t>(e)).radiance == constantSpectrum(7)
+                            ? "*7"
+                            : "*2";
+            text += ' ';
+        }
+        return text;
+    };
+    const std::string light = "emission: {radiance: 7}";
+    CHECK(partsOf("foot: {material: a}") == "c a lamp.obj:brass lamp.obj:glow*2 a ");
+    CHECK(partsOf("stand: {material: a}") == "c a a lamp.obj:glow*2 lamp.obj:glow*2 ");
+    CHECK(partsOf("lamp shade: {material: a}") == "c lamp.obj:brass a lamp.obj:glow*2 lamp.obj:glow*2 ");
+    // A statement may name several groups.
+    CHECK(partsOf("shade: {material: a}") == "c lamp.obj:brass a lamp.obj:glow*2 lamp.obj:glow*2 ");
+    CHECK(partsOf("brass: {material: a}") == "c a a lamp.obj:glow*2 lamp.obj:glow*2 ");
+    CHECK(partsOf("default: {material: a}") == "c lamp.obj:brass lamp.obj:brass a lamp.obj:glow*2 ");
+    // What emits by the file's material stops with it, unless the part emits.
+    CHECK(partsOf("bulb: {material: a}") == "c lamp.obj:brass lamp.obj:brass a a ");
+    CHECK(partsOf("bulb: {" + light + "}") ==
+          "c lamp.obj:brass lamp.obj:brass lamp.obj:glow*7 lamp.obj:glow*7 ");
+    CHECK(partsOf("shade: {material: a, " + light + "}") ==
+          "c lamp.obj:brass a*7 lamp.obj:glow*2 lamp.obj:glow*2 ");
+    // The last part that says it, for material and emission each.
+    CHECK(partsOf("foot: {material: a}, bulb: {material: b}") == "c a lamp.obj:brass b b ");
+    CHECK(partsOf("bulb: {material: b}, foot: {material: a}") == "c a lamp.obj:brass b a ");
+    CHECK(partsOf("bulb: {material: b, " + light + "}, foot: {material: a}") ==
+          "c a lamp.obj:brass b*7 a*7 ");
+    // Patterns
+    CHECK(partsOf("'*': {material: b}, 'f?ot': {material: a}") == "c a b b a ");
+    CHECK(partsOf("'*am*sh*e': {material: a}") == "c lamp.obj:brass a lamp.obj:glow*2 lamp.obj:glow*2 ");
+    // By what has the name
+    CHECK(partsOf("'*a*': {by: material, material: a}") == "c a a lamp.obj:glow*2 lamp.obj:glow*2 ");
+    CHECK(partsOf("'*a*': {by: object, material: a}") == "c a a lamp.obj:glow*2 lamp.obj:glow*2 ");
+    CHECK(partsOf("'*a*': {by: group, material: a}") == "c lamp.obj:brass a a lamp.obj:glow*2 ");
+    // Instead of the file's materials
+    CHECK(partsOf("foot: {material: a}", "material: c, override: true, ") == "c a c c a ");
+    // Nothing of the file is left that no face has.
+    CHECK(parse(grey + "objects: [{obj: lamp.obj, material: c, parts: {'*': {material: a}}}]", {},
+                folder.path())
+              .materials.size() == 3);
+
+    const auto wrong = [&](const std::string& parts) {
+        return refused(grey + "objects: [{obj: lamp.obj, material: c, parts: {" + parts + "}}]", {},
+                       folder.path());
+    };
+    CHECK_THAT(
+        wrong("stnad: {material: a}"),
+        Contains("scene.yaml:3:48: error: no face of 'lamp.obj' belongs to a group, object or material "
+                 "'stnad'") &&
+            Contains("did you mean 'stand'?") &&
+            Contains("its faces have 'brass', 'foot', 'stand', 'lamp shade', 'glow', 'default', 'bulb'"));
+    CHECK_THAT(wrong("foot: {by: material, material: a}"),
+               Contains("no face of 'lamp.obj' belongs to a material 'foot'"));
+    CHECK_THAT(wrong("foot: {material: d}"), Contains("there is no material 'd'"));
+    CHECK_THAT(wrong("foot: a"), Contains("expected a map such as {material: NAME}"));
+    CHECK_THAT(wrong("foot: {by: group}"), Contains("part 'foot' of object 0 says nothing"));
+    CHECK_THAT(wrong("foot: {color: a}"), Contains("unknown key 'color' in part 'foot' of object 0"));
+    CHECK_THAT(wrong("foot: {material: a}, 'b*x': {material: a}"), Contains("'b*x'"));
 }
 
 TEST_CASE("the material of an object fills the faces of an OBJ that have none", "[scene_yaml][mtl]") {
@@ -126,15 +205,17 @@ TEST_CASE("the material of an object fills the faces of an OBJ that have none", 
     CHECK(filled.meshes.at(0).material == std::vector<std::int32_t>{-1, 1, -1});
     CHECK(filled.meshes[0].emission == std::vector<std::int32_t>{-1, 0, -1});
     // Names that no MTL defines can be given a material too.
-    const Scene named = parse(
-        kGrey + "objects: [{obj: some.obj, material: grey, material_overrides: {(null): grey, body: grey}}]",
-        {}, folder.path());
+    const Scene named =
+        parse(kGrey +
+                  "objects: [{obj: some.obj, material: grey, parts: {(null): {material: grey}, body: "
+                  "{material: grey}}}]",
+              {}, folder.path());
     CHECK(named.meshes.at(0).material == std::vector<std::int32_t>{-1, 0, 0});
     CHECK(named.meshes[0].emission.empty());
     CHECK_THAT(refused(kGrey + "objects: [{obj: some.obj}]", {}, folder.path()),
                Contains("2 of 3 triangles of object 0 have no material"));
     CHECK_THAT(
-        refused(kGrey + "objects: [{obj: some.obj, material_overrides: {(null): grey}}]", {}, folder.path()),
+        refused(kGrey + "objects: [{obj: some.obj, parts: {(null): {material: grey}}}]", {}, folder.path()),
         Contains("1 of 3 triangles of object 0 have no material"));
     CHECK_THAT(saidOf(kGrey + "objects: [{obj: some.obj, material: grey}]", folder.path()),
                !Contains("has no face for material"));
@@ -158,7 +239,7 @@ TEST_CASE("an OBJ whose MTL is missing needs a material, and says which file is 
     CHECK(parse(kGrey + "objects: [{obj: lost.obj, material: grey}]", {}, folder.path())
               .meshes.at(0)
               .material == std::vector<std::int32_t>{-1});
-    CHECK(parse(kGrey + "objects: [{obj: lost.obj, material_overrides: {body: grey}}]", {}, folder.path())
+    CHECK(parse(kGrey + "objects: [{obj: lost.obj, parts: {body: {material: grey}}}]", {}, folder.path())
               .meshes.at(0)
               .material == std::vector<std::int32_t>{0});
 }

@@ -516,6 +516,29 @@ TEST_CASE("an OBJ brings texture coordinates, its MTL images", "[texture][obj]")
     CHECK(scene.materials[1].reflectance_texture == crt::kNoTexture);
     CHECK(scene.materials[1].reflectance[0] == Approx(0.5));
 
+    // Opacity and normals: a mask whose right half is there, and which leans to the right.
+    write(in + "/mask.exr", crt::OutputFormat::Exr, {2, 1, {{0, 0, 0}, {1, 0, 0}}});
+    write(in + "/lean.exr", crt::OutputFormat::Exr, {1, 1, {{0.9f, 0.5f, 0.8f}}});
+    crt::spit(in + "/c.mtl",
+              "newmtl leaf\nKd 1 1 1\nd 0.5\nmap_d -clamp on mask.exr\nnorm lean.exr\n"
+              "newmtl fence\nKd 1 1 1\nd 0.5\nmap_d a.obj\n");
+    crt::spit(in + "/c.obj",
+              "mtllib c.mtl\nv 0 0 0\nv 0 0 1\nv 1 0 1\nv 1 0 0\nvt 0 0\nvt 0 1\nvt 1 1\nvt 1 0\nusemtl "
+              "leaf\nf 1/1 2/2 3/3 4/4\nusemtl fence\nf 1/1 2/2 3/3\n");
+    const Scene cut = sceneOf("crt: 1\nobjects: [{obj: c.obj}]\nenvironment: {radiance: 1}\n", in);
+    const crt::Material &leaf = cut.materials.at(0), &fence = cut.materials.at(1);
+    REQUIRE((leaf.opacity_texture >= 0 && leaf.normal_texture >= 0));
+    const crt::Texture& mask = cut.textures.at(static_cast<std::size_t>(leaf.opacity_texture));
+    CHECK(mask.image->kind == crt::TexelKind::Numbers);
+    CHECK(mask.wrap == crt::TextureWrap::Clamp);
+    std::vector<std::uint16_t> texels(2);
+    mask.image->decode(texels);
+    CHECK(texels == std::vector<std::uint16_t>{0, 65535});
+    CHECK(cut.textures.at(static_cast<std::size_t>(leaf.normal_texture)).image->kind ==
+          crt::TexelKind::Normals);
+    CHECK((fence.opacity == .5 && fence.opacity_texture == crt::kNoTexture));
+    CHECK_THAT(log.text(), Contains("c.mtl:9") && Contains("the d beside it counts"));
+
     // A material of the scene's, on an OBJ with texture coordinates and on one without.
     const std::string own =
         "crt: 1\nmaterials: {it: {type: diffuse, reflectance: {texture: Wood Tiles.exr}}}\nobjects: [{obj: "

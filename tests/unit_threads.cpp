@@ -139,19 +139,29 @@ std::string contentsOf(const std::string& text, std::size_t block_bytes) {
             for (const Vec3d& v : *vectors) all += fmt::format("{} {} {}\n", v[0], v[1], v[2]);
             all += "--\n";
         }
-        for (const ObjBlock& block : obj.blocks)
-            for (const ObjFace& face : block.faces) {
-                all += fmt::format("line {} material {}:", face.line, face.material);
+        const auto nameOf = [&](std::int32_t part) {
+            if (part < 0) return std::string("none");
+            const MeshPart& names = obj.parts.at(static_cast<std::size_t>(part));
+            return fmt::format("{}/{}", names.group, names.object);
+        };
+        for (const ObjBlock& block : obj.blocks) {
+            std::size_t run = 0;
+            for (std::size_t i = 0; i < block.faces.size(); ++i) {
+                const ObjFace& face = block.faces[i];
+                if (run + 1 < block.runs.size() && block.runs[run + 1].first_face == i) ++run;
+                all += fmt::format("line {} material {} part {}:", face.line, block.runs.at(run).material,
+                                   nameOf(block.runs[run].part));
                 for (std::uint32_t c = 0; c < face.corner_count; ++c) {
                     const ObjCorner& corner = block.corners[face.first_corner + c];
                     all += fmt::format(" {}//{}", corner.position, corner.normal);
                 }
                 all += '\n';
             }
+        }
         for (const std::string& name : obj.material_names) all += name + '\n';
         for (const auto& library : obj.libraries)
             all += fmt::format("{} {}\n", library.line, library.arguments);
-        for (const ObjLoss* loss : {&obj.bad_positions, &obj.bad_normals, &obj.small_faces})
+        for (const MeshLoss* loss : {&obj.bad_positions, &obj.bad_normals, &obj.small_faces})
             all += fmt::format("{} {} {}\n", loss->count, loss->line, loss->sentence);
         return all + fmt::format("{} {} {} {}", obj.lines, obj.points, obj.free_forms, obj.vertex_colors);
     } catch (const Error& error) {
@@ -172,6 +182,7 @@ TEST_CASE("an OBJ says the same in blocks of any size", "[threads]") {
         vertices +
             "\xEF\xBB\xBFv 3 3 3\nmtllib a.mtl\nmtllib b.mtl\nmtllib a.mtl\n"
             "v nan 1 2\nvn x 1 2\nv 1\nf 1 2 5\n",
+        vertices + "f 1 2 3\ng a b\nf 1 2 3\no c\nf 1 2 3\nusemtl m\nf 1 2 3\ng\nf 1 2 3\ng a b\nf 1 2 3\n",
         vertices + "f 1 2 3\nf 1 2 9\nf 1 2 x\n",     // what cannot be read goes before what is missing
         vertices + "f 1 2 3\nf -1 -2 -9\nf 1 2 x\n",  // in the order of lines
         vertices + "f 1 2 3\nf 1 2 99999999999\nf 1 2 9\n",
@@ -186,10 +197,10 @@ TEST_CASE("an OBJ says the same in blocks of any size", "[threads]") {
             REQUIRE(contentsOf(text, block) == whole);
         }
     }
-    CHECK(contentsOf(texts[4], 1).starts_with("line 8: 'x' is not a corner"));
-    CHECK(contentsOf(texts[5], 1).starts_with("line 7: a face names vertex -9, but only 4 stand before it"));
+    CHECK(contentsOf(texts[5], 1).starts_with("line 8: 'x' is not a corner"));
+    CHECK(contentsOf(texts[6], 1).starts_with("line 7: a face names vertex -9, but only 4 stand before it"));
     CHECK(
-        contentsOf(texts[6], 1).starts_with("line 7: a face names vertex 99999999999, but the file has 4"));
+        contentsOf(texts[7], 1).starts_with("line 7: a face names vertex 99999999999, but the file has 4"));
 }
 
 TEST_CASE("work in parts covers everything once, and its exception arrives", "[threads]") {

@@ -1,8 +1,13 @@
 #include "mesh.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstddef>
 #include <cstdio>
+#include <cstring>
+#include <fstream>
 #include <stdexcept>
+#include <string>
 
 namespace crt::meshgen {
 
@@ -50,6 +55,44 @@ void writeObj(const Mesh& mesh, const std::filesystem::path& path, const char* t
     }
     const bool failed = std::ferror(file) != 0;
     if (std::fclose(file) != 0 || failed) throw std::runtime_error("cannot write " + path.string());
+}
+
+namespace {
+
+/// Least significant byte first.
+template <class T>
+void append(std::string& bytes, T value) {
+    std::array<char, sizeof value> raw;
+    std::memcpy(raw.data(), &value, sizeof value);
+    if (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
+    bytes.append(raw.data(), raw.size());
+}
+
+void append(std::string& bytes, const Vec& v) {
+    for (const double x : {v.x, v.y, v.z}) append(bytes, static_cast<float>(x));
+}
+
+}  // namespace
+
+void writePly(const Mesh& mesh, const std::filesystem::path& path) {
+    std::string bytes =
+        "ply\nformat binary_little_endian 1.0\ncomment written by crt-meshgen\nelement vertex " +
+        std::to_string(mesh.positions.size()) + "\nproperty float x\nproperty float y\nproperty float z\n";
+    if (!mesh.normals.empty()) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
+    bytes += "element face " + std::to_string(mesh.triangles.size()) +
+             "\nproperty list uchar int vertex_indices\nend_header\n";
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+        append(bytes, mesh.positions[i]);
+        if (!mesh.normals.empty()) append(bytes, mesh.normals[i]);
+    }
+    for (const auto& triangle : mesh.triangles) {
+        append(bytes, std::uint8_t{3});
+        for (const std::uint32_t v : triangle) append(bytes, static_cast<std::int32_t>(v));
+    }
+    std::ofstream file(path, std::ios::binary);
+    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    file.close();
+    if (!file) throw std::runtime_error("cannot write " + path.string());
 }
 
 }  // namespace crt::meshgen

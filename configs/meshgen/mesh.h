@@ -1,4 +1,4 @@
-/// Triangle meshes, and the OBJ that is written of them.
+/// Triangle meshes, and the files that are written of them.
 #pragma once
 
 #include "vectors.h"
@@ -28,5 +28,7 @@ void addNormals(Mesh& mesh);
 
 /// Throws std::runtime_error where the file cannot be written.
 void writeObj(const Mesh& mesh, const std::filesystem::path& path, const char* title);
+/// Binary, little endian, in single precision. Throws as writeObj() does.
+void writePly(const Mesh& mesh, const std::filesystem::path& path);
 
 }  // namespace crt::meshgen

@@ -22,4 +22,7 @@ Mesh figure();
 /// its scales as it is coarse on its wings.
 Mesh dragon();
 
+/// A height field of waves, x and z from -1/2 to 1/2, of 2 cells² triangles.
+Mesh grid(std::uint32_t cells, bool with_normals);
+
 }  // namespace crt::meshgen

@@ -5,11 +5,12 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/stage.h"
-#include "base/vec3d.h"
 #include "scene/mesh/material_files.h"
 #include "scene/mesh/mesh_format.h"
+#include "scene/mesh/mesh_rules.h"
 #include "scene/mesh/obj_reader.h"
 #include "scene/mesh/obj_text.h"
+#include "scene/mesh/ply_header.h"
 #include "scene/mesh/triangulate.h"
 
 #include <fmt/format.h>
@@ -17,7 +18,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -31,30 +31,6 @@ namespace {
     throw Error(ErrorKind::Scene, sentence, {file, line});
 }
 
-/// "1 face", "2 faces"
-std::string counted(std::uint64_t count, const char* what) {
-    return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
-}
-
-double maxAbs(const Vec3d& v) { return std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}); }
-bool isNumber(const Vec3d& v) { return !std::isnan(v[0]); }
-
-/// No area beyond what rounding the coordinates to double can make up: collinear points seldom give exactly
-/// zero.
-bool isDegenerate(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
-    const double scale = std::max(maxAbs(b - a), maxAbs(c - a));
-    if (!(scale > 0.0)) return true;
-    // Edges of size one, so that neither a mesh in metres nor one in parsecs overflows.
-    const auto edge = [&](const Vec3d& to) {
-        Vec3d e = to - a;
-        for (double& x : e) x /= scale;
-        return e;
-    };
-    const double coordinate = std::max({maxAbs(a), maxAbs(b), maxAbs(c)}) / scale;
-    return length(cross(edge(b), edge(c))) <=
-           4.0 * std::numeric_limits<double>::epsilon() * (1.0 + coordinate);
-}
-
 /// Puts what an OBJ says together: faces become triangles, names become materials.
 class MeshBuilder {
 public:
@@ -63,7 +39,7 @@ public:
 
     LoadedMesh build() {
         out_.files = {path_};
-        normaliseNormals();
+        normaliseNormals(obj_.normals);
         if (options_.use_mtl) files_ = readMaterialFiles(obj_, path_);
         material_index_.assign(obj_.material_names.size(), -1);
         makeTriangles();
@@ -79,30 +55,13 @@ private:
     struct Part {
         /// Normals and texture coordinates where the file has any.
         std::vector<std::array<std::uint32_t, 3>> triangles, normals, uvs;
-        std::vector<std::int32_t> material;  ///< As of ObjFace, where the file names any.
+        std::vector<std::int32_t> material, part;  ///< As of ObjRun, where the file names any.
         std::vector<std::int32_t> used;      ///< Materials, in the order in which faces use them.
-        ObjLoss wild_normals;
+        MeshLoss wild_normals;
         std::uint64_t flat_faces = 0, faces_without_position = 0, degenerate = 0, crossing = 0;
         std::uint64_t triangles_without_uv = 0;
         bool any_smooth = false;
     };
-
-    /// To unit length; those without a direction become NaN.
-    void normaliseNormals() {
-        constexpr std::size_t kNormals = std::size_t{1} << 14;
-        parallelFor(obj_.normals.size(), kNormals, [this](std::size_t first, std::size_t end) {
-            for (std::size_t i = first; i < end; ++i) {
-                Vec3d& n = obj_.normals[i];
-                const double scale =
-                    maxAbs(n);  // First to size one: squares of very long or short normals would not fit.
-                for (double& x : n) x /= scale;
-                const double unit = length(n);
-                for (double& x : n) x /= unit;
-                if (isNumber(n) && std::isfinite(unit)) continue;
-                n.fill(std::numeric_limits<double>::quiet_NaN());
-            }
-        });
-    }
 
     /// Frees the faces that they are made of.
     void makeTriangles() {
@@ -125,15 +84,19 @@ private:
         std::vector<Vec3d> polygon;
         std::vector<bool> known(obj_.material_names.size(), false);
         part.triangles.reserve(block.faces.size());
-        for (const ObjFace& face : block.faces) {
+        std::size_t run = 0;
+        for (std::size_t i = 0; i < block.faces.size(); ++i) {
+            const ObjFace& face = block.faces[i];
+            if (run + 1 < block.runs.size() && block.runs[run + 1].first_face == i) ++run;
             const std::span<const ObjCorner> corners(&block.corners[face.first_corner], face.corner_count);
             if (!takeCorners(face, corners, polygon, part)) continue;
-            if (face.material >= 0 && !known[static_cast<std::size_t>(face.material)]) {
-                known[static_cast<std::size_t>(face.material)] = true;
-                part.used.push_back(face.material);
+            const std::int32_t material = block.runs[run].material;
+            if (material >= 0 && !known[static_cast<std::size_t>(material)]) {
+                known[static_cast<std::size_t>(material)] = true;
+                part.used.push_back(material);
             }
             for (const PolygonTriangle& triangle : triangulator.split(polygon))
-                addTriangle(triangle, face, corners, polygon, part);
+                addTriangle(triangle, block.runs[run], corners, polygon, part);
         }
         part.crossing = triangulator.crossingPolygons();
     }
@@ -159,9 +122,8 @@ private:
         return !lost_position;
     }
 
-    void addTriangle(const PolygonTriangle& triangle, const ObjFace& face,
-                     std::span<const ObjCorner> corners, const std::vector<Vec3d>& polygon,
-                     Part& part) const {
+    void addTriangle(const PolygonTriangle& triangle, const ObjRun& run, std::span<const ObjCorner> corners,
+                     const std::vector<Vec3d>& polygon, Part& part) const {
         if (isDegenerate(polygon[triangle[0]], polygon[triangle[1]], polygon[triangle[2]])) {
             ++part.degenerate;
             return;
@@ -183,7 +145,8 @@ private:
         part.triangles.push_back(position);
         if (!obj_.normals.empty()) part.normals.push_back(normal);
         if (!obj_.uvs.empty()) part.uvs.push_back(uv);
-        if (namesMaterials()) part.material.push_back(face.material);
+        if (namesMaterials()) part.material.push_back(run.material);
+        if (!obj_.parts.empty()) part.part.push_back(run.part);
     }
 
     bool namesMaterials() const { return options_.use_mtl && !obj_.material_names.empty(); }
@@ -217,6 +180,7 @@ private:
         if (any_smooth_) mesh.normal_index.resize(triangles_);
         if (anyUv()) mesh.uv_index.resize(triangles_);
         if (!out_.materials.empty()) mesh.material.resize(triangles_);
+        if (!obj_.parts.empty()) out_.part.resize(triangles_);
         std::vector<std::size_t> first(parts_.size());
         for (std::size_t i = 1; i < parts_.size(); ++i)
             first[i] = first[i - 1] + parts_[i - 1].triangles.size();
@@ -224,6 +188,7 @@ private:
             const Part part = std::exchange(parts_[i], {});
             const auto at = static_cast<std::ptrdiff_t>(first[i]);
             std::copy(part.triangles.begin(), part.triangles.end(), mesh.triangles.begin() + at);
+            std::copy(part.part.begin(), part.part.end(), out_.part.begin() + (out_.part.empty() ? 0 : at));
             if (any_smooth_)
                 std::copy(part.normals.begin(), part.normals.end(), mesh.normal_index.begin() + at);
             if (anyUv()) std::copy(part.uvs.begin(), part.uvs.end(), mesh.uv_index.begin() + at);
@@ -236,7 +201,7 @@ private:
     }
 
     [[noreturn]] void failForWantOfFaces() const {
-        const ObjLoss& bad = obj_.bad_positions;
+        const MeshLoss& bad = obj_.bad_positions;
         if (bad.count > 0 && (faces_without_position_ > 0 || !any_faces_))
             fail(bad.sentence, path_, bad.line);
         if (out_.degenerate_faces > 0) fail("no face of this mesh has an area", path_);
@@ -260,6 +225,7 @@ private:
         sayWhatIsLost();
         sayMaterials();
         out_.missing_files = files_.missing;
+        out_.parts = std::move(obj_.parts);
         out_.files.insert(out_.files.end(), files_.files.begin(), files_.files.end());
         for (const LoadedMaterial& m : out_.materials) {
             if (!m.mtl || m.mtl->spectrum_file.empty()) continue;
@@ -359,7 +325,7 @@ private:
     LoadedMesh out_;
     std::vector<std::int32_t> material_index_;  ///< By the name's number in the OBJ; −1: not used yet.
     std::vector<Part> parts_;
-    ObjLoss wild_normals_;
+    MeshLoss wild_normals_;
     std::size_t triangles_ = 0, triangles_without_uv_ = 0;
     std::uint64_t flat_faces_ = 0, faces_without_position_ = 0, crossing_polygons_ = 0;
     bool any_faces_ = false, any_smooth_ = false;
@@ -369,6 +335,7 @@ private:
 ObjContents readContents(const std::string& path) {
     Stage stage("reading " + std::filesystem::path(path).filename().string());
     const std::string text = readTextFile(path, "mesh", kMostMeshBytes, {path});
+    if (beginsAsPly(text)) fail("this is a PLY file; name it by 'ply:' in place of 'obj:'", path);
     if (const std::string format = otherFormat(text); !format.empty())
         fail(fmt::format("this is {}; crt reads OBJ", format), path);
     ObjContents obj = readObj(text, path, stage);

@@ -1,9 +1,11 @@
 /// OBJ files, with the materials of their MTL → Mesh.
 #pragma once
 
+#include "scene/mesh/mesh_rules.h"
 #include "scene/mesh/mtl_material.h"
 #include "scene/scene.h"
 
+#include <compare>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,6 +16,7 @@ namespace crt {
 struct ObjOptions {
     bool use_mtl = true;                ///< Reads mtllib and usemtl.
     MtlColor color = MtlColor::Linear;  ///< What Kd, Ks and Ke are.
+    auto operator<=>(const ObjOptions&) const = default;
 };
 
 /// A name that usemtl gives to faces.
@@ -22,12 +25,15 @@ struct LoadedMaterial {
     std::optional<MtlMaterial> mtl;  ///< Nothing where no material file defines the name.
 };
 
-/// What an OBJ file brought.
+/// What the file of a mesh brought.
 struct LoadedMesh {
     Mesh mesh;  ///< mesh.material indexes `materials` below, −1 none, or is empty; mesh.emission is empty.
     std::vector<LoadedMaterial> materials;   ///< Only those that faces use, in the order in which they do.
+    std::vector<MeshPart> parts;  ///< Groups and objects of an OBJ, those that faces belong to among them.
+    std::vector<std::int32_t>
+        part;  ///< By triangle, index into `parts`, −1 none; empty where there are none.
     std::vector<std::string> missing_files;  ///< MTLs that the OBJ names and that are not there.
-    std::vector<std::string> files;          ///< The OBJ, its MTLs and their spectra.
+    std::vector<std::string> files;          ///< The mesh, its MTLs and their spectra.
     std::uint64_t degenerate_faces = 0;      ///< Zero-area triangles, left out with a warning.
 };
 

@@ -44,8 +44,8 @@ const std::vector<MtlKey>& mtlKeys() {
         {"d",
          {},
          "opacity",
-         "Below 1, and with `Ni` above 1: clear glass. Without `Ni` it is opacity, which is the scene's to "
-         "say: the surface is opaque, with a warning."},
+         "Below 1, and with `Ni` above 1: clear glass, unless there is a `map_Kd` or `map_d`. Otherwise the "
+         "opacity; 0 is taken for 1, with a warning: a Sponza in circulation has it everywhere."},
         {"Tr",
          {},
          "1 − opacity",
@@ -82,7 +82,9 @@ const std::vector<MtlKey>& mtlKeys() {
         {"Pcr", {}, "coat roughness", "Left out, with a warning if not 0."},
         {"aniso", {}, "anisotropy", "Left out, with a warning if not 0."},
         {"anisor", {}, "its angle", "Left out, with a warning if not 0."},
-        {"map_Kd", {}, "image",
+        {"map_Kd",
+         {},
+         "image",
          "A texture that takes the place of `Kd`, where `vt` say how it lies: sRGB for 8 and 16 bits. "
          "Looked up beside the MTL, with `/` for `\\`, without its folders, in another case. `-s`, `-o` and "
          "`-clamp` are read. Where the file is not there or cannot be read, with a warning, `Kd` counts; a "
@@ -94,7 +96,11 @@ const std::vector<MtlKey>& mtlKeys() {
         {"map_d",
          {"map_Tr", "map_opacity"},
          "image",
-         "Left out, with a warning: leaves and fences fill their whole outline."},
+         "Takes the place of `d`, as `map_Kd` that of `Kd`: white is there, black is not. Of coloured "
+         "images "
+         "red, or what `-imfchan` says. Left out, with a warning, where the file is not there, of glass, "
+         "and "
+         "where it is the `map_Kd` itself: alpha is not read."},
         {"map_Pr", {}, "image", "Left out, with a warning."},
         {"map_Pm", {}, "image", "Left out, with a warning."},
         {"map_Ps", {}, "image", "Left out, with a warning."},
@@ -102,7 +108,12 @@ const std::vector<MtlKey>& mtlKeys() {
         {"map_bump", {"bump"}, "image", "Left out, with a warning."},
         {"disp", {"map_disp"}, "image", "Left out, with a warning."},
         {"decal", {"map_decal"}, "image", "Left out, with a warning."},
-        {"norm", {"map_Kn", "map_norm"}, "image", "Left out, with a warning."},
+        {"norm",
+         {"map_Kn", "map_norm"},
+         "image",
+         "A normal map, as `normal_map` of materials. Left out, with a warning, of glass and where the file "
+         "is "
+         "not there."},
         {"sharpness", {}, "number", "Ignored: it belongs to reflection maps."},
         {"map_aat", {}, "on or off", "Ignored: it belongs to textures."},
     };

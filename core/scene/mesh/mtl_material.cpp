@@ -82,6 +82,7 @@ public:
         m.place = {mtl_.file, mtl_.line};
         const bool metallic = pm_.value_or(0.0) >= 0.5;
         if (has("map_Kd") && !has("crt_reflectance")) map_kd_ = map("map_Kd");
+        if (has("map_d")) map_d_ = map("map_d");
         const bool polished = illumIs({3, 5}) && brightest(kd_.value_or(Vec3d{})) <= 0.1 &&
                               brightest(ks_.value_or(Vec3d{})) > 0.0;
         if (lightPasses() && refracts())
@@ -91,6 +92,10 @@ public:
         else
             diffuse(m);
         if (reflects_kd_) mapped.map_kd = map_kd_;
+        if (!glass_) {
+            mapped.map_d = map_d_;
+            if (has("norm")) mapped.norm = map("norm");
+        }
         if (emits()) {
             mapped.emission = Emission{rgbEmission(linear(*ke_)), false};
             summary_.became("emitting");
@@ -146,8 +151,11 @@ private:
     /// Maya writes illum 4 and a white Tf for everything. Its Ni is the shader's: 1.5 in a model that came
     /// from 3ds Max.
     bool fromMaya() const { return illumIs({4}) && tf_ && isGrey(*tf_, 1.0); }
+    /// What has images is a surface: leaves and decals, whose exporters write an Ni for everything.
+    bool hasImages() const { return has("map_Kd") || has("map_d"); }
     bool lightPasses() const {
-        return opacity_.value_or(1.0) < 1.0 || filters() || (illumIs({4, 6, 7, 9}) && !fromMaya());
+        return (opacity_.value_or(1.0) < 1.0 && !hasImages()) || filters() ||
+               (illumIs({4, 6, 7, 9}) && !fromMaya());
     }
     bool refracts() const { return ni_.value_or(1.0) > 1.0 && *ni_ <= kMaxIndex; }
     bool emits() const { return ke_ && brightest(*ke_) > 0.0; }
@@ -156,6 +164,7 @@ private:
 
     void glass(Material& m) {
         summary_.became("glass");
+        glass_ = true;
         m.type = MaterialType::Dielectric;
         m.eta = constantSpectrum(*ni_);
         if (opacity_ && *opacity_ > 0.0 && *opacity_ < 1.0)
@@ -171,7 +180,7 @@ private:
         reflects_kd_ = metallic;
         m.reflectance = metallic ? reflectance(kdOrGrey(), "Kd") : reflectance(*ks_, "Ks");
         if (metallic && *pm_ < 1.0) summary_.decided("Pm from 0.5 to 1 read as 1");
-        opaque();
+        cutOut(m);
         smooth();
     }
 
@@ -181,7 +190,7 @@ private:
         reflects_kd_ = true;
         m.reflectance = reflectance(kdOrGrey(), "Kd");
         if (pm_.value_or(0.0) > 0.0) summary_.decided("Pm below 0.5 read as 0");
-        opaque();
+        cutOut(m);
         // illum 0 and 1 say that there is no highlight, whatever Ks holds.
         if (illumIs({0, 1}) || brightest(ks_.value_or(Vec3d{})) == 0.0) return;
         summary_.dropped("Ks");
@@ -189,13 +198,19 @@ private:
             if (has(roughness)) summary_.dropped(roughness);
     }
 
-    /// What says that light passes, where it does not.
-    void opaque() const {
-        if (opacity_.value_or(1.0) < 1.0)
-            summary_.decided(fmt::format("{} without Ni above 1 read as opaque (opacity is not read from "
-                                         "MTL)",
-                                         has("d") ? "d below 1" : "Tr above 0"));
-        else if (illumIs({4, 6, 7, 9}))
+    /// The share of the surface that is there; and what says that light passes, where it does not.
+    void cutOut(Material& m) {
+        const double opacity = opacity_.value_or(1.0);
+        if (map_d_ && map_kd_ && map_d_->file == map_kd_->file) {
+            summary_.decided("map_d that is the map_Kd left out (alpha is not read)");
+            map_d_.reset();
+        }
+        if (opacity > 0.0 && opacity < 1.0)
+            m.opacity = opacity;
+        else if (opacity <= 0.0 && !map_d_)
+            summary_.decided(fmt::format("{}{} read as opaque", has("d") ? "d 0" : "Tr 1",
+                                         refracts() ? " of a surface with images" : " without Ni above 1"));
+        else if (illumIs({4, 6, 7, 9}) && !map_d_)
             summary_.decided(fmt::format("illum {} {} read as opaque", *illum_,
                                          refracts() ? "with a white Tf" : "without Ni above 1"));
         if (filters()) summary_.dropped("Tf");
@@ -268,6 +283,7 @@ private:
                 for (int i = 0; i < arguments; ++i) {
                     const std::string_view value = nextField(after);
                     if (option == "-clamp") map.clamp = value == "on";
+                    if (option == "-imfchan") map.channel = value == "g" ? 1 : value == "b" ? 2 : 0;
                 }
             }
             rest = after;
@@ -295,8 +311,9 @@ private:
             if (read_above.contains(keyword) || ignored.contains(keyword) || statement.arguments.empty())
                 continue;
             std::string_view rest = statement.arguments;
-            if (keyword == "map_Kd" && !has("crt_reflectance") && reflects_kd_)
-                continue;  // told above where it is not there
+            // Told above where they are not there.
+            if (keyword == "map_Kd" && !has("crt_reflectance") && reflects_kd_) continue;
+            if ((keyword == "map_d" || keyword == "norm") && !glass_) continue;
             if (findMtlKey(keyword) == nullptr)
                 summary_.unknown(keyword);
             else if (numberOf(nextField(rest)) != 0.0)
@@ -310,8 +327,8 @@ private:
     std::optional<Vec3d> kd_, ks_, ke_, tf_;
     std::optional<double> ni_, pm_, opacity_, illum_;
     std::string spectrum_file_;
-    std::optional<MtlMap> map_kd_;
-    bool reflects_kd_ = false;
+    std::optional<MtlMap> map_kd_, map_d_;
+    bool reflects_kd_ = false, glass_ = false;
 };
 
 }  // namespace

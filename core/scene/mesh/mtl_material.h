@@ -5,6 +5,7 @@
 #include "scene/scene.h"
 
 #include <array>
+#include <cstddef>
 #include <map>
 #include <optional>
 #include <string>
@@ -20,12 +21,15 @@ struct MtlMap {
     std::string file;                                  ///< It is there; nobody has looked into it.
     std::array<double, 6> transform{1, 0, 0, 0, 1, 0};  ///< As of Texture.
     bool clamp = false;
+    std::size_t channel = 0;  ///< Of a number: red, green or blue.
     SourcePlace place;
 };
 
 struct MtlMaterial {
     Material material;
-    std::optional<MtlMap> map_kd;      ///< To take the place of the material's reflectance.
+    std::optional<MtlMap> map_kd;      ///< To take the place of the material's reflectance,
+    std::optional<MtlMap> map_d;       ///< of its opacity,
+    std::optional<MtlMap> norm;        ///< and of its normals.
     std::optional<Emission> emission;  ///< Ke, if it is not black.
     std::string spectrum_file;         ///< Read for crt_reflectance; empty without it.
 };
@@ -62,12 +66,13 @@ private:
 
 /// A material of an MTL file as one of ours, by these rules, the first that fits (in full: mtlKeys()):
 ///
-///  1. Ni above 1, and light passes (d < 1, or Tr > 0 without d; a Tf that is neither black nor white;
-///     illum 6, 7 or 9; illum 4 without a white Tf): Dielectric, smooth and clear.
+///  1. Ni above 1, and light passes (d < 1, or Tr > 0 without d, of a surface without images; a Tf that is
+///     neither black nor white; illum 6, 7 or 9; illum 4 without a white Tf): Dielectric, smooth and clear.
 ///  2. Pm ≥ 0.5: Mirror with reflectance Kd. illum 3 or 5 with Kd ≤ 0.1 and a Ks: Mirror of reflectance
 ///  Ks.
 ///  3. Diffuse with reflectance Kd.
 ///
+/// Of mirrors and diffuse surfaces map_d is the opacity, or d between 0 and 1.
 /// A statement that cannot be read is as if it were left out. Adds what was decided and lost to `summary`.
 /// Throws crt::Error(Scene) for a spectrum (crt_reflectance) that cannot be read or leaves [0, 1].
 MtlMaterial mapMtlMaterial(const MtlText& mtl, MtlColor color, MtlSummary& summary);

@@ -1,3 +1,4 @@
+// Over 450 lines: what a block of lines says stands beside how blocks are joined.
 #include "scene/mesh/obj_reader.h"
 
 #include "base/error.h"
@@ -21,8 +22,29 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint32_t kMostIndex = kBadObjNormal - 1;  ///< Corners hold what is below.
-constexpr double kMostObjUv = 1e6;  // Beyond it nothing is left of the texel.
-constexpr std::int32_t kAsBefore = -2;  ///< The material that the lines before the block ended with.
+/// The name that the lines before the block ended with.
+constexpr std::int32_t kAsBefore = -2;
+
+/// Names that statements of a block give to the faces that follow.
+struct Names {
+    std::vector<std::string> names;  ///< Each once.
+    std::map<std::string, std::int32_t, std::less<>> index;
+    std::int32_t now = kAsBefore;  ///< Of the next face.
+
+    std::int32_t add(std::string_view name) {
+        if (const auto known = index.find(name); known != index.end()) return known->second;
+        const auto number = static_cast<std::int32_t>(names.size());
+        names.emplace_back(name);
+        index.emplace(name, number);
+        return number;
+    }
+};
+
+/// The faces from `first_face` to the next run, by numbers of the block's names.
+struct NamedRun {
+    std::uint32_t first_face;
+    std::int32_t material, group, object;
+};
 
 /// What a block of lines says, as far as it can be known without the blocks before it: lines, materials and
 /// what counts backwards are of the block alone.
@@ -30,10 +52,10 @@ struct ObjPart {
     std::vector<Vec3d> positions, normals;
     std::vector<std::array<double, 2>> uvs;
     ObjBlock block;
-    std::vector<std::string> material_names;
-    std::int32_t material = kAsBefore;  ///< At its end.
+    Names materials, groups, objects;
+    std::vector<NamedRun> runs;
     std::vector<ObjContents::Library> libraries;
-    ObjLoss bad_positions, bad_normals, bad_uvs, small_faces;
+    MeshLoss bad_positions, bad_normals, bad_uvs, small_faces;
     std::uint64_t lines = 0, points = 0, free_forms = 0;
     bool vertex_colors = false;
     int lines_taken = 0;
@@ -81,7 +103,11 @@ private:
         } else if (keyword == "f" || keyword == "fo")
             face();
         else if (keyword == "usemtl")
-            useMaterial();
+            use(part_.materials, lines_.arguments());
+        else if (keyword == "g")
+            use(part_.groups, lines_.arguments().empty() ? "default" : lines_.arguments());
+        else if (keyword == "o")
+            use(part_.objects, lines_.arguments());
         else if (keyword == "mtllib")
             part_.libraries.push_back({std::string(lines_.arguments()), lines_.number()});
         else if (keyword == "l")
@@ -100,7 +126,7 @@ private:
 
     /// Takes them off `rest`. All of them NaN, and noted, where one cannot be read. More may follow (a
     /// weight, a colour).
-    Vec3d threeNumbers(std::string_view& rest, const char* what, ObjLoss& loss) {
+    Vec3d threeNumbers(std::string_view& rest, const char* what, MeshLoss& loss) {
         Vec3d v{};
         for (double& number : v) {
             const std::string_view field = nextField(rest);
@@ -135,13 +161,13 @@ private:
             const std::string_view field = nextField(rest);
             if (k > 0 && field.empty()) break;
             const std::optional<double> value = numberOf(field);
-            if (value && std::abs(*value) <= kMostObjUv) {
+            if (value && std::abs(*value) <= kMostMeshUv) {
                 uv[k] = *value;
                 continue;
             }
             part_.bad_uvs.add(lines_.number(),
                               fmt::format("texture coordinates must be numbers up to {:g}, found {}",
-                                          kMostObjUv, inQuotes(field)));
+                                          kMostMeshUv, inQuotes(field)));
             uv = {};
             break;
         }
@@ -216,20 +242,25 @@ private:
             part_.small_faces.add(
                 lines_.number(), fmt::format("a face needs at least three corners, this one has {}", count));
         else
-            part_.block.faces.push_back(
-                {static_cast<std::uint32_t>(first), count, part_.material, lines_.number()});
+            addFace({static_cast<std::uint32_t>(first), count, lines_.number()});
     }
 
-    void useMaterial() {
-        const auto [known, fresh] = material_index_.try_emplace(
-            std::string(lines_.arguments()), static_cast<std::int32_t>(part_.material_names.size()));
-        if (fresh) part_.material_names.push_back(known->first);
-        part_.material = known->second;
+    void addFace(const ObjFace& face) {
+        if (new_run_)
+            part_.runs.push_back({static_cast<std::uint32_t>(part_.block.faces.size()), part_.materials.now,
+                                  part_.groups.now, part_.objects.now});
+        new_run_ = false;
+        part_.block.faces.push_back(face);
+    }
+
+    void use(Names& names, std::string_view name) {
+        names.now = names.add(name);
+        new_run_ = true;
     }
 
     TextLines lines_;
     ObjPart part_;
-    std::map<std::string, std::int32_t> material_index_;
+    bool new_run_ = true;
 };
 
 /// The ends of blocks of some `block_bytes`, each after an end of line that no backslash joins with the
@@ -300,8 +331,6 @@ private:
     struct Place {
         std::size_t positions = 0, normals = 0, uvs = 0;
         int line = 0;
-        std::vector<std::int32_t> material;  ///< In the file, of those in the part.
-        std::int32_t material_before = -1;
         std::optional<Missing> missing;  ///< The first face of the part that names a vertex beyond the last.
     };
 
@@ -342,23 +371,53 @@ private:
         }
     }
 
+    /// The names of a kind, of the whole file.
+    struct JoinedNames {
+        Names all;
+        std::int32_t before = -1;             ///< That which the parts so far ended with.
+        std::vector<std::int32_t> of_part{};  ///< By number in the part at hand.
+
+        void enter(const Names& part) {
+            of_part.clear();
+            for (const std::string& name : part.names) of_part.push_back(all.add(name));
+        }
+        std::int32_t operator()(std::int32_t in_part) const {
+            return in_part == kAsBefore ? before : of_part[static_cast<std::size_t>(in_part)];
+        }
+        void leave(const Names& part) { before = (*this)(part.now); }
+    };
+
+    /// Runs by the names of a part → by those of the file.
+    void joinRuns(ObjPart& part) {
+        materials_.enter(part.materials);
+        groups_.enter(part.groups);
+        objects_.enter(part.objects);
+        for (const NamedRun& run : part.runs)
+            part.block.runs.push_back({run.first_face, materials_(run.material),
+                                       partOf(groups_(run.group), objects_(run.object))});
+        materials_.leave(part.materials);
+        groups_.leave(part.groups);
+        objects_.leave(part.objects);
+    }
+
+    std::int32_t partOf(std::int32_t group, std::int32_t object) {
+        if (group < 0 && object < 0) return -1;
+        const auto [known, fresh] =
+            part_index_.try_emplace({group, object}, static_cast<std::int32_t>(obj_.parts.size()));
+        const auto nameOf = [](const JoinedNames& names, std::int32_t i) {
+            return i < 0 ? std::string() : names.all.names[static_cast<std::size_t>(i)];
+        };
+        if (fresh) obj_.parts.push_back({nameOf(groups_, group), nameOf(objects_, object)});
+        return known->second;
+    }
+
     /// All but vertices and faces.
     void joinStatements() {
-        std::map<std::string, std::int32_t> material_index;
         std::set<std::string> libraries;  // Some exporters repeat the statement before each object.
-        std::int32_t material = -1;
         for (std::size_t i = 0; i < parts_.size(); ++i) {
             ObjPart& part = parts_[i];
-            Place& place = places_[i];
-            place.material_before = material;
-            for (const std::string& name : part.material_names) {
-                const auto [known, fresh] =
-                    material_index.try_emplace(name, static_cast<std::int32_t>(obj_.material_names.size()));
-                if (fresh) obj_.material_names.push_back(name);
-                place.material.push_back(known->second);
-            }
-            if (part.material != kAsBefore)
-                material = place.material[static_cast<std::size_t>(part.material)];
+            const Place& place = places_[i];
+            joinRuns(part);
             for (ObjContents::Library& library : part.libraries)
                 if (libraries.insert(library.arguments).second)
                     obj_.libraries.push_back({std::move(library.arguments), place.line + library.line});
@@ -371,6 +430,7 @@ private:
             obj_.free_forms += part.free_forms;
             obj_.vertex_colors |= part.vertex_colors;
         }
+        obj_.material_names = std::move(materials_.all.names);
     }
 
     void joinVertices(std::size_t i) {
@@ -385,9 +445,6 @@ private:
         std::size_t beyond = 0;
         for (ObjFace& face : part.block.faces) {
             face.line += place.line;
-            face.material = face.material == kAsBefore
-                                ? place.material_before
-                                : place.material[static_cast<std::size_t>(face.material)];
             for (std::size_t c = face.first_corner; c < std::size_t{face.first_corner} + face.corner_count;
                  ++c) {
                 ObjCorner& corner = part.block.corners[c];
@@ -416,6 +473,8 @@ private:
     std::vector<Place> places_;
     std::size_t positions_ = 0, normals_ = 0, uvs_ = 0;
     ObjContents obj_;
+    JoinedNames materials_, groups_, objects_;
+    std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> part_index_;  ///< By group and object.
 };
 
 }  // namespace

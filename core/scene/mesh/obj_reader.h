@@ -3,6 +3,7 @@
 #pragma once
 
 #include "base/stage.h"
+#include "scene/mesh/mesh_rules.h"
 #include "spectra/spectra.h"
 
 #include <array>
@@ -24,35 +25,27 @@ inline constexpr std::uint32_t kNoObjNormal = 0xffffffffu;
 inline constexpr std::uint32_t kBadObjNormal = 0xfffffffeu;
 inline constexpr std::uint32_t kNoObjUv = 0xffffffffu;
 
-/// A polygon: a run of corners, its material, and where it stands in the file.
+/// A polygon: a run of corners, and where it stands in the file.
 struct ObjFace {
     std::uint32_t first_corner;  ///< In its block.
     std::uint32_t corner_count;
-    std::int32_t material;  ///< Index into material_names; −1 none.
     int line;
     bool operator==(const ObjFace&) const = default;
+};
+
+/// What a face and those behind it, up to the next run, belong to.
+struct ObjRun {
+    std::uint32_t first_face;  ///< In its block.
+    std::int32_t material;     ///< Index into material_names; −1 none.
+    std::int32_t part;         ///< Index into parts; −1 none.
+    bool operator==(const ObjRun&) const = default;
 };
 
 /// The faces of some lines.
 struct ObjBlock {
     std::vector<ObjCorner> corners;
     std::vector<ObjFace> faces;
-};
-
-/// Something wrong that costs a part of the file and not the file: how often, and the first of them.
-struct ObjLoss {
-    std::uint64_t count = 0;
-    int line = 0;
-    std::string sentence;
-
-    void add(int at_line, const std::string& what) {
-        if (count++ == 0) line = at_line, sentence = what;
-    }
-    /// What was found behind it, in lines counted from `first_line`.
-    void add(const ObjLoss& behind, int first_line = 0) {
-        if (count == 0 && behind.count > 0) line = behind.line + first_line, sentence = behind.sentence;
-        count += behind.count;
-    }
+    std::vector<ObjRun> runs;  ///< The first begins with the first face.
 };
 
 struct ObjContents {
@@ -61,13 +54,14 @@ struct ObjContents {
     std::vector<std::array<double, 2>> uvs;   ///< Texture coordinates; 0 where they cannot be read.
     std::vector<ObjBlock> blocks;             ///< In the order of the file.
     std::vector<std::string> material_names;  ///< Of usemtl, each once.
+    std::vector<MeshPart> parts;              ///< Of g and o, each once; none where there are no such lines.
     struct Library {
         std::string arguments;
         int line;
     };
     std::vector<Library> libraries;  ///< The mtllib statements, each once.
 
-    ObjLoss bad_positions, bad_normals, bad_uvs, small_faces;
+    MeshLoss bad_positions, bad_normals, bad_uvs, small_faces;
     std::uint64_t lines = 0, points = 0, free_forms = 0;  ///< Statements l, p, and curves or surfaces.
     bool vertex_colors = false;
 };

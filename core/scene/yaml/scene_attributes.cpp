@@ -8,8 +8,11 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace crt {
@@ -95,6 +98,7 @@ void ObjectReader::checkTextures(const SectionReader& section, const Object& obj
     materials.erase(-1);
     const std::string_view named = section.has("material") ? "material"
                                    : section.has("obj")    ? "obj"
+                                   : section.has("ply")    ? "ply"
                                                            : "mesh";
     for (const std::int32_t index : materials) {
         const Material& material = scene_.materials[static_cast<std::size_t>(index)];
@@ -104,39 +108,49 @@ void ObjectReader::checkTextures(const SectionReader& section, const Object& obj
                           fmt::format("material '{}' has a texture, but the mesh of {} has no texture "
                                       "coordinates",
                                       material.name, section.subject()),
-                          section.has("obj") ? "" : "give the mesh 'uvs', one [u, v] for each position");
+                          section.has("mesh") ? "give the mesh 'uvs', one [u, v] for each position" : "");
         if (needs.colors && mesh.colors.empty())
             section.error(named,
                           fmt::format("material '{}' asks for colours of vertices, but the mesh of {} has "
                                       "none",
                                       material.name, section.subject()),
-                          section.has("obj") ? "only meshes that are written out have them"
-                                             : "give the mesh 'colors', one [r, g, b] for each position");
+                          section.has("mesh") ? "give the mesh 'colors', one [r, g, b] for each position"
+                          : section.has("obj")
+                              ? "crt reads them from a PLY, and of meshes that are written out"
+                              : "");
     }
 }
 
-/// Images that the materials of an OBJ name take the place of their Kd where they can be read; else Kd
-/// stays, with a warning.
+/// Images that the materials of an OBJ name take the place of what they stand for where they can be read;
+/// else that stays, with a warning.
 void ObjectReader::addMaps(LoadedMesh& loaded, const std::string& path) {
-    std::size_t without_uvs = 0;
-    for (LoadedMaterial& material : loaded.materials) {
-        if (!material.mtl || !material.mtl->map_kd) continue;
-        const MtlMap& map = *material.mtl->map_kd;
+    std::map<std::string_view, std::size_t> without_uvs;
+    const auto add = [&](const std::optional<MtlMap>& map, std::string_view keyword, const TexelUse& use,
+                         std::string_view instead, TextureIndex& into) {
+        if (!map) return;
         if (loaded.mesh.uvs.empty()) {
-            ++without_uvs;
-            continue;
+            ++without_uvs[keyword];
+            return;
         }
         try {
-            material.mtl->material.reflectance_texture = textures_.addImage(
-                map.file, map.transform, map.clamp ? TextureWrap::Clamp : TextureWrap::Repeat, map.place);
+            into = textures_.addImage(map->file, use, map->transform,
+                                      map->clamp ? TextureWrap::Clamp : TextureWrap::Repeat, map->place);
         } catch (const Error& e) {
             if (e.kind() == ErrorKind::Internal) throw;
-            logWarning("{}:{}: {}; the Kd beside it counts", map.place.file, map.place.line, e.what());
+            logWarning("{}:{}: {}; {}", map->place.file, map->place.line, e.what(), instead);
         }
+    };
+    for (LoadedMaterial& material : loaded.materials) {
+        if (!material.mtl) continue;
+        MtlMaterial& mtl = *material.mtl;
+        add(mtl.map_kd, "map_Kd", {}, "the Kd beside it counts", mtl.material.reflectance_texture);
+        add(mtl.map_d, "map_d", {.kind = TexelKind::Numbers, .channel = mtl.map_d ? mtl.map_d->channel : 0},
+            "the d beside it counts", mtl.material.opacity_texture);
+        add(mtl.norm, "norm", {.kind = TexelKind::Normals}, "left out", mtl.material.normal_texture);
     }
-    if (without_uvs > 0)
-        logWarning("{}: map_Kd of {} material{} left out: the file has no texture coordinates (vt)", path,
-                   without_uvs, without_uvs == 1 ? "" : "s");
+    for (const auto& [keyword, count] : without_uvs)
+        logWarning("{}: {} of {} material{} left out: the file has no texture coordinates (vt)", path,
+                   keyword, count, count == 1 ? "" : "s");
 }
 
 }  // namespace crt

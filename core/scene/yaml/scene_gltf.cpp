@@ -35,11 +35,9 @@ std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object)
     const std::optional<SectionReader> form =
         object.section("gltf", fmt::format("the gltf of {}", object.subject()));
     refuseObjKeys(object);
-    if (!object.has("material"))
-        out_.error(object.place(), fmt::format("'material' is missing in {}", object.subject()));
+    if (object.has("vertex_colors")) object.error("vertex_colors", "this is about the colours in a PLY");
+    const NormalsUse normals = readNormals(object);
     std::string name;
-    if (object.read("material", name) && name == "from_mtl")
-        object.error("material", "only an OBJ has materials of its own");
     GltfPrimitive which;
     if (!form->read("file", name)) return std::nullopt;
     std::uint64_t number = 0;
@@ -50,7 +48,7 @@ std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object)
         which.color_factor = {factor[0], factor[1], factor[2]};
     const std::optional<std::string> path = files_.locate(name, form->place("file"), out_);
     if (!path) return std::nullopt;
-    const auto [known, fresh] = gltf_meshes_.try_emplace({*path, which});
+    const auto [known, fresh] = gltf_meshes_.try_emplace({*path, which, normals});
     if (!fresh) return known->second;
     try {
         Mesh mesh = gltfMesh(*form, *path, which);
@@ -58,6 +56,7 @@ std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object)
             logWarning("{} is left out: no triangle of it has an area", object.subject());
             return std::nullopt;
         }
+        setNormals(mesh, normals, object.subject());
         known->second = static_cast<std::uint32_t>(scene_.meshes.size());
         scene_.meshes.push_back(std::move(mesh));
     } catch (const Error& e) {

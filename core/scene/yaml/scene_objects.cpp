@@ -356,7 +356,8 @@ std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) 
 
 // ---- Geometry -------------------------------------------------------------------------------------------
 
-std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section) {
+std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section,
+                                                    const NormalsUse& normals_use) {
     std::optional<std::vector<Vec3d>> positions = readPoints(section, "positions", "position");
     std::optional<std::vector<Vec3d>> normals = readPoints(section, "normals", "normal");
     const YamlNode* faces = section.list("faces");
@@ -434,6 +435,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
     }
     if (!mesh.normals.empty()) mesh.normal_index = mesh.triangles;
     if (!mesh.uvs.empty()) mesh.uv_index = mesh.triangles;
+    setNormals(mesh, normals_use, section.subject());
     scene_.meshes.push_back(std::move(mesh));
     return static_cast<std::uint32_t>(scene_.meshes.size() - 1);
 }
@@ -465,35 +467,29 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
             findMaterial(material_name, section.place("material"), section.has("obj")).value_or(-1);
 
     std::optional<std::uint32_t> mesh;
-    if (section.has("obj") && !section.has("mesh")) {
-        mesh = readObj(section, readObjUse(section, material_name));
+    if (!section.has("obj")) {
+        if (!section.has("material"))
+            out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
+        if (material_given && !named) section.error("material", "only an OBJ has materials of its own");
+    }
+    if ((section.has("obj") || section.has("ply")) && !section.has("mesh")) {
+        mesh = readMeshFile(section, readMeshUse(section, material_name));
     } else if (section.has("gltf")) {
         mesh = readGltf(section);
         if (!mesh) return;
     } else if (const std::optional<SectionReader> written =
                    section.section("mesh", fmt::format("the mesh of {}", section.subject()))) {
-        const auto [known, fresh] = written_meshes_.try_emplace(section.find("mesh")->value.get());
-        if (fresh) known->second = readMesh(*written);
+        const NormalsUse normals = readNormals(section);
+        const auto [known, fresh] =
+            written_meshes_.try_emplace({section.find("mesh")->value.get(), normals});
+        if (fresh) known->second = readMesh(*written, normals);
         mesh = known->second;
-        if (!section.has("material"))
-            out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
-        if (material_given && !named) section.error("material", "only an OBJ has materials of its own");
         refuseObjKeys(section);
+        if (section.has("vertex_colors"))
+            section.error("vertex_colors", "this is about the colours in a PLY",
+                          "a mesh that is written out has 'color_space'");
     }
-
-    if (const std::optional<SectionReader> light =
-            section.section("emission", fmt::format("the emission of {}", section.subject()))) {
-        Emission emission;
-        light->read("two_sided", emission.two_sided);
-        if (std::optional<Spectrum> radiance = spectra_.read(*light, "radiance", SpectrumUse::Emission))
-            emission.radiance = *std::move(radiance);
-        if (object.material >= 0 &&
-            scene_.materials[static_cast<std::size_t>(object.material)].emission >= 0)
-            section.error("emission", fmt::format("material '{}' emits light already", material_name),
-                          "leave 'emission' or the material's 'emission_luminance' out");
-        object.emission = static_cast<std::int32_t>(scene_.emissions.size());
-        scene_.emissions.push_back(std::move(emission));
-    }
+    object.emission = readEmission(section, object.material, material_name).value_or(-1);
     object.mesh = mesh.value_or(0);
     if (mesh) checkTextures(section, object);
     scene_.objects.push_back(std::move(object));

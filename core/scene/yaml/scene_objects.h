@@ -3,6 +3,8 @@
 
 #include "scene/gltf/gltf_mesh.h"
 #include "scene/mesh/mesh_io.h"
+#include "scene/mesh/mesh_parts.h"
+#include "scene/mesh/ply_reader.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_spectra.h"
@@ -14,7 +16,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -33,12 +34,27 @@ public:
     void finish() const;
 
 private:
-    using Overrides = std::map<std::string, std::int32_t>;  ///< Name in the OBJ → index of our material.
+    /// Which normals the mesh of an object has.
+    struct NormalsUse {
+        enum class Source { File, Smooth, Flat } source = Source::File;
+        double crease_angle_deg = 60;
+        auto operator<=>(const NormalsUse&) const = default;
+    };
 
-    /// What an object wants of its OBJ.
-    struct ObjUse {
-        ObjOptions options;
-        Overrides overrides;
+    /// A file of a mesh, and how it is read.
+    struct FileUse {
+        std::string path;
+        bool ply = false;
+        ObjOptions obj;                      ///< Of an OBJ.
+        PlyColor colors = PlyColor::ByType;  ///< Of a PLY.
+        NormalsUse normals;
+        auto operator<=>(const FileUse&) const = default;
+    };
+
+    /// What an object wants of its file.
+    struct MeshUse {
+        FileUse file;
+        std::vector<PartUse> parts;
         std::string material;  ///< For the faces that have none; empty: there must be no such faces.
     };
 
@@ -55,26 +71,30 @@ private:
     void readOpenPbr(const SectionReader& section, Material& material);
     bool transmits(const Material& part) const;
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
-    ObjUse readObjUse(const SectionReader& object, const std::string& material);
+    MeshUse readMeshUse(const SectionReader& object, const std::string& material);
     void refuseObjKeys(const SectionReader& object) const;
-    LoadedMesh* load(const SectionReader& object, const std::string& path, const ObjOptions& options);
-    std::optional<std::uint32_t> readObj(const SectionReader& object, const ObjUse& use);
+    NormalsUse readNormals(const SectionReader& object) const;
+    static void setNormals(Mesh& mesh, const NormalsUse& use, const std::string& subject);
+    std::vector<PartUse> readMeshParts(const SectionReader& object);
+    void tellUnknownParts(const SectionReader& object, const PartFinder& parts) const;
+    std::optional<std::int32_t> readEmission(const SectionReader& section, std::int32_t material,
+                                             const std::string& material_name);
+    LoadedMesh* load(const SectionReader& object, const FileUse& use);
+    std::optional<std::uint32_t> readMeshFile(const SectionReader& object, MeshUse use);
     Mesh takeMesh(LoadedMesh& loaded, std::uint32_t number);
-    Mesh withSceneMaterials(LoadedMesh& loaded, std::uint32_t number, const std::string& path,
-                            const Overrides& overrides);
-    void checkOverrides(const SectionReader& object, const LoadedMesh& loaded, const Overrides& overrides);
+    Mesh withSceneMaterials(LoadedMesh& loaded, std::uint32_t number, const SectionReader& object,
+                            const MeshUse& use);
     void readAttributes(const SectionReader& section, Mesh& mesh) const;
     void addMaps(LoadedMesh& loaded, const std::string& path);
     void checkTextures(const SectionReader& section, const Object& object) const;
     void checkMaterials(const SectionReader& object, const LoadedMesh& loaded, const Mesh& mesh,
-                        const ObjUse& use) const;
-    std::optional<std::uint32_t> readMesh(const SectionReader& mesh);
+                        const MeshUse& use) const;
+    std::optional<std::uint32_t> readMesh(const SectionReader& mesh, const NormalsUse& normals);
     std::optional<std::uint32_t> readGltf(const SectionReader& object);
     void tellGltf() const;
     Mesh gltfMesh(const SectionReader& form, const std::string& path, const GltfPrimitive& which);
     std::optional<std::int32_t> findMaterial(const std::string& name, const YamlPlace& place,
                                              bool from_mtl_possible);
-    Overrides readOverrides(const SectionReader& object);
     std::optional<Matrix4d> readPlacement(const YamlNode& list, const YamlPlace& place,
                                           const std::string& subject);
     std::vector<Matrix4d> readPlacements(const SectionReader& object);
@@ -102,15 +122,13 @@ private:
     };
     std::map<std::int32_t, std::array<PartName, 2>> parts_;
     /// By node: what an alias repeats is read once.
-    std::map<const YamlNode*, std::optional<std::uint32_t>> written_meshes_;
+    std::map<std::pair<const YamlNode*, NormalsUse>, std::optional<std::uint32_t>> written_meshes_;
     std::map<const YamlNode*, std::optional<Matrix4d>> written_placements_;
     ExpansionLimit limit_;
-    std::uint64_t placements_ = 0, triangles_ = 0;  ///< Read so far.
-    /// By file, whether its own materials are read, and what their colours are.
-    using FileUse = std::tuple<std::string, bool, MtlColor>;
+    std::uint64_t placements_ = 0, triangles_ = 0;           ///< Read so far.
     std::map<FileUse, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.
-    std::map<std::pair<FileUse, Overrides>, std::uint32_t> meshes_;
-    std::map<std::pair<std::string, GltfPrimitive>, std::optional<std::uint32_t>> gltf_meshes_;
+    std::map<std::pair<FileUse, std::vector<PartUse>>, std::uint32_t> meshes_;
+    std::map<std::tuple<std::string, GltfPrimitive, NormalsUse>, std::optional<std::uint32_t>> gltf_meshes_;
     struct WithoutArea {
         std::uint64_t triangles = 0, primitives = 0;
     };

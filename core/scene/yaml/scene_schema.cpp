@@ -672,7 +672,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
 void addObjects(std::vector<SectionSchema>& all) {
     all.push_back({"object",
                    "an object",
-                   "A mesh, placed once or many times. Give `obj`, `gltf` or `mesh`; `transform` or "
+                   "A mesh, placed once or many times. Give `obj`, `ply`, `gltf` or `mesh`; `transform` or "
                    "`transforms`.",
                    {
                        {.name = "name", .doc = "For messages and reports."},
@@ -682,6 +682,11 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .kind = Kind::Section,
                         .section = "gltf",
                         .doc = "Or a primitive of a glTF file or GLB; `crt import` writes scenes of them."},
+                       {.name = "ply",
+                        .doc = "Or a PLY file, ascii or binary, looked up in the same places: positions and "
+                               "faces; normals (`nx`, `ny`, `nz`), texture coordinates (`u`, `v`; `s`, `t`; "
+                               "`texture_u`, `texture_v`; or `texcoord` of faces) and colours (`red`, "
+                               "`green`, `blue`) where it has them. One line says what was left out."},
                        {.name = "mesh",
                         .kind = Kind::Section,
                         .section = "mesh",
@@ -694,14 +699,41 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .kind = Kind::Boolean,
                         .fallback = "false",
                         .doc = "Use `material` for all faces of the OBJ; its own materials are not read."},
-                       {.name = "material_overrides",
+                       {.name = "parts",
+                        .kind = Kind::Section,
                         .shape = Shape::Map,
-                        .doc = "Name that the OBJ uses (usemtl) → name in `materials`, used in its place, "
-                               "also where no MTL defines it."},
+                        .section = "part",
+                        .doc = "What parts of the OBJ are made of, by the names that it gives to faces: of "
+                               "groups (`g`), objects (`o`) and materials (`usemtl`, also of those that no "
+                               "MTL defines). In a name `*` stands for any letters and `?` for one. A face "
+                               "that several parts name gets its material of the last of them that has one, "
+                               "and its emission likewise: write the general part before the special one. A "
+                               "name that no face has is an error."},
                        {.name = "mtl",
                         .kind = Kind::Section,
                         .section = "mtl",
                         .doc = "How the MTL of the OBJ is read."},
+                       {.name = "vertex_colors",
+                        .kind = Kind::Choice,
+                        .choices = {"srgb", "linear"},
+                        .doc = "What the colours in the PLY are, for `{attribute: colors}`. Left out: "
+                               "integers are sRGB-encoded, floats linear."},
+                       {.name = "normals",
+                        .kind = Kind::Choice,
+                        .choices = {"file", "smooth", "flat"},
+                        .fallback = "file",
+                        .doc = "For shading. `file`: those of the file or mesh; faces that have none are "
+                               "flat. `smooth`: worked out, at each vertex the mean of the faces around it, "
+                               "weighted by their angles there (Thürmer and Wüthrich 1998); vertices at "
+                               "the same place count as one. `flat`: none."},
+                       {.name = "crease_angle_deg",
+                        .kind = Kind::Number,
+                        .range = {.min = 0, .max = 180},
+                        .unit = "degrees",
+                        .fallback = "60",
+                        .doc = "Of `normals: smooth`: the most that two faces may be bent at their common "
+                               "edge and be shaded as one surface. An edge beyond which the surface is "
+                               "inside out is a crease, too."},
                        {.name = "transform",
                         .kind = Kind::Section,
                         .shape = Shape::List,
@@ -718,8 +750,23 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .section = "emission",
                         .doc = "Makes the surface a light."},
                    },
-                   {{KeyRule::Kind::ExactlyOne, {"obj", "gltf", "mesh"}},
+                   {{KeyRule::Kind::ExactlyOne, {"obj", "ply", "gltf", "mesh"}},
                     {KeyRule::Kind::AtMostOne, {"transform", "transforms"}}}});
+    all.push_back({"part",
+                   "a part",
+                   "",
+                   {{.name = "material",
+                     .doc = "A name in `materials`, in place of the file's; what that emits (Ke) goes with "
+                            "it."},
+                    {.name = "emission",
+                     .kind = Kind::Section,
+                     .section = "emission",
+                     .doc = "Makes the part a light."},
+                    {.name = "by",
+                     .kind = Kind::Choice,
+                     .choices = {"any", "group", "object", "material"},
+                     .fallback = "any",
+                     .doc = "What has the name."}}});
     all.push_back({"mtl",
                    "an mtl",
                    "",

@@ -227,10 +227,11 @@ void TextureReader::requireRoom(const TextureImage& image, const ImageSource& so
     if (!why.empty()) throw Error(ErrorKind::Scene, why);
 }
 
-TextureIndex TextureReader::addImage(const std::string& path, const std::array<double, 6>& transform,
-                                     TextureWrap wrap, const SourcePlace& place) {
+TextureIndex TextureReader::addImage(const std::string& path, const TexelUse& use,
+                                     const std::array<double, 6>& transform, TextureWrap wrap,
+                                     const SourcePlace& place) {
     Texture texture;
-    texture.image = images_.open(path, {});
+    texture.image = images_.open(path, use);
     requireRoom(*texture.image, {path});
     files_.note(path);
     texture.wrap = wrap;

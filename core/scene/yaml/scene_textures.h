@@ -32,8 +32,9 @@ public:
     /// The image of a `normal_map`, put into the scene. kNoTexture when it is wrong, which is told.
     TextureIndex readNormalMap(const SectionReader& form);
 
-    /// An image of a material file, as a reflectance. Throws crt::Error(Scene) where it cannot be read.
-    TextureIndex addImage(const std::string& path, const std::array<double, 6>& transform, TextureWrap wrap,
+    /// An image of a material file. Throws crt::Error(Scene) where it cannot be read.
+    TextureIndex addImage(const std::string& path, const TexelUse& use,
+                          const std::array<double, 6>& transform, TextureWrap wrap,
                           const SourcePlace& place);
 
 private:
