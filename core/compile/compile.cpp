@@ -34,8 +34,7 @@ std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelera
     return kTables + accelerator.nodes.size() * sizeof(kernel::CrtNode4) +
            flat.triangles.size() *
                (sizeof(kernel::CrtTriangle) + sizeof(kernel::CrtFace) + sizeof(kernel::CrtPrimitive)) +
-           flat.normals.size() * sizeof(kernel::CrtNormals) +
-           flat.uvs.size() * sizeof(kernel::CrtUvs) +
+           flat.smooth_triangles * sizeof(kernel::CrtNormals) + flat.uvs.size() * sizeof(kernel::CrtUvs) +
            flat.colors.size() * sizeof(kernel::CrtVertexColors);
 }
 
@@ -126,7 +125,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.primitives = blob.appendFilled<kernel::CrtPrimitive>(count, [&](auto primitives) {
         compilePrimitives(flat, scene.materials.size(), lights.light_of, primitives);
     });
-    header.normals = blob.append(flat.normals);
+    header.normals = blob.appendFilled<kernel::CrtNormals>(
+        flat.smooth_triangles, [&](auto normals) { flattenNormals(scene, flat, normals); });
     header.materials = blob.append(materials.records);
     header.compositions = blob.append(compileCompositions(used, texture_part));
     header.layers = blob.append(compileLayers(used, tables, spectra, texture_part));

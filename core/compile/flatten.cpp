@@ -89,6 +89,21 @@ std::vector<Placement> placementsOf(const Scene& scene) {
     return placements;
 }
 
+/// Calls visit(number in the scene, placement, number in its mesh) for [first, end).
+template <class Visit>
+void forEachTriangle(const std::vector<Placement>& placements, std::size_t first, std::size_t end,
+                     const Visit& visit) {
+    auto placement =
+        std::prev(std::upper_bound(placements.begin(), placements.end(), first,
+                                   [](std::size_t i, const Placement& p) { return i < p.first; }));
+    for (std::size_t i = first; i < end; ++i) {
+        while (i - placement->first >= placement->mesh->triangles.size()) ++placement;
+        visit(i, *placement, i - placement->first);
+    }
+}
+
+constexpr std::size_t kPart = std::size_t{1} << 14;  // of what a thread takes at a time
+
 bool hasTexture(const Scene& scene, bool of_vertices) {
     return std::any_of(scene.textures.begin(), scene.textures.end(), [&](const Texture& t) {
         return (t.kind == Texture::Kind::VertexColors) == of_vertices;
@@ -165,7 +180,7 @@ public:
                 throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity",
                             part.infinite->object->place);
         measure(flat_, boundsOfParts());
-        placeNormals();
+        for (const Part& part : parts_) flat_.smooth_triangles += part.smooth;
         forEachPart([this](Part& part) { normalise(part); });
         std::uint64_t without_area = 0;
         for (const Part& part : parts_) without_area += part.without_area;
@@ -179,12 +194,10 @@ public:
     }
 
 private:
-    static constexpr std::size_t kPart = std::size_t{1} << 14;
-
     struct Part {
         std::size_t first = 0, end = 0;
         Bounds bounds;  ///< In the author's units, of the triangles that have area as far as is known.
-        std::size_t normals = 0;  ///< Of its smooth triangles; then where they begin in the scene's.
+        std::size_t smooth = 0;
         std::uint64_t without_area = 0;
         const Placement* infinite = nullptr;  ///< The first that moves a vertex to infinity.
         std::vector<bool> seen;               ///< Empty: all are.
@@ -206,36 +219,26 @@ private:
         return all;
     }
 
-    /// Calls visit(number in the scene, placement, number in its mesh).
-    template <class Visit>
-    void forEachTriangle(const Part& part, const Visit& visit) const {
-        auto placement = std::prev(
-            std::upper_bound(placements_.begin(), placements_.end(), part.first,
-                             [](std::size_t first, const Placement& p) { return first < p.first; }));
-        for (std::size_t i = part.first; i < part.end; ++i) {
-            while (i - placement->first >= placement->mesh->triangles.size()) ++placement;
-            visit(i, *placement, i - placement->first);
-        }
-    }
-
     void describe(Part& part) {
-        forEachTriangle(part, [&](std::size_t i, const Placement& placement, std::size_t triangle) {
-            const Mesh& mesh = *placement.mesh;
-            const Object& object = *placement.object;
-            FlatTriangle& t = flat_.triangles[i];
-            t.object = static_cast<std::uint32_t>(&placement - placements_.data());
-            t.material = !mesh.material.empty() && mesh.material[triangle] >= 0 ? mesh.material[triangle]
-                                                                                : object.material;
-            t.emission = emissionIndexOf(scene_, object, triangle);
-            for (const Vec3d& p : placement.corners(triangle)) {
-                if (!isFinite(p) && !part.infinite) part.infinite = &placement;
-                part.bounds.add(p);
-            }
-            if (!flat_.uvs.empty()) setUvs(placement, triangle, flat_.uvs[i]);
-            if (!flat_.colors.empty()) setColors(placement, triangle, flat_.colors[i]);
-            t.smooth = placement.normals(triangle).has_value();
-            part.normals += t.smooth;
-        });
+        forEachTriangle(placements_, part.first, part.end,
+                        [&](std::size_t i, const Placement& placement, std::size_t triangle) {
+                            const Mesh& mesh = *placement.mesh;
+                            const Object& object = *placement.object;
+                            FlatTriangle& t = flat_.triangles[i];
+                            t.object = static_cast<std::uint32_t>(&placement - placements_.data());
+                            t.material = !mesh.material.empty() && mesh.material[triangle] >= 0
+                                             ? mesh.material[triangle]
+                                             : object.material;
+                            t.emission = emissionIndexOf(scene_, object, triangle);
+                            for (const Vec3d& p : placement.corners(triangle)) {
+                                if (!isFinite(p) && !part.infinite) part.infinite = &placement;
+                                part.bounds.add(p);
+                            }
+                            if (!flat_.uvs.empty()) setUvs(placement, triangle, flat_.uvs[i]);
+                            if (!flat_.colors.empty()) setColors(placement, triangle, flat_.colors[i]);
+                            t.smooth = placement.normals(triangle).has_value();
+                            part.smooth += t.smooth;
+                        });
     }
 
     static void setUvs(const Placement& placement, std::size_t triangle, kernel::CrtUvs& uvs) {
@@ -260,12 +263,6 @@ private:
         }
     }
 
-    void placeNormals() {
-        std::size_t before = 0;
-        for (Part& part : parts_) before += std::exchange(part.normals, before);
-        flat_.normals.resize(before);
-    }
-
     /// Corners of a triangle, centred and scaled.
     std::array<Vec3d, 3> normalised(const std::array<Vec3d, 3>& corners) const {
         const double scale = std::ldexp(1.0, flat_.scale_exponent);
@@ -279,36 +276,34 @@ private:
             for (std::size_t k = 0; k < 3; ++k) flat_.positions[i][3 * k + v] = static_cast<float>(p[v][k]);
     }
 
-    /// Positions and normals; and which triangles have area.
+    /// Positions; and which triangles have area.
     void normalise(Part& part) {
         Bounds seen;
-        std::size_t normal = part.normals;
-        forEachTriangle(part, [&](std::size_t i, const Placement& placement, std::size_t triangle) {
-            const std::array<Vec3d, 3> corners = placement.corners(triangle);
-            const std::array<Vec3d, 3> p = normalised(corners);
-            setPositions(i, p);
-            if (hasArea(p)) {
-                for (const Vec3d& corner : corners) seen.add(corner);
-            } else {
-                if (part.seen.empty()) part.seen.assign(part.end - part.first, true);
-                part.seen[i - part.first] = false;
-                ++part.without_area;
-            }
-            if (!flat_.triangles[i].smooth) return;
-            const std::array<Vec3d, 3> normals = *placement.normals(triangle);
-            kernel::CrtNormals& n = flat_.normals[normal++];
-            for (std::size_t v = 0; v < 3; ++v)
-                for (std::size_t k = 0; k < 3; ++k) n.n[3 * k + v] = static_cast<float>(normals[v][k]);
-        });
+        forEachTriangle(placements_, part.first, part.end,
+                        [&](std::size_t i, const Placement& placement, std::size_t triangle) {
+                            const std::array<Vec3d, 3> corners = placement.corners(triangle);
+                            const std::array<Vec3d, 3> p = normalised(corners);
+                            setPositions(i, p);
+                            if (hasArea(p)) {
+                                for (const Vec3d& corner : corners) seen.add(corner);
+                            } else {
+                                if (part.seen.empty()) part.seen.assign(part.end - part.first, true);
+                                part.seen[i - part.first] = false;
+                                ++part.without_area;
+                            }
+                        });
         part.bounds = seen;
     }
 
     void normaliseSeen(const Part& part) {
-        forEachTriangle(part, [&](std::size_t i, const Placement& placement, std::size_t triangle) {
-            const bool seen = part.seen.empty() || part.seen[i - part.first];
-            // Rounded to float, three points of one line make a sliver that can be hit; one point cannot.
-            setPositions(i, seen ? normalised(placement.corners(triangle)) : std::array<Vec3d, 3>{});
-        });
+        forEachTriangle(placements_, part.first, part.end,
+                        [&](std::size_t i, const Placement& placement, std::size_t triangle) {
+                            const bool seen = part.seen.empty() || part.seen[i - part.first];
+                            // Rounded to float, three points of one line make a sliver that can be hit; one
+                            // point cannot.
+                            setPositions(
+                                i, seen ? normalised(placement.corners(triangle)) : std::array<Vec3d, 3>{});
+                        });
     }
 
     const Scene& scene_;
@@ -337,6 +332,29 @@ FlatScene flattenScene(const Scene& scene) {
             throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", scene.file, why), {scene.file});
 
     return Flattener(scene, count).flatten();
+}
+
+void flattenNormals(const Scene& scene, const FlatScene& flat, std::span<kernel::CrtNormals> normals) {
+    const std::size_t count = flat.triangles.size();
+    std::vector<std::size_t> first_normal(partsOf(count, kPart));
+    parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) first_normal[first / kPart] += flat.triangles[i].smooth;
+    });
+    std::size_t before = 0;
+    for (std::size_t& smooth : first_normal) before += std::exchange(smooth, before);
+    const std::vector<Placement> placements = placementsOf(scene);
+    parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
+        std::size_t normal = first_normal[first / kPart];
+        forEachTriangle(placements, first, end,
+                        [&](std::size_t i, const Placement& placement, std::size_t triangle) {
+                            if (!flat.triangles[i].smooth) return;
+                            const std::array<Vec3d, 3> corners = *placement.normals(triangle);
+                            kernel::CrtNormals& n = normals[normal++];
+                            for (std::size_t v = 0; v < 3; ++v)
+                                for (std::size_t k = 0; k < 3; ++k)
+                                    n.n[3 * k + v] = static_cast<float>(corners[v][k]);
+                        });
+    });
 }
 
 }  // namespace crt

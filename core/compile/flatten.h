@@ -6,7 +6,9 @@
 #include "scene/scene.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace crt {
@@ -26,7 +28,7 @@ struct FlatScene {
     /// x of the three vertices, y, z: centred, scaled, and rounded to single precision. Those of a triangle
     /// without area are one point.
     std::vector<std::array<float, 9>> positions;
-    std::vector<kernel::CrtNormals> normals;  ///< Of the smooth triangles, in their order.
+    std::size_t smooth_triangles = 0;
     std::vector<kernel::CrtUvs> uvs;          ///< Of all triangles, where a texture or tangent asks.
     std::vector<kernel::CrtVertexColors> colors;  ///< Of all triangles, where a value asks for them.
     Vec3d centre{};                           ///< In the author's units.
@@ -36,5 +38,9 @@ struct FlatScene {
 /// Warns about triangles without area. Throws crt::Error(Scene) when there are too many triangles, or a
 /// transform moves a vertex to infinity.
 FlatScene flattenScene(const Scene& scene);
+
+/// Fills in those of the smooth triangles, in their order. They are worked out from the scene anew: stored
+/// beside the blob they would be a third of the memory that a smooth mesh takes.
+void flattenNormals(const Scene& scene, const FlatScene& flat, std::span<kernel::CrtNormals> normals);
 
 }  // namespace crt

@@ -58,24 +58,29 @@ EmbreeIntegrator::EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo
 
 void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
     tracer_.reset();
-    // Not a vector: it would write zeros over hundreds of megabytes first.
-    blob_.reset(new Line[(scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line)]);
-    std::memcpy(blob_.get(), scene_blob.data, scene_blob.size_bytes);
-    program_ = &chooseProgram(scene().features, info_.kernel);
+    blob_.reset();
     build_seconds_ = render_seconds_ = 0;
     paths_ = 0;
     rays_ = {};
 
-    if ((scene().features & CRT_FEATURE_BVH) != 0) {
+    // From the caller's blob, before it is copied: building takes more memory than what is built.
+    const auto* const bytes = static_cast<const unsigned char*>(scene_blob.data);
+    const auto& given = *reinterpret_cast<const kernel::CrtScene*>(bytes);
+    if ((given.features & CRT_FEATURE_BVH) != 0) {
         const auto start = Clock::now();
         if (!device_) device_ = std::make_unique<Device>();
-        const auto* triangles = CRT_ARRAY(kernel::CrtTriangle, blob(), scene().triangles);
+        const auto* triangles = CRT_ARRAY(kernel::CrtTriangle, bytes, given.triangles);
         const auto progress = [this](double done) { host_.cancelled(done); };
         arena_.execute([&] {
-            tracer_ = std::make_unique<Tracer>(*device_, triangles, scene().triangle_count, progress);
+            tracer_ = std::make_unique<Tracer>(*device_, triangles, given.triangle_count, progress);
         });
         build_seconds_ = secondsSince(start);
     }
+    // Not a vector: it would write zeros over hundreds of megabytes first.
+    blob_.reset(new Line[(scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line)]);
+    std::memcpy(blob_.get(), scene_blob.data, scene_blob.size_bytes);
+    if (tracer_) tracer_->moveTo(CRT_ARRAY(kernel::CrtTriangle, blob(), scene().triangles));
+    program_ = &chooseProgram(scene().features, info_.kernel);
 
     const std::size_t pixels = static_cast<std::size_t>(scene().width) * scene().height;
     sums_.assign(pixels * scene().channels * 2, 0.0);

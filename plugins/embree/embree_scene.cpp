@@ -168,6 +168,9 @@ Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t
 
 Tracer::~Tracer() { rtcReleaseScene(impl_->scene); }
 
+/// Embree asks for bounds while it builds, and never again.
+void Tracer::moveTo(const CrtTriangle* triangles) { impl_->triangles = triangles; }
+
 bool Tracer::takes(const CrtRay& ray) {
     using namespace kernel;
     const vec3 o = abs3(ray.o), d = abs3(ray.d);

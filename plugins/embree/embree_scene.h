@@ -35,8 +35,8 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-/// An Embree BVH over the triangle slots of a blob, which must outlive it. Throws PluginError when Embree
-/// cannot build it.
+/// An Embree BVH over the triangle slots of a blob, which it reads while it lives. Throws PluginError when
+/// Embree cannot build it.
 class Tracer {
 public:
     /// `progress` gets the part of it that is built, in [0,1], from any thread.
@@ -45,6 +45,9 @@ public:
     ~Tracer();
     Tracer(const Tracer&) = delete;
     Tracer& operator=(const Tracer&) = delete;
+
+    /// The same triangles lie there from now on.
+    void moveTo(const kernel::CrtTriangle* triangles);
 
     /// Rays that start within this of 0 on each axis are taken.
     static constexpr float kReach = 4;
