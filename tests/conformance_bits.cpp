@@ -135,6 +135,7 @@ struct Case {
     bool rough_bases = false;
     bool fuzzy = false;
     bool coated = false;
+    bool shaped = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -420,6 +421,43 @@ void addCoats(crt::Scene& scene) {
     }
 }
 
+/// Shapes of every kind, whole and in part, from outside and from inside, one material each; some shine.
+void addShapes(crt::Scene& scene) {
+    const auto empty = static_cast<std::uint32_t>(scene.meshes.size());
+    scene.meshes.emplace_back();
+    std::int32_t material = 0;
+    const auto add = [&](const crt::Quadric& shape, const crt::Matrix4d& transform) {
+        crt::Object object;
+        object.mesh = empty;
+        object.shape = shape;
+        object.transforms = {transform};
+        object.material = material++ % static_cast<std::int32_t>(scene.materials.size());
+        scene.objects.push_back(object);
+    };
+    using enum crt::QuadricType;
+    // Turned by the cosine 0.6 and the sine 0.8, some mirrored.
+    const auto at = [](double x, double y, double z, double scale, double mirrored = 1) -> crt::Matrix4d {
+        return {0.6 * scale, 0, 0.8 * scale * mirrored, x, 0.8 * scale, 0, -0.6 * scale * mirrored, y,
+                0, scale, 0, z, 0, 0, 0, 1};
+    };
+    add({Sphere, 1, -1, 1}, at(0.2, 0.2, 0.25, 0.15));
+    add({Sphere, 1, -0.5, 0.75}, at(0.5, 0.3, 0.3, 0.12));
+    add({Disk, 1, 0, 0}, at(0.8, 0.3, 0.4, 0.2));
+    add({Cylinder, 1, -1, 2}, at(0.7, 0.7, 0.4, 0.06, -1));
+    add({Sphere, 2, 1, 2, true}, at(0.3, 0.5, 0.6, 0.1, -1));
+    add({Sphere, 1, -1, 1}, at(0.5, 0.55, 0.15, 0.1));
+    add({Sphere, 1, -1, 1}, at(0.25, 0.75, 0.2, 0.1));
+    add({Cylinder, 0.5, -1, 1, true}, at(0.85, 0.85, 0.6, 0.1));
+    for (const crt::Vec3d& p : {crt::Vec3d{0.1, 0.9, 0.7}, {0.4, 0.1, 0.1}, {0.9, 0.1, 0.2}})
+        add({Sphere, 1, -1, 1}, at(p[0], p[1], p[2], 0.04));
+    const auto lamps = static_cast<std::int32_t>(scene.emissions.size());
+    scene.emissions.push_back({crt::constantSpectrum(5), false});
+    scene.emissions.push_back({scene.materials[1].reflectance, true});
+    const std::size_t first = scene.objects.size() - 11;  // the first shape
+    for (const auto& [shape, emission] : {std::pair{1, 1}, {2, 0}, {7, 1}, {9, 0}, {10, 1}})
+        scene.objects[first + static_cast<std::size_t>(shape)].emission = lamps + emission;
+}
+
 /// Rough diffuse surfaces, bare and glossy, in turn; some about interpolated normals.
 void addRoughBases(crt::Scene& scene) {
     double eta = 1;
@@ -482,6 +520,12 @@ const Case kCases[] = {
      false, false, false, false, false, false, false, true},
     {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, true, false, false, false, true,
      false, false, false, false, false, false, false, false, true},
+    {"{max_depth: 8}", "{type: sobol}", "", "box", true, "", false, false, false, false, false, false, false,
+     false, false, false, false, false, false, false, true},
+    {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", true, kPointLights, false, true,
+     false, true, false, false, false, false, false, true, false, false, false, false, true},
+    {"{max_depth: 5, accelerator: aabb}", "{type: xorshift}", "", "box", false, "", true, false, false,
+     false, true, false, false, false, false, false, false, false, false, false, true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -518,6 +562,7 @@ crt::Scene sceneOf(const Case& c) {
     crt::Scene scene =
         sceneFrom(richScene(c.integrator, c.sampler, c.camera_extra, c.filter, c.glassware) + c.more);
     scene.environment->light_sampling = c.sampled_environment;
+    if (c.shaped) addShapes(scene);
     if (c.textured) addTextures(scene);
     if (c.composed) addCompositions(scene);
     if (c.mapped) addNormalMaps(scene);
@@ -566,7 +611,10 @@ std::vector<Named> allScenes() {
                                  "metals and gloss by their colours",
                                  "rough bases",
                                  "fuzz",
-                                 "coats"};
+                                 "coats",
+                                 "shapes",
+                                 "shapes, mixes, brushed, tree, independent, textures",
+                                 "shapes, normal maps, boxes, xorshift"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

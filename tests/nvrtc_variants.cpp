@@ -49,6 +49,7 @@ std::map<std::uint64_t, std::string> representativeMasks() {
         {mesh, "a mesh, BVH"},
         {mesh | CRT_FEATURE_SMOOTH_NORMALS, "a smooth mesh"},
         {box & ~CRT_FEATURE_TABLE, "a box of constants"},
+        {mesh | CRT_FEATURE_SHAPES, "a mesh and spheres"},
         {mesh | CRT_FEATURE_CONDUCTOR, "a mesh of metal"},
         {mesh | CRT_FEATURE_ROUGH_CONDUCTOR, "a mesh of rough metal"},
         {mesh | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_ANISOTROPY, "a mesh of brushed metal"},

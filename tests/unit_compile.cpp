@@ -74,6 +74,12 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
             s.objects[1].material = 1;
         };
     };
+    seen |= differs(CRT_FEATURE_SHAPES, 0, [](Scene& s) {
+        s.meshes.emplace_back();
+        s.objects.emplace_back().mesh = 2;
+        s.objects.back().material = 0;
+        s.objects.back().shape = crt::Quadric{};
+    });
     seen |= differs(CRT_FEATURE_MIRROR, 0, other(crt::MaterialType::Mirror));
     seen |= differs(CRT_FEATURE_CONDUCTOR, 0, other(crt::MaterialType::Conductor));
     seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR, 0, other(crt::MaterialType::RoughConductor));

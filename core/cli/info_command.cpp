@@ -118,6 +118,7 @@ std::string acceleratorText(const CompiledScene& compiled) {
         return fmt::format("BVH, {}", counted(compiled.nodes, "node of four", "nodes of four"));
     if (compiled.features & CRT_FEATURE_AABB)
         return fmt::format("a box around each of {}", counted(compiled.objects, "object", "objects"));
+    if (compiled.shapes > 0) return "a loop over all triangles and shapes";
     return compiled.triangles == 0 ? "none: there is nothing to hit" : "a loop over all triangles";
 }
 
@@ -130,7 +131,8 @@ void showScene(const SceneRequest& what) {
     printRow("film", filmText(scene));
     printRow("camera", cameraText(scene.camera));
     printRow("geometry", counted(compiled.objects, "object", "objects") + ", " +
-                        counted(compiled.triangles, "triangle", "triangles"));
+                        counted(compiled.triangles, "triangle", "triangles") +
+                        (compiled.shapes > 0 ? ", " + counted(compiled.shapes, "shape", "shapes") : ""));
     printRow("materials", materialsText(scene));
     printRow("textures", texturesText(compiled));
     printRow("lights", lightsText(scene, compiled));

@@ -22,6 +22,7 @@
 #include "kernel/features.h"
 #include "kernel/layout.h"
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 
@@ -84,10 +85,10 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     std::size_t occluders = 0;
     const bool shows_boxes = scene.integrator.type == IntegratorType::Aabb;
     if (accelerator.kind == CRT_ACCELERATOR_BRUTE_FORCE && !shows_boxes) {
-        const std::vector<std::uint32_t> occluding =
-            shadowRaysLeave(scene) ? accelerator.id_of_slot : occludersOf(flat);
+        const std::vector<std::uint32_t> all = trianglesOf(flat);
+        const std::vector<std::uint32_t> occluding = shadowRaysLeave(scene) ? all : occludersOf(flat);
         occluders = occluding.size();
-        header.triangles8 = blob.append(compileTriangles8(flat, accelerator.id_of_slot));
+        header.triangles8 = blob.append(compileTriangles8(flat, all));
         header.occluders8 = blob.append(compileTriangles8(flat, occluding));
     }
     if (accelerator.kind == CRT_ACCELERATOR_AABB || shows_boxes)
@@ -141,6 +142,10 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     if (measures_spectra)
         header.spectral_film = appendSpectralFilm(blob, scene.film.spectral, header.channels);
     header.filter = blob.append(filterTable(scene.film, CRT_FILTER_TABLE));
+    header.shapes = blob.appendFilled<kernel::CrtShape>(flat.shapes.size(), [&](auto shapes) {
+        std::transform(flat.shapes.begin(), flat.shapes.end(), shapes.begin(),
+                       [](const FlatShape& shape) { return shape.record; });
+    });
 
     header.features = featuresOf(scene, header, materials);
     warnOfUnseenLights(scene, header);
@@ -155,7 +160,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.channels = header.channels;
     out.aovs = header.aovs;
     out.spectral_channels = spectralChannelsOf(scene).count();
-    out.triangles = header.triangle_count;
+    out.triangles = flat.firstShape();
+    out.shapes = flat.shapes.size();
     out.emitters = lights.emitters;
     out.objects = flat.placements;
     out.nodes = header.nodes.count;

@@ -164,32 +164,19 @@ public:
     Flattener(const Scene& scene, std::size_t count)
         : scene_(scene),
           placements_(placementsOf(scene)),
+          shapes_(placedShapes(scene)),
           parts_(partsOf(count, kPart)),
           stage_("placing triangles", 2 * static_cast<double>(count)) {
         flat_.triangles.resize(count);
         flat_.positions.resize(count);
-        if (hasTexture(scene, false) || hasTangents(scene)) flat_.uvs.resize(count);
-        if (hasTexture(scene, true)) flat_.colors.resize(count);
+        if (hasTexture(scene, false) || hasTangents(scene)) flat_.uvs.resize(count + shapes_.size());
+        if (hasTexture(scene, true)) flat_.colors.resize(count + shapes_.size());
         flat_.placements = static_cast<std::uint32_t>(placements_.size());
     }
 
     FlatScene flatten() {
-        forEachPart([this](Part& part) { describe(part); });
-        for (const Part& part : parts_)
-            if (part.infinite)
-                throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity",
-                            part.infinite->object->place);
-        measure(flat_, boundsOfParts());
-        for (const Part& part : parts_) flat_.smooth_triangles += part.smooth;
-        forEachPart([this](Part& part) { normalise(part); });
-        std::uint64_t without_area = 0;
-        for (const Part& part : parts_) without_area += part.without_area;
-        if (without_area == 0) return std::move(flat_);
-        // Nobody sees them: they have no part in centre and scale.
-        logWarning("{} triangle{} no area and will not be seen", without_area,
-                   without_area == 1 ? " has" : "s have");
-        if (without_area < flat_.triangles.size()) measure(flat_, boundsOfParts());
-        forEachPart([this](Part& part) { normaliseSeen(part); });
+        placeTriangles();
+        placeShapes();
         return std::move(flat_);
     }
 
@@ -202,6 +189,37 @@ private:
         const Placement* infinite = nullptr;  ///< The first that moves a vertex to infinity.
         std::vector<bool> seen;               ///< Empty: all are.
     };
+
+    void placeTriangles() {
+        forEachPart([this](Part& part) { describe(part); });
+        for (const Part& part : parts_)
+            if (part.infinite)
+                throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity",
+                            part.infinite->object->place);
+        measure(flat_, boundsOfParts());
+        for (const Part& part : parts_) flat_.smooth_triangles += part.smooth;
+        forEachPart([this](Part& part) { normalise(part); });
+        std::uint64_t without_area = 0;
+        for (const Part& part : parts_) without_area += part.without_area;
+        if (without_area == 0) return;
+        // Nobody sees them: they have no part in centre and scale.
+        logWarning("{} triangle{} no area and will not be seen", without_area,
+                   without_area == 1 ? " has" : "s have");
+        if (without_area < flat_.triangles.size() || !shapes_.empty()) measure(flat_, boundsOfParts());
+        forEachPart([this](Part& part) { normaliseSeen(part); });
+    }
+
+    void placeShapes() {
+        for (const PlacedShape& shape : shapes_) {
+            FlatTriangle t;
+            t.object = shape.placement;
+            t.material = shape.object->material;
+            t.emission = emissionIndexOf(scene_, *shape.object, 0);
+            flat_.triangles.push_back(t);
+            flat_.shapes.push_back(flatShape(shape, flat_.centre, flat_.scale_exponent));
+            flat_.positions.push_back(flat_.shapes.back().box);
+        }
+    }
 
     void forEachPart(const std::function<void(Part&)>& work) {
         parallelFor(flat_.triangles.size(), kPart, [&](std::size_t first, std::size_t end) {
@@ -216,6 +234,10 @@ private:
     Bounds boundsOfParts() const {
         Bounds all;
         for (const Part& part : parts_) all.add(part.bounds);
+        for (const PlacedShape& shape : shapes_) {
+            all.add(shape.lower);
+            all.add(shape.upper);
+        }
         return all;
     }
 
@@ -308,6 +330,7 @@ private:
 
     const Scene& scene_;
     const std::vector<Placement> placements_;
+    const std::vector<PlacedShape> shapes_;
     std::vector<Part> parts_;
     FlatScene flat_;
     Stage stage_;
@@ -335,7 +358,7 @@ FlatScene flattenScene(const Scene& scene) {
 }
 
 void flattenNormals(const Scene& scene, const FlatScene& flat, std::span<kernel::CrtNormals> normals) {
-    const std::size_t count = flat.triangles.size();
+    const std::size_t count = flat.firstShape();
     std::vector<std::size_t> first_normal(partsOf(count, kPart));
     parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
         for (std::size_t i = first; i < end; ++i) first_normal[first / kPart] += flat.triangles[i].smooth;

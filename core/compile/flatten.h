@@ -2,6 +2,7 @@
 /// (docs/architecture.md, "Lengths").
 #pragma once
 
+#include "compile/shapes.h"
 #include "kernel/layout.h"
 #include "scene/scene.h"
 
@@ -13,7 +14,7 @@
 
 namespace crt {
 
-/// One placed triangle.
+/// One placed triangle, or shape.
 struct FlatTriangle {
     std::int32_t material = -1;
     std::int32_t emission = -1;
@@ -21,22 +22,26 @@ struct FlatTriangle {
     bool smooth = false;
 };
 
-/// All triangles of a scene, in the author's order.
+/// All triangles of a scene, in the author's order; then all shapes.
 struct FlatScene {
     std::vector<FlatTriangle> triangles;
+    std::vector<FlatShape> shapes;  ///< The last of `triangles`.
     std::uint32_t placements = 0;
     /// x of the three vertices, y, z: centred, scaled, and rounded to single precision. Those of a triangle
-    /// without area are one point.
+    /// without area are one point; those of a shape its box, as in CrtTriangle.
     std::vector<std::array<float, 9>> positions;
     std::size_t smooth_triangles = 0;
     std::vector<kernel::CrtUvs> uvs;          ///< Of all triangles, where a texture or tangent asks.
     std::vector<kernel::CrtVertexColors> colors;  ///< Of all triangles, where a value asks for them.
     Vec3d centre{};                           ///< In the author's units.
     int scale_exponent = 0;  ///< Lengths were multiplied by 2^scale_exponent after centring.
+
+    /// Number of the first shape: how many triangles there are.
+    std::size_t firstShape() const { return triangles.size() - shapes.size(); }
 };
 
 /// Warns about triangles without area. Throws crt::Error(Scene) when there are too many triangles, or a
-/// transform moves a vertex to infinity.
+/// transform moves a vertex to infinity or changes the form of a shape.
 FlatScene flattenScene(const Scene& scene);
 
 /// Fills in those of the smooth triangles, in their order. They are worked out from the scene anew: stored

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace crt {
 namespace {
@@ -32,6 +33,11 @@ Extent extentOf(const FlatScene& flat, std::size_t id) {
 
 kernel::CrtFace faceOf(const FlatScene& flat, std::size_t id) {
     kernel::CrtFace face{};
+    if (id >= flat.firstShape()) {
+        face.clearance = flat.shapes[id - flat.firstShape()].clearance;
+        face.margin = flat.shapes[id - flat.firstShape()].margin;
+        return face;
+    }
     const Vec3d o = vertexOf(flat, id, 0), a = vertexOf(flat, id, 1) - o, b = vertexOf(flat, id, 2) - o;
     const Vec3d n = cross(a, b);
     const double twice_area = std::sqrt(dot(n, n));
@@ -65,11 +71,18 @@ bool canOcclude(const FlatScene& flat, std::size_t id) {
     const Vec3d o = vertexOf(flat, id, 0);
     const Vec3d n = cross(vertexOf(flat, id, 1) - o, vertexOf(flat, id, 2) - o);
     bool above = false, below = false;
-    for (std::size_t j = 0; j < flat.positions.size() && !(above && below); ++j)
-        for (std::size_t v = 0; v < 3; ++v) {
-            const double d = dot(n, vertexOf(flat, j, v) - o);
-            above = above || d > 0;
-            below = below || d < 0;
+    const auto meet = [&](const Vec3d& p) {
+        const double d = dot(n, p - o);
+        above = above || d > 0;
+        below = below || d < 0;
+    };
+    for (std::size_t j = 0; j < flat.firstShape() && !(above && below); ++j)
+        for (std::size_t v = 0; v < 3; ++v) meet(vertexOf(flat, j, v));
+    for (std::size_t j = flat.firstShape(); j < flat.positions.size(); ++j)
+        for (std::size_t corner = 0; corner < 8; ++corner) {
+            Vec3d p;
+            for (std::size_t k = 0; k < 3; ++k) p[k] = vertexOf(flat, j, corner >> k & 1)[k];
+            meet(p);
         }
     return above && below;
 }
@@ -94,6 +107,8 @@ void compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator,
             const std::uint32_t id = accelerator.id_of_slot[slot];
             std::copy(flat.positions[id].begin(), flat.positions[id].end(), triangles[slot].p);
             triangles[slot].id = id;
+            if (id >= flat.firstShape())
+                triangles[slot].shape = static_cast<std::uint32_t>(id - flat.firstShape()) + 1;
         }
     });
 }
@@ -131,10 +146,16 @@ std::vector<kernel::CrtTriangle8> compileTriangles8(const FlatScene& flat,
     return blocks;
 }
 
+std::vector<std::uint32_t> trianglesOf(const FlatScene& flat) {
+    std::vector<std::uint32_t> ids(flat.firstShape());
+    std::iota(ids.begin(), ids.end(), 0u);
+    return ids;
+}
+
 std::vector<std::uint32_t> occludersOf(const FlatScene& flat) {
     const std::size_t count = flat.positions.size();
     std::vector<std::uint32_t> ids;
-    for (std::uint32_t id = 0; id < count; ++id)
+    for (std::uint32_t id = 0; id < flat.firstShape(); ++id)
         if (count > kBruteForceTriangles || canOcclude(flat, id))  // asking takes quadratic time
             ids.push_back(id);
     return ids;

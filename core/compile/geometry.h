@@ -16,7 +16,7 @@ namespace crt {
 Vec3d vertexOf(const FlatScene& flat, std::size_t id, std::size_t vertex);
 double areaOf(const FlatScene& flat, std::size_t id);
 
-/// Fill in one a triangle, by slot.
+/// Fill in one a triangle or shape, by slot.
 void compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator,
                       std::span<kernel::CrtTriangle> triangles);
 void compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator,
@@ -25,6 +25,8 @@ void compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator,
 /// Triangles side by side for the brute-force loops, which keep the author's order: slot and id are one.
 std::vector<kernel::CrtTriangle8> compileTriangles8(const FlatScene& flat,
                                                     const std::vector<std::uint32_t>& ids);
+/// The ids of all triangles.
+std::vector<std::uint32_t> trianglesOf(const FlatScene& flat);
 /// The triangles that can come between two points of the scene; all of them where there are so many that
 /// asking would take long.
 std::vector<std::uint32_t> occludersOf(const FlatScene& flat);

@@ -101,6 +101,20 @@ LightBounds boundsOfEmitter(const FlatScene& flat, std::size_t triangle, std::si
     return bounds;
 }
 
+/// Of a shape: a disk has one normal, all others have normals all round.
+LightBounds boundsOfShape(const FlatScene& flat, std::size_t id, bool two_sided, double power) {
+    const kernel::CrtShape& record = flat.shapes[id - flat.firstShape()].record;
+    LightBounds bounds;
+    bounds.lower = vertexOf(flat, id, 0);
+    bounds.upper = vertexOf(flat, id, 1);
+    bounds.axis = {record.z[0], record.z[1], record.z[2]};
+    if (record.kind != CRT_SHAPE_DISK) bounds.theta_o = std::numbers::pi;
+    bounds.theta_e = std::numbers::pi / 2;
+    bounds.two_sided = two_sided;
+    bounds.power = power;
+    return bounds;
+}
+
 /// Nothing for lights that lie nowhere, and beams, which light what is in them alone.
 std::optional<LightBounds> boundsOfPoint(const PointLight& light, const kernel::CrtPointLight& compiled,
                                          double power) {
@@ -161,7 +175,8 @@ std::vector<std::uint32_t> emittingTriangles(const Scene& scene, const FlatScene
     for (const Emission& emission : scene.emissions) shines.push_back(emission.radiance.max() > 0);
     for (std::size_t i = 0; i < flat.triangles.size(); ++i) {
         const std::int32_t emission = flat.triangles[i].emission;
-        if (emission >= 0 && shines[static_cast<std::size_t>(emission)] && areaOf(flat, i) > 0)
+        if (emission >= 0 && shines[static_cast<std::size_t>(emission)] &&
+            (i >= flat.firstShape() || areaOf(flat, i) > 0))
             emitting.push_back(static_cast<std::uint32_t>(i));
     }
     return emitting;
@@ -197,13 +212,15 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         const Emission& emission = emissionOf(scene, flat.triangles[i]);
         std::optional<Shared>& own = shared[static_cast<std::size_t>(flat.triangles[i].emission)];
         if (!own) own = {spectra.valueOf(emission.radiance), brightness(emission.radiance)};
-        double area = areaOf(flat, i);
+        const bool shape = i >= flat.firstShape();
+        double area = shape ? areaOf(flat.shapes[i - flat.firstShape()]) : areaOf(flat, i);
         kernel::CrtLight light{};
+        if (shape) light.kind = CRT_LIGHT_SHAPE;
         light.slot = accelerator.slot_of_id[i];
         light.radiance = own->radiance;
         light.flags = emission.two_sided ? CRT_LIGHT_TWO_SIDED : 0;
         part.light_of[i] = static_cast<std::uint32_t>(part.lights.size());
-        if (const auto corner = parallelogramCorner(flat, i)) {
+        if (const auto corner = shape ? std::nullopt : parallelogramCorner(flat, i)) {
             light.kind = CRT_LIGHT_PARALLELOGRAM;
             light.corner = *corner;
             part.light_of[i + 1] = part.light_of[i];
@@ -216,8 +233,9 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         constexpr double kHardlyEver = 1e-6;
         if (passable) area *= kHardlyEver;
         power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
-        bounds.push_back(boundsOfEmitter(flat, i, light.kind == CRT_LIGHT_PARALLELOGRAM ? 2 : 1,
-                                         emission.two_sided, power.back()));
+        bounds.push_back(shape ? boundsOfShape(flat, i, emission.two_sided, power.back())
+                               : boundsOfEmitter(flat, i, light.kind == CRT_LIGHT_PARALLELOGRAM ? 2 : 1,
+                                                 emission.two_sided, power.back()));
     }
     part.emitters = static_cast<std::uint32_t>(part.lights.size());
     if (samplesEnvironment(scene) && (around == nullptr || around->mean_brightness > 0)) {

@@ -171,12 +171,15 @@ CompiledScene nearScene(const CompiledScene& scene) {
     header.faces = blob.append(near_faces);
     header.triangle_count = static_cast<std::uint32_t>(near.size());
     header.primitives = blob.append(std::span<const CrtPrimitive>(primitives, header.primitives.count));
+    const auto* shapes = CRT_ARRAY(kernel::CrtShape, scene.data(), header.shapes);
+    header.shapes = blob.append(std::span<const kernel::CrtShape>(shapes, header.shapes.count));
 
     CompiledScene reduced;
     reduced.blob = blob.finish(header);
     reduced.size_bytes = reduced.blob.size() * sizeof(CompiledScene::Line);
     reduced.features = scene.features;
     reduced.triangles = scene.triangles;
+    reduced.shapes = scene.shapes;
     reduced.emitters = scene.emitters;
     reduced.scale_exponent = scene.scale_exponent;
     return reduced;

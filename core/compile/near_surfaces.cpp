@@ -148,7 +148,7 @@ void visitNeighbours(const kernel::CrtContext& context, const Box& box, std::uin
     }
 }
 
-/// The closest triangle that a ray meets within its reach, which is short.
+/// The closest triangle or shape that a ray meets within its reach, which is short.
 kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::CrtRay& ray,
                              std::uint64_t& tests) {
     using namespace kernel;
@@ -165,7 +165,7 @@ kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::Cr
     const CrtShear shear = crt_shear(ray);
     CrtHit best = crt_no_hit(ray.reach);
     visitNeighbours(context, box, tests, [&](std::uint32_t slot) {
-        crt_test_closest(triangles, slot, shear, &best);
+        crt_test_slot(&context, triangles, slot, ray, shear, &best);
         return false;
     });
     return best;
@@ -176,7 +176,7 @@ kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::Cr
 std::vector<std::uint32_t> slotsOf(const CompiledScene& scene, const kernel::CrtContext& context) {
     using namespace kernel;
     const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
-    std::vector<std::uint32_t> slots(scene.triangles, CRT_NONE);
+    std::vector<std::uint32_t> slots(scene.triangles + scene.shapes, CRT_NONE);
     for (std::uint32_t slot = 0; slot < context.scene->triangle_count; ++slot)
         slots[triangles[slot].id] = slot;
     return slots;

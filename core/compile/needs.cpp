@@ -41,6 +41,7 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(isPath(scene), materials.features & (CRT_FEATURE_ABSORPTION | CRT_FEATURE_OPACITY));
     need((f & CRT_FEATURE_ABSORPTION) != 0, materials.features & CRT_FEATURE_MIX);
     need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
+    need(traces && header.shapes.count > 0, CRT_FEATURE_SHAPES);
     const bool samples_environment = header.environment_light != 0;
     need(header.lights.count > header.point_lights.count + (samples_environment ? 1u : 0u),
          CRT_FEATURE_AREA_LIGHT);
@@ -74,14 +75,17 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     const auto has = [&](std::uint64_t feature) { return (header.features & feature) != 0; };
     if (header.accelerator != CRT_ACCELERATOR_BVH)
         left_out("BVH", scene.integrator.accelerator == Accelerator::Auto
-                            ? fmt::format("{} triangles: testing all of them is faster (up to {})",
-                                          header.triangle_count, kBruteForceTriangles)
+                            ? fmt::format("{} {}: testing all of them is faster (up to {})",
+                                          header.triangle_count,
+                                          header.shapes.count > 0 ? "triangles and shapes" : "triangles",
+                                          kBruteForceTriangles)
                             : std::string("integrator.accelerator asks for another"));
     if (without_nodes) left_out("BVH", "the backend builds an acceleration structure of its own");
-    if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders < header.triangle_count)
+    const std::size_t triangles = header.triangle_count - header.shapes.count;
+    if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders < triangles)
         left_out("shadow tests",
                  fmt::format("{} of {} triangles have the whole scene on one side and cannot come between",
-                             header.triangle_count - occluders, header.triangle_count));
+                             triangles - occluders, triangles));
 #define CRT_LEFT_OUT_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
     if (!has(CRT_FEATURE_##NAME)) left_out(text, "no surface uses it");
     CRT_MATERIAL_LIST(CRT_LEFT_OUT_MATERIAL, )
@@ -100,6 +104,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_FUZZ)) left_out("fuzz", "no surface has any");
     if (!has(CRT_FEATURE_ROUGH_BASE)) left_out("rough diffuse bases", "all are Lambert's");
     if (!has(CRT_FEATURE_ANISOTROPY)) left_out("anisotropy", "all surfaces are as rough in every direction");
+    if (!has(CRT_FEATURE_SHAPES)) left_out("spheres, disks and cylinders", "all surfaces are triangles");
     if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
     if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
     if (!has(CRT_FEATURE_NEE))

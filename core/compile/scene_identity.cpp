@@ -48,7 +48,7 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
           &header.normals, &header.textures, &header.uvs, &header.vertex_colors, &header.nodes,
           &header.objects, &header.materials, &header.compositions, &header.layers, &header.lights,
           &header.point_lights, &header.environment_image, &header.spectral_film, &header.losses,
-          &header.spectra, &header.observer, &header.wavelengths, &header.filter})
+          &header.spectra, &header.observer, &header.wavelengths, &header.filter, &header.shapes})
         *span = {};
     return header;
 }
@@ -73,6 +73,8 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
                  sizeof(CrtComposition));
     if (header.layers.count > 0)
         hash.add(CRT_ARRAY(CrtLayers, blob, header.layers), header.layers.count, sizeof(CrtLayers));
+    if (header.shapes.count > 0)
+        hash.add(CRT_ARRAY(CrtShape, blob, header.shapes), header.shapes.count, sizeof(CrtShape));
     // A texture names its texels by their place in the blob.
     const CrtTexture* textures = CRT_ARRAY(CrtTexture, blob, header.textures);
     for (std::uint32_t i = 0; i < header.textures.count; ++i) {
@@ -98,7 +100,8 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
     const CrtTriangle* triangles = CRT_ARRAY(CrtTriangle, blob, header.triangles);
     std::vector<CrtLight> by_id(lights, lights + header.lights.count);
     for (CrtLight& light : by_id)
-        if (light.kind == CRT_LIGHT_TRIANGLE || light.kind == CRT_LIGHT_PARALLELOGRAM)
+        if (light.kind == CRT_LIGHT_TRIANGLE || light.kind == CRT_LIGHT_PARALLELOGRAM ||
+            light.kind == CRT_LIGHT_SHAPE)
             light.slot = triangles[light.slot].id;
     hash.add(by_id.data(), by_id.size(), sizeof(CrtLight));
     const CrtPointLight* point_lights = CRT_ARRAY(CrtPointLight, blob, header.point_lights);

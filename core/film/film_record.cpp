@@ -139,7 +139,7 @@ std::string planesText(std::uint32_t aovs) {
 
 SceneTrait geometryTrait(const Scene& scene) {
     Digest digest;
-    std::uint64_t triangles = 0, placements = 0;
+    std::uint64_t triangles = 0, shapes = 0, placements = 0;
     for (const Mesh& mesh : scene.meshes) {
         digest.add(mesh.positions);
         digest.add(mesh.normals);
@@ -150,6 +150,12 @@ SceneTrait geometryTrait(const Scene& scene) {
     }
     for (const Object& object : scene.objects) {
         digest.add(object.mesh);
+        if (object.shape) {
+            const Quadric& shape = *object.shape;
+            digest.add(std::vector<double>{static_cast<double>(shape.type), shape.radius, shape.from_z,
+                                           shape.to_z, shape.inward ? 1.0 : 0.0});
+            shapes += object.transforms.size();
+        }
         digest.add(object.transforms);
         digest.add(object.material);
         digest.add(object.emission);
@@ -157,7 +163,8 @@ SceneTrait geometryTrait(const Scene& scene) {
         triangles += object.transforms.size() * scene.meshes[object.mesh].triangles.size();
     }
     return {"the geometry",
-            fmt::format("{} in {}", counted(triangles, "triangle", "triangles"),
+            fmt::format("{}{} in {}", counted(triangles, "triangle", "triangles"),
+                        shapes > 0 ? fmt::format(" and {}", counted(shapes, "shape", "shapes")) : "",
                         counted(placements, "object", "objects")),
             digest.digits()};
 }

@@ -27,8 +27,13 @@ CRT_FN vec3 crt_tangent(const CrtContext *ctx, const CrtSurface *surface, vec3 n
         const vec3 o = crt_triangle_vertex(triangle, 0u);
         const vec3 e1 = crt_triangle_vertex(triangle, 1u) - o, e2 = crt_triangle_vertex(triangle, 2u) - o;
         const f32 v1 = uv[4] - uv[3], v2 = uv[5] - uv[3];
-        const f32 area = crt_difference_of_products(uv[1] - uv[0], v2, uv[2] - uv[0], v1);
-        const vec3 along = (e1 * v2 - e2 * v1) * (area < 0.0f ? -1.0f : 1.0f);
+        f32 area = crt_difference_of_products(uv[1] - uv[0], v2, uv[2] - uv[0], v1);
+        vec3 along = (e1 * v2 - e2 * v1) * (area < 0.0f ? -1.0f : 1.0f);
+        if (CRT_HAS(SHAPES) && triangle->shape != 0u) {
+            vec3 along_v;
+            crt_edges_of_shape(ctx, triangle, surface->p, &along, &along_v);
+            area = 1.0f;
+        }
         const vec3 flat = along - n * dot3(along, n);
         const f32 length = length3(flat);
         if (area != 0.0f && length > 0.0f) return flat * (1.0f / length);

@@ -1,12 +1,12 @@
 /*
  * bvh.h: software tracing, for backends without a tracer of their own: brute force for a handful of
  * triangles, the paper's culling by object boxes, and a four-wide BVH. Box tests only cull, conservatively;
- * crt_intersect_triangle decides.
+ * crt_intersect_triangle and crt_intersect_shape decide.
  */
 #ifndef CRT_BVH_H
 #define CRT_BVH_H
 
-#include "intersect.h"
+#include "shapes.h"
 
 CRT_KERNEL_BEGIN
 
@@ -64,9 +64,12 @@ CRT_FN CrtHit crt_brute_force_closest(const CrtContext *ctx, CrtRay ray) {
     for (u32 b = 0u; b < count; ++b)
         for (u32 lanes = crt_candidates8(blocks + b, ray, slack, best.t); lanes != 0u; lanes &= lanes - 1u)
             crt_test_closest(triangles, blocks[b].slot[crt_lowest_bit(lanes)], shear, &best);
+    if (CRT_HAS(SHAPES)) crt_last_slots_closest(ctx, ray, &best);
 #else
     const u32 count = ctx->scene->triangle_count;
-    for (u32 slot = 0u; slot < count; ++slot) crt_test_closest(triangles, slot, shear, &best);
+    for (u32 slot = 0u; slot < count; ++slot)
+        if (CRT_HAS(SHAPES)) crt_test_slot(ctx, triangles, slot, ray, shear, &best);
+        else crt_test_closest(triangles, slot, shear, &best);
 #endif
     return best;
 }
@@ -92,6 +95,7 @@ CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
         for (u32 lane = 0u; lane < 8u && blocks[b].slot[lane] != CRT_NONE; ++lane)
             if (crt_intersect_triangle(triangles + blocks[b].slot[lane], shear, ray.reach, &hit)) return 1;
 #endif
+    if (CRT_HAS(SHAPES)) return crt_last_slots_any(ctx, ray);
     return 0;
 }
 
@@ -104,7 +108,8 @@ CRT_FN CrtHit crt_aabb_closest(const CrtContext *ctx, CrtRay ray) {
     for (u32 k = 0u; k < ctx->scene->objects.count; ++k) {
         if (!(crt_box(objects[k].lower, objects[k].upper, ray, slab, best.t) < CRT_INFINITY)) continue;
         for (u32 i = 0u; i < objects[k].count; ++i)
-            crt_test_closest(triangles, objects[k].first + i, shear, &best);
+            if (CRT_HAS(SHAPES)) crt_test_slot(ctx, triangles, objects[k].first + i, ray, shear, &best);
+            else crt_test_closest(triangles, objects[k].first + i, shear, &best);
     }
     return best;
 }
@@ -118,7 +123,10 @@ CRT_FN int crt_aabb_any(const CrtContext *ctx, CrtRay ray) {
     for (u32 k = 0u; k < ctx->scene->objects.count; ++k) {
         if (!(crt_box(objects[k].lower, objects[k].upper, ray, slab, ray.reach) < CRT_INFINITY)) continue;
         for (u32 i = 0u; i < objects[k].count; ++i)
-            if (crt_intersect_triangle(triangles + objects[k].first + i, shear, ray.reach, &hit)) return 1;
+            if (CRT_HAS(SHAPES)
+                    ? crt_slot_stops(ctx, triangles, objects[k].first + i, ray, shear, &hit)
+                    : crt_intersect_triangle(triangles + objects[k].first + i, shear, ray.reach, &hit))
+                return 1;
     }
     return 0;
 }
@@ -194,7 +202,9 @@ CRT_FN CrtHit crt_bvh_closest(const CrtContext *ctx, CrtRay ray) {
             }
         } else {
             const u32 first = current >> 4;
-            for (u32 i = 0u; i < count; ++i) crt_test_closest(triangles, first + i, shear, &best);
+            for (u32 i = 0u; i < count; ++i)
+                if (CRT_HAS(SHAPES)) crt_test_slot(ctx, triangles, first + i, ray, shear, &best);
+                else crt_test_closest(triangles, first + i, shear, &best);
         }
         /* A box that begins just behind the best hit may still hold a tie: the slack keeps it. */
         do {
@@ -229,7 +239,9 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
         } else {
             const u32 first = current >> 4;
             for (u32 i = 0u; i < count; ++i)
-                if (crt_intersect_triangle(triangles + first + i, shear, ray.reach, &hit)) return 1;
+                if (CRT_HAS(SHAPES) ? crt_slot_stops(ctx, triangles, first + i, ray, shear, &hit)
+                                    : crt_intersect_triangle(triangles + first + i, shear, ray.reach, &hit))
+                    return 1;
         }
     }
     return 0;

@@ -61,7 +61,8 @@
     F(37, OPENPBR, "metals and glossy surfaces by their colours, as in OpenPBR")             \
     F(38, ROUGH_BASE, "diffuse surfaces that are rough (EON)")                               \
     F(39, FUZZ, "fuzz on top of surfaces")                                                   \
-    F(40, CLEARCOAT, "coats on top of surfaces")
+    F(40, CLEARCOAT, "coats on top of surfaces")                                             \
+    F(41, SHAPES, "spheres, disks and cylinders")
 
 #define CRT_FEATURE_NUMBER(bit, name, text) CRT_BIT_##name = bit,
 enum CrtFeatureNumber { CRT_FEATURE_LIST(CRT_FEATURE_NUMBER) };

@@ -34,13 +34,35 @@ typedef struct CrtSpan {
 
 #define CRT_ARRAY(type, blob, span) ((CRT_GLOBAL const type *)((blob) + (u64)(span).offset * 16u))
 
-/* Geometry of one triangle: x of its three vertices, then y, then z. */
+/* Geometry of one triangle: x of its three vertices, then y, then z. Or a shape, whose box stands there:
+   its lower corner, its upper one, and the lower one again. */
 typedef struct CrtTriangle {
     f32 p[9];
-    u32 id;        /* primitive id: position in the author's order, decides ties */
-    u32 reserved0, reserved1;
+    u32 id;        /* primitive id: position in the author's order, decides ties; of shapes the last */
+    u32 shape;     /* 1 + the index of its CrtShape; 0: a triangle */
+    u32 reserved;
 } CrtTriangle;
 CRT_ASSERT_SIZE(CrtTriangle, 48);
+
+#define CRT_SHAPE_SPHERE 0u   /* around the centre */
+#define CRT_SHAPE_DISK 1u     /* in the plane of x and y */
+#define CRT_SHAPE_CYLINDER 2u /* around z, without ends */
+
+/* A surface of the second order, in a frame of unit axes that are perpendicular to each other. What is left
+   of it is where z, in the frame, is from from_z to to_z. */
+typedef struct CrtShape {
+    f32 centre[3];
+    f32 radius;
+    f32 x[3];
+    f32 from_z;
+    f32 y[3];
+    f32 to_z;
+    f32 z[3];
+    u32 kind;   /* CRT_SHAPE_… */
+    f32 facing; /* 1: normals point outwards, a disk's along z; -1: the other way */
+    f32 reserved[3];
+} CrtShape;
+CRT_ASSERT_SIZE(CrtShape, 80);
 
 /* Eight triangles side by side, for the brute-force loops. A row (x, y, z, w) is an affine function of a
    point p: x·p.x + y·p.y + z·p.z + w. Row 0 is the height over the triangle's plane; rows 1 to 3 the
@@ -55,8 +77,9 @@ typedef struct CrtTriangle8 {
 } CrtTriangle8;
 CRT_ASSERT_SIZE(CrtTriangle8, 576);
 
-/* The plane of a triangle, by slot; how far off it a ray must start to be sure of its side, and how far from
-   its edges, in barycentrics, to be sure of its neighbours' (surface.h). */
+/* The plane of a triangle (of a shape: 0), by slot; how far off it a ray must start to be sure of its side,
+   and how far from its edges, in barycentrics (of a shape: lengths), to be sure of its neighbours'
+   (surface.h). */
 typedef struct CrtFace {
     f32 normal[3]; /* unit, by the order of the vertices */
     f32 clearance;
@@ -98,7 +121,7 @@ typedef struct CrtVertexColors {
 CRT_ASSERT_SIZE(CrtVertexColors, 48);
 
 /* Four children: bounds[2·axis + 0/1][child] is the lower/upper plane. child = index << 4 | count: count >
-   0 is a leaf of the triangle slots index … index + count − 1, count = 0 an inner node. An unused child
+   0 is a leaf of the slots index … index + count − 1, count = 0 an inner node. An unused child
    has lower = +inf, upper = −inf, so no ray enters it. */
 typedef struct CrtNode4 {
     f32 bounds[6][4];
@@ -107,8 +130,8 @@ typedef struct CrtNode4 {
 } CrtNode4;
 CRT_ASSERT_SIZE(CrtNode4, 128);
 
-/* Bounding box of one object's triangles; they lie together in the triangle array when the accelerator is
- * AABB. */
+/* Bounding box of one object's triangles, or of its shape; they lie together in the triangle array when the
+ * accelerator is AABB. */
 typedef struct CrtObject {
     f32 lower[3];
     u32 first;
@@ -253,6 +276,7 @@ CRT_ASSERT_SIZE(CrtLayers, 64);
 #define CRT_LIGHT_IES 7u
 #define CRT_LIGHT_DISK_BEAM 8u
 #define CRT_LIGHT_SLIT_BEAM 9u
+#define CRT_LIGHT_SHAPE 10u /* a sphere, a disk, a cylinder, or what is left of one */
 
 #define CRT_LIGHT_TWO_SIDED 1u
 #define CRT_LIGHT_UNSAMPLED 2u /* left to scattered rays: its surface is not all there */
@@ -423,7 +447,7 @@ typedef struct CrtScene {
 
     CrtSeed seed;
 
-    u32 triangle_count;
+    u32 triangle_count; /* slots: triangles and shapes */
     u32 tree_lights; /* the first of the lights, between which the tree chooses; 0: there is none */
 
     CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
@@ -451,8 +475,10 @@ typedef struct CrtScene {
     CrtSpan filter;              /* CRT_FILTER_TABLE + 1 nodes of the offset from the pixel centre, pixels */
 
     CrtCamera camera;
+
+    CrtSpan shapes;              /* CrtShape. Where slots are in the order of ids, theirs are the last */
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 408);
+CRT_ASSERT_SIZE(CrtScene, 416);
 
 CRT_KERNEL_END
 

@@ -7,7 +7,7 @@
 #ifndef CRT_LIGHT_TREE_H
 #define CRT_LIGHT_TREE_H
 
-#include "light.h"
+#include "shape_light.h"
 
 CRT_KERNEL_BEGIN
 

@@ -34,8 +34,13 @@ CRT_FN vec3 crt_mapped_normal(const CrtContext *ctx, const CrtSurface *surface, 
     const vec4 texel = crt_image(ctx, &map, &surface->at, splat4(0.0f));
     /* Along the picture's rows to the right, and up its columns. */
     const vec3 o = crt_triangle_vertex(triangle, 0u);
-    const vec3 e1 = crt_triangle_vertex(triangle, 1u) - o, e2 = crt_triangle_vertex(triangle, 2u) - o;
-    const f32 u1 = uv[1] - uv[0], u2 = uv[2] - uv[0], v1 = uv[4] - uv[3], v2 = uv[5] - uv[3];
+    vec3 e1 = crt_triangle_vertex(triangle, 1u) - o, e2 = crt_triangle_vertex(triangle, 2u) - o;
+    f32 u1 = uv[1] - uv[0], u2 = uv[2] - uv[0], v1 = uv[4] - uv[3], v2 = uv[5] - uv[3];
+    if (CRT_HAS(SHAPES) && triangle->shape != 0u) {
+        crt_edges_of_shape(ctx, triangle, surface->p, &e1, &e2);
+        u1 = v2 = 1.0f;
+        u2 = v1 = 0.0f;
+    }
     const f32 s1 = map.from_uv[0] * u1 + map.from_uv[1] * v1, s2 = map.from_uv[0] * u2 + map.from_uv[1] * v2;
     const f32 t1 = -map.from_uv[3] * u1 - map.from_uv[4] * v1,
               t2 = -map.from_uv[3] * u2 - map.from_uv[4] * v2;

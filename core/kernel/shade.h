@@ -78,7 +78,11 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
     f32 weight = 1.0f;
     if (CRT_HAS(NEE) && ctx->scene->nee != CRT_NEE_NONE && path->scatter_pdf > 0.0f) {
         const f32 distance = length3(crt_fma3(path->ray.d, t, path->ray.o) - path->p);
-        CrtLightSeen light = crt_light_pdf(ctx, surface->light, path->p, distance);
+        CrtLightSeen light =
+            CRT_HAS(SHAPES) && emitter->kind == CRT_LIGHT_SHAPE
+                ? crt_shape_light_pdf(ctx, surface->light, path->p,
+                                      crt_fma3(path->ray.d, t, path->ray.o), surface->ng)
+                : crt_light_pdf(ctx, surface->light, path->p, distance);
         if (crt_has_light_tree(ctx))
             light.pdf = light.pdf * crt_light_tree_probability(ctx, surface->light, path->p, path->side);
         if (light.pdf > 0.0f) {
@@ -184,7 +188,9 @@ CRT_FN CrtOffer crt_offer_of(const CrtContext *ctx, u32 light, CrtSampler *sampl
         return offer;
     }
     if (CRT_HAS(POINT_LIGHT) &&
-        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].kind >= CRT_LIGHT_POINT) {
+        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].kind >= CRT_LIGHT_POINT &&
+        !(CRT_HAS(SHAPES) &&
+          CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].kind == CRT_LIGHT_SHAPE)) {
         const CrtPointLightSample s = crt_point_light_sample(ctx, offer.light, sampler, dimension, p);
         offer.wi = s.wi;
         offer.pdf = s.pdf;
@@ -194,7 +200,11 @@ CRT_FN CrtOffer crt_offer_of(const CrtContext *ctx, u32 light, CrtSampler *sampl
         offer.reach = CRT_POINT_LIGHT_REACH;
         return offer;
     }
-    const CrtLightSample s = crt_light_sample(ctx, offer.light, sampler, dimension, p);
+    const CrtLightSample s =
+        CRT_HAS(SHAPES) &&
+                CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].kind == CRT_LIGHT_SHAPE
+            ? crt_shape_light_sample(ctx, offer.light, sampler, dimension, p)
+            : crt_light_sample(ctx, offer.light, sampler, dimension, p);
     offer.area = 1;
     offer.wi = s.wi;
     offer.pdf = s.pdf;

@@ -9,16 +9,16 @@
 
 CRT_KERNEL_BEGIN
 
-/* A place on a triangle, as textures are asked for it. */
+/* A place on a triangle or a shape, as textures are asked for it. */
 typedef struct CrtFacePlace {
     u32 id;     /* primitive id; for tangents, too */
-    f32 b1, b2; /* barycentrics of the second and third vertex */
+    f32 b1, b2; /* barycentrics of the second and third vertex; triangles alone */
     f32 u, v;   /* texture coordinates; 0 where the mesh has none */
 } CrtFacePlace;
 
 typedef struct CrtSurface {
     vec3 p;
-    vec3 ng;       /* unit geometric normal, by the order of the vertices */
+    vec3 ng;       /* unit geometric normal, by the order of the vertices, or of the shape */
     vec3 ns;       /* unit shading normal, on the side of ng */
     f32 clearance; /* how far along ng a ray must start from p to be sure of its side */
     u32 material;
@@ -66,9 +66,95 @@ CRT_FN f32 crt_edge_margin(f32 coordinate, f32 size, f32 twice_area) {
                : CRT_EDGE_MARGIN_MAX;
 }
 
+/* A vector in the frame of a shape. */
+CRT_FN vec3 crt_in_frame(CRT_GLOBAL const CrtShape *shape, vec3 v) {
+    return make_vec3(dot3(crt_load3(shape->x), v), dot3(crt_load3(shape->y), v),
+                     dot3(crt_load3(shape->z), v));
+}
+
+/* Texture coordinates of the place q of a shape's frame. Around the axis u grows from 0 at x to 1; v from 0
+   at a sphere's lower pole to 1 at the upper, whatever is left of it; along a cylinder from end to end. On a
+   disk they are those of the square around it. */
+CRT_FN void crt_shape_uv(CRT_GLOBAL const CrtShape *shape, vec3 q, f32 *u, f32 *v) {
+    const f32 x = V3X(q), y = V3Y(q), z = V3Z(q);
+    if (shape->kind == CRT_SHAPE_DISK) {
+        *u = crt_fma(x / shape->radius, 0.5f, 0.5f);
+        *v = crt_fma(y / shape->radius, 0.5f, 0.5f);
+        return;
+    }
+    const f32 turn = crt_atan2(y, x) * (0.5f * CRT_INV_PI);
+    *u = turn < 0.0f ? turn + 1.0f : turn;
+    *v = shape->kind == CRT_SHAPE_CYLINDER
+             ? (z - shape->from_z) / (shape->to_z - shape->from_z)
+             : crt_fma(crt_atan2(z, crt_sqrt(crt_fma(x, x, y * y))), CRT_INV_PI, 0.5f);
+}
+
+/* How the place q moves with u and with v, in the scene's axes. */
+CRT_FN void crt_shape_edges(CRT_GLOBAL const CrtShape *shape, vec3 q, vec3 *along_u, vec3 *along_v) {
+    const vec3 ex = crt_load3(shape->x), ey = crt_load3(shape->y), ez = crt_load3(shape->z);
+    const f32 x = V3X(q), y = V3Y(q), z = V3Z(q);
+    const f32 r = crt_sqrt(crt_fma(x, x, y * y));
+    *along_u = (ey * x - ex * y) * (2.0f * CRT_PI);
+    *along_v = ez * (shape->to_z - shape->from_z);
+    if (shape->kind == CRT_SHAPE_SPHERE && r > 0.0f)
+        *along_v = (ez * r - (ex * x + ey * y) * (z / r)) * CRT_PI;
+    if (shape->kind == CRT_SHAPE_DISK) {
+        *along_u = ex * (2.0f * shape->radius);
+        *along_v = ey * (2.0f * shape->radius);
+    }
+}
+
+/* crt_surface of a shape. Places near its edges are drawn in from them, as those of triangles are: what is
+   within rounding of an edge may lie behind the shape that begins there. */
+CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtShape *shape, CrtHit hit) {
+    CRT_GLOBAL const CrtPrimitive *primitive =
+        CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + hit.id;
+    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + hit.slot;
+    const vec3 ex = crt_load3(shape->x), ey = crt_load3(shape->y), ez = crt_load3(shape->z);
+    const f32 radius = shape->radius, margin = face->margin;
+    const f32 lowest = shape->from_z + margin, highest = shape->to_z - margin;
+    vec3 centre = crt_load3(shape->centre);
+    CrtSurface s;
+    s.clearance = face->clearance;
+    if (shape->kind == CRT_SHAPE_DISK) {
+        const f32 r = crt_sqrt(crt_fma(hit.b1, hit.b1, hit.b2 * hit.b2));
+        const f32 inwards = r > radius - margin ? (radius - margin) / r : 1.0f;
+        s.p = crt_fma3(ex, hit.b1 * inwards, crt_fma3(ey, hit.b2 * inwards, centre));
+        s.ng = ez;
+    } else {
+        if (shape->kind == CRT_SHAPE_CYLINDER) {
+            const vec3 n = crt_direction_of_turn(hit.b1);
+            s.ng = ex * V3X(n) + ey * V3Y(n);
+            centre = crt_fma3(ez, crt_clamp(hit.b2, lowest, highest), centre);
+        } else {
+            s.ng = crt_square_to_direction(hit.b1, hit.b2);
+            const f32 z = dot3(s.ng, ez) * radius;
+            if (z < lowest || z > highest) {
+                const vec3 across = s.ng - ez * (z / radius);
+                const f32 to = crt_clamp(z, lowest, highest) / radius;
+                s.ng = across * (crt_sqrt(crt_max(0.0f, 1.0f - to * to)) / length3(across)) + ez * to;
+            }
+        }
+        s.p = crt_fma3(s.ng, radius, centre);
+    }
+    s.ng = s.ng * shape->facing;
+    s.ns = s.ng;
+    s.material = primitive->material;
+    s.light = primitive->light;
+    if (CRT_HAS(ANISOTROPY)) s.slot = hit.slot;
+    if (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY)) s.at.id = hit.id;
+    if (CRT_HAS(TEXTURE)) {
+        s.at.b1 = s.at.b2 = 0.0f;
+        crt_shape_uv(shape, crt_in_frame(shape, s.p - crt_load3(shape->centre)), &s.at.u, &s.at.v);
+    }
+    return s;
+}
+
 CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     CRT_GLOBAL const CrtTriangle *triangle =
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + hit.slot;
+    if (CRT_HAS(SHAPES) && triangle->shape != 0u)
+        return crt_shape_surface(ctx, crt_shape_of(ctx, triangle->shape - 1u), hit);
     CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + hit.slot;
     CRT_GLOBAL const CrtPrimitive *primitive =
         CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + hit.id;
@@ -118,6 +204,13 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
         }
     }
     return s;
+}
+
+/* Of a place p on a shape: how it moves with u and with v, in place of a triangle's edges. */
+CRT_FN void crt_edges_of_shape(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangle, vec3 p,
+                               vec3 *along_u, vec3 *along_v) {
+    CRT_GLOBAL const CrtShape *shape = crt_shape_of(ctx, triangle->shape - 1u);
+    crt_shape_edges(shape, crt_in_frame(shape, p - crt_load3(shape->centre)), along_u, along_v);
 }
 
 /* Origin of a ray leaving p on the side of direction w. No absolute epsilon: the clearance is the

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 namespace crt {
 namespace {
@@ -56,6 +57,13 @@ std::vector<Face> oneSidedFaces(const Scene& scene, const Object& object) {
     return faces;
 }
 
+/// How far a shape is from the middle of its frame at most.
+double radiusAround(const Quadric& shape, const Matrix4d& transform) {
+    const double scale = evenScaleOf(transform).value_or(std::numeric_limits<double>::infinity());
+    const double z = std::max(std::abs(shape.from_z), std::abs(shape.to_z));
+    return scale * (shape.type == QuadricType::Sphere ? shape.radius : std::hypot(shape.radius, z));
+}
+
 /// Is anything in front of a face? `budget` counts down the points that may still be looked at.
 class Front {
 public:
@@ -85,6 +93,11 @@ public:
                 for (const Vec3d& p : scene_.meshes[object.mesh].positions) {
                     if (++looks_ > kMostLooks || inFront(placed(transform, p), 0)) return false;
                 }
+        for (const Object& object : scene_.objects)
+            for (const Matrix4d& transform : object.transforms)
+                if (object.shape &&
+                    inFront(placed(transform, {0, 0, 0}), radiusAround(*object.shape, transform)))
+                    return false;
         return true;
     }
 
@@ -104,7 +117,7 @@ std::vector<std::string> reasonsForBlack(const Scene& scene) {
     std::vector<std::string> lamps, one_sided;
     for (const Object& object : scene.objects) {
         const Mesh& mesh = scene.meshes[object.mesh];
-        bool emits = false;
+        bool emits = object.shape && emissionOf(scene, object, 0) != nullptr;
         for (std::size_t t = 0; t < mesh.triangles.size() && !emits; ++t)
             emits = emissionOf(scene, object, t) != nullptr;
         if (!emits) continue;

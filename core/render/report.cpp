@@ -126,6 +126,7 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
                        {"height", compiled.height},
                        {"objects", compiled.objects},
                        {"triangles", compiled.triangles},
+                       {"shapes", compiled.shapes},
                        {"emitters", compiled.emitters},
                        {"nodes", compiled.nodes},
                        {"images", compiled.images},

@@ -195,10 +195,30 @@ struct Emission {
     bool two_sided = false;
 };
 
-/// A mesh, placed once per transform.
+enum class QuadricType { Sphere, Disk, Cylinder };
+
+/// A surface of the second order around the origin and the axis z. Whole, or what is left of it where z is
+/// in a range.
+struct Quadric {
+    QuadricType type = QuadricType::Sphere;
+    double radius = 1;
+    double from_z = -1, to_z = 1;  ///< Of a sphere −radius to radius and less; of a disk 0.
+    bool inward = false;           ///< Spheres and cylinders: normals point to the axis.
+};
+
+/// "a sphere"
+const char* wordOf(QuadricType type);
+/// What a transform multiplies lengths by; nothing where it does so in one direction more than in another.
+std::optional<double> evenScaleOf(const Matrix4d& transform);
+/// Of one that does: what is wrong with that, behind wordOf.
+inline constexpr const char* kShapesStayShapes =
+    "is scaled by the same factor in every direction: a transform must not stretch or shear it";
+
+/// A mesh or a shape, placed once per transform.
 struct Object {
     std::string name;
     std::uint32_t mesh = 0;                    ///< Index into Scene::meshes.
+    std::optional<Quadric> shape{};              ///< In place of the mesh, which is an empty one then.
     std::vector<Matrix4d> transforms{kIdentity4d};
     std::int32_t material =
         -1;  ///< Index into Scene::materials; used where the mesh has no material of its own.

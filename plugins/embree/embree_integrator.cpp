@@ -69,17 +69,16 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
     if ((given.features & CRT_FEATURE_BVH) != 0) {
         const auto start = Clock::now();
         if (!device_) device_ = std::make_unique<Device>();
-        const auto* triangles = CRT_ARRAY(kernel::CrtTriangle, bytes, given.triangles);
         const auto progress = [this](double done) { host_.cancelled(done); };
         arena_.execute([&] {
-            tracer_ = std::make_unique<Tracer>(*device_, triangles, given.triangle_count, progress);
+            tracer_ = std::make_unique<Tracer>(*device_, bytes, progress);
         });
         build_seconds_ = secondsSince(start);
     }
     // Not a vector: it would write zeros over hundreds of megabytes first.
     blob_.reset(new Line[(scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line)]);
     std::memcpy(blob_.get(), scene_blob.data, scene_blob.size_bytes);
-    if (tracer_) tracer_->moveTo(CRT_ARRAY(kernel::CrtTriangle, blob(), scene().triangles));
+    if (tracer_) tracer_->moveTo(blob());
     program_ = &chooseProgram(scene().features, info_.kernel);
 
     const std::size_t pixels = static_cast<std::size_t>(scene().width) * scene().height;

@@ -15,6 +15,7 @@
 namespace crt::embree {
 namespace {
 
+using kernel::CrtContext;
 using kernel::CrtHit;
 using kernel::CrtRay;
 using kernel::CrtShear;
@@ -44,6 +45,8 @@ struct Query {
     CrtShear shear;
     CrtHit best;
     float reach;
+    const CrtContext* shapes;  ///< Null: there are none.
+    CrtRay ray;
 };
 
 /// Tests one triangle whose box the ray meets, and lets Embree go no further than just beyond the best hit,
@@ -51,7 +54,10 @@ struct Query {
 void closestHit(const RTCIntersectFunctionNArguments* arguments) {
     Query& query = *reinterpret_cast<Query*>(arguments->context);
     const float before = query.best.t;
-    crt_test_closest(query.triangles, arguments->primID, query.shear, &query.best);
+    if (query.shapes != nullptr)
+        crt_test_slot(query.shapes, query.triangles, arguments->primID, query.ray, query.shear, &query.best);
+    else
+        crt_test_closest(query.triangles, arguments->primID, query.shear, &query.best);
     if (query.best.t < before)
         RTCRayN_tfar(RTCRayHitN_RayN(arguments->rayhit, 1), 1, 0) = query.best.t * kReachSlack;
 }
@@ -59,11 +65,15 @@ void closestHit(const RTCIntersectFunctionNArguments* arguments) {
 void anyHit(const RTCOccludedFunctionNArguments* arguments) {
     Query& query = *reinterpret_cast<Query*>(arguments->context);
     CrtHit hit;
-    if (crt_intersect_triangle(query.triangles + arguments->primID, query.shear, query.reach, &hit))
-        RTCRayN_tfar(arguments->ray, 1, 0) = -std::numeric_limits<float>::infinity();
+    const bool stops =
+        query.shapes != nullptr
+            ? crt_slot_stops(query.shapes, query.triangles, arguments->primID, query.ray, query.shear, &hit)
+            : crt_intersect_triangle(query.triangles + arguments->primID, query.shear, query.reach, &hit);
+    if (stops) RTCRayN_tfar(arguments->ray, 1, 0) = -std::numeric_limits<float>::infinity();
 }
 
-void triangleBounds(const RTCBoundsFunctionArguments* arguments) {
+/// Of a triangle, or of a shape's box, which stands in its place.
+void slotBounds(const RTCBoundsFunctionArguments* arguments) {
     const CrtTriangle& triangle =
         static_cast<const CrtTriangle*>(arguments->geometryUserPtr)[arguments->primID];
     const auto bound = [&](std::uint32_t axis, float& lower, float& upper) {
@@ -77,10 +87,12 @@ void triangleBounds(const RTCBoundsFunctionArguments* arguments) {
     bound(2, b.lower_z, b.upper_z);
 }
 
-Query makeQuery(const CrtTriangle* triangles, const CrtRay& ray) {
+Query makeQuery(const CrtTriangle* triangles, const CrtContext* shapes, const CrtRay& ray) {
     Query query;
     initContext(&query.context);
     query.triangles = triangles;
+    query.shapes = shapes;
+    query.ray = ray;
     query.shear = crt_shear(ray);
     query.best = kernel::crt_no_hit(ray.reach);
     query.reach = ray.reach;
@@ -139,18 +151,28 @@ std::string Device::version() {
 struct Tracer::Impl {
     RTCScene scene = nullptr;
     const CrtTriangle* triangles = nullptr;
+    CrtContext context{};
+    const CrtContext* shapes = nullptr;  ///< As of Query.
+
+    void use(const unsigned char* blob) {
+        using kernel::u64;  // CRT_ARRAY computes with it
+        const auto& header = *reinterpret_cast<const kernel::CrtScene*>(blob);
+        triangles = CRT_ARRAY(CrtTriangle, blob, header.triangles);
+        context.blob = blob;
+        context.scene = &header;
+        shapes = header.shapes.count > 0 ? &context : nullptr;
+    }
 };
 
-Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t count,
-               const std::function<void(double)>& progress)
+Tracer::Tracer(const Device& device, const unsigned char* blob, const std::function<void(double)>& progress)
     : impl_(new Impl) {
     RTCDevice rtc = device.impl_->device;
-    impl_->triangles = triangles;
+    impl_->use(blob);
     impl_->scene = rtcNewScene(rtc);
     RTCGeometry geometry = rtcNewGeometry(rtc, RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(geometry, count);
-    rtcSetGeometryUserData(geometry, const_cast<CrtTriangle*>(triangles));
-    rtcSetGeometryBoundsFunction(geometry, triangleBounds, nullptr);
+    rtcSetGeometryUserPrimitiveCount(geometry, impl_->context.scene->triangle_count);
+    rtcSetGeometryUserData(geometry, const_cast<CrtTriangle*>(impl_->triangles));
+    rtcSetGeometryBoundsFunction(geometry, slotBounds, nullptr);
     rtcSetGeometryIntersectFunction(geometry, closestHit);
     rtcSetGeometryOccludedFunction(geometry, anyHit);
     rtcCommitGeometry(geometry);
@@ -169,7 +191,7 @@ Tracer::Tracer(const Device& device, const CrtTriangle* triangles, std::uint32_t
 Tracer::~Tracer() { rtcReleaseScene(impl_->scene); }
 
 /// Embree asks for bounds while it builds, and never again.
-void Tracer::moveTo(const CrtTriangle* triangles) { impl_->triangles = triangles; }
+void Tracer::moveTo(const unsigned char* blob) { impl_->use(blob); }
 
 bool Tracer::takes(const CrtRay& ray) {
     using namespace kernel;
@@ -179,7 +201,7 @@ bool Tracer::takes(const CrtRay& ray) {
 }
 
 CrtHit Tracer::closest(const CrtRay& ray) const {
-    Query query = makeQuery(impl_->triangles, ray);
+    Query query = makeQuery(impl_->triangles, impl_->shapes, ray);
     RTCRayHit hit;
     hit.ray = embreeRay(ray);
     hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -196,7 +218,7 @@ CrtHit Tracer::closest(const CrtRay& ray) const {
 }
 
 bool Tracer::any(const CrtRay& ray) const {
-    Query query = makeQuery(impl_->triangles, ray);
+    Query query = makeQuery(impl_->triangles, impl_->shapes, ray);
     RTCRay r = embreeRay(ray);
 #if RTC_VERSION_MAJOR >= 4
     RTCOccludedArguments arguments;

@@ -1,6 +1,6 @@
-/// The blob's triangles in an Embree scene. Embree finds candidates; the kernel's shared triangle test has
-/// the last word, so that hits are the same bits as on every other backend. The one file pair that knows
-/// Embree, and hides the difference between Embree 3 and 4.
+/// The blob's triangles and shapes in an Embree scene. Embree finds candidates; the kernel's shared tests
+/// have the last word, so that hits are the same bits as on every other backend. The one file pair that
+/// knows Embree, and hides the difference between Embree 3 and 4.
 #pragma once
 
 namespace crt::embree {
@@ -35,19 +35,18 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-/// An Embree BVH over the triangle slots of a blob, which it reads while it lives. Throws PluginError when
-/// Embree cannot build it.
+/// An Embree BVH over the slots of a blob, which it reads while it lives. Throws PluginError when Embree
+/// cannot build it.
 class Tracer {
 public:
     /// `progress` gets the part of it that is built, in [0,1], from any thread.
-    Tracer(const Device& device, const kernel::CrtTriangle* triangles, std::uint32_t count,
-           const std::function<void(double)>& progress);
+    Tracer(const Device& device, const unsigned char* blob, const std::function<void(double)>& progress);
     ~Tracer();
     Tracer(const Tracer&) = delete;
     Tracer& operator=(const Tracer&) = delete;
 
-    /// The same triangles lie there from now on.
-    void moveTo(const kernel::CrtTriangle* triangles);
+    /// The same blob lies there from now on.
+    void moveTo(const unsigned char* blob);
 
     /// Rays that start within this of 0 on each axis are taken.
     static constexpr float kReach = 4;

@@ -12,7 +12,7 @@ namespace crt::kernel {
 namespace {
 
 // A scene whose rays all start where Embree takes them comes without nodes. Should a ray be another
-// nevertheless, every triangle is tested: slow, and right.
+// nevertheless, every triangle and shape is tested: slow, and right.
 bool lacksNodes(const CrtContext* ctx) { return ctx->tracer != nullptr && ctx->scene->nodes.count == 0; }
 
 CrtHit testAllClosest(const CrtContext* ctx, CrtRay ray) {
@@ -21,7 +21,7 @@ CrtHit testAllClosest(const CrtContext* ctx, CrtRay ray) {
     CrtHit best = crt_no_hit(ray.reach);
     if (!crt_is_ray(ray)) return best;
     for (u32 slot = 0; slot < ctx->scene->triangle_count; ++slot)
-        crt_test_closest(triangles, slot, shear, &best);
+        crt_test_slot(ctx, triangles, slot, ray, shear, &best);
     return best;
 }
 
@@ -31,7 +31,7 @@ int testAllAny(const CrtContext* ctx, CrtRay ray) {
     CrtHit hit;
     if (!crt_is_ray(ray)) return 0;
     for (u32 slot = 0; slot < ctx->scene->triangle_count; ++slot)
-        if (crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit)) return 1;
+        if (crt_slot_stops(ctx, triangles, slot, ray, shear, &hit)) return 1;
     return 0;
 }
 

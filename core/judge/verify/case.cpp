@@ -76,11 +76,12 @@ const std::vector<Case>& registry() {
     static const std::vector<Case> cases = [] {
         std::vector<Case> all;
         for (const auto group :
-             {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases, pointLightCases,
-              environmentCases, spectralFilmCases, stiffCases, scatteringCases, glasswareCases,
-              thinFilmCases, anisotropyCases, openPbrCases, openPbrCoatCases, compositionCases,
-              shadingNormalCases, colourCases, textureCases, accumulationCases, imageCases, inputCases,
-              backendCases, exactRelationCases, mutantCases, contactCases})
+             {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases,
+              pointLightCases, environmentCases, spectralFilmCases, stiffCases, scatteringCases,
+              glasswareCases, thinFilmCases, anisotropyCases, openPbrCases, openPbrCoatCases,
+              compositionCases, shadingNormalCases, quadricCases, shapeLightCases, colourCases,
+              textureCases, accumulationCases, imageCases, inputCases, backendCases, exactRelationCases,
+              mutantCases, contactCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

@@ -104,6 +104,8 @@ std::vector<Case> thinFilmCases();       ///< G, thin films
 std::vector<Case> anisotropyCases();     ///< G, brushed surfaces
 std::vector<Case> openPbrCases();        ///< G, openpbr
 std::vector<Case> openPbrCoatCases();    ///< G, coats
+std::vector<Case> quadricCases();        ///< D and G, spheres, disks and cylinders
+std::vector<Case> shapeLightCases();     ///< G, lamps that are such
 std::vector<Case> colourCases();         ///< H
 std::vector<Case> textureCases();        ///< H, the part about textures
 std::vector<Case> accumulationCases();   ///< I

@@ -180,6 +180,12 @@ Scene moved(Scene scene, double scale, const Vec3d& shift) {
     scene.camera.focus_distance *= scale;
     for (Mesh& mesh : scene.meshes)
         for (Vec3d& p : mesh.positions) p = place(p);
+    for (Object& object : scene.objects)
+        for (Matrix4d& m : object.transforms) {
+            if (!object.shape) continue;
+            for (std::size_t i = 0; i < 12; ++i) m[i] *= scale;
+            for (std::size_t r = 0; r < 3; ++r) m[4 * r + 3] += shift[r];
+        }
     return scene;
 }
 

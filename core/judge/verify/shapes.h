@@ -67,7 +67,7 @@ Scene emptyScene(int resolution, std::uint64_t seed, const Vec3d& eye, const Vec
 /// scattering and tracing all take part. Coordinates are multiples of 2⁻⁴, and at most 1.
 Scene litRoom(int resolution, std::uint64_t seed);
 
-/// The scene times `scale`, then moved by `shift`. Its objects must be placed without transforms.
+/// The scene times `scale`, then moved by `shift`. Its meshes must be placed without transforms.
 Scene moved(Scene scene, double scale, const Vec3d& shift);
 
 }  // namespace crt::verify

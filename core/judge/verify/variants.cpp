@@ -94,6 +94,18 @@ std::vector<Variant> variants(int resolution) {
             material.anisotropy_rotation_deg = 20;
         }
     });
+    add("shapes", [](Scene& s) {
+        for (const Quadric& shape : {Quadric{QuadricType::Sphere, 0.125, -0.125, 0.125},
+                                     Quadric{QuadricType::Sphere, 0.1875, -0.0625, 0.125},
+                                     Quadric{QuadricType::Cylinder, 0.0625, -0.125, 0.1875},
+                                     Quadric{QuadricType::Disk, 0.125, 0, 0}}) {
+            const double along = 0.25 * static_cast<double>(s.objects.size() % 4);
+            const std::size_t added = addObject(s, {}, diffuse(0.5));
+            s.objects[added].shape = shape;
+            s.objects[added].transforms = {
+                {1, 0, 0, 0.125 + along, 0, 1, 0, 0.375, 0, 0, 1, 0.625, 0, 0, 0, 1}};
+        }
+    });
     add("fuzz", [](Scene& s) {
         for (Material& material : s.materials) {
             material.fuzz = 0.5;

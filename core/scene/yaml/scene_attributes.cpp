@@ -92,7 +92,7 @@ void ObjectReader::readAttributes(const SectionReader& section, Mesh& mesh) cons
 
 void ObjectReader::checkTextures(const SectionReader& section, const Object& object) const {
     if (scene_.textures.empty()) return;
-    const Mesh& mesh = scene_.meshes[object.mesh];
+    const Mesh& mesh = scene_.meshes[object.mesh];  // Of a shape it is empty.
     std::set<std::int32_t> materials(mesh.material.begin(), mesh.material.end());
     if (mesh.material.empty() || materials.contains(-1)) materials.insert(object.material);
     materials.erase(-1);
@@ -103,7 +103,7 @@ void ObjectReader::checkTextures(const SectionReader& section, const Object& obj
     for (const std::int32_t index : materials) {
         const Material& material = scene_.materials[static_cast<std::size_t>(index)];
         const Needs needs = needsOf(scene_, material);
-        if (needs.uvs && mesh.uvs.empty())
+        if (needs.uvs && mesh.uvs.empty() && !object.shape)
             section.error(named,
                           fmt::format("material '{}' has a texture, but the mesh of {} has no texture "
                                       "coordinates",

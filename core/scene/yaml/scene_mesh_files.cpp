@@ -50,6 +50,14 @@ void ObjectReader::refuseObjKeys(const SectionReader& object) const {
     if (object.has("mtl")) object.error("mtl", "only an OBJ has an MTL");
 }
 
+/// Keys that only an object with a mesh may have.
+void ObjectReader::refuseMeshKeys(const SectionReader& object) const {
+    refuseObjKeys(object);
+    for (const char* key : {"normals", "crease_angle_deg"})
+        if (object.has(key)) object.error(key, "a shape has normals of its own");
+    if (object.has("vertex_colors")) object.error("vertex_colors", "this is about the colours in a PLY");
+}
+
 ObjectReader::NormalsUse ObjectReader::readNormals(const SectionReader& object) const {
     NormalsUse use;
     object.readEnum("normals", use.source);

@@ -477,6 +477,9 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     } else if (section.has("gltf")) {
         mesh = readGltf(section);
         if (!mesh) return;
+    } else if (hasShape(section)) {
+        mesh = readShape(section, object);
+        refuseMeshKeys(section);
     } else if (const std::optional<SectionReader> written =
                    section.section("mesh", fmt::format("the mesh of {}", section.subject()))) {
         const NormalsUse normals = readNormals(section);

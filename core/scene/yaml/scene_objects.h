@@ -73,6 +73,7 @@ private:
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
     MeshUse readMeshUse(const SectionReader& object, const std::string& material);
     void refuseObjKeys(const SectionReader& object) const;
+    void refuseMeshKeys(const SectionReader& object) const;
     NormalsUse readNormals(const SectionReader& object) const;
     static void setNormals(Mesh& mesh, const NormalsUse& use, const std::string& subject);
     std::vector<PartUse> readMeshParts(const SectionReader& object);
@@ -81,6 +82,8 @@ private:
                                              const std::string& material_name);
     LoadedMesh* load(const SectionReader& object, const FileUse& use);
     std::optional<std::uint32_t> readMeshFile(const SectionReader& object, MeshUse use);
+    static bool hasShape(const SectionReader& object);
+    std::optional<std::uint32_t> readShape(const SectionReader& section, Object& object);
     Mesh takeMesh(LoadedMesh& loaded, std::uint32_t number);
     Mesh withSceneMaterials(LoadedMesh& loaded, std::uint32_t number, const SectionReader& object,
                             const MeshUse& use);

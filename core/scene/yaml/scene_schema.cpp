@@ -669,11 +669,69 @@ void addMaterials(std::vector<SectionSchema>& all) {
                      .doc = "Refractive index of the coat. 1: none, Lambert's law."}}});
 }
 
+void addShapes(std::vector<SectionSchema>& all) {
+    const KeySchema radius{.name = "radius",
+                           .kind = Kind::Number,
+                           .range = kPositive,
+                           .unit = "scene units",
+                           .required = true,
+                           .doc = "Its radius."};
+    const auto end = [](const char* name, const char* doc, bool required) {
+        return KeySchema{.name = name,
+                         .kind = Kind::Number,
+                         .unit = "scene units",
+                         .required = required,
+                         .doc = doc};
+    };
+    const KeySchema inward{.name = "inward",
+                           .kind = Kind::Boolean,
+                           .fallback = "false",
+                           .doc = "Normals point to the inside, and what is outside is the body: the hollow "
+                                  "side of a lens."};
+    const auto size = [](int count, const char* doc) {
+        return KeySchema{.name = "size",
+                         .kind = Kind::Number,
+                         .shape = Shape::List,
+                         .count_min = count,
+                         .count_max = count,
+                         .range = kPositive,
+                         .unit = "scene units",
+                         .required = true,
+                         .doc = doc};
+    };
+    all.push_back({"sphere",
+                   "a sphere",
+                   "A sphere around the origin, as it is: no triangles. A transform may turn, move and "
+                   "scale it, but not stretch it; nor disks and cylinders. Of textures u goes once around "
+                   "the axis z, from x, and v from the lower pole to the upper.",
+                   {radius, end("from_z", "What is below is left out. By default nothing is.", false),
+                    end("to_z", "What is above is left out.", false), inward}});
+    all.push_back({"disk",
+                   "a disk",
+                   "A disk around the origin, seen from z: that is its normal. Textures cover the square "
+                   "around it.",
+                   {radius}});
+    all.push_back({"cylinder",
+                   "a cylinder",
+                   "A cylinder around the axis z, without ends. Of textures u goes once around it, from x, "
+                   "and v from end to end.",
+                   {radius, end("from_z", "Where it begins.", true), end("to_z", "Where it ends.", true),
+                    inward}});
+    all.push_back({"rectangle",
+                   "a rectangle",
+                   "Two triangles around the origin, seen from z. Textures cover it once.",
+                   {size(2, "Along x and along y.")}});
+    all.push_back({"box",
+                   "a box",
+                   "Six rectangles around the origin, seen from outside. Textures cover each.",
+                   {size(3, "Along x, y and z.")}});
+}
+
 void addObjects(std::vector<SectionSchema>& all) {
     all.push_back({"object",
                    "an object",
-                   "A mesh, placed once or many times. Give `obj`, `ply`, `gltf` or `mesh`; `transform` or "
-                   "`transforms`.",
+                   "A mesh or a shape, placed once or many times. Give one of `obj`, `ply`, `gltf`, `mesh`, "
+                   "`sphere`, `disk`, `cylinder`, `rectangle` and `box`; `transform` or `transforms`.",
                    {
                        {.name = "name", .doc = "For messages and reports."},
                        {.name = "obj",
@@ -691,6 +749,20 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .kind = Kind::Section,
                         .section = "mesh",
                         .doc = "Or the geometry written out."},
+                       {.name = "sphere",
+                        .kind = Kind::Section,
+                        .section = "sphere",
+                        .doc = "Or a sphere, or a part of one: a lens is made of two and a cylinder."},
+                       {.name = "disk", .kind = Kind::Section, .section = "disk", .doc = "Or a disk."},
+                       {.name = "cylinder",
+                        .kind = Kind::Section,
+                        .section = "cylinder",
+                        .doc = "Or a cylinder."},
+                       {.name = "rectangle",
+                        .kind = Kind::Section,
+                        .section = "rectangle",
+                        .doc = "Or a rectangle."},
+                       {.name = "box", .kind = Kind::Section, .section = "box", .doc = "Or a box."},
                        {.name = "material",
                         .doc = "A name in `materials`. An OBJ's faces get it where its own materials "
                                "(usemtl, MTL) give them none; left "
@@ -750,7 +822,8 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .section = "emission",
                         .doc = "Makes the surface a light."},
                    },
-                   {{KeyRule::Kind::ExactlyOne, {"obj", "ply", "gltf", "mesh"}},
+                   {{KeyRule::Kind::ExactlyOne,
+                     {"obj", "ply", "gltf", "mesh", "sphere", "disk", "cylinder", "rectangle", "box"}},
                     {KeyRule::Kind::AtMostOne, {"transform", "transforms"}}}});
     all.push_back({"part",
                    "a part",
@@ -988,6 +1061,7 @@ const std::vector<SectionSchema>& sceneSchema() {
         addThinFilm(all);
         addAnisotropy(all);
         addOpenPbr(all);
+        addShapes(all);
         addObjects(all);
         addGltf(all);
         addLights(all);
