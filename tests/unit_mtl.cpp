@@ -280,9 +280,12 @@ TEST_CASE("d between 0 and 1 without Ni is opacity, and so is map_d", "[mesh_io]
     CHECK(load("Kd 1 1 1\nNi 1.45\nd 0.9\nmap_Kd leaf.png\n").material.opacity == .9);
     CHECK(load("map_d mask.png\nd 0\n").material.opacity == 1);
     CHECK(load("norm -bm 1 mask.png\n").norm);
+    CHECK(load("map_d -imfchan m mask.png\n").map_d->channel == 3);
     const CapturedLog lost;
-    CHECK_FALSE(load("map_Kd leaf.png\nmap_d leaf.png\n").map_d);
-    CHECK_THAT(lost.text(), Contains("map_d that is the map_Kd left out (alpha is not read) (1)"));
+    const MtlMaterial cut = load("map_Kd leaf.png\nmap_d leaf.png\n");
+    REQUIRE(cut.map_d);
+    CHECK(cut.map_d->channel == 3);
+    CHECK_THAT(lost.text(), Contains("the alpha of the map_Kd read for the map_d, which is the same image"));
     CHECK_FALSE(load("map_d gone.png\nnorm away.png\n").map_d);
     CHECK_THAT(lost.text(), Contains("dropped: map_d (1), norm (1)"));
     const MtlMaterial glass = load("Ni 1.5\nillum 6\nmap_d mask.png\nnorm mask.png\n");

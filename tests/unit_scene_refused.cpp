@@ -97,7 +97,8 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
     CHECK_THAT(refused("camera: {fov: 40, focal_length: 3}\n"),
                Contains("'fov' and 'focal_length' in camera exclude each other") &&
                    Contains("'focal_length' in camera needs 'sensor' too"));
-    CHECK_THAT(refused("objects: [{material: m}]\n"), Contains("object 0 needs obj or ply or gltf or mesh or"));
+    CHECK_THAT(refused("objects: [{material: m}]\n"),
+               Contains("object 0 needs obj or ply or gltf or mesh or"));
 }
 
 TEST_CASE("columns count characters, not bytes", "[scene_yaml][refused]") {

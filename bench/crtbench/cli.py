@@ -6,6 +6,7 @@ import sys
 
 from . import (
     accelerators,
+    assets,
     calibration,
     cpu_speed,
     false_alarms,
@@ -45,6 +46,7 @@ COMMANDS = {
     ),
     "power": (power, "planted faults: how many seconds until a check finds each"),
     "meshes": (meshes, "OBJ files of other people, in folders: which render, which are refused and why"),
+    "assets": (assets, "glTF, GLB and PLY files of other people: which render, which are refused and why"),
     "mtl-agreement": (
         mtl_agreement,
         "the same OBJ and MTL in crt and in Mitsuba 3: is the luminance the same?",
@@ -81,6 +83,13 @@ def main():
             command.add_argument("folders", nargs="+", type=pathlib.Path, metavar="FOLDER",
                                  help="looked through for *.obj; named REPOSITORY@COMMIT")
             command.add_argument("--note", help="a paragraph for the page, about what is in the folders")
+            continue
+        if name == "assets":
+            command.add_argument("folders", nargs="+", type=pathlib.Path, metavar="FOLDER",
+                                 help="looked through for models; named REPOSITORY@COMMIT")
+            command.add_argument("--note", help="a paragraph for the page, about what is in the folders")
+            command.add_argument("--pictures", type=pathlib.Path, metavar="FOLDER",
+                                 help="keeps the images, and a sheet of them")
             continue
         if name == "mtl-agreement":
             command.add_argument(

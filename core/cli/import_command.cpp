@@ -46,7 +46,7 @@ void write(const std::string& path, const std::string& text, bool overwrite) {
 int import(const Request& request) {
     if (!isModel(request.model))
         throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' is no model: crt imports .glb, .gltf and .obj", request.model));
+                    fmt::format("'{}' is no model: crt imports .glb, .gltf, .obj and .ply", request.model));
     const bool to_file = !request.output.empty() && request.output != "-";
     ImportOptions options;
     options.allow_outside = request.allow_outside;
@@ -70,11 +70,11 @@ int import(const Request& request) {
 Command importCommand() {
     const auto request = std::make_shared<Request>();
     return {.name = "import",
-            .summary = "write a scene that shows a model (glTF, GLB, OBJ)",
+            .summary = "write a scene that shows a model (glTF, GLB, OBJ, PLY)",
             .arguments = {{.name = "MODEL",
-                           .help = "a .glb, .gltf or .obj file",
+                           .help = "a .glb, .gltf, .obj or .ply file",
                            .read = [request](const std::string& text) { request->model = text; },
-                           .completion = completeFile({"glb", "gltf", "obj"})}},
+                           .completion = completeFile({"glb", "gltf", "obj", "ply"})}},
             .groups = {{"Options",
                         {{.names = "-o,--output",
                           .placeholder = "SCENE",

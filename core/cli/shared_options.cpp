@@ -69,7 +69,7 @@ Option quietOption(const char* help) {
             .read = [](const std::string&) { setLogLevel(LogLevel::Warning); }};
 }
 
-Completion completeScene() { return completeFile({"yaml", "yml", "glb", "gltf", "obj"}); }
+Completion completeScene() { return completeFile({"yaml", "yml", "glb", "gltf", "obj", "ply"}); }
 Completion completeImage() { return completeFile({"exr", "png", "ppm", "pfm"}); }
 Completion completeFilm() { return completeFile({"crtfilm"}); }
 Completion completeOutput() { return completeFile({"exr", "png", "ppm", "pfm", "crtfilm"}); }

@@ -68,8 +68,47 @@ class Imports(CliTest):
         self.write_glb()
         done = self.crt("import", "a.glb")
         self.assertIn("# Chosen: the file has no camera.", done.stdout)
-        self.assertIn("a.glb: not in the file, and chosen: a camera that sees all of it; a white sky",
-                      done.stderr)
+        self.assertIn(
+            "a.glb: not in the file, and chosen: a camera that sees all of it; a grey sky and a lamp",
+            done.stderr,
+        )
+
+    def test_a_white_model_is_seen_against_the_light_that_was_chosen(self):
+        """A box of albedo 0.9: its face away from the lamp is 0.9 of the sky, the others far brighter."""
+        if BACKEND == "none":
+            self.skipTest("there is no backend that renders")
+        corners = "".join(f"v {i & 1} {i >> 1 & 1} {i >> 2 & 1}\n" for i in range(8))
+        faces = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
+        self.write("box.obj", "mtllib box.mtl\n" + corners + "usemtl white\n" + faces)
+        self.write("box.mtl", "newmtl white\nKd 0.9 0.9 0.9\n")
+        self.crt("box.obj", "--spp", "64", "--set", "film.resolution=[60,40]", "-b", BACKEND, "-o", "b.pfm")
+        with open(self.path("b.pfm"), "rb") as file:
+            data = file.read()
+        green = struct.unpack("<7200f", data[-28800:])[1::3]
+
+        def luminance(x, y):  # of 3 x 3 pixels; rows from the bottom
+            return statistics.mean(green[60 * (y + j) + x + i] for i in (-1, 0, 1) for j in (-1, 0, 1))
+
+        sky, top, front, right = (luminance(x, y) for x, y in ((3, 3), (30, 28), (26, 14), (38, 16)))
+        self.assertAlmostEqual(right / sky, 0.9, delta=0.02)
+        self.assertGreater(min(top, front) / sky, 1.4)
+
+    def test_a_ply_renders_by_its_name_and_its_import_says_the_same(self):
+        if BACKEND == "none":
+            self.skipTest("there is no backend that renders")
+        self.write("a.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                   "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+                   "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+                   "0 0 0 255 0 0\n1 0 0 0 255 0\n1 1 0 0 0 255\n0 1 0 255 255 255\n4 0 1 2 3\n")
+        done = self.crt("import", "a.ply", "-o", "a.yaml")
+        self.assertIn("a matt material of the colours of its vertices", done.stderr)
+        with open(self.path("a.yaml")) as file:
+            self.assertIn("reflectance: {attribute: colors}", file.read())
+        small = ("--spp", "4", "--set", "film.resolution=[48,32]", "-b", BACKEND)
+        self.crt("a.ply", *small, "-o", "model.pfm")
+        self.crt("a.yaml", *small, "-o", "scene.pfm")
+        with open(self.path("model.pfm"), "rb") as one, open(self.path("scene.pfm"), "rb") as other:
+            self.assertEqual(one.read(), other.read())
 
     def test_a_scene_that_is_there_is_kept(self):
         self.write_glb()
@@ -122,15 +161,15 @@ class Meshes(CliTest):
         self.assertEqual(
             [line for line in said.splitlines() if "mesh.obj" in line],
             [
-                "crt: warning: mesh.obj: 2 materials: 1 diffuse, 1 glass; d below 1 without Ni above 1 read "
-                "as opaque "
-                "(opacity is not read from MTL) (1); dropped: Ks (1)"
+                "crt: warning: mesh.obj: 2 materials: 1 diffuse, 1 glass; d 0 without Ni above 1 read as "
+                "opaque (1); dropped: Ks (1)"
             ],
         )
 
     def test_another_format_is_named(self):
         self.assertIn(
-            "mesh.obj: this is a PLY file; crt reads OBJ", self.render("ply\nformat ascii 1.0\n", expect=3)
+            "mesh.obj: this is a PLY file; name it by 'ply:' in place of 'obj:'",
+            self.render("ply\nformat ascii 1.0\n", expect=3),
         )
 
     def test_an_index_that_leads_nowhere_is_refused_with_its_line(self):

@@ -228,9 +228,8 @@ std::string Writer::cameraText() {
 
 std::string Writer::environmentText() const {
     if (!graph_.lights.empty()) return {};
-    losses_.choose("a white sky");
-    return "\n# Chosen: the file has no light.\nenvironment: {radiance: {rgb: [0.9, 0.9, 0.9], space: "
-           "linear}}\n";
+    losses_.choose("a grey sky and a lamp");
+    return chosenLight();
 }
 
 std::string Writer::lightsText() const {

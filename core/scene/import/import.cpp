@@ -3,7 +3,7 @@
 #include "base/log.h"
 #include "scene/gltf/gltf_model.h"
 #include "scene/import/gltf_import.h"
-#include "scene/import/obj_import.h"
+#include "scene/import/mesh_import.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -35,7 +35,7 @@ std::string inOneLine(std::string text) {
 
 bool isModel(const std::string& path) {
     const std::string extension = extensionOf(path);
-    return extension == ".glb" || extension == ".gltf" || extension == ".obj";
+    return extension == ".glb" || extension == ".gltf" || extension == ".obj" || extension == ".ply";
 }
 
 std::string importModel(GltfFiles& files, const std::string& path, const ImportOptions& options) {
@@ -47,6 +47,8 @@ std::string importModel(GltfFiles& files, const std::string& path, const ImportO
     std::string about;
     if (extensionOf(path) == ".obj") {
         body = objScene(path, name, losses);
+    } else if (extensionOf(path) == ".ply") {
+        body = plyScene(path, name, losses);
     } else {
         GltfFile& gltf = files.open(path);
         if (options.allow_outside) gltf.allowOutside();

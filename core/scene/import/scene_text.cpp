@@ -73,6 +73,16 @@ void Bounds::add(const Vec3d& point) {
 Vec3d Bounds::centre() const { return lower * 0.5 + upper * 0.5; }
 double Bounds::radius() const { return length(upper * 0.5 - lower * 0.5); }
 
+std::string chosenLight() {
+    // The lamp's irradiance is 1.9, the sky's 1.6: a white surface has 1.1 towards the lamp and .5 away from
+    // it, where the sky has .5.
+    return "\n# Chosen: the file has no light.\n"
+           "environment: {radiance: {rgb: [0.5, 0.5, 0.5], space: linear}}\n"
+           "lights:\n"
+           "  - {name: key, type: sun, direction: [0.4, -0.75, -0.55], angular_diameter_deg: 20, radiance: "
+           "{rgb: [20, 20, 20], space: linear}}\n";
+}
+
 std::string chosenCamera(const Bounds& bounds, double aspect) {
     constexpr double kTurn_deg = 35, kElevation_deg = 22, kMargin = 1.05;
     constexpr double kRadian = std::numbers::pi / 180;

@@ -63,6 +63,10 @@ private:
     static constexpr double kNone = std::numeric_limits<double>::infinity();
 };
 
+/// Light for a file that has none: a grey sky, which a white surface does not vanish into, and a soft lamp
+/// over the left shoulder of `chosenCamera`. Both sections, as text.
+std::string chosenLight();
+
 inline constexpr double kChosenFov_deg = 40;
 
 /// A camera that sees all of the box, from the front, the right and above: the section's keys in one line.

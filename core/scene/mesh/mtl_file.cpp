@@ -97,10 +97,8 @@ const std::vector<MtlKey>& mtlKeys() {
          {"map_Tr", "map_opacity"},
          "image",
          "Takes the place of `d`, as `map_Kd` that of `Kd`: white is there, black is not. Of coloured "
-         "images "
-         "red, or what `-imfchan` says. Left out, with a warning, where the file is not there, of glass, "
-         "and "
-         "where it is the `map_Kd` itself: alpha is not read."},
+         "images red, or what `-imfchan` says (`r`, `g`, `b`, `m` for alpha); alpha where it is the image "
+         "of `map_Kd`. Left out, with a warning, where the file is not there, and of glass."},
         {"map_Pr", {}, "image", "Left out, with a warning."},
         {"map_Pm", {}, "image", "Left out, with a warning."},
         {"map_Ps", {}, "image", "Left out, with a warning."},

@@ -20,6 +20,12 @@ namespace {
 constexpr double kMaxIndex = 1e3;    // As `ior` of a scene file.
 constexpr double kUnstatedKd = 0.6;  // As tinyobjloader and assimp assume.
 constexpr double kVisibleRoughness = 0.05;
+constexpr std::size_t kAlpha = 3;
+
+/// What `-imfchan` names.
+std::size_t channelOf(std::string_view name) {
+    return name == "g" ? 1 : name == "b" ? 2 : name == "m" ? kAlpha : 0;
+}
 
 double brightest(const Vec3d& c) { return std::max({c[0], c[1], c[2]}); }
 bool isGrey(const Vec3d& c, double level) { return c == Vec3d{level, level, level}; }
@@ -202,8 +208,8 @@ private:
     void cutOut(Material& m) {
         const double opacity = opacity_.value_or(1.0);
         if (map_d_ && map_kd_ && map_d_->file == map_kd_->file) {
-            summary_.decided("map_d that is the map_Kd left out (alpha is not read)");
-            map_d_.reset();
+            summary_.decided("the alpha of the map_Kd read for the map_d, which is the same image");
+            map_d_->channel = kAlpha;
         }
         if (opacity > 0.0 && opacity < 1.0)
             m.opacity = opacity;
@@ -283,7 +289,7 @@ private:
                 for (int i = 0; i < arguments; ++i) {
                     const std::string_view value = nextField(after);
                     if (option == "-clamp") map.clamp = value == "on";
-                    if (option == "-imfchan") map.channel = value == "g" ? 1 : value == "b" ? 2 : 0;
+                    if (option == "-imfchan") map.channel = channelOf(value);
                 }
             }
             rest = after;

@@ -21,7 +21,7 @@ struct MtlMap {
     std::string file;                                  ///< It is there; nobody has looked into it.
     std::array<double, 6> transform{1, 0, 0, 0, 1, 0};  ///< As of Texture.
     bool clamp = false;
-    std::size_t channel = 0;  ///< Of a number: red, green or blue.
+    std::size_t channel = 0;  ///< Of a number: red, green, blue or alpha.
     SourcePlace place;
 };
 

@@ -1,0 +1,160 @@
+"""Models of other people: which render, which are refused and why, and what was dropped of them.
+
+    bench/run assets FOLDER…    every *.glb, *.gltf and *.ply below each folder, by `crt MODEL`, small
+
+Times nothing. A model must render, with every pixel finite and not all alike, or be refused with code 3 and
+a sentence; anything else (a crash, a hang, an empty picture, a copy of the program's memory beyond
+--memory) ends with code 1. --pictures keeps the images and a sheet of them.
+"""
+
+import math
+import pathlib
+import re
+import resource
+import struct
+import subprocess
+import zlib
+
+from .meshes import cell, pixels
+from .results import Results
+
+RESOLUTION = 96
+SAMPLES = 16
+SECONDS_AT_MOST = 120
+MEMORY_AT_MOST = 8 << 30  # Of addresses, so that a model that asks for all there is fails by itself.
+BACKENDS = ["embree", "opencl", "cuda"]
+EXTENSIONS = (".glb", ".gltf", ".ply")
+SHEET_COLUMNS = 10
+
+
+class Model:
+    """What crt did with one file: exit code, error, warnings, and whether its picture shows something."""
+
+    def __init__(self, program, backend, folder, path):
+        self.name = str(path.relative_to(folder))
+        self.bytes = path.stat().st_size
+        image, shown = program.scratch / "model.pfm", program.scratch / "model.ppm"
+        for file in (image, shown):
+            file.unlink(missing_ok=True)
+        done = run(program, [path.resolve(), "--backend", backend, "--spp", SAMPLES, "-o", image, "-o",
+                             shown, "--set", f"film.resolution=[{RESOLUTION},{RESOLUTION}]"])
+        self.code = done.returncode
+        said = done.stderr.replace(str(path.resolve()), path.name).replace(f"{path.resolve().parent}/", "")
+        self.warnings = [m[1] for line in said.splitlines() if (m := re.match(r"crt: warning: (.*)", line))]
+        errors = re.findall(r"error: (.*)", said)
+        self.error = errors[-1] if errors else said.strip()[-200:]
+        values = pixels(image) if self.code == 0 else ()
+        self.finite = all(map(math.isfinite, values))
+        self.varied = len(set(values)) > 3
+        self.picture = shown.read_bytes() if self.code == 0 else None
+
+    def renders(self):
+        return self.code == 0 and self.finite and self.varied
+
+    def refused(self):
+        return self.code == 3 and len(self.error) > 10
+
+    def verdict(self):
+        if self.renders():
+            return "renders"
+        if self.refused():
+            return "refused"
+        if self.code == 0:
+            return "one colour" if self.finite else "not finite"
+        return f"code {self.code}"
+
+
+def run(program, arguments):
+    command = [str(program.crt), *map(str, arguments)]
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_AT_MOST, MEMORY_AT_MOST))
+
+    try:
+        return subprocess.run(command, cwd=program.scratch, env=program.environment, capture_output=True,
+                              text=True, errors="replace", timeout=SECONDS_AT_MOST, preexec_fn=limit)
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, 124, "", f"not done after {SECONDS_AT_MOST} s")
+
+
+def sheet(models):
+    """The pictures beside each other, as PNG, in the order of the page."""
+    shown = [m for m in models if m.picture]
+    rows = -(-len(shown) // SHEET_COLUMNS)
+    width = SHEET_COLUMNS * RESOLUTION
+    lines = [bytearray(b"\x00" + b"\xff" * (3 * width)) for _ in range(rows * RESOLUTION)]
+    for i, model in enumerate(shown):
+        header = re.match(rb"P6\s+(\d+) (\d+)\s255\s", model.picture)
+        x = 1 + 3 * RESOLUTION * (i % SHEET_COLUMNS)
+        for y in range(RESOLUTION):
+            start = header.end() + 3 * RESOLUTION * y
+            lines[i // SHEET_COLUMNS * RESOLUTION + y][x:x + 3 * RESOLUTION] = model.picture[
+                start:start + 3 * RESOLUTION
+            ]
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    return (b"\x89PNG\r\n\x1a\n"
+            + chunk(b"IHDR", struct.pack(">IIBBBBB", width, rows * RESOLUTION, 8, 2, 0, 0, 0))
+            + chunk(b"IDAT", zlib.compress(b"".join(lines), 9)) + chunk(b"IEND", b""))
+
+
+def measure(program, arguments):
+    backend = program.backends(BACKENDS)[0][0]
+    results = Results(program, arguments, "assets", "Models of other people")
+    results.paragraph(
+        f"Every glTF, GLB and PLY file below each folder as `crt MODEL` renders it, {RESOLUTION} × "
+        f"{RESOLUTION} pixels, {SAMPLES} samples, on `{backend}`, within {SECONDS_AT_MOST} s and "
+        f"{MEMORY_AT_MOST >> 30} GiB of addresses. A file renders when crt ends with code 0, all pixels are "
+        "finite and they are not all of one colour; it is refused when crt ends with code 3 and says why. "
+        "Nothing of these files is part of crt."
+    )
+    if arguments.note:
+        results.paragraph(arguments.note)
+    corpora = {}
+    for folder in arguments.folders:
+        paths = sorted(p for p in folder.rglob("*") if p.suffix.lower() in EXTENSIONS and p.is_file())
+        corpora[folder.name] = []
+        for path in paths:
+            model = Model(program, backend, folder, path)
+            corpora[folder.name].append(model)
+            print(f"{folder.name} {model.name}: {model.verdict()}"
+                  + ("" if model.renders() else f": {model.error}"), flush=True)
+    everything = [m for models in corpora.values() for m in models]
+
+    results.table(
+        ["repository@commit", "files", "render", "refused", "anything else"],
+        [[name, len(models), *counts(models)] for name, models in corpora.items()]
+        + [["together", len(everything), *counts(everything)]],
+    )
+    named = [(name, m) for name, models in corpora.items() for m in models]
+    results.heading("Not rendered")
+    results.table(["file", "bytes", "verdict", "what crt says"],
+                  [[f"{name}/{m.name}", m.bytes, m.verdict(), cell(m.error)]
+                   for name, m in named if not m.renders()])
+    results.heading("Not as in the file")
+    results.table(["file", "what crt says"],
+                  [[f"{name}/{m.name}", cell(w)] for name, m in named if m.renders() for w in m.warnings])
+    results.data = {
+        name: [{"file": m.name, "verdict": m.verdict(), "error": "" if m.renders() else m.error,
+                "warnings": m.warnings} for m in models]
+        for name, models in corpora.items()
+    }
+    if arguments.pictures:
+        arguments.pictures.mkdir(parents=True, exist_ok=True)
+        (arguments.pictures / "assets.png").write_bytes(sheet(everything))
+        for name, m in named:
+            if m.picture:
+                picture = arguments.pictures / f"{name}_{re.sub('[^A-Za-z0-9.]+', '_', m.name)}.ppm"
+                picture.write_bytes(m.picture)
+    results.shown = {str(folder): folder.name for folder in arguments.folders}
+    results.command(f"crt MODEL --backend {backend} --spp {SAMPLES} -o IMAGE.pfm")
+    results.write()
+    return 0 if all(m.renders() or m.refused() for m in everything) else 1
+
+
+def counts(models):
+    renders = sum(m.renders() for m in models)
+    refused = sum(m.refused() for m in models)
+    return [renders, refused, len(models) - renders - refused]

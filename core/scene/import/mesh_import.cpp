@@ -1,0 +1,74 @@
+#include "scene/import/mesh_import.h"
+
+#include "scene/mesh/mesh_io.h"
+#include "scene/mesh/ply_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace crt {
+namespace {
+
+Bounds boundsOf(const Mesh& mesh) {
+    Bounds bounds;
+    for (const auto& triangle : mesh.triangles)
+        for (const std::uint32_t corner : triangle) bounds.add(mesh.positions[corner]);
+    return bounds;
+}
+
+/// Camera and film; and light, unless the file has some.
+std::string viewText(const Bounds& bounds, bool emits, Losses& losses) {
+    losses.choose("a camera that sees all of it");
+    std::string text =
+        fmt::format("\n# Chosen: the file has no camera.\ncamera: {{{}}}\n", chosenCamera(bounds, 1.5));
+    text += "film: {resolution: [960, 640]}\nsampler: {samples: 128}\n";
+    if (emits) return text;
+    losses.choose("a grey sky and a lamp");
+    return text + chosenLight();
+}
+
+}  // namespace
+
+/// Materials stay those of the file; the scene says what faces without one have.
+std::string objScene(const std::string& path, const std::string& file_name, Losses& losses) {
+    const LoadedMesh loaded = loadObj(path);
+    const bool bare =
+        loaded.mesh.material.empty() ||
+        std::any_of(loaded.mesh.material.begin(), loaded.mesh.material.end(), [&](std::int32_t m) {
+            return m < 0 || !loaded.materials[static_cast<std::size_t>(m)].mtl;
+        });
+    const bool emits = std::any_of(loaded.materials.begin(), loaded.materials.end(),
+                                   [](const LoadedMaterial& m) { return m.mtl && m.mtl->emission; });
+    std::string text = viewText(boundsOf(loaded.mesh), emits, losses);
+    if (bare) {
+        losses.choose("grey for faces without a material");
+        text += "\nmaterials:\n  grey: {type: diffuse, reflectance: 0.5}\n";
+    }
+    text += fmt::format("\nobjects:\n  - name: {}\n    obj: {}\n", yamlText(file_name), yamlText(file_name));
+    if (bare) text += "    material: grey\n";
+    if (std::any_of(loaded.materials.begin(), loaded.materials.end(),
+                    [](const LoadedMaterial& m) { return m.mtl.has_value(); })) {
+        text += "    # For a material of the scene in place of the file's own:\n    # parts:\n";
+        for (const LoadedMaterial& m : loaded.materials)
+            if (m.mtl) text += fmt::format("    #   {}: {{material: …}}\n", yamlText(m.name));
+    }
+    return text;
+}
+
+/// Of the colours of its vertices where it has some, else grey; smooth where it has no normals.
+std::string plyScene(const std::string& path, const std::string& file_name, Losses& losses) {
+    const Mesh mesh = loadPly(path).mesh;
+    std::string text = viewText(boundsOf(mesh), false, losses);
+    const bool colored = !mesh.colors.empty();
+    losses.choose(colored ? "a matt material of the colours of its vertices" : "a grey material");
+    text += fmt::format("\nmaterials:\n  surface: {{type: diffuse, reflectance: {}}}\n",
+                        colored ? "{attribute: colors}" : "0.5");
+    text += fmt::format("\nobjects:\n  - name: {}\n    ply: {}\n    material: surface\n",
+                        yamlText(file_name), yamlText(file_name));
+    if (!mesh.normals.empty()) return text;
+    losses.choose("smooth normals");
+    return text + "    normals: smooth  # the file has none\n";
+}
+
+}  // namespace crt
