@@ -79,7 +79,7 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
     if (CRT_HAS(NEE) && ctx->scene->nee != CRT_NEE_NONE && path->scatter_pdf > 0.0f) {
         const f32 distance = length3(crt_fma3(path->ray.d, t, path->ray.o) - path->p);
         CrtLightSeen light =
-            CRT_HAS(SHAPES) && emitter->kind == CRT_LIGHT_SHAPE
+            crt_is_shape_light(ctx, surface->light)
                 ? crt_shape_light_pdf(ctx, surface->light, path->p,
                                       crt_fma3(path->ray.d, t, path->ray.o), surface->ng)
                 : crt_light_pdf(ctx, surface->light, path->p, distance);
@@ -187,10 +187,8 @@ CRT_FN CrtOffer crt_offer_of(const CrtContext *ctx, u32 light, CrtSampler *sampl
         offer.irradiance = sampled ? 1.0f / s.pdf : 0.0f;
         return offer;
     }
-    if (CRT_HAS(POINT_LIGHT) &&
-        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].kind >= CRT_LIGHT_POINT &&
-        !(CRT_HAS(SHAPES) &&
-          CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].kind == CRT_LIGHT_SHAPE)) {
+    if (CRT_HAS(POINT_LIGHT) && !crt_is_shape_light(ctx, offer.light) &&
+        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].kind >= CRT_LIGHT_POINT) {
         const CrtPointLightSample s = crt_point_light_sample(ctx, offer.light, sampler, dimension, p);
         offer.wi = s.wi;
         offer.pdf = s.pdf;
@@ -201,8 +199,7 @@ CRT_FN CrtOffer crt_offer_of(const CrtContext *ctx, u32 light, CrtSampler *sampl
         return offer;
     }
     const CrtLightSample s =
-        CRT_HAS(SHAPES) &&
-                CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].kind == CRT_LIGHT_SHAPE
+        crt_is_shape_light(ctx, offer.light)
             ? crt_shape_light_sample(ctx, offer.light, sampler, dimension, p)
             : crt_light_sample(ctx, offer.light, sampler, dimension, p);
     offer.area = 1;

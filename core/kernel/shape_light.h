@@ -11,6 +11,11 @@
 
 CRT_KERNEL_BEGIN
 
+CRT_FN int crt_is_shape_light(const CrtContext *ctx, u32 light) {
+    if (!CRT_HAS(SHAPES)) return 0;
+    return CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[light].kind == CRT_LIGHT_SHAPE;
+}
+
 /* How a shape is sampled from a point. */
 typedef struct CrtShapeView {
     u32 technique;  /* CRT_LIGHT_BY_… */

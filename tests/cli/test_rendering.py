@@ -134,6 +134,7 @@ class Rendering(CliTest):
                 "height",
                 "objects",
                 "triangles",
+                "shapes",
                 "emitters",
                 "nodes",
                 "images",
