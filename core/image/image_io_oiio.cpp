@@ -7,6 +7,7 @@
 #include "image/image_module.h"
 #include "image/jpeg_reader.h"
 #include "image/png_reader.h"
+#include "image/tga_reader.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -437,7 +438,16 @@ std::int32_t readPart(Part part, const char* path, CrtTexelsInfo* info, void* bu
         ImageSpec spec, wishes;
         wishes.attribute("oiio:UnassociatedAlpha", 1);  // Else colours come multiplied by alpha.
         const std::unique_ptr<ImageInput> input = openKnown(path, spec, wishes);
-        if (!input) throw Failure{"it is no PNG, JPEG, EXR, Radiance HDR or PFM file"};
+        if (!input) {
+            if (!crt::image::beginsAsTga(path))
+                throw Failure{"it is no PNG, JPEG, TGA, EXR, Radiance HDR or PFM file"};
+            const auto tga_part =
+                part == Part::Color ? crt::image::TgaPart::Color : crt::image::TgaPart::Alpha;
+            const std::string why = crt::image::readTga(path, tga_part, info,
+                                                        static_cast<unsigned char*>(buffer), buffer_bytes);
+            if (!why.empty()) throw Failure{why};
+            return;
+        }
         const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)),
                    height = static_cast<std::uint64_t>(std::max(spec.height, 0));
         crt::image::checkPixels(path, width, height,

@@ -1,7 +1,7 @@
 /*
  * image_module.h: the border between crt and its image codec module, lib/crt/crt_image_oiio.so. C99.
  * OpenImageIO and the thirty libraries it brings are behind it, so that only a job that reads or writes EXR,
- * PNG, HDR or JPEG pays for them.
+ * PNG, HDR, JPEG or TGA pays for them.
  *
  * The module exports one symbol, which returns a table. No C++ type and no exception crosses; what the
  * module allocates the module frees. Functions return 0, or non-zero with one sentence in `reason`
@@ -78,8 +78,8 @@ typedef struct CrtImageModule {
        until freed. */
     int32_t (*read)(const char *path, const CrtImagePlanes **image, char *reason, uint32_t reason_size);
     void (*free_image)(const CrtImagePlanes *image);
-    /* EXR, PNG, Radiance HDR or JPEG, by content. *info is filled in; with a buffer, which must have the
-       bytes that an earlier *info says, [height][width][channels], too. */
+    /* EXR, PNG, Radiance HDR, JPEG or TGA, by content. *info is filled in; with a buffer, which must have
+       the bytes that an earlier *info says, [height][width][channels], too. */
     int32_t (*read_texels)(const char *path, CrtTexelsInfo *info, void *buffer, uint64_t buffer_bytes,
                            char *reason, uint32_t reason_size);
     /* The same of alpha: one channel, or none (info->channels is 0) where all of the image is there. */

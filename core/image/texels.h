@@ -32,9 +32,9 @@ struct Texels {
     std::vector<unsigned char> bytes;
 };
 
-/// What the header of a PNG, JPEG, EXR, Radiance HDR or PFM says. Throws crt::Error(Scene), "cannot read
-/// the image 'x.png': …", for a file that is missing, of another format, larger than kMostTexels, or whose
-/// pixels cannot lie in a file of its size.
+/// What the header of a PNG, JPEG, TGA, EXR, Radiance HDR or PFM says. Throws crt::Error(Scene), "cannot
+/// read the image 'x.png': …", for a file that is missing, of another format, larger than kMostTexels, or
+/// whose pixels cannot lie in a file of its size.
 TexelsInfo texelsInfo(const std::string& path);
 
 /// The pixels too. Throws crt::Error(Scene) also for one that is truncated or damaged.

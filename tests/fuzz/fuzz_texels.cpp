@@ -1,4 +1,5 @@
-// Image files as values of a scene: PNG, JPEG, EXR, HDR and PFM, header and pixels, as textures read them.
+// Image files as values of a scene: PNG, JPEG, TGA, EXR, HDR and PFM, header and pixels, as textures
+// read them.
 #include "fuzz_target.h"
 
 #include "image/texels.h"

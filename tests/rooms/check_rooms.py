@@ -27,6 +27,7 @@ OTHER_TARGETS = {
     "image/image_headers.cpp",
     "image/jpeg_reader.cpp",
     "image/png_reader.cpp",
+    "image/tga_reader.cpp",
     "backend/sdk/kernel_cache.cpp",
     "cli/main.cpp",
 }

@@ -73,8 +73,8 @@ void addCompositions(std::vector<SectionSchema>& all) {
         "wrong side.",
         {{.name = "texture",
           .required = true,
-          .doc = "An image in colours: PNG, JPEG, EXR, Radiance HDR or PFM, or a glTF file or GLB, with "
-                 "`image`. Its numbers are taken as they are."},
+          .doc = "An image in colours: PNG, JPEG, TGA, EXR, Radiance HDR or PFM, or a glTF file or GLB, "
+                 "with `image`. Its numbers are taken as they are."},
          {.name = "strength",
           .kind = Kind::Number,
           .range = {.min = 0, .max = 100},

@@ -55,8 +55,8 @@ void addTextures(std::vector<SectionSchema>& all) {
          "alpha is looked at where `channel` asks for it.",
          {{.name = "texture",
            .required = true,
-           .doc = "A PNG, JPEG, EXR, Radiance HDR or PFM, by content; looked up beside the scene, then in "
-                  "CRT_MESH_PATH. Or a glTF file or GLB, with `image`."},
+           .doc = "A PNG, JPEG, TGA, EXR, Radiance HDR or PFM, by content; looked up beside the scene, then "
+                  "in CRT_MESH_PATH. Or a glTF file or GLB, with `image`."},
           {.name = "image",
            .kind = Kind::Integer,
            .range = {0, 1e9, false, false},
