@@ -147,9 +147,16 @@ TEST_CASE("What is wrong in a glTF file is told with a JSON pointer", "[gltf]") 
     pointsTo("/meshes/0/primitives/0/attributes/POSITION",
              [](GltfMaker& m) { primitiveOf(m)["attributes"]["POSITION"] = 99; });
     pointsTo("/meshes/0/primitives/0/mode", [](GltfMaker& m) { primitiveOf(m)["mode"] = 9; });
-    pointsTo("/meshes/0/primitives/0/targets", [](GltfMaker& m) {
+    pointsTo("/meshes/0/weights", [](GltfMaker& m) {
         primitiveOf(m)["targets"] = {{{"POSITION", 0}}};
+        m.root["meshes"][0]["weights"] = {0, 0.5};
     });
+    pointsTo("/nodes/0/weights", [](GltfMaker& m) {
+        primitiveOf(m)["targets"] = {{{"POSITION", 0}}};
+        m.root["nodes"][0]["weights"] = {-1};
+    });
+    pointsTo("/meshes/0/weights", set("/meshes/0/weights", 1));
+    pointsTo("/asset/version", set("/asset/version", ""));
     pointsTo("/meshes/0/primitives/0", [](GltfMaker& m) {
         primitiveOf(m)["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", 0}};
     });
@@ -202,6 +209,18 @@ TEST_CASE("What is wrong in a glTF file is told with a JSON pointer", "[gltf]") 
     });
 }
 
+// Fails when a file is refused for what it does not use.
+TEST_CASE("Morph targets whose weights are 0 change nothing", "[gltf]") {
+    GltfMaker maker = squareFile();
+    const TemporaryFolder folder;
+    const CapturedLog log;
+    const std::size_t size = loadScene(folder.write("a.glb", maker.glb())).meshes.at(0).positions.size();
+    primitiveOf(maker)["targets"] = {{{"POSITION", 0}}, {{"POSITION", 99}}};
+    maker.root["meshes"][0]["weights"] = {0, 0.0};
+    CHECK(loadScene(folder.write("b.glb", maker.glb())).meshes.at(0).positions.size() == size);
+    CHECK(log.warnings() == 0);
+}
+
 // Fails when nodes are followed without asking whether they were met: it does not end.
 TEST_CASE("Nodes in a circle, and those with two parents, are refused", "[gltf]") {
     CHECK_THAT(refusalOf([](GltfMaker& m) { m.root["nodes"][0]["children"] = {0}; }),
@@ -241,6 +260,7 @@ TEST_CASE("Damaged containers are refused", "[gltf]") {
     std::string other = good;
     other[4] = 1;
     CHECK_THAT(refusalOf(other), Contains("GLB of version 1"));
+    CHECK_THAT(refusalOf("", "a.gltf"), Contains("this file is empty"));
     CHECK_THAT(refusalOf("{}", "a.gltf"), Contains("'asset' is missing"));
     CHECK_THAT(refusalOf("{\"asset\": {\"version\": \"1.0\"}}", "a.gltf"), Contains("this is glTF 1.0"));
     CHECK_THAT(refusalOf("{\"asset\": {\"version\": \"2.0\"}}", "a.gltf"), Contains("nothing to see"));

@@ -199,6 +199,7 @@ GltfFile::GltfFile(const std::string& path) : path_(path), model_(std::make_uniq
         throw Error(ErrorKind::Scene, fmt::format("the glTF file '{}' {}", path, refused.what()), {path});
     }
     files_read_.push_back(path);
+    if (content_.empty()) fail("", "this file is empty");
     split();
     checkText();
     GltfJson json{*this, {}};
@@ -210,6 +211,9 @@ GltfFile::GltfFile(const std::string& path) : path_(path), model_(std::make_uniq
     check(json);
     // What tinygltf would read files and images for, and what crt has no use for.
     for (const char* unused : {"buffers", "images", "animations", "extras"}) json.root.erase(unused);
+    if (const auto meshes = json.root.find("meshes"); meshes != json.root.end())
+        for (Value& mesh : *meshes)
+            for (Value& primitive : mesh["primitives"]) primitive.erase("targets");  // All of weight 0.
     const std::string text = json.root.dump();
     std::vector<std::size_t> primitives;
     for (const Value& mesh : json.list("meshes")) primitives.push_back(mesh.at("primitives").size());

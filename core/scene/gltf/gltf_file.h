@@ -27,7 +27,7 @@ class GltfFile {
 public:
     /// Reads a file and checks that everything it names by number is there. Throws crt::Error(Scene),
     /// "a.glb: /nodes/3/mesh: …" with a JSON pointer, for one that is damaged, no glTF 2.0, or needs what
-    /// crt does not have (Draco, meshopt, morph targets).
+    /// crt does not have (Draco, meshopt, morph targets of a weight).
     explicit GltfFile(const std::string& path);
     ~GltfFile();
     GltfFile(const GltfFile&) = delete;

@@ -1,5 +1,6 @@
 #include "scene/gltf/gltf_json.h"
 
+#include <algorithm>
 #include <set>
 
 namespace crt {
@@ -13,7 +14,7 @@ const std::set<std::string, std::less<>> kKnownExtensions{
     "KHR_materials_ior",        "KHR_materials_iridescence",  "KHR_materials_sheen",
     "KHR_materials_specular",   "KHR_materials_transmission", "KHR_materials_unlit",
     "KHR_materials_volume",     "KHR_mesh_quantization",      "KHR_texture_transform",
-    "KHR_materials_anisotropy", "KHR_materials_dispersion"};
+    "KHR_materials_anisotropy", "KHR_materials_dispersion",   "KHR_materials_variants"};
 
 }  // namespace
 
@@ -46,6 +47,8 @@ void GltfJson::checkAsset() const {
     const auto version = asset->find("version");
     if (version == asset->end() || !version->is_string())
         file.fail("/asset/version", "expected a version such as \"2.0\"");
+    if (version->get_ref<const std::string&>().empty())
+        file.fail("/asset/version", "expected a version such as \"2.0\", found an empty text");
     if (!version->get_ref<const std::string&>().starts_with("2."))
         file.fail("/asset/version", fmt::format("this is glTF {}; crt reads version 2.0",
                                                 version->get_ref<const std::string&>().substr(0, 20)));
@@ -123,11 +126,6 @@ void GltfJson::checkPrimitive(const Value& primitive, const std::string& at) con
         file.fail(at,
                   "this mesh is compressed by Draco, which crt does not read; export it without mesh "
                   "compression");
-    const auto targets = primitive.find("targets");
-    if (targets != primitive.end() && !targets->empty())
-        file.fail(at + "/targets",
-                  "this mesh has morph targets, which crt does not have; apply them "
-                  "(shape keys) before the export");
     const auto here = [&] { return at; };
     const auto attributes = primitive.find("attributes");
     if (attributes == primitive.end()) file.fail(at, "'attributes' is missing");
@@ -152,7 +150,23 @@ void GltfJson::checkMeshes() const {
             requireObject((*primitives)[k], [&] { return fmt::format("{}/{}", at(), k); });
             checkPrimitive((*primitives)[k], fmt::format("{}/{}", at(), k));
         }
+        checkWeights(meshes[i], meshes[i], fmt::format("/meshes/{}", i));
     }
+}
+
+/// Morph targets whose weights are 0 change nothing.
+void GltfJson::checkWeights(const Value& of, const Value& mesh, const std::string& at) const {
+    const auto weights = of.find("weights");
+    if (weights == of.end()) return;
+    requireList(*weights, [&] { return at + "/weights"; });
+    const bool morphed = std::any_of(weights->begin(), weights->end(),
+                                     [](const Value& w) { return !w.is_number() || w.get<double>() != 0; });
+    const Value& primitives = mesh.at("primitives");
+    if (morphed && std::any_of(primitives.begin(), primitives.end(),
+                               [](const Value& primitive) { return primitive.contains("targets"); }))
+        file.fail(at + "/weights",
+                  "this mesh has morph targets in use, which crt does not have; apply them (shape keys) "
+                  "before the export");
 }
 
 void GltfJson::checkNodes() const {
@@ -161,6 +175,8 @@ void GltfJson::checkNodes() const {
         const Value& node = nodes[i];
         const auto at = [&] { return fmt::format("/nodes/{}", i); };
         index(node, "mesh", count("meshes"), "mesh", at);
+        if (node.contains("mesh"))
+            checkWeights(node, list("meshes")[node.at("mesh").get<std::size_t>()], at());
         index(node, "camera", count("cameras"), "camera", at);
         index(node, "skin", count("skins"), "skin", at);
         indices(node, "children", nodes.size(), "node", at);

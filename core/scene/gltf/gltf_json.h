@@ -109,6 +109,7 @@ private:
     void checkAsset() const;
     void checkBytes() const;
     void checkMeshes() const;
+    void checkWeights(const nlohmann::json& of, const nlohmann::json& mesh, const std::string& at) const;
     void checkPrimitive(const Value& primitive, const std::string& at) const;
     void checkNodes() const;
     void checkTextures() const;

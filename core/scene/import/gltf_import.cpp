@@ -282,7 +282,10 @@ std::string gltfScene(GltfFile& file, const std::string& file_name, const std::s
     const tinygltf::Model& model = file.model();
     if (file.animationCount() > 0) losses.add("animations: everything stands as before them");
     for (const std::string& name : model.extensionsUsed)
-        if (!knowsGltfExtension(name)) losses.add(fmt::format("the extension '{}'", name.substr(0, 60)));
+        if (name == "KHR_materials_variants")
+            losses.add("variants of materials: those that the file has without one");
+        else if (!knowsGltfExtension(name))
+            losses.add(fmt::format("the extension '{}'", name.substr(0, 60)));
     return Writer(file, file_name, folder, allow_outside, losses).text();
 }
 
