@@ -8,6 +8,7 @@
 #include "captured_log.h"
 #include "compile/compile.h"
 #include "scene/import/import.h"
+#include "scene/import/scene_text.h"
 #include "scene/light_units.h"
 #include "scene/yaml/scene_yaml.h"
 
@@ -41,7 +42,7 @@ Imported importOf(const GltfMaker& maker) {
     const std::string path = folder.write("a.glb", maker.glb());
     GltfFiles files;
     Imported result;
-    result.text = importModel(files, path);
+    result.text = importModel(files, path).scene;
     try {
         result.scene = loadScene(path);
     } catch (const Error& e) {
@@ -90,8 +91,9 @@ TEST_CASE("A model and the scene that is imported of it compile to equal bytes",
     const std::string model = folder.write("a model.glb", maker.glb());
     std::filesystem::create_directory(folder / "scenes");
     GltfFiles files;
-    const std::string scene = folder.write(
-        "scenes/a.yaml", importModel(files, model, {.folder = folder / "scenes", .allow_outside = false}));
+    const std::string scene =
+        folder.write("scenes/a.yaml",
+                     importModel(files, model, {.folder = folder / "scenes", .allow_outside = false}).scene);
     const CompiledScene from_model = compileScene(loadScene(model), 0),
                         from_scene = compileScene(loadScene(scene), 0);
     REQUIRE(from_model.size_bytes == from_scene.size_bytes);
@@ -339,6 +341,22 @@ TEST_CASE("What is not in the scene as in the file is told once, and written int
 }
 
 // Fails when an OBJ's own materials are replaced, or a file without any is refused.
+// Fails when bytes that are no UTF-8 get into the text of the scene, which is then refused.
+TEST_CASE("Names of an OBJ that are no UTF-8 are no obstacle", "[import]") {
+    const TemporaryFolder folder;
+    const CapturedLog log;
+    folder.write("a.mtl", "newmtl T\xfcr\nKd 1 0 0\n");
+    const std::string obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl T\xfcr\nf 1 2 3\n";
+    CHECK(loadScene(folder.write("a.obj", obj)).meshes.size() == 1);
+    try {
+        (void)loadScene(folder.write("\xe6.obj", obj));
+        FAIL("nothing was refused");
+    } catch (const Error& e) {
+        CHECK_THAT(std::string(e.what()), Contains("its name is not UTF-8"));
+    }
+    CHECK(yamlText("T\xc3\xbcr \xe2\x82\n") == "\"T\xc3\xbcr ___\"");
+}
+
 TEST_CASE("An OBJ is imported with its materials, a camera and a sky", "[import]") {
     const TemporaryFolder folder;
     const CapturedLog log;

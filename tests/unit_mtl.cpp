@@ -287,7 +287,8 @@ TEST_CASE("d between 0 and 1 without Ni is opacity, and so is map_d", "[mesh_io]
     CHECK(cut.map_d->channel == 3);
     CHECK_THAT(lost.text(), Contains("the alpha of the map_Kd read for the map_d, which is the same image"));
     CHECK_FALSE(load("map_d gone.png\nnorm away.png\n").map_d);
-    CHECK_THAT(lost.text(), Contains("dropped: map_d (1), norm (1)"));
+    CHECK_THAT(lost.text(),
+               Contains("dropped: map_d (1), norm (1); there is no image 'away.png' and 1 more"));
     const MtlMaterial glass = load("Ni 1.5\nillum 6\nmap_d mask.png\nnorm mask.png\n");
     CHECK(glass.material.type == MaterialType::Dielectric);
     CHECK_FALSE((glass.map_d || glass.norm));
@@ -352,7 +353,8 @@ TEST_CASE("one line says what the materials of a file became and lost", "[mesh_i
                Contains("mesh.obj: 27 materials: 23 diffuse, 1 mirror, 3 glass, 1 of them emitting; d 0 "
                         "without Ni above 1 read as opaque (22), d between 0 and 1 with Ni above 1 read as "
                         "clear glass (3), Pm from 0.5 to 1 read as 1 (1); "
-                        "dropped: Ks (22), Ns (22), map_Kd (22), Tf (3), Pc (1), Pr (1)\n"));
+                        "dropped: Ks (22), Ns (22), map_Kd (22), Tf (3), Pc (1), Pr (1); "
+                        "there is no image 'wall.png'\n"));
 }
 
 TEST_CASE("every documented keyword of an MTL is known and every other is said to be unknown",

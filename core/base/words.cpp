@@ -97,6 +97,27 @@ Parsed<double> parseNumber(const std::string& text) {
 Parsed<std::int64_t> parseInteger(const std::string& text) { return parseWhole<std::int64_t>(text); }
 Parsed<std::uint64_t> parseUnsigned(const std::string& text) { return parseWhole<std::uint64_t>(text); }
 
+std::size_t utf8Length(std::string_view s) {
+    const auto byte = [&](std::size_t i) { return i < s.size() ? static_cast<unsigned char>(s[i]) : 0u; };
+    const auto tail = [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i)
+            if ((byte(i) & 0xc0u) != 0x80u) return false;
+        return true;
+    };
+    const unsigned a = byte(0), b = byte(1);
+    if (a < 0x80u) return 1;
+    if (a >= 0xc2u && a <= 0xdfu) return tail(1, 2) ? 2 : 0;
+    if (a >= 0xe0u && a <= 0xefu) {
+        const bool odd = (a == 0xe0u && b < 0xa0u) || (a == 0xedu && b > 0x9fu);
+        return tail(1, 3) && !odd ? 3 : 0;
+    }
+    if (a >= 0xf0u && a <= 0xf4u) {
+        const bool odd = (a == 0xf0u && b < 0x90u) || (a == 0xf4u && b > 0x8fu);
+        return tail(1, 4) && !odd ? 4 : 0;
+    }
+    return 0;
+}
+
 bool looksLikeNumber(std::string_view text) {
     const Parsed<double> parsed = parseNumber(std::string(text));
     return parsed.value || parsed.problem != "it is not a number";

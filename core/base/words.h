@@ -1,6 +1,7 @@
 /// Words and numbers as people type them: text → number, and the word that was probably meant.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -21,6 +22,10 @@ Parsed<double> parseNumber(const std::string& text);
 /// The same for whole numbers; 1e3 and 3.0 count as whole.
 Parsed<std::int64_t> parseInteger(const std::string& text);
 Parsed<std::uint64_t> parseUnsigned(const std::string& text);
+/// Length of the valid UTF-8 sequence at the start of `text`, 0 when it is not one (overlong forms and
+/// surrogates included).
+std::size_t utf8Length(std::string_view text);
+
 /// Does this plain scalar look like a number (and so cannot be a name)?
 bool looksLikeNumber(std::string_view text);
 

@@ -57,7 +57,7 @@ int import(const Request& request) {
         options.folder = ".";
     }
     GltfFiles files;
-    const std::string text = importModel(files, request.model, options);
+    const std::string text = importModel(files, request.model, options).scene;
     if (to_file)
         write(request.output, text, request.overwrite);
     else

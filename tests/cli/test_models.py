@@ -73,6 +73,18 @@ class Imports(CliTest):
             done.stderr,
         )
 
+    def test_a_mesh_that_renders_by_its_name_is_read_and_complained_of_once(self):
+        self.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nf 1 1 2\n")
+        self.write("a.mtl", "newmtl a\nKd .5 .5 .5\nmap_Kd gone\\leaf.png\n")
+        self.write("a.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                   "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+                   "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 0 1\n")
+        for model in ("a.obj", "a.ply"):
+            with self.subTest(model):
+                said = self.crt("info", model).stderr
+                self.assertEqual(said.count("without area left out"), 1, said)
+        self.assertIn("there is no image 'gone\\leaf.png'", self.crt("info", "a.obj").stderr)
+
     def test_a_white_model_is_seen_against_the_light_that_was_chosen(self):
         """A box of albedo 0.9: its face away from the lamp is 0.9 of the sky, the others far brighter."""
         if BACKEND == "none":

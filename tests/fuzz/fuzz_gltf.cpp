@@ -34,7 +34,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::string path = directory.write(content.starts_with("glTF") ? "a.glb" : "a.gltf", content);
     fuzz::expectRefusalOrSuccess(ErrorKind::Scene, [&] {
         GltfFiles files;
-        const std::string text = importModel(files, path);
+        const std::string text = importModel(files, path).scene;
         try {
             for (const Mesh& mesh : parseScene(text, "scene.yaml", directory.path()).meshes) checkMesh(mesh);
         } catch (const Error& error) {

@@ -1,9 +1,12 @@
 #include "scene/import/import.h"
 
+#include "base/error.h"
 #include "base/log.h"
+#include "base/words.h"
 #include "scene/gltf/gltf_model.h"
 #include "scene/import/gltf_import.h"
 #include "scene/import/mesh_import.h"
+#include "scene/mesh/ply_reader.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -24,11 +27,25 @@ std::string extensionOf(const std::string& path) {
 }
 
 /// What a comment can hold.
-std::string inOneLine(std::string text) {
-    std::replace_if(
-        text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; },
-        ' ');
-    return text.substr(0, 300);
+std::string inOneLine(std::string_view text) {
+    constexpr std::size_t kMostBytes = 300;
+    std::string line;
+    for (std::size_t i = 0, length = 0; i < text.size() && line.size() < kMostBytes; i += length) {
+        length = std::max<std::size_t>(utf8Length(text.substr(i)), 1);
+        const auto c = static_cast<unsigned char>(text[i]);
+        const bool shown = utf8Length(text.substr(i)) > 0 && c >= 0x20 && c != 0x7f;
+        line += shown ? text.substr(i, length) : " ";
+    }
+    return line;
+}
+
+void requireUtf8(const std::string& path, std::string_view name) {
+    for (std::size_t i = 0; i < name.size(); i += utf8Length(name.substr(i)))
+        if (utf8Length(name.substr(i)) == 0)
+            throw Error(
+                ErrorKind::Scene,
+                fmt::format("{}: error: its name is not UTF-8, and a scene cannot name it; rename it", path),
+                {path});
 }
 
 }  // namespace
@@ -38,17 +55,21 @@ bool isModel(const std::string& path) {
     return extension == ".glb" || extension == ".gltf" || extension == ".obj" || extension == ".ply";
 }
 
-std::string importModel(GltfFiles& files, const std::string& path, const ImportOptions& options) {
+ImportedModel importModel(GltfFiles& files, const std::string& path, const ImportOptions& options) {
     const fs::path file(path);
     const std::string folder = options.folder.empty() ? file.parent_path().string() : options.folder;
     const std::string name = fs::proximate(file, folder.empty() ? "." : folder).string();
+    requireUtf8(path, name);
     Losses losses;
     std::string body;
     std::string about;
+    std::unique_ptr<LoadedMesh> mesh;
     if (extensionOf(path) == ".obj") {
-        body = objScene(path, name, losses);
+        mesh = std::make_unique<LoadedMesh>(loadObj(path));
+        body = objScene(*mesh, name, losses);
     } else if (extensionOf(path) == ".ply") {
-        body = plyScene(path, name, losses);
+        mesh = std::make_unique<LoadedMesh>(loadPly(path));
+        body = plyScene(mesh->mesh, name, losses);
     } else {
         GltfFile& gltf = files.open(path);
         if (options.allow_outside) gltf.allowOutside();
@@ -66,8 +87,9 @@ std::string importModel(GltfFiles& files, const std::string& path, const ImportO
     if (!losses.chosen().empty())
         logInfo("{}: not in the file, and chosen: {}", path, fmt::join(losses.chosen(), "; "));
     const std::string stem = file.stem().string();
-    return fmt::format("{}crt: 1\ntitle: {}\n{}\noutputs:\n  - {{file: {}}}\n", text, yamlText(stem), body,
+    text = fmt::format("{}crt: 1\ntitle: {}\n{}\noutputs:\n  - {{file: {}}}\n", text, yamlText(stem), body,
                        yamlText(stem + ".png"));
+    return {std::move(text), std::move(mesh)};
 }
 
 }  // namespace crt

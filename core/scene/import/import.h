@@ -1,14 +1,16 @@
-/// Models as scenes: a glTF, GLB or OBJ file → the text of a scene that shows it. The one way from such a
-/// file to a picture: `crt import` writes the text, and every command that takes a scene reads it.
+/// Models as scenes: a glTF, GLB, OBJ or PLY file → the text of a scene that shows it. The one way from
+/// such a file to a picture: `crt import` writes the text, and every command that takes a scene reads it.
 #pragma once
 
 #include "scene/gltf/gltf_file.h"
+#include "scene/mesh/mesh_io.h"
 
+#include <memory>
 #include <string>
 
 namespace crt {
 
-/// By the end of the file's name: .glb, .gltf, .obj.
+/// By the end of the file's name: .glb, .gltf, .obj, .ply.
 bool isModel(const std::string& path);
 
 struct ImportOptions {
@@ -16,8 +18,13 @@ struct ImportOptions {
     bool allow_outside = false;  ///< Buffers and images may lie outside the file's folder.
 };
 
+struct ImportedModel {
+    std::string scene;                 ///< Its text.
+    std::unique_ptr<LoadedMesh> mesh;  ///< Of an OBJ or PLY: for whoever reads the scene next.
+};
+
 /// The text of a scene of the model, with a camera and light where it has none. What was dropped or
 /// approximated is told in one warning, and written at the top. Throws crt::Error(Scene).
-std::string importModel(GltfFiles& files, const std::string& path, const ImportOptions& options = {});
+ImportedModel importModel(GltfFiles& files, const std::string& path, const ImportOptions& options = {});
 
 }  // namespace crt

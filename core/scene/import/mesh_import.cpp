@@ -1,8 +1,5 @@
 #include "scene/import/mesh_import.h"
 
-#include "scene/mesh/mesh_io.h"
-#include "scene/mesh/ply_reader.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -31,8 +28,7 @@ std::string viewText(const Bounds& bounds, bool emits, Losses& losses) {
 }  // namespace
 
 /// Materials stay those of the file; the scene says what faces without one have.
-std::string objScene(const std::string& path, const std::string& file_name, Losses& losses) {
-    const LoadedMesh loaded = loadObj(path);
+std::string objScene(const LoadedMesh& loaded, const std::string& file_name, Losses& losses) {
     const bool bare =
         loaded.mesh.material.empty() ||
         std::any_of(loaded.mesh.material.begin(), loaded.mesh.material.end(), [&](std::int32_t m) {
@@ -57,8 +53,7 @@ std::string objScene(const std::string& path, const std::string& file_name, Loss
 }
 
 /// Of the colours of its vertices where it has some, else grey; smooth where it has no normals.
-std::string plyScene(const std::string& path, const std::string& file_name, Losses& losses) {
-    const Mesh mesh = loadPly(path).mesh;
+std::string plyScene(const Mesh& mesh, const std::string& file_name, Losses& losses) {
     std::string text = viewText(boundsOf(mesh), false, losses);
     const bool colored = !mesh.colors.empty();
     losses.choose(colored ? "a matt material of the colours of its vertices" : "a grey material");

@@ -2,13 +2,14 @@
 #pragma once
 
 #include "scene/import/scene_text.h"
+#include "scene/mesh/mesh_io.h"
 
 #include <string>
 
 namespace crt {
 
-/// `file_name` is what the scene calls the file. Throw crt::Error(Scene) as loadObj and loadPly.
-std::string objScene(const std::string& path, const std::string& file_name, Losses& losses);
-std::string plyScene(const std::string& path, const std::string& file_name, Losses& losses);
+/// `file_name` is what the scene calls the file.
+std::string objScene(const LoadedMesh& loaded, const std::string& file_name, Losses& losses);
+std::string plyScene(const Mesh& mesh, const std::string& file_name, Losses& losses);
 
 }  // namespace crt

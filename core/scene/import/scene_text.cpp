@@ -28,9 +28,14 @@ bool isPlain(std::string_view name) {
 std::string yamlText(std::string_view name) {
     if (isPlain(name)) return std::string(name);
     std::string text = "\"";
-    for (const char c : name) {
+    for (std::size_t i = 0, length = 0; i < name.size(); i += std::max<std::size_t>(length, 1)) {
+        const char c = name[i];
+        length = utf8Length(name.substr(i));
         if (c == '"' || c == '\\') text += '\\';
-        text += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '_' : c;
+        if (length == 0 || static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+            text += '_';
+        else
+            text += name.substr(i, length);
     }
     return text + "\"";
 }

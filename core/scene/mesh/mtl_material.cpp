@@ -10,7 +10,6 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -244,8 +243,7 @@ private:
         if (map_kd_) return {kUnstatedKd, kUnstatedKd, kUnstatedKd};  // unless the image cannot be read
         if (emits() || has("crt_reflectance")) return {};
         summary_.decided(
-            fmt::format("{} read as grey {}", replaced ? "a black Kd beside map_Kd" : "no Kd",
-                        kUnstatedKd));
+            fmt::format("{} read as grey {}", replaced ? "a black Kd beside map_Kd" : "no Kd", kUnstatedKd));
         return {kUnstatedKd, kUnstatedKd, kUnstatedKd};
     }
 
@@ -299,7 +297,10 @@ private:
             name = name.substr(1, name.size() - 2);
         const std::optional<std::string> file = findMap(name, mtl_.file);
         if (!file) {
-            if (!name.empty()) summary_.dropped(keyword);
+            if (!name.empty()) {
+                summary_.dropped(keyword);
+                summary_.notThere(name);
+            }
             return std::nullopt;
         }
         map.file = *file;
@@ -376,6 +377,10 @@ std::string MtlSummary::text() const {
         text += fmt::format(", {} of them emitting", emitting->second);
     if (!decisions_.empty()) text += "; " + list(decisions_);
     if (!dropped_.empty()) text += "; dropped: " + list(dropped_);
+    if (!not_there_.empty())
+        text +=
+            fmt::format("; there is no image {}{}", inQuotes(*not_there_.begin()),
+                        not_there_.size() == 1 ? "" : fmt::format(" and {} more", not_there_.size() - 1));
     if (!unknown_.empty()) text += "; unknown: " + list(unknown_);
     if (!unreadable_.empty()) text += "; not understood:";
     for (const auto& [what, n] : unreadable_)

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 
 namespace crt {
@@ -43,6 +44,8 @@ public:
     void decided(const std::string& what) { ++decisions_[what]; }
     /// A keyword without effect that would be seen.
     void dropped(const std::string& keyword) { ++dropped_[keyword]; }
+    /// The image of a keyword that was dropped for it.
+    void notThere(const std::string& image) { not_there_.insert(image); }
     /// A keyword that crt does not know.
     void unknown(const std::string& keyword) { ++unknown_[keyword]; }
     /// A statement without the numbers that it needs; `what` begins with its keyword.
@@ -61,6 +64,7 @@ private:
     static std::string list(const Counts& counts);
 
     Counts kinds_, decisions_, dropped_, unknown_, unreadable_;
+    std::set<std::string> not_there_;
     std::map<std::string, std::string> unreadable_at_;  ///< By the keys of `unreadable_`: the first.
 };
 

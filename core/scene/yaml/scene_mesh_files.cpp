@@ -78,13 +78,21 @@ void ObjectReader::setNormals(Mesh& mesh, const NormalsUse& use, const std::stri
     makeSmoothNormals(mesh, use.crease_angle_deg);
 }
 
+std::unique_ptr<LoadedMesh> ObjectReader::takeOffered(const FileUse& use) {
+    std::error_code unknown;
+    const bool taken = offered_ && use.obj == ObjOptions{} && use.colors == PlyOptions{}.color &&
+                       std::filesystem::equivalent(offered_->files.front(), use.path, unknown);
+    return taken ? std::move(offered_) : nullptr;
+}
+
 LoadedMesh* ObjectReader::load(const SectionReader& object, const FileUse& use) {
     const auto [file, fresh] = loaded_.try_emplace(use);
     if (fresh) {
         try {
-            const PlyOptions ply{use.colors};
-            file->second =
-                std::make_unique<LoadedMesh>(use.ply ? loadPly(use.path, ply) : loadObj(use.path, use.obj));
+            file->second = takeOffered(use);
+            if (!file->second)
+                file->second = std::make_unique<LoadedMesh>(
+                    use.ply ? loadPly(use.path, PlyOptions{use.colors}) : loadObj(use.path, use.obj));
             for (const std::string& read : file->second->files) files_.note(read);
             addMaps(*file->second, use.path);
             setNormals(file->second->mesh, use.normals, std::filesystem::path(use.path).filename().string());

@@ -28,6 +28,8 @@ public:
 
     ~ObjectReader();
 
+    /// A file that was read already, with default options: whichever object names it takes it.
+    void offer(std::unique_ptr<LoadedMesh> mesh) { offered_ = std::move(mesh); }
     void readMaterials(const YamlNode& map);
     void readObjects(const YamlNode& list);
     /// Warns about materials that no object uses.
@@ -81,6 +83,7 @@ private:
     std::optional<std::int32_t> readEmission(const SectionReader& section, std::int32_t material,
                                              const std::string& material_name);
     LoadedMesh* load(const SectionReader& object, const FileUse& use);
+    std::unique_ptr<LoadedMesh> takeOffered(const FileUse& use);
     std::optional<std::uint32_t> readMeshFile(const SectionReader& object, MeshUse use);
     static bool hasShape(const SectionReader& object);
     std::optional<std::uint32_t> readShape(const SectionReader& section, Object& object);
@@ -129,6 +132,7 @@ private:
     std::map<const YamlNode*, std::optional<Matrix4d>> written_placements_;
     ExpansionLimit limit_;
     std::uint64_t placements_ = 0, triangles_ = 0;           ///< Read so far.
+    std::unique_ptr<LoadedMesh> offered_;
     std::map<FileUse, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.
     std::map<std::pair<FileUse, std::vector<PartUse>>, std::uint32_t> meshes_;
     std::map<std::tuple<std::string, GltfPrimitive, NormalsUse>, std::optional<std::uint32_t>> gltf_meshes_;

@@ -332,7 +332,8 @@ void readOutput(const SectionReader& section, std::vector<Output>& outputs) {
     outputs.push_back(std::move(output));
 }
 
-void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFiles& gltf, Scene& scene) {
+void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFiles& gltf,
+               std::unique_ptr<LoadedMesh> model_mesh, Scene& scene) {
     const SectionReader top(out, root, root.place, schemaSection(""), "the scene");
     if (root.kind != YamlKind::Map) return;
     int version = 1;
@@ -352,6 +353,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
 
     TextureReader textures(out, files, spectra, gltf, scene);
     ObjectReader objects(out, files, spectra, textures, gltf, scene);
+    if (model_mesh) objects.offer(std::move(model_mesh));
     if (const YamlNode* map = top.map("materials")) objects.readMaterials(*map);
     if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
     if (const YamlNode* list = top.list("lights")) readLights(*list, out, files, spectra, scene);
@@ -370,7 +372,8 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
 
 /// `path` is the file of the scene; empty for text of another origin.
 Scene parse(const std::string& yaml, const std::string& name, const std::string& path,
-            const std::vector<SceneOverride>& overrides, SceneFiles files, GltfFiles gltf = {}) {
+            const std::vector<SceneOverride>& overrides, SceneFiles files, GltfFiles gltf = {},
+            std::unique_ptr<LoadedMesh> model_mesh = {}) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = name;
@@ -380,7 +383,7 @@ Scene parse(const std::string& yaml, const std::string& name, const std::string&
     SceneIncludes includes(out, files);
     if (YamlNodePtr root = includes.read(name, yaml, path)) {
         applyOverrides(root, overrides, override_sources, out);
-        readScene(*root, out, files, gltf, scene);
+        readScene(*root, out, files, gltf, std::move(model_mesh), scene);
     }
     out.throwIfFailed();
     checkRadiance(scene);
@@ -436,10 +439,11 @@ Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overr
     if (isModel(path)) {
         const auto start = std::chrono::steady_clock::now();
         GltfFiles gltf;
-        const std::string text = importModel(gltf, path);
+        ImportedModel model = importModel(gltf, path);
         SceneFiles files(std::filesystem::path(path).parent_path().string());
         files.note(path);
-        Scene scene = parse(text, path, {}, overrides, std::move(files), std::move(gltf));
+        Scene scene = parse(model.scene, path, {}, overrides, std::move(files), std::move(gltf),
+                            std::move(model.mesh));
         const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
         scene.parse_seconds = passed.count();
         return scene;

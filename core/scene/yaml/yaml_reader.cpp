@@ -1,6 +1,7 @@
 // Over 450 lines: a tree and the excerpts of its text, which know the same places.
 #include "scene/yaml/yaml_reader.h"
 
+#include "base/words.h"
 #include "scene/scene_limits.h"
 
 #include <fmt/format.h>
@@ -37,29 +38,6 @@ std::size_t characters(std::string_view text, std::size_t bytes) {
 }
 
 // ---- The text itself ------------------------------------------------------------------------------------
-
-/// Length of the valid UTF-8 sequence at the start of `s`, 0 when it is not one (overlong forms and
-/// surrogates included).
-std::size_t utf8Length(std::string_view s) {
-    const auto byte = [&](std::size_t i) { return i < s.size() ? static_cast<unsigned char>(s[i]) : 0u; };
-    const auto tail = [&](std::size_t from, std::size_t to) {
-        for (std::size_t i = from; i < to; ++i)
-            if ((byte(i) & 0xc0u) != 0x80u) return false;
-        return true;
-    };
-    const unsigned a = byte(0), b = byte(1);
-    if (a < 0x80u) return 1;
-    if (a >= 0xc2u && a <= 0xdfu) return tail(1, 2) ? 2 : 0;
-    if (a >= 0xe0u && a <= 0xefu) {
-        const bool odd = (a == 0xe0u && b < 0xa0u) || (a == 0xedu && b > 0x9fu);
-        return tail(1, 3) && !odd ? 3 : 0;
-    }
-    if (a >= 0xf0u && a <= 0xf4u) {
-        const bool odd = (a == 0xf0u && b < 0x90u) || (a == 0xf4u && b > 0x8fu);
-        return tail(1, 4) && !odd ? 4 : 0;
-    }
-    return 0;
-}
 
 /// Reports the first byte that cannot be in a text file. A picture or a mesh given by mistake ends here,
 /// with its reason.
