@@ -1,6 +1,6 @@
 """Models of other people: which render, which are refused and why, and what was dropped of them.
 
-    bench/run assets FOLDER…    every *.glb, *.gltf and *.ply below each folder, by `crt MODEL`, small
+    bench/run assets FOLDER…    every *.glb, *.gltf, *.obj and *.ply below each folder, small
 
 Times nothing. A model must render, with every pixel finite and not all alike, or be refused with code 3 and
 a sentence; anything else (a crash, a hang, an empty picture, a copy of the program's memory beyond
@@ -23,7 +23,7 @@ SAMPLES = 16
 SECONDS_AT_MOST = 120
 MEMORY_AT_MOST = 8 << 30  # Of addresses, so that a model that asks for all there is fails by itself.
 BACKENDS = ["embree", "opencl", "cuda"]
-EXTENSIONS = (".glb", ".gltf", ".ply")
+EXTENSIONS = (".glb", ".gltf", ".obj", ".ply")
 SHEET_COLUMNS = 10
 
 
@@ -104,7 +104,7 @@ def measure(program, arguments):
     backend = program.backends(BACKENDS)[0][0]
     results = Results(program, arguments, "assets", "Models of other people")
     results.paragraph(
-        f"Every glTF, GLB and PLY file below each folder as `crt MODEL` renders it, {RESOLUTION} × "
+        f"Every glTF, GLB, OBJ and PLY file below each folder as `crt MODEL` renders it, {RESOLUTION} × "
         f"{RESOLUTION} pixels, {SAMPLES} samples, on `{backend}`, within {SECONDS_AT_MOST} s and "
         f"{MEMORY_AT_MOST >> 30} GiB of addresses. A file renders when crt ends with code 0, all pixels are "
         "finite and they are not all of one colour; it is refused when crt ends with code 3 and says why. "
@@ -130,15 +130,17 @@ def measure(program, arguments):
     )
     named = [(name, m) for name, models in corpora.items() for m in models]
     results.heading("Not rendered")
-    results.table(["file", "bytes", "verdict", "what crt says"],
-                  [[f"{name}/{m.name}", m.bytes, m.verdict(), cell(m.error)]
-                   for name, m in named if not m.renders()])
+    results.paragraph("Those that are alike but for numbers (N) and names (…); assets.json has each file.")
+    rows = grouped((name, m, m.verdict(), m.error) for name, m in named if not m.renders())
+    results.table(["files", "for example", "verdict", "what crt says"], rows)
     results.heading("Not as in the file")
-    results.table(["file", "what crt says"],
-                  [[f"{name}/{m.name}", cell(w)] for name, m in named if m.renders() for w in m.warnings])
+    rows = grouped((name, m, "", part) for name, m in named if m.renders()
+                   for part in {part for w in m.warnings for part in parts(w)})
+    results.table(["files", "for example", "what crt says"], [[row[0], row[1], row[3]] for row in rows])
     results.data = {
-        name: [{"file": m.name, "verdict": m.verdict(), "error": "" if m.renders() else m.error,
-                "warnings": m.warnings} for m in models]
+        name: [{"file": m.name, "verdict": m.verdict()}
+               | ({"error": m.error} if not m.renders() else {"warnings": m.warnings} if m.warnings else {})
+               for m in models]
         for name, models in corpora.items()
     }
     if arguments.pictures:
@@ -158,3 +160,24 @@ def counts(models):
     renders = sum(m.renders() for m in models)
     refused = sum(m.refused() for m in models)
     return [renders, refused, len(models) - renders - refused]
+
+
+def parts(warning):
+    """What one warning lists, each by itself, without the name of the file."""
+    listed = warning.split(": not in the scene as in the file: ")
+    return listed[1].split("; ") if len(listed) == 2 else [warning]
+
+
+def grouped(said):
+    """Rows of (files, the first of them, verdict, sentence), the most frequent first."""
+    groups = {}
+    for name, model, verdict, sentence in said:
+        file = re.escape(pathlib.PurePath(model.name).name)
+        sentence = re.sub(rf"^({file}|[^ :]+\.(mtl|gltf))(:\d+)*: ", "", sentence)
+        sentence = re.sub(r"^(/[A-Za-z]+(/\w+)*): ", "", sentence)
+        sentence = re.sub(r"'[^']*\.\w+'", "'…'", sentence) if "image" in sentence else sentence
+        sentence = re.sub(r"(?<![\w.])\d[\d.]*(e-?\d+)?(?![\w.])", "N", sentence)
+        groups.setdefault((verdict, sentence), []).append(f"{name}/{model.name}")
+    rows = [[len(files), files[0], verdict, cell(sentence)]
+            for (verdict, sentence), files in groups.items()]
+    return sorted(rows, key=lambda row: (-row[0], row[3]))

@@ -46,7 +46,10 @@ COMMANDS = {
     ),
     "power": (power, "planted faults: how many seconds until a check finds each"),
     "meshes": (meshes, "OBJ files of other people, in folders: which render, which are refused and why"),
-    "assets": (assets, "glTF, GLB and PLY files of other people: which render, which are refused and why"),
+    "assets": (
+        assets,
+        "glTF, GLB, OBJ and PLY files of other people: which render, which are refused and why",
+    ),
     "mtl-agreement": (
         mtl_agreement,
         "the same OBJ and MTL in crt and in Mitsuba 3: is the luminance the same?",
