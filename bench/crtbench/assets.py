@@ -150,7 +150,9 @@ def measure(program, arguments):
             if m.picture:
                 picture = arguments.pictures / f"{name}_{re.sub('[^A-Za-z0-9.]+', '_', m.name)}.ppm"
                 picture.write_bytes(m.picture)
-    results.shown = {str(folder): folder.name for folder in arguments.folders}
+    results.shown = {shown: folder.name for folder in arguments.folders
+                     for shown in (str(folder), f"{folder}/")}
+    results.shown[str(arguments.pictures)] = "PICTURES"
     results.command(f"crt MODEL --backend {backend} --spp {SAMPLES} -o IMAGE.pfm")
     results.write()
     return 0 if all(m.renders() or m.refused() for m in everything) else 1
