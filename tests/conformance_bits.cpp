@@ -136,6 +136,7 @@ struct Case {
     bool fuzzy = false;
     bool coated = false;
     bool shaped = false;
+    bool instanced = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -458,6 +459,27 @@ void addShapes(crt::Scene& scene) {
         scene.objects[first + static_cast<std::size_t>(shape)].emission = lamps + emission;
 }
 
+/// One copy of each mesh that does not emit; the small ones in two more places, turned, stretched and
+/// mirrored.
+void addInstances(crt::Scene& scene) {
+    for (crt::Object& object : scene.objects) {
+        if (object.shape || object.emission >= 0) continue;
+        object.sharing = crt::Sharing::Always;
+        if (object.name != "gems" && object.name != "glass" && object.name != "strip") continue;
+        const crt::Matrix4d first = object.transforms[0];
+        for (const crt::Matrix4d& m : {crt::Matrix4d{0.3, 0, 0.4, 0.1, 0.4, 0, -0.3, 0.5, 0, 0.75, 0, 0.1,
+                                                     0, 0, 0, 1},
+                                       {-0.5, 0, 0, 0.9, 0, 0.25, 0, 0.55, 0, 0, 0.5, 0.3, 0, 0, 0, 1}}) {
+            crt::Matrix4d moved{};
+            for (std::size_t row = 0; row < 4; ++row)
+                for (std::size_t column = 0; column < 4; ++column)
+                    for (std::size_t k = 0; k < 4; ++k)
+                        moved[4 * row + column] += m[4 * row + k] * first[4 * k + column];
+            object.transforms.push_back(moved);
+        }
+    }
+}
+
 /// Rough diffuse surfaces, bare and glossy, in turn; some about interpolated normals.
 void addRoughBases(crt::Scene& scene) {
     double eta = 1;
@@ -526,6 +548,12 @@ const Case kCases[] = {
      false, true, false, false, false, false, false, true, false, false, false, false, true},
     {"{max_depth: 5, accelerator: aabb}", "{type: xorshift}", "", "box", false, "", true, false, false,
      false, true, false, false, false, false, false, false, false, false, false, true},
+    {.integrator = "{max_depth: 8}", .sampler = "{type: sobol}", .camera_extra = "", .filter = "box",
+     .sampled_environment = true, .glassware = true, .instanced = true},
+    {.integrator = "{max_depth: 6}", .sampler = "{type: independent}", .camera_extra = "", .filter = "box",
+     .more = kPointLights, .textured = true, .brushed = true, .shaped = true, .instanced = true},
+    {.integrator = "{max_depth: 6}", .sampler = "{type: xorshift}", .camera_extra = "", .filter = "box",
+     .composed = true, .mapped = true, .instanced = true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -578,6 +606,7 @@ crt::Scene sceneOf(const Case& c) {
     if (c.rough_bases) addRoughBases(scene);
     if (c.fuzzy) addFuzz(scene);
     if (c.coated) addCoats(scene);
+    if (c.instanced) addInstances(scene);
     return scene;
 }
 
@@ -614,7 +643,10 @@ std::vector<Named> allScenes() {
                                  "coats",
                                  "shapes",
                                  "shapes, mixes, brushed, tree, independent, textures",
-                                 "shapes, normal maps, boxes, xorshift"};
+                                 "shapes, normal maps, boxes, xorshift",
+                                 "instances, glassware, sampled environment",
+                                 "instances, shapes, textures, brushed, independent",
+                                 "instances, mixes and holes, normal maps, xorshift"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

@@ -132,7 +132,12 @@ void showScene(const SceneRequest& what) {
     printRow("camera", cameraText(scene.camera));
     printRow("geometry", counted(compiled.objects, "object", "objects") + ", " +
                         counted(compiled.triangles, "triangle", "triangles") +
-                        (compiled.shapes > 0 ? ", " + counted(compiled.shapes, "shape", "shapes") : ""));
+                        (compiled.shapes > 0 ? ", " + counted(compiled.shapes, "shape", "shapes") : "") +
+                        (compiled.instances > 0
+                             ? fmt::format(", {} of meshes of {}",
+                                           counted(compiled.instances, "instance", "instances"),
+                                           counted(compiled.instanced_triangles, "triangle", "triangles"))
+                             : ""));
     printRow("materials", materialsText(scene));
     printRow("textures", texturesText(compiled));
     printRow("lights", lightsText(scene, compiled));

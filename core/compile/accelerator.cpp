@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::size_t kPart = std::size_t{1} << 16;  // of what a thread takes at a time
 
-std::uint32_t acceleratorOf(const Scene& scene, std::size_t triangles) {
+std::uint32_t acceleratorOf(const Scene& scene, const FlatScene& flat) {
+    const std::size_t triangles = flat.triangles.size();
     // Nothing to find; and the view of the boxes looks for no triangle.
     if (triangles == 0 || scene.integrator.type == IntegratorType::Aabb) return CRT_ACCELERATOR_BRUTE_FORCE;
     switch (scene.integrator.accelerator) {
@@ -22,7 +23,8 @@ std::uint32_t acceleratorOf(const Scene& scene, std::size_t triangles) {
         case Accelerator::None: return CRT_ACCELERATOR_BRUTE_FORCE;
         case Accelerator::Auto: break;
     }
-    return triangles <= kBruteForceTriangles ? CRT_ACCELERATOR_BRUTE_FORCE : CRT_ACCELERATOR_BVH;
+    return triangles <= kBruteForceTriangles && flat.instances.empty() ? CRT_ACCELERATOR_BRUTE_FORCE
+                                                                       : CRT_ACCELERATOR_BVH;
 }
 
 /// Whether the backend finds all hits itself: rays start at the camera or at a surface, and surfaces lie
@@ -49,11 +51,32 @@ TriangleBounds boundsOf(const FlatScene& flat, std::size_t id) {
     return b;
 }
 
+MeshTrees compileMeshTrees(const FlatScene& flat) {
+    MeshTrees trees;
+    std::uint32_t slot = static_cast<std::uint32_t>(flat.triangles.size());
+    for (const InstancedMesh& mesh : flat.meshes) {
+        const std::size_t count = mesh.flat.triangles.size();
+        std::vector<TriangleBounds> bounds(count);
+        parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
+            for (std::size_t i = first; i < end; ++i) bounds[i] = boundsOf(mesh.flat, i);
+        });
+        Bvh bvh = buildBvh(bounds, 0, "building the BVH of a mesh");
+        const auto first_node = static_cast<std::uint32_t>(trees.nodes.size());
+        for (kernel::CrtNode4& node : bvh.nodes)
+            for (std::uint32_t& child : node.child) child += ((child & 15u) != 0 ? slot : first_node) << 4;
+        trees.roots.push_back(first_node);
+        trees.nodes.insert(trees.nodes.end(), bvh.nodes.begin(), bvh.nodes.end());
+        trees.orders.push_back(std::move(bvh.order));
+        slot += static_cast<std::uint32_t>(count);
+    }
+    return trees;
+}
+
 AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat,
                                    const CompileOptions& options) {
     const std::size_t count = flat.triangles.size();
     AcceleratorPart part;
-    part.kind = acceleratorOf(scene, count);
+    part.kind = acceleratorOf(scene, flat);
     part.without_nodes = part.kind == CRT_ACCELERATOR_BVH && backendFindsHits(scene, flat, options);
     if (part.kind == CRT_ACCELERATOR_BVH && !part.without_nodes) {
         const auto start = std::chrono::steady_clock::now();

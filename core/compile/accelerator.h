@@ -24,6 +24,14 @@ struct AcceleratorPart {
     double build_seconds = 0;               ///< As of CompiledScene.
 };
 
+/// Of the meshes that are instanced, whose triangles lie behind the slots of the scene, mesh by mesh.
+struct MeshTrees {
+    std::vector<kernel::CrtNode4> nodes;
+    std::vector<std::uint32_t> roots;                ///< In `nodes`, one a mesh.
+    std::vector<std::vector<std::uint32_t>> orders;  ///< Triangles of each mesh, in leaf order.
+};
+MeshTrees compileMeshTrees(const FlatScene& flat);
+
 AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat, const CompileOptions& options);
 
 /// Coordinates are those of the compiled scene.

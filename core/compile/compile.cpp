@@ -8,6 +8,7 @@
 #include "compile/environment_image.h"
 #include "compile/flatten.h"
 #include "compile/geometry.h"
+#include "compile/instances.h"
 #include "compile/lights.h"
 #include "compile/materials.h"
 #include "compile/near_scene.h"
@@ -29,11 +30,36 @@
 namespace crt {
 namespace {
 
+/// Triangles and shapes of the scene, and triangles of the meshes that are instanced.
+std::size_t primitivesOf(const FlatScene& flat) {
+    std::size_t primitives = flat.firstInstance();
+    for (const InstancedMesh& mesh : flat.meshes) primitives += mesh.flat.triangles.size();
+    return primitives;
+}
+
+std::size_t smoothTrianglesOf(const FlatScene& flat) {
+    std::size_t smooth = flat.smooth_triangles;
+    for (const InstancedMesh& mesh : flat.meshes) smooth += mesh.flat.smooth_triangles;
+    return smooth;
+}
+
+/// What the scene and its meshes have for each primitive.
+template <class T>
+kernel::CrtSpan appendOfPrimitives(BlobWriter& blob, const FlatScene& flat,
+                                   std::vector<T> FlatScene::*member) {
+    if ((flat.*member).empty()) return {0, 0};
+    return blob.appendFilled<T>(primitivesOf(flat), [&](std::span<T> all) {
+        auto next = std::copy((flat.*member).begin(), (flat.*member).end(), all.begin());
+        for (const InstancedMesh& mesh : flat.meshes)
+            next = std::copy((mesh.flat.*member).begin(), (mesh.flat.*member).end(), next);
+    });
+}
+
 /// For what grows with the number of triangles, and some tables.
 std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelerator) {
     constexpr std::size_t kTables = std::size_t{1} << 20;
     return kTables + accelerator.nodes.size() * sizeof(kernel::CrtNode4) +
-           flat.triangles.size() *
+           (primitivesOf(flat) + flat.instances.size()) *
                (sizeof(kernel::CrtTriangle) + sizeof(kernel::CrtFace) + sizeof(kernel::CrtPrimitive)) +
            flat.smooth_triangles * sizeof(kernel::CrtNormals) + flat.uvs.size() * sizeof(kernel::CrtUvs) +
            flat.colors.size() * sizeof(kernel::CrtVertexColors);
@@ -54,10 +80,11 @@ std::vector<const Spectrum*> spectraOf(const Scene& scene, const FlatScene& flat
 /// Warns of lights that nothing in the scene can show.
 void warnOfUnseenLights(const Scene& scene, const kernel::CrtScene& header) {
     if (header.point_lights.count == 0 || (header.features & CRT_FEATURE_POINT_LIGHT) != 0) return;
-    logWarning("{}: nothing scatters their light: surfaces that are mirrors, smooth metals and glass do not "
-               "show point, spot and directional lights{}",
-               scene.file,
-               scene.integrator.max_depth == 0 ? ", and 'max_depth: 0' shows no light on anything" : "");
+    logWarning(
+        "{}: nothing scatters their light: surfaces that are mirrors, smooth metals and glass do not "
+        "show point, spot and directional lights{}",
+        scene.file,
+        scene.integrator.max_depth == 0 ? ", and 'max_depth: 0' shows no light on anything" : "");
 }
 
 /// From part to part: each function takes parts of the scene, or what was made of them, and returns a part
@@ -74,12 +101,16 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     const std::vector<TextureIndex> textures = usedTextures(scene, used);
     blob.reserve(expectedBytes(flat, accelerator) + texelBytes(scene, textures));
     header.accelerator = accelerator.kind;
+    MeshTrees trees = compileMeshTrees(flat);
     header.nodes = blob.append(accelerator.nodes);
     accelerator.nodes = {};  // nobody asks for them again, and they may be hundreds of megabytes
     const std::size_t count = flat.triangles.size();
     header.triangle_count = static_cast<std::uint32_t>(count);
-    header.triangles = blob.appendFilled<kernel::CrtTriangle>(
-        count, [&](auto triangles) { compileTriangles(flat, accelerator, triangles); });
+    const std::size_t primitive_count = primitivesOf(flat), slots = primitive_count + flat.instances.size();
+    header.triangles = blob.appendFilled<kernel::CrtTriangle>(slots, [&](auto triangles) {
+        compileTriangles(flat, accelerator, triangles.first(count));
+        compileMeshTriangles(flat, trees, triangles);
+    });
     header.faces = blob.appendFilled<kernel::CrtFace>(
         count, [&](auto faces) { compileFaces(flat, accelerator, faces); });
     std::size_t occluders = 0;
@@ -121,13 +152,29 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.textures = blob.append(texture_part.records);
     const MaterialPart materials = compileMaterials(used, tables, spectra, texture_part);
     if (header.textures.count > 0 || (materials.features & CRT_FEATURE_ANISOTROPY) != 0)
-        header.uvs = blob.append(flat.uvs);
-    if (header.textures.count > 0) header.vertex_colors = blob.append(flat.colors);
-    header.primitives = blob.appendFilled<kernel::CrtPrimitive>(count, [&](auto primitives) {
-        compilePrimitives(flat, scene.materials.size(), lights.light_of, primitives);
+        header.uvs = appendOfPrimitives(blob, flat, &FlatScene::uvs);
+    if (header.textures.count > 0) header.vertex_colors = appendOfPrimitives(blob, flat, &FlatScene::colors);
+    header.primitives = blob.appendFilled<kernel::CrtPrimitive>(primitive_count, [&](auto primitives) {
+        compilePrimitives(flat, scene.materials.size(), lights.light_of, 0,
+                          primitives.first(flat.firstInstance()));
+        std::size_t first = flat.firstInstance(), normals = flat.smooth_triangles;
+        for (const InstancedMesh& mesh : flat.meshes) {
+            compilePrimitives(mesh.flat, scene.materials.size(), {}, static_cast<std::uint32_t>(normals),
+                              primitives.subspan(first, mesh.flat.triangles.size()));
+            first += mesh.flat.triangles.size();
+            normals += mesh.flat.smooth_triangles;
+        }
     });
-    header.normals = blob.appendFilled<kernel::CrtNormals>(
-        flat.smooth_triangles, [&](auto normals) { flattenNormals(scene, flat, normals); });
+    header.normals = blob.appendFilled<kernel::CrtNormals>(smoothTrianglesOf(flat), [&](auto normals) {
+        flattenNormals(scene, flat, normals.first(flat.smooth_triangles));
+        std::size_t first = flat.smooth_triangles;
+        for (const InstancedMesh& mesh : flat.meshes) {
+            flattenNormals(scene, mesh.flat, normals.subspan(first, mesh.flat.smooth_triangles));
+            first += mesh.flat.smooth_triangles;
+        }
+    });
+    header.mesh_nodes = blob.append(trees.nodes);
+    header.instances = blob.append(compileInstances(flat, trees));
     header.materials = blob.append(materials.records);
     header.compositions = blob.append(compileCompositions(used, texture_part));
     header.layers = blob.append(compileLayers(used, tables, spectra, texture_part));
@@ -162,6 +209,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.spectral_channels = spectralChannelsOf(scene).count();
     out.triangles = flat.firstShape();
     out.shapes = flat.shapes.size();
+    out.instances = flat.instances.size();
+    for (const InstancedMesh& mesh : flat.meshes) out.instanced_triangles += mesh.flat.triangles.size();
     out.emitters = lights.emitters;
     out.objects = flat.placements;
     out.nodes = header.nodes.count;

@@ -22,7 +22,8 @@ struct CompiledScene {
     std::uint32_t channels = 0;       ///< Film channels.
     std::uint32_t aovs = 0;
     std::uint32_t spectral_channels = 0;  ///< Of these channels, behind all others.
-    std::uint64_t triangles = 0, shapes = 0, emitters = 0, objects = 0, nodes = 0;
+    std::uint64_t triangles = 0, shapes = 0, instances = 0, emitters = 0, objects = 0, nodes = 0;
+    std::uint64_t instanced_triangles = 0;  ///< Of the meshes that instances show, each counted once.
     std::uint64_t images = 0, texel_bytes = 0;  ///< Of textures.
     int scale_exponent = 0;           ///< World lengths were multiplied by 2^scale_exponent after centring.
     Vec3d centre{};                   ///< In the author's units.

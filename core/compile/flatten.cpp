@@ -5,6 +5,8 @@
 #include "base/parallel.h"
 #include "base/stage.h"
 #include "base/vec3d.h"
+#include "compile/instances.h"
+#include "compile/placements.h"
 #include "scene/scene_limits.h"
 #include "spectra/sigmoid.h"
 
@@ -22,85 +24,7 @@ namespace crt {
 namespace {
 
 constexpr std::size_t kMostTriangles = std::size_t{1} << 28;
-
-Vec3d transformPoint(const Matrix4d& m, const Vec3d& p) {
-    return {m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
-            m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]};
-}
-
-/// Rows of the cofactor matrix of the linear part: transforms normals, and its sign is that of the
-/// determinant.
-Matrix3d cofactors(const Matrix4d& m) {
-    const Vec3d a{m[0], m[1], m[2]}, b{m[4], m[5], m[6]}, c{m[8], m[9], m[10]};
-    return {cross(b, c), cross(c, a), cross(a, b)};
-}
-
 bool isFinite(const Vec3d& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
-
-/// An object as one of its transforms places it.
-struct Placement {
-    const Object* object;
-    const Mesh* mesh;
-    Matrix4d transform;
-    Matrix3d normal_matrix;
-    /// A mirroring transform turns the order of vertices round; turning it back keeps the outside outside.
-    bool mirrored;
-    std::size_t first;  ///< Number of its first triangle in the scene.
-
-    /// Which corner of the mesh's triangle is the k-th of the placed one.
-    std::size_t from(std::size_t k) const { return mirrored && k > 0 ? 3 - k : k; }
-
-    /// In the author's units, for a triangle of the mesh.
-    std::array<Vec3d, 3> corners(std::size_t triangle) const {
-        std::array<Vec3d, 3> p;
-        for (std::size_t k = 0; k < 3; ++k)
-            p[k] = transformPoint(transform, mesh->positions[mesh->triangles[triangle][from(k)]]);
-        return p;
-    }
-
-    /// Unit normals at the corners; nothing where one of them is missing or has no direction.
-    std::optional<std::array<Vec3d, 3>> normals(std::size_t triangle) const {
-        if (mesh->normal_index.empty()) return std::nullopt;
-        std::array<Vec3d, 3> normals;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const std::uint32_t index = mesh->normal_index[triangle][from(k)];
-            if (index == kNoNormal) return std::nullopt;
-            const Vec3d n = multiply(normal_matrix, mesh->normals[index]);
-            const double norm = length(n);
-            if (!(norm > 0) || !std::isfinite(norm)) return std::nullopt;
-            normals[k] = n * ((mirrored ? -1.0 : 1.0) / norm);
-        }
-        return normals;
-    }
-};
-
-std::vector<Placement> placementsOf(const Scene& scene) {
-    std::vector<Placement> placements;
-    std::size_t first = 0;
-    for (const Object& object : scene.objects)
-        for (const Matrix4d& transform : object.transforms) {
-            const Mesh& mesh = scene.meshes[object.mesh];
-            const Matrix3d normal_matrix = cofactors(transform);
-            const Vec3d first_row{transform[0], transform[1], transform[2]};
-            placements.push_back(
-                {&object, &mesh, transform, normal_matrix, dot(first_row, normal_matrix[0]) < 0, first});
-            first += mesh.triangles.size();
-        }
-    return placements;
-}
-
-/// Calls visit(number in the scene, placement, number in its mesh) for [first, end).
-template <class Visit>
-void forEachTriangle(const std::vector<Placement>& placements, std::size_t first, std::size_t end,
-                     const Visit& visit) {
-    auto placement =
-        std::prev(std::upper_bound(placements.begin(), placements.end(), first,
-                                   [](std::size_t i, const Placement& p) { return i < p.first; }));
-    for (std::size_t i = first; i < end; ++i) {
-        while (i - placement->first >= placement->mesh->triangles.size()) ++placement;
-        visit(i, *placement, i - placement->first);
-    }
-}
 
 constexpr std::size_t kPart = std::size_t{1} << 14;  // of what a thread takes at a time
 
@@ -161,22 +85,27 @@ bool hasArea(const std::array<Vec3d, 3>& p) {
 /// rather than stored: they would be half of the memory that a scene takes.
 class Flattener {
 public:
-    Flattener(const Scene& scene, std::size_t count)
+    Flattener(const Scene& scene, std::optional<std::size_t> only)
         : scene_(scene),
-          placements_(placementsOf(scene)),
-          shapes_(placedShapes(scene)),
-          parts_(partsOf(count, kPart)),
-          stage_("placing triangles", 2 * static_cast<double>(count)) {
+          placements_(placementsOf(scene, only)),
+          shapes_(only ? std::vector<PlacedShape>() : placedShapes(scene)),
+          instances_(only ? std::vector<PlacedMesh>() : placeMeshes()),
+          parts_(partsOf(trianglesOfPlacements(), kPart)),
+          stage_("placing triangles", 2 * static_cast<double>(trianglesOfPlacements())) {
+        const std::size_t count = trianglesOfPlacements(), all = count + shapes_.size();
+        flat_.object = only;
         flat_.triangles.resize(count);
         flat_.positions.resize(count);
-        if (hasTexture(scene, false) || hasTangents(scene)) flat_.uvs.resize(count + shapes_.size());
-        if (hasTexture(scene, true)) flat_.colors.resize(count + shapes_.size());
-        flat_.placements = static_cast<std::uint32_t>(placements_.size());
+        if (hasTexture(scene, false) || hasTangents(scene)) flat_.uvs.resize(all);
+        if (hasTexture(scene, true)) flat_.colors.resize(all);
+        for (const Object& object : scene.objects)
+            flat_.placements += static_cast<std::uint32_t>(object.transforms.size());
     }
 
     FlatScene flatten() {
         placeTriangles();
         placeShapes();
+        placeInstances();
         return std::move(flat_);
     }
 
@@ -205,7 +134,8 @@ private:
         // Nobody sees them: they have no part in centre and scale.
         logWarning("{} triangle{} no area and will not be seen", without_area,
                    without_area == 1 ? " has" : "s have");
-        if (without_area < flat_.triangles.size() || !shapes_.empty()) measure(flat_, boundsOfParts());
+        if (without_area < flat_.triangles.size() || !shapes_.empty() || !instances_.empty())
+            measure(flat_, boundsOfParts());
         forEachPart([this](Part& part) { normaliseSeen(part); });
     }
 
@@ -219,6 +149,42 @@ private:
             flat_.shapes.push_back(flatShape(shape, flat_.centre, flat_.scale_exponent));
             flat_.positions.push_back(flat_.shapes.back().box);
         }
+    }
+
+    /// The meshes that are instanced, flattened each by itself, and where they stand.
+    std::vector<PlacedMesh> placeMeshes() {
+        std::vector<PlacedMesh> placed;
+        std::uint32_t number = 0;
+        for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
+            const Object& object = scene_.objects[i];
+            const std::size_t first = placed.size(), mesh = flat_.meshes.size();
+            const bool shared = sharesMesh(scene_, object);
+            for (const Matrix4d& transform : object.transforms) {
+                if (shared && canInstance(transform)) {
+                    if (placed.size() == first)
+                        flat_.meshes.push_back(instancedMesh(Flattener(scene_, i).flatten()));
+                    placed.push_back(placedMesh(object, transform, flat_.meshes.back(), mesh, number));
+                }
+                ++number;
+            }
+        }
+        return placed;
+    }
+
+    void placeInstances() {
+        for (const PlacedMesh& placed : instances_) {
+            FlatTriangle t;
+            t.object = placed.number;
+            flat_.triangles.push_back(t);
+            flat_.instances.push_back(
+                flatInstance(placed, flat_.meshes[placed.mesh], flat_.centre, flat_.scale_exponent));
+            flat_.positions.push_back(flat_.instances.back().box);
+        }
+    }
+
+    std::size_t trianglesOfPlacements() const {
+        return placements_.empty() ? 0
+                                   : placements_.back().first + placements_.back().mesh->triangles.size();
     }
 
     void forEachPart(const std::function<void(Part&)>& work) {
@@ -238,6 +204,10 @@ private:
             all.add(shape.lower);
             all.add(shape.upper);
         }
+        for (const PlacedMesh& placed : instances_) {
+            all.add(placed.lower);
+            all.add(placed.upper);
+        }
         return all;
     }
 
@@ -247,7 +217,7 @@ private:
                             const Mesh& mesh = *placement.mesh;
                             const Object& object = *placement.object;
                             FlatTriangle& t = flat_.triangles[i];
-                            t.object = static_cast<std::uint32_t>(&placement - placements_.data());
+                            t.object = placement.number;
                             t.material = !mesh.material.empty() && mesh.material[triangle] >= 0
                                              ? mesh.material[triangle]
                                              : object.material;
@@ -331,8 +301,9 @@ private:
     const Scene& scene_;
     const std::vector<Placement> placements_;
     const std::vector<PlacedShape> shapes_;
-    std::vector<Part> parts_;
     FlatScene flat_;
+    const std::vector<PlacedMesh> instances_;
+    std::vector<Part> parts_;
     Stage stage_;
     std::atomic<std::size_t> done_{0};
 };
@@ -341,9 +312,23 @@ private:
 
 FlatScene flattenScene(const Scene& scene) {
     // Before anything is written out.
-    std::uint64_t count = 0;
-    for (const Object& object : scene.objects)
-        count += std::uint64_t{scene.meshes[object.mesh].triangles.size()} * object.transforms.size();
+    std::uint64_t count = 0, ids = 0;
+    for (const Object& object : scene.objects) {
+        const std::uint64_t places = object.transforms.size();
+        const std::uint64_t instances =
+            sharesMesh(scene, object) ? static_cast<std::uint64_t>(std::count_if(
+                                            object.transforms.begin(), object.transforms.end(), canInstance))
+                                      : 0;
+        const std::uint64_t copies = places - instances + (instances > 0 ? 1 : 0);
+        count += copies * scene.meshes[object.mesh].triangles.size() + instances;
+        ids += trianglesOf(scene, object) + places;
+        if (object.sharing == Sharing::Always && places > 1 && emits(scene, object))
+            logWarning("{}: surfaces that emit do not share their mesh; it is written out {} times",
+                       object.name, places);
+    }
+    if (ids >= std::numeric_limits<std::uint32_t>::max())
+        throw Error(ErrorKind::Scene,
+                    fmt::format("the scene shows {} triangles; crt numbers up to 4295 million", ids));
     if (count >= kMostTriangles)
         throw Error(
             ErrorKind::Scene,
@@ -354,7 +339,7 @@ FlatScene flattenScene(const Scene& scene) {
             !why.empty())
             throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", scene.file, why), {scene.file});
 
-    return Flattener(scene, count).flatten();
+    return Flattener(scene, std::nullopt).flatten();
 }
 
 void flattenNormals(const Scene& scene, const FlatScene& flat, std::span<kernel::CrtNormals> normals) {
@@ -365,7 +350,7 @@ void flattenNormals(const Scene& scene, const FlatScene& flat, std::span<kernel:
     });
     std::size_t before = 0;
     for (std::size_t& smooth : first_normal) before += std::exchange(smooth, before);
-    const std::vector<Placement> placements = placementsOf(scene);
+    const std::vector<Placement> placements = placementsOf(scene, flat.object);
     parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
         std::size_t normal = first_normal[first / kPart];
         forEachTriangle(placements, first, end,

@@ -9,6 +9,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,22 +23,42 @@ struct FlatTriangle {
     bool smooth = false;
 };
 
-/// All triangles of a scene, in the author's order; then all shapes.
+struct InstancedMesh;
+
+/// A mesh in one of its places, of which flattening makes no triangles.
+struct FlatInstance {
+    kernel::CrtInstance record{};  ///< Matrices, slack and placement.
+    std::size_t mesh = 0;          ///< In FlatScene::meshes.
+    std::array<float, 9> box{};    ///< As in CrtTriangle.
+};
+
+/// All triangles of a scene, in the author's order; then all shapes, then all instances.
 struct FlatScene {
     std::vector<FlatTriangle> triangles;
-    std::vector<FlatShape> shapes;  ///< The last of `triangles`.
+    std::vector<FlatShape> shapes;        ///< `triangles` from firstShape() on.
+    std::vector<FlatInstance> instances;  ///< The last of `triangles`.
+    std::vector<InstancedMesh> meshes;
+    /// The object of the scene that this is, at its origin; nothing: all that are not instanced.
+    std::optional<std::size_t> object;
     std::uint32_t placements = 0;
     /// x of the three vertices, y, z: centred, scaled, and rounded to single precision. Those of a triangle
     /// without area are one point; those of a shape its box, as in CrtTriangle.
     std::vector<std::array<float, 9>> positions;
     std::size_t smooth_triangles = 0;
-    std::vector<kernel::CrtUvs> uvs;          ///< Of all triangles, where a texture or tangent asks.
+    std::vector<kernel::CrtUvs> uvs;              ///< Of all triangles, where a texture or tangent asks.
     std::vector<kernel::CrtVertexColors> colors;  ///< Of all triangles, where a value asks for them.
-    Vec3d centre{};                           ///< In the author's units.
+    Vec3d centre{};                               ///< In the author's units.
     int scale_exponent = 0;  ///< Lengths were multiplied by 2^scale_exponent after centring.
 
     /// Number of the first shape: how many triangles there are.
-    std::size_t firstShape() const { return triangles.size() - shapes.size(); }
+    std::size_t firstShape() const { return triangles.size() - shapes.size() - instances.size(); }
+    std::size_t firstInstance() const { return triangles.size() - instances.size(); }
+};
+
+/// An object whose mesh is stored once, in coordinates of its own, within ±1.
+struct InstancedMesh {
+    FlatScene flat;
+    std::array<Vec3d, 2> box{};  ///< Lower and upper corner, of what float has.
 };
 
 /// Warns about triangles without area. Throws crt::Error(Scene) when there are too many triangles, or a

@@ -33,6 +33,7 @@ Extent extentOf(const FlatScene& flat, std::size_t id) {
 
 kernel::CrtFace faceOf(const FlatScene& flat, std::size_t id) {
     kernel::CrtFace face{};
+    if (id >= flat.firstInstance()) return face;
     if (id >= flat.firstShape()) {
         face.clearance = flat.shapes[id - flat.firstShape()].clearance;
         face.margin = flat.shapes[id - flat.firstShape()].margin;
@@ -107,7 +108,10 @@ void compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator,
             const std::uint32_t id = accelerator.id_of_slot[slot];
             std::copy(flat.positions[id].begin(), flat.positions[id].end(), triangles[slot].p);
             triangles[slot].id = id;
-            if (id >= flat.firstShape())
+            if (id >= flat.firstInstance())
+                triangles[slot].shape =
+                    CRT_SLOT_INSTANCE + static_cast<std::uint32_t>(id - flat.firstInstance());
+            else if (id >= flat.firstShape())
                 triangles[slot].shape = static_cast<std::uint32_t>(id - flat.firstShape()) + 1;
         }
     });

@@ -145,8 +145,13 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
 std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& flat) {
     const std::size_t count = scene.materials.size();
     std::vector<bool> used(count + 1, false);
-    for (const FlatTriangle& t : flat.triangles)
-        used[isKnown(t, count) ? static_cast<std::size_t>(t.material) : count] = true;
+    const auto use = [&](const FlatScene& part) {
+        for (std::size_t i = 0; i < part.firstInstance(); ++i)
+            used[isKnown(part.triangles[i], count) ? static_cast<std::size_t>(part.triangles[i].material)
+                                                   : count] = true;
+    };
+    use(flat);
+    for (const InstancedMesh& mesh : flat.meshes) use(mesh.flat);
     // What is made of others comes in any order.
     for (int depth = 0; depth < kDeepestComposition + kDeepestOpenPbr; ++depth)
         for (std::size_t i = 0; i < count; ++i)
@@ -278,14 +283,14 @@ std::vector<kernel::CrtLayers> compileLayers(const std::vector<const Material*>&
 }
 
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
-                       const std::vector<std::uint32_t>& light_of,
+                       const std::vector<std::uint32_t>& light_of, std::uint32_t first_normals,
                        std::span<kernel::CrtPrimitive> primitives) {
     constexpr std::size_t kPart = std::size_t{1} << 16;
     std::vector<std::uint32_t> first_normal(partsOf(primitives.size(), kPart));
     parallelFor(primitives.size(), kPart, [&](std::size_t first, std::size_t end) {
         for (std::size_t i = first; i < end; ++i) first_normal[first / kPart] += flat.triangles[i].smooth;
     });
-    std::uint32_t before = 0;
+    std::uint32_t before = first_normals;
     for (std::uint32_t& normals : first_normal) before += std::exchange(normals, before);
     parallelFor(primitives.size(), kPart, [&](std::size_t first, std::size_t end) {
         std::uint32_t normal = first_normal[first / kPart];
@@ -293,7 +298,7 @@ void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
             const FlatTriangle& t = flat.triangles[i];
             primitives[i].material =
                 static_cast<std::uint32_t>(isKnown(t, scene_materials) ? t.material : scene_materials);
-            primitives[i].light = light_of[i];
+            primitives[i].light = light_of.empty() ? CRT_NONE : light_of[i];
             primitives[i].object = t.object;
             primitives[i].normals = t.smooth ? normal++ : CRT_NONE;
         }

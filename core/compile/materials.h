@@ -51,7 +51,7 @@ std::vector<kernel::CrtLayers> compileLayers(const std::vector<const Material*>&
 
 /// Fills in one a triangle, by primitive id. `light_of` as of LightPart.
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,
-                       const std::vector<std::uint32_t>& light_of,
+                       const std::vector<std::uint32_t>& light_of, std::uint32_t first_normals,
                        std::span<kernel::CrtPrimitive> primitives);
 
 }  // namespace crt

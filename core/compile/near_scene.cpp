@@ -136,7 +136,8 @@ std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kern
     std::vector<std::vector<std::uint32_t>> parts(partsOf(count, kPart));
     parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
         for (std::size_t slot = first; slot < end; ++slot)
-            if (all || cells.anyMarked(boundsOf(triangles[slot], reach)))
+            if (triangles[slot].shape < CRT_SLOT_INSTANCE &&
+                (all || cells.anyMarked(boundsOf(triangles[slot], reach))))
                 parts[first / kPart].push_back(static_cast<std::uint32_t>(slot));
     });
     std::vector<std::uint32_t> near;
@@ -157,7 +158,11 @@ CompiledScene nearScene(const CompiledScene& scene) {
     bounds.reserve(near.size());
     for (const std::uint32_t slot : near) bounds.push_back(boundsOf(triangles[slot], 0));
     logDebug("{} of {} triangles lie where surfaces are asked for neighbours", near.size(), scene.triangles);
-    const Bvh bvh = buildBvh(bounds, CRT_BOX_PADDING, "looking for surfaces too near to each other");
+    Bvh bvh;
+    if (near.empty())  // all are instances: there is nothing to make a tree of
+        header.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;
+    else
+        bvh = buildBvh(bounds, CRT_BOX_PADDING, "looking for surfaces too near to each other");
 
     std::vector<CrtTriangle> near_triangles;
     std::vector<CrtFace> near_faces;
@@ -180,6 +185,7 @@ CompiledScene nearScene(const CompiledScene& scene) {
     reduced.features = scene.features;
     reduced.triangles = scene.triangles;
     reduced.shapes = scene.shapes;
+    reduced.instances = scene.instances;
     reduced.emitters = scene.emitters;
     reduced.scale_exponent = scene.scale_exponent;
     return reduced;

@@ -117,13 +117,18 @@ bool overlap(const Corners& a, const Corners& b) {
 }
 
 /// Slots whose bounding boxes meet `box`, until `visit` returns true or no test is left in `tests`.
+/// Instances are passed over: their triangles are stored without the places where they stand.
 template <class Visit>
 void visitNeighbours(const kernel::CrtContext& context, const Box& box, std::uint64_t& tests,
                      const Visit& visit) {
     using namespace kernel;
     const CrtScene& scene = *context.scene;
+    const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, scene.triangles);
     // A false answer goes on; so do the tests, while there are any.
-    const auto stops = [&](std::uint32_t slot) { return tests == 0 || (--tests, visit(slot)); };
+    const auto stops = [&](std::uint32_t slot) {
+        if (triangles[slot].shape >= CRT_SLOT_INSTANCE) return false;
+        return tests == 0 || (--tests, visit(slot));
+    };
     if (scene.accelerator != CRT_ACCELERATOR_BVH) {
         for (std::uint32_t slot = 0; slot < scene.triangle_count; ++slot)
             if (stops(slot)) return;
@@ -176,7 +181,7 @@ kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::Cr
 std::vector<std::uint32_t> slotsOf(const CompiledScene& scene, const kernel::CrtContext& context) {
     using namespace kernel;
     const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
-    std::vector<std::uint32_t> slots(scene.triangles + scene.shapes, CRT_NONE);
+    std::vector<std::uint32_t> slots(scene.triangles + scene.shapes + scene.instances, CRT_NONE);
     for (std::uint32_t slot = 0; slot < context.scene->triangle_count; ++slot)
         slots[triangles[slot].id] = slot;
     return slots;
@@ -214,8 +219,7 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     std::vector<std::uint32_t> lights;  // Slots, in the order of ids.
     if (scene.emitters > 0)
         for (const std::uint32_t slot : slotsOf(scene, context)) {
-            const std::uint32_t emitter =
-                slot != CRT_NONE ? primitives[triangles[slot].id].light : CRT_NONE;
+            const std::uint32_t emitter = slot != CRT_NONE ? primitives[triangles[slot].id].light : CRT_NONE;
             if (emitter != CRT_NONE && emitter % step == 0) lights.push_back(slot);
         }
     std::uint64_t tests = kTriangleTests;

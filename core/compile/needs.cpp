@@ -42,6 +42,7 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need((f & CRT_FEATURE_ABSORPTION) != 0, materials.features & CRT_FEATURE_MIX);
     need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
     need(traces && header.shapes.count > 0, CRT_FEATURE_SHAPES);
+    need(traces && header.instances.count > 0, CRT_FEATURE_INSTANCES);
     const bool samples_environment = header.environment_light != 0;
     need(header.lights.count > header.point_lights.count + (samples_environment ? 1u : 0u),
          CRT_FEATURE_AREA_LIGHT);
@@ -81,7 +82,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
                                           kBruteForceTriangles)
                             : std::string("integrator.accelerator asks for another"));
     if (without_nodes) left_out("BVH", "the backend builds an acceleration structure of its own");
-    const std::size_t triangles = header.triangle_count - header.shapes.count;
+    const std::size_t triangles = header.triangle_count - header.shapes.count - header.instances.count;
     if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders < triangles)
         left_out("shadow tests",
                  fmt::format("{} of {} triangles have the whole scene on one side and cannot come between",
@@ -105,6 +106,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_ROUGH_BASE)) left_out("rough diffuse bases", "all are Lambert's");
     if (!has(CRT_FEATURE_ANISOTROPY)) left_out("anisotropy", "all surfaces are as rough in every direction");
     if (!has(CRT_FEATURE_SHAPES)) left_out("spheres, disks and cylinders", "all surfaces are triangles");
+    if (!has(CRT_FEATURE_INSTANCES)) left_out("instances", "every triangle is stored where it stands");
     if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
     if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
     if (!has(CRT_FEATURE_NEE))

@@ -44,11 +44,13 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
     header.features = 0;
     header.accelerator = 0;
     for (kernel::CrtSpan* span :
-         {&header.triangles, &header.faces, &header.triangles8, &header.occluders8, &header.primitives,
-          &header.normals, &header.textures, &header.uvs, &header.vertex_colors, &header.nodes,
-          &header.objects, &header.materials, &header.compositions, &header.layers, &header.lights,
-          &header.point_lights, &header.environment_image, &header.spectral_film, &header.losses,
-          &header.spectra, &header.observer, &header.wavelengths, &header.filter, &header.shapes})
+         {&header.triangles,         &header.faces,         &header.triangles8, &header.occluders8,
+          &header.primitives,        &header.normals,       &header.textures,   &header.uvs,
+          &header.vertex_colors,     &header.nodes,         &header.objects,    &header.materials,
+          &header.compositions,      &header.layers,        &header.lights,     &header.point_lights,
+          &header.environment_image, &header.spectral_film, &header.losses,     &header.spectra,
+          &header.observer,          &header.wavelengths,   &header.filter,     &header.shapes,
+          &header.instances,         &header.mesh_nodes})
         *span = {};
     return header;
 }
@@ -75,6 +77,17 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
         hash.add(CRT_ARRAY(CrtLayers, blob, header.layers), header.layers.count, sizeof(CrtLayers));
     if (header.shapes.count > 0)
         hash.add(CRT_ARRAY(CrtShape, blob, header.shapes), header.shapes.count, sizeof(CrtShape));
+    if (header.instances.count > 0) {
+        const CrtInstance* instances = CRT_ARRAY(CrtInstance, blob, header.instances);
+        for (std::uint32_t i = 0; i < header.instances.count; ++i) {
+            CrtInstance instance = instances[i];
+            instance.root = 0;
+            hash.add(&instance, 1, sizeof instance);
+        }
+        // Every backend has the same trees of meshes, and so their triangles in the same order.
+        hash.add(CRT_ARRAY(CrtTriangle, blob, header.triangles) + header.triangle_count,
+                 header.triangles.count - header.triangle_count, sizeof(CrtTriangle));
+    }
     // A texture names its texels by their place in the blob.
     const CrtTexture* textures = CRT_ARRAY(CrtTexture, blob, header.textures);
     for (std::uint32_t i = 0; i < header.textures.count; ++i) {

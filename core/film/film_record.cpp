@@ -159,6 +159,8 @@ SceneTrait geometryTrait(const Scene& scene) {
         digest.add(object.transforms);
         digest.add(object.material);
         digest.add(object.emission);
+        // Corners of instances are rounded otherwise.
+        if (object.sharing != Sharing::Auto) digest.add(object.sharing);
         placements += object.transforms.size();
         triangles += object.transforms.size() * scene.meshes[object.mesh].triangles.size();
     }

@@ -24,8 +24,9 @@ CRT_FN vec3 crt_tangent(const CrtContext *ctx, const CrtSurface *surface, vec3 n
         CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[surface->at.id].uv;
         CRT_GLOBAL const CrtTriangle *triangle =
             CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + surface->slot;
-        const vec3 o = crt_triangle_vertex(triangle, 0u);
-        const vec3 e1 = crt_triangle_vertex(triangle, 1u) - o, e2 = crt_triangle_vertex(triangle, 2u) - o;
+        const vec3 o = crt_corner(ctx, triangle, surface->instance, 0u);
+        const vec3 e1 = crt_corner(ctx, triangle, surface->instance, 1u) - o;
+        const vec3 e2 = crt_corner(ctx, triangle, surface->instance, 2u) - o;
         const f32 v1 = uv[4] - uv[3], v2 = uv[5] - uv[3];
         f32 area = crt_difference_of_products(uv[1] - uv[0], v2, uv[2] - uv[0], v1);
         vec3 along = (e1 * v2 - e2 * v1) * (area < 0.0f ? -1.0f : 1.0f);

@@ -55,7 +55,8 @@ CRT_CALLED_FN CrtRay crt_ray_behind(CrtRay ray, vec3 p, f32 clearance, vec3 ng) 
 
 /* Whether a ray passes the surface that it meets. If so, it becomes the ray from behind it. */
 CRT_FN int crt_passes(const CrtContext *ctx, CrtHit hit, CrtSampler *sampler, u32 dimension, CrtRay *ray) {
-    const u32 material = CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[hit.id].material;
+    const u32 primitive = crt_primitive_of(ctx, hit);
+    const u32 material = CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[primitive].material;
     const CrtValue opacity = crt_compositions(ctx)[material].opacity;
     if (opacity == CRT_OPAQUE) return 0;
     const CrtSurface surface = crt_surface(ctx, hit);

@@ -19,6 +19,7 @@ typedef struct CrtHit {
     f32 b1, b2;  /* barycentrics of the second and third vertex */
     u32 slot;    /* in the triangle array; CRT_NONE: nothing hit */
     u32 id;      /* primitive id */
+    u32 instance; /* 1 + the index of its CrtInstance; 0: none. Only where there are some */
 } CrtHit;
 
 /* The ray in the triangle test's coordinates: axis kz is where the direction is largest. */
@@ -59,21 +60,18 @@ CRT_FN CrtShear crt_shear(CrtRay ray) {
 
 /* Does the ray hit the triangle at 0 < t < limit? Fills t, b1, b2. There is no least t: a ray starts far
    enough off its surface (surface.h) that the sign of t is right, and whatever is really in front, however
-   near, must stop it, or light leaks through corners. */
-CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShear ray, f32 limit,
-                                  CrtHit *hit) {
-    CRT_GLOBAL const f32 *px = triangle->p + 3u * ray.kx;
-    CRT_GLOBAL const f32 *py = triangle->p + 3u * ray.ky;
-    CRT_GLOBAL const f32 *pz = triangle->p + 3u * ray.kz;
-    const f32 az = pz[0] - ray.oz;
-    const f32 bz = pz[1] - ray.oz;
-    const f32 cz = pz[2] - ray.oz;
-    const f32 ax = crt_fma(-ray.sx, az, px[0] - ray.ox);
-    const f32 bx = crt_fma(-ray.sx, bz, px[1] - ray.ox);
-    const f32 cx = crt_fma(-ray.sx, cz, px[2] - ray.ox);
-    const f32 ay = crt_fma(-ray.sy, az, py[0] - ray.oy);
-    const f32 by = crt_fma(-ray.sy, bz, py[1] - ray.oy);
-    const f32 cy = crt_fma(-ray.sy, cz, py[2] - ray.oy);
+   near, must stop it, or light leaks through corners. px: the coordinates of the three corners along axis kx
+   of the ray. */
+CRT_FN int crt_intersect_corners(vec3 px, vec3 py, vec3 pz, CrtShear ray, f32 limit, CrtHit *hit) {
+    const f32 az = V3X(pz) - ray.oz;
+    const f32 bz = V3Y(pz) - ray.oz;
+    const f32 cz = V3Z(pz) - ray.oz;
+    const f32 ax = crt_fma(-ray.sx, az, V3X(px) - ray.ox);
+    const f32 bx = crt_fma(-ray.sx, bz, V3Y(px) - ray.ox);
+    const f32 cx = crt_fma(-ray.sx, cz, V3Z(px) - ray.ox);
+    const f32 ay = crt_fma(-ray.sy, az, V3X(py) - ray.oy);
+    const f32 by = crt_fma(-ray.sy, bz, V3Y(py) - ray.oy);
+    const f32 cy = crt_fma(-ray.sy, cz, V3Z(py) - ray.oy);
     const f32 u = crt_difference_of_products(cx, by, cy, bx);
     const f32 v = crt_difference_of_products(ax, cy, ay, cx);
     const f32 w = crt_difference_of_products(bx, ay, by, ax);
@@ -88,6 +86,15 @@ CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShe
     hit->b1 = v * inverse_det;
     hit->b2 = w * inverse_det;
     return 1;
+}
+
+CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShear ray, f32 limit,
+                                  CrtHit *hit) {
+    CRT_GLOBAL const f32 *px = triangle->p + 3u * ray.kx;
+    CRT_GLOBAL const f32 *py = triangle->p + 3u * ray.ky;
+    CRT_GLOBAL const f32 *pz = triangle->p + 3u * ray.kz;
+    return crt_intersect_corners(make_vec3(px[0], px[1], px[2]), make_vec3(py[0], py[1], py[2]),
+                                 make_vec3(pz[0], pz[1], pz[2]), ray, limit, hit);
 }
 
 /* One ulp beyond the best hit, so that ties reach the comparison of ids. */
@@ -106,6 +113,7 @@ CRT_FN void crt_test_closest(CRT_GLOBAL const CrtTriangle *triangles, u32 slot, 
         best->b2 = hit.b2;
         best->slot = slot;
         best->id = id;
+        if (CRT_HAS(INSTANCES)) best->instance = 0u;
     }
 }
 
@@ -115,6 +123,7 @@ CRT_FN CrtHit crt_no_hit(f32 reach) {
     hit.b1 = hit.b2 = 0.0f;
     hit.slot = CRT_NONE;
     hit.id = CRT_NONE;
+    hit.instance = 0u;
     return hit;
 }
 

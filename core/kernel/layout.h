@@ -39,10 +39,28 @@ typedef struct CrtSpan {
 typedef struct CrtTriangle {
     f32 p[9];
     u32 id;        /* primitive id: position in the author's order, decides ties; of shapes the last */
-    u32 shape;     /* 1 + the index of its CrtShape; 0: a triangle */
+    u32 shape;     /* 0: a triangle; CRT_SLOT_INSTANCE + index of a CrtInstance; 1 + that of a CrtShape */
     u32 reserved;
 } CrtTriangle;
 CRT_ASSERT_SIZE(CrtTriangle, 48);
+
+#define CRT_SLOT_INSTANCE 0x80000000u
+
+/* A mesh in one of its places. Its triangles, in coordinates of their own, within ±1, are behind those of
+   the slots, in leaf order; their `id` is the number of their primitive, and of its texture coordinates and
+   colours. to_world makes of them triangles as others are; to_mesh takes rays to their boxes, which grow by
+   crt_instance_slack for what is rounded on the way. */
+typedef struct CrtInstance {
+    f32 to_world[12]; /* rows of x, y, z: x, y, z, 1 */
+    f32 to_mesh[12];
+    f32 slack_per_length, slack;
+    f32 facing;          /* -1: mirrored */
+    u32 root;            /* in mesh_nodes */
+    u32 first_primitive; /* of the mesh */
+    u32 first_id;        /* of the instance's triangles, as primitives of the scene */
+    u32 reserved[2];
+} CrtInstance;
+CRT_ASSERT_SIZE(CrtInstance, 128);
 
 #define CRT_SHAPE_SPHERE 0u   /* around the centre */
 #define CRT_SHAPE_DISK 1u     /* in the plane of x and y */
@@ -447,7 +465,7 @@ typedef struct CrtScene {
 
     CrtSeed seed;
 
-    u32 triangle_count; /* slots: triangles and shapes */
+    u32 triangle_count; /* slots: triangles, shapes and instances */
     u32 tree_lights; /* the first of the lights, between which the tree chooses; 0: there is none */
 
     CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
@@ -477,8 +495,10 @@ typedef struct CrtScene {
     CrtCamera camera;
 
     CrtSpan shapes;              /* CrtShape. Where slots are in the order of ids, theirs are the last */
+    CrtSpan instances;           /* CrtInstance */
+    CrtSpan mesh_nodes;          /* CrtNode4 of the meshes that are instanced */
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 416);
+CRT_ASSERT_SIZE(CrtScene, 432);
 
 CRT_KERNEL_END
 

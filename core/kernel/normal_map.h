@@ -33,8 +33,9 @@ CRT_FN vec3 crt_mapped_normal(const CrtContext *ctx, const CrtSurface *surface, 
     CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[surface->at.id].uv;
     const vec4 texel = crt_image(ctx, &map, &surface->at, splat4(0.0f));
     /* Along the picture's rows to the right, and up its columns. */
-    const vec3 o = crt_triangle_vertex(triangle, 0u);
-    vec3 e1 = crt_triangle_vertex(triangle, 1u) - o, e2 = crt_triangle_vertex(triangle, 2u) - o;
+    const vec3 o = crt_corner(ctx, triangle, surface->instance, 0u);
+    vec3 e1 = crt_corner(ctx, triangle, surface->instance, 1u) - o;
+    vec3 e2 = crt_corner(ctx, triangle, surface->instance, 2u) - o;
     f32 u1 = uv[1] - uv[0], u2 = uv[2] - uv[0], v1 = uv[4] - uv[3], v2 = uv[5] - uv[3];
     if (CRT_HAS(SHAPES) && triangle->shape != 0u) {
         crt_edges_of_shape(ctx, triangle, surface->p, &e1, &e2);

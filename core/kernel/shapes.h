@@ -128,24 +128,8 @@ CRT_FN void crt_test_shape_closest(const CrtContext *ctx, CRT_GLOBAL const CrtTr
         best->b2 = hit.b2;
         best->slot = slot;
         best->id = record->id;
+        if (CRT_HAS(INSTANCES)) best->instance = 0u;
     }
-}
-
-/* crt_test_closest of whatever is in the slot. */
-CRT_FN void crt_test_slot(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
-                          CrtRay ray, CrtShear shear, CrtHit *best) {
-    if (CRT_HAS(SHAPES) && triangles[slot].shape != 0u)
-        crt_test_shape_closest(ctx, triangles + slot, slot, ray, best);
-    else
-        crt_test_closest(triangles, slot, shear, best);
-}
-
-/* Whether what is in the slot stops the ray. */
-CRT_FN int crt_slot_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
-                          CrtRay ray, CrtShear shear, CrtHit *hit) {
-    if (CRT_HAS(SHAPES) && triangles[slot].shape != 0u)
-        return crt_intersect_shape(crt_shape_of(ctx, triangles[slot].shape - 1u), ray, ray.reach, hit);
-    return crt_intersect_triangle(triangles + slot, shear, ray.reach, hit);
 }
 
 /* The shapes of a scene whose slots are in the order of ids. */

@@ -11,7 +11,7 @@ CRT_KERNEL_BEGIN
 
 /* A place on a triangle or a shape, as textures are asked for it. */
 typedef struct CrtFacePlace {
-    u32 id;     /* primitive id; for tangents, too */
+    u32 id;     /* number of the primitive, of an instance that of its mesh; for tangents, too */
     f32 b1, b2; /* barycentrics of the second and third vertex; triangles alone */
     f32 u, v;   /* texture coordinates; 0 where the mesh has none */
 } CrtFacePlace;
@@ -24,11 +24,22 @@ typedef struct CrtSurface {
     u32 material;
     u32 light;     /* CRT_NONE: it does not emit */
     u32 slot;      /* in the triangle array; for tangents only */
+    u32 instance;  /* as of CrtHit; for tangents only */
     CrtFacePlace at; /* of p; for tangents and textures only */
 } CrtSurface;
 
 CRT_FN vec3 crt_triangle_vertex(CRT_GLOBAL const CrtTriangle *triangle, u32 i) {
     return make_vec3(triangle->p[i], triangle->p[3u + i], triangle->p[6u + i]);
+}
+
+/* A corner of a triangle, in the scene. `instance` is that of the hit. */
+CRT_FN vec3 crt_corner(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangle, u32 instance, u32 i) {
+    if (CRT_HAS(INSTANCES) && instance != 0u) {
+        CRT_GLOBAL const f32 *m = crt_instance(ctx, instance - 1u)->to_world;
+        const f32 x = triangle->p[i], y = triangle->p[3u + i], z = triangle->p[6u + i];
+        return make_vec3(crt_place(m, x, y, z), crt_place(m + 4, x, y, z), crt_place(m + 8, x, y, z));
+    }
+    return crt_triangle_vertex(triangle, i);
 }
 
 /* Rounding of the triangle test, relative to the triangle's size, that an origin must be clear of. Measured
@@ -142,6 +153,7 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
     s.material = primitive->material;
     s.light = primitive->light;
     if (CRT_HAS(ANISOTROPY)) s.slot = hit.slot;
+    if (CRT_HAS(INSTANCES)) s.instance = 0u;
     if (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY)) s.at.id = hit.id;
     if (CRT_HAS(TEXTURE)) {
         s.at.b1 = s.at.b2 = 0.0f;
@@ -150,14 +162,57 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
     return s;
 }
 
+/* The number of the primitive that was hit, of an instance that of its mesh. */
+CRT_FN u32 crt_primitive_of(const CrtContext *ctx, CrtHit hit) {
+    if (CRT_HAS(INSTANCES) && hit.instance != 0u)
+        return CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles)[hit.slot].id;
+    return hit.id;
+}
+
+CRT_FN f32 crt_largest(vec3 v) { return crt_max(V3X(v), crt_max(V3Y(v), V3Z(v))); }
+
+/* The plane of a triangle of an instance: what CrtFace has of others, from the same rules. */
+CRT_FN CrtFace crt_placed_face(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangle, u32 instance) {
+    const vec3 o = crt_corner(ctx, triangle, instance, 0u);
+    const vec3 p = crt_corner(ctx, triangle, instance, 1u), q = crt_corner(ctx, triangle, instance, 2u);
+    const vec3 a = p - o, b = q - o;
+    const f32 coordinate =
+        crt_max(crt_largest(abs3(o)), crt_max(crt_largest(abs3(p)), crt_largest(abs3(q))));
+    const f32 size = crt_largest(abs3(a) + abs3(b));
+    const vec3 n = cross3(a, b);
+    const f32 twice_area = length3(n);
+    const f32 scale =
+        twice_area > 0.0f ? crt_instance(ctx, instance - 1u)->facing / twice_area : 0.0f;
+    CrtFace face;
+    face.normal[0] = V3X(n) * scale;
+    face.normal[1] = V3Y(n) * scale;
+    face.normal[2] = V3Z(n) * scale;
+    face.clearance = crt_clearance(coordinate, size);
+    face.margin = crt_edge_margin(coordinate, size, twice_area);
+    return face;
+}
+
+/* The unit normal of a mesh at a corner, in the scene. */
+CRT_FN vec3 crt_placed_normal(const CrtContext *ctx, u32 instance, vec3 n) {
+    CRT_GLOBAL const f32 *m = crt_instance(ctx, instance - 1u)->to_mesh;
+    const vec3 placed = make_vec3(crt_fma(m[0], V3X(n), crt_fma(m[4], V3Y(n), m[8] * V3Z(n))),
+                                  crt_fma(m[1], V3X(n), crt_fma(m[5], V3Y(n), m[9] * V3Z(n))),
+                                  crt_fma(m[2], V3X(n), crt_fma(m[6], V3Y(n), m[10] * V3Z(n))));
+    return placed / length3(placed);
+}
+
 CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     CRT_GLOBAL const CrtTriangle *triangle =
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + hit.slot;
     if (CRT_HAS(SHAPES) && triangle->shape != 0u)
         return crt_shape_surface(ctx, crt_shape_of(ctx, triangle->shape - 1u), hit);
-    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + hit.slot;
+    CrtFace placed;
+    if (CRT_HAS(INSTANCES) && hit.instance != 0u) placed = crt_placed_face(ctx, triangle, hit.instance);
+    else placed = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces)[hit.slot];
+    const CrtFace *face = &placed;
+    const u32 id = crt_primitive_of(ctx, hit);
     CRT_GLOBAL const CrtPrimitive *primitive =
-        CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + hit.id;
+        CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + id;
     f32 b0 = 1.0f - hit.b1 - hit.b2;
     f32 b1 = hit.b1;
     f32 b2 = hit.b2;
@@ -171,21 +226,23 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
         b2 *= scale;
     }
     CrtSurface s;
-    s.p = crt_fma3(crt_triangle_vertex(triangle, 0u), b0,
-                   crt_fma3(crt_triangle_vertex(triangle, 1u), b1, crt_triangle_vertex(triangle, 2u) * b2));
-    s.ng = crt_load3(face->normal);
+    s.p = crt_fma3(crt_corner(ctx, triangle, hit.instance, 0u), b0,
+                   crt_fma3(crt_corner(ctx, triangle, hit.instance, 1u), b1,
+                            crt_corner(ctx, triangle, hit.instance, 2u) * b2));
+    s.ng = make_vec3(face->normal[0], face->normal[1], face->normal[2]);
     s.clearance = face->clearance;
     s.ns = s.ng;
     s.material = primitive->material;
     s.light = primitive->light;
     if (CRT_HAS(ANISOTROPY)) s.slot = hit.slot;
-    if (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY)) s.at.id = hit.id;
+    if (CRT_HAS(INSTANCES)) s.instance = hit.instance;
+    if (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY)) s.at.id = id;
     if (CRT_HAS(TEXTURE)) {
         s.at.b1 = b1;
         s.at.b2 = b2;
         s.at.u = s.at.v = 0.0f;
         if (ctx->scene->uvs.count != 0u) {
-            CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[hit.id].uv;
+            CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[id].uv;
             s.at.u = crt_fma(uv[0], b0, crt_fma(uv[1], b1, uv[2] * b2));
             s.at.v = crt_fma(uv[3], b0, crt_fma(uv[4], b1, uv[5] * b2));
         }
@@ -193,9 +250,13 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     if (CRT_HAS(SMOOTH_NORMALS) && primitive->normals != CRT_NONE) {
         CRT_GLOBAL const CrtNormals *n =
             CRT_ARRAY(CrtNormals, ctx->blob, ctx->scene->normals) + primitive->normals;
-        const vec3 ns = make_vec3(n->n[0] * b0 + n->n[1] * b1 + n->n[2] * b2,
-                                  n->n[3] * b0 + n->n[4] * b1 + n->n[5] * b2,
-                                  n->n[6] * b0 + n->n[7] * b1 + n->n[8] * b2);
+        vec3 ns = make_vec3(n->n[0] * b0 + n->n[1] * b1 + n->n[2] * b2,
+                            n->n[3] * b0 + n->n[4] * b1 + n->n[5] * b2,
+                            n->n[6] * b0 + n->n[7] * b1 + n->n[8] * b2);
+        if (CRT_HAS(INSTANCES) && hit.instance != 0u)
+            ns = crt_fma3(crt_placed_normal(ctx, hit.instance, make_vec3(n->n[0], n->n[3], n->n[6])), b0,
+                 crt_fma3(crt_placed_normal(ctx, hit.instance, make_vec3(n->n[1], n->n[4], n->n[7])), b1,
+                          crt_placed_normal(ctx, hit.instance, make_vec3(n->n[2], n->n[5], n->n[8])) * b2));
         const f32 length = length3(ns);
         /* Opposite normals can cancel: then the geometric one stands. */
         if (length > 1e-6f) {

@@ -127,6 +127,8 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
                        {"objects", compiled.objects},
                        {"triangles", compiled.triangles},
                        {"shapes", compiled.shapes},
+                       {"instances", compiled.instances},
+                       {"instanced_triangles", compiled.instanced_triangles},
                        {"emitters", compiled.emitters},
                        {"nodes", compiled.nodes},
                        {"images", compiled.images},

@@ -214,9 +214,13 @@ std::optional<double> evenScaleOf(const Matrix4d& transform);
 inline constexpr const char* kShapesStayShapes =
     "is scaled by the same factor in every direction: a transform must not stretch or shear it";
 
+/// Whether the places of an object have one copy of its mesh in common.
+enum class Sharing { Auto, Always, Never };
+
 /// A mesh or a shape, placed once per transform.
 struct Object {
     std::string name;
+    Sharing sharing = Sharing::Auto;
     std::uint32_t mesh = 0;                    ///< Index into Scene::meshes.
     std::optional<Quadric> shape{};              ///< In place of the mesh, which is an empty one then.
     std::vector<Matrix4d> transforms{kIdentity4d};

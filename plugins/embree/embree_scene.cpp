@@ -45,7 +45,7 @@ struct Query {
     CrtShear shear;
     CrtHit best;
     float reach;
-    const CrtContext* shapes;  ///< Null: there are none.
+    const CrtContext* slots;  ///< Null: all slots hold triangles.
     CrtRay ray;
 };
 
@@ -54,8 +54,8 @@ struct Query {
 void closestHit(const RTCIntersectFunctionNArguments* arguments) {
     Query& query = *reinterpret_cast<Query*>(arguments->context);
     const float before = query.best.t;
-    if (query.shapes != nullptr)
-        crt_test_slot(query.shapes, query.triangles, arguments->primID, query.ray, query.shear, &query.best);
+    if (query.slots != nullptr)
+        crt_test_slot(query.slots, query.triangles, arguments->primID, query.ray, query.shear, &query.best);
     else
         crt_test_closest(query.triangles, arguments->primID, query.shear, &query.best);
     if (query.best.t < before)
@@ -66,8 +66,8 @@ void anyHit(const RTCOccludedFunctionNArguments* arguments) {
     Query& query = *reinterpret_cast<Query*>(arguments->context);
     CrtHit hit;
     const bool stops =
-        query.shapes != nullptr
-            ? crt_slot_stops(query.shapes, query.triangles, arguments->primID, query.ray, query.shear, &hit)
+        query.slots != nullptr
+            ? crt_slot_stops(query.slots, query.triangles, arguments->primID, query.ray, query.shear, &hit)
             : crt_intersect_triangle(query.triangles + arguments->primID, query.shear, query.reach, &hit);
     if (stops) RTCRayN_tfar(arguments->ray, 1, 0) = -std::numeric_limits<float>::infinity();
 }
@@ -87,11 +87,11 @@ void slotBounds(const RTCBoundsFunctionArguments* arguments) {
     bound(2, b.lower_z, b.upper_z);
 }
 
-Query makeQuery(const CrtTriangle* triangles, const CrtContext* shapes, const CrtRay& ray) {
+Query makeQuery(const CrtTriangle* triangles, const CrtContext* slots, const CrtRay& ray) {
     Query query;
     initContext(&query.context);
     query.triangles = triangles;
-    query.shapes = shapes;
+    query.slots = slots;
     query.ray = ray;
     query.shear = crt_shear(ray);
     query.best = kernel::crt_no_hit(ray.reach);
@@ -152,7 +152,7 @@ struct Tracer::Impl {
     RTCScene scene = nullptr;
     const CrtTriangle* triangles = nullptr;
     CrtContext context{};
-    const CrtContext* shapes = nullptr;  ///< As of Query.
+    const CrtContext* slots = nullptr;  ///< As of Query.
 
     void use(const unsigned char* blob) {
         using kernel::u64;  // CRT_ARRAY computes with it
@@ -160,7 +160,7 @@ struct Tracer::Impl {
         triangles = CRT_ARRAY(CrtTriangle, blob, header.triangles);
         context.blob = blob;
         context.scene = &header;
-        shapes = header.shapes.count > 0 ? &context : nullptr;
+        slots = header.shapes.count + header.instances.count > 0 ? &context : nullptr;
     }
 };
 
@@ -201,7 +201,7 @@ bool Tracer::takes(const CrtRay& ray) {
 }
 
 CrtHit Tracer::closest(const CrtRay& ray) const {
-    Query query = makeQuery(impl_->triangles, impl_->shapes, ray);
+    Query query = makeQuery(impl_->triangles, impl_->slots, ray);
     RTCRayHit hit;
     hit.ray = embreeRay(ray);
     hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -218,7 +218,7 @@ CrtHit Tracer::closest(const CrtRay& ray) const {
 }
 
 bool Tracer::any(const CrtRay& ray) const {
-    Query query = makeQuery(impl_->triangles, impl_->shapes, ray);
+    Query query = makeQuery(impl_->triangles, impl_->slots, ray);
     RTCRay r = embreeRay(ray);
 #if RTC_VERSION_MAJOR >= 4
     RTCOccludedArguments arguments;

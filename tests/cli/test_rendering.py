@@ -135,6 +135,8 @@ class Rendering(CliTest):
                 "objects",
                 "triangles",
                 "shapes",
+                "instances",
+                "instanced_triangles",
                 "emitters",
                 "nodes",
                 "images",

@@ -79,9 +79,9 @@ const std::vector<Case>& registry() {
              {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases,
               pointLightCases, environmentCases, spectralFilmCases, stiffCases, scatteringCases,
               glasswareCases, thinFilmCases, anisotropyCases, openPbrCases, openPbrCoatCases,
-              compositionCases, shadingNormalCases, quadricCases, shapeLightCases, colourCases,
-              textureCases, accumulationCases, imageCases, inputCases, backendCases, exactRelationCases,
-              mutantCases, contactCases})
+              compositionCases, shadingNormalCases, quadricCases, instanceCases, shapeLightCases,
+              colourCases, textureCases, accumulationCases, imageCases, inputCases, backendCases,
+              exactRelationCases, mutantCases, contactCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

@@ -104,6 +104,7 @@ std::vector<Case> thinFilmCases();       ///< G, thin films
 std::vector<Case> anisotropyCases();     ///< G, brushed surfaces
 std::vector<Case> openPbrCases();        ///< G, openpbr
 std::vector<Case> openPbrCoatCases();    ///< G, coats
+std::vector<Case> instanceCases();       ///< D, meshes that are stored once and placed many times
 std::vector<Case> quadricCases();        ///< D and G, spheres, disks and cylinders
 std::vector<Case> shapeLightCases();     ///< G, lamps that are such
 std::vector<Case> colourCases();         ///< H

@@ -94,6 +94,9 @@ std::vector<Variant> variants(int resolution) {
             material.anisotropy_rotation_deg = 20;
         }
     });
+    add("instances", [](Scene& s) {
+        for (Object& object : s.objects) object.sharing = Sharing::Always;
+    });
     add("shapes", [](Scene& s) {
         for (const Quadric& shape : {Quadric{QuadricType::Sphere, 0.125, -0.125, 0.125},
                                      Quadric{QuadricType::Sphere, 0.1875, -0.0625, 0.125},

@@ -458,6 +458,7 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     object.name = fmt::format("object {}", number);
     section.read("name", object.name);
     object.transforms = readPlacements(section);
+    section.readEnum("share", object.sharing);
 
     std::string material_name;
     const bool material_given = section.read("material", material_name);

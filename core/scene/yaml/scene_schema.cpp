@@ -812,6 +812,14 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .section = "transform",
                         .fallback = "[]",
                         .doc = "One placement: steps applied in order, the first one first."},
+                       {.name = "share",
+                        .kind = Kind::Choice,
+                        .choices = {"auto", "always", "never"},
+                        .fallback = "auto",
+                        .doc = "Whether all placements have one copy of the mesh in common: the memory of "
+                               "one, and rays that are slower where both fit. `auto`: where the object "
+                               "would be more than 4 million triangles otherwise. Surfaces that emit, and "
+                               "places that flatten the mesh, never share."},
                        {.name = "transforms",
                         .kind = Kind::Section,
                         .shape = Shape::Lists,

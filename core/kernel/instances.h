@@ -1,0 +1,165 @@
+/*
+ * instances.h: meshes that are stored once and placed many times. A ray goes to the boxes of the mesh in the
+ * mesh's coordinates; a triangle goes to the ray in the scene's: its corners are rounded once, in a stated
+ * order, and the one triangle test decides, as of every other triangle. So hits are the same bits on every
+ * backend, neighbours share their corners, and what holds of triangles (offsets, watertight edges) holds of
+ * these. They differ from those of the flattened scene by the rounding of corners alone.
+ */
+#ifndef CRT_INSTANCES_H
+#define CRT_INSTANCES_H
+
+#include "boxes.h"
+
+CRT_KERNEL_BEGIN
+
+CRT_FN CRT_GLOBAL const CrtInstance *crt_instance(const CrtContext *ctx, u32 index) {
+    return CRT_ARRAY(CrtInstance, ctx->blob, ctx->scene->instances) + index;
+}
+
+/* One coordinate in the scene of a point of the mesh. */
+CRT_FN f32 crt_place(CRT_GLOBAL const f32 *row, f32 x, f32 y, f32 z) {
+    return crt_fma(row[0], x, crt_fma(row[1], y, crt_fma(row[2], z, row[3])));
+}
+
+/* That of the three corners of a triangle. */
+CRT_FN vec3 crt_place_corners(CRT_GLOBAL const f32 *row, CRT_GLOBAL const CrtTriangle *triangle) {
+    CRT_GLOBAL const f32 *p = triangle->p;
+    return make_vec3(crt_place(row, p[0], p[3], p[6]), crt_place(row, p[1], p[4], p[7]),
+                     crt_place(row, p[2], p[5], p[8]));
+}
+
+/* A direction of the scene in the mesh: without the translation. */
+CRT_FN vec3 crt_direction_to_mesh(CRT_GLOBAL const CrtInstance *instance, vec3 d) {
+    CRT_GLOBAL const f32 *m = instance->to_mesh;
+    return make_vec3(crt_fma(m[0], V3X(d), crt_fma(m[1], V3Y(d), m[2] * V3Z(d))),
+                     crt_fma(m[4], V3X(d), crt_fma(m[5], V3Y(d), m[6] * V3Z(d))),
+                     crt_fma(m[8], V3X(d), crt_fma(m[9], V3Y(d), m[10] * V3Z(d))));
+}
+
+/* A ray among the boxes of a mesh. */
+typedef struct CrtMeshRay {
+    vec3 from, to; /* its origin, moved along it by the slack, and back */
+    CrtSlab slab;
+} CrtMeshRay;
+
+CRT_FN CrtMeshRay crt_mesh_ray(CRT_GLOBAL const CrtInstance *instance, CrtRay ray) {
+    CRT_GLOBAL const f32 *m = instance->to_mesh;
+    const f32 x = V3X(ray.o), y = V3Y(ray.o), z = V3Z(ray.o);
+    const vec3 o = make_vec3(crt_place(m, x, y, z), crt_place(m + 4, x, y, z), crt_place(m + 8, x, y, z));
+    const f32 slack =
+        crt_fma(instance->slack_per_length, crt_abs(x) + crt_abs(y) + crt_abs(z), instance->slack);
+    CrtRay moved = ray;
+    moved.o = o;
+    moved.d = crt_direction_to_mesh(instance, ray.d);
+    CrtMeshRay r;
+    r.slab = crt_slab(moved);
+    const vec3 way = make_vec3(r.slab.near_x ? -slack : slack, r.slab.near_y != 2u ? -slack : slack,
+                               r.slab.near_z != 4u ? -slack : slack);
+    r.from = o + way;
+    r.to = o - way;
+    return r;
+}
+
+/* crt_intersect_triangle of a triangle of an instance. */
+CRT_FN int crt_intersect_placed(CRT_GLOBAL const CrtInstance *instance,
+                                CRT_GLOBAL const CrtTriangle *triangle,
+                                CrtShear shear, f32 limit, CrtHit *hit) {
+    return crt_intersect_corners(crt_place_corners(instance->to_world + 4u * shear.kx, triangle),
+                                 crt_place_corners(instance->to_world + 4u * shear.ky, triangle),
+                                 crt_place_corners(instance->to_world + 4u * shear.kz, triangle), shear,
+                                 limit, hit);
+}
+
+/* Tests a triangle of an instance against the best hit so far. */
+CRT_FN void crt_test_placed(CRT_GLOBAL const CrtInstance *instance, u32 index,
+                            CRT_GLOBAL const CrtTriangle *triangles, u32 slot, CrtShear shear,
+                            CrtHit *best) {
+    CRT_GLOBAL const CrtTriangle *triangle = triangles + slot;
+    CrtHit hit;
+    if (!crt_intersect_placed(instance, triangle, shear, crt_tie_limit(best->t), &hit)) return;
+    const u32 id = instance->first_id + (triangle->id - instance->first_primitive);
+    if (hit.t < best->t || id < best->id) {
+        best->t = hit.t;
+        best->b1 = hit.b1;
+        best->b2 = hit.b2;
+        best->slot = slot;
+        best->id = id;
+        best->instance = index + 1u;
+    }
+}
+
+/* The triangles of an instance against the best hit so far: bvh.h's traversal, in the mesh's coordinates. */
+CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, CrtShear shear,
+                                 CrtHit *best) {
+    CRT_GLOBAL const CrtInstance *instance = crt_instance(ctx, index);
+    CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
+    CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->mesh_nodes);
+    const CrtMeshRay mesh = crt_mesh_ray(instance, ray);
+    u32 stack[CRT_BVH_STACK];
+    f32 entry[CRT_BVH_STACK];
+    u32 size = 0u;
+    u32 current = instance->root << 4;
+    for (;;) {
+        const u32 count = current & 15u;
+        if (count == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            const vec4 t = crt_node_distances(node, mesh.from, mesh.to, mesh.slab, best->t);
+            f32 t0 = V4X(t), t1 = V4Y(t), t2 = V4Z(t), t3 = V4W(t);
+            u32 c0 = node->child[0], c1 = node->child[1], c2 = node->child[2], c3 = node->child[3];
+            CRT_SORT_CHILDREN(t0, c0, t1, c1)
+            CRT_SORT_CHILDREN(t2, c2, t3, c3)
+            CRT_SORT_CHILDREN(t0, c0, t2, c2)
+            CRT_SORT_CHILDREN(t1, c1, t3, c3)
+            CRT_SORT_CHILDREN(t1, c1, t2, c2)
+            if (t0 < CRT_INFINITY) {
+                if (t3 < CRT_INFINITY) { stack[size] = c3; entry[size] = t3; ++size; }
+                if (t2 < CRT_INFINITY) { stack[size] = c2; entry[size] = t2; ++size; }
+                if (t1 < CRT_INFINITY) { stack[size] = c1; entry[size] = t1; ++size; }
+                current = c0;
+                continue;
+            }
+        } else {
+            const u32 first = current >> 4;
+            for (u32 i = 0u; i < count; ++i)
+                crt_test_placed(instance, index, triangles, first + i, shear, best);
+        }
+        do {
+            if (size == 0u) return;
+            --size;
+        } while (entry[size] > best->t * CRT_SLAB_SLACK);
+        current = stack[size];
+    }
+}
+
+CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShear shear) {
+    CRT_GLOBAL const CrtInstance *instance = crt_instance(ctx, index);
+    CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
+    CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->mesh_nodes);
+    const CrtMeshRay mesh = crt_mesh_ray(instance, ray);
+    CrtHit hit;
+    u32 stack[CRT_BVH_STACK];
+    u32 size = 1u;
+    stack[0] = instance->root << 4;
+    while (size != 0u) {
+        --size;
+        const u32 current = stack[size];
+        const u32 count = current & 15u;
+        if (count == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            const vec4 t = crt_node_distances(node, mesh.from, mesh.to, mesh.slab, ray.reach);
+            if (V4X(t) < CRT_INFINITY) { stack[size] = node->child[0]; ++size; }
+            if (V4Y(t) < CRT_INFINITY) { stack[size] = node->child[1]; ++size; }
+            if (V4Z(t) < CRT_INFINITY) { stack[size] = node->child[2]; ++size; }
+            if (V4W(t) < CRT_INFINITY) { stack[size] = node->child[3]; ++size; }
+        } else {
+            const u32 first = current >> 4;
+            for (u32 i = 0u; i < count; ++i)
+                if (crt_intersect_placed(instance, triangles + first + i, shear, ray.reach, &hit)) return 1;
+        }
+    }
+    return 0;
+}
+
+CRT_KERNEL_END
+
+#endif
