@@ -3,12 +3,14 @@
 #include "catch.h"
 #include "base/temporary_folder.h"
 #include "scene/mesh/mesh_io.h"
+#include "scene/mesh/ply_reader.h"
 #include "file_bytes.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <iterator>
 #include <map>
 #include <sstream>
@@ -135,13 +137,151 @@ TEST_CASE("the dragon is an uneven load", "[meshgen]") {
     CHECK(area[area.size() * 99 / 100] > 10 * area[area.size() / 10]);
 }
 
+namespace {
+
+struct ExpectedPlant {
+    const char* file;
+    std::size_t triangles;
+    bool has_bark;
+    double widest;  ///< Its outermost point is nearer to the axis than this, and no nearer than half of it.
+};
+constexpr ExpectedPlant kPlants[] = {
+    {"broadleaf.obj", 70000, true, .4},
+    {"conifer.obj", 70000, true, .35},
+    {"fern.obj", 2028, true, 1.6},
+    {"grass.obj", 2800, false, 4.5},
+};
+
+/// The triangles of a plant's group, of which there may be none.
+Mesh partOf(const std::string& file, const std::string& group) {
+    std::istringstream text(slurp(file));
+    std::string part;
+    bool is_wanted = true, is_empty = true;
+    for (std::string line; std::getline(text, line);) {
+        if (line.rfind("g ", 0) == 0) is_wanted = line == "g " + group;
+        if (line[0] != 'f' || is_wanted) part += line + '\n';
+        is_empty &= line[0] != 'f' || !is_wanted;
+    }
+    if (is_empty) return {};
+    const crt::TemporaryFolder folder;
+    std::ofstream(folder / "part.obj") << part;
+    const LoadedMesh loaded = loadObj(folder / "part.obj");
+    CHECK(loaded.degenerate_faces == 0);
+    return loaded.mesh;
+}
+
+/// Its foot is at the origin, it is one unit high, and its texture coordinates are within the unit square.
+void checkPlant(const Mesh& m, const ExpectedPlant& e) {
+    double lowest = 1, highest = 0, widest = 0;
+    for (const Vec3d& p : m.positions) {
+        lowest = std::min(lowest, p[1]);
+        highest = std::max(highest, p[1]);
+        widest = std::max(widest, std::hypot(p[0], p[2]));
+    }
+    CHECK(lowest > -.05);
+    CHECK(highest == 1.0);
+    CHECK(widest < e.widest);
+    CHECK(widest > e.widest / 2);
+    REQUIRE(m.uv_index.size() == m.triangles.size());
+    for (const auto& uv : m.uvs) {
+        REQUIRE((uv[0] >= 0 && uv[0] <= 1));
+        REQUIRE((uv[1] >= 0 && uv[1] <= 1));
+    }
+}
+
+}  // namespace
+
+TEST_CASE("plants are closed wood, and leaves of two triangles", "[meshgen]") {
+    for (const ExpectedPlant& e : kPlants) {
+        CAPTURE(e.file);
+        const LoadedMesh loaded = loadObj(kMeshes + e.file);
+        CHECK(loaded.mesh.triangles.size() == e.triangles);
+        CHECK(loaded.degenerate_faces == 0);
+        checkPlant(loaded.mesh, e);
+
+        const Mesh bark = partOf(kMeshes + e.file, "bark"), leaves = partOf(kMeshes + e.file, "leaves");
+        CHECK(bark.triangles.empty() != e.has_bark);
+        CHECK(bark.triangles.size() + leaves.triangles.size() == e.triangles);
+        CHECK(openEdges(bark) == 0);
+        if (e.has_bark) {
+            CHECK(volume(bark) > 0);
+            CHECK(agreement(bark) > 0.95);
+        }
+        // The triangles of a leaf meet at its midrib, from root to tip, in one sense.
+        REQUIRE(leaves.triangles.size() % 2 == 0);
+        for (std::size_t i = 0; i < leaves.triangles.size(); i += 2) {
+            const auto &right = leaves.triangles[i], &left = leaves.triangles[i + 1];
+            REQUIRE(right[0] == left[0]);
+            REQUIRE(right[2] == left[1]);
+            REQUIRE(dot(areaVector(leaves, right), areaVector(leaves, left)) > 0);
+        }
+    }
+}
+
+TEST_CASE("a tree is of its seed, and of as many triangles as are asked for", "[meshgen]") {
+    const crt::TemporaryFolder folder;
+    for (const std::string species : {"", " --conifer"}) {
+        CAPTURE(species);
+        const auto make = [&](const std::string& numbers) {
+            return std::system((kMeshgen + "--tree " + numbers + " '" + folder / "tree.obj" + "'" + species +
+                                " 2> '" + folder / "error.txt" + "'")
+                                   .c_str());
+        };
+        REQUIRE(make("1 70000") == 0);
+        CHECK((slurp(folder / "tree.obj") ==
+               slurp(kMeshes + (species.empty() ? "broadleaf.obj" : "conifer.obj"))));
+        REQUIRE(make("2 30000") == 0);
+        const Mesh one = loadObj(folder / "tree.obj").mesh;
+        CHECK(one.triangles.size() == 30000);
+        CHECK(openEdges(partOf(folder / "tree.obj", "bark")) == 0);
+        REQUIRE(make("3 30000") == 0);
+        CHECK(loadObj(folder / "tree.obj").mesh.positions != one.positions);
+        // Fewer than the wood alone has; and an odd number.
+        CHECK(make("1 1000") != 0);
+        CHECK_THAT(slurp(folder / "error.txt"), Contains("need more than that"));
+        CHECK(make("1 70001") != 0);
+    }
+}
+
+TEST_CASE("the ground of the forest has a trail, and a colour everywhere", "[meshgen]") {
+    const Mesh m = loadPly(kMeshes + "terrain.ply").mesh;
+    CHECK(m.triangles.size() == 80000);
+    REQUIRE(m.colors.size() == m.positions.size());
+    REQUIRE(m.normal_index.size() == m.triangles.size());
+    for (const auto& t : m.triangles) REQUIRE(areaVector(m, t)[1] > 0);
+    for (const Vec3d& n : m.normals) REQUIRE(n[1] > .5);
+    // The sand at its beginning is the brightest of the first row.
+    std::size_t brightest = 0;
+    for (std::size_t j = 1; j <= 200; ++j)
+        if (m.colors[j][0] > m.colors[brightest][0]) brightest = j;
+    CHECK(std::abs(m.positions[brightest][0]) < .01);
+    CHECK(m.positions[100][1] == 0);
+}
+
 TEST_CASE("every run writes the same bytes", "[meshgen]") {
     const crt::TemporaryFolder folder;
     REQUIRE(std::system((kMeshgen + "'" + folder.path() + "'").c_str()) == 0);
-    for (const Expected& e : kExpected) {
-        CAPTURE(e.file);
-        CHECK((slurp(folder / e.file) == slurp(kMeshes + e.file)));
+    std::size_t files = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(kMeshes)) {
+        const std::string file = entry.path().filename();
+        CAPTURE(file);
+        CHECK((slurp(folder / file) == slurp(kMeshes + file)));
+        ++files;
     }
+    CHECK(files == 11);
+}
+
+TEST_CASE("the bytes of plants and ground are the same on every machine", "[meshgen]") {
+    const auto hash = [](const std::string& file) {  // FNV-1a
+        std::uint64_t h = 0xcbf29ce484222325u;
+        for (const char c : slurp(kMeshes + file)) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+        return h;
+    };
+    CHECK(hash("broadleaf.obj") == 0xa2bfee0502acad63u);
+    CHECK(hash("conifer.obj") == 0x2d135d66fcc86954u);
+    CHECK(hash("fern.obj") == 0xd36bb3869224d3fcu);
+    CHECK(hash("grass.obj") == 0x2ca15a8e23a14be0u);
+    CHECK(hash("terrain.ply") == 0x20f3ff96ed21db37u);
 }
 
 TEST_CASE("options are not taken for the name of a folder", "[meshgen]") {

@@ -79,11 +79,14 @@ void writePly(const Mesh& mesh, const std::filesystem::path& path) {
         "ply\nformat binary_little_endian 1.0\ncomment written by crt-meshgen\nelement vertex " +
         std::to_string(mesh.positions.size()) + "\nproperty float x\nproperty float y\nproperty float z\n";
     if (!mesh.normals.empty()) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
+    if (!mesh.colors.empty()) bytes += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     bytes += "element face " + std::to_string(mesh.triangles.size()) +
              "\nproperty list uchar int vertex_indices\nend_header\n";
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         append(bytes, mesh.positions[i]);
         if (!mesh.normals.empty()) append(bytes, mesh.normals[i]);
+        if (!mesh.colors.empty())
+            for (const std::uint8_t c : mesh.colors[i]) append(bytes, c);
     }
     for (const auto& triangle : mesh.triangles) {
         append(bytes, std::uint8_t{3});

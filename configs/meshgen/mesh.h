@@ -13,6 +13,7 @@ namespace crt::meshgen {
 struct Mesh {
     std::vector<Vec> positions;
     std::vector<Vec> normals;  ///< One per position, or empty for flat faces.
+    std::vector<std::array<std::uint8_t, 3>> colors;  ///< sRGB, one per position, or empty.
     std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 

@@ -1,5 +1,5 @@
 /// The meshes that crt-meshgen writes. Each stands on y = 0, is centred in x and z, has height 1 and
-/// faces −z.
+/// faces −z, where nothing else is said.
 #pragma once
 
 #include "mesh.h"
@@ -24,5 +24,9 @@ Mesh dragon();
 
 /// A height field of waves, x and z from -1/2 to 1/2, of 2 cells² triangles.
 Mesh grid(std::uint32_t cells, bool with_normals);
+
+/// The ground of a forest, x and z from -1/2 to 1/2: knolls, a trail that winds along z through (0, 0, -1/2)
+/// at height 0, and a slope at the far end. Colours of vertices: litter, moss and the sand of the trail.
+Mesh terrain();
 
 }  // namespace crt::meshgen
