@@ -64,6 +64,8 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     });
     seen |= differs(CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE,
                     [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Bvh; });
+    seen |= differs(CRT_FEATURE_INSTANCES | CRT_FEATURE_BVH, CRT_FEATURE_BRUTE_FORCE,
+                    [](Scene& s) { s.objects[0].sharing = crt::Sharing::Always; });
     seen |= differs(CRT_FEATURE_AABB, CRT_FEATURE_BRUTE_FORCE,
                     [](Scene& s) { s.integrator.accelerator = crt::Accelerator::Aabb; });
     const auto other = [](crt::MaterialType type) {
