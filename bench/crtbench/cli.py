@@ -11,6 +11,7 @@ from . import (
     cpu_speed,
     false_alarms,
     figure2,
+    instances,
     leave_out,
     meshes,
     mtl_agreement,
@@ -33,6 +34,7 @@ COMMANDS = {
     "leave-out": (leave_out, "what leaving features out of the kernel saves, bit by bit"),
     "accelerators": (accelerators, "loop, object boxes and BVH; from how many triangles on the BVH wins"),
     "figure2": (figure2, "render time against samples per pixel, at 1440² and 2880²"),
+    "instances": (instances, "one mesh in ten thousand places: memory, time, rays, bits"),
     "stability": (stability, "sweeps to where the arithmetic ends; --scenes names sweeps instead of scenes"),
     "robustness": (robustness, "what the watertight triangle test and the offsets cost, and what they buy"),
     "calibration": (

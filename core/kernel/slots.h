@@ -15,7 +15,8 @@ CRT_KERNEL_BEGIN
 /* crt_test_closest of whatever is in the slot. */
 CRT_FN void crt_test_slot(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
                           CrtRay ray, CrtShear shear, CrtHit *best) {
-    const u32 shape = CRT_HAS_SLOTS ? triangles[slot].shape : 0u;
+    u32 shape = 0u;
+    if (CRT_HAS_SLOTS) shape = triangles[slot].shape;
     if (CRT_HAS(INSTANCES) && shape >= CRT_SLOT_INSTANCE)
         crt_instance_closest(ctx, shape - CRT_SLOT_INSTANCE, ray, shear, best);
     else if (CRT_HAS(SHAPES) && shape != 0u)
@@ -27,7 +28,8 @@ CRT_FN void crt_test_slot(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *t
 /* Whether what is in the slot stops the ray. */
 CRT_FN int crt_slot_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
                           CrtRay ray, CrtShear shear, CrtHit *hit) {
-    const u32 shape = CRT_HAS_SLOTS ? triangles[slot].shape : 0u;
+    u32 shape = 0u;
+    if (CRT_HAS_SLOTS) shape = triangles[slot].shape;
     if (CRT_HAS(INSTANCES) && shape >= CRT_SLOT_INSTANCE)
         return crt_instance_any(ctx, shape - CRT_SLOT_INSTANCE, ray, shear);
     if (CRT_HAS(SHAPES) && shape != 0u)

@@ -206,21 +206,20 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + hit.slot;
     if (CRT_HAS(SHAPES) && triangle->shape != 0u)
         return crt_shape_surface(ctx, crt_shape_of(ctx, triangle->shape - 1u), hit);
-    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + hit.slot;
-    const int is_placed = CRT_HAS(INSTANCES) && hit.instance != 0u; /* then it has no CrtFace */
-    CrtFace placed;
-    if (is_placed) placed = crt_placed_face(ctx, triangle, hit.instance);
-    const f32 margin = is_placed ? placed.margin : face->margin;
+    /* A pointer, or each number chosen by itself, costs the full kernel 120 bytes of spilled registers. */
+    CrtFace face;
+    if (CRT_HAS(INSTANCES) && hit.instance != 0u) face = crt_placed_face(ctx, triangle, hit.instance);
+    else face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces)[hit.slot];
     const u32 id = crt_primitive_of(ctx, hit);
     CRT_GLOBAL const CrtPrimitive *primitive =
         CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + id;
     f32 b0 = 1.0f - hit.b1 - hit.b2;
     f32 b1 = hit.b1;
     f32 b2 = hit.b2;
-    if (crt_min(b0, crt_min(b1, b2)) < margin) { /* rare: drawn in from the edge */
-        b0 = crt_max(b0, margin);
-        b1 = crt_max(b1, margin);
-        b2 = crt_max(b2, margin);
+    if (crt_min(b0, crt_min(b1, b2)) < face.margin) { /* rare: drawn in from the edge */
+        b0 = crt_max(b0, face.margin);
+        b1 = crt_max(b1, face.margin);
+        b2 = crt_max(b2, face.margin);
         const f32 scale = 1.0f / (b0 + b1 + b2);
         b0 *= scale;
         b1 *= scale;
@@ -230,9 +229,8 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     s.p = crt_fma3(crt_corner(ctx, triangle, hit.instance, 0u), b0,
                    crt_fma3(crt_corner(ctx, triangle, hit.instance, 1u), b1,
                             crt_corner(ctx, triangle, hit.instance, 2u) * b2));
-    s.ng = is_placed ? make_vec3(placed.normal[0], placed.normal[1], placed.normal[2])
-                     : crt_load3(face->normal);
-    s.clearance = is_placed ? placed.clearance : face->clearance;
+    s.ng = make_vec3(face.normal[0], face.normal[1], face.normal[2]);
+    s.clearance = face.clearance;
     s.ns = s.ng;
     s.material = primitive->material;
     s.light = primitive->light;
