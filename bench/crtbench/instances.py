@@ -13,7 +13,7 @@ def text(places, side, share, size):
     """Trees in random places of a square, turned and scaled; always the same ones."""
     number = random.Random(1)
     rows = "".join(
-        f"      - [{{scale: {number.uniform(0.6, 1.3):.4f}}}, {{rotate: {{axis: [0, 1, 0], angle_deg: "
+        f"      - [{{scale: {number.uniform(20, 36):.4f}}}, {{rotate: {{axis: [0, 1, 0], angle_deg: "
         f"{number.uniform(0, 360):.2f}}}}}, {{translate: [{number.uniform(-side, side):.3f}, 0, "
         f"{number.uniform(-side, side):.3f}]}}]\n"
         for _ in range(places)
