@@ -470,12 +470,7 @@ void addInstances(crt::Scene& scene) {
         for (const crt::Matrix4d& m : {crt::Matrix4d{0.3, 0, 0.4, 0.1, 0.4, 0, -0.3, 0.5, 0, 0.75, 0, 0.1,
                                                      0, 0, 0, 1},
                                        {-0.5, 0, 0, 0.9, 0, 0.25, 0, 0.55, 0, 0, 0.5, 0.3, 0, 0, 0, 1}}) {
-            crt::Matrix4d moved{};
-            for (std::size_t row = 0; row < 4; ++row)
-                for (std::size_t column = 0; column < 4; ++column)
-                    for (std::size_t k = 0; k < 4; ++k)
-                        moved[4 * row + column] += m[4 * row + k] * first[4 * k + column];
-            object.transforms.push_back(moved);
+            object.transforms.push_back(crt::multiply(m, first));
         }
     }
 }

@@ -66,6 +66,14 @@ inline crt::Vec3d cross(const crt::Vec3d& a, const crt::Vec3d& b) {
 /// A unit vector in float, as near to v as rounding once allows.
 inline vec3 unitFloat(const crt::Vec3d& v) { return toFloat(unit(v)); }
 
+inline CrtRay rayOf(vec3 o, vec3 d, f32 reach = CRT_INFINITY) {
+    CrtRay ray;
+    ray.o = o;
+    ray.d = d;
+    ray.reach = reach;
+    return ray;
+}
+
 /// What crt_hash does, undone: its multipliers' inverses modulo 2^32, and its shifts in the other order.
 inline u32 unhash(u32 x) {
     const auto inverse = [](u32 odd) {

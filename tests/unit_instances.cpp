@@ -99,14 +99,6 @@ const std::vector<Vec3d> kGentle{{0.3, 0.3, 0.3}, {0.5, 0.4, 0.6}, {-0.3, 0.5, 0
 const std::vector<Vec3d> kHarsh{{1, 1e-3, 1e-3},    {1, 1, 1e-3},   {1e-4, 1e-4, 1e-4}, {-1, -2, -0.01},
                                 {1e-6, 1e-6, 1e-6}, {30, 30, 0.02}, {-5e-3, 5, 5}};
 
-CrtRay rayOf(vec3 o, vec3 d, f32 reach = CRT_INFINITY) {
-    CrtRay ray;
-    ray.o = o;
-    ray.d = d;
-    ray.reach = reach;
-    return ray;
-}
-
 /// Slots of the triangles of an instance's mesh, which are behind those of the scene, as primitives are
 /// behind those of its triangles and shapes.
 struct MeshSlots {

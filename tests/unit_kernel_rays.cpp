@@ -45,14 +45,6 @@ Mesh soup(Random& random, std::uint32_t count) {
     return mesh;
 }
 
-CrtRay rayOf(vec3 o, vec3 d, f32 reach = CRT_INFINITY) {
-    CrtRay ray;
-    ray.o = o;
-    ray.d = d;
-    ray.reach = reach;
-    return ray;
-}
-
 bool sameBits(const CrtHit& a, const CrtHit& b) {
     return a.id == b.id && crt_bits(a.t) == crt_bits(b.t) && crt_bits(a.b1) == crt_bits(b.b1) &&
            crt_bits(a.b2) == crt_bits(b.b2);

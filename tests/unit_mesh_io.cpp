@@ -2,6 +2,7 @@
 #include "base/error.h"
 #include "captured_log.h"
 #include "catch.h"
+#include "refused_file.h"
 #include "base/temporary_folder.h"
 #include "scene/mesh/mesh_io.h"
 
@@ -20,18 +21,8 @@ LoadedMesh loadText(const std::string& text) {
 }
 
 void checkRefused(const std::string& text, int line, const char* words) {
-    const TemporaryFolder folder;
-    const std::string path = folder.write("mesh.obj", text);
-    CAPTURE(text);
-    try {
-        loadObj(path);
-        FAIL_CHECK("accepted");
-    } catch (const Error& e) {
-        CHECK(e.kind() == ErrorKind::Scene);
-        CHECK_THAT(e.what(), Contains(words));
-        CHECK(e.place().file == path);
-        CHECK(e.place().line == line);
-    }
+    crt::test::checkRefusedFile("mesh.obj", text, line, words,
+                                [](const std::string& path) { loadObj(path); });
 }
 
 double area(const Mesh& mesh) {

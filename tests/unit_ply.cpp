@@ -7,6 +7,7 @@
 #include "base/temporary_folder.h"
 #include "captured_log.h"
 #include "catch.h"
+#include "refused_file.h"
 #include "scene/mesh/ply_reader.h"
 #include "scene_texts.h"
 
@@ -37,18 +38,8 @@ LoadedMesh loadText(const std::string& text, const PlyOptions& options = {}) {
 }
 
 void checkRefused(const std::string& text, int line, const std::string& words) {
-    const TemporaryFolder folder;
-    const std::string path = folder.write("mesh.ply", text);
-    CAPTURE(words);
-    try {
-        loadPly(path);
-        FAIL_CHECK("accepted");
-    } catch (const Error& e) {
-        CHECK(e.kind() == ErrorKind::Scene);
-        CHECK_THAT(e.what(), Contains(words));
-        CHECK(e.place().file == path);
-        CHECK(e.place().line == line);
-    }
+    crt::test::checkRefusedFile("mesh.ply", text, line, words,
+                                [](const std::string& path) { loadPly(path); });
 }
 
 /// Writes numbers as a type says: text, or bytes of either order.

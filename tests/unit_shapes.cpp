@@ -73,14 +73,6 @@ void addFarTriangle(Scene& scene, double far) {
     scene.objects.back().mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
 }
 
-CrtRay rayOf(vec3 o, vec3 d, f32 reach = CRT_INFINITY) {
-    CrtRay ray;
-    ray.o = o;
-    ray.d = d;
-    ray.reach = reach;
-    return ray;
-}
-
 /// Some direction of a hemisphere, every third nearly along its rim.
 vec3 leaving(vec3 n, Random& random) {
     const Vec3d normal = toDouble(n), away = random.direction();

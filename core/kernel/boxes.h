@@ -86,6 +86,34 @@ CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, vec3 from, vec3 
         cb = c_swap;                      \
     }
 
+/* Of the children that a ray enters at t the nearest becomes `current`; the others go onto the stack, the
+   farthest first. 0: it enters none. */
+CRT_FN int crt_enter_nearest(CRT_GLOBAL const CrtNode4 *node, vec4 t, u32 *stack, f32 *entry, u32 *size,
+                             u32 *current) {
+    f32 t0 = V4X(t), t1 = V4Y(t), t2 = V4Z(t), t3 = V4W(t);
+    u32 c0 = node->child[0], c1 = node->child[1], c2 = node->child[2], c3 = node->child[3];
+    CRT_SORT_CHILDREN(t0, c0, t1, c1)
+    CRT_SORT_CHILDREN(t2, c2, t3, c3)
+    CRT_SORT_CHILDREN(t0, c0, t2, c2)
+    CRT_SORT_CHILDREN(t1, c1, t3, c3)
+    CRT_SORT_CHILDREN(t1, c1, t2, c2)
+    if (!(t0 < CRT_INFINITY)) return 0;
+    if (t3 < CRT_INFINITY) { stack[*size] = c3; entry[*size] = t3; ++*size; }
+    if (t2 < CRT_INFINITY) { stack[*size] = c2; entry[*size] = t2; ++*size; }
+    if (t1 < CRT_INFINITY) { stack[*size] = c1; entry[*size] = t1; ++*size; }
+    *current = c0;
+    return 1;
+}
+
+/* All children that a ray enters at t go onto the stack, in any order. Returns its size. */
+CRT_FN u32 crt_enter_all(CRT_GLOBAL const CrtNode4 *node, vec4 t, u32 *stack, u32 size) {
+    if (V4X(t) < CRT_INFINITY) { stack[size] = node->child[0]; ++size; }
+    if (V4Y(t) < CRT_INFINITY) { stack[size] = node->child[1]; ++size; }
+    if (V4Z(t) < CRT_INFINITY) { stack[size] = node->child[2]; ++size; }
+    if (V4W(t) < CRT_INFINITY) { stack[size] = node->child[3]; ++size; }
+    return size;
+}
+
 /* Boxes let NaN in, so that none is lost that is touched; those of unused children too, which lead back to
    the root. A ray with a number that is none must not get there. */
 CRT_FN int crt_is_ray(CrtRay ray) {

@@ -78,14 +78,7 @@ CRT_FN void crt_test_placed(CRT_GLOBAL const CrtInstance *instance, u32 index,
     CrtHit hit;
     if (!crt_intersect_placed(instance, triangle, shear, crt_tie_limit(best->t), &hit)) return;
     const u32 id = instance->first_id + (triangle->id - instance->first_primitive);
-    if (hit.t < best->t || id < best->id) {
-        best->t = hit.t;
-        best->b1 = hit.b1;
-        best->b2 = hit.b2;
-        best->slot = slot;
-        best->id = id;
-        best->instance = index + 1u;
-    }
+    crt_keep_nearer(hit, slot, id, index + 1u, best);
 }
 
 /* The triangles of an instance against the best hit so far: bvh.h's traversal, in the mesh's coordinates. */
@@ -104,20 +97,7 @@ CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, C
         if (count == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
             const vec4 t = crt_node_distances(node, mesh.from, mesh.to, mesh.slab, best->t);
-            f32 t0 = V4X(t), t1 = V4Y(t), t2 = V4Z(t), t3 = V4W(t);
-            u32 c0 = node->child[0], c1 = node->child[1], c2 = node->child[2], c3 = node->child[3];
-            CRT_SORT_CHILDREN(t0, c0, t1, c1)
-            CRT_SORT_CHILDREN(t2, c2, t3, c3)
-            CRT_SORT_CHILDREN(t0, c0, t2, c2)
-            CRT_SORT_CHILDREN(t1, c1, t3, c3)
-            CRT_SORT_CHILDREN(t1, c1, t2, c2)
-            if (t0 < CRT_INFINITY) {
-                if (t3 < CRT_INFINITY) { stack[size] = c3; entry[size] = t3; ++size; }
-                if (t2 < CRT_INFINITY) { stack[size] = c2; entry[size] = t2; ++size; }
-                if (t1 < CRT_INFINITY) { stack[size] = c1; entry[size] = t1; ++size; }
-                current = c0;
-                continue;
-            }
+            if (crt_enter_nearest(node, t, stack, entry, &size, &current)) continue;
         } else {
             const u32 first = current >> 4;
             for (u32 i = 0u; i < count; ++i)
@@ -147,10 +127,7 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
         if (count == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
             const vec4 t = crt_node_distances(node, mesh.from, mesh.to, mesh.slab, ray.reach);
-            if (V4X(t) < CRT_INFINITY) { stack[size] = node->child[0]; ++size; }
-            if (V4Y(t) < CRT_INFINITY) { stack[size] = node->child[1]; ++size; }
-            if (V4Z(t) < CRT_INFINITY) { stack[size] = node->child[2]; ++size; }
-            if (V4W(t) < CRT_INFINITY) { stack[size] = node->child[3]; ++size; }
+            size = crt_enter_all(node, t, stack, size);
         } else {
             const u32 first = current >> 4;
             for (u32 i = 0u; i < count; ++i)

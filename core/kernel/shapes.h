@@ -122,14 +122,7 @@ CRT_FN void crt_test_shape_closest(const CrtContext *ctx, CRT_GLOBAL const CrtTr
     CrtHit hit;
     if (!crt_intersect_shape(crt_shape_of(ctx, record->shape - 1u), ray, crt_tie_limit(best->t), &hit))
         return;
-    if (hit.t < best->t || record->id < best->id) {
-        best->t = hit.t;
-        best->b1 = hit.b1;
-        best->b2 = hit.b2;
-        best->slot = slot;
-        best->id = record->id;
-        if (CRT_HAS(INSTANCES)) best->instance = 0u;
-    }
+    crt_keep_nearer(hit, slot, record->id, 0u, best);
 }
 
 /* The shapes of a scene whose slots are in the order of ids. */

@@ -25,6 +25,14 @@ namespace crt {
 /// Row-major 4×4 affine transform, points as columns.
 using Matrix4d = std::array<double, 16>;
 inline constexpr Matrix4d kIdentity4d{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+/// b, then a.
+inline Matrix4d multiply(const Matrix4d& a, const Matrix4d& b) {
+    Matrix4d m{};
+    for (std::size_t r = 0; r < 4; ++r)
+        for (std::size_t c = 0; c < 4; ++c)
+            for (std::size_t i = 0; i < 4; ++i) m[4 * r + c] += a[4 * r + i] * b[4 * i + c];
+    return m;
+}
 
 /// Perspective camera, right-handed world; image right = normalise(target − position) × up.
 struct Camera {

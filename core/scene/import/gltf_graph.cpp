@@ -12,14 +12,6 @@
 namespace crt {
 namespace {
 
-Matrix4d multiply(const Matrix4d& a, const Matrix4d& b) {
-    Matrix4d m{};
-    for (std::size_t r = 0; r < 4; ++r)
-        for (std::size_t c = 0; c < 4; ++c)
-            for (std::size_t i = 0; i < 4; ++i) m[4 * r + c] += a[4 * r + i] * b[4 * i + c];
-    return m;
-}
-
 /// glTF writes matrices by columns.
 Matrix4d byRows(const double* columns) {
     Matrix4d m;

@@ -13,14 +13,6 @@
 namespace crt {
 namespace {
 
-Matrix4d multiply(const Matrix4d& a, const Matrix4d& b) {
-    Matrix4d m{};
-    for (std::size_t r = 0; r < 4; ++r)
-        for (std::size_t c = 0; c < 4; ++c)
-            for (std::size_t i = 0; i < 4; ++i) m[4 * r + c] += a[4 * r + i] * b[4 * i + c];
-    return m;
-}
-
 bool isZero(const Vec3d& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
 bool allFinite(const Matrix4d& m) {
     return std::all_of(m.begin(), m.end(), [](double v) { return std::isfinite(v); });
