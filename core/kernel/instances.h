@@ -78,7 +78,7 @@ CRT_FN void crt_test_placed(CRT_GLOBAL const CrtInstance *instance, u32 index,
     CrtHit hit;
     if (!crt_intersect_placed(instance, triangle, shear, crt_tie_limit(best->t), &hit)) return;
     const u32 id = instance->first_id + (triangle->id - instance->first_primitive);
-    crt_keep_nearer(hit, slot, id, index + 1u, best);
+    crt_keep_nearer(hit.t, hit.b1, hit.b2, slot, id, index + 1u, best);
 }
 
 /* The triangles of an instance against the best hit so far: bvh.h's traversal, in the mesh's coordinates. */

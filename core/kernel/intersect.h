@@ -101,12 +101,13 @@ CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShe
 CRT_FN f32 crt_tie_limit(f32 t) { return t < CRT_INFINITY ? crt_next_up(t) : CRT_INFINITY; }
 
 /* Of a hit and the best so far the nearer wins, and of equally near ones the lower primitive id, so that the
-   order of testing does not show. `hit` has its distance and its place. */
-CRT_FN void crt_keep_nearer(CrtHit hit, u32 slot, u32 id, u32 instance, CrtHit *best) {
-    if (hit.t < best->t || id < best->id) {
-        best->t = hit.t;
-        best->b1 = hit.b1;
-        best->b2 = hit.b2;
+   order of testing does not show. (A CrtHit handed over costs the largest kernel 80 bytes of spilled
+   registers.) */
+CRT_FN void crt_keep_nearer(f32 t, f32 b1, f32 b2, u32 slot, u32 id, u32 instance, CrtHit *best) {
+    if (t < best->t || id < best->id) {
+        best->t = t;
+        best->b1 = b1;
+        best->b2 = b2;
         best->slot = slot;
         best->id = id;
         if (CRT_HAS(INSTANCES)) best->instance = instance;
@@ -118,7 +119,7 @@ CRT_FN void crt_test_closest(CRT_GLOBAL const CrtTriangle *triangles, u32 slot, 
                              CrtHit *best) {
     CrtHit hit;
     if (!crt_intersect_triangle(triangles + slot, shear, crt_tie_limit(best->t), &hit)) return;
-    crt_keep_nearer(hit, slot, triangles[slot].id, 0u, best);
+    crt_keep_nearer(hit.t, hit.b1, hit.b2, slot, triangles[slot].id, 0u, best);
 }
 
 CRT_FN CrtHit crt_no_hit(f32 reach) {

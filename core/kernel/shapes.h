@@ -122,7 +122,7 @@ CRT_FN void crt_test_shape_closest(const CrtContext *ctx, CRT_GLOBAL const CrtTr
     CrtHit hit;
     if (!crt_intersect_shape(crt_shape_of(ctx, record->shape - 1u), ray, crt_tie_limit(best->t), &hit))
         return;
-    crt_keep_nearer(hit, slot, record->id, 0u, best);
+    crt_keep_nearer(hit.t, hit.b1, hit.b2, slot, record->id, 0u, best);
 }
 
 /* The shapes of a scene whose slots are in the order of ids. */
