@@ -183,10 +183,11 @@ namespace {
 struct FakeRun {
     CompiledScene compiled = compileScene(
         parseScene("crt: 1\nfilm: {resolution: [6, 4]}\nenvironment: {radiance: 1}\n", "test", "."), 0);
-    Integrator integrator{loadBackend(std::string(CRT_FAKE_PLUGIN_DIR) + "/crt_backend_fake.so"), {}};
+    LoadedBackend backend = loadBackend(std::string(CRT_FAKE_PLUGIN_DIR) + "/crt_backend_fake.so");
+    DeviceGroup devices{backend, {}, probeDevices(backend)};
     TerminalWatch watch{ProgressMode::None, TerminalWatch::Signals::Always};
 
-    FakeRun() { integrator.setScene(compiled); }
+    FakeRun() { devices.setScene(compiled); }
     Film emptyFilm() const {
         return Film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
     }
@@ -198,14 +199,14 @@ TEST_CASE("a device that fails in the middle costs little") {
     unsetenv("CRT_FAKE_FAULT");
     FakeRun whole;
     Film reference = whole.emptyFilm();
-    CHECK(sampleFilm(whole.integrator, reference, {.ranges = {{0, 20}}, .target = 20}, whole.watch, [] {
+    CHECK(sampleFilm(whole.devices, reference, {.ranges = {{0, 20}}, .target = 20}, whole.watch, [] {
           }).rendered == 20);
 
     FakeRun failing;
     Film film = failing.emptyFilm();
     int checkpoints = 0;
     SamplingPlan plan{.ranges = {{0, 20}}, .target = 20, .chunk = 2, .checkpoint_interval_seconds = 1e-9};
-    const SamplingResult result = sampleFilm(failing.integrator, film, plan, failing.watch, [&] {
+    const SamplingResult result = sampleFilm(failing.devices, film, plan, failing.watch, [&] {
         if (++checkpoints == 3) setenv("CRT_FAKE_FAULT", "device", 1);
     });
     unsetenv("CRT_FAKE_FAULT");
@@ -218,7 +219,7 @@ TEST_CASE("a device that fails in the middle costs little") {
     // Going on from there gives what the undisturbed run gives.
     FakeRun second;
     plan = {.ranges = missingSamples({0, 20}, film.samples), .target = 20};
-    CHECK(sampleFilm(second.integrator, film, plan, second.watch, [] {}).stop == StopReason::Samples);
+    CHECK(sampleFilm(second.devices, film, plan, second.watch, [] {}).stop == StopReason::Samples);
     CHECK(film.samples.text() == reference.samples.text());
     for (std::uint32_t y = 0; y < 4; ++y)
         for (std::uint32_t x = 0; x < 6; ++x) CHECK(film.sum(x, y, 1) == reference.sum(x, y, 1));
@@ -230,7 +231,7 @@ TEST_CASE("a signal stops between chunks") {
     const SamplingPlan plan{
         .ranges = {{0, 20}}, .target = 20, .chunk = 3, .checkpoint_interval_seconds = 1e-9};
     const SamplingResult result =
-        sampleFilm(run.integrator, film, plan, run.watch, [] { std::raise(SIGINT); });
+        sampleFilm(run.devices, film, plan, run.watch, [] { std::raise(SIGINT); });
     CHECK(result.stop == StopReason::Interrupted);
     CHECK(result.request.cause == "SIGINT");
     CHECK(result.request.exit_code == 130);

@@ -14,7 +14,8 @@
 namespace crt {
 
 struct IntegratorOptions {
-    std::string device;           ///< "" for the best; an index or a part of a device name.
+    /// "" for the best; an index or a part of a device name. A DeviceGroup takes several, too.
+    std::string device;
     unsigned threads = 0;         ///< 0: all.
     CrtKernelChoice kernel = CRT_KERNEL_LEAN;
     unsigned tile_size = 0;       ///< 0: the backend's own.

@@ -37,14 +37,14 @@ std::string driverOf(const std::vector<CrtDevice>& devices, const std::string& d
     return {};
 }
 
-/// Takes over what the backend says about itself. Its absence is no reason to lose a
-/// render.
+/// Takes over what the backend says about itself. Its absence is no reason to lose a render.
 void askForReport(Session& session, RunFacts& facts) {
     try {
         facts.backend = session.report();
     } catch (const Error& error) {
         logWarning("no report from the backend: {}", error.what());
     }
+    facts.devices = session.group().shares();
 }
 
 /// The backend that is asked for, when it has something to do.
@@ -95,7 +95,7 @@ void prepare(Session& session, const CompiledScene& compiled, RunFacts& facts) {
     facts.prepare_seconds = preparing.seconds();
     stage.reset();
     askForReport(session, facts);
-    facts.driver = driverOf(session.devices(), arrayText(facts.backend.device));
+    facts.driver = driverOf(session.devices(), facts.devices.front().name);
     logInfo("{} on {}", backend.name, arrayText(facts.backend.device));
 }
 
@@ -110,13 +110,14 @@ void renderSamples(Session& session, const SamplingPlan& plan, Watch& watch,
     SamplingResult result;
     {
         const WatchedRendering rendering(watch);
-        result = sampleFilm(session.integrator(), run.film, sampling, watch, [&] {
+        result = sampleFilm(session.group(), run.film, sampling, watch, [&] {
             describeRun(run.identity, facts);
             checkpoints.save(run.film, run.identity);
         });
     }
     // A device that failed is not asked again; what it said before the first sample stands.
     if (result.stop != StopReason::Failed) askForReport(session, facts);
+    facts.devices = session.group().shares();
     facts.stop = result.stop;
     facts.request = result.request;
     facts.rendered_samples = result.rendered;

@@ -116,6 +116,14 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
                          {"registers", b.registers},
                          {"spill_bytes", b.spill_bytes}};
 
+    Json devices = Json::array();
+    for (const DeviceShare& device : facts.devices)
+        devices.push_back({{"name", device.name},
+                           {"samples", device.samples},
+                           {"seconds", device.seconds},
+                           {"failure", device.failure.empty() ? Json(nullptr) : Json(device.failure)}});
+    report["devices"] = std::move(devices);
+
     Json files = Json::array();
     for (const std::string& file : scene.files_read) files.push_back(file);
     report["scene"] = {{"file", scene.file},

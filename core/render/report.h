@@ -3,6 +3,7 @@
 #pragma once
 
 #include "backend/crt_backend.h"
+#include "backend/device_group.h"
 #include "compile/compile.h"
 #include "film/error_estimate.h"
 #include "film/film.h"
@@ -22,6 +23,7 @@ struct RunFacts {
     std::string backend_name, backend_path, backend_version, backend_build;
     std::string driver;
     CrtBackendReport backend{};
+    std::vector<DeviceShare> devices;
 
     double open_seconds = 0;      ///< Loading the plugin and opening its device.
     double prepare_seconds = 0;   ///< All of set_scene: upload, acceleration structure, kernel.

@@ -52,8 +52,8 @@ private:
 /// The film on the host, kept close behind the one on the device.
 class FilmReader {
 public:
-    FilmReader(Integrator& integrator, Film& film, bool independent_samples)
-        : integrator_(integrator),
+    FilmReader(DeviceGroup& devices, Film& film, bool independent_samples)
+        : devices_(devices),
           film_(film),
           independent_samples_(independent_samples),
           read_seconds_(static_cast<double>(film.sums.size() * sizeof(double)) / kReadBytesPerSecond) {
@@ -72,12 +72,12 @@ public:
     /// The same without looking at the error: the device waits for no more than the copy.
     void copy() {
         if (film_.samples.count() == 0) {
-            integrator_.readFilm(film_);
+            devices_.readFilm(film_);
         } else {
             // Beside the last one, which must stay whole should the device fail now.
             if (!next_) next_.emplace(film_.shape());
             next_->samples = SampleRanges();
-            integrator_.readFilm(*next_);
+            devices_.readFilm(*next_);
             if (before_) next_->add(*before_);
             std::swap(film_, *next_);
         }
@@ -97,7 +97,7 @@ private:
         read_at_ = Clock::now();
     }
 
-    Integrator& integrator_;
+    DeviceGroup& devices_;
     Film& film_;
     bool independent_samples_;
     std::optional<Film> before_, next_;
@@ -137,13 +137,13 @@ std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& 
     return missing;
 }
 
-SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan& plan, Watch& watch,
+SamplingResult sampleFilm(DeviceGroup& devices, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint) {
     const Clock::time_point start = Clock::now();
     Clock::time_point checkpoint_at = start;
     SamplingResult result;
     ChunkSizer sizer(plan.chunk);
-    FilmReader reader(integrator, film, plan.independent_samples);
+    FilmReader reader(devices, film, plan.independent_samples);
 
     ProgressState state;
     const std::uint64_t resumed = film.samples.count();
@@ -181,10 +181,9 @@ SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan
             now.samples += std::clamp(done, 0.0, 1.0) * static_cast<double>(count);
             now.elapsed_seconds = secondsSince(start);
             watch.progress(now);
-            return false;  // A chunk is always finished: cancelling would spoil the film on the device.
         };
         show(0);
-        integrator.render({.first_sample = first, .sample_count = count}, show);
+        devices.render({.first_sample = first, .sample_count = count}, show);
         show(1);  // Of a plugin's threads the last to finish need not be the last to have said so.
         sizer.finished(count, secondsSince(chunk_start));
         result.rendered += count;

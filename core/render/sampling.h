@@ -3,7 +3,7 @@
 /// and index, where it stops never shows in the image.
 #pragma once
 
-#include "backend/integrator.h"
+#include "backend/device_group.h"
 #include "base/error.h"
 #include "film/error_estimate.h"
 #include "film/film.h"
@@ -63,10 +63,10 @@ std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels);
 /// variances scatter, the farther the half-width lies above the estimate.
 bool reachesTarget(const Film& film, double target, bool independent_samples = false);
 
-/// Adds the plan's samples to `film`. When the backend fails, `film` holds what was last read from it, at
+/// Adds the plan's samples to `film`. When its last device fails, `film` holds what was last read from it, at
 /// most a small part of the run behind: a backend that failed cannot be asked for its film any more.
 /// `checkpoint` may save the film, which is up to date when it is called.
-SamplingResult sampleFilm(Integrator& integrator, Film& film, const SamplingPlan& plan, Watch& watch,
+SamplingResult sampleFilm(DeviceGroup& devices, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint);
 
 }  // namespace crt

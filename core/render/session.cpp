@@ -13,14 +13,14 @@ Session::Session(LoadedBackend backend, const IntegratorOptions& options)
     : backend_(std::move(backend)), options_(options) {}
 
 void Session::openDevice() {
-    if (integrator_) return;
+    if (group_) return;
     devices_ = probeDevices(backend_);  // Says better than a failing create() why there is none.
-    integrator_ = std::make_unique<Integrator>(backend_, options_);
+    group_ = std::make_unique<DeviceGroup>(backend_, options_, devices_);
 }
 
-Integrator& Session::integrator() {
-    if (!integrator_) throw Error(ErrorKind::Internal, "a session is asked for a device that is not open");
-    return *integrator_;
+DeviceGroup& Session::group() {
+    if (!group_) throw Error(ErrorKind::Internal, "a session is asked for a device that is not open");
+    return *group_;
 }
 
 CompiledScene Session::compile(const Scene& scene, std::uint32_t aovs) const {
@@ -30,21 +30,18 @@ CompiledScene Session::compile(const Scene& scene, std::uint32_t aovs) const {
 void Session::setScene(const CompiledScene& compiled, const std::function<void(double)>& progress) {
     openDevice();
     shape_.reset();
-    integrator_->setScene(compiled, progress);
+    group_->setScene(compiled, progress);
     shape_ = filmShapeOf(compiled);
 }
 
 void Session::render(const RenderRange& range, const std::function<void(double)>& progress) {
-    integrator().render(range, [&progress](double done) {
-        if (progress) progress(done);
-        return false;  // A range is always finished: cancelling would spoil the film on the device.
-    });
+    group().render(range, progress);
 }
 
 Film Session::film() {
     if (!shape_) throw Error(ErrorKind::Internal, "a session without a scene has no film");
     Film film(*shape_);
-    integrator_->readFilm(film);
+    group_->readFilm(film);
     return film;
 }
 

@@ -2,6 +2,7 @@
 /// (render.h), which makes one.
 #pragma once
 
+#include "backend/device_group.h"
 #include "backend/integrator.h"
 #include "backend/loader.h"
 #include "compile/compile.h"
@@ -27,7 +28,7 @@ public:
 
     const LoadedBackend& backend() const { return backend_; }
 
-    /// Opens the device, which the first setScene() does otherwise.
+    /// Opens the device, or the devices, which the first setScene() does otherwise.
     void openDevice();
     /// Of the backend, best first. Requires openDevice().
     const std::vector<CrtDevice>& devices() const { return devices_; }
@@ -43,15 +44,15 @@ public:
     /// Everything rendered since setScene().
     Film film();
 
-    CrtBackendReport report() { return integrator().report(); }
+    CrtBackendReport report() { return group().report(); }
     /// Requires openDevice() or setScene().
-    Integrator& integrator();
+    DeviceGroup& group();
 
 private:
     LoadedBackend backend_;
     IntegratorOptions options_;
     std::vector<CrtDevice> devices_;
-    std::unique_ptr<Integrator> integrator_;
+    std::unique_ptr<DeviceGroup> group_;
     std::optional<FilmShape> shape_;
 };
 

@@ -9,6 +9,8 @@
 //   hang    never comes back
 //   talk    a thread of the plugin warns
 //   nan_film, count_film   the film that is handed over holds a NaN, or more samples than were asked for
+//   scene_oom, read   set_scene or read_film fails
+// CRT_FAKE_FAULT_DEVICE: only that device has the fault.
 // CRT_FAKE_SCENE_SECONDS: so long takes set_scene, which says how far it is.
 // CRT_FAKE_FIRST_START_MS: so long takes the first integrator of a process, as a driver does that is not
 // loaded yet.
@@ -53,6 +55,8 @@ public:
     }
 
     void setScene(const CrtSceneBlob& blob) {
+        if (wantedFault() == "scene_oom")
+            throw PluginError(CRT_OUT_OF_MEMORY, "the scene needs 12 bytes more than there are");
         std::memcpy(&scene_, blob.data, sizeof(scene_));
         const char* seconds = std::getenv("CRT_FAKE_SCENE_SECONDS");
         for (int i = 0; seconds != nullptr && i < 100; ++i) {
@@ -89,6 +93,7 @@ public:
     }
 
     void readFilm(const CrtFilmView& film) {
+        if (wantedFault() == "read") throw PluginError(CRT_DEVICE_FAILED, "the device does not answer");
         std::copy(sums_.begin(), sums_.end(), film.sums);
         std::copy(counts_.begin(), counts_.end(), film.counts);
         if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);
@@ -106,9 +111,10 @@ public:
     }
 
 private:
-    static std::string wantedFault() {
-        const char* value = std::getenv("CRT_FAKE_FAULT");
-        return value != nullptr ? value : "";
+    std::string wantedFault() const {
+        const char *value = std::getenv("CRT_FAKE_FAULT"), *only = std::getenv("CRT_FAKE_FAULT_DEVICE");
+        if (value == nullptr || (only != nullptr && only != std::to_string(device_.index))) return "";
+        return value;
     }
 
     void renderPixel(const CrtRenderRange& range, std::uint64_t seed, std::uint32_t x, std::uint32_t y,

@@ -19,7 +19,7 @@ CRT_API_NAMESPACE_BEGIN
 struct RenderOptions {
     std::string backend =
         "auto";             ///< "cuda", "embree", "opencl", a path of a plugin; "auto": the best here.
-    std::string device{};   ///< Index or part of a device name; empty: the best.
+    std::string device{};   ///< Index or part of a device name, "0,1", or "all"; empty: the best.
     unsigned threads = 0;   ///< Host threads; 0: all. Never changes the image.
     bool use_cache = true;  ///< Of compiled kernels, on disk.
 

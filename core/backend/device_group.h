@@ -1,0 +1,72 @@
+/// One device of a backend, or several, at work on one scene.
+#pragma once
+
+#include "backend/integrator.h"
+#include "base/error.h"
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// What one device of a group did.
+struct DeviceShare {
+    std::string name;
+    std::uint64_t samples = 0;  ///< Per pixel, that it added to the film.
+    double seconds = 0;         ///< In its render calls.
+    std::string failure;        ///< Why it was dropped; empty while it works.
+};
+
+/// Which of `devices` a --device names: "all", indices as "0,2", or else one, as it stands, which the
+/// backend itself looks up. Throws crt::Error(Usage) for an index that is there twice or not at all.
+std::vector<std::string> devicesNamed(const std::string& text, const std::vector<CrtDevice>& devices);
+
+/// The verbs of an Integrator for all devices together.
+///
+/// Each device adds sample ranges to a film of its own, as many as its speed allows, and films merge
+/// exactly: which device rendered what never shows in the image. A device that fails is dropped, with a
+/// warning, and the others render again what only its own memory had. Errors of the kind Device are thrown
+/// when the last one has failed, all others at once. [owner thread]
+class DeviceGroup {
+public:
+    /// Opens them. Of "all", those that cannot be opened are left out with a warning.
+    DeviceGroup(const LoadedBackend& backend, const IntegratorOptions& options,
+                const std::vector<CrtDevice>& devices);
+    ~DeviceGroup();
+    DeviceGroup(const DeviceGroup&) = delete;
+    DeviceGroup& operator=(const DeviceGroup&) = delete;
+
+    /// Integrator::setScene. `progress` gets [0,1].
+    void setScene(const CompiledScene& scene, const std::function<void(double)>& progress = {});
+    /// Adds a range to the films of the devices. `progress` gets [0,1]. A range of all pixels is divided; a
+    /// rectangle goes to one device.
+    void render(const RenderRange& range, const std::function<void(double)>& progress = {});
+    /// Adds what all films hold to `film`, as Integrator::readFilm does. Where there are several devices the
+    /// host keeps a copy of each one's film: what a device loses that fails later is not in it.
+    void readFilm(Film& film);
+
+    /// Of all devices together: counts are sums, times those of the slowest.
+    CrtBackendReport report();
+    /// In the order in which they were named; also those that were dropped.
+    std::vector<DeviceShare> shares() const;
+
+private:
+    struct Member;
+    struct Assignment;
+
+    std::vector<Member*> working();
+    void inParallel(const std::vector<Member*>& members, const std::function<void(Member&)>& work,
+                    bool may_fail = true);
+    std::vector<Assignment> divide(const std::vector<RenderRange>& ranges);
+    std::vector<RenderRange> collectLost();
+    void renderAll(std::vector<RenderRange> ranges, const std::function<void(double)>& progress);
+
+    std::vector<std::unique_ptr<Member>> members_;
+    std::optional<Error> last_failure_;
+};
+
+}  // namespace crt
