@@ -177,6 +177,8 @@ class Rendering(CliTest):
         }
         for section, keys in expected.items():
             self.assertEqual(list(report[section]), keys, section)
+        for device in report["devices"]:
+            self.assertEqual(list(device), ["name", "samples", "seconds", "failure"])
         self.assertEqual(report["samples"]["ranges"], [[0, 16]])
         self.assertEqual(report["rays"]["paths"], 16 * 24 * 16)
         self.assertEqual(report["outputs"], ["a.pfm"])
@@ -307,6 +309,42 @@ class DeviceFailures(CliTest):
         self.assertTrue(os.path.exists(self.path("a.pfm")))
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "32", "--resume")
         self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("whole.pfm")))
+
+
+class SeveralDevices(CliTest):
+    """The two devices of `fake`. That films do not show who rendered what: unit_device_group.cpp."""
+
+    def test_all_give_the_image_of_one(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "one.pfm", "--spp", "40")
+        for devices in ("all", "0,1", "1,0"):
+            self.crt("scene.yaml", "-b", "fake", "-o", "all.pfm", "--spp", "40", "--device", devices)
+            self.assertEqual(read_bytes(self.path("one.pfm")), read_bytes(self.path("all.pfm")))
+        report = self.report("all.report.json")
+        self.assertEqual([d["name"] for d in report["devices"]], ["second pattern", "pattern"])
+        self.assertEqual(sum(d["samples"] for d in report["devices"]), 40)
+        self.assertEqual(report["backend"]["device"], "second pattern + pattern")
+
+    def test_one_that_fails_is_dropped_and_said(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "whole.pfm", "--spp", "40")
+        run = self.crt(
+            "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "40", "--device", "all",
+            fault="device", CRT_FAKE_FAULT_DEVICE="1",
+        )
+        self.assertIn("device 'second pattern' is dropped, the others go on", run.stderr)
+        self.assertIn("fell off the bus", run.stderr)
+        self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("whole.pfm")))
+        first, second = self.report("a.report.json")["devices"]
+        self.assertEqual((first["samples"], first["failure"], second["samples"]), (40, None, 0))
+        self.assertIn("fell off the bus", second["failure"])
+
+    def test_what_is_no_list_of_devices_is_refused(self):
+        for devices, sentence in (
+            ("0,0", "device 0 is named twice"),
+            ("0,7", "there is no device '7'"),
+            ("0,", "there is no device ''"),
+        ):
+            run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--device", devices, expect=2)
+            self.assert_one_error(run, sentence)
 
 
 class Light(LightTest):
