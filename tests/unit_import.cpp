@@ -242,6 +242,39 @@ TEST_CASE("Extensions of materials become keys of OpenPBR", "[gltf][import]") {
                Contains("reflectance: 0\n") && Contains("scale: 1}, two_sided: true}"));
 }
 
+// Found by the fuzzer: a factor of 3e38 became a scene that crt itself refuses.
+TEST_CASE("light beyond any use is refused at its place in the file", "[gltf][import]") {
+    const auto refusal = [](const std::function<void(GltfMaker&)>& change) -> std::string {
+        GltfMaker maker = squareFile();
+        change(maker);
+        const TemporaryFolder folder;
+        GltfFiles files;
+        try {
+            return importModel(files, folder.write("a.glb", maker.glb())).scene;
+        } catch (const Error& error) {
+            CHECK(error.kind() == ErrorKind::Scene);
+            return error.what();
+        }
+    };
+    const auto emissive = [&](double factor) {
+        return refusal([&](GltfMaker& maker) {
+            maker.add("materials", {{"emissiveFactor", {0, 0, factor}}});
+            maker.root["meshes"][0]["primitives"][0]["material"] = 0;
+        });
+    };
+    CHECK_THAT(emissive(3.4e38), Contains("/materials/0/emissiveFactor: it is beyond any use"));
+    CHECK_THAT(emissive(50), Contains("emission: {radiance: {rgb: [0, 0, 1], space: linear, scale: 50}}"));
+    const auto lamp = [&](double intensity) {
+        return refusal([&](GltfMaker& maker) {
+            maker.root["extensions"]["KHR_lights_punctual"]["lights"] = {
+                {{"type", "point"}, {"intensity", intensity}}};
+            maker.node({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+        });
+    };
+    CHECK_THAT(lamp(1e30), Contains("/lights/0: its colour or intensity is below 0, or beyond any use"));
+    CHECK_THAT(lamp(1e3), Contains("luminous_intensity_cd: 1000"));
+}
+
 // Fails when candelas and lux are not those of the file, or a light does not go along −z of its node.
 TEST_CASE("Punctual lights keep their photometric units, colour and direction", "[gltf][import]") {
     GltfMaker maker = squareFile();

@@ -347,6 +347,8 @@ void GltfMaterials::readEmission(Source& source) {
     for (std::size_t k = 0; k < 3 && k < source.material.emissiveFactor.size(); ++k)
         color[k] = std::max(source.material.emissiveFactor[k], 0.0);
     if (largestOf(color) == 0) return;
+    // Up to 1 says the standard, but older exporters put the strength here.
+    if (!(largestOf(color) < 1e6)) file_.fail(source.pointer + "/emissiveFactor", "it is beyond any use");
     const double strength = std::clamp(
         numberOf(extensionOf(source.material, "KHR_materials_emissive_strength"), "emissiveStrength", 1),
         0.0, 1e15);
