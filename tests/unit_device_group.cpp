@@ -174,7 +174,8 @@ TEST_CASE("when every device has failed, the film holds what was read before", "
     Film film(filmShapeOf(group.compiled));
     Watch watch;
     int checkpoints = 0;
-    const SamplingPlan plan{.ranges = {{0, 40}}, .target = 40, .chunk = 4, .checkpoint_interval_seconds = 1e-9};
+    const SamplingPlan plan{
+        .ranges = {{0, 40}}, .target = 40, .chunk = 4, .checkpoint_interval_seconds = 1e-9};
     std::optional<DeviceFault> fault;
     const SamplingResult result = sampleFilm(group.devices, film, plan, watch, [&] {
         if (++checkpoints == 3) fault.emplace("device");

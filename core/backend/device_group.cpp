@@ -189,8 +189,9 @@ void DeviceGroup::inParallel(const std::vector<Member*>& members,
         try {
             std::rethrow_exception(thrown[i]);
         } catch (const Error& error) {
-            const bool is_of_device = error.kind() == ErrorKind::Device || error.kind() == ErrorKind::Backend;
-            if (!may_fail || !is_of_device) throw;
+            const bool of_device =
+                error.kind() == ErrorKind::Device || error.kind() == ErrorKind::Backend;
+            if (!may_fail || !of_device) throw;
             last_failure_ = error;
             members[i]->share.failure = error.what();
         }
@@ -362,8 +363,8 @@ CrtBackendReport DeviceGroup::report() {
     if (names.size() > 1) {
         const bool same = std::all_of(names.begin(), names.end(),
                                       [&](const std::string& name) { return name == names.front(); });
-        const std::string text =
-            same ? fmt::format("{} x {}", names.size(), names.front()) : fmt::format("{}", fmt::join(names, " + "));
+        const std::string text = same ? fmt::format("{} x {}", names.size(), names.front())
+                                      : fmt::format("{}", fmt::join(names, " + "));
         std::snprintf(together.device, sizeof together.device, "%s", text.c_str());
     }
     return together;

@@ -45,7 +45,7 @@ Option backendOption(std::string& backend) {
 Option deviceOption(IntegratorOptions& integrator) {
     return {.names = "-d,--device",
             .placeholder = "NAME",
-            .help = "number or part of the name, as 'crt plugins' lists them; several as 0,1, or all (CRT_DEVICE)",
+            .help = "number or part of the name, as in 'crt plugins'; 0,1 or all for several (CRT_DEVICE)",
             .read = [&integrator](const std::string& text) { integrator.device = text; },
             .environment = "CRT_DEVICE"};
 }

@@ -63,8 +63,8 @@ std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels);
 /// variances scatter, the farther the half-width lies above the estimate.
 bool reachesTarget(const Film& film, double target, bool independent_samples = false);
 
-/// Adds the plan's samples to `film`. When its last device fails, `film` holds what was last read from it, at
-/// most a small part of the run behind: a backend that failed cannot be asked for its film any more.
+/// Adds the plan's samples to `film`. When the last device fails, `film` holds what was last read from it,
+/// at most a small part of the run behind: a backend that failed cannot be asked for its film any more.
 /// `checkpoint` may save the film, which is up to date when it is called.
 SamplingResult sampleFilm(DeviceGroup& devices, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint);
