@@ -2,6 +2,7 @@
 
 #include "base/listener.h"
 #include "base/log.h"
+#include "base/words.h"
 
 #include <fmt/format.h>
 
@@ -21,16 +22,6 @@ using Clock = std::chrono::steady_clock;
 bool isListOfIndices(const std::string& text) {
     return text.find(',') != std::string::npos &&
            text.find_first_not_of("0123456789,") == std::string::npos;
-}
-
-std::vector<std::string> splitAtCommas(const std::string& text) {
-    std::vector<std::string> parts;
-    for (std::size_t begin = 0; begin <= text.size();) {
-        const std::size_t end = std::min(text.find(',', begin), text.size());
-        parts.push_back(text.substr(begin, end - begin));
-        begin = end + 1;
-    }
-    return parts;
 }
 
 std::string listOf(const std::vector<CrtDevice>& devices) {
@@ -118,7 +109,7 @@ std::vector<std::string> devicesNamed(const std::string& text, const std::vector
         return names;
     }
     if (!isListOfIndices(text)) return {text};
-    for (const std::string& index : splitAtCommas(text)) {
+    for (const std::string& index : splitAt(text, ',')) {
         const auto is_it = [&](const CrtDevice& device) { return std::to_string(device.index) == index; };
         if (std::none_of(devices.begin(), devices.end(), is_it))
             throw Error(ErrorKind::Usage, fmt::format("--device {}: there is no device '{}'; there is {}",
@@ -139,7 +130,7 @@ DeviceGroup::DeviceGroup(const LoadedBackend& backend, const IntegratorOptions& 
         members_.push_back(std::make_unique<Member>());
         Member& member = *members_.back();
         member.index = members_.size() - 1;
-        member.share.name = name;
+        member.share.selector = name;
         for (const CrtDevice& device : devices)
             if (std::to_string(device.index) == name) {
                 member.share.name = arrayText(device.name);
@@ -199,8 +190,8 @@ void DeviceGroup::inParallel(const std::vector<Member*>& members,
     if (working().empty()) throw Error(*last_failure_);
     for (std::size_t i = 0; i < members.size(); ++i)
         if (thrown[i])
-            logWarning("device '{}' is dropped, the others go on: {}", members[i]->share.name,
-                       members[i]->share.failure);
+            logWarning("device {} '{}' is dropped, the others go on: {}", members[i]->share.selector,
+                       members[i]->share.name, members[i]->share.failure);
 }
 
 void DeviceGroup::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {

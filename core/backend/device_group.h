@@ -15,7 +15,8 @@ namespace crt {
 
 /// What one device of a group did.
 struct DeviceShare {
-    std::string name;
+    std::string selector;       ///< As --device names it, of several its index: equal GPUs have one name.
+    std::string name;           ///< Empty until the device is open.
     std::uint64_t samples = 0;  ///< Per pixel, that it added to the film.
     double seconds = 0;         ///< In its render calls.
     std::string failure;        ///< Why it was dropped; empty while it works.

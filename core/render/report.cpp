@@ -118,7 +118,8 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
 
     Json devices = Json::array();
     for (const DeviceShare& device : facts.devices)
-        devices.push_back({{"name", device.name},
+        devices.push_back({{"device", device.selector},
+                           {"name", device.name},
                            {"samples", device.samples},
                            {"seconds", device.seconds},
                            {"failure", device.failure.empty() ? Json(nullptr) : Json(device.failure)}});

@@ -178,7 +178,7 @@ class Rendering(CliTest):
         for section, keys in expected.items():
             self.assertEqual(list(report[section]), keys, section)
         for device in report["devices"]:
-            self.assertEqual(list(device), ["name", "samples", "seconds", "failure"])
+            self.assertEqual(list(device), ["device", "name", "samples", "seconds", "failure"])
         self.assertEqual(report["samples"]["ranges"], [[0, 16]])
         self.assertEqual(report["rays"]["paths"], 16 * 24 * 16)
         self.assertEqual(report["outputs"], ["a.pfm"])
@@ -320,7 +320,8 @@ class SeveralDevices(CliTest):
             self.crt("scene.yaml", "-b", "fake", "-o", "all.pfm", "--spp", "40", "--device", devices)
             self.assertEqual(read_bytes(self.path("one.pfm")), read_bytes(self.path("all.pfm")))
         report = self.report("all.report.json")
-        self.assertEqual([d["name"] for d in report["devices"]], ["second pattern", "pattern"])
+        named = [(d["device"], d["name"]) for d in report["devices"]]
+        self.assertEqual(named, [("1", "second pattern"), ("0", "pattern")])
         self.assertEqual(sum(d["samples"] for d in report["devices"]), 40)
         self.assertEqual(report["backend"]["device"], "second pattern + pattern")
 
@@ -330,7 +331,7 @@ class SeveralDevices(CliTest):
             "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "40", "--device", "all",
             fault="device", CRT_FAKE_FAULT_DEVICE="1",
         )
-        self.assertIn("device 'second pattern' is dropped, the others go on", run.stderr)
+        self.assertIn("device 1 'second pattern' is dropped, the others go on", run.stderr)
         self.assertIn("fell off the bus", run.stderr)
         self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("whole.pfm")))
         first, second = self.report("a.report.json")["devices"]
