@@ -28,6 +28,7 @@ import time
 import zlib
 
 import harness
+import hostile_models
 
 SECONDS = 10            # Of processor time; longer is a hang.
 WAIT_SECONDS = (
@@ -757,6 +758,16 @@ def mesh_cases():
         case("mesh", f"{name} in place of an MTL", ["info", "scene.yaml"], (0, 3), (), prepare)
 
 
+def model_cases():
+    hostile_models.gltf_cases(case)
+    hostile_models.glb_cases(case)
+    hostile_models.ply_cases(
+        case,
+        lambda name: HEAD + MATERIALS + f"objects: [{{ply: '{name}', material: m}}]\n",
+        endless_files,
+    )
+
+
 def spectrum_cases():
     for asked, text in (
         ("empty", ""),
@@ -852,6 +863,7 @@ def texture_cases(samples):
         "pixels",
     )
     texture("a JPEG without a height", "a.jpg", jpeg[:frame] + b"\0\0" + jpeg[frame + 2:], "a.jpg")
+    hostile_models.tga_cases(texture)
     for name in ("folder", "pipe", "/dev/zero", "noise", "sparse"):
         def prepare(folder, name=name):
             endless_files(folder)
@@ -1974,6 +1986,7 @@ def main():
         samples = make_samples()
         scene_cases()
         mesh_cases()
+        model_cases()
         spectrum_cases()
         texture_cases(samples)
         image_cases(samples)
