@@ -1,8 +1,9 @@
 """A scene of crt as Mitsuba 3 loads it: the same triangles, materials, lights, camera and depth. Spectra are
-numbers, {rgb: …, space: linear} and tables with every value written out; what has no counterpart is
-refused, so that nothing is compared that was not translated."""
+numbers, {rgb: …, space: linear} and tables, written out or named data that are files; what has no
+counterpart is refused, so that nothing is compared that was not translated."""
 
 import dataclasses
+import math
 import re
 
 import mitsuba as mi
@@ -19,8 +20,14 @@ def refuse_all_but(what, given, known):
         raise Failure(f"{what}: {', '.join(sorted(unknown))} cannot be translated for Mitsuba")
 
 
-def table(nm, value):
-    """Linear between, and 0 outside."""
+SEEN_NM = (360, 830)  # Wavelengths that both programs render.
+
+
+def table(nm, value, outside="zero"):
+    """Linear between, and outside 0 or the value at that end."""
+    if outside == "clamp":
+        nm = [min(SEEN_NM[0], nm[0]) - 1, *nm, max(SEEN_NM[1], nm[-1]) + 1]
+        value = [value[0], *value, value[-1]]
     return {
         "type": "irregular",
         "wavelengths": ", ".join(map(str, nm)),
@@ -32,8 +39,8 @@ def spectrum(given):
     if isinstance(given, (int, float)):
         return {"type": "uniform", "value": float(given)}
     if "table" in given:
-        refuse_all_but("a table", given, {"table"})
-        return table(given["table"]["nm"], given["table"]["value"])
+        refuse_all_but("a table", given, {"table", "outside"})
+        return table(given["table"]["nm"], given["table"]["value"], given.get("outside", "zero"))
     refuse_all_but("a spectrum", given, {"rgb", "space"})
     if given.get("space") != "linear":
         raise Failure("an RGB colour without 'space: linear' cannot be translated for Mitsuba")
@@ -119,6 +126,12 @@ def conductor(given, folder):
     return two_sided({"type": "conductor", "eta": spectrum(given["eta"]), "k": spectrum(given["k"])})
 
 
+def mirror(given, folder):
+    refuse_all_but("a mirror", given, {"type", "reflectance"})
+    reflectance = texture(given["reflectance"], folder)
+    return two_sided({"type": "conductor", "material": "none", "specular_reflectance": reflectance})
+
+
 def dielectric(given, folder):
     refuse_all_but("a dielectric", given, {"type", "ior"})
     return {"type": "dielectric", "int_ior": float(given["ior"]), "ext_ior": 1.0}
@@ -171,6 +184,7 @@ COMPOSED = {"mix": mix, "two_sided": sides}
 MATERIALS = {
     "diffuse": diffuse,
     "conductor": conductor,
+    "mirror": mirror,
     "rough_conductor": rough_conductor,
     "dielectric": dielectric,
     "rough_dielectric": rough_dielectric,
@@ -252,13 +266,14 @@ def to_world(steps):
     return made
 
 
-def loaded_shape(thing, meshes):
-    """An OBJ file with its own normals."""
-    if meshes is None:
-        raise Failure("an object of an OBJ file cannot be translated for Mitsuba here")
+def loaded_shape(thing, folder, meshes):
+    """An OBJ file with its own normals, from the first of the folders that has it."""
+    file = next((f / thing["obj"] for f in (folder, meshes) if f and (f / thing["obj"]).exists()), None)
+    if file is None:
+        raise Failure(f"'{thing['obj']}' is in none of the folders of meshes")
     return {
         "type": "obj",
-        "filename": str(meshes / thing["obj"]),
+        "filename": str(file),
         "to_world": to_world(thing.get("transform", [])),
     }
 
@@ -356,9 +371,22 @@ def bands(file):
     return found
 
 
+def fov_deg(camera):
+    """The full angle, which a square film has in both directions."""
+    if "fov" in camera:
+        return camera["fov"]
+    return 2 * math.degrees(math.atan(camera["sensor"][0] / (2 * camera["focal_length"])))
+
+
+# What a renderer of radiance has no use for: files, how an image is shown, and how crt finds its hits.
+SHOWN = {"filter", "color_space", "white_balance", "exposure_ev"}
+
+
 def film_of(given, band):
     """Of colours, or of one band."""
-    refuse_all_but("the film", given, {"resolution", "spectral", "responses"})
+    refuse_all_but("the film", given, {"resolution", "spectral", "responses", *SHOWN})
+    if given.get("filter", "box") != "box":
+        raise Failure("a filter other than the box cannot be translated for Mitsuba here")
     width, height = given["resolution"]
     if width != height:
         raise Failure("a film that is not square cannot be translated: fields of view differ in their axis")
@@ -368,14 +396,28 @@ def film_of(given, band):
     return made | {"type": "specfilm", "band": table(band.nm, band.answer)}
 
 
+def with_named_spectra(value, spectra):
+    """The same value, names of spectra in it replaced by what they stand for."""
+    if isinstance(value, dict):
+        return {
+            key: spectra[inner] if key in ("reflectance", "radiance") and isinstance(inner, str)
+            else with_named_spectra(inner, spectra)
+            for key, inner in value.items()
+        }
+    if isinstance(value, list):
+        return [with_named_spectra(inner, spectra) for inner in value]
+    return value
+
+
 def translate(file, folder, samples, band=None, meshes=None):
     """The dictionary that mi.load_dict takes. Meshes go to `folder`, where images are. `band`: of a spectral
     film, the one that is rendered. `meshes`: where OBJ files are, if objects may be such."""
     given = scene_file.load(file)
-    known = "crt title camera film integrator sampler materials objects lights environment"
+    known = "crt title camera film integrator sampler spectra materials objects lights environment outputs"
     refuse_all_but("the scene", given, known.split())
+    given = {key: with_named_spectra(value, given.get("spectra", {})) for key, value in given.items()}
     camera, film, integrator = given["camera"], given["film"], given["integrator"]
-    refuse_all_but("the camera", camera, {"position", "target", "fov", "up"})
+    refuse_all_but("the camera", camera, {"position", "target", "fov", "up", "sensor", "focal_length"})
     if integrator.get("roulette") is not False:
         raise Failure("a scene without 'roulette: false' cannot be translated: roulettes differ")
     made = {
@@ -384,7 +426,7 @@ def translate(file, folder, samples, band=None, meshes=None):
         "integrator": {"type": "path", "max_depth": integrator["max_depth"] + 1, "rr_depth": NEVER},
         "sensor": {
             "type": "perspective",
-            "fov": camera["fov"],
+            "fov": fov_deg(camera),
             "near_clip": 1e-3,
             "far_clip": 1e4,
             "to_world": mi.ScalarTransform4f().look_at(
@@ -401,13 +443,15 @@ def translate(file, folder, samples, band=None, meshes=None):
     for number, thing in enumerate(given["objects"]):
         if "obj" in thing:
             refuse_all_but("an object", thing, {"name", "obj", "transform", "material"})
-            part = loaded_shape(thing, meshes)
+            part = loaded_shape(thing, folder, meshes)
         else:
             refuse_all_but("an object", thing, {"name", "mesh", "material", "emission"})
             part = write_shape(thing["mesh"], folder / f"{number}.ply")
         part["bsdf"] = material(given["materials"][thing["material"]], folder, given["materials"])
         if "emission" in thing:
-            refuse_all_but("an emission", thing["emission"], {"radiance"})
+            refuse_all_but("an emission", thing["emission"], {"radiance", "two_sided"})
+            if thing["emission"].get("two_sided"):
+                raise Failure("an emission on both sides cannot be translated for Mitsuba")
             part["emitter"] = {"type": "area", "radiance": spectrum(thing["emission"]["radiance"])}
         made[f"object{number}"] = part
     return made

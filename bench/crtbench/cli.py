@@ -84,6 +84,12 @@ def main():
             command.add_argument(
                 "--quick", action="store_true", help="three runs, and no registers from NVRTC"
             )
+            command.add_argument(
+                "--features",
+                nargs="+",
+                metavar="NAME",
+                help="only these of core/kernel/features.h, such as THIN_FILM",
+            )
         if name == "meshes":
             command.add_argument("folders", nargs="+", type=pathlib.Path, metavar="FOLDER",
                                  help="looked through for *.obj; named REPOSITORY@COMMIT")

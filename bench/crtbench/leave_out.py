@@ -2,12 +2,39 @@
 and against the same kernel with one feature more, for every feature. The one feature more comes through
 CRT_KERNEL_DIR: a copy of the kernel texts in which every kernel has it."""
 
+import concurrent.futures
+import os
+
 from .nvrtc import variants
-from .program import Spread, feature_bits, significant
+from .program import Failure, Program, Spread, feature_bits, significant
 from .results import Results
 
 SCENES = ["cornell_box", "cornell_dragon", "cornell_glass"]
 NO_AOVS = "outputs.0.aovs=[]"   # AOVs are a feature among others.
+
+
+def chosen_bits(program, names):
+    """Those of the features that were asked for, or all."""
+    bits = feature_bits(program.repository)
+    if unknown := set(names or []) - {name for _, name, _ in bits}:
+        raise Failure(f"there is no feature {sorted(unknown)[0]}; core/kernel/features.h lists them")
+    return [b for b in bits if not names or b[1] in names]
+
+
+def compile_ahead(program, kernels, settings):
+    """Puts the CUDA kernels of (scene, environment) into the program's cache, by all processors: one by one,
+    compiling would take much longer than what is timed."""
+
+    def compile_one(kernel):
+        scene, environment = kernel
+        apart = Program(program.repository, program.build, program.busy_share)   # Reports are files.
+        apart.environment["CRT_CACHE_DIR"] = program.environment["CRT_CACHE_DIR"]
+        tiny = ["film.resolution=[8,8]", *settings[1:]]
+        apart.render(scene, "cuda", ["--spp", 1, "--kernel", "lean"], settings=tiny, environment=environment)
+
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as workers:
+        list(workers.map(compile_one, kernels))
+    program.await_compilers()
 
 
 def gain(more, lean):
@@ -17,18 +44,21 @@ def gain(more, lean):
 
 def measure(program, arguments):
     size = 32 if arguments.tiny else 400
-    spp = {"cornell_box": 16, "cornell_dragon": 8, "cornell_glass": 8}
     runs = 2 if arguments.tiny else 3 if arguments.quick else 5
-    scenes = [s for s in SCENES if not arguments.scenes or s in arguments.scenes]
+    scenes = program.scenes(arguments.scenes or SCENES)
+    spp = {scene: 16 if scene == "cornell_box" else 8 for scene in scenes}
     usable, absent = program.backends(["cuda", "opencl", "embree"])
     # By which features are timed one by one: a GPU where there is one, with an image that fills it.
     timed = "cuda" if "cuda" in usable else "opencl"
     if timed == "cuda" and not arguments.tiny:
-        size, spp = 1440, {scene: 64 for scene in SCENES}
+        size, spp = 1440, {scene: 64 for scene in scenes}
     settings = [f"film.resolution=[{size},{size}]", NO_AOVS]
     results = Results(program, arguments, "leave-out", "What leaving out saves")
     data = {"scenes": {}}
-    masks = {scene: scene_mask(program, scene) for scene in scenes}
+    bits = chosen_bits(program, arguments.features)
+    masks = {scene: scene_mask(program, scene, [NO_AOVS]) for scene in scenes}
+    file_masks = {scene: scene_mask(program, scene) for scene in scenes}   # With the AOVs of its file.
+    all_masks = sorted({*masks.values(), *file_masks.values()})
 
     def render(scene, backend, kernel="lean", outputs=(), environment=None):
         return program.render(
@@ -98,10 +128,10 @@ def measure(program, arguments):
     if base is None:
         results.paragraph(f"Not measured: {compiler}.")
     else:
-        by_scene = {scene: next(v for v in base if int(v["mask"], 16) == masks[scene]) for scene in scenes}
+        by_scene = {s: next(v for v in base if int(v["mask"], 16) == file_masks[s]) for s in scenes}
         full = next(v for v in base if v["name"] == "everything")
         data["nvrtc"] = {"compiler": compiler, "full": full, "scenes": by_scene}
-        results.paragraph(f"{compiler}, `crt_render`, without AOVs.")
+        results.paragraph(f"{compiler}, `crt_render`, with the AOVs of the scene's file.")
         results.table(
             ["kernel", "mask", "registers", "stack, bytes", "spilled, bytes", "CUBIN, kB", "ms to compile"],
             [
@@ -128,14 +158,26 @@ def measure(program, arguments):
         f"least and the most. CUDA with "
         "NVRTC: registers, kB of the CUBIN and ms of one compilation more than without."
     )
-    bits = feature_bits(program.repository)
     rows, data["features"] = [], {}
     extra_variants = {}
+    if timed == "cuda":
+        compile_ahead(
+            program,
+            [
+                (scene, {"CRT_KERNEL_DIR": str(program.kernels_with(1 << bit, all_masks))})
+                for bit, _, _ in bits
+                for scene in scenes
+                if not masks[scene] & 1 << bit
+            ],
+            settings,
+        )
     for bit, name, what in bits:
         entry = {"text": what, "scenes": {}}
-        environment = {"CRT_KERNEL_DIR": str(program.kernels_with(1 << bit, sorted(set(masks.values()))))}
+        environment = {"CRT_KERNEL_DIR": str(program.kernels_with(1 << bit, all_masks))}
         if base is not None:
-            extra_variants[bit] = {v["mask"]: v for v in variants(program, scenes, environment)[1]}
+            extra_variants[bit] = {
+                v["mask"]: v for v in variants(program, scenes, environment, only=True)[1]
+            }
         for scene in scenes:
             found = {}
             if masks[scene] & 1 << bit:
@@ -175,8 +217,8 @@ def measure(program, arguments):
     results.write()
 
 
-def scene_mask(program, scene):
-    run = program.render(scene, "auto", ["--spp", 1], settings=["film.resolution=[8,8]", NO_AOVS])
+def scene_mask(program, scene, settings=()):
+    run = program.render(scene, "auto", ["--spp", 1], settings=["film.resolution=[8,8]", *settings])
     return int(run.value("features", "mask"), 16)
 
 

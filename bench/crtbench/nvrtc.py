@@ -14,16 +14,19 @@ def find(program):
     return None
 
 
-def variants(program, scenes, environment=None):
-    """(compiler, [variant]) for the representative masks and those of the scenes; (why not, None) where
-    NVRTC is missing."""
+def variants(program, scenes, environment=None, only=False):
+    """(compiler, [variant]) for the masks of the scenes and, unless `only`, the representative ones; (why not,
+    None) where NVRTC is missing."""
     tool = find(program)
     if tool is None:
         return "this build has no nvrtc_variants", None
     # Code 1 says that a variant spills or keeps memory that it should not; its numbers are measurements all
     # the same.
     run = program.start(
-        [program.scene_file(s) for s in scenes], program=tool, codes=(0, 1, SKIPPED), environment=environment
+        [*(["--only"] if only else []), *map(program.scene_file, scenes)],
+        program=tool,
+        codes=(0, 1, SKIPPED),
+        environment=environment,
     )
     return (run.output.strip(), None) if run.code == SKIPPED else parsed(run.output)
 

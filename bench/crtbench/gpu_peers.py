@@ -1,0 +1,170 @@
+"""Paths a second and time to an error on one GPU, in crt and in Mitsuba 3, scene by scene in one run."""
+
+import dataclasses
+import math
+import time
+
+import drjit as dr
+import mitsuba as mi
+
+from . import race
+from .agree import write_normals, write_picture, write_sky
+from .program import Failure, Spread
+from .results import Results
+
+FOLDERS = ["bench/scenes/gpu_peers", "bench/scenes/race"]
+SEED = 5_000_000   # Of the timed renders.
+
+
+def write_ball(path, segments=64, rings=32):
+    """A sphere of radius 1 with its normals, 2 · segments · (rings - 1) triangles."""
+    lines = []
+    for ring in range(rings + 1):
+        polar = math.pi * ring / rings
+        for segment in range(segments):
+            around = 2 * math.pi * segment / segments
+            place = (math.sin(polar) * math.cos(around), math.cos(polar), math.sin(polar) * math.sin(around))
+            text = " ".join(f"{x:.9g}" for x in place)
+            lines += [f"v {text}", f"vn {text}"]
+
+    def corner(ring, segment):
+        number = 1 + ring * segments + segment % segments
+        return f"{number}//{number}"
+
+    for ring in range(rings):
+        for segment in range(segments):
+            a, b = corner(ring, segment), corner(ring, segment + 1)
+            c, d = corner(ring + 1, segment + 1), corner(ring + 1, segment)
+            if ring > 0:
+                lines.append(f"f {a} {b} {c}")
+            if ring < rings - 1:
+                lines.append(f"f {a} {c} {d}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+@dataclasses.dataclass
+class Rate:
+    """Paths a second of one contestant: camera paths over seconds of rendering."""
+
+    name: str
+    mpaths_per_s: Spread
+
+
+def contestants(program, file, backend, variant, samplers, size):
+    """crt first."""
+    return [
+        race.Crt(program, file, backend, 1, size),
+        *(race.Mitsuba(program, file, variant, sampler, size) for sampler in samplers),
+    ]
+
+
+def rates(program, file, arguments):
+    """Each contestant's rate, in turn: A B C A B C …, after a render of each that is not counted."""
+    racing = contestants(
+        program, file, arguments.backend, arguments.variant, arguments.samplers, arguments.size
+    )
+    for contestant in racing:
+        contestant.warm_up(arguments.samples)
+    found = {contestant.name: [] for contestant in racing}
+    for run in range(arguments.runs):
+        for contestant in racing:
+            cost = contestant.render(arguments.samples, SEED + run)
+            found[contestant.name].append(arguments.size**2 * cost.samples / cost.seconds / 1e6)
+    return [Rate(name, Spread(values)) for name, values in found.items()]
+
+
+def best(found, whose):
+    return max((r for r in found if r.name.startswith(whose)), key=lambda r: r.mpaths_per_s.median)
+
+
+def seconds_to_error(program, file, arguments):
+    """{contestant: (points, seconds to the target or None)}, as bench/race has it."""
+    racing = contestants(
+        program, file, arguments.backend, arguments.variant, arguments.samplers, arguments.error_size
+    )
+    references = {
+        whose: race.Converged(first.render, arguments.reference_samples)
+        for whose, first in (("crt", racing[0]), ("Mitsuba", racing[1]))
+    }
+    found = {}
+    for contestant in racing:
+        points = race.points_to(contestant, references[contestant.name.split()[0]], arguments)
+        found[contestant.name] = (points, race.time_to(points, arguments.target))
+    return found
+
+
+def files_of(program, only):
+    files = [f for folder in FOLDERS for f in sorted((program.repository / folder).glob("*.yaml"))]
+    if unknown := set(only or []) - {f.stem for f in files}:
+        raise Failure(f"there is no scene {sorted(unknown)[0]} in {' or '.join(FOLDERS)}")
+    return [f for f in files if not only or f.stem in only]
+
+
+def write_inputs(folder):
+    """What the scenes name and no repository holds."""
+    write_picture(folder / "picture.png")
+    write_normals(folder / "normals.png")
+    write_sky(folder / "sky.exr")
+    race.write_sun(folder / "sun.exr")
+    write_ball(folder / "smooth_ball.obj")
+
+
+def cells(file, rated, raced):
+    """One line of the table."""
+    ours, theirs = best(rated, "crt"), best(rated, "Mitsuba")
+    row = [
+        f"`{file.stem}`",
+        ours.mpaths_per_s.text(),
+        f"{theirs.mpaths_per_s.text()} ({theirs.name.split(', ')[1]})",
+        f"**{ours.mpaths_per_s.median / theirs.mpaths_per_s.median:.2f}**",
+    ]
+    to_error = [race.best(raced, whose) for whose in ("crt", "Mitsuba")]
+    row += [f"{seconds:.3g}" if seconds else "not reached" for seconds in to_error]
+    return [*row, f"**{to_error[1] / to_error[0]:.1f}**" if all(to_error) else "not known"]
+
+
+def measure(program, arguments):
+    mi.set_variant(arguments.variant)
+    mi.set_log_level(mi.LogLevel.Error)
+    if arguments.tiny:
+        arguments.size, arguments.samples, arguments.runs = 32, 16, 2
+        arguments.error_size, arguments.renders, arguments.target = 16, 2, 0.2
+        arguments.reference_samples = 64
+    write_inputs(program.scratch)
+    results = Results(program, arguments, "gpu-peers", "crt and Mitsuba 3 on one GPU")
+    results.tool = "bench/gpu_peers"
+    begin, rows, results.data = time.monotonic(), [], {}
+    for file in files_of(program, arguments.scenes):
+        if rows and time.monotonic() - begin > arguments.seconds:
+            print(f"{file.stem}: no time is left", flush=True)
+            continue
+        rated = rates(program, file, arguments)
+        for rate in rated:
+            print(f"{file.stem:14} {rate.name:40} {rate.mpaths_per_s.text()} Mpaths/s", flush=True)
+        raced = seconds_to_error(program, file, arguments)
+        rows.append(cells(file, rated, raced))
+        print(rows[-1], flush=True)
+        results.data[file.stem] = {
+            "mpaths_per_s": {rate.name: rate.mpaths_per_s.json() for rate in rated},
+            "to_error": {
+                name: {"points": [dataclasses.asdict(p) for p in points], "seconds": seconds}
+                for name, (points, seconds) in raced.items()
+            },
+        }
+        dr.flush_malloc_cache()
+    results.paragraph(
+        f"Scenes of `{'` and `'.join(FOLDERS)}`, translated for Mitsuba {mi.__version__} "
+        f"(`{arguments.variant}`); no roulette in either; crt on `{arguments.backend}` with Sobol points in "
+        f"one sequence, Mitsuba with the better of {', '.join(arguments.samplers)}. *Mpaths/s*: camera paths "
+        f"over seconds of rendering at {arguments.size} × {arguments.size} pixels and {arguments.samples} "
+        f"samples, median of {arguments.runs} interleaved runs, in brackets the least and the most; scenes "
+        f"loaded and kernels compiled before. *To {arguments.target:g}*: seconds of rendering until the RMSE "
+        f"of luminance at {arguments.error_size} × {arguments.error_size} pixels is so much of the mean, each "
+        "against its own converged image, interpolated between numbers of samples."
+    )
+    to = f"to {arguments.target:g}, s:"
+    results.table(
+        ["scene", "Mpaths/s: crt", "Mitsuba", "ratio", f"{to} crt", f"{to} Mitsuba", "ratio"], rows
+    )
+    results.write()
+    return 0
