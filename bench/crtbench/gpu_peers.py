@@ -155,12 +155,12 @@ def measure(program, arguments):
     results.paragraph(
         f"Scenes of `{'` and `'.join(FOLDERS)}`, translated for Mitsuba {mi.__version__} "
         f"(`{arguments.variant}`); no roulette in either; crt on `{arguments.backend}` with Sobol points in "
-        f"one sequence, Mitsuba with the better of {', '.join(arguments.samplers)}. *Mpaths/s*: camera paths "
-        f"over seconds of rendering at {arguments.size} × {arguments.size} pixels and {arguments.samples} "
-        f"samples, median of {arguments.runs} interleaved runs, in brackets the least and the most; scenes "
-        f"loaded and kernels compiled before. *To {arguments.target:g}*: seconds of rendering until the RMSE "
-        f"of luminance at {arguments.error_size} × {arguments.error_size} pixels is so much of the mean, each "
-        "against its own converged image, interpolated between numbers of samples."
+        f"one sequence, Mitsuba with the better of {', '.join(arguments.samplers)}. *Mpaths/s*: camera "
+        f"paths over seconds of rendering at {arguments.size} × {arguments.size} pixels and "
+        f"{arguments.samples} samples, median of {arguments.runs} interleaved runs, in brackets the least "
+        f"and the most; scenes loaded and kernels compiled before. *To {arguments.target:g}*: seconds of "
+        f"rendering until the RMSE of luminance at {arguments.error_size} × {arguments.error_size} pixels is "
+        "so much of the mean, each against its own converged image, interpolated between numbers of samples."
     )
     to = f"to {arguments.target:g}, s:"
     results.table(

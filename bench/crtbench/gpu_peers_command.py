@@ -1,6 +1,6 @@
-"""How fast are crt and Mitsuba 3 on one GPU? The shipped Cornell boxes, a ball under a sky and the scenes of
-bench/race are rendered by both in one run: paths a second on a large image, and seconds until the error of an
-image is 1 %. Times are those of rendering alone: scenes are loaded and kernels compiled before.
+"""How fast are crt and Mitsuba 3 on one GPU? The shipped Cornell boxes, a ball under a sky and the scenes
+of bench/race are rendered by both in one run: paths a second on a large image, and seconds until the error
+of an image is 1 %. Times are those of rendering alone: scenes are loaded and kernels compiled before.
 
 Needs a Python with mitsuba, numpy and PyYAML (--python)."""
 
@@ -17,10 +17,10 @@ def main():
     parser.add_argument(
         "--samplers", nargs="+", default=["multijitter"], help="of Mitsuba; the best counts (multijitter)"
     )
-    parser.add_argument("--size", type=int, default=1440, help="where paths are counted, pixels a side (1440)")
-    parser.add_argument("--samples", type=int, default=256, help="a pixel where paths are counted (256)")
-    parser.add_argument("--runs", type=int, default=5, help="where paths are counted (5)")
-    parser.add_argument("--error-size", type=int, default=256, help="of images with an error, in pixels (256)")
+    parser.add_argument("--size", type=int, default=1440, help="pixels a side for rates (1440)")
+    parser.add_argument("--samples", type=int, default=256, help="a pixel for rates (256)")
+    parser.add_argument("--runs", type=int, default=5, help="for rates (5)")
+    parser.add_argument("--error-size", type=int, default=256, help="pixels a side for errors (256)")
     parser.add_argument("--renders", type=int, default=2, help="with seeds of their own for an error (2)")
     parser.add_argument("--target", type=float, default=0.01, help="error to reach, of the mean (0.01)")
     parser.add_argument("--most", type=int, default=16384, help="samples a pixel to give up after (16384)")

@@ -15,8 +15,8 @@ def find(program):
 
 
 def variants(program, scenes, environment=None, only=False):
-    """(compiler, [variant]) for the masks of the scenes and, unless `only`, the representative ones; (why not,
-    None) where NVRTC is missing."""
+    """(compiler, [variant]) for the masks of the scenes and, unless `only`, the representative ones; (why
+    not, None) where NVRTC is missing."""
     tool = find(program)
     if tool is None:
         return "this build has no nvrtc_variants", None

@@ -71,14 +71,13 @@ def gltf_cases(case):
     gltf("text", "no JSON\n", "a.gltf")
     gltf("no asset", changed(("asset", None)), "'asset' is missing")
     gltf("glTF 1.0", changed(("asset/version", "1.0")), "version 2.0")
-    gltf("an extension that it needs and nobody has", changed(("extensionsRequired", ["NO_such"])), "NO_such")
+    gltf("an extension that nobody has", changed(("extensionsRequired", ["NO_such"])), "NO_such")
     gltf("Draco", changed(("extensionsRequired", ["KHR_draco_mesh_compression"])), "compressed by Draco")
     gltf("JSON 100,000 deep", '{"asset":' + "[" * 100000, "nested")
     gltf("an index beyond the vertices", changed(data=POSITIONS + struct.pack("<3H", 0, 1, 7)), "/meshes/0")
     gltf("a vertex of NaN", changed(data=struct.pack("<f", float("nan")) + POSITIONS[4:] + INDICES), "NaN")
-    gltf(
-        "a vertex of infinity", changed(data=struct.pack("<f", float("inf")) + POSITIONS[4:] + INDICES), "NaN"
-    )
+    infinite = struct.pack("<f", float("inf"))
+    gltf("a vertex of infinity", changed(data=infinite + POSITIONS[4:] + INDICES), "NaN")
     for place, value, words in (
         ("accessors/0/bufferView", 9, "/accessors/0"),
         ("accessors/0/bufferView", -1, "a.gltf"),
@@ -120,7 +119,8 @@ def gltf_cases(case):
         ("meshes/0/primitives/0/material", 3, "a.gltf"),
     ):
         shown = json.dumps(value)
-        gltf(f"{place} is {shown if len(shown) < 50 else shown[:50] + '…'}", changed((place, value)), words)
+        shown = shown if len(shown) < 50 else shown[:50] + "…"
+        gltf(f"{place} is {shown}", changed((place, value)), words)
     gltf(
         "two nodes that are each other's children",
         changed(("nodes", [{"children": [1], "mesh": 0}, {"children": [0]}])),
