@@ -160,7 +160,8 @@ def measure(program, arguments):
         f"{arguments.samples} samples, median of {arguments.runs} interleaved runs, in brackets the least "
         f"and the most; scenes loaded and kernels compiled before. *To {arguments.target:g}*: seconds of "
         f"rendering until the RMSE of luminance at {arguments.error_size} × {arguments.error_size} pixels "
-        "is so much of the mean, each against its own converged image, interpolated between numbers of samples."
+        "is so much of the mean, each against its own converged image, interpolated between numbers of "
+        "samples."
     )
     to = f"to {arguments.target:g}, s:"
     results.table(
