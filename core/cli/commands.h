@@ -18,6 +18,7 @@ Command convergeCommand();
 Command referenceCommand();
 Command verifyCommand();
 Command pluginsCommand();
+Command warmCommand();
 Command dataCommand();
 Command schemaCommand();
 /// These two describe the others: `all` must outlive them.

@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
              {crt::renderCommand, crt::infoCommand, crt::importCommand, crt::compareCommand,
               crt::mergeCommand, crt::developCommand, crt::convergeCommand, crt::referenceCommand,
               crt::verifyCommand,
-              crt::pluginsCommand, crt::dataCommand, crt::schemaCommand})
+              crt::pluginsCommand, crt::warmCommand, crt::dataCommand, crt::schemaCommand})
             line.add(command());
         line.add(crt::helpCommand(line));
         line.add(crt::completionCommand(line));

@@ -16,7 +16,8 @@ from harness import CliTest, read_bytes
 
 BASH, ZSH, FISH, GROFF = (shutil.which(name) for name in ("bash", "zsh", "fish", "groff"))
 COMMANDS = (
-    "render info compare merge develop converge reference verify plugins data schema help completion".split()
+    "render info compare merge develop converge reference verify plugins warm data schema help completion"
+    .split()
 )
 
 
@@ -177,6 +178,21 @@ class Plugins(CliTest):
         self.assertTrue(fake["refused"])
         self.assertFalse(fake["usable"])
         self.assertEqual(fake["devices"], [])
+
+
+class Warm(CliTest):
+    def test_says_of_each_scene_what_its_kernel_took(self):
+        shutil.copy(self.path("scene.yaml"), self.path("other.yaml"))
+        run = self.crt("warm", "scene.yaml", "other.yaml", "-b", "fake")
+        lines = sorted(run.stdout.splitlines())
+        self.assertEqual([line.split(":")[0] for line in lines], ["other.yaml", "scene.yaml"])
+        for line in lines:
+            self.assertRegex(line, r": fake on .+, which needs no compiling$")
+        self.assertEqual(sorted(os.listdir(self.directory)), ["other.yaml", "scene.yaml"])
+
+    def test_a_scene_that_is_not_there(self):
+        self.assert_one_error(self.crt("warm", "none.yaml", "-b", "fake", expect=3), "none.yaml")
+        self.assert_one_error(self.crt("warm", expect=2), "SCENE")
 
 
 class Data(CliTest):

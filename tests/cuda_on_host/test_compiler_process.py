@@ -54,6 +54,18 @@ class CompilerProcess(unittest.TestCase):
     def kernels(self):
         return list(self.cache.glob("*.crtkernel"))
 
+    def warm(self, compiler):
+        environment = dict(os.environ, CRT_FAKE_NVRTC_SECONDS=compiler, CRT_CACHE_DIR=str(self.cache),
+                           LD_LIBRARY_PATH=f"{FAKE_NVRTC}:{FAKE_CUDA}")
+        return subprocess.run(
+            [CRT, "warm", SCENE, "-b", "cuda"],
+            cwd=self.folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
+
     def compilers(self):
         found = []
         for process in pathlib.Path("/proc").glob("[0-9]*"):
@@ -84,6 +96,21 @@ class CompilerProcess(unittest.TestCase):
         _, backend = self.render("4", "--spp", "1")
         self.assertEqual(backend["kernel"], "NVRTC 13.0 sm_90")
         self.assertTrue(backend["kernel_from_cache"])
+
+    def test_what_was_compiled_ahead_is_there(self):
+        run = self.warm("2")
+        self.assertRegex(run.stdout, r"NVRTC 13.0 sm_90, which was compiled in \d+\.\d s\n$", run.stderr)
+        self.assertEqual(len(self.kernels()), 1, "it ended before its compiler")
+        _, backend = self.render("100", "--spp", "1")
+        self.assertEqual(backend["kernel"], "NVRTC 13.0 sm_90")
+        self.assertTrue(backend["kernel_from_cache"])
+        self.assertRegex(self.warm("100").stdout, r"NVRTC 13.0 sm_90, which was in the cache\n$")
+
+    def test_what_cannot_be_compiled_ahead_is_told(self):
+        run = self.warm("fail")
+        self.assertIn("told by the fake compiler", run.stderr)
+        self.assertRegex(run.stdout, r": precompiled, which needs no compiling\n$")
+        self.assertEqual(self.kernels(), [])
 
     def test_without_a_cache_nothing_is_left_behind(self):
         _, backend = self.render("100", "--spp", "1", "--no-cache")
