@@ -30,11 +30,11 @@ def compile_ahead(program, kernels, settings):
         apart = Program(program.repository, program.build, program.busy_share)   # Reports are files.
         apart.environment["CRT_CACHE_DIR"] = program.environment["CRT_CACHE_DIR"]
         tiny = ["film.resolution=[8,8]", *settings[1:]]
-        apart.render(scene, "cuda", ["--spp", 1, "--kernel", "lean"], settings=tiny, environment=environment)
+        waiting = ["--spp", 1, "--kernel", "lean-only"]
+        apart.render(scene, "cuda", waiting, settings=tiny, environment=environment)
 
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as workers:
         list(workers.map(compile_one, kernels))
-    program.await_compilers()
 
 
 def gain(more, lean):
