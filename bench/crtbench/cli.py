@@ -90,6 +90,14 @@ def main():
                 metavar="NAME",
                 help="only these of core/kernel/features.h, such as THIN_FILM",
             )
+            command.add_argument(
+                "--backends",
+                nargs="+",
+                choices=["cuda", "opencl", "embree"],
+                default=["cuda", "opencl", "embree"],
+                metavar="NAME",
+                help="only these",
+            )
         if name == "meshes":
             command.add_argument("folders", nargs="+", type=pathlib.Path, metavar="FOLDER",
                                  help="looked through for *.obj; named REPOSITORY@COMMIT")

@@ -47,9 +47,9 @@ def measure(program, arguments):
     runs = 2 if arguments.tiny else 3 if arguments.quick else 5
     scenes = program.scenes(arguments.scenes or SCENES)
     spp = {scene: 16 if scene == "cornell_box" else 8 for scene in scenes}
-    usable, absent = program.backends(["cuda", "opencl", "embree"])
+    usable, absent = program.backends(arguments.backends)
     # By which features are timed one by one: a GPU where there is one, with an image that fills it.
-    timed = "cuda" if "cuda" in usable else "opencl"
+    timed = "cuda" if "cuda" in usable else "opencl"   # Embree's kernels are compiled ahead.
     if timed == "cuda" and not arguments.tiny:
         size, spp = 1440, {scene: 64 for scene in scenes}
     settings = [f"film.resolution=[{size},{size}]", NO_AOVS]

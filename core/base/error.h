@@ -2,6 +2,8 @@
 /// program turns it into one message and an exit code, the plugin border into a status.
 #pragma once
 
+#include "base/words.h"
+
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -26,11 +28,11 @@ enum class ErrorKind : int {
     Output = 6,    ///< An output cannot be written.
 };
 
-/// One sentence, what kind it is, and the place it points to.
+/// One sentence, what kind it is, and the place it points to. The sentence is printable, whatever it quotes.
 class Error : public std::runtime_error {
 public:
     Error(ErrorKind kind, const std::string& sentence, SourcePlace place = {})
-        : std::runtime_error(sentence), kind_(kind), place_(std::move(place)) {}
+        : std::runtime_error(printable(sentence)), kind_(kind), place_(std::move(place)) {}
 
     ErrorKind kind() const noexcept { return kind_; }
     const SourcePlace& place() const noexcept { return place_; }

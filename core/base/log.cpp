@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/listener_state.h"
+#include "base/words.h"
 
 #include <cstdio>
 
@@ -24,7 +25,8 @@ void setLogLevel(LogLevel level) {
     listener->level = level;
 }
 
-void logMessage(LogLevel level, std::string_view message) {
+void logMessage(LogLevel level, std::string_view text) {
+    const std::string message = printable(text);
     const ListenerRef listener = currentListener();
     if (!listener) return writeToStandardError(level, message);
     ListenerState& l = *listener;

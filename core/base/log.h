@@ -16,7 +16,7 @@ namespace crt {
 /// crt::Error(Internal) where there is no listener.
 void setLogLevel(LogLevel level);
 
-/// Gives one line to the listener of this thread. [any thread]
+/// Gives one line, made printable, to the listener of this thread. [any thread]
 void logMessage(LogLevel level, std::string_view message);
 
 template <class... Args>

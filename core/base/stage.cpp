@@ -1,14 +1,14 @@
 #include "base/stage.h"
 
 #include "base/listener_state.h"
+#include "base/words.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace crt {
 
-Stage::Stage(std::string what, double amount)
-    : listener_(currentListener()), what_(std::move(what)), amount_(amount) {
+Stage::Stage(const std::string& what, double amount)
+    : listener_(currentListener()), what_(printable(what)), amount_(amount) {
     if (!listener_) return;
     {
         // First: what throws here leaves no stage behind.

@@ -19,7 +19,7 @@ class Stage {
 public:
     /// `what` as in "reading bunny.obj". `amount` is how much there is to do, in any unit; 0: how far it is
     /// cannot be told.
-    explicit Stage(std::string what, double amount = 0);
+    explicit Stage(const std::string& what, double amount = 0);
     ~Stage();
     Stage(const Stage&) = delete;
     Stage& operator=(const Stage&) = delete;

@@ -118,6 +118,24 @@ std::size_t utf8Length(std::string_view s) {
     return 0;
 }
 
+std::string printable(std::string_view text) {
+    // C0 and DEL, and C1, which UTF-8 writes in two bytes: terminals know U+009B as the start of a sequence.
+    const auto isControl = [](std::string_view character) {
+        const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(character[i]); };
+        if (character.size() == 1) return byte(0) == 0x7fu || (byte(0) < 0x20u && byte(0) != '\n');
+        return character.size() == 2 && byte(0) == 0xc2u && byte(1) < 0xa0u;
+    };
+    std::string clean;
+    clean.reserve(text.size());
+    while (!text.empty()) {
+        const std::size_t length = utf8Length(text);
+        const std::string_view character = text.substr(0, std::max<std::size_t>(length, 1));
+        clean += length == 0 || isControl(character) ? std::string_view("\ufffd") : character;
+        text.remove_prefix(character.size());
+    }
+    return clean;
+}
+
 bool looksLikeNumber(std::string_view text) {
     const Parsed<double> parsed = parseNumber(std::string(text));
     return parsed.value || parsed.problem != "it is not a number";

@@ -26,6 +26,10 @@ Parsed<std::uint64_t> parseUnsigned(const std::string& text);
 /// surrogates included).
 std::size_t utf8Length(std::string_view text);
 
+/// The text with U+FFFD in place of what is no UTF-8 and of control characters, ends of lines excepted.
+/// Messages quote what files hold: a zero byte would end them, an escape sequence would act on the terminal.
+std::string printable(std::string_view text);
+
 /// Does this plain scalar look like a number (and so cannot be a name)?
 bool looksLikeNumber(std::string_view text);
 

@@ -1,6 +1,7 @@
 #include "base/stage.h"
 #include "base/standard_output.h"
 #include "base/unit_text.h"
+#include "base/words.h"
 #include "cli/commands.h"
 #include "cli/row.h"
 #include "cli/shared_options.h"
@@ -127,7 +128,7 @@ void showScene(const SceneRequest& what) {
     const Scene scene = loadScene(what);
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
     progress.reset();
-    printOut("{}{}\n", what.file, scene.title.empty() ? "" : ": " + scene.title);
+    printOut("{}{}\n", what.file, scene.title.empty() ? "" : ": " + printable(scene.title));
     printRow("film", filmText(scene));
     printRow("camera", cameraText(scene.camera));
     printRow("geometry", counted(compiled.objects, "object", "objects") + ", " +

@@ -1,6 +1,7 @@
 #include "cli/row.h"
 
 #include "base/standard_output.h"
+#include "base/words.h"
 
 #include <fmt/format.h>
 
@@ -9,11 +10,11 @@ namespace crt {
 void printRow(const char* name, const std::string& value) {
     constexpr int kColumn = 14;
     std::string indented;
-    for (const char c : value) {
+    for (const char c : printable(value)) {
         indented += c;
         if (c == '\n') indented.append(kColumn + 2, ' ');
     }
-    printOut("  {:<{}} {}\n", name, kColumn - 1, indented);
+    printOut("  {:<{}} {}\n", printable(name), kColumn - 1, indented);
 }
 
 std::string counted(std::uint64_t n, const char* one, const char* many) {

@@ -132,6 +132,11 @@ def gltf_cases(case):
         codes=(0, 3),
     )
     gltf("a million nodes", changed(("nodes", [{"mesh": 0}] + [{}] * 999999)), codes=(0, 3))
+    for place in ("nodes", "meshes"):
+        gltf(f"{place}/0/name is no text", changed((f"{place}/0/name", "\0\x1b[2J")), codes=0)
+    gltf("a material whose name is no text and that crt has not",
+         changed(("materials", [{"name": "\x1b[2J", "extensions": {"KHR_materials_subsurface": {}}}]),
+                 ("meshes/0/primitives/0/material", 0)), codes=0)
     gltf("a scene without nodes", changed(("scenes/0/nodes", [])), "nothing to see")
     gltf("a light beyond the list", changed(("nodes/0/extensions/KHR_lights_punctual/light", 4)), "/light")
     gltf(
@@ -197,6 +202,12 @@ def ply_cases(case, scene, endless_files):
     ply("a property before the first element", "ply\nformat ascii 1.0\nproperty float x\nend_header\n",
         "before the first element")
     ply("the vertices twice", replaced("element face 1", "element vertex 1"), "twice")
+    ply("an element of a name that is no text",
+        replaced("element face 1", "element \0\x1b[2J 9\nproperty float q\nelement face 1"), "a.ply")
+    ply("a property of a name that is no text, twice",
+        replaced("float z\n", "float z\n" + 2 * "property float \x1b]0;a\x07\n"), "twice")
+    ply("a texture of a name that is no text",
+        replaced("element vertex", "comment TextureFile \x1b[2J\nelement vertex"), codes=0)
     ply("no vertices", replaced("element vertex", "element point"), "'vertex'")
     ply("no z", replaced("property float z\n", ""), "x, y and z")
     ply("no faces", replaced("face 1", "face 0").replace("3 0 1 2\n", ""), "no faces")

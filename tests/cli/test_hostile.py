@@ -1864,6 +1864,8 @@ def run(case_, number):
         and "crt: info: stopped by" not in text
     ):
         wrong.append("gives no reason")
+    if any((c < " " and c not in "\n\t") or "\x7f" <= c < "\xa0" for c in text):
+        wrong.append("prints control characters")
     if "internal error" in text and 1 not in case_.codes:
         wrong.append("calls it an internal error")
     after = folder.state()

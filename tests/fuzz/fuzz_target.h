@@ -40,6 +40,7 @@ void expectRefusalOrSuccess(ErrorKind refusal, Body&& body) {
     } catch (const Error& error) {
         if (error.kind() != refusal) finding("refused as the wrong kind of error", error.what());
         if (error.what()[0] == '\0') finding("refused", "without a word");
+        if (printable(error.what()) != error.what()) finding("refused in no text", error.what());
     } catch (const std::exception& exception) {
         finding("not a crt::Error", exception.what());
     }

@@ -298,22 +298,6 @@ private:
 
 // ---- Messages -------------------------------------------------------------------------------------------
 
-/// Messages quote whatever was given; what is no text in it must reach neither a terminal nor a JSON report.
-std::string printable(std::string_view text) {
-    std::string clean;
-    clean.reserve(text.size());
-    while (!text.empty()) {
-        const std::size_t length = utf8Length(text);
-        const auto c = static_cast<unsigned char>(text[0]);
-        if (length == 0 || c == 0x7fu || (c < 0x20u && c != '\n'))
-            clean += "\ufffd";
-        else
-            clean += text.substr(0, length);
-        text.remove_prefix(std::max<std::size_t>(length, 1));
-    }
-    return clean;
-}
-
 /// The line with the caret below it. Long lines (tables, meshes) are cut to a window around the place.
 std::string excerpt(const YamlPlace& place, const std::string& suggestion) {
     constexpr std::size_t kWindow = 100, kBefore = 60;
@@ -413,7 +397,7 @@ void Diagnostics::throwIfFailed() const {
     }
     if (order.size() > kMaxErrorsShown)
         text += fmt::format("\n… and {} more errors", count() - kMaxErrorsShown);
-    throw Error(ErrorKind::Scene, printable(text), order.front()->place.resolved());
+    throw Error(ErrorKind::Scene, text, order.front()->place.resolved());
 }
 
 YamlNodePtr readYaml(const YamlSource& source, std::string_view text, Diagnostics& out, int first_column) {
