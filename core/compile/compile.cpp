@@ -121,6 +121,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
         occluders = occluding.size();
         header.triangles8 = blob.append(compileTriangles8(flat, all));
         header.occluders8 = blob.append(compileTriangles8(flat, occluding));
+        header.patches = blob.append(compilePatches(flat, all));
+        header.occluder_patches = blob.append(compilePatches(flat, occluding));
     }
     if (accelerator.kind == CRT_ACCELERATOR_AABB || shows_boxes)
         header.objects = blob.append(compileObjects(flat));

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 namespace crt {
 namespace {
@@ -64,6 +65,96 @@ void setRow(kernel::CrtTriangle8& block, std::size_t row, std::size_t lane, cons
             const Vec3d& origin) {
     for (std::size_t k = 0; k < 3; ++k) block.row[row][k][lane] = static_cast<float>(direction[k]);
     block.row[row][3][lane] = static_cast<float>(-dot(direction, origin));
+}
+
+/// Of a patch: the strip along `edge` of the plane with unit normal n that holds all of `points`. Fills the
+/// row of the distance from its middle; returns half its width.
+double setStrip(float (&row)[4], const Vec3d& n, const Vec3d& edge, std::span<const Vec3d> points) {
+    const double length = std::sqrt(dot(edge, edge));
+    const Vec3d across = length > 0 ? cross(n, edge) * (1 / length) : Vec3d{};
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    for (const Vec3d& p : points) {
+        least = std::min(least, dot(across, p));
+        most = std::max(most, dot(across, p));
+    }
+    for (std::size_t k = 0; k < 3; ++k) row[k] = static_cast<float>(across[k]);
+    row[3] = static_cast<float>(-0.5 * (least + most));
+    return 0.5 * (most - least);
+}
+
+/// The corner of triangle `id` across from its longest edge.
+std::size_t cornerAcross(const FlatScene& flat, std::size_t id) {
+    std::size_t corner = 0;
+    double longest = -1;
+    for (std::size_t v = 0; v < 3; ++v) {
+        const Vec3d edge = vertexOf(flat, id, (v + 1) % 3) - vertexOf(flat, id, (v + 2) % 3);
+        if (dot(edge, edge) > longest) {
+            longest = dot(edge, edge);
+            corner = v;
+        }
+    }
+    return corner;
+}
+
+/// The corner of triangle `id` across from an edge that `other` has, too.
+std::optional<std::size_t> cornerAcrossCommonEdge(const FlatScene& flat, std::size_t id, std::size_t other) {
+    const auto has = [&](const Vec3d& p) {
+        return vertexOf(flat, other, 0) == p || vertexOf(flat, other, 1) == p ||
+               vertexOf(flat, other, 2) == p;
+    };
+    for (std::size_t v = 0; v < 3; ++v)
+        if (has(vertexOf(flat, id, (v + 1) % 3)) && has(vertexOf(flat, id, (v + 2) % 3))) return v;
+    return std::nullopt;
+}
+
+constexpr double kPatchHeight = 4 * 0x1p-24;  ///< What lies in one plane: crt_patch_slack has room for it.
+constexpr double kPatchArea = 1.25;           ///< Of the parallelogram, over that of its two triangles.
+
+/// A patch of triangle `id`, and of `other` unless it is CRT_NONE. Nothing where they do not make one.
+std::optional<kernel::CrtPatch> patchOf(const FlatScene& flat, std::uint32_t id, std::uint32_t other) {
+    const bool pair = other != CRT_NONE;
+    const Vec3d n = planeNormal(flat, id);
+    std::vector<Vec3d> points{vertexOf(flat, id, 0), vertexOf(flat, id, 1), vertexOf(flat, id, 2)};
+    Extent extent = extentOf(flat, id);
+    std::size_t corner = cornerAcross(flat, id);
+    if (pair) {
+        const auto common = cornerAcrossCommonEdge(flat, id, other);
+        if (!common || areaOf(flat, id) == 0 || areaOf(flat, other) == 0) return std::nullopt;
+        corner = *common;
+        for (std::size_t v = 0; v < 3; ++v) {
+            points.push_back(vertexOf(flat, other, v));
+            if (std::abs(dot(n, points.back() - points[0])) > kPatchHeight) return std::nullopt;
+        }
+        const Extent e = extentOf(flat, other);
+        extent = {std::max(extent.coordinate, e.coordinate), std::max(extent.size, e.size)};
+    }
+    const Vec3d o = points[corner], a = points[(corner + 1) % 3] - o, b = points[(corner + 2) % 3] - o;
+
+    kernel::CrtPatch patch{};
+    for (std::size_t k = 0; k < 3; ++k) patch.plane[k] = static_cast<float>(n[k]);
+    patch.plane[3] = static_cast<float>(-dot(n, o));
+    const double first = setStrip(patch.first, n, a, points), second = setStrip(patch.second, n, b, points);
+    if (pair) {
+        // The angle between the strips widens the parallelogram of their widths.
+        const Vec3d turned = cross(a, b);
+        const double sine = std::sqrt(dot(turned, turned) / (dot(a, a) * dot(b, b)));
+        if (4 * first * second > kPatchArea * sine * (areaOf(flat, id) + areaOf(flat, other)))
+            return std::nullopt;
+    }
+    patch.sizes[0] = std::nextafter(static_cast<float>(first), 2.0f);
+    patch.sizes[1] = std::nextafter(static_cast<float>(second), 2.0f);
+    patch.sizes[2] =
+        kernel::crt_height_slack(static_cast<float>(extent.coordinate), static_cast<float>(extent.size)) /
+        CRT_HEIGHT_SCALE;
+    patch.sizes[3] = pair ? 0.0f : 1.0f;
+    const Vec3d edge = b - a;
+    const double length = std::sqrt(dot(edge, edge));
+    const Vec3d inwards = length > 0 ? cross(n, edge) * (1 / length) : Vec3d{};
+    for (std::size_t k = 0; k < 3; ++k) patch.third[k] = static_cast<float>(inwards[k]);
+    patch.third[3] = static_cast<float>(-dot(inwards, o + a));
+    patch.slot[0] = id;
+    patch.slot[1] = other;
+    return patch;
 }
 
 /// Whether a triangle can come between two points of the scene: not if the whole scene lies on one side of
@@ -148,6 +239,17 @@ std::vector<kernel::CrtTriangle8> compileTriangles8(const FlatScene& flat,
         }
     }
     return blocks;
+}
+
+std::vector<kernel::CrtPatch> compilePatches(const FlatScene& flat, const std::vector<std::uint32_t>& ids) {
+    std::vector<kernel::CrtPatch> patches;
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+        auto patch = i + 1 < ids.size() ? patchOf(flat, ids[i], ids[i + 1]) : std::nullopt;
+        if (patch) ++i;
+        else patch = patchOf(flat, ids[i], CRT_NONE);
+        patches.push_back(*patch);
+    }
+    return patches;
 }
 
 std::vector<std::uint32_t> trianglesOf(const FlatScene& flat) {

@@ -25,6 +25,9 @@ void compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator,
 /// Triangles side by side for the brute-force loops, which keep the author's order: slot and id are one.
 std::vector<kernel::CrtTriangle8> compileTriangles8(const FlatScene& flat,
                                                     const std::vector<std::uint32_t>& ids);
+/// The same triangles, two at a time where one that follows lies in the other's plane beside it, for loops
+/// that take one ray in a lane.
+std::vector<kernel::CrtPatch> compilePatches(const FlatScene& flat, const std::vector<std::uint32_t>& ids);
 /// The ids of all triangles.
 std::vector<std::uint32_t> trianglesOf(const FlatScene& flat);
 /// The triangles that can come between two points of the scene; all of them where there are so many that

@@ -7,6 +7,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <new>
@@ -64,7 +65,7 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
     const std::uint32_t bits_version = CRT_BITS_VERSION;
     hash.add(&bits_version, 1, sizeof bits_version);
     const CrtScene settings = settingsOf(header);
-    hash.add(&settings, 1, sizeof settings);
+    hash.add(&settings, 1, offsetof(CrtScene, patches));  // behind them there are places in the blob alone
     hash.add(positions.data(), positions.size(), sizeof positions[0]);
     hash.add(CRT_ARRAY(CrtPrimitive, blob, header.primitives), header.primitives.count,
              sizeof(CrtPrimitive));

@@ -51,30 +51,71 @@ CRT_FN f32 crt_box(CRT_GLOBAL const f32 *lower, CRT_GLOBAL const f32 *upper, Crt
     return enter <= leave * CRT_SLAB_SLACK ? enter : CRT_INFINITY;
 }
 
-/* Entry distances into a node's four children; infinity where the ray misses. The planes that it meets
-   first are asked from `from`, the others from `to`: the ray's origin, both, or apart by what boxes are to
-   be larger on each side. */
-CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, vec3 from, vec3 to, CrtSlab slab,
-                               f32 limit) {
-    const vec4 ox = splat4(V3X(from)), oy = splat4(V3Y(from)), oz = splat4(V3Z(from));
-    const vec4 px = splat4(V3X(to)), py = splat4(V3Y(to)), pz = splat4(V3Z(to));
-    const vec4 ix = splat4(V3X(slab.inverse)), iy = splat4(V3Y(slab.inverse)),
-               iz = splat4(V3Z(slab.inverse));
+/* A ray among the nodes of a tree: 1/d and, for the planes that it meets first and for the others, what makes
+   of a plane's coordinate its distance along the ray. */
+typedef struct CrtNodeRay {
+    u32 near_x, near_y, near_z; /* as of CrtSlab */
+    vec3 inverse, near, far;
+} CrtNodeRay;
+
+#define CRT_LEAST_NORMAL 1.17549435e-38f
+
+/* 1/d. A direction of 0, which would make of planes no numbers, is as good as one of 2^-126. */
+CRT_FN f32 crt_node_inverse(f32 d) {
+    const f32 least = (crt_bits(d) >> 31) != 0u ? -CRT_LEAST_NORMAL : CRT_LEAST_NORMAL;
+    return crt_fast_reciprocal(crt_abs(d) < CRT_LEAST_NORMAL ? least : d);
+}
+
+/* How far apart along one axis planes are to be, besides `slack`, that none is missed by rounding: planes lie
+   within 1; 1/d moves a coordinate by (1 + |o|) 2^-23 at most, and the sum, its product and the fused
+   operation by (1 + |o|) 2^-24 each. */
+CRT_FN f32 crt_node_slack(f32 o, f32 slack) {
+    return crt_fma(6.0f * CRT_EPSILON, 1.0f + crt_abs(o), slack);
+}
+
+/* `slack`: lengths that the boxes are to be larger by on every side. */
+CRT_FN CrtNodeRay crt_node_ray(CrtRay ray, f32 slack) {
+    CrtNodeRay r;
+    const u32 sx = crt_bits(V3X(ray.d)) >> 31, sy = crt_bits(V3Y(ray.d)) >> 31, sz = crt_bits(V3Z(ray.d)) >> 31;
+    r.near_x = sx;
+    r.near_y = 2u + sy;
+    r.near_z = 4u + sz;
+    r.inverse = make_vec3(crt_node_inverse(V3X(ray.d)), crt_node_inverse(V3Y(ray.d)),
+                          crt_node_inverse(V3Z(ray.d)));
+    const f32 x = crt_node_slack(V3X(ray.o), slack), y = crt_node_slack(V3Y(ray.o), slack),
+              z = crt_node_slack(V3Z(ray.o), slack);
+    const vec3 way = make_vec3(sx != 0u ? -x : x, sy != 0u ? -y : y, sz != 0u ? -z : z);
+    r.near = -((ray.o + way) * r.inverse);
+    r.far = -((ray.o - way) * r.inverse);
+    return r;
+}
+
+/* Entry distances into a node's four children; infinity where the ray misses. Boxes that begin beyond `limit`
+   by more than rounding are missed. */
+CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtNodeRay ray, f32 limit) {
     CRT_GLOBAL const f32 *planes = &node->bounds[0][0];
-    const vec4 enter = crt_max4((crt_load4(planes + 4u * slab.near_z) - oz) * iz,
-                       crt_max4((crt_load4(planes + 4u * slab.near_y) - oy) * iy,
-                       crt_max4((crt_load4(planes + 4u * slab.near_x) - ox) * ix, splat4(0.0f))));
-    const vec4 leave =
-        crt_min4(
-            (crt_load4(planes + 4u * (slab.near_z ^ 1u)) - pz) * iz,
-            crt_min4((crt_load4(planes + 4u * (slab.near_y ^ 1u)) - py) * iy,
-                     crt_min4((crt_load4(planes + 4u * (slab.near_x ^ 1u)) - px) * ix, splat4(limit)))) *
-        CRT_SLAB_SLACK;
+    const vec4 ix = splat4(V3X(ray.inverse)), iy = splat4(V3Y(ray.inverse)), iz = splat4(V3Z(ray.inverse));
+    const vec4 enter = crt_cull_max4(
+        crt_fma4(crt_load4(planes + 4u * ray.near_z), iz, splat4(V3Z(ray.near))),
+        crt_cull_max4(crt_fma4(crt_load4(planes + 4u * ray.near_y), iy, splat4(V3Y(ray.near))),
+                      crt_cull_max4(crt_fma4(crt_load4(planes + 4u * ray.near_x), ix, splat4(V3X(ray.near))),
+                                    splat4(0.0f))));
+    const vec4 leave = crt_cull_min4(
+        crt_fma4(crt_load4(planes + 4u * (ray.near_z ^ 1u)), iz, splat4(V3Z(ray.far))),
+        crt_cull_min4(crt_fma4(crt_load4(planes + 4u * (ray.near_y ^ 1u)), iy, splat4(V3Y(ray.far))),
+                      crt_cull_min4(crt_fma4(crt_load4(planes + 4u * (ray.near_x ^ 1u)), ix,
+                                             splat4(V3X(ray.far))),
+                                    splat4(limit * CRT_SLAB_SLACK))));
     return make_vec4(V4X(enter) <= V4X(leave) ? V4X(enter) : CRT_INFINITY,
                      V4Y(enter) <= V4Y(leave) ? V4Y(enter) : CRT_INFINITY,
                      V4Z(enter) <= V4Z(leave) ? V4Z(enter) : CRT_INFINITY,
                      V4W(enter) <= V4W(leave) ? V4W(enter) : CRT_INFINITY);
 }
+
+/* What is left to be visited, and where the ray enters it. */
+#define CRT_STACKED(child, t) (((u64)(child) << 32) | (u64)crt_bits(t))
+#define CRT_STACKED_CHILD(entry) ((u32)((entry) >> 32))
+#define CRT_STACKED_ENTRY(entry) crt_from_bits((u32)(entry))
 
 #define CRT_SORT_CHILDREN(ta, ca, tb, cb) \
     if (tb < ta) {                        \
@@ -88,21 +129,36 @@ CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, vec3 from, vec3 
 
 /* Of the children that a ray enters at t the nearest becomes `current`; the others go onto the stack, the
    farthest first. 0: it enters none. */
-CRT_FN int crt_enter_nearest(CRT_GLOBAL const CrtNode4 *node, vec4 t, u32 *stack, f32 *entry, u32 *size,
-                             u32 *current) {
+CRT_FN int crt_enter_nearest(CRT_GLOBAL const CrtNode4 *node, vec4 t, u64 *stack, u32 *size, u32 *current) {
     f32 t0 = V4X(t), t1 = V4Y(t), t2 = V4Z(t), t3 = V4W(t);
-    u32 c0 = node->child[0], c1 = node->child[1], c2 = node->child[2], c3 = node->child[3];
+    const vec4 child = crt_load4((CRT_GLOBAL const f32 *)node->child); /* in one wide load */
+    u32 c0 = crt_bits(V4X(child)), c1 = crt_bits(V4Y(child)), c2 = crt_bits(V4Z(child)),
+        c3 = crt_bits(V4W(child));
     CRT_SORT_CHILDREN(t0, c0, t1, c1)
     CRT_SORT_CHILDREN(t2, c2, t3, c3)
     CRT_SORT_CHILDREN(t0, c0, t2, c2)
     CRT_SORT_CHILDREN(t1, c1, t3, c3)
     CRT_SORT_CHILDREN(t1, c1, t2, c2)
     if (!(t0 < CRT_INFINITY)) return 0;
-    if (t3 < CRT_INFINITY) { stack[*size] = c3; entry[*size] = t3; ++*size; }
-    if (t2 < CRT_INFINITY) { stack[*size] = c2; entry[*size] = t2; ++*size; }
-    if (t1 < CRT_INFINITY) { stack[*size] = c1; entry[*size] = t1; ++*size; }
+    if (t3 < CRT_INFINITY) { stack[*size] = CRT_STACKED(c3, t3); ++*size; }
+    if (t2 < CRT_INFINITY) { stack[*size] = CRT_STACKED(c2, t2); ++*size; }
+    if (t1 < CRT_INFINITY) { stack[*size] = CRT_STACKED(c1, t1); ++*size; }
     *current = c0;
     return 1;
+}
+
+/* The next from the stack that may hold a hit at most as far as t: a box that begins just behind the best hit
+   may still hold a tie, and the slack keeps it. 0: there is none. */
+CRT_FN int crt_next_stacked(const u64 *stack, u32 *size, f32 t, u32 *current) {
+    const f32 limit = t * CRT_SLAB_SLACK;
+    while (*size != 0u) {
+        --*size;
+        const u64 next = stack[*size];
+        if (CRT_STACKED_ENTRY(next) > limit) continue;
+        *current = CRT_STACKED_CHILD(next);
+        return 1;
+    }
+    return 0;
 }
 
 /* All children that a ray enters at t go onto the stack, in any order. Returns its size. */

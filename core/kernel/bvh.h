@@ -6,28 +6,33 @@
 #ifndef CRT_BVH_H
 #define CRT_BVH_H
 
+#include "patches.h"
 #include "slots.h"
 
 CRT_KERNEL_BEGIN
 
 CRT_FN CrtHit crt_brute_force_closest(const CrtContext *ctx, CrtRay ray) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
-    const CrtShear shear = crt_shear(ray);
-    CrtHit best = crt_no_hit(ray.reach);
+    CrtHit best;
 #if CRT_SIMD8
     CRT_GLOBAL const CrtTriangle8 *blocks = CRT_ARRAY(CrtTriangle8, ctx->blob, ctx->scene->triangles8);
+    const CrtShear shear = crt_shear(ray);
     const u32 count = ctx->scene->triangles8.count;
     const f32 slack = crt_candidate_slack(ray.o);
+    best = crt_no_hit(ray.reach);
     for (u32 b = 0u; b < count; ++b)
         for (u32 lanes = crt_candidates8(blocks + b, ray, slack, best.t); lanes != 0u; lanes &= lanes - 1u)
             crt_test_closest(triangles, blocks[b].slot[crt_lowest_bit(lanes)], shear, &best);
-    if (CRT_HAS(SHAPES)) crt_last_slots_closest(ctx, ray, &best);
 #else
-    const u32 count = ctx->scene->triangle_count;
-    for (u32 slot = 0u; slot < count; ++slot)
-        if (CRT_HAS_SLOTS) crt_test_slot(ctx, triangles, slot, ray, shear, &best);
-        else crt_test_closest(triangles, slot, shear, &best);
+    if (!crt_patches_closest(CRT_ARRAY(CrtPatch, ctx->blob, ctx->scene->patches), ctx->scene->patches.count,
+                             triangles, ray, &best)) {
+        const CrtShear shear = crt_shear(ray);
+        const u32 count = ctx->scene->triangle_count - ctx->scene->shapes.count;
+        best = crt_no_hit(ray.reach);
+        CRT_ROLLED for (u32 slot = 0u; slot < count; ++slot) crt_test_closest(triangles, slot, shear, &best);
+    }
 #endif
+    if (CRT_HAS(SHAPES)) crt_last_slots_closest(ctx, ray, &best);
     return best;
 }
 
@@ -35,10 +40,10 @@ CRT_FN CrtHit crt_brute_force_closest(const CrtContext *ctx, CrtRay ray) {
  * between, and are not asked. */
 CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
-    CRT_GLOBAL const CrtTriangle8 *blocks = CRT_ARRAY(CrtTriangle8, ctx->blob, ctx->scene->occluders8);
-    const u32 count = ctx->scene->occluders8.count;
     CrtHit hit;
 #if CRT_SIMD8
+    CRT_GLOBAL const CrtTriangle8 *blocks = CRT_ARRAY(CrtTriangle8, ctx->blob, ctx->scene->occluders8);
+    const u32 count = ctx->scene->occluders8.count;
     const f32 slack = crt_candidate_slack(ray.o);
     for (u32 b = 0u; b < count; ++b)
         for (u32 lanes = crt_candidates8(blocks + b, ray, slack, ray.reach); lanes != 0u;
@@ -47,10 +52,17 @@ CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
                                        ray.reach, &hit))
                 return 1;
 #else
-    const CrtShear shear = crt_shear(ray);
-    for (u32 b = 0u; b < count; ++b)
-        for (u32 lane = 0u; lane < 8u && blocks[b].slot[lane] != CRT_NONE; ++lane)
-            if (crt_intersect_triangle(triangles + blocks[b].slot[lane], shear, ray.reach, &hit)) return 1;
+    CRT_GLOBAL const CrtPatch *patches = CRT_ARRAY(CrtPatch, ctx->blob, ctx->scene->occluder_patches);
+    const u32 count = ctx->scene->occluder_patches.count;
+    const u32 stopped = crt_patches_any(patches, count, triangles, ray);
+    if (stopped == 1u) return 1;
+    if (stopped == 2u) {
+        const CrtShear shear = crt_shear(ray);
+        CRT_ROLLED for (u32 i = 0u; i < 2u * count; ++i) {
+            const u32 slot = patches[i >> 1].slot[i & 1u];
+            if (slot != CRT_NONE && crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit)) return 1;
+        }
+    }
 #endif
     if (CRT_HAS(SHAPES)) return crt_last_slots_any(ctx, ray);
     return 0;
@@ -92,31 +104,26 @@ CRT_FN CrtHit crt_bvh_closest(const CrtContext *ctx, CrtRay ray) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->nodes);
     const CrtShear shear = crt_shear(ray);
-    const CrtSlab slab = crt_slab(ray);
+    const CrtNodeRay among = crt_node_ray(ray, 0.0f);
     CrtHit best = crt_no_hit(ray.reach);
     if (!crt_is_ray(ray)) return best;
-    u32 stack[CRT_BVH_STACK];
-    f32 entry[CRT_BVH_STACK];
+    u64 stack[CRT_BVH_STACK];
     u32 size = 0u;
     u32 current = 0u; /* the root: node 0 */
+    /* Boxes until there is a leaf, then its triangles: on a GPU the lanes of a warp do the same together (Aila
+       and Laine 2009, "while-while"). */
     for (;;) {
-        const u32 count = current & 15u;
-        if (count == 0u) {
+        while ((current & 15u) == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
-            const vec4 t = crt_node_distances(node, ray.o, ray.o, slab, best.t);
-            if (crt_enter_nearest(node, t, stack, entry, &size, &current)) continue;
-        } else {
-            const u32 first = current >> 4;
-            for (u32 i = 0u; i < count; ++i)
-                if (CRT_HAS_SLOTS) crt_test_slot(ctx, triangles, first + i, ray, shear, &best);
-                else crt_test_closest(triangles, first + i, shear, &best);
+            const vec4 t = crt_node_distances(node, among, best.t);
+            if (crt_enter_nearest(node, t, stack, &size, &current)) continue;
+            if (!crt_next_stacked(stack, &size, best.t, &current)) return best;
         }
-        /* A box that begins just behind the best hit may still hold a tie: the slack keeps it. */
-        do {
-            if (size == 0u) return best;
-            --size;
-        } while (entry[size] > best.t * CRT_SLAB_SLACK);
-        current = stack[size];
+        const u32 first = current >> 4, end = first + (current & 15u);
+        for (u32 slot = first; slot < end; ++slot)
+            if (CRT_HAS_SLOTS) crt_test_slot(ctx, triangles, slot, ray, shear, &best);
+            else crt_test_closest(triangles, slot, shear, &best);
+        if (!crt_next_stacked(stack, &size, best.t, &current)) return best;
     }
 }
 
@@ -124,7 +131,7 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->nodes);
     const CrtShear shear = crt_shear(ray);
-    const CrtSlab slab = crt_slab(ray);
+    const CrtNodeRay among = crt_node_ray(ray, 0.0f);
     CrtHit hit;
     if (!crt_is_ray(ray)) return 0;
     u32 stack[CRT_BVH_STACK];
@@ -136,7 +143,7 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
         const u32 count = current & 15u;
         if (count == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
-            const vec4 t = crt_node_distances(node, ray.o, ray.o, slab, ray.reach);
+            const vec4 t = crt_node_distances(node, among, ray.reach);
             size = crt_enter_all(node, t, stack, size);
         } else {
             const u32 first = current >> 4;

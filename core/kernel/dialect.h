@@ -19,6 +19,7 @@
 #define CRT_FN static inline
 #define CRT_HOT_FN CRT_FN
 #define CRT_CALLED_FN __attribute__((noinline)) static
+#define CRT_SHARED_FN CRT_FN
 #define CRT_GLOBAL __global
 #define CRT_CONSTANT __constant
 #define CRT_KERNEL_BEGIN
@@ -63,10 +64,17 @@ CRT_FN u32 crt_reverse_bits(u32 x) {
 /* min, max and select lane by lane; a < b ? a : b, so that a NaN in `a` yields b. */
 CRT_FN vec4 crt_min4(vec4 a, vec4 b) { return select(b, a, a < b); }
 CRT_FN vec4 crt_max4(vec4 a, vec4 b) { return select(b, a, a > b); }
+/* The same for what only culls: of 0 and −0 either may come. A NaN in `a` yields b, which is none. */
+#define crt_cull_min(a, b) fmin((float)(a), (float)(b))
+#define crt_cull_max(a, b) fmax((float)(a), (float)(b))
+#define crt_cull_min4(a, b) crt_min4(a, b)
+#define crt_cull_max4(a, b) crt_max4(a, b)
 #define crt_fma4(a, b, c) fma((float4)(a), (float4)(b), (float4)(c))
 /* Lane by lane a < b ? x : y. */
 CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) { return select(y, x, a < b); }
 #define CRT_ROLLED _Pragma("unroll 1")
+#define CRT_TWICE _Pragma("unroll 2")
+#define crt_fast_reciprocal(x) (1.0f / (x))
 #ifndef CRT_SIMD8
 #define CRT_SIMD8 1
 #endif
@@ -94,6 +102,13 @@ CRT_FN u32 mask8_bits(mask8 m) {
 #define CRT_FN static __device__ inline
 #define CRT_HOT_FN CRT_FN
 #define CRT_CALLED_FN CRT_FN /* a call costs 0.8 % of a render, and none waits for this compiler */
+/* What many places ask for: copies of it would fill the cache of instructions, for which a kernel of many
+   materials waits more than for all else (docs/decisions/0041-instruction-cache.md). */
+#ifdef CRT_CUDA_ON_HOST
+#define CRT_SHARED_FN CRT_FN
+#else
+#define CRT_SHARED_FN static __device__ __noinline__
+#endif
 #define CRT_GLOBAL
 #define CRT_CONSTANT static __device__ const
 #define CRT_KERNEL_BEGIN
@@ -131,7 +146,9 @@ CRT_FN vec3 operator-(vec3 a) { return make_vec3(-a.x, -a.y, -a.z); }
 CRT_FN vec4 operator+(vec4 a, vec4 b) { return make_vec4(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w); }
 CRT_FN vec4 operator-(vec4 a, vec4 b) { return make_vec4(a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w); }
 CRT_FN vec4 operator*(vec4 a, vec4 b) { return make_vec4(a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w); }
-CRT_FN vec4 operator/(vec4 a, vec4 b) { return make_vec4(a.x / b.x, a.y / b.y, a.z / b.z, a.w / b.w); }
+CRT_SHARED_FN vec4 operator/(vec4 a, vec4 b) {
+    return make_vec4(a.x / b.x, a.y / b.y, a.z / b.z, a.w / b.w);
+}
 CRT_FN vec4 operator*(vec4 a, f32 s) { return a * splat4(s); }
 CRT_FN vec4 operator*(f32 s, vec4 a) { return splat4(s) * a; }
 CRT_FN vec4 operator/(vec4 a, f32 s) { return a / splat4(s); }
@@ -148,6 +165,9 @@ CRT_FN u32 crt_reverse_bits(u32 x) {
 }
 #define crt_abs(x) __builtin_fabsf(x)
 #define crt_floor(x) __builtin_floorf(x)
+#define fminf __builtin_fminf
+#define fmaxf __builtin_fmaxf
+#define crt_fast_reciprocal(x) (1.0f / (x))
 #else
 #define crt_fma(a, b, c) __fmaf_rn((a), (b), (c))
 #define crt_sqrt(x) __fsqrt_rn(x)
@@ -157,10 +177,15 @@ CRT_FN u32 crt_reverse_bits(u32 x) {
 #define crt_from_bits(u) __uint_as_float(u)
 #define crt_mulhi(a, b) __umulhi((a), (b))
 #define crt_reverse_bits(x) __brev(x)
+CRT_FN f32 crt_fast_reciprocal(f32 x) {
+    f32 r;
+    asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(r) : "f"(x));
+    return r;
+}
 #endif
 CRT_FN bool crt_is_finite(f32 x) { return (crt_bits(x) & 0x7f800000u) != 0x7f800000u; }
 CRT_FN vec4 crt_load4(const f32 *p) { return *reinterpret_cast<const vec4 *>(p); }
-CRT_FN vec4 crt_sqrt4(vec4 v) {
+CRT_SHARED_FN vec4 crt_sqrt4(vec4 v) {
     return make_vec4(crt_sqrt(v.x), crt_sqrt(v.y), crt_sqrt(v.z), crt_sqrt(v.w));
 }
 CRT_FN vec4 crt_min4(vec4 a, vec4 b) {
@@ -170,6 +195,14 @@ CRT_FN vec4 crt_min4(vec4 a, vec4 b) {
 CRT_FN vec4 crt_max4(vec4 a, vec4 b) {
     return make_vec4(a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z,
                      a.w > b.w ? a.w : b.w);
+}
+#define crt_cull_min(a, b) fminf((a), (b))
+#define crt_cull_max(a, b) fmaxf((a), (b))
+CRT_FN vec4 crt_cull_min4(vec4 a, vec4 b) {
+    return make_vec4(fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z), fminf(a.w, b.w));
+}
+CRT_FN vec4 crt_cull_max4(vec4 a, vec4 b) {
+    return make_vec4(fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z), fmaxf(a.w, b.w));
 }
 CRT_FN vec4 crt_fma4(vec4 a, vec4 b, vec4 c) {
     return make_vec4(crt_fma(a.x, b.x, c.x), crt_fma(a.y, b.y, c.y), crt_fma(a.z, b.z, c.z),
@@ -181,8 +214,10 @@ CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) {
 }
 #ifdef CRT_CUDA_ON_HOST
 #define CRT_ROLLED _Pragma("GCC unroll 1")
+#define CRT_TWICE _Pragma("GCC unroll 2")
 #else
 #define CRT_ROLLED _Pragma("unroll 1")
+#define CRT_TWICE _Pragma("unroll 2")
 #endif
 #define CRT_SIMD8 0
 #define CRT_ASSERT_SIZE(type, bytes) static_assert(sizeof(type) == (bytes), "layout of " #type)
@@ -196,10 +231,12 @@ CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) {
 #endif
 #define CRT_FN static inline
 #define CRT_ROLLED _Pragma("GCC unroll 1") /* before a loop whose body is too long to repeat */
+#define CRT_TWICE _Pragma("GCC unroll 2")  /* before one whose turns are to overlap */
 #define CRT_HOT_FN \
     __attribute__((always_inline)) static inline /* called twice a vertex, where a call costs 1 % */
 #define CRT_CALLED_FN \
     __attribute__((noinline, unused)) static /* long, with many callers; or seldom called */
+#define CRT_SHARED_FN CRT_FN
 #define CRT_GLOBAL
 #define CRT_CONSTANT static constexpr
 #define CRT_KERNEL_BEGIN namespace crt { namespace kernel {
@@ -247,6 +284,8 @@ CRT_FN f32 crt_fma(f32 a, f32 b, f32 c) { return __builtin_fmaf(a, b, c); }
 CRT_FN f32 crt_sqrt(f32 x) { return __builtin_sqrtf(x); }
 CRT_FN f32 crt_abs(f32 x) { return __builtin_fabsf(x); }
 CRT_FN f32 crt_floor(f32 x) { return __builtin_floorf(x); }
+/* 1/x to within an ulp, and not the same on all backends: for what only culls. */
+CRT_FN f32 crt_fast_reciprocal(f32 x) { return 1.0f / x; }
 CRT_FN u32 crt_bits(f32 x) { u32 u; std::memcpy(&u, &x, 4); return u; }
 CRT_FN f32 crt_from_bits(u32 u) { f32 x; std::memcpy(&x, &u, 4); return x; }
 CRT_FN u32 crt_mulhi(u32 a, u32 b) { return static_cast<u32>((static_cast<u64>(a) * b) >> 32); }
@@ -262,6 +301,10 @@ CRT_FN vec4 crt_load4(const f32 *p) { vec4 r; std::memcpy(&r, p, 16); return r; 
 CRT_FN vec4 crt_min4(vec4 a, vec4 b) { return vec4{a.v < b.v ? a.v : b.v}; }
 CRT_FN vec4 crt_max4(vec4 a, vec4 b) { return vec4{a.v > b.v ? a.v : b.v}; }
 CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) { return vec4{a.v < b.v ? x.v : y.v}; }
+CRT_FN f32 crt_cull_min(f32 a, f32 b) { return a < b ? a : b; }
+CRT_FN f32 crt_cull_max(f32 a, f32 b) { return a > b ? a : b; }
+CRT_FN vec4 crt_cull_min4(vec4 a, vec4 b) { return crt_min4(a, b); }
+CRT_FN vec4 crt_cull_max4(vec4 a, vec4 b) { return crt_max4(a, b); }
 #if defined(__AVX2__) && defined(__FMA__) /* The compiler would take lane after lane. */
 CRT_FN vec4 crt_sqrt4(vec4 a) { return vec4{(crt_native4)_mm_sqrt_ps((__m128)a.v)}; }
 CRT_FN vec4 crt_fma4(vec4 a, vec4 b, vec4 c) {

@@ -37,12 +37,7 @@ CRT_FN vec3 crt_direction_to_mesh(CRT_GLOBAL const CrtInstance *instance, vec3 d
 }
 
 /* A ray among the boxes of a mesh. */
-typedef struct CrtMeshRay {
-    vec3 from, to; /* its origin, moved along it by the slack, and back */
-    CrtSlab slab;
-} CrtMeshRay;
-
-CRT_FN CrtMeshRay crt_mesh_ray(CRT_GLOBAL const CrtInstance *instance, CrtRay ray) {
+CRT_FN CrtNodeRay crt_mesh_ray(CRT_GLOBAL const CrtInstance *instance, CrtRay ray) {
     CRT_GLOBAL const f32 *m = instance->to_mesh;
     const f32 x = V3X(ray.o), y = V3Y(ray.o), z = V3Z(ray.o);
     const vec3 o = make_vec3(crt_place(m, x, y, z), crt_place(m + 4, x, y, z), crt_place(m + 8, x, y, z));
@@ -51,13 +46,7 @@ CRT_FN CrtMeshRay crt_mesh_ray(CRT_GLOBAL const CrtInstance *instance, CrtRay ra
     CrtRay moved = ray;
     moved.o = o;
     moved.d = crt_direction_to_mesh(instance, ray.d);
-    CrtMeshRay r;
-    r.slab = crt_slab(moved);
-    const vec3 way = make_vec3(r.slab.near_x ? -slack : slack, r.slab.near_y != 2u ? -slack : slack,
-                               r.slab.near_z != 4u ? -slack : slack);
-    r.from = o + way;
-    r.to = o - way;
-    return r;
+    return crt_node_ray(moved, slack);
 }
 
 /* crt_intersect_triangle of a triangle of an instance. */
@@ -87,27 +76,22 @@ CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, C
     CRT_GLOBAL const CrtInstance *instance = crt_instance(ctx, index);
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->mesh_nodes);
-    const CrtMeshRay mesh = crt_mesh_ray(instance, ray);
-    u32 stack[CRT_BVH_STACK];
-    f32 entry[CRT_BVH_STACK];
+    const CrtNodeRay mesh = crt_mesh_ray(instance, ray);
+    u64 stack[CRT_BVH_STACK];
     u32 size = 0u;
     u32 current = instance->root << 4;
     for (;;) {
         const u32 count = current & 15u;
         if (count == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
-            const vec4 t = crt_node_distances(node, mesh.from, mesh.to, mesh.slab, best->t);
-            if (crt_enter_nearest(node, t, stack, entry, &size, &current)) continue;
+            const vec4 t = crt_node_distances(node, mesh, best->t);
+            if (crt_enter_nearest(node, t, stack, &size, &current)) continue;
         } else {
             const u32 first = current >> 4;
             for (u32 i = 0u; i < count; ++i)
                 crt_test_placed(instance, index, triangles, first + i, shear, best);
         }
-        do {
-            if (size == 0u) return;
-            --size;
-        } while (entry[size] > best->t * CRT_SLAB_SLACK);
-        current = stack[size];
+        if (!crt_next_stacked(stack, &size, best->t, &current)) return;
     }
 }
 
@@ -115,7 +99,7 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
     CRT_GLOBAL const CrtInstance *instance = crt_instance(ctx, index);
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->mesh_nodes);
-    const CrtMeshRay mesh = crt_mesh_ray(instance, ray);
+    const CrtNodeRay mesh = crt_mesh_ray(instance, ray);
     CrtHit hit;
     u32 stack[CRT_BVH_STACK];
     u32 size = 1u;
@@ -126,7 +110,7 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
         const u32 count = current & 15u;
         if (count == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
-            const vec4 t = crt_node_distances(node, mesh.from, mesh.to, mesh.slab, ray.reach);
+            const vec4 t = crt_node_distances(node, mesh, ray.reach);
             size = crt_enter_all(node, t, stack, size);
         } else {
             const u32 first = current >> 4;

@@ -88,17 +88,33 @@ CRT_FN int crt_intersect_corners(vec3 px, vec3 py, vec3 pz, CrtShear ray, f32 li
     return 1;
 }
 
+CRT_FN f32 crt_choose(u32 k, f32 a, f32 b, f32 c) { return k == 0u ? a : k == 1u ? b : c; }
+CRT_FN vec3 crt_choose3(u32 k, vec3 a, vec3 b, vec3 c) {
+    return make_vec3(crt_choose(k, V3X(a), V3X(b), V3X(c)), crt_choose(k, V3Y(a), V3Y(b), V3Y(c)),
+                     crt_choose(k, V3Z(a), V3Z(b), V3Z(c)));
+}
+
 CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShear ray, f32 limit,
                                   CrtHit *hit) {
+#if CRT_SIMD8
     CRT_GLOBAL const f32 *px = triangle->p + 3u * ray.kx;
     CRT_GLOBAL const f32 *py = triangle->p + 3u * ray.ky;
     CRT_GLOBAL const f32 *pz = triangle->p + 3u * ray.kz;
     return crt_intersect_corners(make_vec3(px[0], px[1], px[2]), make_vec3(py[0], py[1], py[2]),
                                  make_vec3(pz[0], pz[1], pz[2]), ray, limit, hit);
+#else
+    /* In three wide loads, since each lane reads from elsewhere. */
+    const vec4 a = crt_load4(triangle->p), b = crt_load4(triangle->p + 4);
+    const vec3 x = make_vec3(V4X(a), V4Y(a), V4Z(a)), y = make_vec3(V4W(a), V4X(b), V4Y(b)),
+               z = make_vec3(V4Z(b), V4W(b), triangle->p[8]);
+    return crt_intersect_corners(crt_choose3(ray.kx, x, y, z), crt_choose3(ray.ky, x, y, z),
+                                 crt_choose3(ray.kz, x, y, z), ray, limit, hit);
+#endif
 }
 
-/* One ulp beyond the best hit, so that ties reach the comparison of ids. */
-CRT_FN f32 crt_tie_limit(f32 t) { return t < CRT_INFINITY ? crt_next_up(t) : CRT_INFINITY; }
+/* One ulp beyond the best hit, so that ties reach the comparison of ids: of t ≥ 0 the next number; of others
+   one below 0, too. */
+CRT_FN f32 crt_tie_limit(f32 t) { return crt_from_bits(crt_bits(t) + (t < CRT_INFINITY ? 1u : 0u)); }
 
 /* Of a hit and the best so far the nearer wins, and of equally near ones the lower primitive id, so that the
    order of testing does not show. (A CrtHit handed over costs the largest kernel 80 bytes of spilled

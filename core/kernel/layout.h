@@ -95,6 +95,20 @@ typedef struct CrtTriangle8 {
 } CrtTriangle8;
 CRT_ASSERT_SIZE(CrtTriangle8, 576);
 
+/* Two triangles of one plane with a common edge, or one triangle, inside a parallelogram: two strips of their
+   plane. A row (x, y, z, w) is an affine function of a point p: x·p.x + y·p.y + z·p.z + w, in lengths. */
+typedef struct CrtPatch {
+    f32 plane[4];  /* height over it; (x, y, z) is its unit normal */
+    f32 first[4];  /* distance from the middle of one strip, within the plane */
+    f32 second[4];
+    f32 sizes[4];  /* half the width of the first strip, and of the second; crt_height_slack (surface.h) over
+                      CRT_HEIGHT_SCALE; 1 where there is one triangle, otherwise 0 */
+    f32 third[4];  /* of one triangle: distance from the edge that halves the parallelogram, positive inside */
+    u32 slot[2];   /* in the triangle array; the second CRT_NONE where there is one */
+    u32 reserved[2];
+} CrtPatch;
+CRT_ASSERT_SIZE(CrtPatch, 96);
+
 /* The plane of a triangle (of a shape: 0), by slot; how far off it a ray must start to be sure of its side,
    and how far from its edges, in barycentrics (of a shape: lengths), to be sure of its neighbours'
    (surface.h). */
@@ -497,8 +511,10 @@ typedef struct CrtScene {
     CrtSpan shapes;              /* CrtShape. Where slots are in the order of ids, theirs are the last */
     CrtSpan instances;           /* CrtInstance */
     CrtSpan mesh_nodes;          /* CrtNode4 of the meshes that are instanced */
+    CrtSpan patches;             /* CrtPatch, all triangles; only for brute force */
+    CrtSpan occluder_patches;    /* CrtPatch: the triangles that can come between two points of the scene */
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 432);
+CRT_ASSERT_SIZE(CrtScene, 448);
 
 CRT_KERNEL_END
 

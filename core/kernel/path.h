@@ -242,11 +242,16 @@ CRT_FN void crt_add_sample(const CrtContext *ctx, CrtPixelWork *work, vec4 xyz) 
     work->done += 1u;
 }
 
+/* Begins the pixel's next sample. */
+CRT_FN void crt_begin_sample(const CrtContext *ctx, CrtPixelWork *work) {
+    crt_path_begin(ctx, &work->path, work->x, work->y, work->first_sample + work->done);
+}
+
 /* Takes the pixel one vertex further, into its next sample where a path has ended. Returns 0 when the last
  * sample is done. */
 CRT_FN int crt_pixel_vertex(const CrtContext *ctx, CrtPixelWork *work, CrtRayCount *rays) {
     if (work->done >= work->sample_count) return 0;
-    if (!work->alive) crt_path_begin(ctx, &work->path, work->x, work->y, work->first_sample + work->done);
+    if (!work->alive) crt_begin_sample(ctx, work);
     vec4 xyz = splat4(0.0f);
     if (CRT_HAS(VIEW) && ctx->scene->view != CRT_VIEW_PATH) {
         xyz = crt_view(ctx, &work->path, rays);
@@ -262,13 +267,23 @@ CRT_FN int crt_pixel_vertex(const CrtContext *ctx, CrtPixelWork *work, CrtRayCou
 CRT_FN void crt_pixel_end(CrtPixelWork *work) { *work->count += work->valid; }
 
 /* ADDS samples [first_sample, first_sample + sample_count) of pixel (x, y) of the crop window to the film,
-   and rays to *rays. One flat loop over the vertices of all samples, so that on a GPU a lane whose path has
-   ended begins its next sample while others go on bouncing. */
+   and rays to *rays. On a GPU a lane whose path has ended either waits for the others of its warp, whose next
+   camera rays then go the same way through the tree; or, where there is no tree and all rays cost the same, it
+   begins its next sample at once, in one flat loop over the vertices of all samples (measured:
+   docs/decisions/0039-what-a-lane-does-when-its-path-ends.md). */
 CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count,
                              CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives,
                              CrtRayCount *rays) {
     CrtPixelWork work = crt_pixel_begin(ctx, x, y, first_sample, sample_count, sums, counts, primitives);
-    while (crt_pixel_vertex(ctx, &work, rays)) continue;
+    if (CRT_HAS(BVH) && !CRT_HAS(VIEW)) {
+        while (work.done < work.sample_count) {
+            crt_begin_sample(ctx, &work);
+            while (crt_path_vertex(ctx, &work.path, rays)) continue;
+            crt_add_sample(ctx, &work, crt_to_xyz(ctx, work.path.wavelengths, work.path.radiance));
+        }
+    } else {
+        while (crt_pixel_vertex(ctx, &work, rays)) continue;
+    }
     crt_pixel_end(&work);
 }
 

@@ -95,7 +95,7 @@ CRT_FN f32 crt_refraction(f32 cos_i, f32 eta) { return (eta - 1.0f) * (eta + 1.0
 
 /* Unpolarised reflectance of an interface at |cos| of incidence; eta: index beyond / index before. Exactly 1
    in total internal reflection, exactly 0 for an index of 1. */
-CRT_FN f32 crt_fresnel_dielectric(f32 cos_i, f32 eta) {
+CRT_FN f32 crt_fresnel_of(f32 cos_i, f32 eta) {
     const f32 refraction = crt_refraction(cos_i, eta);
     if (!(refraction > 0.0f)) return 1.0f;
     const f32 cos_t = crt_sqrt(refraction) / eta;
@@ -104,9 +104,11 @@ CRT_FN f32 crt_fresnel_dielectric(f32 cos_i, f32 eta) {
     return 0.5f * (rs * rs + rp * rp);
 }
 
-CRT_FN vec4 crt_fresnel_dielectric4(f32 cos_i, vec4 eta) {
-    return make_vec4(crt_fresnel_dielectric(cos_i, V4X(eta)), crt_fresnel_dielectric(cos_i, V4Y(eta)),
-                     crt_fresnel_dielectric(cos_i, V4Z(eta)), crt_fresnel_dielectric(cos_i, V4W(eta)));
+CRT_SHARED_FN f32 crt_fresnel_dielectric(f32 cos_i, f32 eta) { return crt_fresnel_of(cos_i, eta); }
+
+CRT_SHARED_FN vec4 crt_fresnel_dielectric4(f32 cos_i, vec4 eta) {
+    return make_vec4(crt_fresnel_of(cos_i, V4X(eta)), crt_fresnel_of(cos_i, V4Y(eta)),
+                     crt_fresnel_of(cos_i, V4Z(eta)), crt_fresnel_of(cos_i, V4W(eta)));
 }
 
 /* Unpolarised reflectance of a conductor of complex index n + ik at cos of incidence, four wavelengths at

@@ -64,7 +64,7 @@ CRT_FN f32 crt_lookup(CRT_GLOBAL const f32 *table, f32 position) {
 }
 
 /* A table at the path's wavelengths, linear between nanometres. */
-CRT_FN vec4 crt_lookup4(CRT_GLOBAL const f32 *table, vec4 position) {
+CRT_SHARED_FN vec4 crt_lookup4(CRT_GLOBAL const f32 *table, vec4 position) {
     return make_vec4(crt_lookup(table, V4X(position)), crt_lookup(table, V4Y(position)),
                      crt_lookup(table, V4Z(position)), crt_lookup(table, V4W(position)));
 }

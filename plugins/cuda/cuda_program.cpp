@@ -54,6 +54,11 @@ std::string kernelText(const std::string& path_text) {
     return path_text + "\n#line 1 \"kernels.cu\"\n" + kKernelText;
 }
 
+std::vector<int> blocksPerMultiprocessor(std::uint64_t features) {
+    if ((features & CRT_FEATURE_BVH) == 0) return {5, 4, 3};
+    return {4, 3};
+}
+
 std::vector<std::string> nvrtcOptions(int arch, std::uint64_t features, int blocks_per_multiprocessor) {
     char mask[48];
     std::snprintf(mask, sizeof mask, "-DCRT_FEATURES=0x%llxul", static_cast<unsigned long long>(features));
@@ -71,7 +76,7 @@ std::vector<std::string> nvrtcOptions(int arch, std::uint64_t features, int bloc
 KernelCache::Key cacheKey(const std::string& text, int arch, std::uint64_t features,
                           const std::string& compiler, const std::string& driver_version) {
     std::string options;
-    for (const int blocks : kBlocksPerMultiprocessor)
+    for (const int blocks : blocksPerMultiprocessor(features))
         for (const std::string& option : nvrtcOptions(arch, features, blocks)) options += option + ' ';
     return KernelCache::makeKey({"cuda", text, options, compiler, driver_version});
 }
@@ -100,7 +105,7 @@ ResourceUse resourceUse(const std::string& log, const std::string& kernel) {
 
 Cubin compileLean(const Nvrtc& compiler, const std::string& text, int arch, std::uint64_t features) {
     Cubin cubin;
-    for (const int blocks : kBlocksPerMultiprocessor) {
+    for (const int blocks : blocksPerMultiprocessor(features)) {
         cubin = compiler.compile(text, "path.h", nvrtcOptions(arch, features, blocks));
         if (resourceUse(cubin.log, "crt_render").spill_bytes <= kSpillBytesAllowed) break;
     }
@@ -126,9 +131,9 @@ Module::Module(const void* image, std::uint64_t features, std::string name)
                    "asking for local memory");
         cuda.check(cuda.cuOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, render_, kBlock, 0),
                    "asking for the occupancy");
-        // Local memory is the BVH's traversal stack, which is meant to be there, and what did not fit into
-        // registers.
-        constexpr int kTraversalStack = CRT_BVH_STACK * (sizeof(kernel::u32) + sizeof(kernel::f32));
+        // Local memory is the stacks of both traversals of the BVH, which are meant to be there, and what did
+        // not fit into registers.
+        constexpr int kTraversalStack = CRT_BVH_STACK * (sizeof(kernel::u64) + sizeof(kernel::u32));
         registers_ = static_cast<std::uint32_t>(registers);
         spill_bytes_ = static_cast<std::uint32_t>(
             std::max(0, local_bytes - ((features_ & CRT_FEATURE_BVH) ? kTraversalStack : 0)));
