@@ -1,12 +1,13 @@
-// The GPU's side of bench/paper: bandwidth of copies, sums (by a kernel of our own and by CUB), boxes by layout
-// and with the upload in streams, and sweeps of a table in constant, global and shared memory. One JSON object
-// a line for every measurement; exit code 1 when a result is wrong. Needs a GPU and its driver, nothing else.
+// The GPU's side of bench/paper: bandwidth of copies, sums (by a kernel of our own and by CUB), boxes by
+// layout and with the upload in streams, and sweeps of a table in constant, global and shared memory. One
+// JSON object a line for every measurement; exit code 1 when a result is wrong. Needs a GPU and its driver,
+// nothing else.
 //
 //     paper_gpu [copy] [sum] [boxes] [table] [--quick] [--runs N] [--meshes DIR]
 //
-// "time" of a row: `device`, kernels alone by the GPU's clock, many in a row; `call`, by the host's clock from
-// the first launch until the result is on the host; `upload`, that and before it the data from the host's
-// pinned memory; `upload, pageable`, the same from memory that the driver has to copy first.
+// "time" of a row: `device`, kernels alone by the GPU's clock, many in a row; `call`, by the host's clock
+// from the first launch until the result is on the host; `upload`, that and before it the data from the
+// host's pinned memory; `upload, pageable`, the same from memory that the driver has to copy first.
 #include "paper_kernels.h"
 #include "paper_rows.h"
 
@@ -19,7 +20,8 @@ namespace {
 constexpr unsigned kThreads = 256;
 
 void check(cudaError_t error, const char* what) {
-    if (error != cudaSuccess) throw std::runtime_error(std::string(what) + ": " + cudaGetErrorString(error));
+    if (error != cudaSuccess)
+        throw std::runtime_error(std::string(what) + ": " + cudaGetErrorString(error));
 }
 
 /// Memory of the GPU.
@@ -51,7 +53,9 @@ private:
 /// Memory of the host that the GPU reads and writes by itself.
 class PinnedArray {
 public:
-    explicit PinnedArray(std::size_t count) { check(cudaMallocHost(&data_, count * sizeof(float)), "pinning"); }
+    explicit PinnedArray(std::size_t count) {
+        check(cudaMallocHost(&data_, count * sizeof(float)), "pinning");
+    }
     ~PinnedArray() { cudaFreeHost(data_); }
     PinnedArray(const PinnedArray&) = delete;
     PinnedArray& operator=(const PinnedArray&) = delete;
@@ -157,7 +161,8 @@ bool sums(const Options& options, const cudaDeviceProp& device) {
 
         const unsigned blocks = gridFor(sumKernel, count / 4, device);
         const auto own = [&] {
-            sumKernel<<<blocks, kThreads>>>(data.get(), count, of_blocks.get(), arrived.get(), result.get());
+            sumKernel<<<blocks, kThreads>>>(data.get(), count, of_blocks.get(), arrived.get(),
+                                            result.get());
         };
         std::size_t bytes = 0;
         const int items = static_cast<int>(count);
@@ -170,7 +175,8 @@ bool sums(const Options& options, const cudaDeviceProp& device) {
         const double of_cub = std::ceil(double(count) / (256.0 * device.multiProcessorCount)) + 64;
         const auto measure = [&](const char* method, double additions, const auto& launch) {
             const auto fetch = [&] {
-                check(cudaMemcpy(answer.get(), result.get(), sizeof(float), cudaMemcpyDeviceToHost), "result");
+                check(cudaMemcpy(answer.get(), result.get(), sizeof(float), cudaMemcpyDeviceToHost),
+                      "result");
                 return double{*answer.get()};
             };
             const auto print = [&](const char* time, const std::vector<double>& seconds) {
@@ -203,9 +209,14 @@ bool sums(const Options& options, const cudaDeviceProp& device) {
 class BoxInParts {
 public:
     BoxInParts(std::size_t points, unsigned parts, unsigned streams, const cudaDeviceProp& device)
-        : points_(points), parts_(parts), streams_(streams), data_(3 * points),
+        : points_(points),
+          parts_(parts),
+          streams_(streams),
+          data_(3 * points),
           blocks_(gridFor(boxKernel<PointsAosWide>, points / 4 / parts, device)),
-          of_blocks_(std::size_t{6} * blocks_ * parts), arrived_(parts), results_(6 * parts),
+          of_blocks_(std::size_t{6} * blocks_ * parts),
+          arrived_(parts),
+          results_(6 * parts),
           answers_(6 * parts) {
         check(cudaDeviceSynchronize(), "clearing memory");  // The streams do not wait for it.
     }
@@ -331,7 +342,8 @@ bool table(const Options& options) {
         sweepOnHost(checked, triangles, TableFetch{host.data()}, expected.data(), makers);
         const DeviceArray<float> aos(host), soa(tableAsArrays(host));
         const float4* fours = reinterpret_cast<const float4*>(aos.get());
-        check(cudaMemcpyToSymbol(constant_table, host.data(), host.size() * sizeof(float)), "constant memory");
+        check(cudaMemcpyToSymbol(constant_table, host.data(), host.size() * sizeof(float)),
+              "constant memory");
         const auto measure = [&](const char* method, const char* layout, const auto& launch) {
             check(cudaMemset(nearest.get(), 0xff, rays * sizeof(std::uint32_t)), "cudaMemset");
             const auto seconds = timedOnDevice(options.runs, launch);

@@ -1,5 +1,5 @@
-// The processor's side of bench/paper: sums, boxes and sweeps of a table, in one thread and in all. One JSON
-// object a line for every measurement; exit code 1 when a result is wrong.
+// The processor's side of bench/paper: sums, boxes and sweeps of a table, in one thread and in all. One
+// JSON object a line for every measurement; exit code 1 when a result is wrong.
 //
 //     paper_host [sum] [boxes] [table] [--quick] [--runs N] [--meshes DIR]
 #include "paper_rows.h"
@@ -25,8 +25,8 @@ bool sums(const Options& options) {
         const double exact = exactSum(values.data(), count);
         right = withThreads([&](Threads& threads, const char* method) {
                     double sum = 0;
-                    const auto seconds = timed(
-                        options.runs, [&] { sum = sumOnHost(values.data(), count, threads); });
+                    const auto seconds =
+                        timed(options.runs, [&] { sum = sumOnHost(values.data(), count, threads); });
                     return printSum("cpu", method, "call", count, sum, exact, kHostAdditions, seconds);
                 }) &&
                 right;

@@ -1,6 +1,6 @@
-/// The kernels of bench/paper_gpu.cu. Compiled by nvcc, and by a C++ compiler in tests/unit_paper.cpp, where
-/// threads of the host play those of a block (tests/block_on_host.h, included before). Blocks have a multiple
-/// of 32 threads, at most 1024.
+/// The kernels of bench/paper_gpu.cu. Compiled by nvcc, and by a C++ compiler in tests/unit_paper.cpp,
+/// where threads of the host play those of a block (tests/block_on_host.h, included before). Blocks have a
+/// multiple of 32 threads, at most 1024.
 #pragma once
 
 #include "paper_work.h"
@@ -25,8 +25,8 @@ struct Most {
     static __device__ float neutral() { return -3.402823466e38f; }
 };
 
-/// `value` of all threads of the block together; the result is right in thread 0 alone. `scratch` has one place
-/// a warp; all threads must have arrived before it is used again.
+/// `value` of all threads of the block together; the result is right in thread 0 alone. `scratch` has one
+/// place a warp; all threads must have arrived before it is used again.
 template <typename Operation>
 __device__ float blockTotal(float value, float* scratch) {
     for (unsigned distance = kWarp / 2; distance > 0; distance /= 2)
@@ -42,8 +42,8 @@ __device__ float blockTotal(float value, float* scratch) {
     return value;
 }
 
-/// Whether this block is the last of the grid to come here. What thread 0 of the others wrote before is there
-/// to be read. `arrived` is 0 before and after.
+/// Whether this block is the last of the grid to come here. What thread 0 of the others wrote before is
+/// there to be read. `arrived` is 0 before and after.
 __device__ inline bool isLastBlock(unsigned* arrived, bool* answer) {
     if (threadIdx.x == 0) {
         __threadfence();
@@ -54,8 +54,9 @@ __device__ inline bool isLastBlock(unsigned* arrived, bool* answer) {
     return *answer;
 }
 
-/// Sum of `count` numbers that begin at a multiple of 16 bytes, in one pass: four loads of 16 bytes a thread
-/// before the first is used, warps by shuffles, blocks by the last to finish, in the same order every time.
+/// Sum of `count` numbers that begin at a multiple of 16 bytes, in one pass: four loads of 16 bytes a
+/// thread before the first is used, warps by shuffles, blocks by the last to finish, in the same order
+/// every time.
 __global__ void sumKernel(const float* values, std::size_t count, float* of_blocks, unsigned* arrived,
                           float* result) {
     __shared__ float scratch[kWarp];
@@ -150,7 +151,8 @@ struct PointsSoaWide {
     }
 };
 
-/// Box of `count` points, a multiple of what Points takes at once; the program fills up with the last point.
+/// Box of `count` points, a multiple of what Points takes at once; the program fills up with the last
+/// point.
 template <typename Points>
 __global__ void boxKernel(const float* points, std::size_t count, std::size_t pitch, float* of_blocks,
                           unsigned* arrived, float* result) {
@@ -184,7 +186,8 @@ __global__ void boxKernel(const float* points, std::size_t count, std::size_t pi
 __constant__ float4 constant_table[3 * kConstantTriangles];
 
 __device__ inline void unpack(float4 a, float4 b, float4 c, float* t) {
-    t[0] = a.x, t[1] = a.y, t[2] = a.z, t[3] = b.x, t[4] = b.y, t[5] = b.z, t[6] = c.x, t[7] = c.y, t[8] = c.z;
+    t[0] = a.x, t[1] = a.y, t[2] = a.z, t[3] = b.x, t[4] = b.y, t[5] = b.z, t[6] = c.x, t[7] = c.y,
+    t[8] = c.z;
 }
 struct FetchConstant {
     __device__ void operator()(std::uint32_t i, float* t) const {
@@ -213,7 +216,8 @@ struct FetchShared {
 
 /// Every ray against every triangle; a ray a thread.
 template <typename Fetch>
-__global__ void sweepKernel(Fetch fetch, std::uint32_t triangles, std::uint32_t rays, std::uint32_t* nearest) {
+__global__ void sweepKernel(Fetch fetch, std::uint32_t triangles, std::uint32_t rays,
+                            std::uint32_t* nearest) {
     const std::uint32_t index = blockIdx.x * blockDim.x + threadIdx.x;
     if (index < rays) nearest[index] = nearestOf(rayAt(index), triangles, fetch);
 }

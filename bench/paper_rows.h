@@ -1,4 +1,5 @@
-/// How bench/paper_host.cpp and bench/paper_gpu.cu read their command line, time their runs and print a row.
+/// How bench/paper_host.cpp and bench/paper_gpu.cu read their command line, time their runs and print a
+/// row.
 #pragma once
 
 #include "paper_work.h"
@@ -12,9 +13,7 @@ struct Options {
     int runs = 7;
     std::string meshes = "share/crt/meshes";
 
-    bool has(const char* part) const {
-        return std::find(parts.begin(), parts.end(), part) != parts.end();
-    }
+    bool has(const char* part) const { return std::find(parts.begin(), parts.end(), part) != parts.end(); }
 };
 
 inline Options optionsOf(int argc, char** argv, const std::vector<std::string>& known) {
@@ -47,8 +46,8 @@ inline std::vector<std::size_t> sumCounts(const Options& options) {
     return {5'000, 10'000, 100'000, 1'000'000, 10'000'000, 100'000'000};
 }
 
-/// What is boxed: a name and the corners of its triangles. "random" is none of the paper's: large enough that
-/// memory is what limits.
+/// What is boxed: a name and the corners of its triangles. "random" is none of the paper's: large enough
+/// that memory is what limits.
 struct Cloud {
     std::string name;
     std::vector<float> points;
@@ -61,8 +60,8 @@ inline std::vector<Cloud> clouds(const Options& options, Threads& threads) {
     return all;
 }
 
-/// Sizes of the table that all rays sweep: the Cornell box's and the sphere's number of triangles, all of the
-/// sphere.
+/// Sizes of the table that all rays sweep: the Cornell box's and the sphere's number of triangles, all of
+/// the sphere.
 constexpr std::uint32_t kTableSizes[] = {38, 960};
 
 /// Seconds of one of several calls in a row of at least 2 ms, `runs` times, after two rows that are not
@@ -146,7 +145,8 @@ inline bool printSum(const char* where, const char* method, const char* time, st
 inline int reported(const char* program, const std::function<bool()>& work) {
     try {
         if (work()) return 0;
-        std::fprintf(stderr, "%s: a result is not what it must be; its row says \"right\": false\n", program);
+        std::fprintf(stderr, "%s: a result is not what it must be; its row says \"right\": false\n",
+                     program);
     } catch (const std::exception& error) {
         std::fprintf(stderr, "%s: %s\n", program, error.what());
     }

@@ -142,7 +142,8 @@ constexpr double kHostAdditions = static_cast<double>(kRun / kLanes) + 1 + kLane
 inline double sumOnHost(const float* values, std::size_t count) {
     double sum = 0;
     for (std::size_t begin = 0; begin < count; begin += kRun) {
-        const std::size_t end = std::min(count, begin + kRun), whole = begin + (end - begin) / kLanes * kLanes;
+        const std::size_t end = std::min(count, begin + kRun),
+                          whole = begin + (end - begin) / kLanes * kLanes;
         float lanes[kLanes] = {};
         for (std::size_t i = begin; i < whole; i += kLanes)
             for (std::size_t lane = 0; lane < kLanes; ++lane) lanes[lane] += values[i + lane];
@@ -224,8 +225,8 @@ inline Box boxOnHost(const float* points, std::size_t count, bool arrays, Thread
     threads.run([&](unsigned part) {
         const std::size_t begin = partBegin(count, part, threads.count());
         const std::size_t end = partBegin(count, part + 1, threads.count());
-        boxes[part] = arrays ? boxOfArrays(points, begin, end, count)
-                             : boxOfPoints(points + 3 * begin, end - begin);
+        boxes[part] =
+            arrays ? boxOfArrays(points, begin, end, count) : boxOfPoints(points + 3 * begin, end - begin);
     });
     Box box = emptyBox();
     for (const Box& of_part : boxes) join(box, of_part);
@@ -246,7 +247,8 @@ inline std::vector<float> asArrays(const std::vector<float>& points) {
 /// of three corners with positive numbers.
 inline std::vector<float> cornersOf(const std::string& path) {
     std::ifstream file(path);
-    if (!file) throw std::runtime_error("cannot open the mesh '" + path + "'; --meshes DIR says where it is");
+    if (!file)
+        throw std::runtime_error("cannot open the mesh '" + path + "'; --meshes DIR says where it is");
     std::vector<float> places, corners;
     std::string line, word;
     while (std::getline(file, line)) {
@@ -289,12 +291,13 @@ PAPER_ANYWHERE inline Ray rayAt(std::uint32_t index) {
     return ray;
 }
 
-/// The test of Möller and Trumbore (1997): distance in units of the direction's length, or `limit` where the
-/// ray misses. A triangle is a corner and the two edges from it. The same operations everywhere; both
+/// The test of Möller and Trumbore (1997): distance in units of the direction's length, or `limit` where
+/// the ray misses. A triangle is a corner and the two edges from it. The same operations everywhere; both
 /// compilers are told not to contract them, so that processor and GPU agree bit for bit.
 PAPER_ANYWHERE inline float distanceTo(const Ray& ray, const float* t, float limit) {
     const float *d = ray.to, *a = t, *e = t + 3, *f = t + 6;
-    const float px = d[1] * f[2] - d[2] * f[1], py = d[2] * f[0] - d[0] * f[2], pz = d[0] * f[1] - d[1] * f[0];
+    const float px = d[1] * f[2] - d[2] * f[1], py = d[2] * f[0] - d[0] * f[2],
+                pz = d[0] * f[1] - d[1] * f[0];
     const float determinant = e[0] * px + e[1] * py + e[2] * pz;
     const float sx = ray.from[0] - a[0], sy = ray.from[1] - a[1], sz = ray.from[2] - a[2];
     const float inverse = 1.0f / determinant;
@@ -324,8 +327,8 @@ PAPER_ANYWHERE inline std::uint32_t nearestOf(const Ray& ray, std::uint32_t coun
     return nearest;
 }
 
-/// Corner and edges of the first `count` triangles, twelve numbers each (three of four; the fourth is 0), so
-/// that a GPU reads a triangle in three loads.
+/// Corner and edges of the first `count` triangles, twelve numbers each (three of four; the fourth is 0),
+/// so that a GPU reads a triangle in three loads.
 inline std::vector<float> tableOf(const std::vector<float>& corners, std::size_t count) {
     std::vector<float> table(12 * count);
     for (std::size_t i = 0; i < count; ++i)

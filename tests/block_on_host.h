@@ -1,6 +1,7 @@
-/// The words of CUDA that bench/paper_kernels.h uses, for a C++ compiler: the threads of a block are threads of
-/// the host that wait for each other where a block's do, and the blocks of a grid run one after another. It
-/// shows what kernels compute with barriers, shuffles and shared memory; nothing about their speed.
+/// The words of CUDA that bench/paper_kernels.h uses, for a C++ compiler: the threads of a block are
+/// threads of the host that wait for each other where a block's do, and the blocks of a grid run one after
+/// another. It shows what kernels compute with barriers, shuffles and shared memory; nothing about their
+/// speed.
 #pragma once
 
 #include <barrier>

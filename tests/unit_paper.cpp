@@ -1,5 +1,5 @@
-// What bench/paper measures is right: the processor's sums, boxes and sweeps, and the kernels, played by threads
-// of the host (the program itself sees on every GPU that its results are those of the processor).
+// What bench/paper measures is right: the processor's sums, boxes and sweeps, and the kernels, played by
+// threads of the host (the program itself sees on every GPU that its results are those of the processor).
 #include "catch.h"
 
 #include <algorithm>
@@ -137,8 +137,10 @@ TEST_CASE("the sweeps' kernels find what the processor finds", "[paper]") {
         return nearest;
     };
     CHECK(found([&](auto* nearest) { sweepKernel(FetchConstant{}, 20, 200, nearest); }) == expected);
-    CHECK(found([&](auto* nearest) { sweepKernel(FetchGlobal{fours.data()}, 20, 200, nearest); }) == expected);
-    CHECK(found([&](auto* nearest) { sweepKernel(FetchGlobalArrays{soa.data(), 20}, 20, 200, nearest); }) ==
+    CHECK(found([&](auto* nearest) { sweepKernel(FetchGlobal{fours.data()}, 20, 200, nearest); }) ==
           expected);
+    CHECK(found([&](auto* nearest) {
+              sweepKernel(FetchGlobalArrays{soa.data(), 20}, 20, 200, nearest);
+          }) == expected);
     CHECK(found([&](auto* nearest) { sweepSharedKernel<64>(fours.data(), 20, 200, nearest); }) == expected);
 }
