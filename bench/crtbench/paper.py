@@ -67,7 +67,8 @@ def read_rows(file):
 
 def measure(program, arguments, folder):
     rows = Rows(arguments.write_rows)
-    program.busy_share = float("inf")  # A disturbed run is no reason to stop; the page says that it was one.
+    # A disturbed run is not made again: the page says that it was one.
+    program.busy_share = float("inf")
     describe(program, arguments, rows)
     for part in arguments.parts:
         for name, words in WORK.get(part, {}).items():
@@ -81,6 +82,7 @@ def measure(program, arguments, folder):
     for part, function in renders.items():
         if part in arguments.parts and usable:
             function(program, arguments, rows, usable, folder)
+    program.timed = 0   # So that the page does not speak of repeated runs.
     return rows.all
 
 
@@ -118,7 +120,7 @@ def work(program, arguments, rows, part, name, words):
     printed = [json.loads(line) for line in run.output.splitlines()]
     for row in printed:
         rows.add(row.pop("part"), of=part, **row)
-    rows.add("run", of=part, what=name, others=round(run.others, 4))
+    rows.add("run", of=part, what=name, complete=run.code == 0, others=round(run.others, 4))
     if run.code and not any(row.get("right") is False for row in printed):
         rows.add("absent", of=part, what=name, reason=run.errors.strip().split("\n")[-1])
 

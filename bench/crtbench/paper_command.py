@@ -1,6 +1,6 @@
-"""The experiments of the paper that crt grew out of, with today's crt: sums (Table 1), boxes of meshes (Table
-2), ways to find what a ray hits (Table 3), time against samples (Figure 2), the pictures (Figure 3), and its
-remarks on the layout of data and on constant memory. Writes one page, docs/results/paper.md.
+"""The experiments of the paper that crt grew out of, with today's crt: sums (Table 1), boxes of meshes
+(Table 2), ways to find what a ray hits (Table 3), time against samples (Figure 2), the pictures (Figure 3),
+and its remarks on the layout of data and on constant memory. Writes one page, docs/results/paper.md.
 
 Where the build is not, on a machine with a GPU say, the portable tree and --write-rows measure; --rows makes
 the page of what they wrote, here."""
@@ -52,7 +52,11 @@ def main():
         "--longest", type=float, default=16, metavar="S", help="a render of Figure 2 may take (16)"
     )
     parser.add_argument(
-        "--longest-picture", type=float, default=120, metavar="S", help="a picture of Figure 3 may take (120)"
+        "--longest-picture",
+        type=float,
+        default=120,
+        metavar="S",
+        help="a picture of Figure 3 may take (120)",
     )
     parser.add_argument(
         "--write-rows",
@@ -76,13 +80,13 @@ def main():
         program = program_for(arguments)
         if arguments.rows:
             rows = [row for file in arguments.rows for row in paper.read_rows(file)]
-            folder = arguments.rows[0].parent
+            folders = [file.parent for file in arguments.rows]
         else:
             folder = arguments.write_rows.resolve().parent if arguments.write_rows else program.scratch
             folder.mkdir(parents=True, exist_ok=True)
-            rows = paper.measure(program, arguments, folder)
+            rows, folders = paper.measure(program, arguments, folder), [folder]
         if arguments.write_rows and not arguments.rows:
             return 0
-        return paper_page.write(program, arguments, rows, folder)
+        return paper_page.write(program, arguments, rows, folders)
 
     return exit_code("bench/paper", arguments, measure)

@@ -54,13 +54,14 @@ def ratio_text(a, b):
 def table1(results, found):
     results.heading("Table 1: the sum of N numbers")
     results.paragraph(
-        "Floats in [0, 1), multiples of 2⁻²⁴, whose sum in double is exact; every sum here is within its "
-        "bound of that. *Kernel*: on the GPU's clock, the numbers already there, launch after launch. "
+        "Floats in [0, 1), multiples of 2⁻²⁴, whose sum in double is exact; every sum here is within "
+        "its bound of that. *Kernel*: on the GPU's clock, the numbers already there, launch after launch. "
         "*Answer*: on the host's clock, from the launch until the sum is on the host. *With upload*: that, "
         "and the numbers brought from pinned memory of the host before. *Ours*: loads of 16 bytes, warps by "
         "shuffles, blocks by the last to finish, one pass (`bench/paper_kernels.h`); CUB's is "
         "`cub::DeviceReduce::Sum`. The processor's numbers are in its caches where they fit, the GPU's in "
-        "its L2: rates above that of memory are those of a cache."
+        "its L2: rates above that of memory are those of a cache. Uploads from pageable memory are in "
+        "`paper.json`."
     )
     copies = {}
     for row in found.all("copy"):
@@ -114,7 +115,8 @@ def table1(results, found):
             if s := found.seconds("sum", where="gpu", method=method, time="device", n=n):
                 share = 4 * n / s / copy
                 data[f"{method}_share_of_copy"] = share
-                said.append(f"{name} reads {significant(4 * n / s / 1e9)} GB/s, {share:.0%} of the faster copy")
+                rate = significant(4 * n / s / 1e9)
+                said.append(f"{name} reads {rate} GB/s, {share:.0%} of the faster copy")
         results.paragraph(f"At N = {n:,.0f} {' and '.join(said)}; {ASKED:.0%} were asked.")
     return data
 
@@ -150,7 +152,8 @@ def table2(results, found):
         )
         data[mesh] = dict(
             zip(
-                ("cpu_one_thread", "cpu_all_threads", "gpu_there", "gpu_pageable", "gpu_pinned", "gpu_streams"),
+                ("cpu_one_thread", "cpu_all_threads", "gpu_there", "gpu_pageable", "gpu_pinned",
+                 "gpu_streams"),
                 times,
             )
         )
@@ -169,7 +172,8 @@ def table3(results, found):
     results.paragraph(
         f"Milliseconds of rendering a million camera paths ({' '.join(SETTINGS)}, Sobol points), median of "
         "interleaved runs; the same image whatever is chosen. Sizes and samples differ, so that no render "
-        "takes minutes: they are in `paper.json`. Of the paper's rates two are known, on the GPU of its time "
+        "takes minutes: they are in `paper.json`. Of the paper's rates two are known, on the GPU of its "
+        "time "
         "and at five events: 48 Mpaths/s of the Cornell box and 0.14 of a dragon, without the way in which "
         "they were found; they stand here as milliseconds, too."
     )
@@ -183,7 +187,8 @@ def table3(results, found):
                 paths = row["size"] ** 2 * row["spp"]
                 cost[kind] = statistics.median(row["seconds"]) / paths * 1e6
         triangles = found.all("render", scene=scene)[0]["triangles"]
-        paper = f"{significant(1e3 / PAPER_MPATHS[scene])}, one way" if scene in PAPER_MPATHS else UNKNOWN
+        rate = PAPER_MPATHS.get(scene)
+        paper = f"{significant(1e3 / rate)} ({rate} Mpaths/s)" if rate else UNKNOWN
         rows.append(
             [
                 scene,
@@ -214,7 +219,8 @@ def time_against_samples(results, found, folder):
     results.paragraph(
         "Render seconds of the Cornell box by the backend's report, median of repeats, fitted by t₀ + cN. "
         f"The paper's curve: {UNKNOWN}; its rate of 48 Mpaths/s would be "
-        f"{significant(1e3 * 1440**2 / 48e6)} ms a sample at 1440² and {significant(1e3 * 2880**2 / 48e6)} at "
+        f"{significant(1e3 * 1440**2 / 48e6)} ms a sample at 1440² and "
+        f"{significant(1e3 * 2880**2 / 48e6)} at "
         "2880². Renders that would take long were left out."
     )
     results.paragraph("![Seconds against samples per pixel](paper.svg)")
@@ -226,13 +232,14 @@ def time_against_samples(results, found, folder):
     return data
 
 
-def figure3(results, found, rows_folder, folder):
+def figure3(results, found, rows_folders, folder):
     results.heading("Figure 3: the pictures")
     rows = []
     for row in found.all("picture"):
         paths = row["size"] ** 2 * row["spp"]
         scene = row["scene"]
-        paper = f"{significant(paths / PAPER_MPATHS[scene] / 1e6)} s" if scene in PAPER_MPATHS else UNKNOWN
+        rate = PAPER_MPATHS.get(scene)
+        paper = time_text(paths / rate / 1e6) if rate else UNKNOWN
         seconds = statistics.median(row["seconds"])
         rows.append(
             [scene, f"{row['size']}²", f"{row['spp']:,}", UNKNOWN, paper, row["backend"],
@@ -250,8 +257,8 @@ def figure3(results, found, rows_folder, folder):
         )
     for scene in dict.fromkeys(r["scene"] for r in found.all("picture")):
         row = found.all("picture", scene=scene)[0]
-        source = rows_folder / row["file"]
-        if source.exists():
+        source = next((f / row["file"] for f in rows_folders if (f / row["file"]).exists()), None)
+        if source:
             name = f"paper-{scene}.png"
             folder.mkdir(parents=True, exist_ok=True)
             paper_pictures.write_png(folder / name, *paper_pictures.smaller(source.read_bytes(), 360))
@@ -262,7 +269,8 @@ def figure3(results, found, rows_folder, folder):
 def remarks(results, found):
     results.heading("The paper's remarks, in our numbers")
     results.paragraph(
-        "The paper remarks on structures of arrays against arrays of structures, and on constant memory; how "
+        "The paper remarks on structures of arrays against arrays of structures, and on constant memory; "
+        "how "
         f"it judges is {UNKNOWN} to the project."
     )
     data = {"layouts": {}, "tables": {}}
@@ -276,7 +284,8 @@ def remarks(results, found):
         data["layouts"][mesh] = cost
         rows.append(
             [f"{mesh}, {triangles:,.0f}"]
-            + [f"{time_text(s)}; {significant(36 * triangles / s / 1e9)}" if s else "–" for s in cost.values()]
+            + [f"{time_text(s)}; {significant(36 * triangles / s / 1e9)}" if s else "–"
+               for s in cost.values()]
         )
     if rows:
         results.paragraph("**Layout.** Boxes on the GPU as in Table 2, the kernel alone; then GB/s read.")
@@ -284,7 +293,8 @@ def remarks(results, found):
         largest = list(data["layouts"].values())[-1]
         if all(largest.values()):
             results.paragraph(
-                f"Of the largest, arrays of structures take {ratio_text(largest['aos'], largest['soa'])} times "
+                f"Of the largest, arrays of structures take {ratio_text(largest['aos'], largest['soa'])} "
+                "times "
                 f"as long as structures of arrays with loads of 4 bytes, and "
                 f"{ratio_text(largest['aos, wide'], largest['soa, wide'])} times with loads of 16."
             )
@@ -301,20 +311,24 @@ def remarks(results, found):
             )
     if rows:
         results.paragraph(
-            "**Constant memory.** All rays against all triangles of a table, as brute force does: every thread "
-            "reads the same triangle at the same time. The test of Möller and Trumbore, rays made on the spot; "
+            "**Constant memory.** All rays against all triangles of a table, as brute force does: every "
+            "thread "
+            "reads the same triangle at the same time. The test of Möller and Trumbore, rays made on the "
+            "spot; "
             "the same nearest triangles everywhere."
         )
         results.table(["triangles", "where the table is", "layout", "paper", "10⁹ tests a second"], rows)
         said = []
         for triangles in sorted({r["triangles"] for r in found.all("table", where="gpu")}):
             tests = {
-                m: data["tables"].get(f"{triangles:.0f} gpu {m} aos") for m in ("constant", "global", "shared")
+                m: data["tables"].get(f"{triangles:.0f} gpu {m} aos")
+                for m in ("constant", "global", "shared")
             }
             if all(tests.values()):
                 said.append(
                     f"of {triangles:.0f} triangles, constant memory gives "
-                    f"{ratio_text(tests['constant'], tests['global'])} times the tests of global memory, and "
+                    f"{ratio_text(tests['constant'], tests['global'])} times the tests of global memory, "
+                    "and "
                     f"shared {ratio_text(tests['shared'], tests['global'])} times"
                 )
         if said:
@@ -338,20 +352,23 @@ def begin(results, found):
         results.paragraph(
             "**Made with `--quick`, to see whether the tools work: these figures mean nothing.**"
         )
-    limit = max((m["busy"] for m in machines if m.get("busy") is not None), default=0.05)
+    limit = max((m["busy"] or 0.05 for m in machines), default=0.05)
     shares = [(r["others"], r) for r in found.rows if "others" in r]
     busy = [r for share, r in shares if share > limit]
     if busy:
         results.paragraph(
-            f"**Disturbed:** in {len(busy)} of {len(shares)} timed runs or groups of runs other processes took "
-            f"more than {limit:.0%} of the processor, at most {max(s for s, _ in shares):.0%}: figures of the "
+            f"**Disturbed:** in {len(busy)} of {len(shares)} timed runs or groups of runs other processes "
+            "took "
+            f"more than {limit:.0%} of the processor, at most {max(s for s, _ in shares):.0%}: figures of "
+            "the "
             "processor are not to be published."
         )
     if wrong := wrong_rows(found):
         results.paragraph(f"**Wrong:** {len(wrong)} results are not what they must be: see `paper.json`.")
     gpus = dict.fromkeys(
         f"{r['method']}, {r['multiprocessors']:.0f} multiprocessors, {r['l2_bytes'] / 2**20:.0f} MiB of L2, "
-        f"compiled with CUDA {r['compiled_with_cuda'] // 1000:.0f}.{r['compiled_with_cuda'] % 1000 // 10:.0f}"
+        "compiled with CUDA "
+        f"{r['compiled_with_cuda'] // 1000:.0f}.{r['compiled_with_cuda'] % 1000 // 10:.0f}"
         for r in found.all("device")
     )
     rows = []
@@ -370,15 +387,28 @@ def begin(results, found):
         results.paragraph(f"Tables 1 and 2 and the remarks: one {gpu}.")
 
 
+def is_elsewhere(found, absent):
+    """Whether what one machine could not measure is in the rows of another."""
+    part, what = absent["of"], absent["what"]
+    if what in ("paper_host", "paper_gpu"):
+        return bool(found.all("run", of=part, what=what, complete=True))
+    if part == "figure2":
+        return bool(found.all("figure2", backend=what))
+    return any(what in (r["backend"], f"{r['scene']}, {r['backend']}")
+               for kind in ("render", "picture") for r in found.all(kind, of=part))
+
+
 def end(results, found, arguments):
     """What is not there, and how to measure it."""
     measured = {part for m in found.all("machine") for part in m["parts"]}
     absent = {}
     for row in found.all("absent"):
-        absent.setdefault((row["what"], row["reason"]), []).append(row["of"])
+        if not is_elsewhere(found, row):
+            absent.setdefault((row["what"], row["reason"]), []).append(row["of"])
     for (what, reason), parts in absent.items():
         results.paragraph(
-            f"Not measured: {', '.join(parts)}, `{what}`: {reason}. The command, where it can run: `bench/paper "
+            f"Not measured: {', '.join(parts)}, `{what}`: {reason}. The command, where it can run: "
+            "`bench/paper "
             f"--parts {','.join(parts)}`."
         )
     for part in PARTS:
@@ -391,8 +421,8 @@ def end(results, found, arguments):
         results.paragraph(arguments.note)
 
 
-def write(program, arguments, rows, rows_folder):
-    """The page; 1 where a result is wrong."""
+def write(program, arguments, rows, rows_folders):
+    """The page; 1 where a result is wrong. The pictures are in one of the folders."""
     found = Found(rows)
     results = Results(program, arguments, "paper", "The paper's experiments, today")
     results.tool = "bench/paper"
@@ -402,7 +432,7 @@ def write(program, arguments, rows, rows_folder):
         "table2": table2(results, found),
         "table3": table3(results, found),
         "figure2": time_against_samples(results, found, arguments.results),
-        "figure3": figure3(results, found, rows_folder, arguments.results),
+        "figure3": figure3(results, found, rows_folders, arguments.results),
         "remarks": remarks(results, found),
         "rows": rows,
     }

@@ -1,5 +1,5 @@
-"""A PPM of crt as a smaller PNG, by Python's standard library: where the program that rendered it came without
-the library for PNG, nothing else is there."""
+"""A PPM of crt as a smaller PNG, by Python's standard library: where the program that rendered it came
+without the library for PNG, nothing else is there."""
 
 import struct
 import zlib
@@ -13,12 +13,12 @@ def to_linear(code):
 
 
 def to_code(value):
-    return round(255 * (12.92 * value if value <= 0.0031308 else 1.055 * value ** (1 / 2.4) - 0.055))
+    return round(255 * (12.92 * value if value <= 0.0031308 else 1.055 * value ** (5 / 12) - 0.055))
 
 
 def smaller(ppm, most):
-    """(width, height, bytes of RGB) of a P6 file, with at most `most` pixels a side: means of whole blocks of
-    pixels, in linear light."""
+    """(width, height, bytes of RGB) of a P6 file, with at most `most` pixels a side: means of whole blocks
+    of pixels, in linear light."""
     fields = ppm.split(None, 4)
     if len(fields) < 4 or fields[0] != b"P6" or fields[3] != b"255":
         raise Failure("a picture is no PPM of 8 bits, which crt writes")

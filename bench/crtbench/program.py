@@ -180,9 +180,9 @@ class Program:
         return result
 
     def interleaved(self, cases, runs, attempts=6, warm_up=True):
-        """{name: function → Run} → {name: [Run]}: first all once, untimed, to warm caches (`warm_up`); then
-        all in turn, `runs` times. A run during which other processes used the processor is repeated; when that
-        does not help, the measurement is given up. """
+        """{name: function → Run} → {name: [Run]}: first all once, untimed, to warm caches (`warm_up`);
+        then all in turn, `runs` times. A run during which other processes used the processor is repeated;
+        when that does not help, the measurement is given up."""
         for case in cases.values() if warm_up else ():
             case()
         self.await_compilers()
