@@ -134,8 +134,8 @@ def table3(program, arguments, rows, usable, _folder):
     for scene in TABLE3_SCENES:
         triangles = accelerators.triangles_of(program, scene, usable[0])
         for backend in usable:
-            # So many paths that a render takes some tenths of a second at least where the loop is fast.
-            factor = 64 if on_gpu(program, backend) else 4
+            # A GPU needs more paths to be busy for a while.
+            factor = 16 if on_gpu(program, backend) else 1
             kept = accelerators.runs_by_kind(
                 program, scene, backend, triangles, arguments.runs, arguments.tiny, factor, SETTINGS
             )

@@ -400,7 +400,7 @@ def is_elsewhere(found, absent):
 
 def end(results, found, arguments):
     """What is not there, and how to measure it."""
-    measured = {part for m in found.all("machine") for part in m["parts"]}
+    asked = {part for m in found.all("machine") for part in m["parts"]}
     absent = {}
     for row in found.all("absent"):
         if not is_elsewhere(found, row):
@@ -412,10 +412,10 @@ def end(results, found, arguments):
             f"--parts {','.join(parts)}`."
         )
     for part in PARTS:
-        if part not in measured:
+        if not any(part in (r["part"], r.get("of")) for r in found.rows):
+            why = "the run ended before" if part in asked else "it was not asked for"
             results.paragraph(
-                f"Not measured: {part} ({PARTS[part]}): it was not asked for. The command: `bench/paper "
-                f"--parts {part}`."
+                f"Not measured: {part} ({PARTS[part]}): {why}. The command: `bench/paper --parts {part}`."
             )
     if arguments.note:
         results.paragraph(arguments.note)
