@@ -1,9 +1,10 @@
-# The target `portable`: crt in two archives for machines on which nothing can be installed, a cluster's
+# The target `portable`: crt in three archives for machines on which nothing can be installed, a cluster's
 # nodes say.
 #
 #   crt-portable.tar.gz        the program, its backends, scenes, meshes, and the libraries they need but
 #   glibc's and the compiler's
 #   crt-portable-tests.tar.gz  the conformance suite and its reference backend, to be unpacked over the first
+#   crt-portable-bench.tar.gz  the programs of bench/paper, likewise
 #
 # Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's.
 # OpenImageIO and the 250 libraries it brings stay behind, being larger than all the rest: images are written
@@ -59,8 +60,14 @@ if(CMAKE_SCRIPT_MODE_FILE)
   file(COPY ${REFERENCE_BACKEND} DESTINATION ${tests}/lib/crt)
   file(MAKE_DIRECTORY ${tests}/bin)
   file(RENAME ${tree}/bin/crt_conformance ${tests}/bin/crt_conformance)
+  foreach(program paper_host paper_gpu)
+    if(EXISTS ${BUILD_DIR}/bin/${program})
+      file(COPY ${BUILD_DIR}/bin/${program} DESTINATION ${staging}/crt-portable-bench/crt/bin)
+    endif()
+  endforeach()
   pack(crt-portable)
   pack(crt-portable-tests)
+  pack(crt-portable-bench)
   file(REMOVE_RECURSE ${staging})
   return()
 endif()
@@ -74,7 +81,7 @@ add_custom_target(portable
 # What is installed, and what is taken from the build tree.
 foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_kernel_cache
   crt_meshes crt_shell_files crt-meshgen
-        conformance crt_backend_example libcrt)
+        conformance crt_backend_example libcrt paper_host paper_gpu)
   if(TARGET ${part})
     add_dependencies(portable ${part})
   endif()

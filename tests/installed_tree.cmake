@@ -64,6 +64,11 @@ else()
       "crt-portable has ${bytes} bytes unpacked, meshes and Embree aside: more than ${limit}")
   endif()
 
+  run(${CMAKE_COMMAND} -E chdir ${WORK_DIR} ${CMAKE_COMMAND} -E tar xzf
+    ${BUILD_DIR}/crt-portable-bench.tar.gz)
+  run(${CLEAN} ${WORK_DIR}/crt/bin/paper_host boxes --quick --runs 1 --meshes
+    ${WORK_DIR}/crt/share/crt/meshes)
+
   render(${WORK_DIR}/crt cornell_box a.pfm a.ppm)
   render(${WORK_DIR}/crt cornell_figure b.pfm)
   render(${WORK_DIR}/crt cornell_dragon c.pfm)

@@ -67,13 +67,37 @@ objects:
     return text
 
 
-def size_and_samples(kind, triangles, tiny):
-    """Few enough paths that a loop ends within a minute, enough for a timing where it is fast."""
+def size_and_samples(kind, triangles, tiny, work=1):
+    """Few enough paths that a loop ends within a minute, enough for a timing where it is fast; `work` times
+    as many."""
     if tiny:
         return 16, 1
-    paths = min(400 * 400 * 8, TESTS / (8 * triangles)) if kind != "bvh" else 400 * 400 * 8
+    most = 400 * 400 * 8 * work
+    paths = min(most, TESTS * work / (8 * triangles)) if kind != "bvh" else most
     size = next((s for s in (400, 64) if paths >= s * s), 32)
     return size, max(1, int(paths / (size * size)))
+
+
+def runs_by_kind(program, scene, backend, triangles, runs, tiny, work=1, settings=()):
+    """{kind: [Run]}, interleaved."""
+    cases = {}
+    for kind in KINDS:
+        size, spp = size_and_samples(kind, triangles, tiny, work)
+        all_settings = [
+            f"film.resolution=[{size},{size}]",
+            "outputs.0.aovs=[]",
+            f"integrator.accelerator={kind}",
+            *settings,
+        ]
+        cases[kind] = lambda all_settings=all_settings, spp=spp: program.render(
+            scene, backend, ["--spp", spp], settings=all_settings
+        )
+    return program.interleaved(cases, runs)
+
+
+def triangles_of(program, scene, backend):
+    run = program.render(scene, backend, ["--spp", 1], settings=["film.resolution=[8,8]"])
+    return run.value("scene", "triangles")
 
 
 def measure(program, arguments):
@@ -83,23 +107,10 @@ def measure(program, arguments):
 
     rows, data = [], {"scenes": {}, "crossover": {}}
     for scene in program.scenes(arguments.scenes or SCENES):
-        triangles = program.render(scene, usable[0], ["--spp", 1], settings=["film.resolution=[8,8]"]).value(
-            "scene", "triangles"
-        )
+        triangles = triangles_of(program, scene, usable[0])
         entry = data["scenes"][scene] = {"triangles": triangles, "backends": {}}
         for backend in usable:
-            cases = {}
-            for kind in KINDS:
-                size, spp = size_and_samples(kind, triangles, arguments.tiny)
-                settings = [
-                    f"film.resolution=[{size},{size}]",
-                    "outputs.0.aovs=[]",
-                    f"integrator.accelerator={kind}",
-                ]
-                cases[kind] = lambda settings=settings, spp=spp: program.render(
-                    scene, backend, ["--spp", spp], settings=settings
-                )
-            kept = program.interleaved(cases, runs)
+            kept = runs_by_kind(program, scene, backend, triangles, runs, arguments.tiny)
             speed = {
                 kind: Spread(r.value("speed", "mpaths_per_second") for r in done)
                 for kind, done in kept.items()

@@ -21,44 +21,60 @@ COLOURS = {
 
 def measure(program, arguments):
     resolutions = (72, 144) if arguments.tiny else (1440, 2880)
-    longest = (
-        0.2 if arguments.tiny else 16.0
-    )  # Seconds that one render may take: a processor does not get to 1024.
+    # Seconds that one render may take: a processor does not get to 1024.
+    longest = 0.2 if arguments.tiny else 16.0
     usable, absent = program.backends(["cuda", "embree", "opencl"])
-    rows = []
-    for resolution in resolutions:
-        for spp in COUNTS:
-            cases = {
-                b: (
-                    lambda b=b: program.render(
-                        SCENE,
-                        b,
-                        ["--spp", spp],
-                        settings=[f"film.resolution=[{resolution},{resolution}]", "outputs.0.aovs=[]"],
-                    )
-                )
-                for b in usable
-                if last_seconds(rows, b, resolution) * 2 < longest
-            }
-            if not cases:
-                break
-            for backend, done in program.interleaved(cases, 1 if spp > 4 else 2).items():
-                rows += [
-                    {
-                        "backend": backend,
-                        "resolution": resolution,
-                        "spp": spp,
-                        "repeat": i,
-                        "render": r.value("seconds", "render"),
-                    }
-                    for i, r in enumerate(done)
-                ]
-            print(rows[-1], flush=True)
+    rows = timings(program, usable, resolutions, longest)
     if arguments.rows:
         rows += [json.loads(line) for line in pathlib.Path(arguments.rows).read_text().splitlines()]
     if not rows:
         raise Failure("no backend can run here")
     write(program, arguments, rows, absent)
+
+
+def few_runs(spp, _seconds):
+    """Of a number of samples, where the last one took `_seconds`."""
+    return 1 if spp > 4 else 2
+
+
+def timings(program, backends, resolutions, longest, settings=(), runs=few_runs, keep=print):
+    """A row for every render: of growing numbers of samples, as long as one is likely to take less than
+    `longest` seconds. `runs(spp, seconds of the last)`: how often each is rendered; `keep(row)` is told of
+    each row when it is there."""
+    rows = []
+    for resolution in resolutions:
+        size = f"film.resolution=[{resolution},{resolution}]"
+        for spp in COUNTS:
+            last = {b: last_seconds(rows, b, resolution) for b in backends}
+            cases = {
+                b: (
+                    lambda b=b, spp=spp: program.render(
+                        SCENE, b, ["--spp", spp], settings=[size, "outputs.0.aovs=[]", *settings]
+                    )
+                )
+                for b in backends
+                if last[b] * 2 < longest
+            }
+            if not cases:
+                break
+            for repeats in sorted({runs(spp, last[b]) for b in cases}):
+                chosen = {b: case for b, case in cases.items() if runs(spp, last[b]) == repeats}
+                # The kernel is the same for all counts: a long render needs no uncounted one before it.
+                warm_up = max(last[b] for b in chosen) < 1
+                for backend, done in program.interleaved(chosen, repeats, warm_up=warm_up).items():
+                    for i, r in enumerate(done):
+                        rows.append(
+                            {
+                                "backend": backend,
+                                "resolution": resolution,
+                                "spp": spp,
+                                "repeat": i,
+                                "render": r.value("seconds", "render"),
+                                "others": round(r.others, 4),
+                            }
+                        )
+                        keep(rows[-1])
+    return rows
 
 
 def last_seconds(rows, backend, resolution):
@@ -104,6 +120,23 @@ def write(program, arguments, rows, absent):
         "processor was left out."
     )
     results.paragraph("![Seconds against samples per pixel](figure2.svg)")
+    data = show(results, lines)
+    results.heading("The doubling")
+    results.lines += [*doublings(lines, data), ""]
+    results.not_measured(
+        {name: reason for name, reason in absent.items() if not any(b == name for b, _ in lines)}
+    )
+    results.command(
+        f"crt render configs/{SCENE}.yaml --backend BACKEND --spp N --set 'film.resolution=[1440,1440]' "
+        f"--set 'outputs.0.aovs=[]' -o unseen.pfm"
+    )
+    results.data = {"rows": rows, "fits": data}
+    results.write()
+    (arguments.results / "figure2.svg").write_text(draw(lines))
+
+
+def show(results, lines):
+    """The table of the fits; returns them for programs."""
     table, data = [], {}
     for (backend, resolution), points in lines.items():
         if len(points) < 3:
@@ -145,7 +178,12 @@ def write(program, arguments, rows, absent):
         ],
         table,
     )
-    doubling = []
+    return data
+
+
+def doublings(lines, data):
+    """A sentence a backend on the larger image's cost; adds the ratio to the fits."""
+    sentences = []
     for backend in sorted({b for b, _ in lines}):
         small, large = (
             (data.get(f"{backend} {r}") for r in sorted({r for b, r in lines if b == backend})[:2])
@@ -155,23 +193,12 @@ def write(program, arguments, rows, absent):
         if small and large:
             ratio = large["seconds_per_sample"] / small["seconds_per_sample"]
             data[f"{backend} doubling"] = ratio
-            doubling.append(
+            sentences.append(
                 f"- {backend}: twice the width and height costs {significant(ratio)} times as much a "
                 f"sample; "
                 f"4 is linear in the number of pixels"
             )
-    results.heading("The doubling")
-    results.lines += [*doubling, ""]
-    results.not_measured(
-        {name: reason for name, reason in absent.items() if not any(b == name for b, _ in lines)}
-    )
-    results.command(
-        f"crt render configs/{SCENE}.yaml --backend BACKEND --spp N --set 'film.resolution=[1440,1440]' "
-        f"--set 'outputs.0.aovs=[]' -o unseen.pfm"
-    )
-    results.data = {"rows": rows, "fits": data}
-    results.write()
-    (arguments.results / "figure2.svg").write_text(draw(lines))
+    return sentences
 
 
 def draw(lines):

@@ -33,10 +33,11 @@ class Run:
     """One process that ran: how long, what it printed, what crt reported, and what share of the processor
     others took meanwhile."""
 
-    def __init__(self, code, seconds, output, others, report=None):
+    def __init__(self, code, seconds, output, others, report=None, errors=""):
         self.code = code
         self.seconds = seconds
         self.output = output
+        self.errors = errors
         self.others = others
         self.report = report
 
@@ -146,7 +147,7 @@ class Program:
                 f"{self.plain(' '.join(command))} ended with code {done.returncode}: "
                 f"{done.stderr.strip()[-1500:]}"
             )
-        return Run(done.returncode, seconds, done.stdout, others)
+        return Run(done.returncode, seconds, done.stdout, others, errors=done.stderr)
 
     def render(self, scene, backend, arguments=(), outputs=(), settings=(), codes=(0,), environment=None):
         """Renders a scene of the repository (by name) or a file, and reads the report. Without outputs, a
@@ -178,11 +179,11 @@ class Program:
             raise Failure(f"{a} and {b} cannot be compared: {result['mismatch']}")
         return result
 
-    def interleaved(self, cases, runs, attempts=6):
-        """{name: function → Run} → {name: [Run]}: first all once, untimed, to warm caches; then all in
-        turn, `runs` times. A run during which other processes used the processor is repeated; when that
-        does not help, the measurement is given up. """
-        for case in cases.values():
+    def interleaved(self, cases, runs, attempts=6, warm_up=True):
+        """{name: function → Run} → {name: [Run]}: first all once, untimed, to warm caches (`warm_up`);
+        then all in turn, `runs` times. A run during which other processes used the processor is repeated;
+        when that does not help, the measurement is given up."""
+        for case in cases.values() if warm_up else ():
             case()
         self.await_compilers()
         kept = {name: [] for name in cases}
