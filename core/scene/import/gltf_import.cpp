@@ -274,7 +274,7 @@ std::string Writer::cameraText() {
 
 std::string Writer::environmentText() const {
     if (!graph_.lights.empty()) return {};
-    losses_.choose(inner_ ? "a grey sky, a lamp, and one at the camera" : "a grey sky and a lamp");
+    losses_.choose(inner_ ? "a grey sky and a lamp at the camera" : "a grey sky and a lamp");
     return chosenLight(inner_);
 }
 

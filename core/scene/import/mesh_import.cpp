@@ -36,7 +36,7 @@ std::string viewText(const Mesh& mesh, bool emits, Losses& losses) {
     std::string text = chosenCamera(boundsOf(mesh), inner, kAspect, losses);
     text += "film: {resolution: [960, 640]}\nsampler: {samples: 128}\n";
     if (emits) return text;
-    losses.choose(inner ? "a grey sky, a lamp, and one at the camera" : "a grey sky and a lamp");
+    losses.choose(inner ? "a grey sky and a lamp at the camera" : "a grey sky and a lamp");
     return text + chosenLight(inner);
 }
 

@@ -82,19 +82,19 @@ std::string chosenLight(const std::optional<InnerView>& inner) {
     // The lamp's irradiance is 1.9, the sky's 1.6: a white surface has 1.1 towards the lamp and .5 away from
     // it, where the sky has .5.
     constexpr double kIrradiance = 1.9;
-    std::string text = fmt::format(
+    const std::string text =
         "\n# Chosen: the file has no light.\n"
-        "environment: {{radiance: {{rgb: [0.5, 0.5, 0.5], space: linear}}{}}}\n"
-        "lights:\n"
-        "  - {{name: key, type: sun, direction: [0.4, -0.75, -0.55], angular_diameter_deg: 20, radiance: "
-        "{{rgb: [20, 20, 20], space: linear}}}}\n",
-        inner ? ", light_sampling: true" : "");
-    if (!inner) return text;
+        "environment: {radiance: {rgb: [0.5, 0.5, 0.5], space: linear}}\n"
+        "lights:\n";
+    if (!inner)
+        return text +
+               "  - {name: key, type: sun, direction: [0.4, -0.75, -0.55], angular_diameter_deg: 20, "
+               "radiance: {rgb: [20, 20, 20], space: linear}}\n";
     // As bright as the other where half of what is seen is nearer.
     const double intensity = kIrradiance * inner->distance * inner->distance;
     return text + fmt::format(
-                      "  - {{name: camera, type: point, position: {}, radiant_intensity: {{rgb: {}, "
-                      "space: linear}}}}\n",
+                      "  - {{name: camera, type: point, position: {}, radiant_intensity: {{rgb: {}, space: "
+                      "linear}}}}\n",
                       yamlList(inner->position), yamlList(Vec3d{intensity, intensity, intensity}));
 }
 

@@ -66,8 +66,8 @@ private:
 };
 
 /// Light for a file that has none: a grey sky, which a white surface does not vanish into, and a soft lamp
-/// over the left shoulder of `chosenCamera`; within a building one at the camera, too. Both sections, as
-/// text.
+/// over the left shoulder of `chosenCamera`; within a building, where that may not reach, one at the camera.
+/// Both sections, as text.
 std::string chosenLight(const std::optional<InnerView>& inner);
 
 inline constexpr double kChosenFov_deg = 40, kChosenTurn_deg = 35;
