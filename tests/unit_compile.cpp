@@ -149,15 +149,6 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     };
     seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_ANISOTROPY, 0, brushed(0.5));
     differs(CRT_FEATURE_ROUGH_CONDUCTOR, 0, brushed(0.01));  // a mirror
-    const auto colored = [&](crt::MaterialType type) {
-        return [=](Scene& s) {
-            other(type)(s);
-            s.materials[1].by_color = true;
-        };
-    };
-    seen |= differs(CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_OPENPBR, 0,
-                    colored(crt::MaterialType::RoughConductor));
-    differs(CRT_FEATURE_PLASTIC | CRT_FEATURE_OPENPBR, 0, colored(crt::MaterialType::Plastic));
     const auto fuzzy = [&](double weight) {
         return [=](Scene& s) {
             s.materials[0].fuzz = weight;

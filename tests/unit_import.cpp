@@ -242,6 +242,44 @@ TEST_CASE("Extensions of materials become keys of OpenPBR", "[gltf][import]") {
                Contains("reflectance: 0\n") && Contains("scale: 1}, two_sided: true}"));
 }
 
+// Fails when metals are taken for dielectrics, what is mirrored is not taken off the diffuse colour, alpha
+// is not the glossiness, or the extension wins over what the file says better.
+TEST_CASE("Specular and glossiness become a metal or a dielectric", "[gltf][import]") {
+    const auto textOf = [](const Json& value, bool textured = false, Json material = Json::object()) {
+        material["extensions"]["KHR_materials_pbrSpecularGlossiness"] = value;
+        const Imported result = importOf(material, [&](GltfMaker& maker) {
+            maker.root["extensionsUsed"] =
+                maker.root["extensionsRequired"] = {"KHR_materials_pbrSpecularGlossiness"};
+            if (textured) maker.texture(rgba(2, 2, kFourTexels));
+        });
+        return result.text + result.log;
+    };
+    const Json plastic{{"diffuseFactor", {0.5, 0.25, 0.125, 1}},
+                       {"specularFactor", {0.25, 0.25, 0.25}},
+                       {"glossinessFactor", 0.75}};
+    CHECK_THAT(textOf(plastic), Contains("base_color: {rgb: [0.375, 0.1875, 0.09375], space: linear}\n    "
+                                         "specular_roughness: 0.25\n    specular_ior: 3\n"));
+    const Json gold{{"diffuseFactor", {0, 0, 0, 1}}, {"specularFactor", {1, 0.5, 0.25}}};
+    CHECK_THAT(textOf(gold), Contains("base_color: {rgb: [1, 0.5, 0.25], space: linear}\n    "
+                                      "base_metalness: 1\n    specular_roughness: 0\n"));
+    const Json by_texture{{"diffuseFactor", {0, 0, 0, 1}}, {"specularGlossinessTexture", {{"index", 0}}}};
+    CHECK_THAT(textOf(by_texture, true),
+               Contains("base_color: {texture: a.glb, image: 0}\n    base_metalness: 1\n    "
+                        "specular_roughness: " +
+                        yamlNumber(1 - (255 + 128 + 64) / 4.0 / 255)) &&
+                   Contains("glossiness by a texture: its mean"));
+    const Json painted{{"diffuseTexture", {{"index", 0}}}, {"specularFactor", {0, 0, 0}}};
+    CHECK_THAT(textOf(painted, true),
+               Contains("base_color: {texture: a.glb, image: 0}\n") && Contains("specular_ior: 1\n"));
+    const Json both{
+        {"pbrMetallicRoughness",
+         {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}, {"roughnessFactor", 0.5}}}};
+    CHECK_THAT(textOf(gold, true, both),
+               Contains("base_color: {texture: a.glb, image: 0}\n    specular_roughness: 0.5\n"));
+    CHECK_THAT(textOf({{"diffuseFactor", "red"}, {"specularFactor", {1}}, {"glossinessFactor", {}}}),
+               Contains("base_metalness: 1\n"));
+}
+
 // Found by the fuzzer: a factor of 3e38 became a scene that crt itself refuses.
 TEST_CASE("light beyond any use is refused at its place in the file", "[gltf][import]") {
     const auto refusal = [](const std::function<void(GltfMaker&)>& change) -> std::string {

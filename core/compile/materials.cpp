@@ -203,7 +203,6 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (hasFuzz(*material)) part.features |= CRT_FEATURE_FUZZ;
         if (hasClearcoat(*material)) part.features |= CRT_FEATURE_CLEARCOAT;
         if (hasRoughBase(*material)) part.features |= CRT_FEATURE_ROUGH_BASE;
-        if ((record.flags & CRT_MATERIAL_OPENPBR) != 0) part.features |= CRT_FEATURE_OPENPBR;
     }
     return part;
 }

@@ -69,7 +69,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->k = crt_value(ctx, material.k, surface, position);
                 b->alpha = roughness * roughness;
                 if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
-                if (CRT_HAS(OPENPBR) && (material.flags & CRT_MATERIAL_OPENPBR) != 0u)
+                if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u)
                     crt_prepare_colors(b, V4X(crt_value(ctx, material.coat, surface, position)));
                 if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
                 if (b->alpha >= CRT_ALPHA_MIN) {
@@ -150,7 +150,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                               (material.coat & CRT_VALUE_INDEX) * CRT_SPECTRUM_STRIDE;
                 /* Of what enters, the base sends this much back through the coat. */
                 vec4 returned = base * (1.0f - k) / (splat4(1.0f) - base * k);
-                if (CRT_HAS(OPENPBR) && (material.flags & CRT_MATERIAL_OPENPBR) != 0u) returned = base;
+                if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u) returned = base;
                 const f32 mirrored = crt_coat_albedo(b, dot3(wo, b->ns));
                 const f32 scattered = 0.25f * sum4(returned) * (1.0f - mirrored);
                 b->reflectance = returned * ((1.0f - mirrored) / ((1.0f - k) * eta * eta));

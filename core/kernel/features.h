@@ -58,12 +58,11 @@
     F(34, NORMAL_MAP, "normal maps")                                                         \
     F(35, SPECTRAL_FILM, "spectral film: bins of wavelengths, responses of sensors")         \
     F(36, ANISOTROPY, "roughness that differs along the surface")                            \
-    F(37, OPENPBR, "metals and glossy surfaces by their colours, as in OpenPBR")             \
+    F(37, INSTANCES, "meshes that are stored once and placed many times")                    \
     F(38, ROUGH_BASE, "diffuse surfaces that are rough (EON)")                               \
     F(39, FUZZ, "fuzz on top of surfaces")                                                   \
     F(40, CLEARCOAT, "coats on top of surfaces")                                             \
-    F(41, SHAPES, "spheres, disks and cylinders")                                            \
-    F(42, INSTANCES, "meshes that are stored once and placed many times")
+    F(41, SHAPES, "spheres, disks and cylinders")
 
 #define CRT_FEATURE_NUMBER(bit, name, text) CRT_BIT_##name = bit,
 enum CrtFeatureNumber { CRT_FEATURE_LIST(CRT_FEATURE_NUMBER) };

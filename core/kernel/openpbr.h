@@ -17,7 +17,7 @@ CRT_KERNEL_BEGIN
 #define CRT_EDGE_DIP 17.651394f      /* 1 / ((1/7)(6/7)⁶) */
 
 CRT_FN int crt_is_colored(const CrtBsdf *b) {
-    return CRT_HAS(OPENPBR) && (b->flags & CRT_BSDF_COLORED) != 0u;
+    return CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_COLORED) != 0u;
 }
 
 /* From b->eta, F₀, and b->k, the tint, what is asked for at each angle. */

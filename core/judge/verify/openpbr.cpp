@@ -304,20 +304,19 @@ void fuzz(Context& context) {
 }  // namespace
 
 std::vector<Case> openPbrCases() {
-    constexpr std::uint64_t seen = CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_OPENPBR;
     return {
         row("G32", "openpbr-metal",
             "Metals by base_color, specular_color and their weights, polished at four angles, one of them "
             "82°; rough at three; white ones",
             "F82-tint's curve; its quadrature over the normals, what is lost given back; 1",
             "OpenPBR Surface 1.1; Kutz, Hasan and Edmondson (2021)", "1e-5; ± 0.2 %", Level::Commit,
-            seen | CRT_FEATURE_ROUGH_CONDUCTOR, metals),
+            CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ROUGH_CONDUCTOR, metals),
         row("G33", "openpbr-limits",
             "Glossy bases at three angles, a mix with metal; what is left when weights are 0 or 1, beside "
             "crt's own material; what crt has not",
             "E + (1 − E) · base_color; shares of the mix; the same bits; a refusal",
             "OpenPBR Surface 1.1", "± 0.2 %; 0", Level::Commit,
-            seen | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_MIX |
+            CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_MIX |
                 CRT_FEATURE_DIFFUSE | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ROUGH_DIELECTRIC |
                 CRT_FEATURE_ANISOTROPY | CRT_FEATURE_ABSORPTION | CRT_FEATURE_THIN_FILM |
                 CRT_FEATURE_TABLE,
@@ -333,7 +332,7 @@ std::vector<Case> openPbrCases() {
             "three angles in light from everywhere, white and grey",
             "EON's closed forms; 1 for white; quadrature over directions under a gloss",
             "Portsmouth, Kutz and Hill (2025)", "± 0.02 %, ± 0.2 %", Level::Commit,
-            CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_BASE | CRT_FEATURE_OPENPBR |
+            CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_BASE |
                 CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_TABLE,
             roughDiffuse),
         row("G38", "fuzz",

@@ -14,7 +14,8 @@ const std::set<std::string, std::less<>> kKnownExtensions{
     "KHR_materials_ior",        "KHR_materials_iridescence",  "KHR_materials_sheen",
     "KHR_materials_specular",   "KHR_materials_transmission", "KHR_materials_unlit",
     "KHR_materials_volume",     "KHR_mesh_quantization",      "KHR_texture_transform",
-    "KHR_materials_anisotropy", "KHR_materials_dispersion",   "KHR_materials_variants"};
+    "KHR_materials_anisotropy", "KHR_materials_dispersion",   "KHR_materials_variants",
+    "KHR_materials_pbrSpecularGlossiness"};
 
 }  // namespace
 

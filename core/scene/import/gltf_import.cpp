@@ -2,6 +2,7 @@
 
 #include "scene/gltf/gltf_accessor.h"
 #include "scene/gltf/gltf_json.h"
+#include "scene/gltf/gltf_mesh.h"
 #include "scene/gltf/gltf_model.h"
 #include "scene/import/gltf_graph.h"
 #include "scene/import/gltf_materials.h"
@@ -14,6 +15,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -56,6 +59,7 @@ public:
 
 private:
     std::string objectsText();
+    std::vector<PaintedTriangle> paintedTriangles();
     std::string primitiveText(int mesh, std::size_t number, const std::vector<Matrix4d>& worlds,
                               const std::string& name);
     std::string cameraText();
@@ -75,6 +79,8 @@ private:
     GltfMaterials materials_;
     UniqueNames names_;
     Bounds bounds_;
+    std::vector<std::vector<Matrix4d>> worlds_;  ///< By mesh, where it stands.
+    std::optional<InnerView> inner_;             ///< Where the chosen camera is, if not around everything.
 };
 
 double luminanceOf(const std::vector<double>& c) {
@@ -132,7 +138,7 @@ std::string Writer::primitiveText(int mesh, std::size_t number, const std::vecto
 
 /// An object for each primitive, placed as often as its mesh is.
 std::string Writer::objectsText() {
-    std::vector<std::vector<Matrix4d>> worlds(model_.meshes.size());
+    worlds_.resize(model_.meshes.size());
     std::vector<std::string> names(model_.meshes.size());
     std::vector<int> order;
     for (const GltfPlaced& placed : graph_.meshes) {
@@ -142,23 +148,62 @@ std::string Writer::objectsText() {
             losses_.add("a node that flattens its mesh");
             continue;
         }
-        if (worlds[mesh].empty()) {
+        if (worlds_[mesh].empty()) {
             order.push_back(placed.what);
             names[mesh] = model_.nodes[static_cast<std::size_t>(placed.node)].name;
         }
-        worlds[mesh].push_back(world);
+        worlds_[mesh].push_back(world);
     }
     std::string text;
     for (const int mesh : order) {
         const auto i = static_cast<std::size_t>(mesh);
         const std::string& own = model_.meshes[i].name;
-        const std::string name = worlds[i].size() == 1 && !names[i].empty() ? names[i]
-                                 : own.empty()                              ? fmt::format("mesh {}", mesh)
-                                                                            : own;
+        const std::string name = worlds_[i].size() == 1 && !names[i].empty() ? names[i]
+                                 : own.empty()                               ? fmt::format("mesh {}", mesh)
+                                                                             : own;
         for (std::size_t k = 0; k < model_.meshes[i].primitives.size(); ++k)
-            text += primitiveText(mesh, k, worlds[i], name);
+            text += primitiveText(mesh, k, worlds_[i], name);
     }
     return text;
+}
+
+/// What the objects show, in the world; nothing where that is too much to look for a place in.
+std::vector<PaintedTriangle> Writer::paintedTriangles() {
+    std::vector<PaintedTriangle> triangles;
+    const auto forPrimitives = [&](const auto& what) {
+        for (std::size_t mesh = 0; mesh < worlds_.size(); ++mesh)
+            for (std::size_t k = 0; k < model_.meshes[mesh].primitives.size(); ++k) {
+                const tinygltf::Primitive& primitive = model_.meshes[mesh].primitives[k];
+                const auto position = primitive.attributes.find("POSITION");
+                if (primitive.mode >= TINYGLTF_MODE_TRIANGLES && position != primitive.attributes.end())
+                    what(mesh, k, primitive.indices >= 0 ? primitive.indices : position->second);
+            }
+    };
+    std::size_t corners = 0;
+    std::set<int> materials;
+    forPrimitives([&](std::size_t mesh, std::size_t k, int accessor) {
+        corners += worlds_[mesh].size() * model_.accessors[static_cast<std::size_t>(accessor)].count;
+        materials.insert(model_.meshes[mesh].primitives[k].material);
+    });
+    if (corners > 3 * kMostPaintedTriangles || materials.size() < kFewestMaterialsOfBuildings)
+        return triangles;
+    forPrimitives([&](std::size_t mesh, std::size_t k, int) {
+        if (worlds_[mesh].empty()) return;
+        std::uint64_t without_area = 0;
+        const Mesh read = readGltfPrimitive(file_, {.mesh = mesh, .primitive = k}, without_area);
+        const auto material = static_cast<std::uint32_t>(model_.meshes[mesh].primitives[k].material);
+        for (const Matrix4d& world : worlds_[mesh]) {
+            const bool mirrors = dot(cross(directionAt(world, {1, 0, 0}), directionAt(world, {0, 1, 0})),
+                                     directionAt(world, {0, 0, 1})) < 0;
+            for (const auto& corner : read.triangles) {
+                const Vec3d a = pointAt(world, read.positions[corner[0]]),
+                            b = pointAt(world, read.positions[corner[1]]),
+                            c = pointAt(world, read.positions[corner[2]]);
+                triangles.emplace_back(a, mirrors ? c : b, mirrors ? b : c, material);
+            }
+        }
+    });
+    return triangles;
 }
 
 /// Of a surface in the middle that faces the light, roughly: lamps within the model count as if on its edge.
@@ -210,11 +255,12 @@ std::string Writer::cameraText() {
               height = aspect >= 1 ? std::max(static_cast<int>(std::lround(kLonger / aspect)), 1) : kLonger;
     std::string text;
     if (camera.empty()) {
-        losses_.choose("a camera that sees all of it");
-        text += "\n# Chosen: the file has no camera.";
-        camera = chosenCamera(bounds_, static_cast<double>(width) / height);
+        const double chosen_aspect = static_cast<double>(width) / height;
+        inner_ = innerView(paintedTriangles(), chosen_aspect);
+        text += chosenCamera(bounds_, inner_, chosen_aspect, losses_);
+    } else {
+        text += fmt::format("\ncamera: {{{}}}\n", camera);
     }
-    text += fmt::format("\ncamera: {{{}}}\n", camera);
     std::string film = fmt::format("resolution: [{}, {}]", width, height);
     if (!graph_.lights.empty()) {
         const double lux = illuminance();
@@ -228,8 +274,8 @@ std::string Writer::cameraText() {
 
 std::string Writer::environmentText() const {
     if (!graph_.lights.empty()) return {};
-    losses_.choose("a grey sky and a lamp");
-    return chosenLight();
+    losses_.choose(inner_ ? "a grey sky and a lamp at the camera" : "a grey sky and a lamp");
+    return chosenLight(inner_);
 }
 
 std::string Writer::lightsText() const {

@@ -2,6 +2,8 @@
 #include "scene/import/gltf_materials.h"
 
 #include "scene/gltf/gltf_model.h"
+#include "scene/import/gltf_specular.h"
+#include "scene/import/gltf_values.h"
 #include "spectra/spectra.h"
 
 #include <fmt/format.h>
@@ -14,33 +16,8 @@ namespace {
 
 using tinygltf::Value;
 
-/// An extension's map; one without keys where the material has it not.
-const Value& extensionOf(const tinygltf::Material& material, const char* name) {
-    static const Value nothing;
-    const auto found = material.extensions.find(name);
-    return found == material.extensions.end() ? nothing : found->second;
-}
-
 bool hasExtension(const tinygltf::Material& material, const char* name) {
     return material.extensions.contains(name);
-}
-
-double numberOf(const Value& object, const char* key, double fallback) {
-    return object.IsObject() && object.Has(key) && object.Get(key).IsNumber()
-               ? object.Get(key).GetNumberAsDouble()
-               : fallback;
-}
-
-std::array<double, 3> colorOf(const Value& object, const char* key, const std::array<double, 3>& fallback) {
-    if (!object.IsObject() || !object.Has(key)) return fallback;
-    const Value& list = object.Get(key);
-    if (!list.IsArray() || list.ArrayLen() != 3) return fallback;
-    std::array<double, 3> color;
-    for (std::size_t k = 0; k < 3; ++k) {
-        if (!list.Get(k).IsNumber()) return fallback;
-        color[k] = std::max(list.Get(k).GetNumberAsDouble(), 0.0);
-    }
-    return color;
 }
 
 double unitOf(double value) { return std::clamp(value, 0.0, 1.0); }
@@ -233,17 +210,17 @@ void GltfMaterials::readNormals(Source& source, Surface& surface) {
 
 /// Index and strength of the reflection of what is not metal.
 void GltfMaterials::readDielectric(Source& source, Surface& surface) {
-    double ior = numberOf(extensionOf(source.material, "KHR_materials_ior"), "ior", 1.5);
+    double ior = gltfNumber(gltfExtension(source.material, "KHR_materials_ior"), "ior", 1.5);
     if (ior < 1 || ior > 10) {
         losses_.add("an index of refraction that is none of 1 to 10: 1.5");
         ior = 1.5;
     }
     surface.pane_ior = yamlNumber(ior);
     if (ior != 1.5) surface.dielectric.emplace_back("specular_ior", yamlNumber(ior));
-    const Value& specular = extensionOf(source.material, "KHR_materials_specular");
+    const Value& specular = gltfExtension(source.material, "KHR_materials_specular");
     if (!specular.IsObject()) return;
-    const std::array<double, 3> color = colorOf(specular, "specularColorFactor", kWhite);
-    double factor = unitOf(numberOf(specular, "specularFactor", 1));
+    const std::array<double, 3> color = gltfColor(specular, "specularColorFactor", kWhite);
+    double factor = unitOf(gltfNumber(specular, "specularFactor", 1));
     if (color[0] == color[1] && color[1] == color[2])
         factor = std::min(factor * color[0], 1.0);
     else
@@ -254,14 +231,14 @@ void GltfMaterials::readDielectric(Source& source, Surface& surface) {
 }
 
 void GltfMaterials::readClear(Source& source, Surface& surface) {
-    const Value& transmission = extensionOf(source.material, "KHR_materials_transmission");
-    const double factor = unitOf(numberOf(transmission, "transmissionFactor", 0));
+    const Value& transmission = gltfExtension(source.material, "KHR_materials_transmission");
+    const double factor = unitOf(gltfNumber(transmission, "transmissionFactor", 0));
     const std::string share =
         weight(source, textures_.named(transmission, "transmissionTexture", source.pointer), factor, "red",
                "the texture of the transmission");
     if (share.empty()) return;
-    const Value& volume = extensionOf(source.material, "KHR_materials_volume");
-    const double thickness = numberOf(volume, "thicknessFactor", 0);
+    const Value& volume = gltfExtension(source.material, "KHR_materials_volume");
+    const double thickness = gltfNumber(volume, "thicknessFactor", 0);
     if (!(thickness > 0)) {
         surface.pane = share;
         if (surface.color_factor != kWhite || surface.color.starts_with("{texture"))
@@ -273,9 +250,9 @@ void GltfMaterials::readClear(Source& source, Surface& surface) {
     if (volume.Has("thicknessTexture")) losses_.add("a texture of thickness: the mesh is the body itself");
     if (surface.color.starts_with("{texture")) losses_.add("a texture that tints what glass lets through");
     // What is left after the thickness: of the base colour once, and of the attenuation.
-    const double distance = numberOf(volume, "attenuationDistance", 0);
+    const double distance = gltfNumber(volume, "attenuationDistance", 0);
     std::array<double, 3> left = surface.color.starts_with("{texture") ? kWhite : surface.color_factor;
-    const std::array<double, 3> attenuation = bounded(colorOf(volume, "attenuationColor", kWhite));
+    const std::array<double, 3> attenuation = bounded(gltfColor(volume, "attenuationColor", kWhite));
     const double depth = distance > 0 && left == kWhite ? distance : thickness;
     for (std::size_t k = 0; k < 3; ++k) {
         if (distance > 0) left[k] *= std::pow(attenuation[k], depth / distance);
@@ -283,7 +260,7 @@ void GltfMaterials::readClear(Source& source, Surface& surface) {
     }
     surface.dielectric.emplace_back("transmission_weight", share);
     if (const double dispersion =
-            numberOf(extensionOf(source.material, "KHR_materials_dispersion"), "dispersion", 0);
+            gltfNumber(gltfExtension(source.material, "KHR_materials_dispersion"), "dispersion", 0);
         dispersion > 0) {
         surface.dielectric.emplace_back("transmission_dispersion_scale", yamlNumber(unitOf(dispersion)));
         if (dispersion > 1) losses_.add("a dispersion above 1: 1");
@@ -295,14 +272,14 @@ void GltfMaterials::readClear(Source& source, Surface& surface) {
 }
 
 void GltfMaterials::readCoat(Source& source, Surface& surface) {
-    const Value& coat = extensionOf(source.material, "KHR_materials_clearcoat");
-    const double factor = unitOf(numberOf(coat, "clearcoatFactor", 0));
+    const Value& coat = gltfExtension(source.material, "KHR_materials_clearcoat");
+    const double factor = unitOf(gltfNumber(coat, "clearcoatFactor", 0));
     if (factor == 0) return;
     if (!surface.clear.empty()) return losses_.add("a clear coat on glass");
     const std::string share = weight(source, textures_.named(coat, "clearcoatTexture", source.pointer),
                                      factor, "red", "the texture of the clear coat");
     if (share.empty()) return;
-    double rough = unitOf(numberOf(coat, "clearcoatRoughnessFactor", 0));
+    double rough = unitOf(gltfNumber(coat, "clearcoatRoughnessFactor", 0));
     if (const auto texture =
             usable(source, textures_.named(coat, "clearcoatRoughnessTexture", source.pointer),
                    "the texture of the clear coat's roughness")) {
@@ -320,8 +297,8 @@ void GltfMaterials::readCoat(Source& source, Surface& surface) {
 }
 
 void GltfMaterials::readFuzz(Source& source, Surface& surface) {
-    const Value& sheen = extensionOf(source.material, "KHR_materials_sheen");
-    std::array<double, 3> color = bounded(colorOf(sheen, "sheenColorFactor", {0, 0, 0}));
+    const Value& sheen = gltfExtension(source.material, "KHR_materials_sheen");
+    std::array<double, 3> color = bounded(gltfColor(sheen, "sheenColorFactor", {0, 0, 0}));
     if (largestOf(color) > 0)
         if (const auto texture = usable(source, textures_.named(sheen, "sheenColorTexture", source.pointer),
                                         "the texture of the sheen")) {
@@ -337,7 +314,7 @@ void GltfMaterials::readFuzz(Source& source, Surface& surface) {
     surface.layers.emplace_back("fuzz_weight", yamlNumber(most));
     surface.layers.emplace_back("fuzz_color", colorText(color));
     surface.layers.emplace_back("fuzz_roughness",
-                                yamlNumber(unitOf(numberOf(sheen, "sheenRoughnessFactor", 0))));
+                                yamlNumber(unitOf(gltfNumber(sheen, "sheenRoughnessFactor", 0))));
 }
 
 /// Light of the object: the sum of what a texture of light would vary is no single radiance, so that is
@@ -350,7 +327,7 @@ void GltfMaterials::readEmission(Source& source) {
     // Up to 1 says the standard, but older exporters put the strength here.
     if (!(largestOf(color) < 1e6)) file_.fail(source.pointer + "/emissiveFactor", "it is beyond any use");
     const double strength = std::clamp(
-        numberOf(extensionOf(source.material, "KHR_materials_emissive_strength"), "emissiveStrength", 1),
+        gltfNumber(gltfExtension(source.material, "KHR_materials_emissive_strength"), "emissiveStrength", 1),
         0.0, 1e15);
     const tinygltf::TextureInfo& info = source.material.emissiveTexture;
     if (info.index >= 0) {
@@ -454,10 +431,14 @@ const GltfMaterialText& GltfMaterials::of(const GltfMaterialUse& use) {
     if (!fresh) return text;
     const tinygltf::Model& model = file_.model();
     const bool own = use.material >= 0 && static_cast<std::size_t>(use.material) < model.materials.size();
-    const tinygltf::Material& material =
+    const tinygltf::Material& said =
         own ? model.materials[static_cast<std::size_t>(use.material)] : standardMaterial();
+    const std::string pointer = fmt::format("/materials/{}", use.material);
+    const std::optional<tinygltf::Material> converted =
+        withoutSpecularGlossiness(said, textures_, pointer, losses_);
+    const tinygltf::Material& material = converted ? *converted : said;
     text.name = names_.take(material.name, own ? fmt::format("material {}", use.material) : "standard");
-    Source source{material, use, text, fmt::format("/materials/{}", use.material), {}};
+    Source source{material, use, text, pointer, {}};
     if (material.occlusionTexture.index >= 0)
         losses_.add("textures of ambient occlusion, which light itself makes here");
     if (readUnlit(source)) return text;
@@ -472,22 +453,22 @@ const GltfMaterialText& GltfMaterials::of(const GltfMaterialUse& use) {
     readCoat(source, surface);
     readFuzz(source, surface);
     readEmission(source);
-    const Value& film = extensionOf(material, "KHR_materials_iridescence");
-    if (const double factor = unitOf(numberOf(film, "iridescenceFactor", 0)); factor > 0) {
+    const Value& film = gltfExtension(material, "KHR_materials_iridescence");
+    if (const double factor = unitOf(gltfNumber(film, "iridescenceFactor", 0)); factor > 0) {
         if (surface.all_clear && surface.metal == 0 && surface.metal_texture.empty()) {
             const double thickness =
-                std::clamp(numberOf(film, "iridescenceThicknessMaximum", 400), 0.0, 20000.0);
+                std::clamp(gltfNumber(film, "iridescenceThicknessMaximum", 400), 0.0, 20000.0);
             surface.dielectric.emplace_back("thin_film_weight", yamlNumber(factor));
             surface.dielectric.emplace_back("thin_film_thickness", yamlNumber(thickness / 1000));
             surface.dielectric.emplace_back(
-                "thin_film_ior", yamlNumber(std::clamp(numberOf(film, "iridescenceIor", 1.3), 1.0, 10.0)));
+                "thin_film_ior", yamlNumber(std::clamp(gltfNumber(film, "iridescenceIor", 1.3), 1.0, 10.0)));
             if (film.Has("iridescenceTexture") || film.Has("iridescenceThicknessTexture"))
                 losses_.add("textures of iridescence");
         } else {
             losses_.add("iridescence of what is not glass");
         }
     }
-    if (numberOf(extensionOf(material, "KHR_materials_anisotropy"), "anisotropyStrength", 0) > 0)
+    if (gltfNumber(gltfExtension(material, "KHR_materials_anisotropy"), "anisotropyStrength", 0) > 0)
         losses_.add("anisotropy");
     if (surface.absorbs && !surface.opacity.empty()) {
         losses_.add("the opacity of glass that absorbs");

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "scene/gltf/gltf_model.h"
+#include "scene/import/gltf_values.h"
 #include "spectra/spectra.h"
 
 #include <fmt/format.h>
@@ -17,13 +18,6 @@ namespace crt {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A number of an extension, where it is one.
-double numberOf(const tinygltf::Value& object, const char* key, double fallback) {
-    return object.IsObject() && object.Has(key) && object.Get(key).IsNumber()
-               ? object.Get(key).GetNumberAsDouble()
-               : fallback;
-}
 
 std::array<double, 2> pairOf(const tinygltf::Value& object, const char* key,
                              const std::array<double, 2>& fallback) {
@@ -97,8 +91,8 @@ std::optional<GltfTexture> GltfTextures::named(int index, int set, const tinyglt
     if (transform != nullptr) {
         texture.offset = pairOf(*transform, "offset", texture.offset);
         texture.scale = pairOf(*transform, "scale", texture.scale);
-        texture.rotation = numberOf(*transform, "rotation", 0);
-        set = static_cast<int>(std::clamp(numberOf(*transform, "texCoord", set), 0.0, 99.0));
+        texture.rotation = gltfNumber(*transform, "rotation", 0);
+        set = static_cast<int>(std::clamp(gltfNumber(*transform, "texCoord", set), 0.0, 99.0));
     }
     if (set < 0 || set > 7) file_.fail(pointer + "/texCoord", "it is none of 0 to 7");
     texture.set = static_cast<std::size_t>(set);
@@ -113,7 +107,7 @@ std::optional<GltfTexture> GltfTextures::named(const tinygltf::Value& extension,
     if (info.IsObject() && info.Has("extensions") && info.Get("extensions").IsObject() &&
         info.Get("extensions").Has("KHR_texture_transform"))
         transform = &info.Get("extensions").Get("KHR_texture_transform");
-    const double index = numberOf(info, "index", -1), set = numberOf(info, "texCoord", 0);
+    const double index = gltfNumber(info, "index", -1), set = gltfNumber(info, "texCoord", 0);
     return named(static_cast<int>(std::clamp(index, -1.0, 2e9)),
                  static_cast<int>(std::clamp(set, -1.0, 99.0)), transform, pointer + "/" + key);
 }
@@ -151,6 +145,17 @@ bool GltfTextures::hasHoles(const GltfTexture& texture) {
     const Texels alpha = readAlpha(image(texture).source);
     if (alpha.info.type == TexelType::Float) return alpha.info.channels > 0;
     return std::any_of(alpha.bytes.begin(), alpha.bytes.end(), [](unsigned char c) { return c != 255; });
+}
+
+double GltfTextures::meanAlpha(const GltfTexture& texture) {
+    const Texels alpha = readAlpha(image(texture).source);
+    if (alpha.info.channels == 0) return 1;
+    switch (alpha.info.type) {
+        case TexelType::Uint8: return statisticsOfCodes<std::uint8_t>(alpha).mean[0];
+        case TexelType::Uint16: return statisticsOfCodes<std::uint16_t>(alpha).mean[0];
+        case TexelType::Float: break;
+    }
+    return statisticsOfFloats(alpha).mean[0];
 }
 
 /// Blender's import and three.js turn the same way: with v up, scale, then turn, then move.

@@ -57,6 +57,8 @@ public:
     /// "{texture: a.glb, image: 2}" of one that can be read; `more` are further keys: ", channel: blue".
     std::string form(const GltfTexture& texture, const std::string& more = {});
     const TexelStatistics& statistics(const GltfTexture& texture);
+    /// 1 where it has none. Reads the pixels.
+    double meanAlpha(const GltfTexture& texture);
 
 private:
     struct Known {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
+#include <vector>
 
 namespace crt {
 namespace {
@@ -14,15 +16,28 @@ Bounds boundsOf(const Mesh& mesh) {
     return bounds;
 }
 
+/// From within, where the mesh has materials that are seen from there.
+std::optional<InnerView> innerViewOf(const Mesh& mesh, double aspect) {
+    if (mesh.material.empty() || mesh.triangles.size() > kMostPaintedTriangles) return std::nullopt;
+    std::vector<PaintedTriangle> triangles;
+    triangles.reserve(mesh.triangles.size());
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const auto& corners = mesh.triangles[i];
+        triangles.emplace_back(mesh.positions[corners[0]], mesh.positions[corners[1]],
+                               mesh.positions[corners[2]], static_cast<std::uint32_t>(mesh.material[i]));
+    }
+    return innerView(triangles, aspect);
+}
+
 /// Camera and film; and light, unless the file has some.
-std::string viewText(const Bounds& bounds, bool emits, Losses& losses) {
-    losses.choose("a camera that sees all of it");
-    std::string text =
-        fmt::format("\n# Chosen: the file has no camera.\ncamera: {{{}}}\n", chosenCamera(bounds, 1.5));
+std::string viewText(const Mesh& mesh, bool emits, Losses& losses) {
+    constexpr double kAspect = 1.5;
+    const std::optional<InnerView> inner = innerViewOf(mesh, kAspect);
+    std::string text = chosenCamera(boundsOf(mesh), inner, kAspect, losses);
     text += "film: {resolution: [960, 640]}\nsampler: {samples: 128}\n";
     if (emits) return text;
-    losses.choose("a grey sky and a lamp");
-    return text + chosenLight();
+    losses.choose(inner ? "a grey sky and a lamp at the camera" : "a grey sky and a lamp");
+    return text + chosenLight(inner);
 }
 
 }  // namespace
@@ -36,7 +51,7 @@ std::string objScene(const LoadedMesh& loaded, const std::string& file_name, Los
         });
     const bool emits = std::any_of(loaded.materials.begin(), loaded.materials.end(),
                                    [](const LoadedMaterial& m) { return m.mtl && m.mtl->emission; });
-    std::string text = viewText(boundsOf(loaded.mesh), emits, losses);
+    std::string text = viewText(loaded.mesh, emits, losses);
     if (bare) {
         losses.choose("grey for faces without a material");
         text += "\nmaterials:\n  grey: {type: diffuse, reflectance: 0.5}\n";
@@ -54,7 +69,7 @@ std::string objScene(const LoadedMesh& loaded, const std::string& file_name, Los
 
 /// Of the colours of its vertices where it has some, else grey; smooth where it has no normals.
 std::string plyScene(const Mesh& mesh, const std::string& file_name, Losses& losses) {
-    std::string text = viewText(boundsOf(mesh), false, losses);
+    std::string text = viewText(mesh, false, losses);
     const bool colored = !mesh.colors.empty();
     losses.choose(colored ? "a matt material of the colours of its vertices" : "a grey material");
     text += fmt::format("\nmaterials:\n  surface: {{type: diffuse, reflectance: {}}}\n",

@@ -78,24 +78,49 @@ void Bounds::add(const Vec3d& point) {
 Vec3d Bounds::centre() const { return lower * 0.5 + upper * 0.5; }
 double Bounds::radius() const { return length(upper * 0.5 - lower * 0.5); }
 
-std::string chosenLight() {
+std::string chosenLight(const std::optional<InnerView>& inner) {
     // The lamp's irradiance is 1.9, the sky's 1.6: a white surface has 1.1 towards the lamp and .5 away from
     // it, where the sky has .5.
-    return "\n# Chosen: the file has no light.\n"
-           "environment: {radiance: {rgb: [0.5, 0.5, 0.5], space: linear}}\n"
-           "lights:\n"
-           "  - {name: key, type: sun, direction: [0.4, -0.75, -0.55], angular_diameter_deg: 20, radiance: "
-           "{rgb: [20, 20, 20], space: linear}}\n";
+    constexpr double kIrradiance = 1.9;
+    const std::string text =
+        "\n# Chosen: the file has no light.\n"
+        "environment: {radiance: {rgb: [0.5, 0.5, 0.5], space: linear}}\n"
+        "lights:\n";
+    if (!inner)
+        return text +
+               "  - {name: key, type: sun, direction: [0.4, -0.75, -0.55], angular_diameter_deg: 20, "
+               "radiance: {rgb: [20, 20, 20], space: linear}}\n";
+    // As bright as the other where half of what is seen is nearer.
+    const double intensity = kIrradiance * inner->distance * inner->distance;
+    return text + fmt::format(
+                      "  - {{name: camera, type: point, position: {}, radiant_intensity: {{rgb: {}, space: "
+                      "linear}}}}\n",
+                      yamlList(inner->position), yamlList(Vec3d{intensity, intensity, intensity}));
 }
 
-std::string chosenCamera(const Bounds& bounds, double aspect) {
-    constexpr double kTurn_deg = 35, kElevation_deg = 22, kMargin = 1.05;
-    constexpr double kRadian = std::numbers::pi / 180;
+Vec3d backOfChosenCamera(double turn_deg) {
+    constexpr double kElevation_deg = 22, kRadian = std::numbers::pi / 180;
     const double up = std::sin(kElevation_deg * kRadian), flat = std::cos(kElevation_deg * kRadian);
-    const Vec3d back{flat * std::sin(kTurn_deg * kRadian), up, flat * std::cos(kTurn_deg * kRadian)};
+    return {flat * std::sin(turn_deg * kRadian), up, flat * std::cos(turn_deg * kRadian)};
+}
+
+std::string chosenCamera(const Bounds& bounds, const std::optional<InnerView>& inner, double aspect,
+                         Losses& losses) {
+    const auto section = [](const Vec3d& position, const Vec3d& target, double fov_deg) {
+        return fmt::format(
+            "\n# Chosen: the file has no camera.\ncamera: {{position: {}, target: {}, fov: {}}}\n",
+            yamlList(position), yamlList(target), yamlNumber(fov_deg));
+    };
+    if (inner) {
+        losses.choose("a camera within it, which sees more of its materials than any around it");
+        return section(inner->position, inner->target, inner->fov_deg);
+    }
+    losses.choose("a camera that sees all of it");
+    constexpr double kMargin = 1.05;
+    const Vec3d back = backOfChosenCamera(kChosenTurn_deg);
     const Vec3d across = cross({0, 1, 0}, back), right = across * (1 / length(across)),
                 above = cross(back, right);
-    const double shorter = std::tan(kChosenFov_deg / 2 * kRadian);
+    const double shorter = std::tan(kChosenFov_deg / 2 * std::numbers::pi / 180);
     const double half_width = shorter * std::max(aspect, 1.0),
                  half_height = shorter * std::max(1 / aspect, 1.0);
     const Vec3d centre = bounds.centre();
@@ -109,9 +134,7 @@ std::string chosenCamera(const Bounds& bounds, double aspect) {
         distance = std::max(distance, dot(at, back) + kMargin * needed);
     }
     if (!(distance > 0)) distance = 1;
-    const Vec3d position = centre + back * distance;
-    return fmt::format("position: {}, target: {}, fov: {}", yamlList(position), yamlList(centre),
-                       yamlNumber(kChosenFov_deg));
+    return section(centre + back * distance, centre, kChosenFov_deg);
 }
 
 }  // namespace crt

@@ -2,11 +2,13 @@
 #pragma once
 
 #include "base/vec3d.h"
+#include "scene/import/inner_view.h"
 
 #include <array>
 #include <cstddef>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -64,13 +66,18 @@ private:
 };
 
 /// Light for a file that has none: a grey sky, which a white surface does not vanish into, and a soft lamp
-/// over the left shoulder of `chosenCamera`. Both sections, as text.
-std::string chosenLight();
+/// over the left shoulder of `chosenCamera`; within a building, where that may not reach, one at the camera.
+/// Both sections, as text.
+std::string chosenLight(const std::optional<InnerView>& inner);
 
-inline constexpr double kChosenFov_deg = 40;
+inline constexpr double kChosenFov_deg = 40, kChosenTurn_deg = 35;
 
-/// A camera that sees all of the box, from the front, the right and above: the section's keys in one line.
-/// `aspect` is width over height.
-std::string chosenCamera(const Bounds& bounds, double aspect);
+/// Towards the chosen camera from what it looks at: from above, and so far to the right of the front.
+Vec3d backOfChosenCamera(double turn_deg);
+
+/// The given view, or a camera that sees all of the box, from the front, the right and above: the comment
+/// and the section, as text. `aspect` is width over height.
+std::string chosenCamera(const Bounds& bounds, const std::optional<InnerView>& inner, double aspect,
+                         Losses& losses);
 
 }  // namespace crt

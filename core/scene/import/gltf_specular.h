@@ -1,0 +1,21 @@
+/// Materials of KHR_materials_pbrSpecularGlossiness → those of metalness and roughness.
+#pragma once
+
+#include "scene/gltf/gltf_model.h"
+#include "scene/import/gltf_textures.h"
+
+#include <optional>
+#include <string>
+
+namespace crt {
+
+inline constexpr const char* kGltfSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
+
+/// The material, said by metalness and roughness: a metal of the specular colour, or a dielectric of the
+/// diffuse one, whichever its mean is nearer to; both by their textures. Nothing where the material has not
+/// the extension, or says itself by metalness and roughness with a texture, too.
+std::optional<tinygltf::Material> withoutSpecularGlossiness(const tinygltf::Material& material,
+                                                            GltfTextures& textures,
+                                                            const std::string& pointer, Losses& losses);
+
+}  // namespace crt

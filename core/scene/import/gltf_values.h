@@ -1,0 +1,19 @@
+/// What extensions of a glTF file say: values that may be missing, or of another kind than they should be.
+#pragma once
+
+#include "scene/gltf/gltf_model.h"
+
+#include <array>
+
+namespace crt {
+
+/// An extension's map; one without keys where the material has it not.
+const tinygltf::Value& gltfExtension(const tinygltf::Material& material, const char* name);
+
+double gltfNumber(const tinygltf::Value& object, const char* key, double fallback);
+
+/// Linear, and not below 0.
+std::array<double, 3> gltfColor(const tinygltf::Value& object, const char* key,
+                                const std::array<double, 3>& fallback);
+
+}  // namespace crt
