@@ -75,9 +75,9 @@ void describeRun(FilmIdentity& identity, const RunFacts& facts) {
     identity.record->addRun(run);
 }
 
-void prepare(Session& session, const CompiledScene& compiled, RunFacts& facts) {
+void openDevices(Session& session, RunFacts& facts) {
     const LoadedBackend& backend = session.backend();
-    std::optional<Stage> stage(std::in_place, "opening the device");
+    const Stage stage("opening the device");
     const Stopwatch opening;
     session.openDevice();
     facts.open_seconds += opening.seconds();
@@ -85,10 +85,13 @@ void prepare(Session& session, const CompiledScene& compiled, RunFacts& facts) {
     facts.backend_path = backend.path;
     facts.backend_version = textOrEmpty(backend.table->version);
     facts.backend_build = textOrEmpty(backend.table->build);
+}
 
-    stage.emplace("preparing the scene for " + backend.name);
+void prepare(Session& session, DeviceFilm& devices, RunFacts& facts) {
+    const std::string& backend = session.backend().name;
+    std::optional<Stage> stage(std::in_place, "preparing the scene for " + backend);
     const Stopwatch preparing;
-    session.setScene(compiled, [&](double done) {
+    devices.setScene([&](double done) {
         stage->setAmount(1);
         stage->at(done);
     });
@@ -96,21 +99,23 @@ void prepare(Session& session, const CompiledScene& compiled, RunFacts& facts) {
     stage.reset();
     askForReport(session, facts);
     facts.driver = driverOf(session.devices(), facts.devices.front().name);
-    logInfo("{} on {}", backend.name, arrayText(facts.backend.device));
+    logInfo("{} on {}", backend, arrayText(facts.backend.device));
 }
 
 /// CompiledScene → Film, by a backend.
 void renderSamples(Session& session, const SamplingPlan& plan, Watch& watch,
                    const CheckpointPlan& checkpoints, Rendered& run) {
     RunFacts& facts = run.facts;
-    prepare(session, run.compiled, facts);
+    openDevices(session, facts);
+    DeviceFilm devices(session.group(), run.compiled);
+    prepare(session, devices, facts);
     SamplingPlan sampling = plan;
     sampling.checkpoint_interval_seconds = checkpoints.interval_seconds;
     sampling.checkpoint_possible = checkpoints.possible;
     SamplingResult result;
     {
         const WatchedRendering rendering(watch);
-        result = sampleFilm(session.group(), run.film, sampling, watch, [&] {
+        result = sampleFilm(devices, run.film, sampling, watch, [&] {
             describeRun(run.identity, facts);
             checkpoints.save(run.film, run.identity);
         });
@@ -118,6 +123,7 @@ void renderSamples(Session& session, const SamplingPlan& plan, Watch& watch,
     // A device that failed is not asked again; what it said before the first sample stands.
     if (result.stop != StopReason::Failed) askForReport(session, facts);
     facts.devices = session.group().shares();
+    facts.film_bands = devices.bands();
     facts.stop = result.stop;
     facts.request = result.request;
     facts.rendered_samples = result.rendered;
@@ -192,6 +198,8 @@ Rendered render(const Scene& scene, const RenderOptions& options, const Sampling
     facts.target_samples = plan.target;
     facts.target_error = options.target_error;
     std::optional<Session> session = openSession(options, plan, facts);
+
+    if (session) session->beginOpeningDevice();
 
     // What it takes to see the scene: one flat blob, and the mask of what it needs.
     CompiledScene compiled = compileFor(session, scene);
