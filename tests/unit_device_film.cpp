@@ -52,11 +52,16 @@ struct Run {
     }
 };
 
+/// Of a device with room for it, whatever those of the test have.
 Film filmOfOne(std::uint64_t samples) {
+    const char* const limit = std::getenv("CRT_FAKE_MEMORY");
+    const std::string memory = limit != nullptr ? limit : "";
+    ::unsetenv("CRT_FAKE_MEMORY");
     Run one;
     one.devices.setScene();
     REQUIRE_FALSE(one.devices.inBands());
     one.devices.render({.sample_count = samples});
+    if (limit != nullptr) ::setenv("CRT_FAKE_MEMORY", memory.c_str(), 1);
     return one.film();
 }
 
@@ -139,7 +144,7 @@ TEST_CASE("memory that others take in the middle makes more bands", "[device_fil
     CHECK(run.devices.bands() == 2);
     ::setenv("CRT_FAKE_MEMORY", run.roomFor(3).c_str(), 1);
     run.devices.render({.first_sample = 4, .sample_count = 16});
-    CHECK(run.devices.bands() == 4);
+    CHECK(run.devices.bands() == 3);
     checkSame(run.film(), expected);
     ::setenv("CRT_FAKE_MEMORY", "1", 1);
     CHECK_THROWS_WITH(run.devices.render({.first_sample = 20, .sample_count = 1}),

@@ -74,7 +74,6 @@ void DeviceFilm::setScene(const std::function<void(double)>& progress) {
 /// Devices do not say how much of a film they could hold: other programs share their memory, and drivers
 /// take some of it when they see fit. So it is tried.
 void DeviceFilm::beginBands(const Error& why) {
-    setWindow({0, 1});  // Where this fails, it is not the film that is too large.
     std::uint32_t rows = scene_.height;
     for (bool fits = false; !fits;) {
         rows = (rows + 1) / 2;
@@ -82,15 +81,22 @@ void DeviceFilm::beginBands(const Error& why) {
             setWindow({0, rows});
             fits = true;
         } catch (const Error& error) {
-            if (!error.lacksMemory() || rows == 1) throw;
+            if (!error.lacksMemory() || rows == 1) throw;  // Not the film is too large, but the scene.
         }
     }
-    const std::uint32_t count = (scene_.height + rows - 1) / rows;
-    const std::uint32_t even = (scene_.height + count - 1) / count;
-    for (std::uint32_t first = 0; first < scene_.height; first += even)
-        bands_.push_back({first, std::min(first + even, scene_.height)});
+    cut(0, rows);
     logInfo("{}; so it is rendered in {} bands of {} rows, with the same result", why.what(), bands_.size(),
-            even);
+            bands_.front().rows());
+}
+
+/// Into bands of about the same size, of at most `rows`, from `first` on.
+void DeviceFilm::cut(std::uint32_t first, std::uint32_t rows) {
+    const std::uint32_t all = scene_.height - first;
+    const std::uint32_t count = (all + rows - 1) / rows;
+    const std::uint32_t even = (all + count - 1) / count;
+    std::erase_if(bands_, [first](const Band& band) { return band.first >= first; });
+    for (; first < scene_.height; first += even)
+        bands_.push_back({first, std::min(first + even, scene_.height)});
 }
 
 void DeviceFilm::render(const RenderRange& range, const std::function<void(double)>& progress) {
@@ -115,21 +121,17 @@ void DeviceFilm::renderInBands(const RenderRange& range, const std::function<voi
     fixed_seconds_ = 0;
     for (std::size_t i = 0; i < bands_.size();) {
         const Band band = bands_[i];
-        const double before = static_cast<double>(band.first) / shape.height;
-        const double share = static_cast<double>(band.rows()) / shape.height;
         try {
             renderBand(band, range, [&](double done) {
-                if (progress) progress(before + share * done);
+                if (progress) progress((band.first + band.rows() * done) / shape.height);
             });
             ++i;
         } catch (const Error& error) {
             if (!error.lacksMemory() || band.rows() == 1) throw;
             // Somebody took memory since the last time, or it was too little to work in.
-            const std::uint32_t middle = band.first + (band.rows() + 1) / 2;
-            bands_[i].end = middle;
-            bands_.insert(bands_.begin() + static_cast<std::ptrdiff_t>(i) + 1, {middle, band.end});
-            logInfo("{}; so the rows {} to {} are rendered in two bands", error.what(), band.first,
-                    band.end - 1);
+            cut(band.first, (band.rows() + 1) / 2);
+            logInfo("{}; so it is rendered in bands of {} rows from row {} on", error.what(),
+                    bands_[i].rows(), band.first);
         }
     }
     pass_->samples = SampleRanges({{range.first_sample, range.first_sample + range.sample_count}});

@@ -52,6 +52,7 @@ private:
     };
     void setWindow(const Band& band);
     void beginBands(const Error& why);
+    void cut(std::uint32_t first, std::uint32_t rows);
     void renderInBands(const RenderRange& range, const std::function<void(double)>& progress);
     void renderBand(const Band& band, const RenderRange& range, const std::function<void(double)>& progress);
 

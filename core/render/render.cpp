@@ -1,6 +1,7 @@
 #include "render/render.h"
 
 #include "backend/loader.h"
+#include "base/listener.h"
 #include "base/log.h"
 #include "base/stage.h"
 #include "base/stopwatch.h"
@@ -9,6 +10,7 @@
 #include "render/session.h"
 
 #include <limits>
+#include <thread>
 #include <utility>
 
 namespace crt {
@@ -103,10 +105,16 @@ void prepare(Session& session, DeviceFilm& devices, RunFacts& facts) {
 }
 
 /// CompiledScene → Film, by a backend.
-void renderSamples(Session& session, const SamplingPlan& plan, Watch& watch,
-                   const CheckpointPlan& checkpoints, Rendered& run) {
+void renderSamples(Session& session, const SamplingPlan& plan, const std::function<void()>& meanwhile,
+                   Watch& watch, const CheckpointPlan& checkpoints, Rendered& run) {
     RunFacts& facts = run.facts;
     openDevices(session, facts);
+    std::jthread beside;
+    if (meanwhile)
+        beside = std::jthread([&meanwhile, listener = currentListener()] {
+            const ListenerScope scope(listener);
+            meanwhile();
+        });
     DeviceFilm devices(session.group(), run.compiled);
     prepare(session, devices, facts);
     SamplingPlan sampling = plan;
@@ -211,7 +219,7 @@ Rendered render(const Scene& scene, const RenderOptions& options, const Sampling
     facts.resumed_samples = film.samples.count();
     Rendered run{std::move(compiled), std::move(film), std::move(identity), std::move(facts), std::nullopt};
     if (session) {
-        renderSamples(*session, plan, watch, checkpoints, run);
+        renderSamples(*session, plan, options.meanwhile, watch, checkpoints, run);
         session.reset();  // What the device held is free while files are written.
     } else {
         watch.renderingEnds();

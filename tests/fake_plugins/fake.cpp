@@ -83,9 +83,10 @@ public:
         const std::uint64_t seed = (std::uint64_t{scene_.seed.high} << 32) | scene_.seed.low;
         for (std::uint32_t y = range.y0; y < range.y1; ++y) {
             const double done = double(y - range.y0) / (range.y1 - range.y0);
-            if (done >= 0.5 && fault == "oom")
+            const bool half_way = done >= 0.5 || range.y1 - range.y0 == 1;
+            if (half_way && fault == "oom")
                 throw PluginError(CRT_OUT_OF_MEMORY, "the device has no memory left for 12 more rows");
-            if (done >= 0.5 && fault == "device")
+            if (half_way && fault == "device")
                 throw PluginError(CRT_DEVICE_FAILED, "the device fell off the bus");
             if (fault == "slow") std::this_thread::sleep_for(std::chrono::milliseconds(2));
             if (host_.cancelled(done)) return false;
