@@ -177,7 +177,8 @@ TEST_CASE("when every device has failed, the film holds what was read before", "
     const SamplingPlan plan{
         .ranges = {{0, 40}}, .target = 40, .chunk = 4, .checkpoint_interval_seconds = 1e-9};
     std::optional<DeviceFault> fault;
-    const SamplingResult result = sampleFilm(group.devices, film, plan, watch, [&] {
+    DeviceFilm devices(group.devices, group.compiled);
+    const SamplingResult result = sampleFilm(devices, film, plan, watch, [&] {
         if (++checkpoints == 3) fault.emplace("device");
     });
     fault.reset();

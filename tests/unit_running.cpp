@@ -184,10 +184,11 @@ struct FakeRun {
     CompiledScene compiled = compileScene(
         parseScene("crt: 1\nfilm: {resolution: [6, 4]}\nenvironment: {radiance: 1}\n", "test", "."), 0);
     LoadedBackend backend = loadBackend(std::string(CRT_FAKE_PLUGIN_DIR) + "/crt_backend_fake.so");
-    DeviceGroup devices{backend, {}, probeDevices(backend)};
+    DeviceGroup group{backend, {}, probeDevices(backend)};
+    DeviceFilm devices{group, compiled};
     TerminalWatch watch{ProgressMode::None, TerminalWatch::Signals::Always};
 
-    FakeRun() { devices.setScene(compiled); }
+    FakeRun() { devices.setScene(); }
     Film emptyFilm() const {
         return Film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
     }

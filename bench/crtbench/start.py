@@ -37,6 +37,37 @@ def mapped_libraries(program, arguments):
     return sorted(seen)
 
 
+STAGES = ["parse", "build", "compile", "open", "prepare", "sampling", "write", "other", "total"]
+
+
+def first_image(program, results, arguments, runs):
+    """Where the time of a small job on a GPU goes, kernels cached."""
+    results.heading("A first image on a GPU")
+    results.paragraph(
+        "256 × 256 pixels with 1 sample, kernels cached; ms, medians, the process with the least and the "
+        "most. The stages are those of the report (docs/architecture.md, Film); what the process takes "
+        "beyond their total is its start and its end, in which the driver takes its context apart."
+    )
+    scenes = program.scenes(arguments.scenes or ["cornell_box", "cornell_dragon", "cornell_glass"])
+    kept = program.interleaved(
+        {
+            scene: lambda scene=scene: program.render(
+                scene, "cuda", ["--spp", 1, "--kernel", "lean-only"], settings=["film.resolution=[256,256]"]
+            )
+            for scene in scenes
+        },
+        runs,
+    )
+    found, rows = {}, []
+    for scene, done in kept.items():
+        whole = Spread(r.seconds for r in done)
+        stages = {stage: Spread(r.value("seconds", stage) for r in done) for stage in STAGES}
+        found[scene] = {"process": whole.json(), **{name: s.json() for name, s in stages.items()}}
+        rows.append([scene, whole.text(scale=1e3)] + [f"{s.median * 1e3:.3g}" for s in stages.values()])
+    results.table(["scene", "process"] + STAGES, rows)
+    return found
+
+
 def measure(program, arguments):
     runs = 3 if arguments.tiny else 20
     kernel_runs = 2 if arguments.tiny else 5
@@ -145,6 +176,10 @@ def measure(program, arguments):
             print(rows[-1], flush=True)
     results.table(["scene", "", "ms to compile", "ms for the cache", "ms, whole process"], rows)
 
+    # A first image on a GPU.
+    gpu, gpu_absent = program.backends(["cuda"])
+    first_images = first_image(program, results, arguments, runs) if gpu else {}
+
     # NVRTC.
     results.heading("CUDA kernels with NVRTC")
     nvrtc = {}
@@ -186,7 +221,7 @@ def measure(program, arguments):
         results.table(
             ["variant", "mask", "ms", "registers", "stack, bytes", "spilled, bytes", "CUBIN, kB"], rows
         )
-    results.not_measured(absent)
+    results.not_measured({**absent, **gpu_absent})
     results.command(
         "crt render configs/SCENE.yaml --backend opencl --set 'film.resolution=[64,64]' --spp 1 -o "
         "unseen.pfm   # CRT_CACHE_DIR, POCL_CACHE_DIR fresh"
@@ -196,6 +231,7 @@ def measure(program, arguments):
         "process_seconds": {name: s.json() for name, s in seconds.items()},
         "libraries": libraries,
         "opencl_kernels": kernels,
+        "first_images": first_images,
         "nvrtc": {"compiler": compiler, "variants": nvrtc},
     }
     results.write()

@@ -19,6 +19,19 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+/// Of what a backend counts from zero on with every scene.
+void addCounts(const CrtBackendReport& from, CrtBackendReport& to) {
+    to.paths += from.paths;
+    to.closest_rays += from.closest_rays;
+    to.shadow_rays += from.shadow_rays;
+    to.render_seconds += from.render_seconds;
+}
+
+void clearCounts(CrtBackendReport& report) {
+    report.paths = report.closest_rays = report.shadow_rays = 0;
+    report.render_seconds = 0;
+}
+
 bool isListOfIndices(const std::string& text) {
     return text.find(',') != std::string::npos &&
            text.find_first_not_of("0123456789,") == std::string::npos;
@@ -92,8 +105,26 @@ struct DeviceGroup::Member {
     /// Its film as it was read last, with several devices only: what is in there outlives the device.
     std::optional<Film> read;
     std::vector<RenderRange> unread;  ///< What its own film has besides.
+    bool lacks_room = false;  ///< Dropped for want of memory, and nothing else.
+    std::uint64_t pixel_samples = 0;  ///< What share.samples stands for: a window may be a part of the film.
+    bool has_scene = false;           ///< And what it counts belongs to it.
+    CrtBackendReport earlier{};  ///< Of other windows of this scene: what backends count from zero on again.
 
     bool works() const { return share.failure.empty(); }
+    /// Keeps what it counted of its scene, before it gets another.
+    void keepCounts() {
+        if (!std::exchange(has_scene, false)) return;
+        try {
+            addCounts(integrator->report(), earlier);
+        } catch (const Error&) {
+            // A device that is lost says so when it gets its scene.
+        }
+    }
+    /// `count` modulo 2^64, so that it may be taken back.
+    void countSamples(std::uint64_t count, std::uint64_t window_pixels, std::uint64_t film_pixels) {
+        pixel_samples += count * window_pixels;
+        share.samples = pixel_samples / film_pixels;
+    }
 };
 
 /// What one device is to render.
@@ -175,6 +206,7 @@ void DeviceGroup::inParallel(const std::vector<Member*>& members,
                 }
             });
     }
+    last_failure_.reset();
     for (std::size_t i = 0; i < members.size(); ++i) {
         if (!thrown[i]) continue;
         try {
@@ -183,8 +215,10 @@ void DeviceGroup::inParallel(const std::vector<Member*>& members,
             const bool of_device =
                 error.kind() == ErrorKind::Device || error.kind() == ErrorKind::Backend;
             if (!may_fail || !of_device) throw;
-            last_failure_ = error;
+            // Want of memory before all others: there something can be done.
+            if (!last_failure_ || !last_failure_->lacksMemory()) last_failure_ = error;
             members[i]->share.failure = error.what();
+            members[i]->lacks_room = error.lacksMemory();
         }
     }
     if (working().empty()) throw Error(*last_failure_);
@@ -194,19 +228,48 @@ void DeviceGroup::inParallel(const std::vector<Member*>& members,
                        members[i]->share.name, members[i]->share.failure);
 }
 
-void DeviceGroup::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
+void DeviceGroup::loadScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
     const std::vector<Member*> there = working();
     for (const auto& member : members_) {
         member->read.reset();
         member->unread.clear();
-        member->share.samples = 0;
-        member->share.seconds = 0;
     }
     SharedProgress shown(members_.size(), progress);
     const double part = 1.0 / static_cast<double>(std::max<std::size_t>(there.size(), 1));
     inParallel(there, [&](Member& member) {
+        member.has_scene = false;
         member.integrator->setScene(scene, [&](double done) { shown.part(member.index, done * part); });
+        member.has_scene = true;
     });
+    window_pixels_ = std::uint64_t{scene.width} * scene.height;
+}
+
+void DeviceGroup::readmitThoseWithoutRoom() {
+    for (const auto& member : members_)
+        if (std::exchange(member->lacks_room, false)) member->share.failure.clear();
+}
+
+void DeviceGroup::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
+    readmitThoseWithoutRoom();
+    film_pixels_ = std::uint64_t{scene.width} * scene.height;
+    for (const auto& member : members_) {
+        member->share.samples = 0;
+        member->share.seconds = 0;
+        member->pixel_samples = 0;
+        member->earlier = {};
+    }
+    loadScene(scene, progress);
+}
+
+void DeviceGroup::setWindow(const CompiledScene& scene) {
+    // Others are left out for good, or every window would try, and warn of, them again.
+    if (working().empty()) readmitThoseWithoutRoom();
+    for (const auto& member : members_) {
+        for (const RenderRange& range : member->unread)
+            if (isAllPixels(range)) member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
+        if (member->works()) member->keepCounts();
+    }
+    loadScene(scene, {});
 }
 
 /// Who renders what: of ranges of all pixels each device a share as large as it is fast. A film knows
@@ -258,7 +321,7 @@ std::vector<RenderRange> DeviceGroup::collectLost() {
         if (member->works()) continue;
         lost.insert(lost.end(), member->unread.begin(), member->unread.end());
         for (const RenderRange& range : std::exchange(member->unread, {}))
-            if (isAllPixels(range)) member->share.samples -= range.sample_count;
+            if (isAllPixels(range)) member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
     }
     return lost;
 }
@@ -283,7 +346,8 @@ void DeviceGroup::renderAll(std::vector<RenderRange> ranges, const std::function
                 const auto count = static_cast<double>(range.sample_count);
                 // Noted first: what is lost when it fails is this range, too.
                 member.unread.push_back(range);
-                if (isAllPixels(range)) member.share.samples += range.sample_count;
+                if (isAllPixels(range))
+                    member.countSamples(range.sample_count, window_pixels_, film_pixels_);
                 member.integrator->render(range, [&](double done) {
                     shown.part(member.index, (before + done * count) / all);
                     return false;  // A range is always finished.
@@ -307,7 +371,7 @@ void DeviceGroup::render(const RenderRange& range, const std::function<void(doub
         return false;
     });
     only.share.seconds += std::chrono::duration<double>(Clock::now() - start).count();
-    if (isAllPixels(range)) only.share.samples += range.sample_count;
+    if (isAllPixels(range)) only.countSamples(range.sample_count, window_pixels_, film_pixels_);
 }
 
 void DeviceGroup::readFilm(Film& film) {
@@ -335,7 +399,9 @@ CrtBackendReport DeviceGroup::report() {
     CrtBackendReport together{};
     std::vector<std::string> names;
     for (Member* member : working()) {
-        const CrtBackendReport own = member->integrator->report();
+        CrtBackendReport own = member->integrator->report();
+        if (!member->has_scene) clearCounts(own);
+        addCounts(member->earlier, own);
         if (names.empty()) together = own;
         names.push_back(arrayText(own.device));
         member->share.name = names.back();

@@ -41,8 +41,12 @@ public:
     DeviceGroup(const DeviceGroup&) = delete;
     DeviceGroup& operator=(const DeviceGroup&) = delete;
 
-    /// Integrator::setScene. `progress` gets [0,1].
+    /// Integrator::setScene. `progress` gets [0,1]. A device that has no room for the scene is left out
+    /// until the next; when none has, the error says so (Error::lacksMemory).
     void setScene(const CompiledScene& scene, const std::function<void(double)>& progress = {});
+    /// The same scene once more, with another window of its film: what devices have done by now still
+    /// counts in shares() and report(), and what was not read is lost.
+    void setWindow(const CompiledScene& scene);
     /// Adds a range to the films of the devices. `progress` gets [0,1]. A range of all pixels is divided; a
     /// rectangle goes to one device.
     void render(const RenderRange& range, const std::function<void(double)>& progress = {});
@@ -60,6 +64,8 @@ private:
     struct Assignment;
 
     std::vector<Member*> working();
+    void loadScene(const CompiledScene& scene, const std::function<void(double)>& progress);
+    void readmitThoseWithoutRoom();
     void inParallel(const std::vector<Member*>& members, const std::function<void(Member&)>& work,
                     bool may_fail = true);
     std::vector<Assignment> divide(const std::vector<RenderRange>& ranges);
@@ -68,6 +74,7 @@ private:
 
     std::vector<std::unique_ptr<Member>> members_;
     std::optional<Error> last_failure_;
+    std::uint64_t window_pixels_ = 0, film_pixels_ = 1;  ///< Of the scene that is set, and of all of it.
 };
 
 }  // namespace crt

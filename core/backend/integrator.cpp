@@ -245,9 +245,10 @@ struct Integrator::Impl {
             sentence = table.last_error(table.state);
             return CrtStatus{CRT_OK};
         });
-        throw Error(kindOf(status),
+        Error error(kindOf(status),
                     fmt::format("backend '{}': {}", backend.name,
                                 sentence != nullptr && *sentence != '\0' ? sentence : statusText(status)));
+        throw status == CRT_OUT_OF_MEMORY ? std::move(error).lackingMemory() : std::move(error);
     }
 
     /// A plugin leaves out samples that are no numbers and counts what it keeps (crt_backend.h). One pixel

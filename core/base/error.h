@@ -34,13 +34,21 @@ public:
     Error(ErrorKind kind, const std::string& sentence, SourcePlace place = {})
         : std::runtime_error(printable(sentence)), kind_(kind), place_(std::move(place)) {}
 
+    /// The same, said of a device whose memory did not suffice: with less to hold it may go well.
+    Error&& lackingMemory() && {
+        lacks_memory_ = true;
+        return std::move(*this);
+    }
+
     ErrorKind kind() const noexcept { return kind_; }
+    bool lacksMemory() const noexcept { return lacks_memory_; }
     const SourcePlace& place() const noexcept { return place_; }
     int exitCode() const noexcept { return static_cast<int>(kind_); }
 
 private:
     ErrorKind kind_;
     SourcePlace place_;
+    bool lacks_memory_ = false;
 };
 
 }  // namespace crt

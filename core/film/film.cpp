@@ -1,6 +1,7 @@
 #include "film/film.h"
 
 #include "base/host.h"
+#include "base/parallel.h"
 #include "film/error_estimate.h"
 #include "film/luminance_error.h"
 #include "image/image_metadata.h"
@@ -134,8 +135,12 @@ void Film::add(const Film& other) {
     SampleRanges merged = samples;
     for (const SampleRange& range : other.samples.ranges()) merged.add(range);
 
-    for (std::size_t i = 0; i < sums.size(); i += 2) addPair(&sums[i], &other.sums[i]);
-    for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += other.counts[i];
+    constexpr std::size_t kPixelsAtOnce = 8192;
+    const std::size_t values = std::size_t{2} * shape_.channels;
+    parallelFor(counts.size(), kPixelsAtOnce, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first * values; i < end * values; i += 2) addPair(&sums[i], &other.sums[i]);
+        for (std::size_t i = first; i < end; ++i) counts[i] += other.counts[i];
+    });
     // The lower first sample wins, so that the id plane does not depend on who is added to whom.
     const auto& mine = samples.ranges();
     const auto& theirs = other.samples.ranges();

@@ -58,4 +58,13 @@ const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {
     return *opened.table;
 }
 
+void prepareToWrite(OutputFormat format) noexcept {
+    if (format != OutputFormat::Exr && format != OutputFormat::Png) return;
+    try {
+        imageModule("", ErrorKind::Output);
+    } catch (...) {
+        // Whoever writes asks again.
+    }
+}
+
 }  // namespace crt

@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "image/image_module.h"
+#include "scene/scene.h"
 
 #include <string>
 
@@ -12,5 +13,9 @@ namespace crt {
 /// crt::Error(kind), with the name of the file that is to be written (kind Output) or read, when there is
 /// none.
 const CrtImageModule& imageModule(const std::string& path, ErrorKind kind);
+
+/// Opens it beforehand, where writing such a file needs it: its hundreds of libraries take a fifth of a
+/// second. What goes wrong is told when the file is written. [any thread]
+void prepareToWrite(OutputFormat format) noexcept;
 
 }  // namespace crt

@@ -78,7 +78,7 @@ CRT_FN int crt_patches_closest(CRT_GLOBAL const CrtPatch *patches, u32 count,
         const int met = crt_patch_meeting(patches + i, ray, slack, ray.reach, &least);
         const f32 from = met ? least : CRT_INFINITY;
         next = crt_cull_min(crt_cull_max(from, nearest), next);
-        found = met & (from < nearest) ? i : found;
+        found = (met & (from < nearest)) ? i : found;
         nearest = crt_cull_min(from, nearest);
     }
     *best = crt_no_hit(ray.reach);
@@ -105,8 +105,8 @@ CRT_FN u32 crt_patches_any(CRT_GLOBAL const CrtPatch *patches, u32 count,
     if (met == 0u) return 0u;
     const CrtShear shear = crt_shear(ray);
     CrtHit hit;
-    for (u32 half = 0u; half < 2u; ++half) {
-        const u32 slot = patches[found].slot[half];
+    for (u32 k = 0u; k < 2u; ++k) {
+        const u32 slot = patches[found].slot[k];
         if (slot != CRT_NONE && crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit)) return 1u;
     }
     return met > 1u ? 2u : 0u;

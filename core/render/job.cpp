@@ -8,6 +8,7 @@
 #include "film/checkpoint.h"
 #include "film/checkpoint_writer.h"
 #include "film/error_text.h"
+#include "image/open_module.h"
 #include "render/output_guard.h"
 #include "render/outputs.h"
 #include "render/report.h"
@@ -229,7 +230,12 @@ int runJob(const Job& job, Watch& watch) {
                                    checkpoint.save(film, identity);
                                }};
     if (files.checkpoint_wanted) checkpoints.interval_seconds = job.checkpoint_interval_seconds;
-    Rendered run = render(scene, job, plan, std::move(earlier), watch, checkpoints);
+    RenderOptions options = job;
+    // Not earlier: a driver that is being opened would wait for the same lock of the loader.
+    options.meanwhile = [&files] {
+        for (const Output& image : files.outputs.images) prepareToWrite(image.format);
+    };
+    Rendered run = render(scene, options, plan, std::move(earlier), watch, checkpoints);
     checkpoint.finish();
 
     // Images, and the report of how they came about.

@@ -1,6 +1,7 @@
 #include "render/render.h"
 
 #include "backend/loader.h"
+#include "base/listener.h"
 #include "base/log.h"
 #include "base/stage.h"
 #include "base/stopwatch.h"
@@ -9,6 +10,7 @@
 #include "render/session.h"
 
 #include <limits>
+#include <thread>
 #include <utility>
 
 namespace crt {
@@ -75,9 +77,9 @@ void describeRun(FilmIdentity& identity, const RunFacts& facts) {
     identity.record->addRun(run);
 }
 
-void prepare(Session& session, const CompiledScene& compiled, RunFacts& facts) {
+void openDevices(Session& session, RunFacts& facts) {
     const LoadedBackend& backend = session.backend();
-    std::optional<Stage> stage(std::in_place, "opening the device");
+    const Stage stage("opening the device");
     const Stopwatch opening;
     session.openDevice();
     facts.open_seconds += opening.seconds();
@@ -85,10 +87,13 @@ void prepare(Session& session, const CompiledScene& compiled, RunFacts& facts) {
     facts.backend_path = backend.path;
     facts.backend_version = textOrEmpty(backend.table->version);
     facts.backend_build = textOrEmpty(backend.table->build);
+}
 
-    stage.emplace("preparing the scene for " + backend.name);
+void prepare(Session& session, DeviceFilm& devices, RunFacts& facts) {
+    const std::string& backend = session.backend().name;
+    std::optional<Stage> stage(std::in_place, "preparing the scene for " + backend);
     const Stopwatch preparing;
-    session.setScene(compiled, [&](double done) {
+    devices.setScene([&](double done) {
         stage->setAmount(1);
         stage->at(done);
     });
@@ -96,21 +101,29 @@ void prepare(Session& session, const CompiledScene& compiled, RunFacts& facts) {
     stage.reset();
     askForReport(session, facts);
     facts.driver = driverOf(session.devices(), facts.devices.front().name);
-    logInfo("{} on {}", backend.name, arrayText(facts.backend.device));
+    logInfo("{} on {}", backend, arrayText(facts.backend.device));
 }
 
 /// CompiledScene → Film, by a backend.
-void renderSamples(Session& session, const SamplingPlan& plan, Watch& watch,
-                   const CheckpointPlan& checkpoints, Rendered& run) {
+void renderSamples(Session& session, const SamplingPlan& plan, const std::function<void()>& meanwhile,
+                   Watch& watch, const CheckpointPlan& checkpoints, Rendered& run) {
     RunFacts& facts = run.facts;
-    prepare(session, run.compiled, facts);
+    openDevices(session, facts);
+    std::jthread beside;
+    if (meanwhile)
+        beside = std::jthread([&meanwhile, listener = currentListener()] {
+            const ListenerScope scope(listener);
+            meanwhile();
+        });
+    DeviceFilm devices(session.group(), run.compiled);
+    prepare(session, devices, facts);
     SamplingPlan sampling = plan;
     sampling.checkpoint_interval_seconds = checkpoints.interval_seconds;
     sampling.checkpoint_possible = checkpoints.possible;
     SamplingResult result;
     {
         const WatchedRendering rendering(watch);
-        result = sampleFilm(session.group(), run.film, sampling, watch, [&] {
+        result = sampleFilm(devices, run.film, sampling, watch, [&] {
             describeRun(run.identity, facts);
             checkpoints.save(run.film, run.identity);
         });
@@ -118,6 +131,7 @@ void renderSamples(Session& session, const SamplingPlan& plan, Watch& watch,
     // A device that failed is not asked again; what it said before the first sample stands.
     if (result.stop != StopReason::Failed) askForReport(session, facts);
     facts.devices = session.group().shares();
+    facts.film_bands = devices.bands();
     facts.stop = result.stop;
     facts.request = result.request;
     facts.rendered_samples = result.rendered;
@@ -193,6 +207,8 @@ Rendered render(const Scene& scene, const RenderOptions& options, const Sampling
     facts.target_error = options.target_error;
     std::optional<Session> session = openSession(options, plan, facts);
 
+    if (session) session->beginOpeningDevice();
+
     // What it takes to see the scene: one flat blob, and the mask of what it needs.
     CompiledScene compiled = compileFor(session, scene);
     FilmIdentity identity{.scene_hash = compiled.hash, .version = CRT_VERSION, .record = recordOf(scene)};
@@ -203,7 +219,7 @@ Rendered render(const Scene& scene, const RenderOptions& options, const Sampling
     facts.resumed_samples = film.samples.count();
     Rendered run{std::move(compiled), std::move(film), std::move(identity), std::move(facts), std::nullopt};
     if (session) {
-        renderSamples(*session, plan, watch, checkpoints, run);
+        renderSamples(*session, plan, options.meanwhile, watch, checkpoints, run);
         session.reset();  // What the device held is free while files are written.
     } else {
         watch.renderingEnds();

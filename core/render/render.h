@@ -27,6 +27,8 @@ struct RenderOptions {
     double time_limit_seconds = 0;           ///< 0: none. Alone it replaces the scene's number of samples.
     double target_error =
         0;  ///< Stop at this relative error; 0: none. Alone it replaces the scene's number of samples.
+    std::function<void()> meanwhile{};  ///< Called on a thread of its own, once the devices are open: what
+                                        ///< need not wait for the render. Throws nothing.
     std::uint64_t chunk = 0;  ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
 };
 

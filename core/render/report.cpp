@@ -185,7 +185,8 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
     report["memory"] = {{"scene_bytes", compiled.size_bytes},
                         {"texel_bytes", compiled.texel_bytes},
                         {"host_peak_bytes", peakHostMemory()},
-                        {"device_peak_bytes", b.peak_memory_bytes}};
+                        {"device_peak_bytes", b.peak_memory_bytes},
+                        {"film_bands", facts.film_bands}};
     report["error"] = errorJson(facts);
     report["warnings"] = facts.warnings;
 

@@ -36,6 +36,7 @@ struct RunFacts {
     std::uint64_t rendered_samples = 0; ///< Per pixel, by this run.
     SampleRanges samples;               ///< All that are in the film.
     std::uint64_t chunks = 0;
+    std::uint64_t film_bands = 1;       ///< In which the film was rendered; 1: as a whole.
     std::uint64_t invalid_samples = 0;
     std::optional<ErrorEstimate> error; ///< Of the film, by all replicates; nothing while unknown.
     std::optional<ErrorEstimate> deciding,

@@ -18,6 +18,7 @@ double secondsSince(Clock::time_point start) {
 
 constexpr double kChunkSeconds =
     0.4;  // Aimed at, so that the promised half second holds when a chunk is dearer than the last.
+constexpr double kFixedShare = 0.2;  // Of a chunk may go into what does not depend on its samples.
 constexpr std::uint64_t kChunkGrowth =
     8;  // The first chunk may hold a kernel's warm-up; it says little about the next.
 constexpr double kReadShare =
@@ -33,32 +34,37 @@ public:
         if (fixed_ > 0) return fixed_;
         if (last_count_ == 0) return 1;
         const double per_sample = std::max(last_seconds_, 1e-7) / static_cast<double>(last_count_);
-        const double affordable = std::min(std::min(kChunkSeconds, seconds_left) / per_sample, 1e15);
+        const double sampling = std::max(kChunkSeconds, fixed_seconds_ * (1 / kFixedShare - 1));
+        const double affordable =
+            std::min(std::min(sampling, seconds_left - fixed_seconds_) / per_sample, 1e15);
+        if (affordable < 1) return 1;
         return std::clamp<std::uint64_t>(static_cast<std::uint64_t>(affordable), 1,
                                          last_count_ * kChunkGrowth);
     }
 
-    void finished(std::uint64_t count, double seconds) {
+    /// `fixed_seconds` of `seconds` would have been the same with any other count.
+    void finished(std::uint64_t count, double seconds, double fixed_seconds) {
         last_count_ = count;
-        last_seconds_ = seconds;
+        last_seconds_ = seconds - fixed_seconds;
+        fixed_seconds_ = fixed_seconds;
     }
 
 private:
     std::uint64_t fixed_;
     std::uint64_t last_count_ = 0;
-    double last_seconds_ = 0;
+    double last_seconds_ = 0, fixed_seconds_ = 0;
 };
 
 /// The film on the host, kept close behind the one on the device.
 class FilmReader {
 public:
-    FilmReader(DeviceGroup& devices, Film& film, bool independent_samples)
+    FilmReader(DeviceFilm& devices, Film& film, bool independent_samples)
         : devices_(devices),
           film_(film),
           independent_samples_(independent_samples),
           read_seconds_(static_cast<double>(film.sums.size() * sizeof(double)) / kReadBytesPerSecond) {
-        // A film that begins empty need not be kept twice.
-        if (film.samples.count() > 0) before_ = film;
+        // A film that begins empty need not be kept twice, nor one that only ever grows.
+        if (film.samples.count() > 0 && !devices.inBands()) before_ = film;
     }
 
     /// film = what was there before + what the device has by now.
@@ -71,6 +77,12 @@ public:
 
     /// The same without looking at the error: the device waits for no more than the copy.
     void copy() {
+        current_ = true;
+        if (devices_.inBands()) {
+            before_.reset();
+            devices_.readFilm(film_);
+            return;
+        }
         if (film_.samples.count() == 0) {
             devices_.readFilm(film_);
         } else {
@@ -82,7 +94,6 @@ public:
             std::swap(film_, *next_);
         }
         read_at_ = Clock::now();
-        current_ = true;
     }
 
     void deviceAdvanced() { current_ = false; }
@@ -97,7 +108,7 @@ private:
         read_at_ = Clock::now();
     }
 
-    DeviceGroup& devices_;
+    DeviceFilm& devices_;
     Film& film_;
     bool independent_samples_;
     std::optional<Film> before_, next_;
@@ -137,7 +148,7 @@ std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& 
     return missing;
 }
 
-SamplingResult sampleFilm(DeviceGroup& devices, Film& film, const SamplingPlan& plan, Watch& watch,
+SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint) {
     const Clock::time_point start = Clock::now();
     Clock::time_point checkpoint_at = start;
@@ -185,11 +196,14 @@ SamplingResult sampleFilm(DeviceGroup& devices, Film& film, const SamplingPlan& 
         show(0);
         devices.render({.first_sample = first, .sample_count = count}, show);
         show(1);  // Of a plugin's threads the last to finish need not be the last to have said so.
-        sizer.finished(count, secondsSince(chunk_start));
+        reader.deviceAdvanced();
+        // In bands nothing of it is on the devices any more, and a failure later shall not cost it.
+        const bool due = reader.due();
+        if (devices.inBands()) reader.copy();
+        sizer.finished(count, secondsSince(chunk_start), devices.inBands() ? devices.fixedSeconds() : 0);
         result.rendered += count;
         ++result.chunks;
-        reader.deviceAdvanced();
-        if (reader.due()) reader.read();
+        if (due) reader.read();
         if (plan.checkpoint_interval_seconds > 0 &&
             secondsSince(checkpoint_at) >= plan.checkpoint_interval_seconds &&
             (!plan.checkpoint_possible || plan.checkpoint_possible())) {
@@ -220,7 +234,7 @@ SamplingResult sampleFilm(DeviceGroup& devices, Film& film, const SamplingPlan& 
 
     try {
         result.stop = renderAll();
-        if (!reader.current()) reader.read();
+        if (!reader.current()) reader.copy();
     } catch (const Error& error) {
         result.stop = StopReason::Failed;
         result.failure = error;

@@ -3,10 +3,10 @@
 /// and index, where it stops never shows in the image.
 #pragma once
 
-#include "backend/device_group.h"
 #include "base/error.h"
 #include "film/error_estimate.h"
 #include "film/film.h"
+#include "render/device_film.h"
 #include "render/watch.h"
 
 #include <cstdint>
@@ -65,8 +65,9 @@ bool reachesTarget(const Film& film, double target, bool independent_samples = f
 
 /// Adds the plan's samples to `film`. When the last device fails, `film` holds what was last read from it,
 /// at most a small part of the run behind: a backend that failed cannot be asked for its film any more.
-/// `checkpoint` may save the film, which is up to date when it is called.
-SamplingResult sampleFilm(DeviceGroup& devices, Film& film, const SamplingPlan& plan, Watch& watch,
+/// `checkpoint` may save the film, which is up to date when it is called. In bands (device_film.h) chunks
+/// are longer: what a chunk costs besides its samples shall be no more than a fifth of it.
+SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint);
 
 }  // namespace crt

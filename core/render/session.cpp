@@ -1,6 +1,7 @@
 #include "render/session.h"
 
 #include "base/error.h"
+#include "base/listener.h"
 
 #include <utility>
 
@@ -12,10 +13,28 @@ Session::Session(const std::string& backend, const IntegratorOptions& options)
 Session::Session(LoadedBackend backend, const IntegratorOptions& options)
     : backend_(std::move(backend)), options_(options) {}
 
+Session::Opened Session::open(const LoadedBackend& backend, const IntegratorOptions& options) {
+    Opened opened;
+    opened.devices = probeDevices(backend);  // Says better than a failing create() why there is none.
+    opened.group = std::make_unique<DeviceGroup>(backend, options, opened.devices);
+    return opened;
+}
+
+void Session::beginOpeningDevice() {
+    if (group_ || opening_.valid()) return;
+    // Of copies: a session may be moved meanwhile.
+    opening_ = std::async(std::launch::async,
+                          [backend = backend_, options = options_, listener = currentListener()] {
+                              const ListenerScope scope(listener);
+                              return open(backend, options);
+                          });
+}
+
 void Session::openDevice() {
     if (group_) return;
-    devices_ = probeDevices(backend_);  // Says better than a failing create() why there is none.
-    group_ = std::make_unique<DeviceGroup>(backend_, options_, devices_);
+    Opened opened = opening_.valid() ? opening_.get() : open(backend_, options_);
+    devices_ = std::move(opened.devices);
+    group_ = std::move(opened.group);
 }
 
 DeviceGroup& Session::group() {
@@ -50,11 +69,6 @@ Film renderFilm(Session& session, const Scene& scene, const FilmRequest& request
     session.setScene(session.compile(scene, request.aovs));
     session.render({.first_sample = request.first_sample, .sample_count = request.samples}, progress);
     return session.film();
-}
-
-FilmShape filmShapeOf(const CompiledScene& compiled) {
-    return {compiled.width, compiled.height, compiled.channels, compiled.aovs,
-            compiled.spectral_channels};
 }
 
 }  // namespace crt

@@ -7,10 +7,12 @@
 #include "backend/loader.h"
 #include "compile/compile.h"
 #include "film/film.h"
+#include "render/device_film.h"
 #include "scene/scene.h"
 
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +32,9 @@ public:
 
     /// Opens the device, or the devices, which the first setScene() does otherwise.
     void openDevice();
+    /// Begins to, on a thread of its own, and returns at once: opening a driver takes as long as compiling a
+    /// scene. What goes wrong is thrown by openDevice().
+    void beginOpeningDevice();
     /// Of the backend, best first. Requires openDevice().
     const std::vector<CrtDevice>& devices() const { return devices_; }
 
@@ -49,11 +54,18 @@ public:
     DeviceGroup& group();
 
 private:
+    struct Opened {
+        std::vector<CrtDevice> devices;
+        std::unique_ptr<DeviceGroup> group;
+    };
+    static Opened open(const LoadedBackend& backend, const IntegratorOptions& options);
+
     LoadedBackend backend_;
     IntegratorOptions options_;
     std::vector<CrtDevice> devices_;
     std::unique_ptr<DeviceGroup> group_;
     std::optional<FilmShape> shape_;
+    std::future<Opened> opening_;  ///< Last: its end is waited for first.
 };
 
 /// One range of samples of one scene.
@@ -66,8 +78,5 @@ struct FilmRequest {
 /// Compiles, sets the scene, renders the range as one, reads the film.
 Film renderFilm(Session& session, const Scene& scene, const FilmRequest& request,
                 const std::function<void(double)>& progress = {});
-
-/// The shape of a film of this scene.
-FilmShape filmShapeOf(const CompiledScene& compiled);
 
 }  // namespace crt

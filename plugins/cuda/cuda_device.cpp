@@ -164,15 +164,30 @@ void Context::makeCurrent() const {
     driver().check(driver().cuCtxSetCurrent(context_), "making the device current");
 }
 
+namespace {
+
+[[noreturn]] void refuseFor(std::uint64_t bytes, std::size_t free_bytes, std::size_t all_bytes,
+                            const Device& device, const char* what) {
+    throw PluginError(CRT_OUT_OF_MEMORY, std::string(what) + " needs " + megabytes(bytes) + ", but '" +
+                                             device.name + "' has only " + megabytes(free_bytes) +
+                                             " of its " + megabytes(all_bytes) + " free");
+}
+
+}  // namespace
+
+void requireFree(std::uint64_t bytes, const Device& device, const char* what) {
+    std::size_t free_bytes = 0, all_bytes = 0;
+    driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "asking for free memory");
+    if (bytes > free_bytes) refuseFor(bytes, free_bytes, all_bytes, device, what);
+}
+
 Memory::Memory(std::uint64_t bytes, const Device& device, const char* what) {
     const Driver& cuda = driver();
     const CUresult result = cuda.cuMemAlloc(&address_, bytes);
     if (result == CUDA_ERROR_OUT_OF_MEMORY) {
         std::size_t free_bytes = 0, all_bytes = 0;
         cuda.cuMemGetInfo(&free_bytes, &all_bytes);
-        throw PluginError(CRT_OUT_OF_MEMORY, std::string(what) + " needs " + megabytes(bytes) + ", but '" +
-                                                 device.name + "' has only " + megabytes(free_bytes) +
-                                                 " of its " + megabytes(all_bytes) + " free");
+        refuseFor(bytes, free_bytes, all_bytes, device, what);
     }
     cuda.check(result, "allocating " + megabytes(bytes) + " for " + what);
     bytes_ = bytes;

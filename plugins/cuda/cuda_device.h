@@ -84,6 +84,10 @@ private:
     CUcontext context_ = nullptr;
 };
 
+/// Throws PluginError(CRT_OUT_OF_MEMORY), with the numbers, where the current device has less than `bytes`
+/// free. That it has more promises nothing: memory is shared with other programs.
+void requireFree(std::uint64_t bytes, const Device& device, const char* what);
+
 /// Plain device memory.
 class Memory {
 public:

@@ -22,6 +22,7 @@ double now() {
 
 CudaIntegrator::CudaIntegrator(const plugin::Host& host, const CrtCreateInfo& info)
     : host_(host),
+      opening_compiler_(info.kernel == CRT_KERNEL_FULL ? std::jthread() : std::jthread(openCompiler)),
       device_(chooseDevice(info.device)),
       context_(device_),
       kernel_choice_(info.kernel),
@@ -45,6 +46,10 @@ CudaIntegrator::~CudaIntegrator() {
 
 CudaIntegrator::DeviceFilm CudaIntegrator::allocateFilm(std::uint64_t copies, const char* what) {
     const std::uint64_t pixels = copies * scene_.width * scene_.height;
+    const std::uint64_t bytes = pixels * (scene_.channels * 2 * sizeof(double) + sizeof(std::uint64_t) +
+                                          (scene_.aovs & CRT_AOV_PRIMITIVE ? sizeof(std::uint32_t) : 0));
+    // Of the whole, or the sentence would have the numbers of whichever part came too late.
+    requireFree(bytes, device_, what);
     DeviceFilm film;
     film.sums = Memory(pixels * scene_.channels * 2 * sizeof(double), device_, what);
     film.counts = Memory(pixels * sizeof(std::uint64_t), device_, what);
@@ -71,6 +76,8 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     film_ = DeviceFilm();
     slices_ = DeviceFilm();
     slice_count_ = 0;
+    rays_ = Memory();
+    launched_ = {};
     scene_ = scene;
 
     const std::uint64_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
@@ -90,7 +97,6 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     uploaded.upload(blob.data);
     blob_ = std::move(uploaded);
     upload_seconds_ += now() - start;
-    launched_.paths = 0;
     noteMemory();
 }
 
@@ -107,7 +113,14 @@ std::uint32_t CudaIntegrator::ensureSlices(std::uint32_t slices) {
     if (slices <= std::max(slice_count_, 1u)) return std::max(slice_count_, 1u);
     slices_ = DeviceFilm();
     slice_count_ = 0;
-    slices_ = allocateFilm(slices, "the film's slices");
+    try {
+        slices_ = allocateFilm(slices, "the film's slices");
+    } catch (const plugin::PluginError& error) {
+        // Somebody was faster, or what is free lies in pieces.
+        if (error.status() != CRT_OUT_OF_MEMORY) throw;
+        host_.log(CRT_LOG_DEBUG, std::string("cuda: going on without slices: ") + error.what());
+        return 1;
+    }
     slice_count_ = slices;
     noteMemory();
     return slices;

@@ -14,6 +14,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <thread>
 
 namespace crt::cuda {
 
@@ -44,6 +45,7 @@ private:
     double launch(const Launch& launch);
 
     plugin::Host host_;
+    std::jthread opening_compiler_;  ///< While the device is opened.
     Device device_;
     Context context_;
     CUevent start_ = nullptr, end_ = nullptr;

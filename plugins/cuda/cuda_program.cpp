@@ -160,6 +160,14 @@ Module::~Module() {
     if (module_ != nullptr) driver().cuModuleUnload(module_);
 }
 
+void openCompiler() noexcept {
+    try {
+        nvrtc();
+    } catch (...) {
+        // Whoever needs it tries again, and tells.
+    }
+}
+
 CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::uint64_t scene_features,
                          CrtKernelChoice choice)
     : host_(host), features_(choice == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene_features) {

@@ -81,6 +81,10 @@ private:
     std::string name_;
 };
 
+/// Opens NVRTC, which is a library of 100 MB, as far as that was not done before. A CudaProgram does so
+/// itself; beside other work it costs no time. [any thread]
+void openCompiler() noexcept;
+
 /// The kernel for one mask on one device. Used by one thread at a time, the context current.
 class CudaProgram {
 public:

@@ -87,6 +87,7 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     // The old film goes first: two need not fit side by side.
     for (Buffer* buffer : {&scene_, &sums_, &counts_, &primitives_, &rays_}) *buffer = Buffer();
     allocated_bytes_ = 0;
+    launched_ = {};
     const double start = now();
     const std::uint64_t pixels = std::uint64_t{scene.width} * scene.height;
     const std::uint64_t sums_bytes = pixels * scene.channels * 2 * sizeof(cl_double);
@@ -110,7 +111,6 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     setArgument(program_.render.get(), 2, counts_.get());
     setArgument(program_.render.get(), 3, primitives_.get());
     setArgument(program_.render.get(), 4, rays_.get());
-    launched_.paths = 0;
 }
 
 double OpenClIntegrator::launch(const Launch& launch) {

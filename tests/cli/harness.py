@@ -91,6 +91,24 @@ def first_real_backend():
     return next(iter(real_backends()), None)
 
 
+def can_mount():
+    """Whether this process may mount a disk, which root in a container may not."""
+    if os.geteuid() != 0 or shutil.which("mount") is None:
+        return False
+    probe = "/tmp/crt-mount-probe"
+    os.makedirs(probe, exist_ok=True)
+    mounted = (
+        subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=64k", "crt-test", probe], capture_output=True
+        ).returncode
+        == 0
+    )
+    if mounted:
+        subprocess.run(["umount", probe], capture_output=True)
+    os.rmdir(probe)
+    return mounted
+
+
 class CliTest(unittest.TestCase):
     TIMEOUT_SECONDS = 120  # Of one crt.
 

@@ -161,7 +161,7 @@ class Rendering(CliTest):
             "samples": ["target", "per_pixel", "resumed", "rendered", "ranges", "chunks", "invalid"],
             "rays": ["paths", "closest", "shadow"],
             "speed": ["mpaths_per_second", "mrays_per_second"],
-            "memory": ["scene_bytes", "texel_bytes", "host_peak_bytes", "device_peak_bytes"],
+            "memory": ["scene_bytes", "texel_bytes", "host_peak_bytes", "device_peak_bytes", "film_bands"],
             "error": [
                 "knowledge",
                 "mean_luminance",

@@ -1,14 +1,21 @@
-// A libcuda.so.1 for tests: one device with 1 GB whose memory is the host's and whose kernels are those of
+// A libcuda.so.1 for tests: a device with 1 GB whose memory is the host's and whose kernels are those of
 // host_kernels.cpp. With it the real CUDA plugin runs on a machine without a GPU: opening the driver,
 // allocating, choosing slices, passing arguments, going over from the precompiled kernel to NVRTC's, running
 // out of memory. It checks what a driver would check: sizes, handles, and that memory is given back.
 //
 // CRT_FAKE_CUDA says what is to go wrong: "no_device", "old" (a driver for CUDA 11), "launch" (every launch
-// fails) or "little_memory" (other programs have taken all but a few megabytes).
+// fails), "little_memory" (other programs have taken all but a few megabytes) or "overtaken" (they take it
+// after cuMemGetInfo was asked).
+// CRT_FAKE_CUDA_DEVICES: so many devices instead of one.
+// CRT_FAKE_CUDA_MEMORY: so many bytes of each are left by other programs.
+// CRT_FAKE_CUDA_LAUNCH_MEMORY: so many bytes must be free for a launch, as a kernel's local memory is.
+// CRT_FAKE_CUDA_LOST=D:N,…: the N-th launch on device D fails, and whatever is asked of it after that.
+// CRT_FAKE_CUDA_PEAK: a file, to which the most bytes that were ever allocated are written in the end.
 #include "host_kernels.h"
 
 #include <cuda.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -23,30 +30,51 @@ namespace {
 constexpr std::size_t kMemory = std::size_t{1} << 30;
 constexpr int kMultiprocessors = 8;
 
+struct Allocation {
+    std::size_t bytes;
+    CUcontext owner;
+};
+
 std::mutex mutex;
-std::map<CUdeviceptr, std::size_t> allocations;
-std::size_t allocated = 0;
+std::map<CUdeviceptr, Allocation> allocations;
+std::size_t allocated = 0, most_allocated = 0;  // On all devices.
 
 bool goesWrong(const char* how) {
     const char* wanted = std::getenv("CRT_FAKE_CUDA");
     return wanted != nullptr && std::strcmp(wanted, how) == 0;
 }
 
-/// What this program can have of the device's memory.
-std::size_t ownMemory() { return goesWrong("little_memory") ? std::size_t{8} << 20 : kMemory; }
+std::size_t number(const char* variable, std::size_t otherwise) {
+    const char* value = std::getenv(variable);
+    return value != nullptr ? std::strtoull(value, nullptr, 10) : otherwise;
+}
+
+/// What this program can have of a device's memory.
+std::size_t ownMemory() {
+    return number("CRT_FAKE_CUDA_MEMORY", goesWrong("little_memory") ? std::size_t{8} << 20 : kMemory);
+}
+
+/// The launch at which a device is lost; 0: never.
+std::size_t lostAt(int device) {
+    const char* value = std::getenv("CRT_FAKE_CUDA_LOST");
+    const std::string text = value != nullptr ? ',' + std::string(value) : "";
+    const std::size_t at = text.find(',' + std::to_string(device) + ':');
+    return at == std::string::npos ? 0 : std::strtoull(text.c_str() + text.find(':', at) + 1, nullptr, 10);
+}
 
 /// Whether [address, address + bytes) lies in one allocation.
 bool isAllocated(CUdeviceptr address, std::size_t bytes) {
     const std::lock_guard<std::mutex> lock(mutex);
     auto next = allocations.upper_bound(address);
     if (next == allocations.begin()) return false;
-    const auto& [start, size] = *--next;
-    return address + bytes <= start + size;
+    const auto& [start, allocation] = *--next;
+    return address + bytes <= start + allocation.bytes;
 }
 
 void* host(CUdeviceptr address) { return reinterpret_cast<void*>(address); }
 
 int modules_loaded = 0;
+bool lost = false;  // A device, whose memory cannot be given back then.
 double clockSeconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -54,7 +82,13 @@ double clockSeconds() {
 /// Looks for what was not given back when the process ends.
 struct LeakCheck {
     ~LeakCheck() {
-        if (allocated == 0 && modules_loaded == 0) return;
+        if (const char* name = std::getenv("CRT_FAKE_CUDA_PEAK")) {
+            if (std::FILE* file = std::fopen(name, "w")) {
+                std::fprintf(file, "%zu\n", most_allocated);
+                std::fclose(file);
+            }
+        }
+        if (lost || (allocated == 0 && modules_loaded == 0)) return;
         std::fprintf(stderr, "fake CUDA driver: %zu bytes and %d modules were not given back\n", allocated,
                      modules_loaded);
         std::_Exit(99);
@@ -75,10 +109,22 @@ struct CUmod_st {
 };
 struct CUctx_st {
     int users = 0;
+    std::size_t allocated = 0, launches = 0;
+    bool lost = false;
 };
 
-static CUctx_st context;
+static constexpr int kMostDevices = 8;
+static CUctx_st contexts[kMostDevices];
 static thread_local CUcontext current = nullptr;
+
+/// What every call says first.
+static CUresult stateOfDevice() {
+    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    const std::lock_guard<std::mutex> lock(mutex);
+    return current->lost ? CUDA_ERROR_LAUNCH_FAILED : CUDA_SUCCESS;
+}
+#define CRT_FAKE_NEEDS_DEVICE() \
+    if (const CUresult state = stateOfDevice(); state != CUDA_SUCCESS) return state
 
 extern "C" {
 
@@ -90,7 +136,9 @@ CRT_FAKE cuDriverGetVersion(int* version) {
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuGetErrorName(CUresult result, const char** name) {
-    *name = result == CUDA_ERROR_LAUNCH_FAILED ? "CUDA_ERROR_LAUNCH_FAILED" : "CUDA_ERROR_OTHER";
+    *name = result == CUDA_ERROR_LAUNCH_FAILED   ? "CUDA_ERROR_LAUNCH_FAILED"
+            : result == CUDA_ERROR_OUT_OF_MEMORY ? "CUDA_ERROR_OUT_OF_MEMORY"
+                                                 : "CUDA_ERROR_OTHER";
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuGetErrorString(CUresult, const char** text) {
@@ -103,12 +151,12 @@ CRT_FAKE cuGetExportTable(const void** table, const CUuuid*) {
     return CUDA_ERROR_NOT_FOUND;
 }
 CRT_FAKE cuDeviceGetCount(int* count) {
-    *count = 1;
+    *count = static_cast<int>(std::min<std::size_t>(number("CRT_FAKE_CUDA_DEVICES", 1), kMostDevices));
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuDeviceGet(CUdevice* device, int index) {
     *device = index;
-    return index == 0 ? CUDA_SUCCESS : CUDA_ERROR_INVALID_DEVICE;
+    return index >= 0 && index < kMostDevices ? CUDA_SUCCESS : CUDA_ERROR_INVALID_DEVICE;
 }
 CRT_FAKE cuDeviceGetName(char* name, int size, CUdevice) {
     std::snprintf(name, static_cast<std::size_t>(size), "Fake GPU");
@@ -129,15 +177,15 @@ CRT_FAKE cuDeviceTotalMem(std::size_t* bytes, CUdevice) {
     return CUDA_SUCCESS;
 }
 
-CRT_FAKE cuDevicePrimaryCtxRetain(CUcontext* retained, CUdevice) {
+CRT_FAKE cuDevicePrimaryCtxRetain(CUcontext* retained, CUdevice device) {
     const std::lock_guard<std::mutex> lock(mutex);
-    ++context.users;
-    *retained = &context;
+    ++contexts[device].users;
+    *retained = &contexts[device];
     return CUDA_SUCCESS;
 }
-CRT_FAKE cuDevicePrimaryCtxRelease(CUdevice) {
+CRT_FAKE cuDevicePrimaryCtxRelease(CUdevice device) {
     const std::lock_guard<std::mutex> lock(mutex);
-    --context.users;
+    --contexts[device].users;
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuCtxSetCurrent(CUcontext made_current) {
@@ -146,7 +194,7 @@ CRT_FAKE cuCtxSetCurrent(CUcontext made_current) {
 }
 
 CRT_FAKE cuModuleLoadData(CUmodule* module, const void* image) {
-    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    CRT_FAKE_NEEDS_DEVICE();
     unsigned magic = 0;
     std::memcpy(&magic, image, sizeof magic);
     const bool elf = magic == 0x464c457fu, fat_binary = magic == 0xba55ed50u;
@@ -157,7 +205,7 @@ CRT_FAKE cuModuleLoadData(CUmodule* module, const void* image) {
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuModuleUnload(CUmodule module) {
-    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    CRT_FAKE_NEEDS_DEVICE();
     delete module;
     const std::lock_guard<std::mutex> lock(mutex);
     --modules_loaded;
@@ -180,8 +228,16 @@ CRT_FAKE cuOccupancyMaxActiveBlocksPerMultiprocessor(int* blocks, CUfunction, in
 CRT_FAKE cuLaunchKernel(CUfunction function, unsigned grid_x, unsigned grid_y, unsigned grid_z,
                         unsigned block_x, unsigned block_y, unsigned block_z, unsigned shared_bytes,
                         CUstream, void** arguments, void** extra) {
-    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    CRT_FAKE_NEEDS_DEVICE();
     if (goesWrong("launch")) return CUDA_ERROR_LAUNCH_FAILED;
+    {
+        const std::lock_guard<std::mutex> lock(mutex);
+        const auto device = static_cast<int>(current - contexts);
+        if (++current->launches == lostAt(device)) lost = current->lost = true;
+        if (current->lost) return CUDA_ERROR_LAUNCH_FAILED;
+        if (number("CRT_FAKE_CUDA_LAUNCH_MEMORY", 0) > ownMemory() - current->allocated)
+            return CUDA_ERROR_OUT_OF_MEMORY;
+    }
     if (grid_x == 0 || grid_y == 0 || grid_y > 65535 || grid_z != 1 || block_y != 1 || block_z != 1 ||
         shared_bytes != 0 || extra != nullptr)
         return CUDA_ERROR_INVALID_VALUE;
@@ -193,45 +249,52 @@ CRT_FAKE cuLaunchKernel(CUfunction function, unsigned grid_x, unsigned grid_y, u
 }
 
 CRT_FAKE cuMemAlloc(CUdeviceptr* address, std::size_t bytes) {
-    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    CRT_FAKE_NEEDS_DEVICE();
     if (bytes == 0) return CUDA_ERROR_INVALID_VALUE;
     const std::lock_guard<std::mutex> lock(mutex);
-    if (bytes > ownMemory() - allocated) return CUDA_ERROR_OUT_OF_MEMORY;
+    if (bytes > ownMemory() - current->allocated) return CUDA_ERROR_OUT_OF_MEMORY;
     void* memory = std::aligned_alloc(256, (bytes + 255) / 256 * 256);
     if (memory == nullptr) return CUDA_ERROR_OUT_OF_MEMORY;
     std::memset(memory, 0xcd, bytes);  // whoever relies on cleared memory shall see it
     *address = reinterpret_cast<CUdeviceptr>(memory);
-    allocations[*address] = bytes;
+    allocations[*address] = {bytes, current};
+    current->allocated += bytes;
     allocated += bytes;
+    most_allocated = std::max(most_allocated, allocated);
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuMemFree(CUdeviceptr address) {
-    if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
+    CRT_FAKE_NEEDS_DEVICE();
     const std::lock_guard<std::mutex> lock(mutex);
     const auto found = allocations.find(address);
-    if (found == allocations.end()) return CUDA_ERROR_INVALID_VALUE;
-    allocated -= found->second;
+    if (found == allocations.end() || found->second.owner != current) return CUDA_ERROR_INVALID_VALUE;
+    allocated -= found->second.bytes;
+    current->allocated -= found->second.bytes;
     allocations.erase(found);
     std::free(host(address));
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuMemGetInfo(std::size_t* free_bytes, std::size_t* all_bytes) {
+    CRT_FAKE_NEEDS_DEVICE();
     const std::lock_guard<std::mutex> lock(mutex);
-    *free_bytes = ownMemory() - allocated;
+    *free_bytes = (goesWrong("overtaken") ? kMemory : ownMemory()) - current->allocated;
     *all_bytes = kMemory;
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuMemcpyHtoD(CUdeviceptr to, const void* from, std::size_t bytes) {
+    CRT_FAKE_NEEDS_DEVICE();
     if (!isAllocated(to, bytes)) return CUDA_ERROR_INVALID_VALUE;
     std::memcpy(host(to), from, bytes);
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuMemcpyDtoH(void* to, CUdeviceptr from, std::size_t bytes) {
+    CRT_FAKE_NEEDS_DEVICE();
     if (!isAllocated(from, bytes)) return CUDA_ERROR_INVALID_VALUE;
     std::memcpy(to, host(from), bytes);
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuMemsetD8(CUdeviceptr to, unsigned char value, std::size_t bytes) {
+    CRT_FAKE_NEEDS_DEVICE();
     if (!isAllocated(to, bytes)) return CUDA_ERROR_INVALID_VALUE;
     std::memset(host(to), value, bytes);
     return CUDA_SUCCESS;

@@ -11,6 +11,7 @@
 //   nan_film, count_film   the film that is handed over holds a NaN, or more samples than were asked for
 //   scene_oom, read   set_scene or read_film fails
 // CRT_FAKE_FAULT_DEVICE: only that device has the fault.
+// CRT_FAKE_MEMORY: so many bytes for film and scene has each device, or with "1000,2000" each its own.
 // CRT_FAKE_SCENE_SECONDS: so long takes set_scene, which says how far it is.
 // CRT_FAKE_FIRST_START_MS: so long takes the first integrator of a process, as a driver does that is not
 // loaded yet.
@@ -22,6 +23,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
 #include <thread>
 
@@ -58,6 +60,9 @@ public:
         if (wantedFault() == "scene_oom")
             throw PluginError(CRT_OUT_OF_MEMORY, "the scene needs 12 bytes more than there are");
         std::memcpy(&scene_, blob.data, sizeof(scene_));
+        paths_ = 0;
+        seconds_ = 0;
+        requireRoom(blob.size_bytes);
         const char* seconds = std::getenv("CRT_FAKE_SCENE_SECONDS");
         for (int i = 0; seconds != nullptr && i < 100; ++i) {
             host_.cancelled(i / 100.0);
@@ -78,9 +83,10 @@ public:
         const std::uint64_t seed = (std::uint64_t{scene_.seed.high} << 32) | scene_.seed.low;
         for (std::uint32_t y = range.y0; y < range.y1; ++y) {
             const double done = double(y - range.y0) / (range.y1 - range.y0);
-            if (done >= 0.5 && fault == "oom")
+            const bool half_way = done >= 0.5 || range.y1 - range.y0 == 1;
+            if (half_way && fault == "oom")
                 throw PluginError(CRT_OUT_OF_MEMORY, "the device has no memory left for 12 more rows");
-            if (done >= 0.5 && fault == "device")
+            if (half_way && fault == "device")
                 throw PluginError(CRT_DEVICE_FAILED, "the device fell off the bus");
             if (fault == "slow") std::this_thread::sleep_for(std::chrono::milliseconds(2));
             if (host_.cancelled(done)) return false;
@@ -115,6 +121,22 @@ private:
         const char *value = std::getenv("CRT_FAKE_FAULT"), *only = std::getenv("CRT_FAKE_FAULT_DEVICE");
         if (value == nullptr || (only != nullptr && only != std::to_string(device_.index))) return "";
         return value;
+    }
+
+    void requireRoom(std::uint64_t scene_bytes) const {
+        const char* text = std::getenv("CRT_FAKE_MEMORY");
+        if (text == nullptr) return;
+        char* next = nullptr;
+        std::uint64_t memory = std::strtoull(text, &next, 10);
+        for (std::uint32_t i = 0; i < device_.index && *next == ','; ++i)
+            memory = std::strtoull(next + 1, &next, 10);
+        const std::uint64_t film_bytes = std::uint64_t{scene_.width} * scene_.height *
+                                         (16 * std::uint64_t{scene_.channels} + sizeof(std::uint64_t));
+        if (film_bytes + scene_bytes <= memory) return;
+        const std::string needs = scene_bytes > memory
+                                      ? "the scene needs " + std::to_string(scene_bytes)
+                                      : "the film needs " + std::to_string(film_bytes);
+        throw PluginError(CRT_OUT_OF_MEMORY, needs + " bytes, and there are " + std::to_string(memory));
     }
 
     void renderPixel(const CrtRenderRange& range, std::uint64_t seed, std::uint32_t x, std::uint32_t y,
