@@ -146,8 +146,10 @@ std::uint64_t disagreements(const ThreeWays& scene, Random& random, int rays, st
 }
 
 /// Shadow rays, from above one triangle to just before another: how often one triangle after another and the
-/// four ways disagree.
-std::uint64_t shadowDisagreements(const ThreeWays& scene, Random& random, int rays, std::uint64_t* hits) {
+/// four ways disagree. Of so many triangles one after another as lie in one plane, none is the target of
+/// another: a wall with all of the scene on one side is no occluder, for rays within its plane neither.
+std::uint64_t shadowDisagreements(const ThreeWays& scene, Random& random, int rays, std::uint64_t* hits,
+                                  u32 in_one_plane = 1) {
     const CrtContext brute = contextOf(scene.brute), bvh = contextOf(scene.bvh),
                      boxes = contextOf(scene.boxes);
     const auto* triangles = CRT_ARRAY(CrtTriangle, brute.blob, brute.scene->triangles);
@@ -160,7 +162,7 @@ std::uint64_t shadowDisagreements(const ThreeWays& scene, Random& random, int ra
         from.b2 = static_cast<f32>(random.uniform(0, 0.5));
         const CrtSurface surface = crt_surface(&brute, from);
         const u32 target = random.below(brute.scene->triangle_count);
-        if (target == from.slot) continue;
+        if (target / in_one_plane == from.slot / in_one_plane) continue;
         const vec3 to = aimAt(triangles[target], 2, random);
         const vec3 o = crt_offset_origin(surface.p, surface.clearance, surface.ng, to - surface.p);
         const CrtRay ray = rayOf(o, to - o, 0.999f);
@@ -244,6 +246,114 @@ TEST_CASE("tree, boxes and lanes find what the plain loop finds, bit by bit", "[
     const ThreeWays sphere(icosphere(3, 1, {0, 0, 0}));
     CHECK(disagreements(sphere, random, 10000, &hits) == 0);
     CHECK(shadowDisagreements(sphere, random, 10000, &blocked) == 0);
+}
+
+/// Parallelograms and other quadrangles, each of two triangles: anywhere, in planes of constant x, y or z, and
+/// where it is asked for in one plane with the one before, beside it or over it.
+Mesh quadrangles(Random& random, std::uint32_t count, bool in_one_plane = true) {
+    Mesh mesh;
+    Vec3d p{}, a{}, b{};
+    for (std::uint32_t i = 0; i < count; ++i) {
+        if (i % 4 != 3 || !in_one_plane) {
+            p = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+            a = times(random.direction(), std::pow(10.0, random.uniform(-2, 0)));
+            b = times(random.direction(), std::pow(10.0, random.uniform(-2, 0)));
+            if (i % 4 == 1) p[i % 3] = a[i % 3] = b[i % 3] = 0;
+        } else {
+            p = plus(p, random.bits() & 1 ? a : times(a, 0.5));
+        }
+        // The corner across: of a parallelogram; or near it, in the plane.
+        const double u = i % 2 ? 1 : random.uniform(0.9, 1.1), v = i % 2 ? 1 : random.uniform(0.9, 1.1);
+        const Vec3d across = plus(p, plus(times(a, u), times(b, v)));
+        addTriangle(mesh, p, plus(p, a), across);
+        addTriangle(mesh, p, across, plus(p, b));
+    }
+    return mesh;
+}
+
+TEST_CASE("patches of two triangles find what the plain loop finds, bit by bit", "[kernel][rays]") {
+    Random random(29);
+    std::uint64_t hits = 0, blocked = 0, patches = 0, pairs = 0;
+    for (int i = 0; i < 60; ++i) {
+        const ThreeWays scene(quadrangles(random, 1 + random.below(24)));
+        const CrtContext ctx = contextOf(scene.brute);
+        const auto* all = CRT_ARRAY(CrtPatch, ctx.blob, ctx.scene->patches);
+        std::vector<int> met(ctx.scene->triangle_count);
+        for (u32 k = 0; k < ctx.scene->patches.count; ++k) {
+            ++patches;
+            pairs += all[k].slot[1] != CRT_NONE;
+            for (const u32 slot : all[k].slot)
+                if (slot != CRT_NONE) ++met.at(slot);
+        }
+        CHECK(std::all_of(met.begin(), met.end(), [](int n) { return n == 1; }));
+        CHECK(disagreements(scene, random, 10000, &hits) == 0);
+        const ThreeWays apart(quadrangles(random, 1 + random.below(24), false));
+        CHECK(shadowDisagreements(apart, random, 10000, &blocked, 2) == 0);
+        // The patches themselves, also where eight triangles are taken at a time.
+        const auto* triangles = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles);
+        std::uint64_t wrong = 0, undecided = 0;
+        for (int ray = 0; ray < 5000; ++ray) {
+            CrtRay r = awkwardRay(ctx, random, true);
+            const CrtHit expected = oneByOne(ctx, r);
+            CrtHit hit;
+            if (crt_patches_closest(all, ctx.scene->patches.count, triangles, r, &hit))
+                wrong += !sameBits(expected, hit);
+            else
+                ++undecided;
+            if (expected.slot == CRT_NONE) continue;
+            r.reach = expected.t * static_cast<f32>(random.uniform(0.5, 1.5));
+            const u32 any = crt_patches_any(all, ctx.scene->patches.count, triangles, r);
+            wrong += any < 2 && any != (expected.t < r.reach ? 1u : 0u);
+        }
+        CHECK(wrong == 0);
+        CHECK(undecided < 5000);
+    }
+    CHECK(hits > 100000);
+    CHECK(blocked > 1000);
+    CHECK(pairs * 10 > patches * 9);
+}
+
+TEST_CASE("patches refuse no hit of a ray that starts within rounding of a triangle's plane",
+          "[kernel][rays]") {
+    Random random(30);
+    std::uint64_t accepted = 0, refused = 0, farther = 0;
+    for (int scene = 0; scene < 40; ++scene) {
+        const crt::CompiledScene compiled =
+            ThreeWays::compiled(scene % 2 ? soup(random, 64) : quadrangles(random, 32), Accelerator::None);
+        const CrtContext ctx = contextOf(compiled);
+        const auto* triangles = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles);
+        const auto* patches = CRT_ARRAY(CrtPatch, ctx.blob, ctx.scene->patches);
+        for (int i = 0; i < 20000; ++i) {
+            const CrtTriangle& target = triangles[random.below(ctx.scene->triangle_count)];
+            const Vec3d a = toDouble(vertexOf(target, 0)), b = toDouble(vertexOf(target, 1)),
+                        c = toDouble(vertexOf(target, 2));
+            const Vec3d normal = cross(minus(b, a), minus(c, a));
+            if (!(length(normal) > 0)) continue;
+            const double u = random.uniform(-2, 3), v = random.uniform(-2, 3);
+            const double height = std::pow(10.0, random.uniform(-7.5, -5.7)) * (random.bits() & 1 ? 1 : -1);
+            const Vec3d in_plane = plus(a, plus(times(minus(b, a), u), times(minus(c, a), v)));
+            const vec3 o = toFloat(plus(in_plane, times(unit(normal), height)));
+            const CrtRay ray = rayOf(o, unitFloat(minus(toDouble(aimAt(target, 2, random)), toDouble(o))));
+            const CrtShear shear = crt_shear(ray);
+            const CrtPatchSlack slack = crt_patch_slack(ray);
+            for (u32 k = 0; k < ctx.scene->patches.count; ++k) {
+                f32 least;
+                const int met = crt_patch_meeting(patches + k, ray, slack, CRT_INFINITY, &least);
+                for (const u32 slot : patches[k].slot) {
+                    CrtHit hit;
+                    if (slot == CRT_NONE ||
+                        !crt_intersect_triangle(triangles + slot, shear, CRT_INFINITY, &hit))
+                        continue;
+                    ++accepted;
+                    refused += !met;
+                    farther += met && least > hit.t;
+                }
+            }
+        }
+    }
+    CHECK(accepted > 400000);
+    CHECK(refused == 0);
+    CHECK(farther == 0);
 }
 
 #if CRT_SIMD8
