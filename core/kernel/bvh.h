@@ -100,6 +100,21 @@ CRT_FN int crt_aabb_any(const CrtContext *ctx, CrtRay ray) {
     return 0;
 }
 
+/* The node `current`: its nearest child that the ray enters becomes the current one. 0: it enters none. */
+CRT_FN int crt_enter_node(CRT_GLOBAL const CrtNode4 *nodes, CrtNodeRay ray, f32 limit, u64 *stack, u32 *size,
+                          u32 *current) {
+    CRT_GLOBAL const CrtNode4 *node = nodes + (*current >> 4);
+    return crt_enter_nearest(node, crt_node_distances(node, ray, limit), stack, size, current);
+}
+
+CRT_FN void crt_test_leaf(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 leaf, CrtRay ray,
+                          CrtShear shear, CrtHit *best) {
+    const u32 first = leaf >> 4, end = first + (leaf & 15u);
+    for (u32 slot = first; slot < end; ++slot)
+        if (CRT_HAS_SLOTS) crt_test_slot(ctx, triangles, slot, ray, shear, best);
+        else crt_test_closest(triangles, slot, shear, best);
+}
+
 CRT_FN CrtHit crt_bvh_closest(const CrtContext *ctx, CrtRay ray) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->nodes);
@@ -110,19 +125,22 @@ CRT_FN CrtHit crt_bvh_closest(const CrtContext *ctx, CrtRay ray) {
     u64 stack[CRT_BVH_STACK];
     u32 size = 0u;
     u32 current = 0u; /* the root: node 0 */
-    /* Boxes until there is a leaf, then its triangles: on a GPU the lanes of a warp do the same together (Aila
-       and Laine 2009, "while-while"). */
     for (;;) {
+#if CRT_SIMD8
+        if ((current & 15u) == 0u) {
+            if (crt_enter_node(nodes, among, best.t, stack, &size, &current)) continue;
+        } else {
+            crt_test_leaf(ctx, triangles, current, ray, shear, &best);
+        }
+#else
+        /* Boxes until there is a leaf, then its triangles: the lanes of a warp do the same together (Aila and
+           Laine 2009, "while-while"). */
         while ((current & 15u) == 0u) {
-            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
-            const vec4 t = crt_node_distances(node, among, best.t);
-            if (crt_enter_nearest(node, t, stack, &size, &current)) continue;
+            if (crt_enter_node(nodes, among, best.t, stack, &size, &current)) continue;
             if (!crt_next_stacked(stack, &size, best.t, &current)) return best;
         }
-        const u32 first = current >> 4, end = first + (current & 15u);
-        for (u32 slot = first; slot < end; ++slot)
-            if (CRT_HAS_SLOTS) crt_test_slot(ctx, triangles, slot, ray, shear, &best);
-            else crt_test_closest(triangles, slot, shear, &best);
+        crt_test_leaf(ctx, triangles, current, ray, shear, &best);
+#endif
         if (!crt_next_stacked(stack, &size, best.t, &current)) return best;
     }
 }
