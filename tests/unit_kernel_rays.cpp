@@ -248,8 +248,8 @@ TEST_CASE("tree, boxes and lanes find what the plain loop finds, bit by bit", "[
     CHECK(shadowDisagreements(sphere, random, 10000, &blocked) == 0);
 }
 
-/// Parallelograms and other quadrangles, each of two triangles: anywhere, in planes of constant x, y or z, and
-/// where it is asked for in one plane with the one before, beside it or over it.
+/// Parallelograms and other quadrangles, each of two triangles: anywhere, in planes of constant x, y or z,
+/// and where it is asked for in one plane with the one before, beside it or over it.
 Mesh quadrangles(Random& random, std::uint32_t count, bool in_one_plane = true) {
     Mesh mesh;
     Vec3d p{}, a{}, b{};

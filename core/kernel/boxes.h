@@ -76,7 +76,8 @@ CRT_FN f32 crt_node_slack(f32 o, f32 slack) {
 /* `slack`: lengths that the boxes are to be larger by on every side. */
 CRT_FN CrtNodeRay crt_node_ray(CrtRay ray, f32 slack) {
     CrtNodeRay r;
-    const u32 sx = crt_bits(V3X(ray.d)) >> 31, sy = crt_bits(V3Y(ray.d)) >> 31, sz = crt_bits(V3Z(ray.d)) >> 31;
+    const u32 sx = crt_bits(V3X(ray.d)) >> 31, sy = crt_bits(V3Y(ray.d)) >> 31,
+              sz = crt_bits(V3Z(ray.d)) >> 31;
     r.near_x = sx;
     r.near_y = 2u + sy;
     r.near_z = 4u + sz;

@@ -60,7 +60,8 @@ CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
         const CrtShear shear = crt_shear(ray);
         CRT_ROLLED for (u32 i = 0u; i < 2u * count; ++i) {
             const u32 slot = patches[i >> 1].slot[i & 1u];
-            if (slot != CRT_NONE && crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit)) return 1;
+            if (slot != CRT_NONE && crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit))
+                return 1;
         }
     }
 #endif
@@ -107,8 +108,8 @@ CRT_FN int crt_enter_node(CRT_GLOBAL const CrtNode4 *nodes, CrtNodeRay ray, f32 
     return crt_enter_nearest(node, crt_node_distances(node, ray, limit), stack, size, current);
 }
 
-CRT_FN void crt_test_leaf(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 leaf, CrtRay ray,
-                          CrtShear shear, CrtHit *best) {
+CRT_FN void crt_test_leaf(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 leaf,
+                          CrtRay ray, CrtShear shear, CrtHit *best) {
     const u32 first = leaf >> 4, end = first + (leaf & 15u);
     for (u32 slot = first; slot < end; ++slot)
         if (CRT_HAS_SLOTS) crt_test_slot(ctx, triangles, slot, ray, shear, best);

@@ -103,7 +103,8 @@ typedef struct CrtPatch {
     f32 second[4];
     f32 sizes[4];  /* half the width of the first strip, and of the second; crt_height_slack (surface.h) over
                       CRT_HEIGHT_SCALE; 1 where there is one triangle, otherwise 0 */
-    f32 third[4];  /* of one triangle: distance from the edge that halves the parallelogram, positive inside */
+    f32 third[4];  /* of one triangle: distance from the edge that halves the parallelogram, inside
+                      positive */
     u32 slot[2];   /* in the triangle array; the second CRT_NONE where there is one */
     u32 reserved[2];
 } CrtPatch;
