@@ -51,8 +51,8 @@ CRT_FN f32 crt_box(CRT_GLOBAL const f32 *lower, CRT_GLOBAL const f32 *upper, Crt
     return enter <= leave * CRT_SLAB_SLACK ? enter : CRT_INFINITY;
 }
 
-/* A ray among the nodes of a tree: 1/d and, for the planes that it meets first and for the others, what makes
-   of a plane's coordinate its distance along the ray. */
+/* A ray among the nodes of a tree: 1/d and, for the planes that it meets first and for the others, what
+   makes of a plane's coordinate its distance along the ray. */
 typedef struct CrtNodeRay {
     u32 near_x, near_y, near_z; /* as of CrtSlab */
     vec3 inverse, near, far;
@@ -66,8 +66,8 @@ CRT_FN f32 crt_node_inverse(f32 d) {
     return crt_fast_reciprocal(crt_abs(d) < CRT_LEAST_NORMAL ? least : d);
 }
 
-/* How far apart along one axis planes are to be, besides `slack`, that none is missed by rounding: planes lie
-   within 1; 1/d moves a coordinate by (1 + |o|) 2^-23 at most, and the sum, its product and the fused
+/* How far apart along one axis planes are to be, besides `slack`, that none is missed by rounding: planes
+   lie within 1; 1/d moves a coordinate by (1 + |o|) 2^-23 at most, and the sum, its product and the fused
    operation by (1 + |o|) 2^-24 each. */
 CRT_FN f32 crt_node_slack(f32 o, f32 slack) {
     return crt_fma(6.0f * CRT_EPSILON, 1.0f + crt_abs(o), slack);
@@ -91,8 +91,8 @@ CRT_FN CrtNodeRay crt_node_ray(CrtRay ray, f32 slack) {
     return r;
 }
 
-/* Entry distances into a node's four children; infinity where the ray misses. Boxes that begin beyond `limit`
-   by more than rounding are missed. */
+/* Entry distances into a node's four children; infinity where the ray misses. Boxes that begin beyond
+   `limit` by more than rounding are missed. */
 CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtNodeRay ray, f32 limit) {
     CRT_GLOBAL const f32 *planes = &node->bounds[0][0];
     const vec4 ix = splat4(V3X(ray.inverse)), iy = splat4(V3Y(ray.inverse)), iz = splat4(V3Z(ray.inverse));
@@ -148,8 +148,8 @@ CRT_FN int crt_enter_nearest(CRT_GLOBAL const CrtNode4 *node, vec4 t, u64 *stack
     return 1;
 }
 
-/* The next from the stack that may hold a hit at most as far as t: a box that begins just behind the best hit
-   may still hold a tie, and the slack keeps it. 0: there is none. */
+/* The next from the stack that may hold a hit at most as far as t: a box that begins just behind the best
+   hit may still hold a tie, and the slack keeps it. 0: there is none. */
 CRT_FN int crt_next_stacked(const u64 *stack, u32 *size, f32 t, u32 *current) {
     const f32 limit = t * CRT_SLAB_SLACK;
     while (*size != 0u) {

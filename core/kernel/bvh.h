@@ -134,8 +134,8 @@ CRT_FN CrtHit crt_bvh_closest(const CrtContext *ctx, CrtRay ray) {
             crt_test_leaf(ctx, triangles, current, ray, shear, &best);
         }
 #else
-        /* Boxes until there is a leaf, then its triangles: the lanes of a warp do the same together (Aila and
-           Laine 2009, "while-while"). */
+        /* Boxes until there is a leaf, then its triangles: the lanes of a warp do the same together (Aila
+           and Laine 2009, "while-while"). */
         while ((current & 15u) == 0u) {
             if (crt_enter_node(nodes, among, best.t, stack, &size, &current)) continue;
             if (!crt_next_stacked(stack, &size, best.t, &current)) return best;

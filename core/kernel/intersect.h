@@ -112,8 +112,8 @@ CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShe
 #endif
 }
 
-/* One ulp beyond the best hit, so that ties reach the comparison of ids: of t ≥ 0 the next number; of others
-   one below 0, too. */
+/* One ulp beyond the best hit, so that ties reach the comparison of ids: of t ≥ 0 the next number; of
+   others one below 0, too. */
 CRT_FN f32 crt_tie_limit(f32 t) { return crt_from_bits(crt_bits(t) + (t < CRT_INFINITY ? 1u : 0u)); }
 
 /* Of a hit and the best so far the nearer wins, and of equally near ones the lower primitive id, so that the

@@ -1,8 +1,9 @@
 /*
  * patches.h: a handful of triangles, two at a time, for backends that take rays one by one in lanes of their
  * own. Of all patches of the scene the one that a ray enters first is found by planes and strips, without a
- * branch; the one ray–triangle test decides about its triangles alone. Where the patch found does not settle
- * it (the ray misses it by rounding, or the next one is as near by rounding), the caller tests all triangles.
+ * branch; the one ray–triangle test decides about its triangles alone. Where the patch found does not
+ * settle it (the ray misses it by rounding, or the next one is as near by rounding), the caller tests all
+ * triangles.
  */
 #ifndef CRT_PATCHES_H
 #define CRT_PATCHES_H
@@ -21,7 +22,8 @@ typedef struct CrtPatchSlack {
 } CrtPatchSlack;
 
 CRT_FN CrtPatchSlack crt_patch_slack(CrtRay ray) {
-    const f32 size = CRT_EPSILON * (1.0f + (crt_abs(V3X(ray.o)) + crt_abs(V3Y(ray.o)) + crt_abs(V3Z(ray.o))));
+    const f32 far = crt_abs(V3X(ray.o)) + crt_abs(V3Y(ray.o)) + crt_abs(V3Z(ray.o));
+    const f32 size = CRT_EPSILON * (1.0f + far);
     CrtPatchSlack slack;
     slack.across = 128.0f * size * (crt_abs(V3X(ray.d)) + crt_abs(V3Y(ray.d)) + crt_abs(V3Z(ray.d)));
     slack.along = 64.0f * size;

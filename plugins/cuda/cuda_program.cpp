@@ -131,8 +131,8 @@ Module::Module(const void* image, std::uint64_t features, std::string name)
                    "asking for local memory");
         cuda.check(cuda.cuOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, render_, kBlock, 0),
                    "asking for the occupancy");
-        // Local memory is the stacks of both traversals of the BVH, which are meant to be there, and what did
-        // not fit into registers.
+        // Local memory is the stacks of both traversals of the BVH, which are meant to be there, and what
+        // did not fit into registers.
         constexpr int kTraversalStack = CRT_BVH_STACK * (sizeof(kernel::u64) + sizeof(kernel::u32));
         registers_ = static_cast<std::uint32_t>(registers);
         spill_bytes_ = static_cast<std::uint32_t>(

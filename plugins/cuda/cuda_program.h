@@ -27,8 +27,8 @@ std::string kernelText(const std::string& path_text);
 
 /// How many blocks a multiprocessor should hold at once, in the order of trying: more hide latency better,
 /// but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the last is
-/// not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md); a fifth gains
-/// where there is no tree to traverse (docs/decisions/0041-instruction-cache.md).
+/// not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md); a fifth
+/// gains where there is no tree to traverse (docs/decisions/0041-instruction-cache.md).
 std::vector<int> blocksPerMultiprocessor(std::uint64_t features);
 /// Of all stores and loads in the code of crt_render.
 constexpr std::uint32_t kSpillBytesAllowed = 128;
