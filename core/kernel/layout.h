@@ -96,7 +96,8 @@ typedef struct CrtTriangle8 {
 CRT_ASSERT_SIZE(CrtTriangle8, 576);
 
 /* Two triangles of one plane with a common edge, or one triangle, inside a parallelogram: two strips of
-   their plane. A row (x, y, z, w) is an affine function of a point p: x·p.x + y·p.y + z·p.z + w, in lengths. */
+   their plane. A row (x, y, z, w) is an affine function of a point p: x·p.x + y·p.y + z·p.z + w, in
+   lengths. */
 typedef struct CrtPatch {
     f32 plane[4];  /* height over it; (x, y, z) is its unit normal */
     f32 first[4];  /* distance from the middle of one strip, within the plane */

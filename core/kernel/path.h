@@ -268,8 +268,8 @@ CRT_FN void crt_pixel_end(CrtPixelWork *work) { *work->count += work->valid; }
 
 /* ADDS samples [first_sample, first_sample + sample_count) of pixel (x, y) of the crop window to the film,
    and rays to *rays. On a GPU a lane whose path has ended either waits for the others of its warp, whose
-   next camera rays then go the same way through the tree; or, where there is no tree and all rays cost the same,
-   it begins its next sample at once, in one flat loop over the vertices of all samples (measured:
+   next camera rays then go the same way through the tree; or, where there is no tree and all rays cost the
+   same, it begins its next sample at once, in one flat loop over the vertices of all samples (measured:
    docs/decisions/0039-what-a-lane-does-when-its-path-ends.md). */
 CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count,
                              CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives,
