@@ -338,11 +338,15 @@ TEST_CASE("walls with the whole scene before them are not asked whether they occ
     };
     CHECK(headerOf(compiled(room(false))).occluders8.count == 0);
     CHECK(headerOf(compiled(room(false))).triangles8.count == 2);
+    CHECK(headerOf(compiled(room(false))).occluder_patches.count == 0);
+    CHECK(headerOf(compiled(room(false))).patches.count == 6);  // of twelve triangles
     const CompiledScene screened = compiled(room(true));
     REQUIRE(headerOf(screened).occluders8.count == 1);
     const auto block = listOf<CrtTriangle8>(screened, headerOf(screened).occluders8)[0];
     CHECK(block.slot[0] == 12);
     CHECK(block.slot[1] == CRT_NONE);
+    REQUIRE(headerOf(screened).occluder_patches.count == 1);
+    CHECK(listOf<CrtPatch>(screened, headerOf(screened).occluder_patches)[0].slot[0] == 12);
     // Not of many triangles, where asking would take longer than rendering.
     Scene many = room(false);
     many.integrator.accelerator = crt::Accelerator::None;

@@ -274,6 +274,8 @@ TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]")
                                                           {h.faces, sizeof(CrtFace)},
                                                           {h.triangles8, sizeof(CrtTriangle8)},
                                                           {h.occluders8, sizeof(CrtTriangle8)},
+                                                          {h.patches, sizeof(CrtPatch)},
+                                                          {h.occluder_patches, sizeof(CrtPatch)},
                                                           {h.primitives, sizeof(CrtPrimitive)},
                                                           {h.normals, sizeof(CrtNormals)},
                                                           {h.nodes, sizeof(CrtNode4)},
@@ -295,6 +297,7 @@ TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]")
         // Nothing is there that nothing reads.
         CHECK((h.nodes.count > 0) == (accelerator == crt::Accelerator::Bvh));
         CHECK((h.triangles8.count > 0) == (accelerator == crt::Accelerator::None));
+        CHECK((h.patches.count > 0) == (accelerator == crt::Accelerator::None));
         CHECK((h.objects.count > 0) == (accelerator == crt::Accelerator::Aabb));
         CHECK(h.triangles.count == 8);
         CHECK(h.primitives.count == 8);
