@@ -57,10 +57,11 @@ CRT_FN int crt_patch_meeting(CRT_GLOBAL const CrtPatch *patch, CrtRay ray, CrtPa
     const f32 nearest = crt_fma(-slack.along, grazing, t);
     *least = crt_cull_max(nearest, 0.0f);
     /* Without branches, so that the work of two patches overlaps. */
-    int met = !(crt_abs(u) > crt_fma(slack.across, grazing, V4X(sizes))) &
-              !(crt_abs(v) > crt_fma(slack.across, grazing, V4Y(sizes))) & !(behind <= 0.0f) &
-              !(nearest >= reach);
-    if (met & (V4W(sizes) != 0.0f)) { /* one triangle: half of the parallelogram */
+    const int in_first = !(crt_abs(u) > crt_fma(slack.across, grazing, V4X(sizes)));
+    const int in_second = !(crt_abs(v) > crt_fma(slack.across, grazing, V4Y(sizes)));
+    const int ahead = !(behind <= 0.0f), before = !(nearest >= reach);
+    int met = in_first & in_second & ahead & before;
+    if (met && V4W(sizes) != 0.0f) { /* one triangle: half of the parallelogram */
         const vec4 third = crt_load4(patch->third);
         const f32 w = crt_fma(V4X(third), V3X(p),
                               crt_fma(V4Y(third), V3Y(p), crt_fma(V4Z(third), V3Z(p), V4W(third))));
@@ -80,7 +81,7 @@ CRT_FN int crt_patches_closest(CRT_GLOBAL const CrtPatch *patches, u32 count,
         const int met = crt_patch_meeting(patches + i, ray, slack, ray.reach, &least);
         const f32 from = met ? least : CRT_INFINITY;
         next = crt_cull_min(crt_cull_max(from, nearest), next);
-        found = (met & (from < nearest)) ? i : found;
+        found = met && from < nearest ? i : found;
         nearest = crt_cull_min(from, nearest);
     }
     *best = crt_no_hit(ray.reach);
