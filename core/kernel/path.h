@@ -275,7 +275,8 @@ CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_samp
                              CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives,
                              CrtRayCount *rays) {
     CrtPixelWork work = crt_pixel_begin(ctx, x, y, first_sample, sample_count, sums, counts, primitives);
-    if (CRT_HAS(BVH) && !CRT_HAS(VIEW)) {
+    const int waits = CRT_HAS(VIEW) ? 0 : CRT_HAS(BVH);
+    if (waits) {
         while (work.done < work.sample_count) {
             crt_begin_sample(ctx, &work);
             while (crt_path_vertex(ctx, &work.path, rays)) continue;
