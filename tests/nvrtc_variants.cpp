@@ -87,11 +87,10 @@ std::map<std::uint64_t, std::string> representativeMasks() {
 
 /// Scenes of many materials whose files ask for AOVs: what is kept of the first hit until the path ends does
 /// not fit into registers, too. The last number of blocks that the backend tries it takes as it is. An array
-/// of a vertex's, which does not belong there, would be 500 bytes or more. Every other variant, these scenes
-/// without AOVs among them, may spill what the backend allows.
-// Called functions (CRT_SHARED_FN) make kernels spill more, and smaller: on an H100 those of these scenes take
-// 0.76 to 0.82 of the time without them and with the traversal of before, without AOVs
-// (docs/decisions/0041-instruction-cache.md). The forest was not timed.
+/// of a vertex's, which does not belong there, would be 500 bytes or more. Called functions (CRT_SHARED_FN)
+/// make kernels smaller and spill more: on an H100 these scenes, without AOVs, take 0.76 to 0.82 of the time
+/// that they took with everything inlined (docs/decisions/0041-instruction-cache.md); the forest was not
+/// timed. Every other variant may spill what the backend allows.
 constexpr std::pair<const char*, std::uint32_t> kMostSpillBytes[] = {
     {"clay.yaml", 412},          {"clay.yaml without AOVs", 196},
     {"lacquer.yaml", 332},       {"lacquer.yaml without AOVs", 168},
