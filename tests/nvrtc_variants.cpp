@@ -9,8 +9,10 @@
 // Exit code 77, which ctest shows as skipped, where NVRTC is missing.
 #include "cuda_nvrtc.h"
 #include "cuda_program.h"
+#include "cuda_wavefront.h"
 
 #include "backend/loader.h"
+#include "backend/sdk/gpu_schedule.h"
 #include "base/error.h"
 #include "compile/compile.h"
 #include "kernel/features.h"
@@ -28,6 +30,9 @@
 #include <vector>
 
 namespace {
+
+using crt::cuda::Entry;
+using crt::cuda::KernelSpec;
 
 constexpr int kSkipped = 77;
 
@@ -85,47 +90,48 @@ std::map<std::uint64_t, std::string> representativeMasks() {
     };
 }
 
-/// Scenes of many materials whose files ask for AOVs: what is kept of the first hit until the path ends does
-/// not fit into registers, too. The last number of blocks that the backend tries it takes as it is. An array
-/// of a vertex's, which does not belong there, would be 500 bytes or more. Called functions (CRT_SHARED_FN)
-/// make kernels smaller and spill more: on an H100 these scenes, without AOVs, take 0.76 to 0.82 of the time
-/// that they took with everything inlined (docs/decisions/0041-instruction-cache.md); the forest was not
-/// timed. Every other variant may spill what the backend allows.
-constexpr std::pair<const char*, std::uint32_t> kMostSpillBytes[] = {
-    {"clay.yaml", 412},      {"clay.yaml without AOVs", 196},      {"lacquer.yaml", 332},
-    {"lacquer.yaml without AOVs", 168},                            {"materials.yaml", 320},
-    {"materials.yaml without AOVs", 152},                          {"openpbr.yaml", 408},
-    {"openpbr.yaml without AOVs", 216},                            {"product.yaml", 140},
-    {"soap.yaml", 156},      {"forest.yaml", 132}};
+/// Names of kernels by what they are compiled from.
+using Variants = std::map<std::pair<std::uint32_t, std::uint64_t>, std::string>;
 
-std::uint32_t mostSpillBytes(const std::string& variant) {
-    for (const auto& [name, bytes] : kMostSpillBytes)
-        if (variant.ends_with(name)) return bytes;
-    return crt::cuda::kSpillBytesAllowed;
+void add(const KernelSpec& kernel, const std::string& name, Variants& variants) {
+    variants.emplace(std::pair(static_cast<std::uint32_t>(kernel.entry), kernel.features), name);
+}
+
+void addMask(std::uint64_t mask, const std::string& name, Variants& variants) {
+    if (!crt::wantsWavefront(mask)) return add({Entry::Render, mask}, name, variants);
+    add({Entry::Trace, mask}, name, variants);
+    const std::uint64_t kinds = mask & CRT_FEATURES_MATERIALS;
+    for (std::uint64_t kind = 1; kind <= kinds; kind <<= 1)
+        if ((kinds & kind) != 0) add({Entry::Shade, (mask & ~kinds) | kind}, name, variants);
+}
+
+void addScene(const crt::CompiledScene& scene, const std::string& name, Variants& variants) {
+    if (!crt::wantsWavefront(scene.features)) return add({Entry::Render, scene.features}, name, variants);
+    for (const KernelSpec& kernel : crt::cuda::planWave(scene.data()).kernels) add(kernel, name, variants);
 }
 
 int run(int argc, char** argv) {
     int arch = 90;
-    std::map<std::uint64_t, std::string> masks = representativeMasks();
+    Variants variants;
+    for (const auto& [mask, name] : representativeMasks()) addMask(mask, name, variants);
     for (int i = 1; i < argc; ++i) {
         if (std::strcmp(argv[i], "--arch") == 0 && i + 1 < argc) {
             arch = std::atoi(argv[++i]);
             continue;
         }
         if (std::strcmp(argv[i], "--only") == 0) {
-            masks.clear();
+            variants.clear();
             continue;
         }
         const crt::Scene scene = crt::loadScene(argv[i]);
-        masks.emplace(crt::compileScene(scene, crt::requestedAovs(scene)).features, argv[i]);
-        if (mostSpillBytes(argv[i]) > crt::cuda::kSpillBytesAllowed)
-            masks.emplace(crt::compileScene(scene, 0).features, std::string(argv[i]) + " without AOVs");
+        addScene(crt::compileScene(scene, crt::requestedAovs(scene)), argv[i], variants);
     }
 
     const CrtHost host = crt::makeHost(false);
-    const char* path_text = host.kernel_source(host.user, "path.h");
-    if (path_text == nullptr) throw std::runtime_error("the program holds no kernel source path.h");
-    const std::string text = crt::cuda::kernelText(path_text);
+    const char* wavefront_text = host.kernel_source(host.user, "wavefront.h");
+    if (wavefront_text == nullptr)
+        throw std::runtime_error("the program holds no kernel source wavefront.h");
+    const std::string text = crt::cuda::kernelText(wavefront_text);
 
     std::vector<crt::cuda::Nvrtc> found;
     try {
@@ -141,31 +147,35 @@ int run(int argc, char** argv) {
     }
 
     std::printf("%s, sm_%d, %zu variants\n%9s %6s %6s %8s %8s  %s\n", nvrtc.name().c_str(), arch,
-                masks.size(), "registers", "stack", "spill", "CUBIN kB", "ms", "variant");
+                variants.size(), "registers", "stack", "spill", "CUBIN kB", "ms", "variant");
     int failures = 0;
-    for (const auto& [mask, name] : masks) {
+    for (const auto& [key, name] : variants) {
+        const KernelSpec spec{static_cast<Entry>(key.first), key.second};
+        const std::string entry = crt::cuda::entryName(spec.entry);
         const auto start = std::chrono::steady_clock::now();
-        const crt::cuda::Cubin cubin = crt::cuda::compileLean(nvrtc, text, arch, mask);
+        const crt::cuda::Cubin cubin = crt::cuda::compileLean(nvrtc, text, arch, spec);
         const double ms =
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-        const crt::cuda::ResourceUse use = crt::cuda::resourceUse(cubin.log, "crt_render");
-        std::printf("%9u %6u %6u %8.1f %8.0f  0x%010lx %s\n", use.registers, use.stack_bytes,
-                    use.spill_bytes, static_cast<double>(cubin.bytes.size()) / 1e3, ms, mask, name.c_str());
+        const crt::cuda::ResourceUse use = crt::cuda::resourceUse(cubin.log, entry);
+        std::printf("%9u %6u %6u %8.1f %8.0f  %-15s 0x%011lx %s\n", use.registers, use.stack_bytes,
+                    use.spill_bytes, static_cast<double>(cubin.bytes.size()) / 1e3, ms, entry.c_str(),
+                    spec.features, name.c_str());
         std::fflush(stdout);
         // An entry that is not in the log would pass for one that spills nothing.
         if (use.registers == 0)
-            std::printf("FAILED: the assembler's log says nothing of crt_render:\n%s\n", cubin.log.c_str());
-        const std::uint32_t allowed = mostSpillBytes(name);
-        const bool spills = use.spill_bytes > allowed;
+            std::printf("FAILED: the assembler's log says nothing of %s:\n%s\n", entry.c_str(),
+                        cubin.log.c_str());
+        constexpr std::uint32_t kAllowed = crt::cuda::kSpillBytesAllowed;
+        const bool spills = use.spill_bytes > kAllowed;
         if (spills)
-            std::printf("FAILED: %u bytes are spilled, and %u are allowed\n", use.spill_bytes, allowed);
+            std::printf("FAILED: %u bytes are spilled, and %u are allowed\n", use.spill_bytes, kAllowed);
         // The only array that a thread may keep in memory is the BVH's traversal stack. Spilled values are
         // there, too, and each is stored and loaded at least once.
-        const bool array = (mask & CRT_FEATURE_BVH) == 0 && use.stack_bytes > use.spill_bytes;
+        const bool array = !crt::cuda::traverses(spec) && use.stack_bytes > use.spill_bytes;
         if (array) std::printf("FAILED: local memory without a traversal stack\n");
         failures += use.registers == 0 || spills || array;
     }
-    std::printf("%d of %zu variants failed\n", failures, masks.size());
+    std::printf("%d of %zu variants failed\n", failures, variants.size());
     return failures == 0 ? 0 : 1;
 }
 

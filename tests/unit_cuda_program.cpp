@@ -35,7 +35,7 @@ TEST_CASE("a machine without NVRTC gets one sentence", "[cuda]") {
 }
 
 TEST_CASE("no option relaxes arithmetic", "[cuda]") {
-    const std::vector<std::string> options = nvrtcOptions(90, 0x1851, 4);
+    const std::vector<std::string> options = nvrtcOptions(90, {Entry::Render, 0x1851}, 4);
     const auto has = [&](const char* option) {
         return std::find(options.begin(), options.end(), option) != options.end();
     };
@@ -49,17 +49,18 @@ TEST_CASE("no option relaxes arithmetic", "[cuda]") {
 }
 
 TEST_CASE("the cache key changes with whatever decides the machine code", "[cuda]") {
-    const auto key = cacheKey("text", 90, 0x51, "NVRTC 13.0", "580.1, CUDA 13.0");
-    CHECK(key == cacheKey("text", 90, 0x51, "NVRTC 13.0", "580.1, CUDA 13.0"));
+    const auto key = cacheKey("text", 90, {Entry::Render, 0x51}, "NVRTC 13.0", "580.1, CUDA 13.0");
+    CHECK(key == cacheKey("text", 90, {Entry::Render, 0x51}, "NVRTC 13.0", "580.1, CUDA 13.0"));
     const std::set<crt::plugin::KernelCache::Key> others = {
         key,
-        cacheKey("text ", 90, 0x51, "NVRTC 13.0", "580.1, CUDA 13.0"),
-        cacheKey("text", 89, 0x51, "NVRTC 13.0", "580.1, CUDA 13.0"),
-        cacheKey("text", 90, 0x50, "NVRTC 13.0", "580.1, CUDA 13.0"),
-        cacheKey("text", 90, 0x51, "NVRTC 13.1", "580.1, CUDA 13.0"),
-        cacheKey("text", 90, 0x51, "NVRTC 13.0", "580.2, CUDA 13.0"),
+        cacheKey("text ", 90, {Entry::Render, 0x51}, "NVRTC 13.0", "580.1, CUDA 13.0"),
+        cacheKey("text", 89, {Entry::Render, 0x51}, "NVRTC 13.0", "580.1, CUDA 13.0"),
+        cacheKey("text", 90, {Entry::Render, 0x50}, "NVRTC 13.0", "580.1, CUDA 13.0"),
+        cacheKey("text", 90, {Entry::Trace, 0x51}, "NVRTC 13.0", "580.1, CUDA 13.0"),
+        cacheKey("text", 90, {Entry::Render, 0x51}, "NVRTC 13.1", "580.1, CUDA 13.0"),
+        cacheKey("text", 90, {Entry::Render, 0x51}, "NVRTC 13.0", "580.2, CUDA 13.0"),
     };
-    CHECK(others.size() == 6);
+    CHECK(others.size() == 7);
 }
 
 TEST_CASE("resources are read from the assembler's log, each kernel's own", "[cuda]") {
@@ -86,10 +87,12 @@ TEST_CASE("resources are read from the assembler's log, each kernel's own", "[cu
 }
 
 TEST_CASE("the text that is compiled ends with the entry points", "[cuda]") {
-    const std::string text = kernelText("#define CRT_PATH_H\n");
-    CHECK(text.rfind("#define CRT_PATH_H\n", 0) == 0);
+    const std::string text = kernelText("#define CRT_WAVEFRONT_H\n");
+    CHECK(text.rfind("#define CRT_WAVEFRONT_H\n", 0) == 0);
     CHECK(text.find("crt_render(") != std::string::npos);
     CHECK(text.find("crt_add_slices(") != std::string::npos);
+    for (const Entry entry : {Entry::Render, Entry::Trace, Entry::Shade, Entry::Choose})
+        CHECK(text.find(std::string(entryName(entry)) + "(") != std::string::npos);
 }
 
 TEST_CASE("what NVRTC refuses is quoted", "[cuda]") {

@@ -1,3 +1,4 @@
+#include "backend/sdk/gpu_schedule.h"
 #include "base/stage.h"
 #include "base/standard_output.h"
 #include "base/unit_text.h"
@@ -123,6 +124,12 @@ std::string acceleratorText(const CompiledScene& compiled) {
     return compiled.triangles == 0 ? "none: there is nothing to hit" : "a loop over all triangles";
 }
 
+std::string scheduleText(const CompiledScene& compiled) {
+    return wantsWavefront(compiled.features)
+               ? "cuda traces and shades by kernels of their own, paths sorted by material (--kernel lean)"
+               : "one kernel takes a path to its end";
+}
+
 void showScene(const SceneRequest& what) {
     std::optional<StageProgress> progress(std::in_place, ProgressMode::Auto);
     const Scene scene = loadScene(what);
@@ -131,20 +138,22 @@ void showScene(const SceneRequest& what) {
     printOut("{}{}\n", what.file, scene.title.empty() ? "" : ": " + printable(scene.title));
     printRow("film", filmText(scene));
     printRow("camera", cameraText(scene.camera));
-    printRow("geometry", counted(compiled.objects, "object", "objects") + ", " +
-                        counted(compiled.triangles, "triangle", "triangles") +
-                        (compiled.shapes > 0 ? ", " + counted(compiled.shapes, "shape", "shapes") : "") +
-                        (compiled.instances > 0
-                             ? fmt::format(", {} of meshes of {}",
-                                           counted(compiled.instances, "instance", "instances"),
-                                           counted(compiled.instanced_triangles, "triangle", "triangles"))
-                             : ""));
+    printRow(
+        "geometry",
+        counted(compiled.objects, "object", "objects") + ", " +
+            counted(compiled.triangles, "triangle", "triangles") +
+            (compiled.shapes > 0 ? ", " + counted(compiled.shapes, "shape", "shapes") : "") +
+            (compiled.instances > 0
+                 ? fmt::format(", {} of meshes of {}", counted(compiled.instances, "instance", "instances"),
+                               counted(compiled.instanced_triangles, "triangle", "triangles"))
+                 : ""));
     printRow("materials", materialsText(scene));
     printRow("textures", texturesText(compiled));
     printRow("lights", lightsText(scene, compiled));
     printRow("sampler", fmt::format("{}, seed {}, {} samples per pixel", name(scene.sampler.type),
-                               scene.sampler.seed, scene.sampler.samples));
+                                    scene.sampler.seed, scene.sampler.samples));
     printRow("accelerator", acceleratorText(compiled));
+    printRow("schedule", scheduleText(compiled));
     printRow("needs", featureNames(compiled.features));
     std::string left_out;
     for (const auto& [thing, why] : compiled.left_out)
@@ -153,8 +162,8 @@ void showScene(const SceneRequest& what) {
     printRow("scene blob", bytesText(static_cast<double>(compiled.size_bytes)));
     printRow("scene hash", compiled.hash);
     printRow("times", fmt::format("{} to read, {} to compile, {} of it for the accelerator",
-                             durationText(scene.parse_seconds), durationText(compiled.compile_seconds),
-                             durationText(compiled.build_seconds)));
+                                  durationText(scene.parse_seconds), durationText(compiled.compile_seconds),
+                                  durationText(compiled.build_seconds)));
 }
 
 std::string aovText(std::uint32_t aovs) {
@@ -181,8 +190,8 @@ void showRecord(const FilmRecord& record) {
     optional_row("title", record.title);
     if (record.isCropped())
         printRow("window",
-            fmt::format("[{}, {}) x [{}, {}) of {} x {} pixels", record.window[0], record.window[2],
-                        record.window[1], record.window[3], record.width, record.height));
+                 fmt::format("[{}, {}) x [{}, {}) of {} x {} pixels", record.window[0], record.window[2],
+                             record.window[1], record.window[3], record.width, record.height));
     optional_row("spectral", spectralText(record.spectral));
     printRow("developed in", developmentText(record.development));
     std::vector<std::string> lights;
@@ -238,15 +247,15 @@ Command infoCommand() {
     const auto request = std::make_shared<SceneRequest>();
     OptionGroup options{"Options"};
     addSceneChanges(options, *request);
-    return {.name = "info",
-            .summary = "say what a scene needs, or what a .crtfilm or an image holds",
-            .arguments = {{.name = "FILE",
-                           .help = "scene (- for standard input), film or image",
-                           .read = [request](const std::string& text) { request->file = text; },
-                           .completion =
-                               completeFile({"yaml", "yml", "crtfilm", "exr", "png", "ppm", "pfm"})}},
-            .groups = {std::move(options)},
-            .run = [request](const std::string&) { return showInfo(*request); }};
+    return {
+        .name = "info",
+        .summary = "say what a scene needs, or what a .crtfilm or an image holds",
+        .arguments = {{.name = "FILE",
+                       .help = "scene (- for standard input), film or image",
+                       .read = [request](const std::string& text) { request->file = text; },
+                       .completion = completeFile({"yaml", "yml", "crtfilm", "exr", "png", "ppm", "pfm"})}},
+        .groups = {std::move(options)},
+        .run = [request](const std::string&) { return showInfo(*request); }};
 }
 
 }  // namespace crt

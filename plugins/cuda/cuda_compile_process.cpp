@@ -193,7 +193,8 @@ CompileProcess::CompileProcess(const std::string& program, const CompileJob& job
     message.add(job.nvrtc_path);
     message.add(job.text);
     message.addNumber(job.arch);
-    message.addNumber(job.features);
+    message.addNumber(job.spec.entry);
+    message.addNumber(job.spec.features);
     message.add(job.cache_directory);
     message.add(job.key.data(), job.key.size());
     const Descriptor request(sharedMemory("crt kernel text"));
@@ -252,13 +253,14 @@ int runCompileProcess(int job_descriptor, int answer_descriptor) {
         job.nvrtc_path = request.nextText();
         job.text = request.nextText();
         job.arch = request.nextNumber<int>();
-        job.features = request.nextNumber<std::uint64_t>();
+        job.spec.entry = request.nextNumber<Entry>();
+        job.spec.features = request.nextNumber<std::uint64_t>();
         job.cache_directory = request.nextText();
         const std::vector<unsigned char> key = request.next();
         std::copy_n(key.begin(), std::min(key.size(), job.key.size()), job.key.begin());
 
         const auto compiling = std::chrono::steady_clock::now();
-        const Cubin cubin = compileLean(Nvrtc::open({job.nvrtc_path}), job.text, job.arch, job.features);
+        const Cubin cubin = compileLean(Nvrtc::open({job.nvrtc_path}), job.text, job.arch, job.spec);
         const double compile_seconds = secondsSince(compiling);
         const auto storing = std::chrono::steady_clock::now();
         KernelCache(job.cache_directory.empty() ? nullptr : job.cache_directory.c_str())

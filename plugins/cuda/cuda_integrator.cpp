@@ -1,5 +1,6 @@
 #include "cuda_integrator.h"
 
+#include "backend/sdk/gpu_schedule.h"
 #include "kernel/features.h"
 
 #include <algorithm>
@@ -13,7 +14,14 @@ using plugin::divideUp;
 namespace {
 
 constexpr double kLaunchSeconds = 0.03;
+/// Of a wave, whose last passes have few paths left.
+constexpr double kWaveSeconds = 0.2;
 constexpr std::uint64_t kFirstPaths = 1u << 18;
+
+LaunchPacer pacerFor(bool waves) {
+    return LaunchPacer(waves ? kWaveSeconds : kLaunchSeconds, kFirstPaths, kBlockHeight);
+}
+
 double now() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -27,7 +35,7 @@ CudaIntegrator::CudaIntegrator(const plugin::Host& host, const CrtCreateInfo& in
       context_(device_),
       kernel_choice_(info.kernel),
       tile_size_(info.tile_size),
-      pacer_(kLaunchSeconds, kFirstPaths, kBlockHeight) {
+      pacer_(pacerFor(false)) {
     if (info.threads != 0) host_.log(CRT_LOG_DEBUG, "cuda: the number of threads does not apply");
     context_.makeCurrent();
     const Driver& cuda = driver();
@@ -63,7 +71,8 @@ CudaIntegrator::DeviceFilm CudaIntegrator::allocateFilm(std::uint64_t copies, co
 }
 
 void CudaIntegrator::noteMemory() {
-    peak_bytes_ = std::max(peak_bytes_, blob_.bytes() + rays_.bytes() + film_.bytes() + slices_.bytes());
+    peak_bytes_ = std::max(peak_bytes_, blob_.bytes() + rays_.bytes() + film_.bytes() + slices_.bytes() +
+                                            (wavefront_ ? wavefront_->bytes() : 0));
 }
 
 void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
@@ -77,16 +86,24 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     slices_ = DeviceFilm();
     slice_count_ = 0;
     rays_ = Memory();
+    wavefront_.reset();
     launched_ = {};
     scene_ = scene;
 
-    const std::uint64_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
-    if (!program_ || program_->features() != features) {
+    std::vector<KernelSpec> wanted;
+    if (kernel_choice_ != CRT_KERNEL_FULL && wantsWavefront(scene.features)) {
+        wavefront_.emplace(device_, blob.data);
+        wanted = wavefront_->plan().kernels;
+    } else if (kernel_choice_ != CRT_KERNEL_FULL) {
+        wanted = {{Entry::Render, scene.features}};
+    }
+    pacer_ = pacerFor(wavefront_.has_value());
+    if (!program_ || program_->wanted() != wanted) {
         if (program_) {
             compile_seconds_ += program_->compileSeconds();
             cache_seconds_ += program_->cacheSeconds();
         }
-        program_ = std::make_unique<CudaProgram>(host_, device_, features, kernel_choice_);
+        program_ = std::make_unique<CudaProgram>(host_, device_, wanted, kernel_choice_);
     }
 
     const double start = now();
@@ -126,43 +143,73 @@ std::uint32_t CudaIntegrator::ensureSlices(std::uint32_t slices) {
     return slices;
 }
 
-double CudaIntegrator::launch(const Launch& launch) {
-    const Driver& cuda = driver();
-    const Module& module = program_->current();
-
+void CudaIntegrator::launchRender(const Module& module, const Launch& launch, std::uint32_t slices,
+                                  const WaveTarget& target) {
     const std::uint64_t blocks =
         divideUp(launch.x1 - launch.x0, kBlockWidth) * divideUp(launch.y1 - launch.y0, kBlockHeight);
-    const std::uint64_t most = plugin::sliceBudget(device_.memory_bytes, device_.memory_bytes) /
-                               std::max<std::uint64_t>(film_.bytes(), 1);
+    Launch range = launch;
+    kernel::CrtScene scene = scene_;
+    WaveTarget to = target;
+    void* arguments[] = {&scene,    &to.blob,   &range.x0,           &range.y0,
+                         &range.x1, &range.y1,  &range.first_sample, &range.sample_count,
+                         &to.sums,  &to.counts, &to.primitives,      &to.rays};
+    driver().check(driver().cuLaunchKernel(module.kernel(), static_cast<unsigned>(blocks), slices, 1, kBlock,
+                                           1, 1, 0, nullptr, arguments, nullptr),
+                   "launching the kernel");
+}
+
+void CudaIntegrator::addSlices(const Module& module, const Launch& launch, std::uint32_t slices) {
+    Launch range = launch;
+    kernel::CrtScene scene = scene_;
+    CUdeviceptr sums = film_.sums.address(), counts = film_.counts.address(),
+                primitives = film_.primitives.address();
+    CUdeviceptr slice_sums = slices_.sums.address(), slice_counts = slices_.counts.address(),
+                slice_primitives = slices_.primitives.address();
+    void* arguments[] = {
+        &range.x0, &range.y0, &range.x1, &range.y1,   &scene.width, &scene.height, &scene.channels,
+        &slices,   &sums,     &counts,   &primitives, &slice_sums,  &slice_counts, &slice_primitives};
+    const std::uint64_t threads = launch.pixels() * scene_.channels;
+    driver().check(
+        driver().cuLaunchKernel(module.addSlices(), static_cast<unsigned>(divideUp(threads, kBlock)), 1, 1,
+                                kBlock, 1, 1, 0, nullptr, arguments, nullptr),
+        "launching the sum of the slices");
+}
+
+void CudaIntegrator::launchKernels(const std::vector<Module>& kernels, const Launch& launch) {
+    const Module& module = kernels.front();
+    const bool waves = module.spec().entry == Entry::Trace;
+    const std::uint64_t across = divideUp(launch.x1 - launch.x0, kBlockWidth);
+    const std::uint64_t blocks = across * divideUp(launch.y1 - launch.y0, kBlockHeight);
+    std::uint64_t most = plugin::sliceBudget(device_.memory_bytes, device_.memory_bytes) /
+                         std::max<std::uint64_t>(film_.bytes(), 1);
+    if (waves) most = std::min<std::uint64_t>(most, wavefront_->mostSlices(across));
     std::uint32_t slices = ensureSlices(
         plugin::chooseSlices(blocks, std::uint64_t{module.residentBlocks()} * device_.multiprocessors,
                              launch.sample_count, most));
+    if (waves) slices = std::min(slices, wavefront_->mostSlices(across));
 
-    DeviceFilm& target = slices > 1 ? slices_ : film_;
-    CUdeviceptr blob = blob_.address(), rays = rays_.address();
-    CUdeviceptr sums = target.sums.address(), counts = target.counts.address(),
-                primitives = target.primitives.address();
-    Launch range = launch;
-    kernel::CrtScene scene = scene_;
-    void* render_arguments[] = {&scene,    &blob,     &range.x0,           &range.y0,
-                                &range.x1, &range.y1, &range.first_sample, &range.sample_count,
-                                &sums,     &counts,   &primitives,         &rays};
+    const DeviceFilm& film = slices > 1 ? slices_ : film_;
+    const WaveTarget target{blob_.address(), film.sums.address(), film.counts.address(),
+                            film.primitives.address(), rays_.address()};
+    if (waves)
+        wavefront_->launch(kernels, scene_, launch, slices, target);
+    else
+        launchRender(module, launch, slices, target);
+    if (slices > 1) addSlices(module, launch, slices);
+}
 
+double CudaIntegrator::launch(const Launch& launch) {
+    const Driver& cuda = driver();
     cuda.check(cuda.cuEventRecord(start_, nullptr), "recording an event");
-    cuda.check(cuda.cuLaunchKernel(module.render(), static_cast<unsigned>(blocks), slices, 1, kBlock, 1, 1,
-                                   0, nullptr, render_arguments, nullptr),
-               "launching the kernel");
-    if (slices > 1) {
-        CUdeviceptr film_sums = film_.sums.address(), film_counts = film_.counts.address(),
-                    film_primitives = film_.primitives.address();
-        void* add_arguments[] = {&range.x0,        &range.y0,       &range.x1, &range.y1,  &scene.width,
-                                 &scene.height,    &scene.channels, &slices,   &film_sums, &film_counts,
-                                 &film_primitives, &sums,           &counts,   &primitives};
-        const std::uint64_t threads = launch.pixels() * scene_.channels;
-        cuda.check(cuda.cuLaunchKernel(module.addSlices(), static_cast<unsigned>(divideUp(threads, kBlock)),
-                                       1, 1, kBlock, 1, 1, 0, nullptr, add_arguments, nullptr),
-                   "launching the sum of the slices");
+    try {
+        launchKernels(program_->current(), launch);
+    } catch (const plugin::PluginError& error) {
+        // Waves only make a render faster: it must not fail for want of memory for them.
+        if (error.status() != CRT_OUT_OF_MEMORY || !wavefront_ || wavefront_->bytes() != 0) throw;
+        program_->giveUp(std::string("going on with the precompiled kernel: ") + error.what());
+        launchKernels(program_->current(), launch);
     }
+    noteMemory();
     cuda.check(cuda.cuEventRecord(end_, nullptr), "recording an event");
     cuda.check(cuda.cuEventSynchronize(end_), "rendering on '" + device_.name + "'");
 
@@ -190,14 +237,16 @@ void CudaIntegrator::report(CrtBackendReport& report) {
     report.compile_seconds = compile_seconds_;
     report.cache_seconds = cache_seconds_;
     if (program_) {
-        const Module& module = program_->current();
+        const std::vector<Module>& kernels = program_->current();
         plugin::writeText(report.kernel, program_->description());
         report.kernel_from_cache = program_->fromCache() ? 1 : 0;
-        report.kernel_features = module.features();
+        report.kernel_features = kernels.front().spec().features;
         report.compile_seconds += program_->compileSeconds();
         report.cache_seconds += program_->cacheSeconds();
-        report.registers = module.registers();
-        report.spill_bytes = module.spillBytes();
+        for (const Module& kernel : kernels) {
+            report.registers = std::max(report.registers, kernel.registers());
+            report.spill_bytes = std::max(report.spill_bytes, kernel.spillBytes());
+        }
     }
     report.upload_seconds = upload_seconds_;
     report.render_seconds = launched_.seconds;

@@ -3,6 +3,7 @@
 
 #include "cuda_device.h"
 #include "cuda_program.h"
+#include "cuda_wavefront.h"
 
 #include "common/film_slices.h"
 #include "common/launch_loop.h"
@@ -14,6 +15,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <thread>
 
 namespace crt::cuda {
@@ -43,6 +45,11 @@ private:
     std::uint32_t ensureSlices(std::uint32_t slices);
     void noteMemory();
     double launch(const Launch& launch);
+    /// The samples of a launch, in slices or not, by waves or by crt_render.
+    void launchKernels(const std::vector<Module>& kernels, const Launch& launch);
+    void launchRender(const Module& module, const Launch& launch, std::uint32_t slices,
+                      const WaveTarget& target);
+    void addSlices(const Module& module, const Launch& launch, std::uint32_t slices);
 
     plugin::Host host_;
     std::jthread opening_compiler_;  ///< While the device is opened.
@@ -54,6 +61,7 @@ private:
     LaunchPacer pacer_;
 
     std::unique_ptr<CudaProgram> program_;
+    std::optional<Wavefront> wavefront_;  ///< Where the scene wants it.
     kernel::CrtScene scene_{};  ///< The blob's header.
     Memory blob_, rays_;
     DeviceFilm film_, slices_;

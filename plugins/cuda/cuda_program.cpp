@@ -50,18 +50,35 @@ std::uint32_t numberBefore(const std::string& line, const std::string& word) {
 
 }  // namespace
 
-std::string kernelText(const std::string& path_text) {
-    return path_text + "\n#line 1 \"kernels.cu\"\n" + kKernelText;
+const char* entryName(Entry entry) {
+    switch (entry) {
+        case Entry::Trace: return "crt_trace";
+        case Entry::Shade: return "crt_shade_queue";
+        case Entry::Choose: return "crt_choose";
+        case Entry::Render: break;
+    }
+    return "crt_render";
 }
 
-std::vector<int> blocksPerMultiprocessor(std::uint64_t features) {
-    if ((features & CRT_FEATURE_BVH) == 0) return {5, 4, 3};
+bool traverses(const KernelSpec& spec) {
+    return (spec.entry == Entry::Render || spec.entry == Entry::Trace) &&
+           (spec.features & CRT_FEATURE_BVH) != 0;
+}
+
+std::string kernelText(const std::string& wavefront_text) {
+    return wavefront_text + "\n#line 1 \"kernels.cu\"\n" + kKernelText;
+}
+
+std::vector<int> blocksPerMultiprocessor(const KernelSpec& spec) {
+    if (spec.entry == Entry::Trace) return {7, 6, 5};
+    if (spec.entry == Entry::Render && (spec.features & CRT_FEATURE_BVH) == 0) return {5, 4, 3};
     return {4, 3};
 }
 
-std::vector<std::string> nvrtcOptions(int arch, std::uint64_t features, int blocks_per_multiprocessor) {
+std::vector<std::string> nvrtcOptions(int arch, const KernelSpec& spec, int blocks_per_multiprocessor) {
     char mask[48];
-    std::snprintf(mask, sizeof mask, "-DCRT_FEATURES=0x%llxul", static_cast<unsigned long long>(features));
+    std::snprintf(mask, sizeof mask, "-DCRT_FEATURES=0x%llxul",
+                  static_cast<unsigned long long>(spec.features));
     return {"--gpu-architecture=sm_" + std::to_string(arch),
             "--std=c++17",
             "--fmad=false",
@@ -70,14 +87,15 @@ std::vector<std::string> nvrtcOptions(int arch, std::uint64_t features, int bloc
             "--ftz=false",
             "--ptxas-options=-v",
             mask,
+            "-DCRT_ENTRIES=" + std::to_string(static_cast<std::uint32_t>(spec.entry)),
             "-DCRT_BLOCKS_PER_SM=" + std::to_string(blocks_per_multiprocessor)};
 }
 
-KernelCache::Key cacheKey(const std::string& text, int arch, std::uint64_t features,
+KernelCache::Key cacheKey(const std::string& text, int arch, const KernelSpec& spec,
                           const std::string& compiler, const std::string& driver_version) {
     std::string options;
-    for (const int blocks : blocksPerMultiprocessor(features))
-        for (const std::string& option : nvrtcOptions(arch, features, blocks)) options += option + ' ';
+    for (const int blocks : blocksPerMultiprocessor(spec))
+        for (const std::string& option : nvrtcOptions(arch, spec, blocks)) options += option + ' ';
     return KernelCache::makeKey({"cuda", text, options, compiler, driver_version});
 }
 
@@ -103,40 +121,43 @@ ResourceUse resourceUse(const std::string& log, const std::string& kernel) {
     return use;
 }
 
-Cubin compileLean(const Nvrtc& compiler, const std::string& text, int arch, std::uint64_t features) {
+Cubin compileLean(const Nvrtc& compiler, const std::string& text, int arch, const KernelSpec& spec) {
     Cubin cubin;
-    for (const int blocks : blocksPerMultiprocessor(features)) {
-        cubin = compiler.compile(text, "path.h", nvrtcOptions(arch, features, blocks));
-        if (resourceUse(cubin.log, "crt_render").spill_bytes <= kSpillBytesAllowed) break;
+    for (const int blocks : blocksPerMultiprocessor(spec)) {
+        cubin = compiler.compile(text, "wavefront.h", nvrtcOptions(arch, spec, blocks));
+        if (resourceUse(cubin.log, entryName(spec.entry)).spill_bytes <= kSpillBytesAllowed) break;
     }
     return cubin;
 }
 
-Module::Module(const void* image, std::uint64_t features, std::string name)
-    : features_(features), name_(std::move(name)) {
+Module::Module(const void* image, const KernelSpec& spec, std::string name)
+    : spec_(spec), name_(std::move(name)) {
     const Driver& cuda = driver();
     cuda.check(cuda.cuModuleLoadData(&module_, image), "loading the " + name_ + " kernel");
     try {
-        cuda.check(cuda.cuModuleGetFunction(&render_, module_, "crt_render"),
-                   "taking crt_render from the module");
-        cuda.check(cuda.cuModuleGetFunction(&add_slices_, module_, "crt_add_slices"),
-                   "taking crt_add_slices from the module");
+        const std::string entry = entryName(spec_.entry);
+        cuda.check(cuda.cuModuleGetFunction(&kernel_, module_, entry.c_str()),
+                   "taking " + entry + " from the module");
+        if (spec_.entry == Entry::Render || spec_.entry == Entry::Trace)
+            cuda.check(cuda.cuModuleGetFunction(&add_slices_, module_, "crt_add_slices"),
+                       "taking crt_add_slices from the module");
         // No kernel uses shared memory: all of it may cache the scene.
-        cuda.check(cuda.cuFuncSetCacheConfig(render_, CU_FUNC_CACHE_PREFER_L1), "preferring the L1 cache");
+        cuda.check(cuda.cuFuncSetCacheConfig(kernel_, CU_FUNC_CACHE_PREFER_L1), "preferring the L1 cache");
 
         int registers = 0, local_bytes = 0, blocks = 0;
-        cuda.check(cuda.cuFuncGetAttribute(&registers, CU_FUNC_ATTRIBUTE_NUM_REGS, render_),
+        cuda.check(cuda.cuFuncGetAttribute(&registers, CU_FUNC_ATTRIBUTE_NUM_REGS, kernel_),
                    "asking for registers");
-        cuda.check(cuda.cuFuncGetAttribute(&local_bytes, CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES, render_),
+        cuda.check(cuda.cuFuncGetAttribute(&local_bytes, CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES, kernel_),
                    "asking for local memory");
-        cuda.check(cuda.cuOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, render_, kBlock, 0),
+        cuda.check(cuda.cuOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel_, kBlock, 0),
                    "asking for the occupancy");
         // Local memory is the stacks of both traversals of the BVH, which are meant to be there, and what
         // did not fit into registers.
         constexpr int kTraversalStack = CRT_BVH_STACK * (sizeof(kernel::u64) + sizeof(kernel::u32));
+
         registers_ = static_cast<std::uint32_t>(registers);
-        spill_bytes_ = static_cast<std::uint32_t>(
-            std::max(0, local_bytes - ((features_ & CRT_FEATURE_BVH) ? kTraversalStack : 0)));
+        spill_bytes_ =
+            static_cast<std::uint32_t>(std::max(0, local_bytes - (traverses(spec_) ? kTraversalStack : 0)));
         resident_blocks_ = static_cast<std::uint32_t>(std::max(blocks, 1));
     } catch (...) {
         cuda.cuModuleUnload(module_);
@@ -146,9 +167,9 @@ Module::Module(const void* image, std::uint64_t features, std::string name)
 
 Module& Module::operator=(Module&& other) noexcept {
     std::swap(module_, other.module_);
-    std::swap(render_, other.render_);
+    std::swap(kernel_, other.kernel_);
     std::swap(add_slices_, other.add_slices_);
-    std::swap(features_, other.features_);
+    std::swap(spec_, other.spec_);
     std::swap(registers_, other.registers_);
     std::swap(spill_bytes_, other.spill_bytes_);
     std::swap(resident_blocks_, other.resident_blocks_);
@@ -168,12 +189,9 @@ void openCompiler() noexcept {
     }
 }
 
-CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::uint64_t scene_features,
+CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::vector<KernelSpec> wanted,
                          CrtKernelChoice choice)
-    : host_(host), features_(choice == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene_features) {
-    const auto loadPrecompiled = [&] {
-        precompiled_ = Module(kPrecompiledKernels, CRT_FEATURES_ALL, "precompiled");
-    };
+    : host_(host), wanted_(std::move(wanted)) {
     if (choice == CRT_KERNEL_FULL) {
         loadPrecompiled();
         return;
@@ -196,74 +214,111 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ui
         return;
     }
 
-    const Stopwatch cache_time;
     lean_name_ = compiler->name() + " sm_" + std::to_string(device.arch);
-    const std::string text = kernelText(host_.kernelSource("path.h"));
-    const KernelCache::Key key = cacheKey(text, device.arch, features_, compiler->name(), driver().version);
-    std::string refused;
-    const std::optional<std::vector<unsigned char>> cubin =
-        KernelCache(host_.cacheDirectory()).load(key, &refused);
-    if (!refused.empty())
-        host_.log(CRT_LOG_WARNING, "cuda: a cached kernel is refused, and compiled again: " + refused);
-    if (cubin) {
-        try {
-            lean_ = Module(cubin->data(), features_, lean_name_);
-            from_cache_ = true;
-        } catch (const plugin::PluginError& error) {
-            host_.log(
-                CRT_LOG_DEBUG,
-                std::string("cuda: the cached kernel is refused, and compiled again: ") + error.what());
-        }
+    const std::string text = kernelText(host_.kernelSource("wavefront.h"));
+    takeFromCache(text, *compiler, device);
+    if (pending_.empty()) {
+        from_cache_ = true;
+        return;
     }
-    cache_seconds_ = cache_time.seconds();
-    if (lean_) return;
 
     const char* directory = host_.cacheDirectory();
+    job_ = CompileJob{compiler->path(), text, device.arch, {}, directory != nullptr ? directory : "", {}};
     try {
-        compiling_ = std::make_unique<CompileProcess>(
-            compileProgram(), CompileJob{compiler->path(), text, device.arch, features_,
-                                         directory != nullptr ? directory : "", key});
-        if (choice == CRT_KERNEL_LEAN_ONLY) {
-            std::optional<CompiledKernel> compiled;
-            while (!(compiled = compiling_->poll()))
-                std::this_thread::sleep_for(std::chrono::milliseconds(5));
-            compiling_.reset();
-            takeLean(*compiled);
-            return;
+        startCompilers();
+        while (choice == CRT_KERNEL_LEAN_ONLY && !pending_.empty()) {
+            poll();
+            if (!pending_.empty()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
         }
     } catch (const std::runtime_error& error) {
-        compiling_.reset();
-        host_.log(CRT_LOG_WARNING,
-                  std::string("cuda: using the precompiled kernel with everything in: ") + error.what());
+        giveUp(std::string("using the precompiled kernel with everything in: ") + error.what());
     }
+    if (!pending_.empty()) loadPrecompiled();
+}
+
+void CudaProgram::loadPrecompiled() {
+    if (precompiled_.empty())
+        precompiled_.emplace_back(kPrecompiledKernels, KernelSpec{Entry::Render, CRT_FEATURES_ALL},
+                                  "precompiled");
+}
+
+void CudaProgram::takeFromCache(const std::string& text, const Nvrtc& compiler, const Device& device) {
+    const Stopwatch cache_time;
+    const KernelCache cache(host_.cacheDirectory());
+    lean_.resize(wanted_.size());
+    for (std::size_t i = 0; i < wanted_.size(); ++i) {
+        Pending kernel{i, cacheKey(text, device.arch, wanted_[i], compiler.name(), driver().version),
+                       nullptr};
+        std::string refused;
+        const std::optional<std::vector<unsigned char>> cubin = cache.load(kernel.key, &refused);
+        if (!refused.empty())
+            host_.log(CRT_LOG_WARNING, "cuda: a cached kernel is refused, and compiled again: " + refused);
+        if (cubin) {
+            try {
+                lean_[i] = Module(cubin->data(), wanted_[i], lean_name_);
+                continue;
+            } catch (const plugin::PluginError& error) {
+                host_.log(
+                    CRT_LOG_DEBUG,
+                    std::string("cuda: the cached kernel is refused, and compiled again: ") + error.what());
+            }
+        }
+        pending_.push_back(std::move(kernel));
+    }
+    cache_seconds_ = cache_time.seconds();
+}
+
+void CudaProgram::startCompilers() {
+    // The host's cores render nothing meanwhile, but each compiler takes some 200 MB.
+    const std::size_t most = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+    for (std::size_t i = 0; i < std::min(most, pending_.size()); ++i) {
+        if (pending_[i].process != nullptr) continue;
+        job_.spec = wanted_[pending_[i].index];
+        job_.key = pending_[i].key;
+        pending_[i].process = std::make_unique<CompileProcess>(compileProgram(), job_);
+    }
+}
+
+void CudaProgram::poll() {
+    for (std::size_t i = 0; i < pending_.size();) {
+        const std::optional<CompiledKernel> compiled =
+            pending_[i].process != nullptr ? pending_[i].process->poll() : std::nullopt;
+        if (!compiled) {
+            ++i;
+            continue;
+        }
+        const std::size_t index = pending_[i].index;
+        pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
+        compile_seconds_ += compiled->compile_seconds;
+        cache_seconds_ += compiled->cache_seconds;
+        lean_[index] = Module(compiled->cubin.data(), wanted_[index], lean_name_);
+    }
+    startCompilers();
+}
+
+void CudaProgram::giveUp(const std::string& why) {
+    pending_.clear();
+    lean_.clear();
+    host_.log(CRT_LOG_WARNING, "cuda: " + why);
     loadPrecompiled();
 }
 
-void CudaProgram::takeLean(const CompiledKernel& compiled) {
-    compile_seconds_ = compiled.compile_seconds;
-    cache_seconds_ += compiled.cache_seconds;
-    lean_ = Module(compiled.cubin.data(), features_, lean_name_);
-}
-
-const Module& CudaProgram::current() {
-    if (!compiling_) return lean_ ? lean_ : precompiled_;
-    try {
-        const std::optional<CompiledKernel> compiled = compiling_->poll();
-        if (!compiled) return precompiled_;
-        compiling_.reset();
-        takeLean(*compiled);
-    } catch (const std::exception& error) {
-        // The precompiled kernel gives the same image.
-        compiling_.reset();
-        host_.log(CRT_LOG_WARNING,
-                  std::string("cuda: going on with the precompiled kernel: ") + error.what());
+const std::vector<Module>& CudaProgram::current() {
+    if (!pending_.empty()) {
+        try {
+            poll();
+        } catch (const std::exception& error) {
+            giveUp(std::string("going on with the precompiled kernel: ") + error.what());
+        }
     }
-    return lean_ ? lean_ : precompiled_;
+    return lean_.empty() || !pending_.empty() ? precompiled_ : lean_;
 }
 
 std::string CudaProgram::description() const {
-    if (!lean_) return precompiled_.name();
-    return precompiled_ ? precompiled_.name() + ", then " + lean_.name() : lean_.name();
+    if (lean_.empty() || !pending_.empty()) return precompiled_.front().name();
+    const std::string lean =
+        lean_name_ + (lean_.size() > 1 ? ", " + std::to_string(lean_.size()) + " kernels" : std::string());
+    return precompiled_.empty() ? lean : precompiled_.front().name() + ", then " + lean;
 }
 
 }  // namespace crt::cuda

@@ -1,10 +1,11 @@
-/// From a feature mask to a kernel that can be launched: the precompiled one at once, and the lean one from
-/// the disk cache or, compiled by a process of its own, as soon as it is ready. Both give the same bits, so
-/// a render may go over from one to the other between launches.
+/// From what a scene needs to kernels that can be launched: the precompiled one at once, and the lean ones
+/// from the disk cache or, compiled by processes of their own, as soon as all are ready. They give the same
+/// bits, so a render may go over from one to the other between launches.
 #pragma once
 
 #include "cuda_compile_process.h"
 #include "cuda_device.h"
+#include "cuda_kernel_spec.h"
 #include "cuda_nvrtc.h"
 
 #include "backend/sdk/kernel_cache.h"
@@ -22,24 +23,28 @@ constexpr std::uint32_t kBlock = 128, kBlockWidth = 16, kBlockHeight = 8;
 /// Pairs of ray counters, as in kernels.cu.
 constexpr std::uint32_t kRayCounters = 1024;
 
-/// The whole text that NVRTC compiles: the host's text of kernel/path.h, then kernels.cu.
-std::string kernelText(const std::string& path_text);
+/// Whether it has the stacks of a tree's traversal.
+bool traverses(const KernelSpec& spec);
+
+/// The whole text that NVRTC compiles: the host's text of kernel/wavefront.h, then kernels.cu.
+std::string kernelText(const std::string& wavefront_text);
 
 /// How many blocks a multiprocessor should hold at once, in the order of trying: more hide latency better,
 /// but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the last is
 /// not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md); a fifth
-/// gains where there is no tree to traverse (docs/decisions/0041-instruction-cache.md).
-std::vector<int> blocksPerMultiprocessor(std::uint64_t features);
-/// Of all stores and loads in the code of crt_render.
+/// gains where there is no tree to traverse (docs/decisions/0041-instruction-cache.md); a kernel that only
+/// traces is best with seven (docs/decisions/0042-wavefront.md).
+std::vector<int> blocksPerMultiprocessor(const KernelSpec& spec);
+/// Of all stores and loads in the code of a kernel.
 constexpr std::uint32_t kSpillBytesAllowed = 128;
 
 /// Options for NVRTC. Arithmetic stays IEEE: nothing is contracted, divisions and square roots are rounded
 /// correctly, subnormals are kept.
-std::vector<std::string> nvrtcOptions(int arch, std::uint64_t features, int blocks_per_multiprocessor);
+std::vector<std::string> nvrtcOptions(int arch, const KernelSpec& spec, int blocks_per_multiprocessor);
 
 /// Key of the machine code: everything that decides it, and the driver's version, so that no driver has to
 /// take what another one was given.
-plugin::KernelCache::Key cacheKey(const std::string& text, int arch, std::uint64_t features,
+plugin::KernelCache::Key cacheKey(const std::string& text, int arch, const KernelSpec& spec,
                                   const std::string& compiler, const std::string& driver_version);
 
 /// What a kernel takes on the device, as the assembler reports it (--ptxas-options=-v).
@@ -50,34 +55,37 @@ struct ResourceUse {
 };
 ResourceUse resourceUse(const std::string& log, const std::string& kernel);
 
-/// Machine code for a mask, with as many blocks on a multiprocessor as go almost without spilling. Throws
+/// Machine code with as many blocks on a multiprocessor as go almost without spilling. Throws
 /// std::runtime_error. [any thread]
-Cubin compileLean(const Nvrtc& nvrtc, const std::string& text, int arch, std::uint64_t features);
+Cubin compileLean(const Nvrtc& nvrtc, const std::string& text, int arch, const KernelSpec& spec);
 
 /// The kernels of one loaded module.
 class Module {
 public:
     Module() = default;
     /// `image`: a CUBIN or a fat binary.
-    Module(const void* image, std::uint64_t features, std::string name);
+    Module(const void* image, const KernelSpec& spec, std::string name);
     Module(Module&& other) noexcept { *this = std::move(other); }
     Module& operator=(Module&& other) noexcept;
     ~Module();
     explicit operator bool() const { return module_ != nullptr; }
 
-    CUfunction render() const { return render_; }
+    /// That of spec().entry.
+    CUfunction kernel() const { return kernel_; }
+    /// Of Entry::Render and Entry::Trace; else null.
     CUfunction addSlices() const { return add_slices_; }
-    std::uint64_t features() const { return features_; }
+    const KernelSpec& spec() const { return spec_; }
     const std::string& name() const { return name_; }
     std::uint32_t registers() const { return registers_; }
     std::uint32_t spillBytes() const { return spill_bytes_; }
-    /// Blocks of crt_render that one multiprocessor holds at once.
+    /// Blocks of kernel() that one multiprocessor holds at once.
     std::uint32_t residentBlocks() const { return resident_blocks_; }
 
 private:
     CUmodule module_ = nullptr;
-    CUfunction render_ = nullptr, add_slices_ = nullptr;
-    std::uint64_t features_ = 0, registers_ = 0, spill_bytes_ = 0, resident_blocks_ = 1;
+    CUfunction kernel_ = nullptr, add_slices_ = nullptr;
+    KernelSpec spec_;
+    std::uint32_t registers_ = 0, spill_bytes_ = 0, resident_blocks_ = 1;
     std::string name_;
 };
 
@@ -85,34 +93,52 @@ private:
 /// itself; beside other work it costs no time. [any thread]
 void openCompiler() noexcept;
 
-/// The kernel for one mask on one device. Used by one thread at a time, the context current.
+/// The kernels for one scene on one device. Used by one thread at a time, the context current.
 class CudaProgram {
 public:
-    CudaProgram(const plugin::Host& host, const Device& device, std::uint64_t scene_features,
+    /// `wanted`: the lean kernels. With CRT_KERNEL_FULL there are none.
+    CudaProgram(const plugin::Host& host, const Device& device, std::vector<KernelSpec> wanted,
                 CrtKernelChoice choice);
     CudaProgram(const CudaProgram&) = delete;
     CudaProgram& operator=(const CudaProgram&) = delete;
 
-    /// The best kernel that there is by now.
-    const Module& current();
+    /// The kernels to be launched by now: those wanted, in their order, once all are there; before that, and
+    /// where they cannot be had, the precompiled crt_render alone.
+    const std::vector<Module>& current();
 
-    std::uint64_t features() const { return features_; }
+    /// Goes on with the precompiled kernel, which gives the same image.
+    void giveUp(const std::string& why);
+
+    const std::vector<KernelSpec>& wanted() const { return wanted_; }
+    /// All lean kernels came from the disk cache.
     bool fromCache() const { return from_cache_; }
+    /// What the compilers took, added up.
     double compileSeconds() const { return compile_seconds_; }
     double cacheSeconds() const { return cache_seconds_; }
     /// Which kernels ran: "precompiled, then NVRTC 13.0 sm_90".
     std::string description() const;
 
 private:
-    void takeLean(const CompiledKernel& compiled);
+    /// A lean kernel on its way.
+    struct Pending {
+        std::size_t index;  ///< In wanted_.
+        plugin::KernelCache::Key key;
+        std::unique_ptr<CompileProcess> process;
+    };
+    void takeFromCache(const std::string& text, const Nvrtc& compiler, const Device& device);
+    void startCompilers();
+    /// Takes what is ready. Throws std::runtime_error when a kernel cannot be compiled.
+    void poll();
+    void loadPrecompiled();
 
     plugin::Host host_;
-    std::uint64_t features_;
+    std::vector<KernelSpec> wanted_;
+    CompileJob job_;  ///< But for the spec and the key.
     std::string lean_name_;
-    Module precompiled_, lean_;
+    std::vector<Module> precompiled_, lean_;
+    std::vector<Pending> pending_;
     bool from_cache_ = false;
     double compile_seconds_ = 0, cache_seconds_ = 0;
-    std::unique_ptr<CompileProcess> compiling_;
 };
 
 }  // namespace crt::cuda

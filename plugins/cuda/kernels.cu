@@ -1,14 +1,29 @@
 /*
  * kernels.cu: the CUDA entry points. nvcc compiles this file ahead of time with everything in; while the
- * program runs, the host's text of kernel/path.h stands above it, and NVRTC compiles what one scene needs.
+ * program runs, the host's text of kernel/wavefront.h stands above it, and NVRTC compiles what one scene
+ * needs.
  *
- * A thread renders one pixel over a range of samples. Where the image is too small to fill the device, the
- * range is split over `slices` rows of the grid: each adds to a film of its own, and crt_add_slices then
- * adds those to the film in the order of the samples, so the result does not depend on which block ran
- * first. No thread waits for another: tests run these very functions as plain loops.
+ * crt_render: a thread renders one pixel over a range of samples. Where the image is too small to fill the
+ * device, the range is split over `slices` rows of the grid: each adds to a film of its own, and
+ * crt_add_slices then adds those to the film in the order of the samples, so the result does not depend on
+ * which block ran first.
+ *
+ * crt_trace, crt_choose and crt_shade_queue: a thread takes one slot of a wave one vertex further
+ * (kernel/wavefront.h). They are compiled one at a time, each with the features that it needs.
+ *
+ * No thread waits for another: tests run these very functions as plain loops.
  */
-#ifndef CRT_PATH_H
-#include "kernel/path.h"
+#ifndef CRT_WAVEFRONT_H
+#include "kernel/wavefront.h"
+#endif
+
+/* Which entry points this module has. */
+#define CRT_ENTRY_RENDER 1
+#define CRT_ENTRY_TRACE 2
+#define CRT_ENTRY_SHADE 4
+#define CRT_ENTRY_CHOOSE 8
+#ifndef CRT_ENTRIES
+#define CRT_ENTRIES CRT_ENTRY_RENDER
 #endif
 
 #define CRT_BLOCK 128u      /* threads: four warps of 8 × 4 pixels, side by side as 16 × 8 */
@@ -25,6 +40,7 @@
 #define CRT_BLOCKS_PER_SM 4
 #endif
 
+#if CRT_ENTRIES & CRT_ENTRY_RENDER
 /*
  * Samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1). `scene` is the
  * blob's header once more: as a kernel argument it lies in constant memory, where all threads read the same
@@ -60,6 +76,107 @@ extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
     atomicAdd(counter, (u64)traced.closest);
     atomicAdd(counter + 1, (u64)traced.shadow);
 }
+#endif
+
+#if CRT_ENTRIES & (CRT_ENTRY_TRACE | CRT_ENTRY_SHADE | CRT_ENTRY_CHOOSE)
+CRT_FN CRT_GLOBAL u32 *crt_queue_length(const CrtWave *wave, u32 pass, u32 queue) {
+    return wave->lengths + ((pass & 1u) * CRT_WAVE_QUEUES + queue);
+}
+#endif
+
+#if CRT_ENTRIES & (CRT_ENTRY_TRACE | CRT_ENTRY_CHOOSE)
+#ifdef CRT_CUDA_ON_HOST
+CRT_FN void crt_enqueue(const CrtWave *wave, u32 pass, u32 queue, u32 slot) {
+    if (queue == CRT_NONE) return;
+    const u32 at = atomicAdd(crt_queue_length(wave, pass, queue), 1u);
+    wave->queued[(u64)queue * wave->slots + at] = slot;
+}
+CRT_FN u32 crt_sum_of_warp(u32 value) { return value; }
+CRT_FN int crt_speaks_for_warp() { return 1; }
+#else
+#define CRT_WARP 0xffffffffu
+/* Lanes of the same queue take their places together, in the order of their slots. All lanes call. */
+CRT_FN void crt_enqueue(const CrtWave *wave, u32 pass, u32 queue, u32 slot) {
+    const u32 lane = threadIdx.x % 32u;
+    const u32 same = __match_any_sync(CRT_WARP, queue);
+    const u32 leader = __ffs(same) - 1u;
+    u32 at = 0u;
+    if (queue != CRT_NONE && lane == leader)
+        at = atomicAdd(crt_queue_length(wave, pass, queue), (u32)__popc(same));
+    at = __shfl_sync(CRT_WARP, at, leader) + __popc(same & ((1u << lane) - 1u));
+    if (queue != CRT_NONE) wave->queued[(u64)queue * wave->slots + at] = slot;
+}
+/* Of numbers that are 0 or 1. All lanes call. */
+CRT_FN u32 crt_sum_of_warp(u32 value) { return __popc(__ballot_sync(CRT_WARP, value != 0u)); }
+CRT_FN int crt_speaks_for_warp() { return threadIdx.x % 32u == 0u; }
+#endif
+#endif
+
+#if CRT_ENTRIES & CRT_ENTRY_TRACE
+/* Traces what the slots of a wave wait for. One thread a slot. */
+extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
+    crt_trace(const __grid_constant__ CrtScene scene, const __grid_constant__ CrtWave wave,
+              const unsigned char* blob, u32 pass) {
+    const u32 slot = blockIdx.x * CRT_BLOCK + threadIdx.x;
+    CrtContext context;
+    context.blob = blob;
+    context.scene = &scene;
+    CrtRayCount traced;
+    traced.closest = 0u;
+    traced.shadow = 0u;
+    u32 finished = 0u;
+    /* The next pass's queues: those who read these places have ended. */
+    if (slot < CRT_WAVE_QUEUES) *crt_queue_length(&wave, pass + 1u, slot) = 0u;
+    const u32 queue = crt_wave_trace(&context, &wave, slot, pass == 0u, &traced, &finished);
+    crt_enqueue(&wave, pass, queue, slot);
+
+    const u32 closest = crt_sum_of_warp(traced.closest), shadows = crt_sum_of_warp(traced.shadow),
+              ends = crt_sum_of_warp(finished);
+    if (!crt_speaks_for_warp()) return;
+    u64 *counter = wave.rays + 2u * (blockIdx.x % CRT_RAY_COUNTERS);
+    if (closest != 0u) atomicAdd(counter, (u64)closest);
+    if (shadows != 0u) atomicAdd(counter + 1, (u64)shadows);
+    if (ends != 0u) atomicAdd(wave.finished, ends);
+}
+#endif
+
+#if CRT_ENTRIES & CRT_ENTRY_CHOOSE
+/* Hands the slots that have met a mix to the queues of the materials that they find. */
+extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
+    crt_choose(const __grid_constant__ CrtScene scene, const __grid_constant__ CrtWave wave,
+               const unsigned char* blob, u32 pass) {
+    CrtContext context;
+    context.blob = blob;
+    context.scene = &scene;
+    const u32 mix = wave.queue_of_mix;
+    const u32 length = *crt_queue_length(&wave, pass, mix);
+    for (u32 first = blockIdx.x * CRT_BLOCK; first < length; first += gridDim.x * CRT_BLOCK) {
+        const u32 i = first + threadIdx.x;
+        u32 slot = 0u, queue = CRT_NONE;
+        if (i < length) {
+            slot = wave.queued[(u64)mix * wave.slots + i];
+            queue = crt_wave_choose(&context, &wave, slot);
+        }
+        crt_enqueue(&wave, pass, queue, slot);
+    }
+}
+#endif
+
+#if CRT_ENTRIES & CRT_ENTRY_SHADE
+/* Shades the slots of one queue. */
+extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
+    crt_shade_queue(const __grid_constant__ CrtScene scene, const __grid_constant__ CrtWave wave,
+                    const unsigned char* blob, u32 pass, u32 queue) {
+    CrtContext context;
+    context.blob = blob;
+    context.scene = &scene;
+    const u32 length = *crt_queue_length(&wave, pass, queue);
+    for (u32 i = blockIdx.x * CRT_BLOCK + threadIdx.x; i < length; i += gridDim.x * CRT_BLOCK)
+        crt_wave_shade(&context, &wave, wave.queued[(u64)queue * wave.slots + i]);
+}
+#endif
+
+#if CRT_ENTRIES & (CRT_ENTRY_RENDER | CRT_ENTRY_TRACE)
 
 /* Adds `slices` films, which lie one after another, to the film, in order, and clears them for the next
    launch. One thread a channel of a pixel of [x0, x1) × [y0, y1). */
@@ -92,3 +209,4 @@ extern "C" __global__ void __launch_bounds__(CRT_BLOCK)
         slice_counts[part] = 0u;
     }
 }
+#endif

@@ -102,6 +102,69 @@ class LostGpu(FakeGpuTest):
         self.assert_same("a.pfm", "whole.pfm")
 
 
+class Waves(FakeGpuTest):
+    """A scene that is rendered by kernels of their own for tracing and shading. The least memory is that of
+    film, scene and counters: what a render without waves takes, as an image without sample slices shows."""
+
+    def setUp(self):
+        super().setUp()
+        self.write("waves.yaml", harness.SCENE.replace(
+            "  black:", "  foil: {type: rough_conductor, metal: Au, roughness: 0.3}\n  black:"
+        ).replace("material: floor\n", "material: foil\n", 1))
+
+    def render(self, image, *arguments, **more):
+        return super().render(image, *self.SIZE, *arguments, scene="waves.yaml", **more)
+
+    def test_the_kernels_are_those_of_waves(self):
+        self.render("whole.pfm", "--kernel", "full")
+        self.assertEqual(self.report("whole.report.json")["backend"]["kernel"], "precompiled")
+        self.render("a.pfm", "--kernel", "lean-only")
+        # Tracing, diffuse, metal; nothing shines from outside.
+        self.assertIn("3 kernels", self.report("a.report.json")["backend"]["kernel"])
+        self.assert_same("a.pfm", "whole.pfm")
+
+    def test_a_render_goes_over_to_waves(self):
+        self.render("whole.pfm", "--kernel", "full", spp=64)
+        self.render("a.pfm", "--chunk", "1", spp=64, CRT_FAKE_NVRTC_SECONDS="0.05")
+        self.assert_same("a.pfm", "whole.pfm")
+
+    def test_waves_of_a_part_of_the_pixels(self):
+        self.render("whole.pfm", "--kernel", "full")
+        self.render("a.pfm", "--kernel", "lean-only")
+        full, waves = (self.memory(image)["device_peak_bytes"] for image in ("whole.pfm", "a.pfm"))
+        self.assertGreater(waves, 2 * full)
+        for share in (0.5, 0.25):
+            room = full + int(share * (waves - full))
+            self.render("b.pfm", "--kernel", "lean-only", CRT_FAKE_CUDA_MEMORY=str(room))
+            self.assertLess(self.memory("b.pfm")["device_peak_bytes"], room)
+            self.assert_same("b.pfm", "whole.pfm")
+
+    def test_no_room_for_waves(self):
+        self.render("whole.pfm", "--kernel", "full", spp=1)
+        full = self.memory("whole.pfm")["device_peak_bytes"]
+        run = self.render("a.pfm", "--kernel", "lean-only", spp=1, CRT_FAKE_CUDA_MEMORY=str(full + 4096))
+        self.assertIn("the paths of a wave needs", run.stderr)
+        self.assertIn("going on with the precompiled kernel", run.stderr)
+        self.assertEqual(self.memory("a.pfm")["film_bands"], 1)
+        self.assert_same("a.pfm", "whole.pfm")
+
+    def test_a_device_lost_in_a_wave(self):
+        self.render("whole.pfm", "--kernel", "full", spp=40)
+        run = self.render(
+            "a.pfm", "--device", "all", "--chunk", "4", "--kernel", "lean-only", spp=40,
+            CRT_FAKE_CUDA_DEVICES="2", CRT_FAKE_CUDA_LOST="1:50",
+        )
+        self.assertIn("device 1 'Fake GPU' is dropped, the others go on", run.stderr)
+        self.assert_same("a.pfm", "whole.pfm")
+
+    def test_a_compiler_that_fails(self):
+        self.render("whole.pfm", "--kernel", "full")
+        for failure in ("fail", "crash"):
+            run = self.render("a.pfm", "--kernel", "lean-only", CRT_FAKE_NVRTC_SECONDS=failure)
+            self.assertIn("using the precompiled kernel with everything in", run.stderr)
+            self.assert_same("a.pfm", "whole.pfm")
+
+
 class LittleGpuMemory(FakeGpuTest):
     """160 x 120 pixels: a film of 1.4 MB."""
 

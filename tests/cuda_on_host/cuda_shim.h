@@ -16,6 +16,9 @@ inline thread_local CrtHostDim3 gridDim{1, 1, 1}, blockDim{1, 1, 1}, blockIdx{0,
 inline unsigned long long atomicAdd(unsigned long long* address, unsigned long long value) {
     return __atomic_fetch_add(address, value, __ATOMIC_RELAXED);
 }
+inline unsigned atomicAdd(unsigned* address, unsigned value) {
+    return __atomic_fetch_add(address, value, __ATOMIC_RELAXED);
+}
 
 #define CRT_CUDA_ON_HOST
 #define __CUDACC_RTC__

@@ -105,7 +105,8 @@ struct CUfunc_st {
     std::string name;
 };
 struct CUmod_st {
-    CUfunc_st render{"crt_render"}, add_slices{"crt_add_slices"};
+    CUfunc_st functions[5] = {
+        {"crt_render"}, {"crt_add_slices"}, {"crt_trace"}, {"crt_choose"}, {"crt_shade_queue"}};
 };
 struct CUctx_st {
     int users = 0;
@@ -213,7 +214,8 @@ CRT_FAKE cuModuleUnload(CUmodule module) {
 }
 CRT_FAKE cuModuleGetFunction(CUfunction* function, CUmodule module, const char* name) {
     if (!crt::cuda_on_host::hasKernel(name)) return CUDA_ERROR_NOT_FOUND;
-    *function = module->render.name == name ? &module->render : &module->add_slices;
+    for (CUfunc_st& known : module->functions)
+        if (known.name == name) *function = &known;
     return CUDA_SUCCESS;
 }
 CRT_FAKE cuFuncGetAttribute(int* value, CUfunction_attribute what, CUfunction) {

@@ -9,6 +9,7 @@
 
 #include "cuda_shim.h"
 
+#define CRT_ENTRIES 15  // all
 #include "../../plugins/cuda/kernels.cu"
 
 namespace crt::cuda_on_host {
@@ -61,7 +62,9 @@ void launchWith(void (*kernel)(Parameters...), unsigned grid_x, unsigned grid_y,
 }  // namespace
 
 bool hasKernel(const char* name) {
-    return std::strcmp(name, "crt_render") == 0 || std::strcmp(name, "crt_add_slices") == 0;
+    for (const char* known : {"crt_render", "crt_add_slices", "crt_trace", "crt_choose", "crt_shade_queue"})
+        if (std::strcmp(name, known) == 0) return true;
+    return false;
 }
 
 bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned block, void** arguments,
@@ -69,6 +72,12 @@ bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned b
     if (!hasKernel(name) || block != CRT_BLOCK) return false;
     if (std::strcmp(name, "crt_render") == 0)
         launchWith(crt_render, grid_x, grid_y, arguments, host_threads);
+    else if (std::strcmp(name, "crt_trace") == 0)
+        launchWith(crt_trace, grid_x, grid_y, arguments, host_threads);
+    else if (std::strcmp(name, "crt_choose") == 0)
+        launchWith(crt_choose, grid_x, grid_y, arguments, host_threads);
+    else if (std::strcmp(name, "crt_shade_queue") == 0)
+        launchWith(crt_shade_queue, grid_x, grid_y, arguments, host_threads);
     else
         launchWith(crt_add_slices, grid_x, grid_y, arguments, host_threads);
     return true;
@@ -86,6 +95,48 @@ void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t sl
                    launch.y1, launch.first_sample, launch.sample_count, film.sums, device(film.counts),
                    film.primitives, device(rays));
     });
+}
+
+void launchWave(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film,
+                std::uint64_t* rays, unsigned host_threads) {
+    const CrtScene scene = header(scene_blob);
+    const unsigned across = (launch.x1 - launch.x0 + CRT_WAVE_BLOCK_WIDTH - 1) / CRT_WAVE_BLOCK_WIDTH;
+    const unsigned down = (launch.y1 - launch.y0 + CRT_WAVE_BLOCK_HEIGHT - 1) / CRT_WAVE_BLOCK_HEIGHT;
+    const unsigned blocks = across * down * slices;
+    constexpr u32 kShaders = 2, kQueues = 3;  // This one shader does for all; the last queue is of mixes.
+    const std::size_t slots = std::size_t{blocks} * CRT_WAVE_BLOCK;
+    std::vector<vec4> rows(slots * CRT_WAVE_ROWS(CRT_FEATURES_ALL));
+    std::vector<u32> words(slots * (3 + kQueues) + 2 * CRT_WAVE_QUEUES + 1);
+    CrtWave wave{};
+    wave.x0 = launch.x0;
+    wave.y0 = launch.y0;
+    wave.x1 = launch.x1;
+    wave.y1 = launch.y1;
+    wave.first_sample = launch.first_sample;
+    wave.sample_count = launch.sample_count;
+    wave.slices = slices;
+    wave.blocks_per_slice = across * down;
+    wave.slots = static_cast<u32>(slots);
+    wave.rows = rows.data();
+    wave.state = words.data();
+    wave.done = wave.state + slots;
+    wave.valid = wave.done + slots;
+    wave.queued = wave.valid + slots;
+    wave.lengths = wave.queued + slots * kQueues;
+    wave.finished = wave.lengths + 2 * CRT_WAVE_QUEUES;
+    wave.sums = film.sums;
+    wave.counts = device(film.counts);
+    wave.primitives = film.primitives;
+    wave.rays = device(rays);
+    wave.queue_of_mix = kShaders;
+    wave.queue_of_miss = scene.environment == CRT_NONE && scene.point_lights.count == 0 ? CRT_NONE : 1;
+    const auto* blob = static_cast<const unsigned char*>(scene_blob);
+    for (u32 pass = 0; *wave.finished < slots; ++pass) {
+        launchGrid(blocks, 1, host_threads, [&] { crt_trace(scene, wave, blob, pass); });
+        launchGrid(blocks, 1, host_threads, [&] { crt_choose(scene, wave, blob, pass); });
+        for (u32 queue = 0; queue < kShaders; ++queue)
+            launchGrid(blocks, 1, host_threads, [&] { crt_shade_queue(scene, wave, blob, pass, queue); });
+    }
 }
 
 void launchAddSlices(const void* scene_blob, const Launch& launch, std::uint32_t slices,

@@ -21,6 +21,10 @@ std::uint32_t rayCounterPairs();
 void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t slices,
                   const FilmPointers& film, std::uint64_t* rays, unsigned host_threads);
 
+/// The same by crt_trace and crt_shade_queue.
+void launchWave(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film,
+                std::uint64_t* rays, unsigned host_threads);
+
 /// crt_add_slices over the pixels of `launch`.
 void launchAddSlices(const void* scene_blob, const Launch& launch, std::uint32_t slices,
                      const FilmPointers& film, const FilmPointers& parts, unsigned host_threads);

@@ -47,15 +47,15 @@ public:
         if (host_.cancelled(0.0)) return false;
         for (Launch launch; pacer_.next(launch);) {
             const auto start = std::chrono::steady_clock::now();
-            // Slices where there are samples for them, and without where there are not: both ways of the
-            // real backend.
-            if (launch.sample_count >= kSlices) {
-                launchRender(blob_.data(), launch, kSlices, slices_.pointers(), rays_.data(), threads_);
+            // Both schedules in turn, each with slices where there are samples for them and without where
+            // there are not: all ways of the real backend.
+            const bool slices = launch.sample_count >= kSlices;
+            const auto take = launches_++ % 2 == 0 || !hasWaves() ? launchRender : launchWave;
+            HostFilm& film = slices ? slices_ : film_;
+            take(blob_.data(), launch, slices ? kSlices : 1, film.pointers(), rays_.data(), threads_);
+            if (slices)
                 launchAddSlices(blob_.data(), launch, kSlices, film_.pointers(), slices_.pointers(),
                                 threads_);
-            } else {
-                launchRender(blob_.data(), launch, 1, film_.pointers(), rays_.data(), threads_);
-            }
             const double seconds =
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
             pacer_.finished(launch, seconds);
@@ -75,7 +75,8 @@ public:
 
     void report(CrtBackendReport& report) {
         plugin::writeText(report.device, "CUDA kernels on the host");
-        plugin::writeText(report.kernel, "precompiled, " + std::to_string(kSlices) + " slices");
+        plugin::writeText(report.kernel,
+                          "precompiled, both schedules, " + std::to_string(kSlices) + " slices");
         report.kernel_features = CRT_FEATURES_ALL;
         report.render_seconds = render_seconds_;
         report.paths = paths_;
@@ -87,6 +88,11 @@ public:
 
 private:
     static constexpr std::uint32_t kSlices = 3;
+
+    /// A view is no path.
+    bool hasWaves() const {
+        return reinterpret_cast<const kernel::CrtScene*>(blob_.data())->view == CRT_VIEW_PATH;
+    }
 
     struct alignas(64) Line {
         unsigned char bytes[64];
@@ -117,7 +123,7 @@ private:
     HostFilm film_, slices_;
     std::vector<std::uint64_t> rays_;
     double render_seconds_ = 0;
-    std::uint64_t paths_ = 0;
+    std::uint64_t paths_ = 0, launches_ = 0;
 };
 
 }  // namespace

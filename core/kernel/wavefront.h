@@ -1,0 +1,382 @@
+/*
+ * wavefront.h: paths advanced by kernels of their own for tracing and for shading (Laine, Karras and Aila
+ * 2013, "Megakernels Considered Harmful"). A slot takes a share of one pixel's samples, one after another.
+ * A pass traces what every slot waits for and sorts the slots by the kind of material that they have met;
+ * then each kind is shaded by a kernel that holds that kind alone. Between kernels a path lies in rows of 16
+ * bytes, a row of all slots after another. What a slot computes, and in which order it adds to the film, is
+ * what crt_render_pixel does.
+ */
+#ifndef CRT_WAVEFRONT_H
+#define CRT_WAVEFRONT_H
+
+#include "path.h"
+
+CRT_KERNEL_BEGIN
+
+#define CRT_WAVE_BLOCK 128u /* slots of 16 × 8 pixels, as warps of 8 × 4 */
+#define CRT_WAVE_BLOCK_WIDTH 16u
+#define CRT_WAVE_BLOCK_HEIGHT 8u
+#define CRT_WAVE_QUEUES 16u /* at most: one a kind of material, one of misses, one of mixes */
+
+/* State of a slot. None: its path goes on from a vertex. */
+#define CRT_WAVE_DONE 1u  /* its samples are taken, or it has none */
+#define CRT_WAVE_ENDED 2u /* its path has ended */
+#define CRT_WAVE_ASKED 4u /* a shadow ray waits for its answer */
+
+/* Rows. */
+#define CRT_ROW_ORIGIN 0u       /* of the ray; depth, hero wavelength and `alone` */
+#define CRT_ROW_DIRECTION 1u    /* of the ray; state of xorshift */
+#define CRT_ROW_THROUGHPUT 2u
+#define CRT_ROW_RADIANCE 3u
+#define CRT_ROW_WAVELENGTHS 4u  /* positions */
+#define CRT_ROW_POINT 5u        /* where it was scattered; with which density */
+#define CRT_ROW_REST 6u         /* scatter_cosine, eta_square, the wavelengths' number, absorption */
+#define CRT_ROW_HIT 7u          /* t, b1, b2, slot of the scene */
+#define CRT_ROW_HIT_IDS 8u      /* primitive, instance */
+#define CRT_ROW_SHADOW_ORIGIN 9u /* and reach */
+#define CRT_ROW_SHADOW_DIRECTION 10u
+#define CRT_ROW_SHADOW_RADIANCE 11u
+#define CRT_ROW_SIDE 12u        /* where there is a tree of lights, or where there are AOVs, too: */
+#define CRT_ROW_ALBEDO 13u      /* first hit: */
+#define CRT_ROW_NORMAL 14u      /* and depth */
+#define CRT_ROW_PRIMITIVE 15u
+
+/* Rows that a scene's slots have. */
+#define CRT_WAVE_ROWS(features) \
+    (((features) & CRT_FEATURE_AOV) ? 16u : ((features) & CRT_FEATURE_LIGHT_TREE) ? 13u : 12u)
+
+/* A launch: samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1), and
+   where its slots are kept. */
+typedef struct CrtWave {
+    u32 x0, y0, x1, y1;
+    u64 first_sample;
+    u32 sample_count;
+    u32 slices;           /* each adds to a film of its own */
+    u32 blocks_per_slice;
+    u32 slots;            /* slices · blocks_per_slice · CRT_WAVE_BLOCK */
+    CRT_GLOBAL vec4 *rows;
+    CRT_GLOBAL u32 *state, *done, *valid; /* of each slot; its samples, and the finite ones */
+    CRT_GLOBAL u32 *queued;   /* the slots of each queue, in places for all slots */
+    CRT_GLOBAL u32 *lengths;  /* CRT_WAVE_QUEUES of even passes, then those of odd ones */
+    CRT_GLOBAL u32 *finished; /* how many slots are done */
+    CRT_GLOBAL f64 *sums;     /* as crt_render_pixel takes them, a film after another for the slices */
+    CRT_GLOBAL u64 *counts;
+    CRT_GLOBAL u32 *primitives;
+    CRT_GLOBAL u64 *rays;     /* pairs of counters */
+    u32 queue_of_kind[32];    /* by CRT_MATERIAL_… */
+    u32 queue_of_mix;         /* whose slots go on to other queues (crt_wave_choose) */
+    u32 queue_of_miss;        /* CRT_NONE: nothing shines there */
+} CrtWave;
+CRT_ASSERT_SIZE(CrtWave, 264);
+
+/* Which samples of which pixel a slot takes. */
+typedef struct CrtWaveShare {
+    u32 x, y, slice;
+    u32 first, count; /* samples, from the launch's first */
+} CrtWaveShare;
+
+CRT_FN CrtWaveShare crt_wave_share(const CrtWave *wave, u32 slot) {
+    const u32 block = slot / CRT_WAVE_BLOCK, thread = slot % CRT_WAVE_BLOCK;
+    const u32 warp = thread / 32u, lane = thread % 32u;
+    const u32 across = (wave->x1 - wave->x0 + CRT_WAVE_BLOCK_WIDTH - 1u) / CRT_WAVE_BLOCK_WIDTH;
+    const u32 tile = block % wave->blocks_per_slice;
+    CrtWaveShare share;
+    share.slice = block / wave->blocks_per_slice;
+    share.x = wave->x0 + (tile % across) * CRT_WAVE_BLOCK_WIDTH + (warp % 2u) * 8u + lane % 8u;
+    share.y = wave->y0 + (tile / across) * CRT_WAVE_BLOCK_HEIGHT + (warp / 2u) * 4u + lane / 8u;
+    share.first = (u32)((u64)wave->sample_count * share.slice / wave->slices);
+    const u32 end = (u32)((u64)wave->sample_count * (share.slice + 1u) / wave->slices);
+    share.count = share.x < wave->x1 && share.y < wave->y1 ? end - share.first : 0u;
+    return share;
+}
+
+CRT_FN CRT_GLOBAL vec4 *crt_row(const CrtWave *wave, u32 row, u32 slot) {
+    return wave->rows + ((u64)row * wave->slots + slot);
+}
+CRT_FN vec4 crt_row_of(vec3 v, f32 w) { return make_vec4(V3X(v), V3Y(v), V3Z(v), w); }
+CRT_FN vec3 crt_row_vector(vec4 row) { return make_vec3(V4X(row), V4Y(row), V4Z(row)); }
+
+/* Whether the rows of the first hit are there. */
+CRT_FN int crt_wave_has_first_hit(const CrtContext *ctx) {
+    return CRT_HAS(AOV) && CRT_IN_MASK(ctx->scene->features, AOV);
+}
+
+CRT_FN vec4 crt_hero_lane(u32 lane) {
+    return make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f,
+                     lane == 3u ? 1.0f : 0.0f);
+}
+
+/* What crt_shade changes, but for the radiance. */
+CRT_FN void crt_store_vertex(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtPath *path) {
+    u32 word = path->depth | (path->alone ? 0x80000000u : 0u);
+    if (CRT_HAS(DISPERSION))
+        word |= (u32)(V4Y(path->hero) + 2.0f * V4Z(path->hero) + 3.0f * V4W(path->hero)) << 29;
+    *crt_row(wave, CRT_ROW_ORIGIN, slot) = crt_row_of(path->ray.o, crt_from_bits(word));
+    *crt_row(wave, CRT_ROW_DIRECTION, slot) = crt_row_of(path->ray.d, crt_from_bits(path->sampler.b0));
+    *crt_row(wave, CRT_ROW_THROUGHPUT, slot) = path->throughput;
+    *crt_row(wave, CRT_ROW_POINT, slot) = crt_row_of(path->p, path->scatter_pdf);
+    *crt_row(wave, CRT_ROW_REST, slot) = make_vec4(path->scatter_cosine, path->eta_square,
+                                                   path->wavelengths.u, crt_from_bits(path->absorption));
+    if (crt_has_light_tree(ctx)) *crt_row(wave, CRT_ROW_SIDE, slot) = crt_row_of(path->side, 0.0f);
+}
+
+CRT_FN void crt_store_first_hit(const CrtWave *wave, u32 slot, const CrtFirstHit *first) {
+    *crt_row(wave, CRT_ROW_ALBEDO, slot) = first->albedo;
+    *crt_row(wave, CRT_ROW_NORMAL, slot) = crt_row_of(first->normal, first->depth);
+    *crt_row(wave, CRT_ROW_PRIMITIVE, slot) = splat4(crt_from_bits(first->primitive));
+}
+
+/* The random numbers of the slot's sample, as its path left them. */
+CRT_FN CrtSampler crt_load_sampler(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    const CrtWaveShare share = crt_wave_share(wave, slot);
+    CrtSampler sampler =
+        crt_sampler_begin(scene->sampler, scene->replicate_shift, scene->seed,
+                          (scene->crop_y + share.y) * scene->film_width + scene->crop_x + share.x,
+                          wave->first_sample + share.first + wave->done[slot]);
+    if (CRT_HAS(XORSHIFT) && scene->sampler == CRT_SAMPLER_XORSHIFT)
+        sampler.b0 = crt_bits(V4W(*crt_row(wave, CRT_ROW_DIRECTION, slot)));
+    return sampler;
+}
+
+CRT_FN CrtWavelengths crt_load_wavelengths(const CrtWave *wave, u32 slot) {
+    CrtWavelengths w;
+    w.position = *crt_row(wave, CRT_ROW_WAVELENGTHS, slot);
+    w.u = V4Z(*crt_row(wave, CRT_ROW_REST, slot));
+    return w;
+}
+
+CRT_FN CrtRay crt_load_path_ray(const CrtWave *wave, u32 slot) {
+    CrtRay ray;
+    ray.o = crt_row_vector(*crt_row(wave, CRT_ROW_ORIGIN, slot));
+    ray.d = crt_row_vector(*crt_row(wave, CRT_ROW_DIRECTION, slot));
+    ray.reach = CRT_INFINITY;
+    return ray;
+}
+
+CRT_FN u32 crt_load_depth(const CrtWave *wave, u32 slot) {
+    return crt_bits(V4W(*crt_row(wave, CRT_ROW_ORIGIN, slot))) & 0x1fffffffu;
+}
+
+/* Written in place, as crt_path_begin does. */
+CRT_FN void crt_load_path(const CrtContext *ctx, const CrtWave *wave, u32 slot, CrtPath *path) {
+    const vec4 point = *crt_row(wave, CRT_ROW_POINT, slot);
+    const vec4 rest = *crt_row(wave, CRT_ROW_REST, slot);
+    const u32 word = crt_bits(V4W(*crt_row(wave, CRT_ROW_ORIGIN, slot)));
+    path->ray = crt_load_path_ray(wave, slot);
+    path->sampler = crt_load_sampler(ctx, wave, slot);
+    path->wavelengths = crt_load_wavelengths(wave, slot);
+    path->hero = crt_hero_lane(CRT_HAS(DISPERSION) ? word >> 29 & 3u : 0u);
+    path->throughput = *crt_row(wave, CRT_ROW_THROUGHPUT, slot);
+    path->radiance = *crt_row(wave, CRT_ROW_RADIANCE, slot);
+    path->scatter_pdf = V4W(point);
+    path->scatter_cosine = V4X(rest);
+    path->p = crt_row_vector(point);
+    if (crt_has_light_tree(ctx)) path->side = crt_row_vector(*crt_row(wave, CRT_ROW_SIDE, slot));
+    path->eta_square = V4Y(rest);
+    path->depth = word & 0x1fffffffu;
+    path->alone = word >> 31 != 0u;
+    path->absorption = crt_bits(V4W(rest));
+}
+
+/* Adds the sample of a path that has ended to the film. */
+CRT_FN void crt_wave_add(const CrtContext *ctx, const CrtWave *wave, u32 slot, CrtPixelWork *work) {
+    CrtPath *path = &work->path;
+    path->radiance = *crt_row(wave, CRT_ROW_RADIANCE, slot);
+    path->wavelengths = crt_load_wavelengths(wave, slot);
+    if (crt_wave_has_first_hit(ctx)) {
+        const vec4 normal = *crt_row(wave, CRT_ROW_NORMAL, slot);
+        path->first.albedo = *crt_row(wave, CRT_ROW_ALBEDO, slot);
+        path->first.normal = crt_row_vector(normal);
+        path->first.depth = V4W(normal);
+        path->first.primitive = crt_bits(V4X(*crt_row(wave, CRT_ROW_PRIMITIVE, slot)));
+    }
+    crt_add_sample(ctx, work, crt_to_xyz(ctx, path->wavelengths, path->radiance));
+}
+
+/* Adds the sample that has ended, unless this is the first pass, and begins the slot's next one. Returns 0
+   when there is none. */
+CRT_FN int crt_wave_next_sample(const CrtContext *ctx, const CrtWave *wave, u32 slot, int first_pass) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    const CrtWaveShare share = crt_wave_share(wave, slot);
+    const u64 film = (u64)share.slice * scene->width * scene->height;
+    if (share.count == 0u) {
+        wave->state[slot] = CRT_WAVE_DONE;
+        return 0;
+    }
+    CrtPixelWork work = crt_pixel_begin(
+        ctx, share.x, share.y, wave->first_sample + share.first, share.count,
+        wave->sums + film * scene->channels * 2u, wave->counts + film,
+        wave->primitives != 0 ? wave->primitives + film : 0);
+    if (!first_pass) {
+        work.done = wave->done[slot];
+        work.valid = wave->valid[slot];
+        crt_wave_add(ctx, wave, slot, &work);
+    }
+    wave->done[slot] = work.done;
+    wave->valid[slot] = work.valid;
+    if (work.done >= share.count) {
+        crt_pixel_end(&work);
+        wave->state[slot] = CRT_WAVE_DONE;
+        return 0;
+    }
+    crt_begin_sample(ctx, &work);
+    crt_store_vertex(ctx, wave, slot, &work.path);
+    *crt_row(wave, CRT_ROW_RADIANCE, slot) = splat4(0.0f);
+    *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) = work.path.wavelengths.position;
+    if (crt_wave_has_first_hit(ctx)) crt_store_first_hit(wave, slot, &work.path.first);
+    return 1;
+}
+
+/* What a ray meets where it may pass surfaces, and *ray from behind the last that it has passed. Its random
+   numbers follow `dimension` (crt_path_vertex_passing). */
+CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, CrtRay *ray) {
+    for (u32 passed = 0u;; ++passed) {
+        CrtHit hit = crt_no_hit(ray->reach);
+        if (ray->reach > 0.0f) hit = crt_trace_closest(ctx, *ray);
+        if (hit.slot == CRT_NONE || passed >= CRT_PASSES_MAX ||
+            !crt_passes(ctx, hit, sampler, dimension + passed, ray))
+            return hit;
+    }
+}
+
+CRT_FN int crt_wave_passable(const CrtContext *ctx) {
+    return CRT_HAS(OPACITY) && ctx->scene->compositions.count != 0u;
+}
+
+/* Where the random numbers of surfaces that the path's ray passes begin; its shadow ray's follow. */
+CRT_FN u32 crt_passing_dimension(u32 depth) { return CRT_DIM_PASS + 2u * CRT_PASSES_MAX * depth; }
+
+/* Numbers of a state that were taken while tracing. */
+CRT_FN void crt_store_xorshift(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtSampler *s) {
+    if (!CRT_HAS(XORSHIFT) || ctx->scene->sampler != CRT_SAMPLER_XORSHIFT) return;
+    CRT_GLOBAL vec4 *row = crt_row(wave, CRT_ROW_DIRECTION, slot);
+    *row = crt_row_of(crt_row_vector(*row), crt_from_bits(s->b0));
+}
+
+/* Traces the shadow ray that a slot waits for, and adds its light where nothing stops it. */
+CRT_FN void crt_wave_answer(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state,
+                            CrtRayCount *rays) {
+    const vec4 origin = *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot);
+    CrtRay ray;
+    ray.o = crt_row_vector(origin);
+    ray.d = crt_row_vector(*crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot));
+    ray.reach = V4W(origin);
+    int blocked = 0;
+    if (ray.reach > 0.0f) {
+        rays->shadow += 1u;
+        if (crt_wave_passable(ctx)) {
+            /* The vertex that asked: crt_shade has counted it where the path goes on. */
+            const u32 depth = crt_load_depth(wave, slot) - (state & CRT_WAVE_ENDED ? 0u : 1u);
+            CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
+            blocked = crt_trace_passing(ctx, &sampler, crt_passing_dimension(depth) + CRT_PASSES_MAX, &ray)
+                          .slot != CRT_NONE;
+            crt_store_xorshift(ctx, wave, slot, &sampler);
+        } else {
+            blocked = crt_trace_any(ctx, ray);
+        }
+    }
+    CRT_GLOBAL vec4 *radiance = crt_row(wave, CRT_ROW_RADIANCE, slot);
+    if (!blocked) *radiance = *radiance + *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot);
+}
+
+/* Traces the ray of the slot's path to its next vertex. */
+CRT_FN CrtHit crt_wave_closest(const CrtContext *ctx, const CrtWave *wave, u32 slot, CrtRayCount *rays) {
+    CrtRay ray = crt_load_path_ray(wave, slot);
+    rays->closest += 1u;
+    CrtHit hit;
+    if (crt_wave_passable(ctx)) {
+        const vec3 o = ray.o;
+        CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
+        hit = crt_trace_passing(ctx, &sampler, crt_passing_dimension(crt_load_depth(wave, slot)), &ray);
+        crt_store_xorshift(ctx, wave, slot, &sampler);
+        hit.t = hit.t + dot3(ray.o - o, ray.d); /* from where the path's ray began */
+    } else {
+        hit = crt_trace_closest(ctx, ray);
+    }
+    *crt_row(wave, CRT_ROW_HIT, slot) = make_vec4(hit.t, hit.b1, hit.b2, crt_from_bits(hit.slot));
+    *crt_row(wave, CRT_ROW_HIT_IDS, slot) =
+        make_vec4(crt_from_bits(hit.id), crt_from_bits(CRT_HAS(INSTANCES) ? hit.instance : 0u), 0.0f, 0.0f);
+    return hit;
+}
+
+CRT_FN u32 crt_queue_of_material(const CrtContext *ctx, const CrtWave *wave, u32 material) {
+    return wave->queue_of_kind[CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].type];
+}
+
+/* Who shades what a ray has met. */
+CRT_FN u32 crt_queue_of(const CrtContext *ctx, const CrtWave *wave, CrtHit hit) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    if (hit.slot == CRT_NONE) return wave->queue_of_miss;
+    const u32 material =
+        CRT_ARRAY(CrtPrimitive, ctx->blob, scene->primitives)[crt_primitive_of(ctx, hit)].material;
+    if (CRT_HAS(MIX) && scene->compositions.count != 0u &&
+        crt_compositions(ctx)[material].kind != CRT_COMPOSED_PLAIN)
+        return wave->queue_of_mix;
+    return crt_queue_of_material(ctx, wave, material);
+}
+
+/* One slot in one pass: its shadow ray, then the ray of its path or, where that has ended, of its next
+   sample. Returns the queue that it belongs to, or CRT_NONE. *finished: its last sample is done. */
+CRT_FN u32 crt_wave_trace(const CrtContext *ctx, const CrtWave *wave, u32 slot, int first_pass,
+                          CrtRayCount *rays, u32 *finished) {
+    const u32 state = first_pass ? CRT_WAVE_ENDED : wave->state[slot];
+    if ((state & CRT_WAVE_DONE) != 0u) return CRT_NONE;
+    if ((state & CRT_WAVE_ASKED) != 0u) crt_wave_answer(ctx, wave, slot, state, rays);
+    if ((state & CRT_WAVE_ENDED) != 0u && !crt_wave_next_sample(ctx, wave, slot, first_pass)) {
+        *finished = 1u;
+        return CRT_NONE;
+    }
+    const u32 queue = crt_queue_of(ctx, wave, crt_wave_closest(ctx, wave, slot, rays));
+    if (queue == CRT_NONE) wave->state[slot] = CRT_WAVE_ENDED;
+    return queue;
+}
+
+CRT_FN CrtHit crt_load_hit(const CrtWave *wave, u32 slot) {
+    const vec4 found = *crt_row(wave, CRT_ROW_HIT, slot), ids = *crt_row(wave, CRT_ROW_HIT_IDS, slot);
+    CrtHit hit;
+    hit.t = V4X(found);
+    hit.b1 = V4Y(found);
+    hit.b2 = V4Z(found);
+    hit.slot = crt_bits(V4W(found));
+    hit.id = crt_bits(V4X(ids));
+    hit.instance = crt_bits(V4Y(ids));
+    return hit;
+}
+
+/* The queue of the material that the slot's path finds of a mix: crt_shade will find the same one. */
+CRT_FN u32 crt_wave_choose(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
+    const CrtSurface surface = crt_surface(ctx, crt_load_hit(wave, slot));
+    CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
+    const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * crt_load_depth(wave, slot);
+    const u32 material = crt_chosen_material(ctx, &surface, crt_load_path_ray(wave, slot).d, &sampler,
+                                             dimension + CRT_DIM_MIX);
+    return crt_queue_of_material(ctx, wave, material);
+}
+
+/* Shades what the slot's path has met. */
+CRT_FN void crt_wave_shade(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
+    CrtPath path;
+    CrtShadow shadow;
+    crt_load_path(ctx, wave, slot, &path);
+    const CrtHit hit = crt_load_hit(wave, slot);
+    const int first = crt_wave_has_first_hit(ctx) && path.depth == 0u && hit.slot != CRT_NONE;
+    const int alive = crt_shade(ctx, &path, hit, &shadow);
+    u32 state = alive ? 0u : CRT_WAVE_ENDED;
+    *crt_row(wave, CRT_ROW_RADIANCE, slot) = path.radiance;
+    if (alive) crt_store_vertex(ctx, wave, slot, &path);
+    if (first) crt_store_first_hit(wave, slot, &path.first);
+    if (CRT_HAS(NEE) && shadow.asked) {
+        state |= CRT_WAVE_ASKED;
+        *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot) = crt_row_of(shadow.ray.o, shadow.ray.reach);
+        *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot) = crt_row_of(shadow.ray.d, 0.0f);
+        *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot) = shadow.radiance;
+        /* What its ray takes of a state's numbers follows what the vertex took. */
+        if (CRT_HAS(OPACITY) && !alive) crt_store_xorshift(ctx, wave, slot, &path.sampler);
+    }
+    wave->state[slot] = state;
+}
+
+CRT_KERNEL_END
+
+#endif

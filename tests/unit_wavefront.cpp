@@ -1,0 +1,143 @@
+// Which scenes a GPU renders in waves, and which kernels those need.
+#include "backend/sdk/gpu_schedule.h"
+#include "compiled_scenes.h"
+
+#ifdef CRT_HAVE_CUDA_PROGRAM
+#include "cuda_wavefront.h"
+#endif
+
+#include <algorithm>
+#include <set>
+
+using namespace compile_test;
+using crt::wantsWavefront;
+
+TEST_CASE("waves are for several kinds of material in a tree, and for long ones", "[wavefront]") {
+    constexpr std::uint64_t one = CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE;
+    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_BRUTE_FORCE));
+    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_BVH));
+    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_BRUTE_FORCE));
+    CHECK(wantsWavefront(one | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_BVH));
+    for (const std::uint64_t lengthy :
+         {CRT_FEATURE_ROUGH_CONDUCTOR, CRT_FEATURE_ROUGH_DIELECTRIC, CRT_FEATURE_PLASTIC,
+          CRT_FEATURE_CLEARCOAT, CRT_FEATURE_FUZZ, CRT_FEATURE_ROUGH_BASE, CRT_FEATURE_THIN_FILM}) {
+        CHECK(wantsWavefront(one | lengthy | CRT_FEATURE_BRUTE_FORCE));
+        // A view is no path.
+        CHECK_FALSE(wantsWavefront(one | lengthy | CRT_FEATURE_VIEW));
+    }
+    CHECK_FALSE(wantsWavefront(CRT_FEATURES_ALL));
+}
+
+#ifdef CRT_HAVE_CUDA_PROGRAM
+
+using crt::cuda::Entry;
+using crt::cuda::KernelSpec;
+using crt::cuda::planWave;
+using crt::cuda::WavePlan;
+
+namespace {
+
+/// The floor is of material 0; the others are there, though nothing is made of them.
+crt::Scene sceneOf(const std::vector<crt::MaterialType>& types) {
+    crt::Scene scene = litFloor();
+    scene.materials.resize(types.size(), scene.materials[0]);
+    for (std::size_t i = 0; i < types.size(); ++i) scene.materials[i].type = types[i];
+    crt::Mesh floor = scene.meshes[0];
+    for (std::size_t i = 1; i < types.size(); ++i) {
+        for (crt::Vec3d& p : floor.positions) p[1] -= 0.1;
+        scene.meshes.push_back(floor);
+        crt::Object object = scene.objects[0];
+        object.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+        object.material = static_cast<std::uint32_t>(i);
+        scene.objects.push_back(object);
+    }
+    return scene;
+}
+
+}  // namespace
+
+TEST_CASE("each kind of material has a shader that holds no other kind", "[wavefront]") {
+    const CompiledScene c = compiled(
+        sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Mirror, crt::MaterialType::Diffuse}));
+    const WavePlan plan = planWave(c.data());
+    REQUIRE(plan.kernels.size() == 3);
+    CHECK(plan.kernels[0] == KernelSpec{Entry::Trace, c.features});
+    REQUIRE(plan.queues() == 2);
+    for (const std::uint32_t kind : {CRT_MATERIAL_DIFFUSE, CRT_MATERIAL_MIRROR}) {
+        const std::uint64_t bit = std::uint64_t{1} << kind;
+        const std::uint32_t queue = plan.queue_of_kind[kind];
+        REQUIRE(queue < plan.queues());
+        CHECK(plan.kernels[queue + 1] ==
+              KernelSpec{Entry::Shade, (c.features & ~std::uint64_t{CRT_FEATURES_MATERIALS}) | bit});
+    }
+    CHECK(plan.queue_of_kind[CRT_MATERIAL_DIFFUSE] != plan.queue_of_kind[CRT_MATERIAL_MIRROR]);
+    // There is no mix, and nothing shines from outside.
+    CHECK(plan.queue_of_mix == CRT_NONE);
+    CHECK(plan.queue_of_miss == CRT_NONE);
+}
+
+TEST_CASE("a material that nothing is made of has no shader", "[wavefront]") {
+    crt::Scene scene = sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Mirror});
+    scene.materials.push_back(scene.materials[0]);
+    scene.materials.back().type = crt::MaterialType::Plastic;
+    const CompiledScene c = compiled(scene);
+    const WavePlan plan = planWave(c.data());
+    CHECK(plan.queues() == 2);
+    for (const KernelSpec& kernel : plan.kernels) CHECK((kernel.features & ~c.features) == 0);
+}
+
+TEST_CASE("a shader holds the film that its kind has, and not that of another", "[wavefront]") {
+    crt::Scene scene =
+        sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Conductor, crt::MaterialType::Dielectric});
+    scene.materials[1].eta = crt::constantSpectrum(0.2);
+    scene.materials[1].k = crt::constantSpectrum(3);
+    scene.materials[2].eta = crt::constantSpectrum(1.5);
+    scene.materials[1].film_thickness_nm = 300;
+    const CompiledScene c = compiled(scene);
+    REQUIRE((c.features & CRT_FEATURE_THIN_FILM) != 0);
+    const WavePlan plan = planWave(c.data());
+    const auto featuresOf = [&](std::uint32_t kind) {
+        return plan.kernels[plan.queue_of_kind[kind] + 1].features;
+    };
+    CHECK((featuresOf(CRT_MATERIAL_CONDUCTOR) & CRT_FEATURE_THIN_FILM) != 0);
+    CHECK((featuresOf(CRT_MATERIAL_DIELECTRIC) & CRT_FEATURE_THIN_FILM) == 0);
+    CHECK((featuresOf(CRT_MATERIAL_DIFFUSE) & CRT_FEATURE_THIN_FILM) == 0);
+}
+
+TEST_CASE("a mix goes to the queues of what it is made of", "[wavefront]") {
+    crt::Scene scene =
+        sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Mirror, crt::MaterialType::Mix});
+    scene.materials[2].parts = {0, 1};
+    const CompiledScene c = compiled(scene);
+    REQUIRE((c.features & CRT_FEATURE_MIX) != 0);
+    const WavePlan plan = planWave(c.data());
+    REQUIRE(plan.queues() == 3);
+    CHECK(plan.queue_of_mix == 2);
+    CHECK(plan.kernels.back().entry == Entry::Choose);
+    for (const KernelSpec& kernel : plan.kernels)
+        if (kernel.entry == Entry::Shade)
+            CHECK((kernel.features & CRT_FEATURES_MATERIALS) != CRT_FEATURES_MATERIALS);
+}
+
+TEST_CASE("what meets nothing is shaded where something shines there, without any material", "[wavefront]") {
+    crt::Scene scene = sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Mirror});
+    scene.environment.emplace();
+    scene.environment->radiance = crt::constantSpectrum(1);
+    const CompiledScene c = compiled(scene);
+    REQUIRE((c.features & CRT_FEATURE_ENVIRONMENT) != 0);
+    const WavePlan plan = planWave(c.data());
+    REQUIRE(plan.queue_of_miss < plan.queues());
+    CHECK((plan.kernels[plan.queue_of_miss + 1].features & CRT_FEATURES_MATERIALS) == 0);
+    CHECK((plan.kernels[plan.queue_of_miss + 1].features & CRT_FEATURE_ENVIRONMENT) != 0);
+}
+
+TEST_CASE("no two queues are one, and there is room for all", "[wavefront]") {
+    std::vector<crt::MaterialType> types;
+#define CRT_TYPE(F, bit, NAME, Name, word, scatter, text) types.push_back(crt::MaterialType::Name);
+    CRT_MATERIAL_LIST(CRT_TYPE, )
+#undef CRT_TYPE
+    // One of each kind, a mix, and misses.
+    CHECK(types.size() + 2 <= CRT_WAVE_QUEUES);
+}
+
+#endif
