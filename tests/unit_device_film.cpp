@@ -7,12 +7,14 @@
 #include "render/device_film.h"
 #include "render/sampling.h"
 #include "render/session.h"
+#include "same_film.h"
 #include "scene/yaml/scene_yaml.h"
 
 #include <cstdlib>
 #include <string>
 
 using namespace crt;
+using crt::test::checkSame;
 
 namespace {
 
@@ -63,13 +65,6 @@ Film filmOfOne(std::uint64_t samples) {
     one.devices.render({.sample_count = samples});
     if (limit != nullptr) ::setenv("CRT_FAKE_MEMORY", memory.c_str(), 1);
     return one.film();
-}
-
-void checkSame(const Film& film, const Film& expected) {
-    CHECK(film.samples.text() == expected.samples.text());
-    CHECK(film.sums == expected.sums);
-    CHECK(film.counts == expected.counts);
-    CHECK(film.primitives == expected.primitives);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "fake_plugins/fake_pattern.h"
 #include "render/sampling.h"
 #include "render/session.h"
+#include "same_film.h"
 #include "scene/yaml/scene_yaml.h"
 
 #include <cstdlib>
@@ -14,6 +15,7 @@
 #include <vector>
 
 using namespace crt;
+using crt::test::checkSame;
 
 namespace {
 
@@ -60,13 +62,6 @@ Film filmOfOne(std::uint64_t samples) {
     Group one("");
     one.devices.render({.sample_count = samples});
     return one.film();
-}
-
-void checkSame(const Film& film, const Film& expected) {
-    CHECK(film.samples.text() == expected.samples.text());
-    CHECK(film.sums == expected.sums);
-    CHECK(film.counts == expected.counts);
-    CHECK(film.primitives == expected.primitives);
 }
 
 }  // namespace

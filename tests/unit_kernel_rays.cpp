@@ -313,6 +313,25 @@ TEST_CASE("patches of two triangles find what the plain loop finds, bit by bit",
     CHECK(pairs * 10 > patches * 9);
 }
 
+namespace {
+
+/// Towards a triangle, from a place in its plane, beside it or on it, and off the plane by what lies on both
+/// sides of the rounding of heights. False where the triangle has no plane.
+bool rayNearPlane(const CrtTriangle& target, Random& random, CrtRay* ray) {
+    const Vec3d a = toDouble(vertexOf(target, 0)), b = toDouble(vertexOf(target, 1)),
+                c = toDouble(vertexOf(target, 2));
+    const Vec3d normal = cross(minus(b, a), minus(c, a));
+    if (!(length(normal) > 0)) return false;
+    const double u = random.uniform(-2, 3), v = random.uniform(-2, 3);
+    const double height = std::pow(10.0, random.uniform(-7.5, -5.7)) * (random.bits() & 1 ? 1 : -1);
+    const Vec3d in_plane = plus(a, plus(times(minus(b, a), u), times(minus(c, a), v)));
+    const vec3 o = toFloat(plus(in_plane, times(unit(normal), height)));
+    *ray = rayOf(o, unitFloat(minus(toDouble(aimAt(target, 2, random)), toDouble(o))));
+    return true;
+}
+
+}  // namespace
+
 TEST_CASE("patches refuse no hit of a ray that starts within rounding of a triangle's plane",
           "[kernel][rays]") {
     Random random(30);
@@ -324,16 +343,8 @@ TEST_CASE("patches refuse no hit of a ray that starts within rounding of a trian
         const auto* triangles = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles);
         const auto* patches = CRT_ARRAY(CrtPatch, ctx.blob, ctx.scene->patches);
         for (int i = 0; i < 20000; ++i) {
-            const CrtTriangle& target = triangles[random.below(ctx.scene->triangle_count)];
-            const Vec3d a = toDouble(vertexOf(target, 0)), b = toDouble(vertexOf(target, 1)),
-                        c = toDouble(vertexOf(target, 2));
-            const Vec3d normal = cross(minus(b, a), minus(c, a));
-            if (!(length(normal) > 0)) continue;
-            const double u = random.uniform(-2, 3), v = random.uniform(-2, 3);
-            const double height = std::pow(10.0, random.uniform(-7.5, -5.7)) * (random.bits() & 1 ? 1 : -1);
-            const Vec3d in_plane = plus(a, plus(times(minus(b, a), u), times(minus(c, a), v)));
-            const vec3 o = toFloat(plus(in_plane, times(unit(normal), height)));
-            const CrtRay ray = rayOf(o, unitFloat(minus(toDouble(aimAt(target, 2, random)), toDouble(o))));
+            CrtRay ray;
+            if (!rayNearPlane(triangles[random.below(ctx.scene->triangle_count)], random, &ray)) continue;
             const CrtShear shear = crt_shear(ray);
             const CrtPatchSlack slack = crt_patch_slack(ray);
             for (u32 k = 0; k < ctx.scene->patches.count; ++k) {
@@ -386,20 +397,10 @@ TEST_CASE(
         const auto* triangles = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles);
         const auto* blocks = CRT_ARRAY(CrtTriangle8, ctx.blob, ctx.scene->triangles8);
         for (int i = 0; i < 50000; ++i) {
-            const CrtTriangle& target = triangles[random.below(ctx.scene->triangle_count)];
-            const Vec3d a = toDouble(vertexOf(target, 0)), b = toDouble(vertexOf(target, 1)),
-                        c = toDouble(vertexOf(target, 2));
-            const Vec3d normal = cross(minus(b, a), minus(c, a));
-            if (!(length(normal) > 0)) continue;
-            // In the plane, beside the triangle or on it, and off it by what lies on both sides of the
-            // rounding of heights.
-            const double u = random.uniform(-2, 3), v = random.uniform(-2, 3);
-            const double height = std::pow(10.0, random.uniform(-7.5, -5.7)) * (random.bits() & 1 ? 1 : -1);
-            const Vec3d in_plane = plus(a, plus(times(minus(b, a), u), times(minus(c, a), v)));
-            const vec3 o = toFloat(plus(in_plane, times(unit(normal), height)));
-            const CrtRay ray = rayOf(o, unitFloat(minus(toDouble(aimAt(target, 2, random)), toDouble(o))));
+            CrtRay ray;
+            if (!rayNearPlane(triangles[random.below(ctx.scene->triangle_count)], random, &ray)) continue;
             const CrtShear shear = crt_shear(ray);
-            const f32 slack = crt_candidate_slack(o);
+            const f32 slack = crt_candidate_slack(ray.o);
             for (u32 block = 0; block < ctx.scene->triangles8.count; ++block) {
                 const u32 lanes = crt_candidates8(blocks + block, ray, slack, CRT_INFINITY);
                 for (u32 lane = 0; lane < 8; ++lane) {
