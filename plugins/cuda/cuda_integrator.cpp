@@ -97,7 +97,11 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     } else if (kernel_choice_ != CRT_KERNEL_FULL) {
         wanted = {{Entry::Render, scene.features}};
     }
-    pacer_ = pacerFor(wavefront_.has_value());
+    // What it has learnt holds for the next scene, too, or for the next band of a film.
+    if (paced_for_waves_ != wavefront_.has_value()) {
+        paced_for_waves_ = wavefront_.has_value();
+        pacer_ = pacerFor(paced_for_waves_);
+    }
     if (!program_ || program_->wanted() != wanted) {
         if (program_) {
             compile_seconds_ += program_->compileSeconds();

@@ -59,6 +59,7 @@ private:
     CrtKernelChoice kernel_choice_;
     std::uint32_t tile_size_;
     LaunchPacer pacer_;
+    bool paced_for_waves_ = false;
 
     std::unique_ptr<CudaProgram> program_;
     std::optional<Wavefront> wavefront_;  ///< Where the scene wants it.
