@@ -153,7 +153,7 @@ int run(int argc, char** argv) {
         const KernelSpec spec{static_cast<Entry>(key.first), key.second};
         const std::string entry = crt::cuda::entryName(spec.entry);
         const auto start = std::chrono::steady_clock::now();
-        // The one with everything in is compiled ahead of time, for three blocks (plugins/cuda/CMakeLists.txt).
+        // The one with everything in is compiled ahead of time, for three blocks (its CMakeLists.txt).
         const crt::cuda::Cubin cubin =
             spec.features == CRT_FEATURES_ALL
                 ? nvrtc.compile(text, "wavefront.h", crt::cuda::nvrtcOptions(arch, spec, 3))
