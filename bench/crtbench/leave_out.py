@@ -128,10 +128,14 @@ def measure(program, arguments):
     if base is None:
         results.paragraph(f"Not measured: {compiler}.")
     else:
-        by_scene = {s: next(v for v in base if int(v["mask"], 16) == file_masks[s]) for s in scenes}
+        # Of a scene that is rendered in waves, the kernel that traces.
+        whole = [v for v in base if v["kernel"] in ("crt_render", "crt_trace")]
+        by_scene = {s: next(v for v in whole if int(v["mask"], 16) == file_masks[s]) for s in scenes}
         full = next(v for v in base if v["name"] == "everything")
         data["nvrtc"] = {"compiler": compiler, "full": full, "scenes": by_scene}
-        results.paragraph(f"{compiler}, `crt_render`, with the AOVs of the scene's file.")
+        results.paragraph(
+            f"{compiler}, `crt_render` or, of waves, `crt_trace`, with the AOVs of the scene's file."
+        )
         results.table(
             ["kernel", "mask", "registers", "stack, bytes", "spilled, bytes", "CUBIN, kB", "ms to compile"],
             [

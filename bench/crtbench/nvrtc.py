@@ -15,7 +15,7 @@ def find(program):
 
 
 def variants(program, scenes, environment=None, only=False):
-    """(compiler, [variant]) for the masks of the scenes and, unless `only`, the representative ones; (why
+    """(compiler, [variant]) for the kernels of the scenes and, unless `only`, the representative ones; (why
     not, None) where NVRTC is missing."""
     tool = find(program)
     if tool is None:
@@ -34,13 +34,16 @@ def variants(program, scenes, environment=None, only=False):
 def parsed(output):
     head = re.match(r"(.*), (sm_\d+), \d+ variants", output)
     rows = re.findall(
-        r"^\s*(\d+)\s+(\d+)\s+(\d+)\s+([\d.]+)\s+([\d.]+)\s+(0x[0-9a-f]+) (.*)$", output, re.MULTILINE
+        r"^\s*(\d+)\s+(\d+)\s+(\d+)\s+([\d.]+)\s+([\d.]+)\s+(crt_\w+)\s+(0x[0-9a-f]+) (.*)$",
+        output,
+        re.MULTILINE,
     )
     if not head or not rows:
         raise Failure(f"nvrtc_variants prints something new:\n{output[:500]}")
     return f"{head[1]}, {head[2]}", [
         {
-            "mask": mask,
+            "kernel": kernel,
+            "mask": hex(int(mask, 16)),
             "name": name,
             "registers": int(registers),
             "stack": int(stack),
@@ -48,5 +51,5 @@ def parsed(output):
             "cubin_kb": float(size),
             "ms": float(ms),
         }
-        for registers, stack, spill, size, ms, mask, name in rows
+        for registers, stack, spill, size, ms, kernel, mask, name in rows
     ]

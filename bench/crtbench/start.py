@@ -196,15 +196,16 @@ def measure(program, arguments):
         samples = {}
         for run in kept:
             for v in parsed(run.output)[1]:
-                samples.setdefault((v["mask"], v["name"]), []).append(v)
+                samples.setdefault((v["kernel"], v["mask"], v["name"]), []).append(v)
         rows = []
-        for (mask, title), all_runs in samples.items():
+        for (kernel, mask, title), all_runs in samples.items():
             ms = Spread(v["ms"] for v in all_runs)
             first = all_runs[0]
-            nvrtc[mask] = {**first, "ms": ms.json()}
+            nvrtc[f"{kernel} {mask}"] = {**first, "ms": ms.json()}
             rows.append(
                 [
                     title,
+                    f"`{kernel}`",
                     f"`{mask}`",
                     ms.text(),
                     first["registers"],
@@ -219,7 +220,8 @@ def measure(program, arguments):
             "least and the most."
         )
         results.table(
-            ["variant", "mask", "ms", "registers", "stack, bytes", "spilled, bytes", "CUBIN, kB"], rows
+            ["variant", "kernel", "mask", "ms", "registers", "stack, bytes", "spilled, bytes", "CUBIN, kB"],
+            rows,
         )
     results.not_measured({**absent, **gpu_absent})
     results.command(
