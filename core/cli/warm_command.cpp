@@ -22,11 +22,11 @@ struct State {
     IntegratorOptions integrator{};
 };
 
-/// How the backend came by its kernel.
+/// How the backend came by its kernels.
 std::string kernelText(const CrtBackendReport& report) {
-    if (report.kernel_from_cache != 0) return "was in the cache";
-    if (report.compile_seconds > 0) return fmt::format("was compiled in {:.1f} s", report.compile_seconds);
-    return "needs no compiling";
+    if (report.kernel_from_cache != 0) return "from the cache";
+    if (report.compile_seconds > 0) return fmt::format("compiled in {:.1f} s", report.compile_seconds);
+    return "nothing to compile";
 }
 
 /// One sample of one pixel: what is compiled for it serves the scene in every size.
@@ -38,7 +38,7 @@ std::string warm(const State& state, const std::string& file) {
     Session session(state.backend, state.integrator);
     (void)renderFilm(session, scene, {.samples = 1, .aovs = requestedAovs(scene)});
     const CrtBackendReport report = session.report();
-    return fmt::format("{}: {} on {}: {}, which {}\n", file, session.backend().name,
+    return fmt::format("{}: {} on {}: {}, {}\n", file, session.backend().name,
                        arrayText(report.device), arrayText(report.kernel), kernelText(report));
 }
 

@@ -187,7 +187,7 @@ class Warm(CliTest):
         lines = sorted(run.stdout.splitlines())
         self.assertEqual([line.split(":")[0] for line in lines], ["other.yaml", "scene.yaml"])
         for line in lines:
-            self.assertRegex(line, r": fake on .+, which needs no compiling$")
+            self.assertRegex(line, r": fake on .+, nothing to compile$")
         self.assertEqual(sorted(os.listdir(self.directory)), ["other.yaml", "scene.yaml"])
 
     def test_a_scene_that_is_not_there(self):
