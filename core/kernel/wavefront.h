@@ -69,6 +69,25 @@ typedef struct CrtWave {
 } CrtWave;
 CRT_ASSERT_SIZE(CrtWave, 264);
 
+/* Words of 4 bytes that so many slots and queues take beside the rows. */
+#define CRT_WAVE_WORDS(slots, queues) ((slots) * (3u + (queues)) + 2u * CRT_WAVE_QUEUES + 1u)
+
+/* How many slots the wave's pixels and slices make, and where all that is kept of them begins. The host
+   calls. */
+CRT_FN void crt_wave_lay_out(CrtWave *wave, u32 queues, CRT_GLOBAL vec4 *rows, CRT_GLOBAL u32 *words) {
+    const u32 across = (wave->x1 - wave->x0 + CRT_WAVE_BLOCK_WIDTH - 1u) / CRT_WAVE_BLOCK_WIDTH;
+    const u32 down = (wave->y1 - wave->y0 + CRT_WAVE_BLOCK_HEIGHT - 1u) / CRT_WAVE_BLOCK_HEIGHT;
+    wave->blocks_per_slice = across * down;
+    wave->slots = wave->blocks_per_slice * wave->slices * CRT_WAVE_BLOCK;
+    wave->rows = rows;
+    wave->state = words;
+    wave->done = wave->state + wave->slots;
+    wave->valid = wave->done + wave->slots;
+    wave->queued = wave->valid + wave->slots;
+    wave->lengths = wave->queued + (u64)queues * wave->slots;
+    wave->finished = wave->lengths + 2u * CRT_WAVE_QUEUES;
+}
+
 /* Which samples of which pixel a slot takes. */
 typedef struct CrtWaveShare {
     u32 x, y, slice;

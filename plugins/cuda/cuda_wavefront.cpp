@@ -14,10 +14,6 @@ namespace {
 
 /// Slots of a wave: enough to fill any GPU many times over.
 constexpr std::uint64_t kMostSlots = std::uint64_t{1} << 22;
-/// Of each slot: its state, its samples so far, and the finite ones of these.
-constexpr std::uint64_t kWordsPerSlot = 3;
-/// Lengths of the queues, of even and of odd passes; how many slots are done.
-constexpr std::uint64_t kSharedWords = 2 * CRT_WAVE_QUEUES + 1;
 /// Between two looks at how many slots are done. A pass without any costs a few microseconds.
 constexpr std::uint32_t kPassesAtOnce = 4;
 
@@ -101,7 +97,8 @@ Wavefront::Wavefront(const Device& device, const void* blob)
       row_count_(CRT_WAVE_ROWS(static_cast<const kernel::CrtScene*>(blob)->features)) {}
 
 std::uint64_t Wavefront::bytesPerSlot() const {
-    return row_count_ * sizeof(kernel::vec4) + (kWordsPerSlot + plan_.queues()) * sizeof(std::uint32_t);
+    const std::uint64_t words = CRT_WAVE_WORDS(1, plan_.queues()) - CRT_WAVE_WORDS(0, plan_.queues());
+    return row_count_ * sizeof(kernel::vec4) + words * sizeof(std::uint32_t);
 }
 
 std::uint32_t Wavefront::mostSlices(std::uint64_t blocks_across) const {
@@ -126,8 +123,7 @@ std::uint64_t Wavefront::ensureSlots(std::uint64_t wanted, std::uint64_t least) 
     try {
         requireFree(wanted * bytesPerSlot(), device_, what);
         rows_ = Memory(wanted * row_count_ * sizeof(kernel::vec4), device_, what);
-        words_ = Memory((wanted * (kWordsPerSlot + plan_.queues()) + kSharedWords) * sizeof(std::uint32_t),
-                        device_, what);
+        words_ = Memory(CRT_WAVE_WORDS(wanted, plan_.queues()) * sizeof(std::uint32_t), device_, what);
     } catch (...) {
         rows_ = Memory();
         throw;
@@ -146,16 +142,8 @@ kernel::CrtWave Wavefront::waveOf(const Launch& launch, std::uint32_t slices,
     wave.first_sample = launch.first_sample;
     wave.sample_count = launch.sample_count;
     wave.slices = slices;
-    wave.blocks_per_slice = static_cast<std::uint32_t>(divideUp(launch.x1 - launch.x0, kBlockWidth) *
-                                                       divideUp(launch.y1 - launch.y0, kBlockHeight));
-    wave.slots = wave.blocks_per_slice * slices * CRT_WAVE_BLOCK;
-    wave.rows = onDevice<kernel::vec4>(rows_.address());
-    wave.state = onDevice<kernel::u32>(words_.address());
-    wave.done = wave.state + wave.slots;
-    wave.valid = wave.done + wave.slots;
-    wave.queued = wave.valid + wave.slots;
-    wave.lengths = wave.queued + std::uint64_t{plan_.queues()} * wave.slots;
-    wave.finished = wave.lengths + 2 * CRT_WAVE_QUEUES;
+    kernel::crt_wave_lay_out(&wave, plan_.queues(), onDevice<kernel::vec4>(rows_.address()),
+                             onDevice<kernel::u32>(words_.address()));
     wave.sums = onDevice<kernel::f64>(target.sums);
     wave.counts = onDevice<kernel::u64>(target.counts);
     wave.primitives = onDevice<kernel::u32>(target.primitives);
@@ -199,7 +187,7 @@ void Wavefront::runWave(const std::vector<Module>& kernels, const kernel::CrtSce
     const Driver& cuda = driver();
     const auto finished = reinterpret_cast<CUdeviceptr>(wave.finished);
     cuda.check(cuda.cuMemsetD8(reinterpret_cast<CUdeviceptr>(wave.lengths), 0,
-                               kSharedWords * sizeof(std::uint32_t)),
+                               CRT_WAVE_WORDS(0, plan_.queues()) * sizeof(std::uint32_t)),
                "clearing the queues");
     // No sample takes fewer passes than one, and the last is added in one more.
     std::uint64_t passes = divideUp(wave.sample_count, wave.slices) + 1;

@@ -11,7 +11,9 @@ Tests that mount a small disk need root and are skipped by name without it. Pyth
 import glob
 import os
 import random
+import shutil
 import subprocess
+import time
 import unittest
 
 import harness
@@ -40,6 +42,15 @@ class FakeGpuTest(CliTest):
             "CRT_CACHE_DIR": self.path("cache"),
             "CRT_FAKE_NVRTC_SECONDS": "0",
         }
+        self.addCleanup(self.remove_cache)
+
+    def remove_cache(self):
+        """A compiler that a failed render has left behind may still be writing into it."""
+        for _ in range(100):
+            shutil.rmtree(self.path("cache"), ignore_errors=True)
+            time.sleep(0.02)
+            if not os.path.exists(self.path("cache")):
+                return
 
     def render(self, image, *arguments, spp=SPP, expect=0, scene="scene.yaml", **changes):
         return self.crt(

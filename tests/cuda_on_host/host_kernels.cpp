@@ -100,13 +100,7 @@ void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t sl
 void launchWave(const void* scene_blob, const Launch& launch, std::uint32_t slices, const FilmPointers& film,
                 std::uint64_t* rays, unsigned host_threads) {
     const CrtScene scene = header(scene_blob);
-    const unsigned across = (launch.x1 - launch.x0 + CRT_WAVE_BLOCK_WIDTH - 1) / CRT_WAVE_BLOCK_WIDTH;
-    const unsigned down = (launch.y1 - launch.y0 + CRT_WAVE_BLOCK_HEIGHT - 1) / CRT_WAVE_BLOCK_HEIGHT;
-    const unsigned blocks = across * down * slices;
     constexpr u32 kShaders = 2, kQueues = 3;  // This one shader does for all; the last queue is of mixes.
-    const std::size_t slots = std::size_t{blocks} * CRT_WAVE_BLOCK;
-    std::vector<vec4> rows(slots * CRT_WAVE_ROWS(CRT_FEATURES_ALL));
-    std::vector<u32> words(slots * (3 + kQueues) + 2 * CRT_WAVE_QUEUES + 1);
     CrtWave wave{};
     wave.x0 = launch.x0;
     wave.y0 = launch.y0;
@@ -115,15 +109,11 @@ void launchWave(const void* scene_blob, const Launch& launch, std::uint32_t slic
     wave.first_sample = launch.first_sample;
     wave.sample_count = launch.sample_count;
     wave.slices = slices;
-    wave.blocks_per_slice = across * down;
-    wave.slots = static_cast<u32>(slots);
-    wave.rows = rows.data();
-    wave.state = words.data();
-    wave.done = wave.state + slots;
-    wave.valid = wave.done + slots;
-    wave.queued = wave.valid + slots;
-    wave.lengths = wave.queued + slots * kQueues;
-    wave.finished = wave.lengths + 2 * CRT_WAVE_QUEUES;
+    crt_wave_lay_out(&wave, kQueues, nullptr, nullptr);
+    std::vector<vec4> rows(std::size_t{wave.slots} * CRT_WAVE_ROWS(CRT_FEATURES_ALL));
+    std::vector<u32> words(CRT_WAVE_WORDS(std::size_t{wave.slots}, kQueues));
+    crt_wave_lay_out(&wave, kQueues, rows.data(), words.data());
+    const unsigned blocks = wave.slots / CRT_WAVE_BLOCK;
     wave.sums = film.sums;
     wave.counts = device(film.counts);
     wave.primitives = film.primitives;
@@ -131,7 +121,7 @@ void launchWave(const void* scene_blob, const Launch& launch, std::uint32_t slic
     wave.queue_of_mix = kShaders;
     wave.queue_of_miss = scene.environment == CRT_NONE && scene.point_lights.count == 0 ? CRT_NONE : 1;
     const auto* blob = static_cast<const unsigned char*>(scene_blob);
-    for (u32 pass = 0; *wave.finished < slots; ++pass) {
+    for (u32 pass = 0; *wave.finished < wave.slots; ++pass) {
         launchGrid(blocks, 1, host_threads, [&] { crt_trace(scene, wave, blob, pass); });
         launchGrid(blocks, 1, host_threads, [&] { crt_choose(scene, wave, blob, pass); });
         for (u32 queue = 0; queue < kShaders; ++queue)
