@@ -202,30 +202,33 @@ void beyondTwoToThe32(Context& context) {
 
 void grazingBoxes(Context& context) {
     // A lamp in the plane z = 1, seen along z from 5e-6 inside its edges: rays run 5e-6 within the box's
-    // side, parallel to it within 1e-6.
-    for (const auto& [edge, x, y] : {std::tuple{"right", 1 - 5e-6, 0.1},
-                                     {"left", -1 + 5e-6, 0.1},
-                                     {"upper", 0.1, 1 - 5e-6},
-                                     {"lower", 0.1, -1 + 5e-6}}) {
-        const Film film = context.render(fmt::format(R"(crt: 1
+    // side, parallel to it within 1e-6. The boxes of objects and those of a tree have tests of their own.
+    const std::pair<const char*, std::pair<double, double>> edges[] = {{"right", {1 - 5e-6, 0.1}},
+                                                                       {"left", {-1 + 5e-6, 0.1}},
+                                                                       {"upper", {0.1, 1 - 5e-6}},
+                                                                       {"lower", {0.1, -1 + 5e-6}}};
+    for (const char* accelerator : {"bvh", "aabb"})
+        for (const auto& [edge, place] : edges) {
+            const Film film = context.render(fmt::format(R"(crt: 1
 camera: {{position: [{0}, {1}, -1], target: [{0}, {1}, 1], fov: 5e-5}}
 film: {{resolution: [8, 8]}}
-integrator: {{accelerator: bvh, max_depth: 0}}
+integrator: {{accelerator: {2}, max_depth: 0}}
 materials: {{black: {{type: diffuse, reflectance: 0}}}}
 objects:
   - {{mesh: {{positions: [[-1,-1,1],[-1,1,1],[1,1,1],[1,-1,1]], faces: [[0,1,2,3]]}},
       material: black, emission: {{radiance: 1}}}}
 )",
-                                                     x, y));
-        std::uint32_t missed = 0;
-        for (std::uint32_t v = 0; v < 8; ++v)
-            for (std::uint32_t u = 0; u < 8; ++u) missed += film.mean(u, v, 1) > 0.9 ? 0 : 1;
-        context.holds(
-            fmt::format("parallel to a box within 1e-6, 5e-6 inside its {} side", edge), missed == 0,
-            "every pixel is lit",
-            "rays that run along a box's side are lost: is the reciprocal of the direction clamped?",
-            fmt::format("{} of 64 pixels dark or dim", missed));
-    }
+                                                         place.first, place.second, accelerator));
+            std::uint32_t missed = 0;
+            for (std::uint32_t v = 0; v < 8; ++v)
+                for (std::uint32_t u = 0; u < 8; ++u) missed += film.mean(u, v, 1) > 0.9 ? 0 : 1;
+            context.holds(
+                fmt::format("parallel to a box ({}) within 1e-6, 5e-6 inside its {} side", accelerator,
+                            edge),
+                missed == 0, "every pixel is lit",
+                "rays that run along a box's side are lost: is the reciprocal of the direction clamped?",
+                fmt::format("{} of 64 pixels dark or dim", missed));
+        }
 }
 
 void indexMatchedGlass(Context& context) {
