@@ -2,6 +2,8 @@
 
 #include "base/parallel.h"
 #include "base/stage.h"
+#include "compile/bvh_collapse.h"
+#include "compile/bvh_reinsert.h"
 #include "kernel/bvh.h"
 
 #include <algorithm>
@@ -22,44 +24,6 @@ constexpr std::uint32_t kLeafSize = 4;
 constexpr std::uint32_t kLargestLeaf = 15;  // what a child reference can count
 constexpr float kTraversalCost = 1.2f;      // of a box test in triangle tests; flat between 0.8 and 2
 
-struct Box {
-    std::array<float, 3> lower{std::numeric_limits<float>::infinity(),
-                               std::numeric_limits<float>::infinity(),
-                               std::numeric_limits<float>::infinity()};
-    std::array<float, 3> upper{-std::numeric_limits<float>::infinity(),
-                               -std::numeric_limits<float>::infinity(),
-                               -std::numeric_limits<float>::infinity()};
-
-    void grow(const TriangleBounds& b) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            lower[k] = std::min(lower[k], b.lower[k]);
-            upper[k] = std::max(upper[k], b.upper[k]);
-        }
-    }
-    void grow(const Box& b) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            lower[k] = std::min(lower[k], b.lower[k]);
-            upper[k] = std::max(upper[k], b.upper[k]);
-        }
-    }
-    void grow(const std::array<float, 3>& p) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            lower[k] = std::min(lower[k], p[k]);
-            upper[k] = std::max(upper[k], p[k]);
-        }
-    }
-    float halfArea() const {
-        const float x = upper[0] - lower[0], y = upper[1] - lower[1], z = upper[2] - lower[2];
-        return x < 0 ? 0.0f : x * y + y * z + z * x;
-    }
-};
-
-struct BinaryNode {
-    Box box;
-    std::uint32_t left = 0, right = 0;  // children, when count is 0
-    std::uint32_t first = 0, count = 0;
-};
-
 struct Split {
     int axis = -1;
     float position = 0;
@@ -74,7 +38,7 @@ float twiceCentroid(const TriangleBounds& b, std::size_t axis) { return b.lower[
 
 /// What is known of a range of triangles at once: its box, and the box of the centroids.
 struct Extents {
-    Box box, centroids;
+    BvhBox box, centroids;
 
     void grow(const TriangleBounds& b) {
         box.grow(b);
@@ -91,7 +55,7 @@ struct Extents {
 /// Triangles sorted into bins along the three axes, by centroid.
 class Bins {
 public:
-    explicit Bins(const Box& centroids) : lower_(centroids.lower) {
+    explicit Bins(const BvhBox& centroids) : lower_(centroids.lower) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const float extent = centroids.upper[axis] - lower_[axis];
             scale_[axis] = extent > 0 ? static_cast<float>(kBins) / extent : 0.0f;
@@ -122,14 +86,14 @@ public:
         for (std::size_t axis = 0; axis < 3; ++axis) {
             if (scale_[axis] == 0.0f) continue;
             std::array<float, kBins> right_cost{};
-            Box box;
+            BvhBox box;
             std::uint32_t count = 0;
             for (std::size_t b = kBins - 1; b > 0; --b) {
                 box.grow(boxes_[axis][b]);
                 count += counts_[axis][b];
                 right_cost[b] = static_cast<float>(count) * box.halfArea();
             }
-            box = Box{};
+            box = BvhBox{};
             count = 0;
             for (std::size_t b = 1; b < kBins; ++b) {
                 box.grow(boxes_[axis][b - 1]);
@@ -146,9 +110,12 @@ public:
 
 private:
     std::array<float, 3> lower_, scale_{};
-    std::array<std::array<Box, kBins>, 3> boxes_;
+    std::array<std::array<BvhBox, kBins>, 3> boxes_;
     std::array<std::array<std::uint32_t, kBins>, 3> counts_{};
 };
+
+/// How a tree is made: should the better one be too deep for the kernel's stack, the next.
+enum class Way { Improved, Plain, Median };
 
 /// Which way is taken depends on the number of triangles alone, never on that of threads.
 class Builder {
@@ -168,15 +135,15 @@ public:
         parallelFor(copies.size(), 1, [&](std::size_t i, std::size_t) { copy(copies[i]); });
     }
 
-    const std::vector<BinaryNode>& nodes() const { return nodes_; }
-    std::vector<std::uint32_t>& order() { return order_; }
+    BinaryTree take() { return std::move(nodes_); }
+    const std::vector<std::uint32_t>& order() const { return order_; }
 
 private:
     static constexpr int kSahDepth = 40;
 
     /// A subtree: built by one thread, or a root over two others.
     struct Tree {
-        std::vector<BinaryNode> nodes;  ///< Of one thread's; children are counted from the first.
+        BinaryTree nodes;  ///< Of one thread's; children are counted from the first.
         BinaryNode root;
         std::unique_ptr<Tree> left, right;
 
@@ -204,8 +171,7 @@ private:
                        [&] { build(middle, end, depth + 1, *tree.right); });
     }
 
-    std::uint32_t buildSerial(std::uint32_t begin, std::uint32_t end, int depth,
-                              std::vector<BinaryNode>& nodes) {
+    std::uint32_t buildSerial(std::uint32_t begin, std::uint32_t end, int depth, BinaryTree& nodes) {
         const auto index = static_cast<std::uint32_t>(nodes.size());
         nodes.emplace_back();
         const Extents extents = extentsOf(begin, end);
@@ -247,7 +213,7 @@ private:
             begin, end, Extents(), [](Extents& all, const Extents& part) { all.grow(part); },
             [](Extents& part, const TriangleBounds& b) { part.grow(b); });
     }
-    Bins binsOf(std::uint32_t begin, std::uint32_t end, const Box& centroids) const {
+    Bins binsOf(std::uint32_t begin, std::uint32_t end, const BvhBox& centroids) const {
         return gather(
             begin, end, Bins(centroids), [](Bins& all, const Bins& part) { all.add(part); },
             [](Bins& part, const TriangleBounds& b) { part.add(b); });
@@ -305,7 +271,7 @@ private:
 
     // Halves by the widest axis of the centroids; ids decide ties, so that the tree is the same on every
     // machine.
-    std::uint32_t medianSplit(std::uint32_t begin, std::uint32_t end, const Box& centroid_box) {
+    std::uint32_t medianSplit(std::uint32_t begin, std::uint32_t end, const BvhBox& centroid_box) {
         std::size_t axis = 0;
         for (std::size_t k = 1; k < 3; ++k)
             if (centroid_box.upper[k] - centroid_box.lower[k] >
@@ -334,7 +300,7 @@ private:
         place(*tree.right, nodes_[to].right, copies);
     }
     void copy(const Copy& copy) {
-        const std::vector<BinaryNode> from = std::move(copy.tree->nodes);
+        const BinaryTree from = std::move(copy.tree->nodes);
         for (std::size_t i = 0; i < from.size(); ++i) {
             BinaryNode node = from[i];
             if (node.count == 0) {
@@ -350,89 +316,20 @@ private:
     Stage& stage_;
     std::atomic<std::uint32_t> done_{0};
     std::vector<std::uint32_t> order_, scratch_;
-    std::vector<BinaryNode> nodes_;
-};
-
-class Collapser {
-public:
-    Collapser(const std::vector<BinaryNode>& binary, float padding) : binary_(binary), padding_(padding) {
-        nodes_.emplace_back();
-        if (binary_[0].count > 0)
-            writeNode(0, {0u});
-        else
-            collapse(0, 0, 1);
-    }
-    std::vector<kernel::CrtNode4> take() { return std::move(nodes_); }
-    int depth() const { return depth_; }
-
-private:
-    void collapse(std::uint32_t binary_node, std::uint32_t target, int depth) {
-        depth_ = std::max(depth_, depth);
-        if (depth > kMaxBvhDepth) return;  // the caller sees depth() and builds again with median splits
-        std::vector<std::uint32_t> children{binary_[binary_node].left, binary_[binary_node].right};
-        while (children.size() < 4) {
-            // Open the inner child that rays enter most.
-            auto widest = children.end();
-            for (auto c = children.begin(); c != children.end(); ++c)
-                if (binary_[*c].count == 0 && (widest == children.end() ||
-                                               binary_[*c].box.halfArea() > binary_[*widest].box.halfArea()))
-                    widest = c;
-            if (widest == children.end()) break;
-            const std::uint32_t opened = *widest;
-            *widest = binary_[opened].left;
-            children.push_back(binary_[opened].right);
-        }
-        const auto references = writeNode(target, children);
-        for (std::size_t i = 0; i < children.size(); ++i)
-            if (binary_[children[i]].count == 0) collapse(children[i], references[i], depth + 1);
-    }
-
-    std::array<std::uint32_t, 4> writeNode(std::uint32_t target,
-                                           const std::vector<std::uint32_t>& children) {
-        kernel::CrtNode4 node{};
-        std::array<std::uint32_t, 4> references{};
-        for (std::size_t c = 0; c < 4; ++c) {
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                node.bounds[2 * axis][c] = std::numeric_limits<float>::infinity();
-                node.bounds[2 * axis + 1][c] = -std::numeric_limits<float>::infinity();
-            }
-            if (c >= children.size()) continue;
-            const BinaryNode& child = binary_[children[c]];
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                node.bounds[2 * axis][c] = child.box.lower[axis] - padding_;
-                node.bounds[2 * axis + 1][c] = child.box.upper[axis] + padding_;
-            }
-            if (child.count > 0) {
-                node.child[c] = child.first << 4 | child.count;
-            } else {
-                references[c] = static_cast<std::uint32_t>(nodes_.size());
-                node.child[c] = references[c] << 4;
-                nodes_.emplace_back();
-            }
-        }
-        nodes_[target] = node;
-        return references;
-    }
-
-    const std::vector<BinaryNode>& binary_;
-    float padding_;
-    std::vector<kernel::CrtNode4> nodes_;
-    int depth_ = 1;
+    BinaryTree nodes_;
 };
 
 }  // namespace
 
 Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding, const std::string& what) {
     Stage stage(what, static_cast<double>(triangles.size()));
-    for (const bool median_only : {false, true}) {
-        Builder builder(triangles, median_only, stage);
-        Collapser collapser(builder.nodes(), padding);
-        if (collapser.depth() > kMaxBvhDepth) continue;
-        Bvh bvh;
-        bvh.depth = collapser.depth();
-        bvh.nodes = collapser.take();
-        bvh.order = std::move(builder.order());
-        return bvh;
+    for (const Way way : {Way::Improved, Way::Plain, Way::Median}) {
+        Builder builder(triangles, way == Way::Median, stage);
+        BinaryTree tree = builder.take();
+        if (way == Way::Improved) reinsert(tree);
+        WideTree wide = collapse(tree, builder.order(), padding, kMaxBvhDepth);
+        if (wide.depth > kMaxBvhDepth) continue;
+        return {std::move(wide.nodes), std::move(wide.order), wide.depth};
     }
     return {};  // a median tree of 2^31 triangles has 31 levels
 }

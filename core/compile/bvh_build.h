@@ -1,5 +1,5 @@
-/// Four-wide BVH over triangles: binned SAH into a binary tree, then collapsed. Built once at load, on the
-/// host.
+/// Four-wide BVH over triangles: binned SAH into a binary tree, which is improved and made wide. Built once
+/// at load, on the host.
 #pragma once
 
 #include "kernel/layout.h"
