@@ -11,6 +11,7 @@ from .results import Results
 
 SCENES = ["cornell_box", "cornell_dragon", "cornell_glass"]
 NO_AOVS = "outputs.0.aovs=[]"   # AOVs are a feature among others.
+ROWS_OF_WAVES = {"AOV", "LIGHT_TREE"}   # Features for which the host keeps more of a path between kernels.
 
 
 def chosen_bits(program, names):
@@ -60,7 +61,7 @@ def measure(program, arguments):
     file_masks = {scene: scene_mask(program, scene) for scene in scenes}   # With the AOVs of its file.
     all_masks = sorted({*masks.values(), *file_masks.values()})
 
-    def render(scene, backend, kernel="lean", outputs=(), environment=None):
+    def render(scene, backend, kernel, outputs=(), environment=None):
         return program.render(
             scene,
             backend,
@@ -69,6 +70,13 @@ def measure(program, arguments):
             settings,
             environment=environment,
         )
+
+    def same_image(scene, environment):
+        """Whether the kernel with the feature more does the same work: it renders the same bits."""
+        images = [program.scratch / f"{scene}-{which}.exr" for which in ("without", "with")]
+        render(scene, timed, "lean-only", [images[0]])
+        render(scene, timed, "lean-only", [images[1]], environment=environment)
+        return program.compare(*images)["differing_pixels"] == 0
 
     # Lean against full.
     rows = []
@@ -187,11 +195,15 @@ def measure(program, arguments):
             if masks[scene] & 1 << bit:
                 entry["scenes"][scene] = None  # The scene needs it.
                 continue
-            if timed in usable:
+            if timed in usable and name in ROWS_OF_WAVES and timed == "cuda" and in_waves(program, scene):
+                found = {"not_measured": "its waves have no rows for it"}
+            elif timed in usable and not same_image(scene, environment):
+                found = {"not_measured": "**another image**"}
+            elif timed in usable:
                 kept = program.interleaved(
                     {
-                        "lean": lambda: render(scene, timed),
-                        "more": lambda: render(scene, timed, environment=environment),
+                        "lean": lambda: render(scene, timed, "lean-only"),
+                        "more": lambda: render(scene, timed, "lean-only", environment=environment),
                     },
                     runs,
                 )
@@ -221,6 +233,11 @@ def measure(program, arguments):
     results.write()
 
 
+def in_waves(program, scene):
+    """Whether CUDA renders the scene by kernels of their own for tracing and for each kind of material."""
+    return "paths sorted by material" in program.start(["info", program.scene_file(scene)]).output
+
+
 def scene_mask(program, scene, settings=()):
     run = program.render(scene, "auto", ["--spp", 1], settings=["film.resolution=[8,8]", *settings])
     return int(run.value("features", "mask"), 16)
@@ -229,7 +246,7 @@ def scene_mask(program, scene, settings=()):
 def feature_cell(found):
     if found is None:
         return "needs it"
-    parts = []
+    parts = [found["not_measured"]] if "not_measured" in found else []
     if "more_over_lean" in found:
         r = found["more_over_lean"]
         parts.append(f"{r['median']:.3f} ({r['min']:.3f} – {r['max']:.3f})")

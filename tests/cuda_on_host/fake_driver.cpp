@@ -10,6 +10,7 @@
 // CRT_FAKE_CUDA_MEMORY: so many bytes of each are left by other programs.
 // CRT_FAKE_CUDA_LAUNCH_MEMORY: so many bytes must be free for a launch, as a kernel's local memory is.
 // CRT_FAKE_CUDA_LOST=D:N,…: the N-th launch on device D fails, and whatever is asked of it after that.
+// Devices that are not to be lost launch nothing until it has happened, or all work could be done without D.
 // CRT_FAKE_CUDA_PEAK: a file, to which the most bytes that were ever allocated are written in the end.
 #include "host_kernels.h"
 
@@ -17,6 +18,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -117,6 +119,14 @@ struct CUctx_st {
 static constexpr int kMostDevices = 8;
 static CUctx_st contexts[kMostDevices];
 static thread_local CUcontext current = nullptr;
+static std::condition_variable device_lost;
+
+/// Whether a device will be lost that is not yet.
+static bool lossIsAwaited() {
+    for (int device = 0; device < kMostDevices; ++device)
+        if (lostAt(device) != 0 && !contexts[device].lost) return true;
+    return false;
+}
 
 /// What every call says first.
 static CUresult stateOfDevice() {
@@ -233,9 +243,15 @@ CRT_FAKE cuLaunchKernel(CUfunction function, unsigned grid_x, unsigned grid_y, u
     CRT_FAKE_NEEDS_DEVICE();
     if (goesWrong("launch")) return CUDA_ERROR_LAUNCH_FAILED;
     {
-        const std::lock_guard<std::mutex> lock(mutex);
-        const auto device = static_cast<int>(current - contexts);
-        if (++current->launches == lostAt(device)) lost = current->lost = true;
+        std::unique_lock<std::mutex> lock(mutex);
+        const std::size_t last_launch = lostAt(static_cast<int>(current - contexts));
+        static bool patient = true;
+        if (last_launch == 0 && patient)
+            patient = device_lost.wait_for(lock, std::chrono::seconds(2), [] { return !lossIsAwaited(); });
+        if (++current->launches == last_launch) {
+            lost = current->lost = true;
+            device_lost.notify_all();
+        }
         if (current->lost) return CUDA_ERROR_LAUNCH_FAILED;
         if (number("CRT_FAKE_CUDA_LAUNCH_MEMORY", 0) > ownMemory() - current->allocated)
             return CUDA_ERROR_OUT_OF_MEMORY;
