@@ -226,6 +226,20 @@ class Program:
         return text
 
     def patched_kernel(self, patch):
+        """A copy of the kernel texts with a patch of the repository in it, for CRT_KERNEL_DIR."""
+        tree = self.scratch / patch.stem
+        shutil.copytree(self.repository / "core" / "kernel", tree / "core" / "kernel")
+        # Without fuzz: where the text around a change is another now, somebody has to look.
+        done = subprocess.run(
+            ["patch", "--strip=1", "--fuzz=0", "--silent", "-d", str(tree), "-i", str(patch)],
+            capture_output=True,
+            text=True,
+        )
+        if done.returncode != 0:
+            raise Failure(f"{patch.name} does not fit the kernel any more: {done.stdout.strip()}")
+        return tree / "core" / "kernel"
+
+    def kernels_with(self, extra, masks):
         """A copy of the kernel texts, for CRT_KERNEL_DIR, in which a kernel with one of the masks, or with a
         part of one, as the shaders of a wave have, has the feature `extra` as well. Other kernels, which
         were not asked for, have nothing at all, so that they compile fast: what they render is wrong, and
