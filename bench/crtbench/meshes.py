@@ -8,7 +8,6 @@ there: otherwise it ends with code 1.
 """
 
 import math
-import pathlib
 import re
 import struct
 import subprocess

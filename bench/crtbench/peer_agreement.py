@@ -7,7 +7,6 @@ import zlib
 
 import numpy as np
 
-from . import peer_scene
 
 TILES = 8
 STUDENT_975 = {
