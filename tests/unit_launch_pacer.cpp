@@ -20,7 +20,7 @@ TEST_CASE("launches cover a range exactly once, with any tile, at any speed", "[
         const std::uint32_t width = 1 + below(40), height = 1 + below(40), x0 = below(5), y0 = below(5);
         const std::uint64_t first = below(100), samples = 1 + below(70);
         const std::uint32_t tile = below(2) ? 0 : 1 + below(50);
-        LaunchPacer pacer(0.01, 1 + below(5000), 1 + below(8));
+        LaunchPacer pacer(0.01, 1 + below(5000), 1 + below(8), 1 + below(3000));
         // The same pacer twice: what it has learnt must not show.
         for (int repeat = 0; repeat < 2; ++repeat) {
             std::vector<std::vector<int>> seen(std::size_t{width} * height, std::vector<int>(samples));
@@ -92,6 +92,19 @@ TEST_CASE("a device whose clock says nothing does not make launches grow", "[lau
         REQUIRE(pacer.next(launch));
         CHECK(launch.paths() <= 4000);  // One row.
         pacer.finished(launch, i % 2 == 0 ? 0.0 : std::nan(""));
+    }
+}
+
+TEST_CASE("launches that take as long as one long path do not shrink to single paths", "[launch_pacer]") {
+    // A device of 1000 lanes and a path a lane: fifty times the wanted time, however few paths there are.
+    constexpr std::uint64_t kLanes = 1000, kSamples = 16384;
+    // Six films of 4 * 16384 paths, so that all of it is learnt before the last.
+    LaunchPacer pacer(0.02, 1 << 18, 4, kLanes);
+    for (int repeat = 0; repeat < 6; ++repeat) {
+        pacer.begin(renderRange(0, 0, 2, 2, 0, kSamples), 0);
+        std::uint64_t launches = 0;
+        for (Launch launch; pacer.next(launch); ++launches) pacer.finished(launch, 1.0);
+        CHECK(launches <= 4 * kSamples / kLanes + 2);
     }
 }
 

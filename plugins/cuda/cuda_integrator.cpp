@@ -17,9 +17,13 @@ constexpr double kLaunchSeconds = 0.03;
 /// Of a wave, whose last passes have few paths left.
 constexpr double kWaveSeconds = 0.2;
 constexpr std::uint64_t kFirstPaths = 1u << 18;
+/// One warp for each of the four schedulers of a multiprocessor: none waits for another's turn, so that a
+/// launch of this many paths takes as long as its longest one. Paths of 100,000 bounces take a second.
+constexpr std::uint64_t kPathsAtOnce = 4 * 32;
 
-LaunchPacer pacerFor(bool waves) {
-    return LaunchPacer(waves ? kWaveSeconds : kLaunchSeconds, kFirstPaths, kBlockHeight);
+LaunchPacer pacerFor(bool waves, const Device& device) {
+    return LaunchPacer(waves ? kWaveSeconds : kLaunchSeconds, kFirstPaths, kBlockHeight,
+                       kPathsAtOnce * device.multiprocessors);
 }
 
 double now() {
@@ -35,7 +39,7 @@ CudaIntegrator::CudaIntegrator(const plugin::Host& host, const CrtCreateInfo& in
       context_(device_),
       kernel_choice_(info.kernel),
       tile_size_(info.tile_size),
-      pacer_(pacerFor(false)) {
+      pacer_(pacerFor(false, device_)) {
     if (info.threads != 0) host_.log(CRT_LOG_DEBUG, "cuda: the number of threads does not apply");
     context_.makeCurrent();
     const Driver& cuda = driver();
@@ -100,7 +104,7 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     // What it has learnt holds for the next scene, too, or for the next band of a film.
     if (paced_for_waves_ != wavefront_.has_value()) {
         paced_for_waves_ = wavefront_.has_value();
-        pacer_ = pacerFor(paced_for_waves_);
+        pacer_ = pacerFor(paced_for_waves_, device_);
     }
     if (!program_ || program_->wanted() != wanted) {
         if (program_) {

@@ -45,9 +45,14 @@ class LaunchPacer {
 public:
     /// `first_paths` is the size of the very first launch: small enough to be quick on the slowest device.
     /// Launches are cut between rows that are multiples of `row_step` apart where the budget allows it, for
-    /// devices that work on blocks of pixels.
-    LaunchPacer(double target_seconds, std::uint64_t first_paths, std::uint32_t row_step = 1)
-        : target_seconds_(target_seconds), budget_(static_cast<double>(first_paths)), row_step_(row_step) {}
+    /// devices that work on blocks of pixels. `least_paths` is how many paths the device traces beside each
+    /// other in about the time of the longest: smaller launches would be more, and none of them shorter.
+    LaunchPacer(double target_seconds, std::uint64_t first_paths, std::uint32_t row_step = 1,
+                std::uint64_t least_paths = 1)
+        : target_seconds_(target_seconds),
+          least_(static_cast<double>(least_paths)),
+          budget_(std::max(static_cast<double>(first_paths), least_)),
+          row_step_(row_step) {}
 
     /// Starts a range. `tile_size` 0 works through it in the largest pieces that the budget allows.
     void begin(const CrtRenderRange& range, std::uint32_t tile_size) {
@@ -83,7 +88,7 @@ public:
         // A launch much below the budget says little about larger ones: its fixed cost hides the rate.
         if (paths < 0.4 * budget_ && seconds < target_seconds_) return;
         // Half-way, and at most four times as much: neighbouring parts of an image may differ much in cost.
-        budget_ = std::clamp(0.5 * (budget_ + fitting), 0.25 * budget_, 4.0 * budget_);
+        budget_ = std::max(std::clamp(0.5 * (budget_ + fitting), 0.25 * budget_, 4.0 * budget_), least_);
     }
 
     /// Share of the range that is finished.
@@ -110,7 +115,7 @@ private:
         x_ = y_ = row_in_tile_ = 0;
         if (total_ == 0 || sample_ >= range_.sample_count) return;
         const std::uint64_t left = range_.sample_count - sample_;
-        const auto budget = static_cast<std::uint64_t>(std::max(budget_, 1.0));
+        const auto budget = static_cast<std::uint64_t>(budget_);
         std::uint64_t chunk = budget / (std::uint64_t{tile_width_} * tile_height_);
         if (chunk < kWorthwhileSamples)  // then in bands of rows, of one row at least
             chunk = std::min(kWorthwhileSamples, budget / (std::uint64_t{tile_width_} * row_step_));
@@ -142,6 +147,7 @@ private:
     }
 
     double target_seconds_;
+    double least_;   ///< Paths of the smallest launch that is worth one.
     double budget_;  ///< Paths that one launch should trace.
     std::uint32_t row_step_;
 
