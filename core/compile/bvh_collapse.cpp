@@ -67,7 +67,7 @@ private:
     }
 
     Costs cut(std::uint32_t node, const Costs& left, const Costs& right) {
-        Cut& cut = cuts_[node];
+        Cut& cheapest = cuts_[node];
         Costs costs{{}, left.triangles + right.triangles};
         for (std::uint32_t children = 2; children <= kWidth; ++children) {
             float& least = costs.of[children - 1];
@@ -76,14 +76,14 @@ private:
                 const float cost = left.of[k - 1] + right.of[children - k - 1];
                 if (cost >= least) continue;
                 least = cost;
-                cut.left[children - 2] = static_cast<std::uint8_t>(k);
+                cheapest.left[children - 2] = static_cast<std::uint8_t>(k);
             }
         }
         const float half_area = tree_[node].box.halfArea();
         const float as_node = kNodeCost * half_area + costs.of[kWidth - 1];
         const float as_leaf = half_area * static_cast<float>(costs.triangles);
-        cut.is_leaf = costs.triangles <= kLeafSize && as_leaf <= as_node;
-        costs.of[0] = cut.is_leaf ? as_leaf : as_node;
+        cheapest.is_leaf = costs.triangles <= kLeafSize && as_leaf <= as_node;
+        costs.of[0] = cheapest.is_leaf ? as_leaf : as_node;
         return costs;
     }
 

@@ -154,10 +154,10 @@ private:
     CrtRenderRange range_{};
     std::uint32_t width_ = 0, height_ = 0, tile_width_ = 0, tile_height_ = 0;
     std::uint32_t x_ = 0, y_ = 0,
-                  row_in_tile_ = 0;  ///< Where the next launch starts, from the range's corner.
-    std::uint32_t chunk_ = 0;                        ///< Samples per pixel of this pass.
-    std::uint64_t sample_ = 0;                       ///< First sample of this pass, from the range's first.
-    std::uint64_t finished_ = 0, total_ = 0;         ///< Paths.
+                  row_in_tile_ = 0;           ///< Where the next launch starts, from the range's corner.
+    std::uint32_t chunk_ = 0;                 ///< Samples per pixel of this pass.
+    std::uint64_t sample_ = 0;                ///< First sample of this pass, from the range's first.
+    std::uint64_t finished_ = 0, total_ = 0;  ///< Paths.
 };
 
 }  // namespace crt
