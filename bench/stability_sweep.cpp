@@ -226,7 +226,8 @@ int main(int argc, char** argv) {
     const ListenerScope scope(listener);
     try {
         const LoadedBackend backend = loadBackend(argv[1]);
-        Context context(backend, {}, Level::Nightly);
+        Watch goes_on;
+        Context context(backend, {}, Level::Nightly, goes_on);
         sweeps.at(argv[2])(context, static_cast<std::uint64_t>(std::stod(argv[3])));
         return 0;
     } catch (const Error& error) {

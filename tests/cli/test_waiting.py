@@ -14,6 +14,7 @@ import pty
 import re
 import select
 import signal
+import subprocess
 import time
 
 import harness
@@ -154,6 +155,39 @@ class Waiting(CliTest):
             f"status {status}",
         )
         self.assertEqual(os.listdir(self.directory), ["scene.yaml"])
+
+    def test_ctrl_c_ends_what_would_take_hours(self):
+        backend = harness.first_real_backend()
+        if backend is None:
+            self.skipTest("no backend has a device")
+        long = ["--spp", "100000000"]
+        for command in (
+            ["render", "scene.yaml", "-b", backend, "-o", "a.pfm", *long],
+            ["compare", "--backends", f"{backend},{backend}", "scene.yaml", *long],
+            ["converge", "scene.yaml", "--backends", backend, "--time", "9h", "-o", "c"],
+            ["reference", "scene.yaml", "-b", backend, "-o", "r.exr", *long],
+            # One case, ten million rays at each of four kinds of place.
+            ["verify", "-b", backend, "--level", "nightly", "--case", "B04"],
+        ):
+            process = subprocess.Popen(
+                [harness.CRT, *command],
+                cwd=self.directory,
+                env=harness.environment(CRT_BACKEND_PATH=""),
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                preexec_fn=harness.default_signals,
+            )
+            time.sleep(2)
+            self.assertIsNone(process.poll(), f"{command} has ended by itself")
+            process.send_signal(signal.SIGINT)
+            try:
+                said, _ = process.communicate(timeout=120)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                said, _ = process.communicate()
+                self.fail(f"{command} goes on after Ctrl-C:\n{said}")
+            self.assertIn(process.returncode, (130, -signal.SIGINT), f"{command}:\n{said}")
 
     # --- E12: nothing is built that is not read, and seconds add up
     # ------------------------------------------------------

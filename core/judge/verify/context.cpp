@@ -70,8 +70,12 @@ std::uint64_t differingPixels(const Film& a, const Film& b) {
 
 }  // namespace
 
-Context::Context(const LoadedBackend& backend, const IntegratorOptions& options, Level level)
-    : backend_(backend), options_(options), level_(level) {}
+Context::Context(const LoadedBackend& backend, const IntegratorOptions& options, Level level, Watch& watch)
+    : backend_(backend), options_(options), level_(level), watch_(watch) {}
+
+void Context::stopIfAsked() const {
+    if (const std::optional<StopRequest> request = watch_.stopRequested()) throw Stopped{*request};
+}
 
 Scene Context::scene(const std::string& yaml, const std::vector<SceneOverride>& overrides) const {
     return parseScene(yaml, "case.yaml", ".", overrides);
@@ -112,9 +116,11 @@ Film Context::renderRaw(const Scene& original, const Render& how) {
         if (how.squares) changed.sampler.replicates = 1;
         what = &changed;
     }
+    stopIfAsked();
     Session& session = sessionFor(how);
-    Film film = renderFilm(
-        session, *what, {.samples = how.samples, .first_sample = how.first_sample, .aovs = how.aovs});
+    Film film = renderFilm(session, *what,
+                           {.samples = how.samples, .first_sample = how.first_sample, .aovs = how.aovs},
+                           [this](double) { stopIfAsked(); });
     report_ = session.report();
     return film;
 }

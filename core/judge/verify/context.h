@@ -7,6 +7,7 @@
 #include "film/film.h"
 #include "judge/verify/case.h"
 #include "render/session.h"
+#include "render/watch.h"
 #include "scene/yaml/scene_yaml.h"
 
 #include <cstdint>
@@ -61,9 +62,15 @@ struct Asked {
     double expected;
 };
 
+/// The run is to end in the middle of a case. Nothing that went wrong: cases must not take it for an error.
+struct Stopped {
+    StopRequest request;
+};
+
 class Context {
 public:
-    Context(const LoadedBackend& backend, const IntegratorOptions& options, Level level);
+    /// Throws Stopped out of every render from when `watch` asks for an end.
+    Context(const LoadedBackend& backend, const IntegratorOptions& options, Level level, Watch& watch);
 
     const LoadedBackend& backend() const { return backend_; }
     Level level() const { return level_; }
@@ -128,10 +135,12 @@ public:
 
 private:
     Session& sessionFor(const Render& how);
+    void stopIfAsked() const;
 
     const LoadedBackend& backend_;
     IntegratorOptions options_;
     Level level_;
+    Watch& watch_;
     std::unique_ptr<Session> usual_, unusual_;  ///< With the run's options; with a case's own.
     CrtBackendReport report_{};
     std::vector<Outcome> outcomes_;

@@ -61,7 +61,7 @@ std::string summaryText(const SuiteResult& suite) {
         if (const std::size_t n = suite.count(v); n > 0)
             text += fmt::format("{}{} {}", text.empty() ? "" : ", ", n, name(v));
     if (suite.cases.size() < suite.asked)
-        text += fmt::format(", {} not run", suite.asked - suite.cases.size());
+        text += fmt::format("{}{} not run", text.empty() ? "" : ", ", suite.asked - suite.cases.size());
     return fmt::format("{} in {}", text, durationText(suite.seconds));
 }
 

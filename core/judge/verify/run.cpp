@@ -70,12 +70,17 @@ SuiteResult runCases(const LoadedBackend& backend, const IntegratorOptions& opti
     suite.asked = cases.size();
     const std::vector<CrtDevice> devices = probeDevices(backend);
     suite.device = devices.front().name;
-    Context context(backend, options, level);
+    Context context(backend, options, level, watch);
     for (std::size_t i = 0; i < cases.size(); ++i) {
         suite.request = watch.stopRequested();
         if (suite.request) break;
         show(*cases[i], i, nullptr);
-        suite.cases.push_back(runCase(*cases[i], context));
+        try {
+            suite.cases.push_back(runCase(*cases[i], context));
+        } catch (const Stopped& stopped) {
+            suite.request = stopped.request;
+            break;
+        }
         show(*cases[i], i, &suite.cases.back());
     }
     suite.seconds = secondsSince(start);

@@ -22,8 +22,9 @@ struct SuiteResult {
     std::string backend, version, build, device;
     Level level = Level::Commit;
     std::vector<CaseResult> cases;
-    std::optional<StopRequest> request;  ///< That ended the run early; the cases after it are missing.
-    std::size_t asked = 0;   ///< Cases that were to run.
+    std::optional<StopRequest>
+        request;            ///< That ended the run early; the case it ended and those after are missing.
+    std::size_t asked = 0;  ///< Cases that were to run.
     double seconds = 0;
 
     std::size_t count(Verdict verdict) const;
