@@ -31,8 +31,8 @@
 
 namespace {
 
-using crt::cuda::Entry;
-using crt::cuda::KernelSpec;
+using crt::plugin::Entry;
+using crt::plugin::KernelSpec;
 
 constexpr int kSkipped = 77;
 
@@ -107,7 +107,7 @@ void addMask(std::uint64_t mask, const std::string& name, Variants& variants) {
 
 void addScene(const crt::CompiledScene& scene, const std::string& name, Variants& variants) {
     if (!crt::wantsWavefront(scene.features)) return add({Entry::Render, scene.features}, name, variants);
-    for (const KernelSpec& kernel : crt::cuda::planWave(scene.data()).kernels) add(kernel, name, variants);
+    for (const KernelSpec& kernel : crt::plugin::planWave(scene.data()).kernels) add(kernel, name, variants);
 }
 
 int run(int argc, char** argv) {
@@ -151,7 +151,7 @@ int run(int argc, char** argv) {
     int failures = 0;
     for (const auto& [key, name] : variants) {
         const KernelSpec spec{static_cast<Entry>(key.first), key.second};
-        const std::string entry = crt::cuda::entryName(spec.entry);
+        const std::string entry = crt::plugin::entryName(spec.entry);
         const auto start = std::chrono::steady_clock::now();
         // The one with everything in is compiled ahead of time, for three blocks (its CMakeLists.txt).
         const crt::cuda::Cubin cubin =

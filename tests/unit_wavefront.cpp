@@ -1,10 +1,7 @@
 // Which scenes a GPU renders in waves, and which kernels those need.
 #include "backend/sdk/gpu_schedule.h"
+#include "common/wave_plan.h"
 #include "compiled_scenes.h"
-
-#ifdef CRT_HAVE_CUDA_PROGRAM
-#include "cuda_wavefront.h"
-#endif
 
 #include <algorithm>
 #include <set>
@@ -28,12 +25,10 @@ TEST_CASE("waves are for several kinds of material in a tree, and for long ones"
     CHECK_FALSE(wantsWavefront(CRT_FEATURES_ALL));
 }
 
-#ifdef CRT_HAVE_CUDA_PROGRAM
-
-using crt::cuda::Entry;
-using crt::cuda::KernelSpec;
-using crt::cuda::planWave;
-using crt::cuda::WavePlan;
+using crt::plugin::Entry;
+using crt::plugin::KernelSpec;
+using crt::plugin::planWave;
+using crt::plugin::WavePlan;
 
 namespace {
 
@@ -139,5 +134,3 @@ TEST_CASE("no two queues are one, and there is room for all", "[wavefront]") {
     // One of each kind, a mix, and misses.
     CHECK(types.size() + 2 <= CRT_WAVE_QUEUES);
 }
-
-#endif

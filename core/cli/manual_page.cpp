@@ -91,6 +91,8 @@ constexpr std::array kVariables{
     Variable{"CRT_CACHE_DIR",
              "Where compiled kernels are kept, instead of crt in $XDG_CACHE_HOME or ~/.cache."},
     Variable{"CRT_KERNEL_DIR", "Kernel headers to be compiled instead of those in the program."},
+    Variable{"CRT_OPENCL_WAVES",
+             "1: OpenCL renders scenes of many materials on a processor as it does on a GPU, for tests."},
     Variable{"CUDA_HOME", "Where NVRTC is, when the system does not find it."},
     Variable{
         "CRT_SCENE_MEMORY",

@@ -9,9 +9,8 @@
 
 #include "cuda_nvrtc.h"
 
-#include "cuda_kernel_spec.h"
-
 #include "backend/sdk/kernel_cache.h"
+#include "common/kernel_spec.h"
 
 #include <sys/types.h>
 
@@ -26,7 +25,7 @@ struct CompileJob {
     std::string nvrtc_path;  ///< As Nvrtc::path() has it.
     std::string text;
     int arch = 0;
-    KernelSpec spec;
+    plugin::KernelSpec spec;
     std::string
         cache_directory;  ///< Empty: none; then only the process that waits could use the kernel.
     plugin::KernelCache::Key key{};

@@ -50,16 +50,6 @@ std::uint32_t numberBefore(const std::string& line, const std::string& word) {
 
 }  // namespace
 
-const char* entryName(Entry entry) {
-    switch (entry) {
-        case Entry::Trace: return "crt_trace";
-        case Entry::Shade: return "crt_shade_queue";
-        case Entry::Choose: return "crt_choose";
-        case Entry::Render: break;
-    }
-    return "crt_render";
-}
-
 bool traverses(const KernelSpec& spec) {
     return (spec.entry == Entry::Render || spec.entry == Entry::Trace) &&
            (spec.features & CRT_FEATURE_BVH) != 0;

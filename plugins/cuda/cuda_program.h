@@ -5,11 +5,11 @@
 
 #include "cuda_compile_process.h"
 #include "cuda_device.h"
-#include "cuda_kernel_spec.h"
 #include "cuda_nvrtc.h"
 
 #include "backend/sdk/kernel_cache.h"
 #include "backend/sdk/plugin_guard.h"
+#include "common/kernel_spec.h"
 
 #include <cstdint>
 #include <memory>
@@ -17,6 +17,9 @@
 #include <vector>
 
 namespace crt::cuda {
+
+using plugin::Entry;
+using plugin::KernelSpec;
 
 /// Threads of a block and the pixels that it covers, as in kernels.cu.
 constexpr std::uint32_t kBlock = 128, kBlockWidth = 16, kBlockHeight = 8;

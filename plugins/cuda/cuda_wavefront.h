@@ -5,24 +5,13 @@
 #include "cuda_program.h"
 
 #include "backend/sdk/launch_pacer.h"
+#include "common/wave_plan.h"
 #include "kernel/wavefront.h"
 
 #include <cstdint>
 #include <vector>
 
 namespace crt::cuda {
-
-/// The kernels that a scene's waves need, and who of them shades what.
-struct WavePlan {
-    /// crt_trace; the shader of queue 0, of queue 1, …; where there are mixes, crt_choose, whose queue is
-    /// the last.
-    std::vector<KernelSpec> kernels;
-    std::uint32_t queue_of_kind[32] = {};
-    std::uint32_t queue_of_mix = CRT_NONE, queue_of_miss = CRT_NONE;
-    std::uint32_t queues() const { return static_cast<std::uint32_t>(kernels.size() - 1); }
-};
-/// `blob`: a compiled scene (kernel/layout.h).
-WavePlan planWave(const void* blob);
 
 /// What a wave adds to, on the device.
 struct WaveTarget {
@@ -34,7 +23,7 @@ class Wavefront {
 public:
     Wavefront(const Device& device, const void* blob);
 
-    const WavePlan& plan() const { return plan_; }
+    const plugin::WavePlan& plan() const { return plan_; }
     std::uint64_t bytes() const { return rows_.bytes() + words_.bytes(); }
 
     /// How many slices there may be where so many blocks of pixels lie side by side.
@@ -46,7 +35,6 @@ public:
                 std::uint32_t slices, const WaveTarget& target);
 
 private:
-    std::uint64_t bytesPerSlot() const;
     /// Room for at least so many slots, or for as many as memory allows.
     std::uint64_t ensureSlots(std::uint64_t wanted, std::uint64_t least);
     kernel::CrtWave waveOf(const Launch& launch, std::uint32_t slices, const WaveTarget& target) const;
@@ -56,7 +44,7 @@ private:
                  const kernel::CrtWave& wave, CUdeviceptr blob) const;
 
     const Device& device_;
-    WavePlan plan_;
+    plugin::WavePlan plan_;
     std::uint32_t row_count_;
     std::uint64_t slots_ = 0;  ///< That rows_ and words_ have room for.
     Memory rows_, words_;

@@ -8,7 +8,7 @@
  * crt_add_slices then adds those to the film in the order of the samples, so the result does not depend on
  * which block ran first.
  *
- * crt_trace, crt_choose and crt_shade_queue: a thread takes one slot of a wave one vertex further
+ * crt_trace, crt_choose_queue and crt_shade_queue: a thread takes one slot of a wave one vertex further
  * (kernel/wavefront.h). They are compiled one at a time, each with the features that it needs.
  *
  * No thread waits for another: tests run these very functions as plain loops.
@@ -143,7 +143,7 @@ extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
 #if CRT_ENTRIES & CRT_ENTRY_CHOOSE
 /* Hands the slots that have met a mix to the queues of the materials that they find. */
 extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
-    crt_choose(const __grid_constant__ CrtScene scene, const __grid_constant__ CrtWave wave,
+    crt_choose_queue(const __grid_constant__ CrtScene scene, const __grid_constant__ CrtWave wave,
                const unsigned char* blob, u32 pass) {
     CrtContext context;
     context.blob = blob;

@@ -74,6 +74,7 @@ Device describe(cl_platform_id platform, cl_device_id id, std::uint32_t index) {
     device.has_correct_division_option = (deviceInfo<cl_device_fp_config>(id, CL_DEVICE_SINGLE_FP_CONFIG) &
                                           CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
     device.compute_units = deviceInfo<cl_uint>(id, CL_DEVICE_MAX_COMPUTE_UNITS);
+    device.address_bits = deviceInfo<cl_uint>(id, CL_DEVICE_ADDRESS_BITS);
     device.memory_bytes = deviceInfo<cl_ulong>(id, CL_DEVICE_GLOBAL_MEM_SIZE);
     device.largest_buffer_bytes = deviceInfo<cl_ulong>(id, CL_DEVICE_MAX_MEM_ALLOC_SIZE);
     device.unusable = whatIsMissing(id, device.is_cpu);

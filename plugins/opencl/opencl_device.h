@@ -59,7 +59,7 @@ struct Device {
     std::string driver;    ///< Driver version and platform version.
     bool is_cpu = false;
     bool has_correct_division_option = false;  ///< Takes -cl-fp32-correctly-rounded-divide-sqrt.
-    std::uint32_t compute_units = 0;
+    std::uint32_t compute_units = 0, address_bits = 0;
     std::uint64_t memory_bytes = 0;
     std::uint64_t largest_buffer_bytes = 0;
     std::string unusable;  ///< Why it cannot give the same bits as the others; empty when it can.

@@ -1,11 +1,13 @@
 #include "opencl_integrator.h"
 
+#include "backend/sdk/gpu_schedule.h"
 #include "kernel/features.h"
 #include "kernel/layout.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <future>
 #include <string>
 
 namespace crt::opencl {
@@ -15,6 +17,16 @@ using plugin::PluginError;
 namespace {
 
 constexpr double kLaunchSeconds = 0.05;
+/// Of a wave, whose last passes have few paths left.
+constexpr double kWaveSeconds = 0.2;
+
+/// Every device has traced these first paths in far less than a second.
+LaunchPacer pacerFor(bool waves, const Device& device) {
+    return LaunchPacer(waves ? kWaveSeconds : kLaunchSeconds, device.is_cpu ? 4096 : 65536,
+                       waves ? CRT_WAVE_BLOCK_HEIGHT : groupSize(device).y);
+}
+
+constexpr std::size_t kRayCounterBytes = kRayCounters * 4 * sizeof(cl_uint);
 
 double now() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -40,8 +52,7 @@ OpenClIntegrator::OpenClIntegrator(const plugin::Host& host, const CrtCreateInfo
       session_(openSession(device_, info.threads)),
       kernel_choice_(info.kernel),
       tile_size_(info.tile_size),
-      // Every device has traced these in far less than a second.
-      pacer_(kLaunchSeconds, device_.is_cpu ? 4096 : 65536, groupSize(device_).y) {
+      pacer_(pacerFor(false, device_)) {
     if (info.threads != 0 && !device_.is_cpu)
         host_.log(CRT_LOG_DEBUG,
                   "opencl: '" + device_.name + "' is not a CPU: the number of threads does not apply");
@@ -76,16 +87,9 @@ void OpenClIntegrator::fill(const Buffer& buffer, std::uint64_t bytes, cl_uint p
 
 void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     const auto& scene = *static_cast<const kernel::CrtScene*>(blob.data);
-    const std::uint64_t features = kernel_choice_ == CRT_KERNEL_FULL ? CRT_FEATURES_ALL : scene.features;
-    if (!program_.render || program_.features != features) {
-        const double compile_seconds = program_.compile_seconds, cache_seconds = program_.cache_seconds;
-        program_ = buildProgram(host_, device_, session_, features);
-        program_.compile_seconds += compile_seconds;
-        program_.cache_seconds += cache_seconds;
-    }
-
     // The old film goes first: two need not fit side by side.
     for (Buffer* buffer : {&scene_, &sums_, &counts_, &primitives_, &rays_}) *buffer = Buffer();
+    wavefront_.reset();
     allocated_bytes_ = 0;
     launched_ = {};
     const double start = now();
@@ -94,10 +98,10 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     scene_ = allocate(CL_MEM_READ_ONLY, blob.size_bytes, blob.data, "the scene");
     sums_ = allocate(CL_MEM_READ_WRITE, sums_bytes, nullptr, "the film");
     counts_ = allocate(CL_MEM_READ_WRITE, pixels * sizeof(cl_ulong), nullptr, "the film's sample counts");
-    rays_ = allocate(CL_MEM_READ_WRITE, 4 * sizeof(cl_uint), nullptr, "the ray counters");
+    rays_ = allocate(CL_MEM_READ_WRITE, kRayCounterBytes, nullptr, "the ray counters");
     fill(sums_, sums_bytes, 0);
     fill(counts_, pixels * sizeof(cl_ulong), 0);
-    fill(rays_, 4 * sizeof(cl_uint), 0);
+    fill(rays_, kRayCounterBytes, 0);
     if (scene.aovs & CRT_AOV_PRIMITIVE) {
         primitives_ =
             allocate(CL_MEM_READ_WRITE, pixels * sizeof(cl_uint), nullptr, "the film's primitives");
@@ -106,15 +110,69 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     check(clFinish(session_.queue.get()), "uploading the scene");
     upload_seconds_ += now() - start;
 
-    setArgument(program_.render.get(), 0, scene_.get());
-    setArgument(program_.render.get(), 1, sums_.get());
-    setArgument(program_.render.get(), 2, counts_.get());
-    setArgument(program_.render.get(), 3, primitives_.get());
-    setArgument(program_.render.get(), 4, rays_.get());
+    const bool full = kernel_choice_ == CRT_KERNEL_FULL;
+    std::vector<plugin::KernelSpec> wanted{
+        {plugin::Entry::Render, full ? std::uint64_t{CRT_FEATURES_ALL} : scene.features}};
+    if (!full && wantsWavefront(scene.features) && takesWaves(device_)) {
+        const std::uint64_t allocated = allocated_bytes_;
+        try {
+            wavefront_.emplace(device_, session_, blob.data, [this](std::uint64_t bytes, const char* what) {
+                return allocate(CL_MEM_READ_WRITE, bytes, nullptr, what);
+            });
+            wanted = wavefront_->plan().kernels;
+        } catch (const PluginError& error) {
+            // Waves only make a render faster: it must not fail for want of memory for them.
+            if (error.status() != CRT_OUT_OF_MEMORY) throw;
+            host_.log(CRT_LOG_DEBUG, std::string("opencl: going on without waves: ") + error.what());
+            allocated_bytes_ = allocated;
+        }
+    }
+    useKernels(wanted);
+    // What it has learnt holds for the next scene, too, or for the next band of a film.
+    if (paced_for_waves_ != wavefront_.has_value()) {
+        paced_for_waves_ = wavefront_.has_value();
+        pacer_ = pacerFor(paced_for_waves_, device_);
+    }
+}
+
+void OpenClIntegrator::useKernels(const std::vector<plugin::KernelSpec>& wanted) {
+    const bool there = std::equal(programs_.begin(), programs_.end(), wanted.begin(), wanted.end(),
+                                  [](const Program& a, const plugin::KernelSpec& b) { return a.spec == b; });
+    if (there) return;
+    std::vector<std::future<Program>> building;
+    for (const plugin::KernelSpec& spec : wanted)
+        building.push_back(std::async(wanted.size() > 1 ? std::launch::async : std::launch::deferred,
+                                      [&] { return buildProgram(host_, device_, session_, spec); }));
+    std::vector<Program> built;
+    double compile_seconds = 0, cache_seconds = 0;
+    for (std::future<Program>& program : building) {
+        built.push_back(program.get());
+        compile_seconds = std::max(compile_seconds, built.back().compile_seconds);
+        cache_seconds = std::max(cache_seconds, built.back().cache_seconds);
+    }
+    programs_ = std::move(built);
+    compile_seconds_ += compile_seconds;
+    cache_seconds_ += cache_seconds;
 }
 
 double OpenClIntegrator::launch(const Launch& launch) {
-    const cl_kernel kernel = program_.render.get();
+    return wavefront_ ? launchWave(launch) : launchRender(launch);
+}
+
+double OpenClIntegrator::launchWave(const Launch& launch) {
+    const double start = now();
+    wavefront_->launch(programs_, launch,
+                       {scene_.get(), sums_.get(), counts_.get(), primitives_.get(), rays_.get()});
+    return now() - start;
+}
+
+double OpenClIntegrator::launchRender(const Launch& launch) {
+    const cl_kernel kernel = programs_.front().kernel.get();
+    setArgument(kernel, 0, scene_.get());
+    setArgument(kernel, 1, sums_.get());
+    setArgument(kernel, 2, counts_.get());
+    setArgument(kernel, 3, primitives_.get());
+    setArgument(kernel, 4, rays_.get());
     setArgument(kernel, 5, static_cast<cl_uint>(launch.x0));
     setArgument(kernel, 6, static_cast<cl_uint>(launch.y0));
     setArgument(kernel, 7, static_cast<cl_uint>(launch.x1));
@@ -162,24 +220,30 @@ void OpenClIntegrator::readFilm(const CrtFilmView& film) {
 
 void OpenClIntegrator::report(CrtBackendReport& report) {
     plugin::writeText(report.device, device_.name);
-    plugin::writeText(report.kernel, std::string(kernel_choice_ == CRT_KERNEL_FULL ? "full" : "lean") +
-                                         " kernel, " + std::to_string(session_.compute_units) + " of " +
-                                         std::to_string(device_.compute_units) + " compute units");
-    report.kernel_from_cache = program_.from_cache ? 1 : 0;
-    report.kernel_features = program_.features;
-    report.compile_seconds = program_.compile_seconds;
-    report.cache_seconds = program_.cache_seconds;
+    plugin::writeText(report.kernel,
+                      std::string(kernel_choice_ == CRT_KERNEL_FULL ? "full" : "lean") +
+                          (wavefront_ ? " kernels, paths sorted by material, " : " kernel, ") +
+                          std::to_string(session_.compute_units) + " of " +
+                          std::to_string(device_.compute_units) + " compute units");
+    report.kernel_from_cache =
+        std::all_of(programs_.begin(), programs_.end(), [](const Program& p) { return p.from_cache; }) ? 1
+                                                                                                       : 0;
+    if (!programs_.empty()) report.kernel_features = programs_.front().spec.features;
+    report.compile_seconds = compile_seconds_;
+    report.cache_seconds = cache_seconds_;
     report.upload_seconds = upload_seconds_;
     report.render_seconds = launched_.seconds;
     report.paths = launched_.paths;
     report.peak_memory_bytes = device_.is_cpu ? 0 : peak_bytes_;
     if (rays_) {
-        cl_uint counts[4] = {};
-        check(clEnqueueReadBuffer(session_.queue.get(), rays_.get(), CL_TRUE, 0, sizeof counts, counts, 0,
-                                  nullptr, nullptr),
+        std::vector<cl_uint> words(kRayCounterBytes / sizeof(cl_uint));
+        check(clEnqueueReadBuffer(session_.queue.get(), rays_.get(), CL_TRUE, 0, kRayCounterBytes,
+                                  words.data(), 0, nullptr, nullptr),
               "reading the ray counters");
-        report.closest_rays = (std::uint64_t{counts[1]} << 32) | counts[0];
-        report.shadow_rays = (std::uint64_t{counts[3]} << 32) | counts[2];
+        for (std::size_t i = 0; i < words.size(); i += 4) {
+            report.closest_rays += (std::uint64_t{words[i + 1]} << 32) | words[i];
+            report.shadow_rays += (std::uint64_t{words[i + 3]} << 32) | words[i + 2];
+        }
     }
 }
 

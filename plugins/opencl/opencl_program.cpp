@@ -88,27 +88,28 @@ ProgramHandle fromText(const Session& session, const Device& device, const std::
 
 GroupSize groupSize(const Device& device) { return device.is_cpu ? GroupSize{1, 1} : GroupSize{8, 8}; }
 
-std::string buildOptions(const Device& device, std::uint64_t features) {
+std::string buildOptions(const Device& device, const plugin::KernelSpec& spec) {
     const GroupSize group = groupSize(device);
     char options[256];
-    std::snprintf(
-        options, sizeof options,
-        "-cl-std=CL1.2 -DCRT_FEATURES=0x%llxul -DCRT_SIMD8=%d -DCRT_GROUP_X=%u -DCRT_GROUP_Y=%u",
-        static_cast<unsigned long long>(features),
-        device.is_cpu ? 1
+    std::snprintf(options, sizeof options,
+                  "-cl-std=CL1.2 -DCRT_ENTRIES=%u -DCRT_FEATURES=0x%llxul -DCRT_SIMD8=%d -DCRT_GROUP_X=%u "
+                  "-DCRT_GROUP_Y=%u",
+                  static_cast<unsigned>(spec.entry), static_cast<unsigned long long>(spec.features),
+                  device.is_cpu
+                      ? 1
                       : 0,  // a GPU's lanes are its work-items: eight-wide vectors only cost it registers
-        group.x, group.y);
+                  group.x, group.y);
     return options +
            std::string(device.has_correct_division_option ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
 }
 
 Program buildProgram(const plugin::Host& host, const Device& device, const Session& session,
-                     std::uint64_t features) {
+                     const plugin::KernelSpec& spec) {
     Program built;
-    built.features = features;
-    const std::string options = buildOptions(device, features);
+    built.spec = spec;
+    const std::string options = buildOptions(device, spec);
     const std::string text =
-        std::string(host.kernelSource("path.h")) + "\n#line 1 \"kernels.cl\"\n" + kKernelText;
+        std::string(host.kernelSource("wavefront.h")) + "\n#line 1 \"kernels.cl\"\n" + kKernelText;
 
     Stopwatch cache_time;
     const KernelCache cache(host.cacheDirectory());
@@ -139,8 +140,9 @@ Program buildProgram(const plugin::Host& host, const Device& device, const Sessi
     }
 
     cl_int result = CL_SUCCESS;
-    built.render = Kernel(clCreateKernel(built.program.get(), "crt_render", &result));
-    check(result, "taking crt_render from the compiled program");
+    const char* name = plugin::entryName(spec.entry);
+    built.kernel = Kernel(clCreateKernel(built.program.get(), name, &result));
+    check(result, std::string("taking ") + name + " from the compiled program");
     return built;
 }
 

@@ -4,6 +4,7 @@
 #include "opencl_device.h"
 
 #include "backend/sdk/plugin_guard.h"
+#include "common/kernel_spec.h"
 
 #include <cstdint>
 #include <string>
@@ -20,22 +21,25 @@ struct GroupSize {
 /// the square that two warps or one wavefront fill.
 GroupSize groupSize(const Device& device);
 
+/// Places of ray counters, of two counters of two words each, as in kernels.cl.
+constexpr std::uint32_t kRayCounters = 256;
+
 /// A built kernel and what it cost to get it.
 struct Program {
     ProgramHandle program;
-    Kernel render;
-    std::uint64_t features = 0;
+    Kernel kernel;
+    plugin::KernelSpec spec;
     bool from_cache = false;
     double compile_seconds = 0;
     double cache_seconds = 0;
 };
 
-/// Options that a mask and a device are compiled with. No option that relaxes arithmetic: OpenCL's defaults
-/// keep IEEE rounding.
-std::string buildOptions(const Device& device, std::uint64_t features);
+/// Options that a kernel and a device are compiled with. No option that relaxes arithmetic: OpenCL's
+/// defaults keep IEEE rounding.
+std::string buildOptions(const Device& device, const plugin::KernelSpec& spec);
 
-/// Compiles the kernel for `features`, or takes it from the host's cache.
+/// Compiles a kernel, or takes it from the host's cache.
 Program buildProgram(const plugin::Host& host, const Device& device, const Session& session,
-                     std::uint64_t features);
+                     const plugin::KernelSpec& spec);
 
 }  // namespace crt::opencl

@@ -108,7 +108,7 @@ struct CUfunc_st {
 };
 struct CUmod_st {
     CUfunc_st functions[5] = {
-        {"crt_render"}, {"crt_add_slices"}, {"crt_trace"}, {"crt_choose"}, {"crt_shade_queue"}};
+        {"crt_render"}, {"crt_add_slices"}, {"crt_trace"}, {"crt_choose_queue"}, {"crt_shade_queue"}};
 };
 struct CUctx_st {
     int users = 0;

@@ -62,7 +62,8 @@ void launchWith(void (*kernel)(Parameters...), unsigned grid_x, unsigned grid_y,
 }  // namespace
 
 bool hasKernel(const char* name) {
-    for (const char* known : {"crt_render", "crt_add_slices", "crt_trace", "crt_choose", "crt_shade_queue"})
+    for (const char* known :
+         {"crt_render", "crt_add_slices", "crt_trace", "crt_choose_queue", "crt_shade_queue"})
         if (std::strcmp(name, known) == 0) return true;
     return false;
 }
@@ -74,8 +75,8 @@ bool launchByName(const char* name, unsigned grid_x, unsigned grid_y, unsigned b
         launchWith(crt_render, grid_x, grid_y, arguments, host_threads);
     else if (std::strcmp(name, "crt_trace") == 0)
         launchWith(crt_trace, grid_x, grid_y, arguments, host_threads);
-    else if (std::strcmp(name, "crt_choose") == 0)
-        launchWith(crt_choose, grid_x, grid_y, arguments, host_threads);
+    else if (std::strcmp(name, "crt_choose_queue") == 0)
+        launchWith(crt_choose_queue, grid_x, grid_y, arguments, host_threads);
     else if (std::strcmp(name, "crt_shade_queue") == 0)
         launchWith(crt_shade_queue, grid_x, grid_y, arguments, host_threads);
     else
@@ -123,7 +124,7 @@ void launchWave(const void* scene_blob, const Launch& launch, std::uint32_t slic
     const auto* blob = static_cast<const unsigned char*>(scene_blob);
     for (u32 pass = 0; *wave.finished < wave.slots; ++pass) {
         launchGrid(blocks, 1, host_threads, [&] { crt_trace(scene, wave, blob, pass); });
-        launchGrid(blocks, 1, host_threads, [&] { crt_choose(scene, wave, blob, pass); });
+        launchGrid(blocks, 1, host_threads, [&] { crt_choose_queue(scene, wave, blob, pass); });
         for (u32 queue = 0; queue < kShaders; ++queue)
             launchGrid(blocks, 1, host_threads, [&] { crt_shade_queue(scene, wave, blob, pass, queue); });
     }
