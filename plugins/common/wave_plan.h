@@ -17,8 +17,8 @@
 namespace crt::plugin {
 
 struct WavePlan {
-    /// crt_trace; the shader of queue 0, of queue 1, …; where there are mixes, crt_choose, whose queue is
-    /// the last.
+    /// crt_trace; the shader of queue 0, of queue 1, …; where there are mixes, crt_choose_queue, whose
+    /// queue is the last.
     std::vector<KernelSpec> kernels;
     std::uint32_t queue_of_kind[32] = {};
     std::uint32_t queue_of_mix = CRT_NONE, queue_of_miss = CRT_NONE;

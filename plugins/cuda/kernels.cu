@@ -144,7 +144,7 @@ extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
 /* Hands the slots that have met a mix to the queues of the materials that they find. */
 extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
     crt_choose_queue(const __grid_constant__ CrtScene scene, const __grid_constant__ CrtWave wave,
-               const unsigned char* blob, u32 pass) {
+                     const unsigned char* blob, u32 pass) {
     CrtContext context;
     context.blob = blob;
     context.scene = &scene;

@@ -15,6 +15,13 @@
 /* Ray counters are spread, so that groups do not queue for one address; the host adds them up. */
 #define CRT_RAY_COUNTERS 256u
 
+static inline CrtContext crt_context_of(__global const uchar *blob) {
+    CrtContext context;
+    context.blob = blob;
+    context.scene = (__global const CrtScene *)blob;
+    return context;
+}
+
 /* Adds to a 64-bit counter kept as two words, low first: OpenCL 1.2 promises atomics of 32 bits only. */
 static inline void crt_count(volatile __global uint *counter, uint n) {
     const uint before = atomic_add(&counter[0], n);
@@ -23,7 +30,7 @@ static inline void crt_count(volatile __global uint *counter, uint n) {
 
 #if CRT_ENTRIES & CRT_ENTRY_RENDER
 /* Samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1), one work-item a
-   pixel. `rays` holds the counts of closest and of shadow rays. */
+   pixel. `rays` holds CRT_RAY_COUNTERS places for the numbers of closest and of shadow rays. */
 __kernel __attribute__((reqd_work_group_size(CRT_GROUP_X, CRT_GROUP_Y, 1))) void crt_render(
     __global const uchar* blob, __global double* sums, __global ulong* counts, __global uint* primitives,
     volatile __global uint* rays, uint x0, uint y0, uint x1, uint y1, ulong first_sample,
@@ -32,9 +39,7 @@ __kernel __attribute__((reqd_work_group_size(CRT_GROUP_X, CRT_GROUP_Y, 1))) void
     const uint y = y0 + (uint)get_global_id(1);
     if (x >= x1 || y >= y1) return;
 
-    CrtContext context;
-    context.blob = blob;
-    context.scene = (__global const CrtScene *)blob;
+    const CrtContext context = crt_context_of(blob);
     CrtRayCount traced;
     traced.closest = 0u;
     traced.shadow = 0u;
@@ -96,9 +101,7 @@ __kernel __attribute__((reqd_work_group_size(CRT_WAVE_BLOCK, 1, 1))) void crt_tr
     /* The next pass's queues: those who read these places have ended. */
     if (slot < CRT_WAVE_QUEUES) *crt_queue_length(&wave, pass + 1u, slot) = 0u;
 
-    CrtContext context;
-    context.blob = blob;
-    context.scene = (__global const CrtScene *)blob;
+    const CrtContext context = crt_context_of(blob);
     CrtRayCount traced;
     traced.closest = 0u;
     traced.shadow = 0u;
@@ -125,9 +128,7 @@ __kernel __attribute__((reqd_work_group_size(CRT_WAVE_BLOCK, 1, 1))) void crt_ch
     __global uint* words, uint pass) {
     __local uint lengths[2u * CRT_WAVE_QUEUES];
     CrtWave wave = crt_wave_given(header, queues, rows, words);
-    CrtContext context;
-    context.blob = blob;
-    context.scene = (__global const CrtScene *)blob;
+    const CrtContext context = crt_context_of(blob);
     const uint mix = wave.queue_of_mix, length = *crt_queue_length(&wave, pass, mix);
     for (uint first = (uint)get_group_id(0) * CRT_WAVE_BLOCK; first < length;
          first += (uint)get_num_groups(0) * CRT_WAVE_BLOCK) {
@@ -148,9 +149,7 @@ __kernel __attribute__((reqd_work_group_size(CRT_WAVE_BLOCK, 1, 1))) void crt_sh
     __global const uchar* blob, __global const uchar* header, uint queues, __global float4* rows,
     __global uint* words, uint pass, uint queue) {
     const CrtWave wave = crt_wave_given(header, queues, rows, words);
-    CrtContext context;
-    context.blob = blob;
-    context.scene = (__global const CrtScene *)blob;
+    const CrtContext context = crt_context_of(blob);
     const uint length = *crt_queue_length(&wave, pass, queue);
     for (uint i = (uint)get_global_id(0); i < length; i += (uint)get_global_size(0))
         crt_wave_shade(&context, &wave, wave.queued[(ulong)queue * wave.slots + i]);

@@ -225,10 +225,11 @@ void OpenClIntegrator::report(CrtBackendReport& report) {
                           (wavefront_ ? " kernels, paths sorted by material, " : " kernel, ") +
                           std::to_string(session_.compute_units) + " of " +
                           std::to_string(device_.compute_units) + " compute units");
-    report.kernel_from_cache =
-        std::all_of(programs_.begin(), programs_.end(), [](const Program& p) { return p.from_cache; }) ? 1
-                                                                                                       : 0;
-    if (!programs_.empty()) report.kernel_features = programs_.front().spec.features;
+    if (!programs_.empty()) {
+        const auto cached = [](const Program& program) { return program.from_cache; };
+        report.kernel_from_cache = std::all_of(programs_.begin(), programs_.end(), cached) ? 1 : 0;
+        report.kernel_features = programs_.front().spec.features;
+    }
     report.compile_seconds = compile_seconds_;
     report.cache_seconds = cache_seconds_;
     report.upload_seconds = upload_seconds_;

@@ -22,8 +22,8 @@ struct SuiteResult {
     std::string backend, version, build, device;
     Level level = Level::Commit;
     std::vector<CaseResult> cases;
-    std::optional<StopRequest>
-        request;            ///< That ended the run early; the case it ended and those after are missing.
+    /// That ended the run early: the case in which it came, and those after, are missing.
+    std::optional<StopRequest> request;
     std::size_t asked = 0;  ///< Cases that were to run.
     double seconds = 0;
 
