@@ -1,6 +1,6 @@
 /*
  * intersect.h: the one ray–triangle test that decides hit, distance and barycentrics on every backend.
- * Whatever finds candidates (BVH, Embree, eight at a time) may be sloppy as long as it misses none; this has
+ * Whatever finds candidates (BVH, eight at a time) may be sloppy as long as it misses none; this has
  * the last word.
  *
  * Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection", with the edge functions as Kahan

@@ -57,7 +57,7 @@ EmbreeIntegrator::EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo
 }
 
 void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
-    tracer_.reset();
+    tree_.reset();
     blob_.reset();
     build_seconds_ = render_seconds_ = 0;
     paths_ = 0;
@@ -70,15 +70,12 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
         const auto start = Clock::now();
         if (!device_) device_ = std::make_unique<Device>();
         const auto progress = [this](double done) { host_.cancelled(done); };
-        arena_.execute([&] {
-            tracer_ = std::make_unique<Tracer>(*device_, bytes, progress);
-        });
+        arena_.execute([&] { tree_ = std::make_unique<Tree>(*device_, bytes, progress); });
         build_seconds_ = secondsSince(start);
     }
     // Not a vector: it would write zeros over hundreds of megabytes first.
     blob_.reset(new Line[(scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line)]);
     std::memcpy(blob_.get(), scene_blob.data, scene_blob.size_bytes);
-    if (tracer_) tracer_->moveTo(blob());
     program_ = &chooseProgram(scene().features, info_.kernel);
 
     const std::size_t pixels = static_cast<std::size_t>(scene().width) * scene().height;
@@ -120,7 +117,7 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
                 for (std::uint32_t tile = tiles.begin(); tile != tiles.end(); ++tile) {
                     TileJob job{};
                     job.blob = blob();
-                    job.tracer = tracer_.get();
+                    job.tree = tree_.get();
                     job.x0 = range.x0 + tile % columns * size;
                     job.y0 = range.y0 + tile / columns * size;
                     job.x1 = std::min(job.x0 + size, range.x1);

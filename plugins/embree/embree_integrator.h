@@ -1,13 +1,14 @@
-/// Renders on the CPU: TBB over tiles, Embree or the kernel's own loop for rays.
+/// Renders on the CPU: TBB over tiles, a tree that Embree builds or the kernel's own loop for rays.
 #pragma once
 
 #include "embree_program.h"
-#include "embree_scene.h"
+#include "embree_tree.h"
 
 #include "backend/crt_backend.h"
 #include "backend/sdk/plugin_guard.h"
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -20,7 +21,7 @@ std::vector<CrtDevice> probeDevices(const plugin::Host& host);
 
 class EmbreeIntegrator {
 public:
-    static constexpr double kAcceleratorReach = static_cast<double>(Tracer::kReach);
+    static constexpr double kAcceleratorReach = std::numeric_limits<double>::infinity();
 
     EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo& info);
 
@@ -43,7 +44,7 @@ private:
     tbb::global_control parallelism_;  ///< Lets --threads exceed the number of processors.
     tbb::task_arena arena_;
     std::unique_ptr<Device> device_;  ///< Opened when a scene needs it.
-    std::unique_ptr<Tracer> tracer_;
+    std::unique_ptr<Tree> tree_;
     const Program* program_ = nullptr;
     std::unique_ptr<Line[]> blob_;
     std::vector<double> sums_;

@@ -9,7 +9,7 @@
 
 /// A handful of diffuse triangles.
 #define CRT_EMBREE_BOX_FEATURES ((unsigned long)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BRUTE_FORCE))
-/// Diffuse meshes: Embree's BVH and smooth normals.
+/// Diffuse meshes: a tree and smooth normals.
 #define CRT_EMBREE_MESH_FEATURES \
     ((unsigned long)(CRT_EMBREE_LIT_FEATURES | CRT_FEATURE_BVH | CRT_FEATURE_SMOOTH_NORMALS))
 /// Mirrors, metals and glass without roughness, in any shape.

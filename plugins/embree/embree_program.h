@@ -1,7 +1,7 @@
 /// Feature mask → kernel: the smallest of those compiled ahead that covers the scene.
 #pragma once
 
-#include "embree_scene.h"
+#include "embree_tree.h"
 
 #include "backend/crt_backend.h"
 
@@ -13,7 +13,7 @@ namespace crt::embree {
 /// (CrtFilmView's layout).
 struct TileJob {
     const unsigned char* blob;
-    const Tracer* tracer;  ///< Null: the kernel traces by itself.
+    const Tree* tree;  ///< Null: the kernel traces by itself.
     std::uint32_t x0, y0, x1, y1;
     std::uint64_t first_sample;
     std::uint32_t sample_count;

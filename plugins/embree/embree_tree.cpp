@@ -1,4 +1,5 @@
-#include "embree_scene.h"
+// The one file that knows Embree, and hides the difference between Embree 3 and 4.
+#include "embree_tree.h"
 
 #include "backend/sdk/plugin_guard.h"
 
@@ -10,121 +11,144 @@
 
 #include <algorithm>
 #include <limits>
-#include <new>
+
+#include <tbb/parallel_for.h>
 
 namespace crt::embree {
 namespace {
 
-using kernel::CrtContext;
-using kernel::CrtHit;
-using kernel::CrtRay;
-using kernel::CrtShear;
 using kernel::CrtTriangle;
+using kernel::u64;  // CRT_ARRAY computes with it
 
-/// Embree's distances may differ from the shared test's in the last bits: what culls is given this much more
-/// reach.
-constexpr float kReachSlack = 1.0f + 1e-5f;
-
-/// Embree tests the boxes of user primitives without its robust mode's care: planes err by some 7 · 2^-24
-/// of the coordinates that take part, whatever the scene's flags say. For rays that start within
-/// Tracer::kReach of the scene (which lies within ±1) this holds what they touch, with room to spare.
-constexpr float kBoxPadding = 8 * CRT_BOX_PADDING;
-
-#if RTC_VERSION_MAJOR >= 4
-using QueryContext = RTCRayQueryContext;
-void initContext(QueryContext* context) { rtcInitRayQueryContext(context); }
-#else
-using QueryContext = RTCIntersectContext;
-void initContext(QueryContext* context) { rtcInitIntersectContext(context); }
-#endif
-
-/// What the callbacks need; Embree hands them the context back, which is its first member.
-struct Query {
-    QueryContext context;
-    const CrtTriangle* triangles;
-    CrtShear shear;
-    CrtHit best;
-    float reach;
-    const CrtContext* slots;  ///< Null: all slots hold triangles.
-    CrtRay ray;
-};
-
-/// Tests one triangle whose box the ray meets, and lets Embree go no further than just beyond the best hit,
-/// so that ties still come here.
-void closestHit(const RTCIntersectFunctionNArguments* arguments) {
-    Query& query = *reinterpret_cast<Query*>(arguments->context);
-    const float before = query.best.t;
-    if (query.slots != nullptr)
-        crt_test_slot(query.slots, query.triangles, arguments->primID, query.ray, query.shear, &query.best);
-    else
-        crt_test_closest(query.triangles, arguments->primID, query.shear, &query.best);
-    if (query.best.t < before)
-        RTCRayN_tfar(RTCRayHitN_RayN(arguments->rayhit, 1), 1, 0) = query.best.t * kReachSlack;
-}
-
-void anyHit(const RTCOccludedFunctionNArguments* arguments) {
-    Query& query = *reinterpret_cast<Query*>(arguments->context);
-    CrtHit hit;
-    const bool stops =
-        query.slots != nullptr
-            ? crt_slot_stops(query.slots, query.triangles, arguments->primID, query.ray, query.shear, &hit)
-            : crt_intersect_triangle(query.triangles + arguments->primID, query.shear, query.reach, &hit);
-    if (stops) RTCRayN_tfar(arguments->ray, 1, 0) = -std::numeric_limits<float>::infinity();
-}
-
-/// Of a triangle, or of a shape's box, which stands in its place.
-void slotBounds(const RTCBoundsFunctionArguments* arguments) {
-    const CrtTriangle& triangle =
-        static_cast<const CrtTriangle*>(arguments->geometryUserPtr)[arguments->primID];
-    const auto bound = [&](std::uint32_t axis, float& lower, float& upper) {
-        const float* p = triangle.p + 3 * axis;
-        lower = std::min({p[0], p[1], p[2]}) - kBoxPadding;
-        upper = std::max({p[0], p[1], p[2]}) + kBoxPadding;
-    };
-    RTCBounds& b = *arguments->bounds_o;
-    bound(0, b.lower_x, b.upper_x);
-    bound(1, b.lower_y, b.upper_y);
-    bound(2, b.lower_z, b.upper_z);
-}
-
-Query makeQuery(const CrtTriangle* triangles, const CrtContext* slots, const CrtRay& ray) {
-    Query query;
-    initContext(&query.context);
-    query.triangles = triangles;
-    query.slots = slots;
-    query.ray = ray;
-    query.shear = crt_shear(ray);
-    query.best = kernel::crt_no_hit(ray.reach);
-    query.reach = ray.reach;
-    return query;
-}
-
-RTCRay embreeRay(const CrtRay& ray) {
-    RTCRay r;
-    r.org_x = ray.o.x;
-    r.org_y = ray.o.y;
-    r.org_z = ray.o.z;
-    r.tnear = 0.0f;
-    r.dir_x = ray.d.x;
-    r.dir_y = ray.d.y;
-    r.dir_z = ray.d.z;
-    r.time = 0.0f;
-    r.tfar = ray.reach * kReachSlack;
-    r.mask = 0xffffffffu;
-    r.id = 0;
-    r.flags = 0;
-    return r;
-}
-
-/// Called by Embree's threads while it builds; true means to go on.
-bool reportProgress(void* progress, double done) {
-    (*static_cast<const std::function<void(double)>*>(progress))(done);
-    return true;
-}
+constexpr unsigned kLanes = 8;
 
 std::string errorText(RTCDevice device, const char* what) {
     const RTCError code = rtcGetDeviceError(device);
     return std::string(what) + " (Embree error " + std::to_string(static_cast<int>(code)) + ")";
+}
+
+/// What the children of a node lead to that are not there: overflow may let a ray in.
+const Leaf8& nothing() {
+    static const Leaf8 leaf = [] {
+        Leaf8 empty;
+        for (auto& row : empty.p) std::fill_n(row, kLanes, std::numeric_limits<float>::quiet_NaN());
+        std::fill_n(empty.slot, kLanes, CRT_NONE);
+        return empty;
+    }();
+    return leaf;
+}
+
+/// What Embree hands back to the functions below.
+struct Building {
+    const CrtTriangle* triangles;
+    const std::function<void(double)>* progress;
+};
+
+/// Of a triangle, or of a shape's or an instance's box, which stands in its place.
+RTCBuildPrimitive primitiveOf(const CrtTriangle& triangle, std::size_t slot) {
+    const auto bound = [&](std::uint32_t axis, float& lower, float& upper) {
+        const float* p = triangle.p + 3 * axis;
+        lower = std::min({p[0], p[1], p[2]}) - CRT_BOX_PADDING;
+        upper = std::max({p[0], p[1], p[2]}) + CRT_BOX_PADDING;
+    };
+    RTCBuildPrimitive b{};
+    bound(0, b.lower_x, b.upper_x);
+    bound(1, b.lower_y, b.upper_y);
+    bound(2, b.lower_z, b.upper_z);
+    b.primID = static_cast<unsigned>(slot);
+    return b;
+}
+
+/// Children that are not set have boxes that no ray enters.
+void* createNode(RTCThreadLocalAllocator allocator, unsigned, void*) {
+    auto* node = static_cast<Node8*>(rtcThreadLocalAlloc(allocator, sizeof(Node8), alignof(Node8)));
+    for (unsigned plane = 0; plane < 6; ++plane)
+        std::fill_n(node->bounds[plane], kLanes,
+                    (plane & 1u) != 0 ? -std::numeric_limits<float>::infinity()
+                                      : std::numeric_limits<float>::infinity());
+    std::fill_n(node->child, kLanes, reinterpret_cast<Child>(&nothing()) | kLeaf);
+    return node;
+}
+
+void setChildren(void* node, void** children, unsigned count, void*) {
+    for (unsigned i = 0; i < count; ++i)
+        static_cast<Node8*>(node)->child[i] = reinterpret_cast<Child>(children[i]);
+}
+
+void setBounds(void* into, const RTCBounds** bounds, unsigned count, void*) {
+    auto& planes = static_cast<Node8*>(into)->bounds;
+    for (unsigned i = 0; i < count; ++i) {
+        const RTCBounds& b = *bounds[i];
+        const float values[6] = {b.lower_x, b.upper_x, b.lower_y, b.upper_y, b.lower_z, b.upper_z};
+        for (unsigned plane = 0; plane < 6; ++plane) planes[plane][i] = values[plane];
+    }
+}
+
+Child triangleLeaf(RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* const* primitives,
+                   unsigned count, const CrtTriangle* triangles) {
+    auto* leaf = static_cast<Leaf8*>(rtcThreadLocalAlloc(allocator, sizeof(Leaf8), alignof(Leaf8)));
+    *leaf = nothing();
+    for (unsigned lane = 0; lane < count; ++lane) {
+        leaf->slot[lane] = primitives[lane]->primID;
+        for (unsigned i = 0; i < 9; ++i) leaf->p[i][lane] = triangles[leaf->slot[lane]].p[i];
+    }
+    return reinterpret_cast<Child>(leaf) | kLeaf;
+}
+
+RTCBounds boundsOf(const RTCBuildPrimitive* const* primitives, unsigned count) {
+    RTCBounds b{};
+    const auto bound = [&](float RTCBuildPrimitive::*from, float RTCBounds::*to, auto&& better) {
+        b.*to = primitives[0]->*from;
+        for (unsigned i = 1; i < count; ++i) b.*to = better(b.*to, primitives[i]->*from);
+    };
+    const auto least = [](float x, float y) { return std::min(x, y); };
+    const auto most = [](float x, float y) { return std::max(x, y); };
+    bound(&RTCBuildPrimitive::lower_x, &RTCBounds::lower_x, least);
+    bound(&RTCBuildPrimitive::lower_y, &RTCBounds::lower_y, least);
+    bound(&RTCBuildPrimitive::lower_z, &RTCBounds::lower_z, least);
+    bound(&RTCBuildPrimitive::upper_x, &RTCBounds::upper_x, most);
+    bound(&RTCBuildPrimitive::upper_y, &RTCBounds::upper_y, most);
+    bound(&RTCBuildPrimitive::upper_z, &RTCBounds::upper_z, most);
+    return b;
+}
+
+/// The triangles as a leaf, and each other slot, with a box of its own, as another: an instance is not to be
+/// entered because a ray meets its neighbour. Where there are several of these, a node holds them.
+void* createLeaf(RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* primitives, std::size_t count,
+                 void* building) {
+    const CrtTriangle* triangles = static_cast<const Building*>(building)->triangles;
+    const RTCBuildPrimitive *of_leaf[kLanes], *others[kLanes];
+    unsigned in_leaf = 0, other_count = 0;
+    for (std::size_t i = 0; i < count; ++i)
+        if (triangles[primitives[i].primID].shape == 0)
+            of_leaf[in_leaf++] = primitives + i;
+        else
+            others[other_count++] = primitives + i;
+
+    void* children[kLanes];
+    RTCBounds bounds[kLanes];
+    unsigned child_count = 0;
+    const auto add = [&](Child child, const RTCBuildPrimitive* const* of, unsigned n) {
+        children[child_count] = reinterpret_cast<void*>(child);
+        bounds[child_count++] = boundsOf(of, n);
+    };
+    if (in_leaf > 0) add(triangleLeaf(allocator, of_leaf, in_leaf, triangles), of_leaf, in_leaf);
+    for (unsigned i = 0; i < other_count; ++i)
+        add(Child{others[i]->primID} << kSlotShift | kSlot, others + i, 1);
+    if (child_count == 1) return children[0];
+
+    void* node = createNode(allocator, child_count, building);
+    const RTCBounds* pointers[kLanes];
+    for (unsigned i = 0; i < child_count; ++i) pointers[i] = bounds + i;
+    setChildren(node, children, child_count, building);
+    setBounds(node, pointers, child_count, building);
+    return node;
+}
+
+/// Called by Embree's threads while it builds; true means to go on.
+bool reportProgress(void* building, double done) {
+    (*static_cast<const Building*>(building)->progress)(done);
+    return true;
 }
 
 }  // namespace
@@ -148,87 +172,41 @@ std::string Device::version() {
            std::to_string(RTC_VERSION_PATCH);
 }
 
-struct Tracer::Impl {
-    RTCScene scene = nullptr;
-    const CrtTriangle* triangles = nullptr;
-    CrtContext context{};
-    const CrtContext* slots = nullptr;  ///< As of Query.
-
-    void use(const unsigned char* blob) {
-        using kernel::u64;  // CRT_ARRAY computes with it
-        const auto& header = *reinterpret_cast<const kernel::CrtScene*>(blob);
-        triangles = CRT_ARRAY(CrtTriangle, blob, header.triangles);
-        context.blob = blob;
-        context.scene = &header;
-        slots = header.shapes.count + header.instances.count > 0 ? &context : nullptr;
-    }
+struct Tree::Impl {
+    RTCBVH bvh = nullptr;
+    ~Impl() { rtcReleaseBVH(bvh); }
 };
 
-Tracer::Tracer(const Device& device, const unsigned char* blob, const std::function<void(double)>& progress)
+Tree::Tree(const Device& device, const unsigned char* blob, const std::function<void(double)>& progress)
     : impl_(new Impl) {
+    const auto& scene = *reinterpret_cast<const kernel::CrtScene*>(blob);
+    Building building{CRT_ARRAY(CrtTriangle, blob, scene.triangles), &progress};
+    // Not a vector: it would write zeros over hundreds of megabytes first.
+    const std::size_t count = scene.triangle_count;
+    const std::unique_ptr<RTCBuildPrimitive[]> primitives(new RTCBuildPrimitive[count]);
+    tbb::parallel_for(std::size_t{0}, count,
+                      [&](std::size_t i) { primitives[i] = primitiveOf(building.triangles[i], i); });
     RTCDevice rtc = device.impl_->device;
-    impl_->use(blob);
-    impl_->scene = rtcNewScene(rtc);
-    RTCGeometry geometry = rtcNewGeometry(rtc, RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(geometry, impl_->context.scene->triangle_count);
-    rtcSetGeometryUserData(geometry, const_cast<CrtTriangle*>(impl_->triangles));
-    rtcSetGeometryBoundsFunction(geometry, slotBounds, nullptr);
-    rtcSetGeometryIntersectFunction(geometry, closestHit);
-    rtcSetGeometryOccludedFunction(geometry, anyHit);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(impl_->scene, geometry);
-    rtcReleaseGeometry(geometry);
-    rtcSetSceneProgressMonitorFunction(impl_->scene, reportProgress,
-                                       const_cast<std::function<void(double)>*>(&progress));
-    rtcCommitScene(impl_->scene);
-    rtcSetSceneProgressMonitorFunction(impl_->scene, nullptr, nullptr);
-    if (rtcGetDeviceError(rtc) != RTC_ERROR_NONE) {
-        rtcReleaseScene(impl_->scene);
-        throw plugin::PluginError(CRT_DEVICE_FAILED, errorText(rtc, "Embree could not build its scene"));
-    }
+    impl_->bvh = rtcNewBVH(rtc);
+    RTCBuildArguments arguments = rtcDefaultBuildArguments();
+    arguments.bvh = impl_->bvh;
+    arguments.maxBranchingFactor = kLanes;
+    arguments.maxDepth = kMostLevels - 1;
+    arguments.sahBlockSize = kLanes;  // as many are tested in the time of one
+    arguments.maxLeafSize = kLanes;
+    arguments.primitives = primitives.get();
+    arguments.primitiveCount = arguments.primitiveArrayCapacity = count;
+    arguments.createNode = createNode;
+    arguments.setNodeChildren = setChildren;
+    arguments.setNodeBounds = setBounds;
+    arguments.createLeaf = createLeaf;
+    arguments.buildProgress = reportProgress;
+    arguments.userPtr = &building;
+    root_ = reinterpret_cast<Child>(rtcBuildBVH(&arguments));
+    if (root_ == 0 || rtcGetDeviceError(rtc) != RTC_ERROR_NONE)
+        throw plugin::PluginError(CRT_DEVICE_FAILED, errorText(rtc, "Embree could not build its tree"));
 }
 
-Tracer::~Tracer() { rtcReleaseScene(impl_->scene); }
-
-/// Embree asks for bounds while it builds, and never again.
-void Tracer::moveTo(const unsigned char* blob) { impl_->use(blob); }
-
-bool Tracer::takes(const CrtRay& ray) {
-    using namespace kernel;
-    const vec3 o = abs3(ray.o), d = abs3(ray.d);
-    const bool near = o.x <= kReach && o.y <= kReach && o.z <= kReach;  // false for NaN
-    return near && d.x <= kReach && d.y <= kReach && d.z <= kReach;
-}
-
-CrtHit Tracer::closest(const CrtRay& ray) const {
-    Query query = makeQuery(impl_->triangles, impl_->slots, ray);
-    RTCRayHit hit;
-    hit.ray = embreeRay(ray);
-    hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-#if RTC_VERSION_MAJOR >= 4
-    RTCIntersectArguments arguments;
-    rtcInitIntersectArguments(&arguments);
-    arguments.context = &query.context;
-    rtcIntersect1(impl_->scene, &hit, &arguments);
-#else
-    rtcIntersect1(impl_->scene, &query.context, &hit);
-#endif
-    return query.best;
-}
-
-bool Tracer::any(const CrtRay& ray) const {
-    Query query = makeQuery(impl_->triangles, impl_->slots, ray);
-    RTCRay r = embreeRay(ray);
-#if RTC_VERSION_MAJOR >= 4
-    RTCOccludedArguments arguments;
-    rtcInitOccludedArguments(&arguments);
-    arguments.context = &query.context;
-    rtcOccluded1(impl_->scene, &r, &arguments);
-#else
-    rtcOccluded1(impl_->scene, &query.context, &r);
-#endif
-    return r.tfar < 0.0f;  // Embree's mark for "occluded"
-}
+Tree::~Tree() = default;
 
 }  // namespace crt::embree

@@ -1,23 +1,44 @@
-/// The blob's triangles and shapes in an Embree scene. Embree finds candidates; the kernel's shared tests
-/// have the last word, so that hits are the same bits as on every other backend. The one file pair that
-/// knows Embree, and hides the difference between Embree 3 and 4.
+/// A tree of boxes over a blob's slots, eight children a node, built by Embree and traversed by traversal.h.
 #pragma once
 
 namespace crt::embree {
-class Tracer;
+class Tree;
 }
-// The kernels of this backend carry the tracer along, and trace with it (kernels.cpp).
-#define CRT_CONTEXT_EXTRA const crt::embree::Tracer* tracer;
+// The kernels of this backend carry the tree along, and trace with it (kernels.cpp).
+#define CRT_CONTEXT_EXTRA const crt::embree::Tree* tree;
 #define CRT_BACKEND_TRACE
 #include "kernel/surface.h"
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
 
 namespace crt::embree {
 
-/// One Embree device; its scenes must not outlive it.
+/// The address of a Node8; that of a Leaf8, marked; or a slot that holds no triangle. Addresses are
+/// multiples of 64.
+using Child = std::uintptr_t;
+inline constexpr Child kLeaf = 1, kSlot = 2, kMarks = 63;
+inline constexpr unsigned kSlotShift = 6;
+
+struct alignas(64) Node8 {
+    float bounds[6][8];  ///< Lower x, upper x, lower y, … of each child; of those that are not, empty.
+    Child child[8];
+};
+static_assert(sizeof(Node8) == 256);
+
+/// Eight triangles side by side. Where there is none the coordinates are NaN, which no ray hits.
+struct alignas(64) Leaf8 {
+    float p[9][8];  ///< CrtTriangle::p of each.
+    std::uint32_t slot[8];
+};
+static_assert(sizeof(Leaf8) == 320);
+
+/// Of nodes: Embree's, and one of slots.
+inline constexpr std::uint32_t kMostLevels = 33;
+
+/// One Embree device; its trees must not outlive it.
 class Device {
 public:
     /// It works with as many threads as TBB may use. Throws PluginError(CRT_NO_DEVICE) with Embree's reason.
@@ -30,35 +51,26 @@ public:
     static std::string version();
 
 private:
-    friend class Tracer;
+    friend class Tree;
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
 
-/// An Embree BVH over the slots of a blob, which it reads while it lives. Throws PluginError when Embree
-/// cannot build it.
-class Tracer {
+class Tree {
 public:
-    /// `progress` gets the part of it that is built, in [0,1], from any thread.
-    Tracer(const Device& device, const unsigned char* blob, const std::function<void(double)>& progress);
-    ~Tracer();
-    Tracer(const Tracer&) = delete;
-    Tracer& operator=(const Tracer&) = delete;
+    /// Of the slots of a blob, which it does not need afterwards. `progress` gets the part that is built, in
+    /// [0,1], from any thread. Throws PluginError when Embree cannot build it.
+    Tree(const Device& device, const unsigned char* blob, const std::function<void(double)>& progress);
+    ~Tree();
+    Tree(const Tree&) = delete;
+    Tree& operator=(const Tree&) = delete;
 
-    /// The same blob lies there from now on.
-    void moveTo(const unsigned char* blob);
-
-    /// Rays that start within this of 0 on each axis are taken.
-    static constexpr float kReach = 4;
-    /// Whether Embree is sure to find what this ray meets: not for rays from far outside the scene, and
-    /// those that are none.
-    static bool takes(const kernel::CrtRay& ray);
-    kernel::CrtHit closest(const kernel::CrtRay& ray) const;
-    bool any(const kernel::CrtRay& ray) const;
+    Child root() const { return root_; }
 
 private:
     struct Impl;
     std::unique_ptr<Impl> impl_;
+    Child root_ = 0;
 };
 
 }  // namespace crt::embree
