@@ -81,16 +81,15 @@ CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, C
     u32 size = 0u;
     u32 current = instance->root << 4;
     for (;;) {
-        const u32 count = current & 15u;
-        if (count == 0u) {
+        while ((current & 15u) == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
             const vec4 t = crt_node_distances(node, mesh, best->t);
             if (crt_enter_nearest(node, t, stack, &size, &current)) continue;
-        } else {
-            const u32 first = current >> 4;
-            for (u32 i = 0u; i < count; ++i)
-                crt_test_placed(instance, index, triangles, first + i, shear, best);
+            if (!crt_next_stacked(stack, &size, best->t, &current)) return;
         }
+        const u32 first = current >> 4, end = first + (current & 15u);
+        for (u32 slot = first; slot < end; ++slot)
+            crt_test_placed(instance, index, triangles, slot, shear, best);
         if (!crt_next_stacked(stack, &size, best->t, &current)) return;
     }
 }
@@ -102,23 +101,23 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
     const CrtNodeRay mesh = crt_mesh_ray(instance, ray);
     CrtHit hit;
     u32 stack[CRT_BVH_STACK];
-    u32 size = 1u;
-    stack[0] = instance->root << 4;
-    while (size != 0u) {
-        --size;
-        const u32 current = stack[size];
-        const u32 count = current & 15u;
-        if (count == 0u) {
+    u32 size = 0u;
+    u32 current = instance->root << 4;
+    for (;;) {
+        while ((current & 15u) == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
-            const vec4 t = crt_node_distances(node, mesh, ray.reach);
-            size = crt_enter_all(node, t, stack, size);
-        } else {
-            const u32 first = current >> 4;
-            for (u32 i = 0u; i < count; ++i)
-                if (crt_intersect_placed(instance, triangles + first + i, shear, ray.reach, &hit)) return 1;
+            size = crt_enter_all(node, crt_node_distances(node, mesh, ray.reach), stack, size);
+            if (size == 0u) return 0;
+            --size;
+            current = stack[size];
         }
+        const u32 first = current >> 4, end = first + (current & 15u);
+        for (u32 slot = first; slot < end; ++slot)
+            if (crt_intersect_placed(instance, triangles + slot, shear, ray.reach, &hit)) return 1;
+        if (size == 0u) return 0;
+        --size;
+        current = stack[size];
     }
-    return 0;
 }
 
 CRT_KERNEL_END
