@@ -27,7 +27,7 @@ std::string errorText(RTCDevice device, const char* what) {
     return std::string(what) + " (Embree error " + std::to_string(static_cast<int>(code)) + ")";
 }
 
-/// What the children of a node lead to that are not there: overflow may let a ray in.
+/// The leaf of children that are not there: a ray whose distances overflow enters them too.
 const Leaf8& nothing() {
     static const Leaf8 leaf = [] {
         Leaf8 empty;
