@@ -154,6 +154,27 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
     CrtHit hit;
     if (!crt_is_ray(ray)) return 0;
     u32 stack[CRT_BVH_STACK];
+#if CRT_SIMD8
+    u32 size = 1u;
+    stack[0] = 0u;
+    while (size != 0u) {
+        --size;
+        const u32 current = stack[size];
+        const u32 count = current & 15u;
+        if (count == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            const vec4 t = crt_node_distances(node, among, ray.reach);
+            size = crt_enter_all(node, t, stack, size);
+        } else {
+            const u32 first = current >> 4;
+            for (u32 i = 0u; i < count; ++i)
+                if (CRT_HAS_SLOTS ? crt_slot_stops(ctx, triangles, first + i, ray, shear, &hit)
+                                    : crt_intersect_triangle(triangles + first + i, shear, ray.reach, &hit))
+                    return 1;
+        }
+    }
+    return 0;
+#else
     u32 size = 0u;
     u32 current = 0u; /* the root: node 0 */
     for (;;) {
@@ -173,6 +194,7 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
         --size;
         current = stack[size];
     }
+#endif
 }
 
 CRT_FN CrtHit crt_software_closest(const CrtContext *ctx, CrtRay ray) {

@@ -80,6 +80,21 @@ CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, C
     u64 stack[CRT_BVH_STACK];
     u32 size = 0u;
     u32 current = instance->root << 4;
+#if CRT_SIMD8
+    for (;;) {
+        const u32 count = current & 15u;
+        if (count == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            const vec4 t = crt_node_distances(node, mesh, best->t);
+            if (crt_enter_nearest(node, t, stack, &size, &current)) continue;
+        } else {
+            const u32 first = current >> 4;
+            for (u32 i = 0u; i < count; ++i)
+                crt_test_placed(instance, index, triangles, first + i, shear, best);
+        }
+        if (!crt_next_stacked(stack, &size, best->t, &current)) return;
+    }
+#else /* two loops, as in bvh.h */
     for (;;) {
         while ((current & 15u) == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
@@ -92,6 +107,7 @@ CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, C
             crt_test_placed(instance, index, triangles, slot, shear, best);
         if (!crt_next_stacked(stack, &size, best->t, &current)) return;
     }
+#endif
 }
 
 CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShear shear) {
@@ -101,6 +117,25 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
     const CrtNodeRay mesh = crt_mesh_ray(instance, ray);
     CrtHit hit;
     u32 stack[CRT_BVH_STACK];
+#if CRT_SIMD8
+    u32 size = 1u;
+    stack[0] = instance->root << 4;
+    while (size != 0u) {
+        --size;
+        const u32 current = stack[size];
+        const u32 count = current & 15u;
+        if (count == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            const vec4 t = crt_node_distances(node, mesh, ray.reach);
+            size = crt_enter_all(node, t, stack, size);
+        } else {
+            const u32 first = current >> 4;
+            for (u32 i = 0u; i < count; ++i)
+                if (crt_intersect_placed(instance, triangles + first + i, shear, ray.reach, &hit)) return 1;
+        }
+    }
+    return 0;
+#else
     u32 size = 0u;
     u32 current = instance->root << 4;
     for (;;) {
@@ -118,6 +153,7 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
         --size;
         current = stack[size];
     }
+#endif
 }
 
 CRT_KERNEL_END
