@@ -60,11 +60,13 @@ inline u32 hitsOf(const Leaf8& leaf, const CrtShear& ray, f32 limit, Hits8* hits
     const vec8 w = differenceOfProducts(bx, ay, by, ax);
     const vec8 zero = splat8(0.0f);
     const mask8 outside = ((u < zero) | (v < zero) | (w < zero)) & ((u > zero) | (v > zero) | (w > zero));
-    if (mask8_bits(outside) == 0xffu) return 0u;
     const vec8 det = u + v + w;
+    // Where there is no triangle it is NaN, neither below 0 nor above.
+    const mask8 met = ~outside & ((det < zero) | (det > zero));
+    if (mask8_bits(met) == 0u) return 0u;
     const vec8 inverse_det = splat8(1.0f) / det;
     const vec8 t = crt_fma8(u, az, crt_fma8(v, bz, w * cz)) * splat8(ray.sz) * inverse_det;
-    const u32 lanes = mask8_bits(~outside & (det != zero) & (t > zero) & (t < splat8(limit)));
+    const u32 lanes = mask8_bits(met & (t > zero) & (t < splat8(limit)));
     if (lanes == 0u) return 0u;
     _mm256_store_ps(hits->t, (__m256)t);
     _mm256_store_ps(hits->b1, (__m256)(v * inverse_det));
