@@ -148,13 +148,6 @@ CRT_FN int crt_enter_nearest(CRT_GLOBAL const CrtNode4 *node, vec4 t, u64 *stack
     return 1;
 }
 
-/* The node `current`: its nearest child that the ray enters becomes the current one. 0: it enters none. */
-CRT_FN int crt_enter_node(CRT_GLOBAL const CrtNode4 *nodes, CrtNodeRay ray, f32 limit, u64 *stack, u32 *size,
-                          u32 *current) {
-    CRT_GLOBAL const CrtNode4 *node = nodes + (*current >> 4);
-    return crt_enter_nearest(node, crt_node_distances(node, ray, limit), stack, size, current);
-}
-
 /* The next from the stack that may hold a hit at most as far as t: a box that begins just behind the best
    hit may still hold a tie, and the slack keeps it. 0: there is none. */
 CRT_FN int crt_next_stacked(const u64 *stack, u32 *size, f32 t, u32 *current) {
@@ -176,22 +169,6 @@ CRT_FN u32 crt_enter_all(CRT_GLOBAL const CrtNode4 *node, vec4 t, u32 *stack, u3
     if (V4Z(t) < CRT_INFINITY) { stack[size] = node->child[2]; ++size; }
     if (V4W(t) < CRT_INFINITY) { stack[size] = node->child[3]; ++size; }
     return size;
-}
-
-/* The next leaf that the ray enters at most `reach` away, in any order; 0: there is none. The caller tests
-   what is in it: on a GPU lanes of a warp search together, then test together (Aila and Laine 2009,
-   "while-while"). */
-CRT_FN int crt_next_leaf(CRT_GLOBAL const CrtNode4 *nodes, CrtNodeRay ray, f32 reach, u32 *stack, u32 *size,
-                         u32 *leaf) {
-    while (*size != 0u) {
-        --*size;
-        const u32 current = stack[*size];
-        *leaf = current;
-        if ((current & 15u) != 0u) return 1;
-        CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
-        *size = crt_enter_all(node, crt_node_distances(node, ray, reach), stack, *size);
-    }
-    return 0;
 }
 
 /* Boxes let NaN in, so that none is lost that is touched; those of unused children too, which lead back to

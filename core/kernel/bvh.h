@@ -101,6 +101,13 @@ CRT_FN int crt_aabb_any(const CrtContext *ctx, CrtRay ray) {
     return 0;
 }
 
+/* The node `current`: its nearest child that the ray enters becomes the current one. 0: it enters none. */
+CRT_FN int crt_enter_node(CRT_GLOBAL const CrtNode4 *nodes, CrtNodeRay ray, f32 limit, u64 *stack, u32 *size,
+                          u32 *current) {
+    CRT_GLOBAL const CrtNode4 *node = nodes + (*current >> 4);
+    return crt_enter_nearest(node, crt_node_distances(node, ray, limit), stack, size, current);
+}
+
 CRT_FN void crt_test_leaf(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 leaf,
                           CrtRay ray, CrtShear shear, CrtHit *best) {
     const u32 first = leaf >> 4, end = first + (leaf & 15u);
@@ -147,16 +154,47 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
     CrtHit hit;
     if (!crt_is_ray(ray)) return 0;
     u32 stack[CRT_BVH_STACK];
-    u32 size = 1u, leaf;
+#if CRT_SIMD8
+    u32 size = 1u;
     stack[0] = 0u;
-    while (crt_next_leaf(nodes, among, ray.reach, stack, &size, &leaf)) {
-        const u32 first = leaf >> 4, end = first + (leaf & 15u);
-        for (u32 slot = first; slot < end; ++slot)
-            if (CRT_HAS_SLOTS ? crt_slot_stops(ctx, triangles, slot, ray, shear, &hit)
-                                : crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit))
-                return 1;
+    while (size != 0u) {
+        --size;
+        const u32 current = stack[size];
+        const u32 count = current & 15u;
+        if (count == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            const vec4 t = crt_node_distances(node, among, ray.reach);
+            size = crt_enter_all(node, t, stack, size);
+        } else {
+            const u32 first = current >> 4;
+            for (u32 i = 0u; i < count; ++i)
+                if (CRT_HAS_SLOTS ? crt_slot_stops(ctx, triangles, first + i, ray, shear, &hit)
+                                    : crt_intersect_triangle(triangles + first + i, shear, ray.reach, &hit))
+                    return 1;
+        }
     }
     return 0;
+#else
+    u32 size = 0u;
+    u32 current = 0u; /* the root: node 0 */
+    for (;;) {
+        while ((current & 15u) == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            size = crt_enter_all(node, crt_node_distances(node, among, ray.reach), stack, size);
+            if (size == 0u) return 0;
+            --size;
+            current = stack[size];
+        }
+        const u32 first = current >> 4, end = first + (current & 15u);
+        for (u32 slot = first; slot < end; ++slot)
+            if (CRT_HAS_SLOTS ? crt_slot_stops(ctx, triangles, slot, ray, shear, &hit)
+                              : crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit))
+                return 1;
+        if (size == 0u) return 0;
+        --size;
+        current = stack[size];
+    }
+#endif
 }
 
 CRT_FN CrtHit crt_software_closest(const CrtContext *ctx, CrtRay ray) {

@@ -70,14 +70,6 @@ CRT_FN void crt_test_placed(CRT_GLOBAL const CrtInstance *instance, u32 index,
     crt_keep_nearer(hit.t, hit.b1, hit.b2, slot, id, index + 1u, best);
 }
 
-CRT_FN void crt_test_placed_leaf(CRT_GLOBAL const CrtInstance *instance, u32 index,
-                                 CRT_GLOBAL const CrtTriangle *triangles, u32 leaf, CrtShear shear,
-                                 CrtHit *best) {
-    const u32 first = leaf >> 4, end = first + (leaf & 15u);
-    for (u32 slot = first; slot < end; ++slot)
-        crt_test_placed(instance, index, triangles, slot, shear, best);
-}
-
 /* The triangles of an instance against the best hit so far: bvh.h's traversal, in the mesh's coordinates. */
 CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, CrtShear shear,
                                  CrtHit *best) {
@@ -88,22 +80,34 @@ CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, C
     u64 stack[CRT_BVH_STACK];
     u32 size = 0u;
     u32 current = instance->root << 4;
-    for (;;) {
 #if CRT_SIMD8
-        if ((current & 15u) == 0u) {
-            if (crt_enter_node(nodes, mesh, best->t, stack, &size, &current)) continue;
+    for (;;) {
+        const u32 count = current & 15u;
+        if (count == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            const vec4 t = crt_node_distances(node, mesh, best->t);
+            if (crt_enter_nearest(node, t, stack, &size, &current)) continue;
         } else {
-            crt_test_placed_leaf(instance, index, triangles, current, shear, best);
+            const u32 first = current >> 4;
+            for (u32 i = 0u; i < count; ++i)
+                crt_test_placed(instance, index, triangles, first + i, shear, best);
         }
-#else /* as in crt_bvh_closest */
-        while ((current & 15u) == 0u) {
-            if (crt_enter_node(nodes, mesh, best->t, stack, &size, &current)) continue;
-            if (!crt_next_stacked(stack, &size, best->t, &current)) return;
-        }
-        crt_test_placed_leaf(instance, index, triangles, current, shear, best);
-#endif
         if (!crt_next_stacked(stack, &size, best->t, &current)) return;
     }
+#else /* two loops, as in bvh.h */
+    for (;;) {
+        while ((current & 15u) == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            const vec4 t = crt_node_distances(node, mesh, best->t);
+            if (crt_enter_nearest(node, t, stack, &size, &current)) continue;
+            if (!crt_next_stacked(stack, &size, best->t, &current)) return;
+        }
+        const u32 first = current >> 4, end = first + (current & 15u);
+        for (u32 slot = first; slot < end; ++slot)
+            crt_test_placed(instance, index, triangles, slot, shear, best);
+        if (!crt_next_stacked(stack, &size, best->t, &current)) return;
+    }
+#endif
 }
 
 CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShear shear) {
@@ -113,14 +117,43 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
     const CrtNodeRay mesh = crt_mesh_ray(instance, ray);
     CrtHit hit;
     u32 stack[CRT_BVH_STACK];
-    u32 size = 1u, leaf;
+#if CRT_SIMD8
+    u32 size = 1u;
     stack[0] = instance->root << 4;
-    while (crt_next_leaf(nodes, mesh, ray.reach, stack, &size, &leaf)) {
-        const u32 first = leaf >> 4, end = first + (leaf & 15u);
-        for (u32 slot = first; slot < end; ++slot)
-            if (crt_intersect_placed(instance, triangles + slot, shear, ray.reach, &hit)) return 1;
+    while (size != 0u) {
+        --size;
+        const u32 current = stack[size];
+        const u32 count = current & 15u;
+        if (count == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            const vec4 t = crt_node_distances(node, mesh, ray.reach);
+            size = crt_enter_all(node, t, stack, size);
+        } else {
+            const u32 first = current >> 4;
+            for (u32 i = 0u; i < count; ++i)
+                if (crt_intersect_placed(instance, triangles + first + i, shear, ray.reach, &hit)) return 1;
+        }
     }
     return 0;
+#else
+    u32 size = 0u;
+    u32 current = instance->root << 4;
+    for (;;) {
+        while ((current & 15u) == 0u) {
+            CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
+            size = crt_enter_all(node, crt_node_distances(node, mesh, ray.reach), stack, size);
+            if (size == 0u) return 0;
+            --size;
+            current = stack[size];
+        }
+        const u32 first = current >> 4, end = first + (current & 15u);
+        for (u32 slot = first; slot < end; ++slot)
+            if (crt_intersect_placed(instance, triangles + slot, shear, ray.reach, &hit)) return 1;
+        if (size == 0u) return 0;
+        --size;
+        current = stack[size];
+    }
+#endif
 }
 
 CRT_KERNEL_END
