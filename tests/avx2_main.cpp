@@ -1,7 +1,6 @@
 // The main of tests compiled for AVX2. Compiled without it: on a CPU that lacks it nothing else of the
 // program may run, static initialisers included.
-#define CATCH_CONFIG_RUNNER
-#include "catch.h"
+#include "catch_runner.h"
 
 #if defined(__x86_64__)
 #include <unistd.h>
@@ -24,5 +23,5 @@ __attribute__((constructor(101))) void leaveWithoutAvx2() {
 #endif
 
 int main(int argc, char** argv) {
-    return Catch::Session().run(argc, argv);
+    return runTests(argc, argv);
 }

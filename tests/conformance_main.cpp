@@ -1,11 +1,11 @@
 // conformance --backend NAME [--against NAME] [--one-kernel] [Catch2 options]: one suite for every backend.
 // Exit code 77 and one sentence when the backend cannot run here, so that a machine without a GPU skips
 // visibly.
-#define CATCH_CONFIG_RUNNER
 #include "conformance.h"
 
 #include "base/error.h"
 #include "base/listener.h"
+#include "catch_runner.h"
 #include "render/session.h"
 
 #include <cstdio>
@@ -72,23 +72,22 @@ double imageMean(const crt::Film& film) {
 }  // namespace conformance
 
 int main(int argc, char** argv) {
-    Catch::Session session;
-    session.cli(
-        session.cli() |
-        Catch::Clara::Opt(conformance::backend_name,
-                          "name")["--backend"]("backend under test, or a path to its .so") |
-        Catch::Clara::Opt(conformance::reference_name, "name")["--against"]("backend to compare bits with") |
-        Catch::Clara::Opt(conformance::one_kernel)["--one-kernel"](
-            "the backend has no lean kernels to compare"));
-    if (const int code = session.applyCommandLine(argc, argv); code != 0) return code;
     const crt::Listener listener(crt::standardErrorSink(), crt::LogLevel::Error);
     const crt::ListenerScope scope(listener);
-    try {
-        crt::probeDevices(conformance::backend());
-    } catch (const crt::Error& error) {
-        std::printf("SKIPPED: backend '%s' cannot run here: %s\n", conformance::backend_name.c_str(),
-                    error.what());
-        return conformance::kSkipped;
-    }
-    return session.run();
+    const auto probe = [] {
+        try {
+            crt::probeDevices(conformance::backend());
+            return 0;
+        } catch (const crt::Error& error) {
+            std::printf("SKIPPED: backend '%s' cannot run here: %s\n", conformance::backend_name.c_str(),
+                        error.what());
+            return conformance::kSkipped;
+        }
+    };
+    return runTests(
+        argc, argv,
+        {{"--backend", "backend under test, or a path to its .so", &conformance::backend_name},
+         {"--against", "backend to compare bits with", &conformance::reference_name},
+         {"--one-kernel", "the backend has no lean kernels to compare", nullptr, &conformance::one_kernel}},
+        probe);
 }

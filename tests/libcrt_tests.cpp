@@ -1,6 +1,6 @@
 // libcrt as a program sees it: this file includes none of the rooms' headers, and links libcrt.so alone.
-#define CATCH_CONFIG_MAIN
 #include "catch.h"
+#include "catch_runner.h"
 
 #include <crt/crt.h>
 
@@ -293,4 +293,8 @@ TEST_CASE("plugins are listed, with why one cannot run") {
     CHECK(has_cuda);
     CHECK(std::string(crt::version()).find('.') != std::string::npos);
     CHECK(crt::bitsVersion() > 0);
+}
+
+int main(int argc, char** argv) {
+    return runTests(argc, argv);
 }
