@@ -6,6 +6,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 BUILD_DIR=${CRT_BUILD_DIR:-build/release}
 CUDA_CACHE=.cache/cuda
+PYTHON_CACHE=.cache/python
 JOBS=${CRT_JOBS:-$(nproc)}
 
 say() { printf '== %s\n' "$*"; }
@@ -35,4 +36,9 @@ find_cuda() {
         done
     fi
     cuda_is_usable "$CUDA_CACHE/toolkit" && readlink -f "$CUDA_CACHE/toolkit"
+}
+
+# Whether scripts/setup has made an environment of Python that has what the package needs and its tests.
+python_is_usable() {
+    "$PYTHON_CACHE/bin/python3" -c 'import nanobind, numpy, pytest, tqdm, yaml' 2>/dev/null
 }

@@ -71,6 +71,13 @@ std::vector<std::pair<std::uint64_t, std::uint64_t>> Film::sampleRanges() const 
     return impl_->film.first.samples.ranges();
 }
 
+std::vector<std::string> Film::aovs() const {
+    std::vector<std::string> names;
+    for (const std::string& name : aovNames())
+        if ((impl_->film.second.record->aovs & aovNamed(name)) != 0) names.push_back(name);
+    return names;
+}
+
 std::uint64_t Film::count(std::uint32_t x, std::uint32_t y) const {
     const crt::Film& film = impl_->film.first;
     requirePixel(film, x, y);

@@ -8,7 +8,8 @@ import pathlib
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-FOLDERS = (".github", "bench", "cmake", "configs", "core", "data", "docs", "plugins", "scripts", "tests")
+FOLDERS = (".github", "bench", "cmake", "configs", "core", "data", "docs", "plugins", "python", "scripts",
+           "tests")
 KINDS = {".c", ".cl", ".cmake", ".cpp", ".csv", ".cu", ".h", ".in", ".json", ".map", ".patch", ".py",
          ".supp", ".txt", ".yaml", ".yml"}
 BYTES = 109

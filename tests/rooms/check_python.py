@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-FOLDERS = ("bench", "core", "plugins", "scripts", "tests")
+FOLDERS = ("bench", "core", "plugins", "python", "scripts", "tests")
 
 
 def is_python(path):

@@ -57,6 +57,8 @@ public:
     std::uint64_t samples() const;
     /// Their indices, half-open ranges in order.
     std::vector<std::pair<std::uint64_t, std::uint64_t>> sampleRanges() const;
+    /// AOVs that the scene's outputs ask for, all of which the film holds: "albedo", "normal", …
+    std::vector<std::string> aovs() const;
     /// Valid samples of one pixel: those that were NaN or infinite are left out.
     std::uint64_t count(std::uint32_t x, std::uint32_t y) const;
     /// X, Y and Z of one pixel: the mean of its valid samples, radiance under the CIE 1931 observer.

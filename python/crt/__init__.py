@@ -1,0 +1,25 @@
+"""crt in Python: scenes, renders, films and images of the spectral path tracer crt, as NumPy arrays.
+
+    import crt
+
+    scene = crt.load("cornell_box.yaml", set={"film.resolution": [256, 256]})
+    scene["sampler.samples"] = 64
+    result = crt.render(scene, backend="auto")
+    result.image            # float32, (height, width, 3), top row first, linear
+    result.error            # what the image knows of its own error
+    result.save("box.png")
+
+A film from Python has the bits of one from the program `crt`: the same scene, seed and samples give the same
+sums on every backend, however the samples are split. Films of different samples of one scene add:
+`a.film + b.film` has the bits of one render of all.
+"""
+
+from ._crt import Device, ErrorEstimate, Film, Image, Plugin, bits_version
+from ._crt import version as _version
+from .errors import Error, Kind, RenderFailed
+from .rendering import Result, develop, plugins, render
+from .scenes import Scene, load, scene
+
+__version__ = _version()
+__all__ = ["Device", "Error", "ErrorEstimate", "Film", "Image", "Kind", "Plugin", "RenderFailed", "Result",
+           "Scene", "bits_version", "develop", "load", "plugins", "render", "scene"]

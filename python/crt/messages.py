@@ -1,0 +1,10 @@
+"""What libcrt says goes to the logger `crt`, which shows warnings and errors unless it is told otherwise."""
+
+import logging
+
+LOGGER = logging.getLogger("crt")
+LEVELS = (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR)
+
+
+def tell(level, text):
+    LOGGER.log(LEVELS[level], "%s", text)

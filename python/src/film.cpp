@@ -1,0 +1,93 @@
+#include "binding.h"
+
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+#include <utility>
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace crt_python {
+namespace {
+
+template <class T>
+nb::ndarray<nb::numpy, T> arrayOf(std::unique_ptr<T[]> values, std::initializer_list<std::size_t> shape) {
+    T* const data = values.release();
+    const nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+    return nb::ndarray<nb::numpy, T>(data, shape, owner);
+}
+
+/// Means of X, Y and Z. [height][width][3]
+nb::ndarray<nb::numpy, double> xyzOf(const crt::Film& film) {
+    const std::size_t width = film.width(), height = film.height();
+    auto values = std::make_unique<double[]>(width * height * 3);
+    {
+        const nb::gil_scoped_release release;
+        double* next = values.get();
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x)
+                for (const double value : film.mean(x, y)) *next++ = value;
+    }
+    return arrayOf(std::move(values), {height, width, 3});
+}
+
+/// Valid samples. [height][width]
+nb::ndarray<nb::numpy, std::uint64_t> countsOf(const crt::Film& film) {
+    const std::size_t width = film.width(), height = film.height();
+    auto values = std::make_unique<std::uint64_t[]>(width * height);
+    {
+        const nb::gil_scoped_release release;
+        std::uint64_t* next = values.get();
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x) *next++ = film.count(x, y);
+    }
+    return arrayOf(std::move(values), {height, width});
+}
+
+crt::Film sumOf(const crt::Film& a, const crt::Film& b) {
+    crt::Film sum = a;
+    sum.merge(b);
+    return sum;
+}
+
+crt::Image develop(const crt::Film& film, bool for_display, std::optional<double> exposure_ev,
+                   std::vector<std::string> aovs) {
+    return film.develop({for_display, exposure_ev, std::move(aovs)});
+}
+
+}  // namespace
+
+void bindFilm(nb::module_& module) {
+    nb::class_<crt::ErrorEstimate>(module, "ErrorEstimate",
+                                   "What a film knows of its own error, relative to the mean luminance.")
+        .def_ro("relative_rmse", &crt::ErrorEstimate::relative_rmse)
+        .def_ro("relative_rmse_lower", &crt::ErrorEstimate::relative_rmse_lower)
+        .def_ro("relative_rmse_upper", &crt::ErrorEstimate::relative_rmse_upper)
+        .def_ro("half_width_95", &crt::ErrorEstimate::half_width_95)
+        .def_ro("mean_luminance", &crt::ErrorEstimate::mean_luminance);
+    nb::class_<crt::Film>(module, "Film",
+                          "Sums of samples: what a render gives, and what images are made of.")
+        .def_static("load", &crt::Film::load, "path"_a, nb::call_guard<nb::gil_scoped_release>())
+        .def("save", &crt::Film::save, "path"_a, nb::call_guard<nb::gil_scoped_release>())
+        .def("__add__", &sumOf, "other"_a, nb::call_guard<nb::gil_scoped_release>())
+        .def_prop_ro("width", &crt::Film::width)
+        .def_prop_ro("height", &crt::Film::height)
+        .def_prop_ro("samples", &crt::Film::samples)
+        .def_prop_ro("sample_ranges", &crt::Film::sampleRanges)
+        .def_prop_ro("aovs", &crt::Film::aovs)
+        .def_prop_ro("xyz", &xyzOf, nb::rv_policy::automatic)
+        .def_prop_ro("counts", &countsOf, nb::rv_policy::automatic)
+        .def_prop_ro("error", &crt::Film::error)
+        .def("develop", &develop, "for_display"_a = false, "exposure_ev"_a = nb::none(),
+             "aovs"_a = std::vector<std::string>(), nb::call_guard<nb::gil_scoped_release>())
+        .def(
+            "save_image", [](const crt::Film& film, const std::string& path) { film.saveImage(path); },
+            "path"_a, nb::call_guard<nb::gil_scoped_release>());
+}
+
+}  // namespace crt_python

@@ -1,0 +1,186 @@
+"""Renders: bits, options, interruption, and what a result holds."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import crt
+from conftest import BOX
+
+
+def same(a, b):
+    return a.shape == b.shape and np.array_equal(a.view(np.uint8), b.view(np.uint8))
+
+
+def test_bits_are_those_of_the_program(backend, program, tmp_path):
+    (tmp_path / "box.yaml").write_text(BOX)
+    program("render", tmp_path / "box.yaml", "-b", backend, "-q", "-o", tmp_path / "box.pfm", "--spp", 8)
+    result = crt.render(tmp_path / "box.yaml", spp=8, backend=backend)
+    assert same(np.ascontiguousarray(crt.Image.load(str(tmp_path / "box.pfm")).pixels), result.image.copy())
+    assert result.image.mean() > 0.01
+
+
+def test_result_is_numpy(box):
+    result = crt.render(box, spp=32, backend="embree")
+    assert result.image.shape == (16, 24, 3) and result.image.dtype == np.float32
+    assert not result.image.flags.owndata and not result.image.flags.writeable
+    assert result.film.xyz.shape == (16, 24, 3) and result.film.xyz.dtype == np.float64
+    assert result.film.counts.shape == (16, 24) and (result.film.counts == 32).all()
+    assert result.film.samples == 32 and result.stop == "samples"
+    assert 0 < result.error.half_width_95 < 1
+    assert result.report["samples"]["per_pixel"] == 32
+    # Y of the film is the luminance of the image: linear sRGB has the weights of IEC 61966-2-1.
+    y = result.image @ np.array([0.2126390, 0.7151687, 0.0721923])
+    assert np.abs(y - result.film.xyz[..., 1]).max() < 1e-4 * result.film.xyz[..., 1].max()
+
+
+def test_rows_go_from_the_top(box):
+    """The floor fills the lower rows, above its edge there is nothing but the lamp's lower side."""
+    rows = crt.render(box, spp=16, backend="embree").film.xyz[..., 1].mean(axis=1)
+    assert rows[-4:].min() > 0 and rows[-1] > 0
+
+
+def test_image_outlives_the_result(box):
+    image = crt.render(box, spp=4, backend="embree").image
+    before = image.copy()
+    crt.render(box, spp=4, backend="embree", sample_range=None)
+    assert same(before, image.copy())
+
+
+def test_films_add_exactly(box):
+    whole = crt.render(box, spp=16, backend="embree")
+    first = crt.render(box, sample_range=(0, 6), backend="embree")
+    rest = crt.render(box, sample_range=(6, 16), backend="embree")
+    total = first.film + rest.film
+    assert total.samples == 16 and total.sample_ranges == [(0, 16)]
+    assert first.film.samples == 6  # neither is changed
+    assert same(whole.film.xyz, total.xyz)
+    with pytest.raises(crt.Error) as refused:
+        total + rest.film
+    assert refused.value.kind == crt.Kind.USAGE
+
+
+def test_resume(box):
+    part = crt.render(box, spp=6, backend="embree")
+    assert same(crt.render(box, spp=16, backend="embree", resume=part.film).film.xyz,
+                crt.render(box, spp=16, backend="embree").film.xyz)
+
+
+def test_film_in_a_file(box, tmp_path):
+    film = crt.render(box, spp=4, backend="embree").film
+    film.save(str(tmp_path / "a.crtfilm"))
+    assert same(crt.Film.load(str(tmp_path / "a.crtfilm")).xyz, film.xyz)
+    (tmp_path / "b.crtfilm").write_bytes(b"none")
+    with pytest.raises(crt.Error) as refused:
+        crt.Film.load(str(tmp_path / "b.crtfilm"))
+    assert refused.value.kind == crt.Kind.USAGE
+
+
+def test_target_error(box):
+    result = crt.render(box, backend="embree", target_error=0.2)
+    assert result.stop == "target" and result.error.half_width_95 <= 0.2
+
+
+def test_aovs(box):
+    box["outputs"] = [{"file": "unused.exr", "aovs": ["normal", "depth"]}]
+    result = crt.render(box, spp=4, backend="embree")
+    assert set(result.aovs) == {"normal", "depth"}
+    assert result.aovs["normal"].shape == (16, 24, 3) and result.aovs["depth"].shape == (16, 24)
+    lengths = np.linalg.norm(result.aovs["normal"], axis=-1)
+    assert (lengths < 1.001).all() and lengths[-1].min() > 0.99  # the floor's, at the bottom
+    assert crt.render(crt.scene(BOX), spp=4, backend="embree").aovs == {}
+
+
+def test_notebook_picture(box, tmp_path):
+    result = crt.render(box, spp=16, backend="embree")
+    (tmp_path / "a.png").write_bytes(result._repr_png_())
+    result.save(tmp_path / "b.png")
+    a, b = (crt.Image.load(str(tmp_path / f"{name}.png")).pixels for name in "ab")
+    assert a.shape == (16, 24, 3)
+    assert np.abs(a - b).max() < 0.012  # one step of 8 bits, where both round
+
+
+def test_progress_and_exceptions(box):
+    heard = []
+    crt.render(box, spp=4096, backend="embree", on_progress=heard.append)
+    assert heard and heard[-1]["samples"] <= 4096 and heard[-1]["fraction"] <= 1
+
+    def fail(now):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        crt.render(box, spp=1 << 22, backend="embree", on_progress=fail)
+
+
+def test_other_threads_run_meanwhile(box):
+    counted, done = [0], threading.Event()
+
+    def count():
+        while not done.is_set():
+            counted[0] += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    began = time.monotonic()
+    crt.render(box, backend="embree", time_limit=0.6)
+    seconds = time.monotonic() - began
+    done.set()
+    thread.join()
+    assert counted[0] > 20 * seconds
+
+
+def test_renders_of_two_threads_do_not_mix(box):
+    alone = crt.render(box, spp=64, backend="embree").film.xyz
+    results = [None] * 4
+
+    def render(i):
+        results[i] = crt.render(crt.scene(BOX), spp=64, backend="embree").film.xyz
+
+    threads = [threading.Thread(target=render, args=(i,)) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(same(alone, xyz) for xyz in results)
+
+
+def test_interrupt_keeps_the_film(tmp_path):
+    script = textwrap.dedent("""
+        import sys, crt
+        sys.path.insert(0, sys.argv[1])
+        from conftest import BOX
+        print("begin", flush=True)
+        result = crt.render(crt.scene(BOX), spp=1 << 24, backend="embree",
+                            on_progress=lambda now: print("on", flush=True))
+        print("end", result.stop, result.film.samples, flush=True)
+    """)
+    process = subprocess.Popen([sys.executable, "-c", script, os.path.dirname(__file__)], text=True,
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    while process.stdout.readline().strip() != "on":
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    out, said = process.communicate(timeout=60)
+    word, stop, samples = out.split()[-3:]
+    assert process.returncode == 0 and (word, stop) == ("end", "interrupted") and 0 < int(samples) < 1 << 24
+    assert "interrupted" in said
+
+
+def test_bad_options(box):
+    for wrong in ({"spp": 0}, {"backend": "none"}, {"target_error": 1.5}, {"sample_range": (4, 4)},
+                  {"devices": "no such device"}):
+        with pytest.raises(crt.Error) as refused:
+            crt.render(box, **{"backend": "embree", **wrong})
+        assert refused.value.kind in (crt.Kind.USAGE, crt.Kind.BACKEND) and str(refused.value)
+
+
+def test_plugins():
+    found = {plugin.name: plugin for plugin in crt.plugins()}
+    assert "embree" in found and (found["embree"].devices or found["embree"].reason)

@@ -1,0 +1,153 @@
+"""Scenes: keys, errors with their places, dicts and arrays."""
+
+import gc
+import logging
+import os
+import pathlib
+
+import numpy as np
+import pytest
+import yaml
+
+import crt
+from conftest import BOX
+from test_render import same
+
+
+def xyz(scene, spp=8):
+    return crt.render(scene, spp=spp, backend="embree").film.xyz
+
+
+def test_keys_are_set(box):
+    before = xyz(box)
+    box["film.resolution"] = np.array([12, 8])
+    box["materials.red.reflectance"] = np.float32(0.25)
+    assert (box.width, box.height) == (12, 8)
+    other = crt.scene(BOX, set={"film.resolution": (12, 8), "materials.red.reflectance": 0.25})
+    assert same(xyz(box), xyz(other))
+    copy = box.copy()
+    del copy["film.resolution"]
+    del copy["materials.red.reflectance"]
+    assert same(xyz(copy), before) and box.width == 12
+
+
+def test_errors_have_a_place(tmp_path):
+    file = tmp_path / "wrong.yaml"
+    file.write_text(BOX.replace("fov: 50", "fof: 50"))
+    with pytest.raises(crt.Error) as wrong:
+        crt.load(file).native
+    error = wrong.value
+    assert error.kind == crt.Kind.SCENE and error.file == str(file) and error.line == 4 and error.column > 1
+    assert "fof" in str(error) and "fov" in str(error)
+    with pytest.raises(crt.Error) as missing:
+        crt.load(tmp_path / "none.yaml").native
+    assert missing.value.kind in (crt.Kind.SCENE, crt.Kind.USAGE)
+    with pytest.raises(crt.Error) as unknown:
+        crt.scene(BOX, set={"film.resolutoin": 1}).native
+    assert unknown.value.kind == crt.Kind.SCENE and "resolution" in str(unknown.value)
+
+
+def test_a_dict_is_its_text(box):
+    assert same(xyz(yaml.safe_load(BOX)), xyz(box))
+
+
+def field(n):
+    """A wavy square of 2 n² triangles: positions and faces as lists of Python numbers."""
+    axis = np.linspace(-1, 1, n + 1)
+    x, z = np.meshgrid(axis, axis)
+    y = 0.2 * np.sin(5 * x) * np.cos(4 * z)
+    positions = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    i = np.arange(n * (n + 1)).reshape(n, n + 1)[:, :-1].ravel()
+    faces = np.concatenate([np.stack([i, i + n + 1, i + 1], 1), np.stack([i + 1, i + n + 1, i + n + 2], 1)])
+    return positions, faces
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_arrays_are_their_numbers(dtype):
+    positions, faces = field(40)
+    positions = positions.astype(dtype)
+    uvs = (0.5 + 0.5 * positions[:, [0, 2]]).astype(dtype)
+    scene = yaml.safe_load(BOX)
+    checker = {"checker": [0.2, 0.8], "scale": [8, 8]}
+    scene["materials"]["board"] = {"type": "diffuse", "reflectance": checker}
+    written = {**scene, "objects": scene["objects"][2:] + [
+        {"name": "field", "material": "board",
+         "mesh": {"positions": positions.tolist(), "faces": faces.tolist(), "uvs": uvs.tolist()}}]}
+    arrays = {**scene, "objects": scene["objects"][2:] + [
+        {"name": "field", "material": "board",
+         "mesh": {"positions": positions, "faces": faces, "uvs": uvs}}]}
+    a, b = crt.scene(written), crt.scene(arrays)
+    assert same(xyz(a), xyz(b)) and xyz(a).mean() > 0
+    assert any(name.endswith(".ply") for name in b.files_read)
+
+
+def textured(texture):
+    scene = yaml.safe_load(BOX)
+    scene["materials"]["picture"] = {"type": "diffuse", "reflectance": {"texture": texture}}
+    scene["objects"][0]["material"] = "picture"
+    scene["objects"][0]["mesh"]["uvs"] = [[0, 1], [0, 0], [1, 0], [1, 1]]
+    return scene
+
+
+def test_textures_are_arrays(tmp_path):
+    rng = np.random.default_rng(1)
+    floats = rng.uniform(0.1, 0.9, (8, 12, 3)).astype(np.float32)
+    # A PFM that this test writes by itself: bottom row first.
+    file = tmp_path / "floats.pfm"
+    file.write_bytes(b"PF\n12 8\n-1.0\n" + b"".join(row.astype("<f4").tobytes() for row in reversed(floats)))
+    of_file = xyz(textured(str(file)))
+    assert same(xyz(textured(floats)), of_file)
+    assert not same(xyz(textured(floats[::-1].copy())), of_file)  # rows matter
+
+    eight = rng.integers(20, 230, (8, 12, 3), dtype=np.uint8)
+    decoded = np.where(eight / 255 <= 0.04045, eight / 255 / 12.92, ((eight / 255 + 0.055) / 1.055) ** 2.4)
+    a, b = xyz(textured(eight), 64), xyz(textured(decoded.astype(np.float32)), 64)
+    assert np.abs(a - b).max() < 1e-3 * a.max()
+
+
+def test_wrong_arrays():
+    positions, faces = field(40)
+    for wrong in ({"positions": positions[:, :2], "faces": faces},
+                  {"positions": positions, "faces": faces + len(positions)},
+                  {"positions": positions, "faces": faces.astype(float)},
+                  {"positions": positions, "faces": faces, "uvs": positions[:5, :2]}):
+        scene = yaml.safe_load(BOX)
+        scene["objects"][0]["mesh"] = wrong
+        with pytest.raises(ValueError):
+            crt.scene(scene).native
+    with pytest.raises(ValueError):
+        crt.scene(textured(np.zeros((4, 4, 2)))).native
+    with pytest.raises(TypeError):
+        crt.scene(17)
+    nan = positions.copy()
+    nan[7, 1] = np.nan
+    scene = yaml.safe_load(BOX)
+    scene["objects"][0]["mesh"] = {"positions": nan, "faces": faces}
+    with pytest.raises(ValueError, match="row 7"):
+        crt.scene(scene).native
+
+
+def test_files_of_arrays_go_with_the_scene():
+    scene = crt.scene(textured(np.full((4, 4, 3), 0.5, np.float32)))
+    files = [pathlib.Path(name) for name in scene.files_read if "crt-arrays" in name]
+    assert len(files) == 1 and files[0].exists()
+    copy = scene.copy()
+    del scene
+    assert xyz(copy).mean() > 0 and files[0].exists()
+    del copy
+    gc.collect()
+    assert not files[0].parent.exists()
+
+
+def test_messages_go_to_logging(caplog):
+    scene = yaml.safe_load(BOX)
+    scene["lights"] = [{"type": "point", "position": [0, 1.5, 0], "power_w": 1}]
+    scene["materials"]["grey"] = scene["materials"]["red"] = {"type": "mirror", "reflectance": 0.9}
+    with caplog.at_level(logging.INFO, logger="crt"):
+        crt.render(scene, spp=1, backend="embree")
+    assert any("point" in record.getMessage() for record in caplog.records)
+
+
+def test_configs_load():
+    for file in sorted(pathlib.Path(os.environ["CRT_CONFIGS"]).glob("*.yaml"))[:4]:
+        assert crt.load(file, set={"film.resolution": [8, 8]}).width == 8
