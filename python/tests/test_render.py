@@ -69,8 +69,9 @@ def test_films_add_exactly(box):
 
 def test_resume(box):
     part = crt.render(box, spp=6, backend="embree")
-    assert same(crt.render(box, spp=16, backend="embree", resume=part.film).film.xyz,
-                crt.render(box, spp=16, backend="embree").film.xyz)
+    rest = crt.render(box, spp=16, backend="embree", resume=part.film)
+    assert rest.report["samples"]["resumed"] == 6 and part.film.samples == 6
+    assert same(rest.film.xyz, crt.render(box, spp=16, backend="embree").film.xyz)
 
 
 def test_film_in_a_file(box, tmp_path):
@@ -171,6 +172,15 @@ def test_interrupt_keeps_the_film(tmp_path):
     word, stop, samples = out.split()[-3:]
     assert process.returncode == 0 and (word, stop) == ("end", "interrupted") and 0 < int(samples) < 1 << 24
     assert "interrupted" in said
+
+
+def test_interrupt_within_a_function_of_python(box):
+    """Where Ctrl-C finds the interpreter is chance: here it is in the function that hears of progress."""
+    def interrupt(now):
+        raise KeyboardInterrupt
+
+    result = crt.render(box, spp=1 << 24, backend="embree", on_progress=interrupt)
+    assert result.stop == "interrupted" and 0 < result.film.samples < 1 << 24
 
 
 def test_bad_options(box):

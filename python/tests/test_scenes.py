@@ -68,7 +68,7 @@ def test_arrays_are_their_numbers(dtype):
     positions = positions.astype(dtype)
     uvs = (0.5 + 0.5 * positions[:, [0, 2]]).astype(dtype)
     scene = yaml.safe_load(BOX)
-    checker = {"checker": [0.2, 0.8], "scale": [8, 8]}
+    checker = {"checker": [0.2, 0.8], "scale": [8, 3]}
     scene["materials"]["board"] = {"type": "diffuse", "reflectance": checker}
     written = {**scene, "objects": scene["objects"][2:] + [
         {"name": "field", "material": "board",
