@@ -1,6 +1,7 @@
 """Scenes: from files, from text, and from dicts with NumPy arrays in them."""
 
 import collections.abc
+import contextlib
 import json
 import os
 import pathlib
@@ -24,8 +25,9 @@ class Scene:
     for anything, and again after a key was set.
     """
 
-    def __init__(self, read, overrides=None):
+    def __init__(self, read, file, overrides=None):
         self._read = read
+        self._file = file
         self._overrides = {}
         self._native = None
         for key, value in (overrides or {}).items():
@@ -56,10 +58,17 @@ class Scene:
 
     def copy(self):
         """Another scene of the same text and values, to be changed apart."""
-        other = Scene(self._read)
+        other = Scene(self._read, self._file)
         other._overrides = dict(self._overrides)
         other._native = self._native
         return other
+
+    @contextlib.contextmanager
+    def arguments(self):
+        """A context manager: meanwhile these arguments show the scene to the program crt. A scene that is
+        no file is one meanwhile, beside the files that it names."""
+        with self._file() as path:
+            yield [path, *(word for item in self._overrides.items() for word in ("--set", "=".join(item)))]
 
     @property
     def title(self):
@@ -115,7 +124,8 @@ def load(path, set=None):
     kind SCENE when the scene is first used.
     """
     where = os.fspath(path)
-    return Scene(lambda overrides: _crt.Scene.from_file(where, overrides, tell), set)
+    return Scene(lambda overrides: _crt.Scene.from_file(where, overrides, tell),
+                 lambda: contextlib.nullcontext(where), set)
 
 
 def scene(source, directory=".", set=None, name="scene"):
@@ -126,20 +136,29 @@ def scene(source, directory=".", set=None, name="scene"):
     T}` with T of shape (height, width) or (height, width, 3), floats and linear, or uint8 and sRGB, top row
     first. `directory` is where files are looked up; `name` stands in messages.
     """
-    if isinstance(source, str):
-        return Scene(lambda overrides: _crt.Scene.from_text(source, overrides, name, os.fspath(directory),
-                                                            tell), set)
-    if not isinstance(source, collections.abc.Mapping):
+    folder = Folder()
+
+    def text():
+        if isinstance(source, str):
+            return source
+        return json.dumps(plain(Arrays(folder.path).written(source)))
+
+    def read(overrides):
+        return _crt.Scene.from_text(text(), overrides, name, os.fspath(directory), tell)
+
+    @contextlib.contextmanager
+    def file():
+        with tempfile.NamedTemporaryFile("w", dir=directory, prefix=f".{name}-", suffix=".yaml",
+                                         encoding="utf-8") as written:
+            written.write(text())
+            written.flush()
+            yield written.name
+
+    if not isinstance(source, str) and not isinstance(source, collections.abc.Mapping):
         raise TypeError("a scene is a dict or YAML text, or crt.load(path) for a file, and no "
                         f"{type(source).__name__}")
 
-    folder = Folder()
-
-    def read(overrides):
-        text = json.dumps(plain(Arrays(folder.path).written(source)))
-        return _crt.Scene.from_text(text, overrides, name, os.fspath(directory), tell)
-
-    return Scene(read, set)
+    return Scene(read, file, set)
 
 
 class Folder:

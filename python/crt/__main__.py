@@ -1,0 +1,27 @@
+"""`crt` and `python -m crt`: the commands that are written in Python; all others are the program's."""
+
+import importlib
+import os
+import sys
+
+from . import program
+from .errors import Error
+
+# Command: the module whose main(arguments) it is. It returns the exit code.
+COMMANDS = {}
+
+
+def main(arguments=None):
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        if arguments and arguments[0] in COMMANDS:
+            return importlib.import_module(COMMANDS[arguments[0]], __package__).main(arguments[1:])
+        path = str(program.path())
+    except Error as error:
+        print(f"crt: error: {error}", file=sys.stderr)
+        return int(error.kind)
+    os.execv(path, [path, *arguments])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
