@@ -22,6 +22,6 @@ from .rendering import Result, develop, plugins, render
 from .scenes import Scene, load, scene
 
 __version__ = _version()
-__all__ = ["Device", "Error", "ErrorEstimate", "Film", "Image", "Judgement", "Kind", "Plugin", "RenderFailed",
-           "Result", "Scene", "bits_version", "compare", "converge", "develop", "load", "plugins", "render",
-           "scene", "verify"]
+__all__ = ["Device", "Error", "ErrorEstimate", "Film", "Image", "Judgement", "Kind", "Plugin",
+           "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "develop", "load",
+           "plugins", "render", "scene", "verify"]

@@ -65,7 +65,8 @@ def image_file(image, stem):
     elif isinstance(image, _crt.Image):
         image.save(path)
     else:
-        raise TypeError(f"an image is a path, crt.Image, crt.Film or crt.Result, and no {type(image).__name__}")
+        raise TypeError("an image is a path, crt.Image, crt.Film or crt.Result, and no "
+                        f"{type(image).__name__}")
     return path
 
 
@@ -73,7 +74,7 @@ def converge(scenes, output, *, backends=None, vary=None, references=(), time_li
              max_spp=None, resolution=None, resume=False, device=None, threads=0):
     """Measures error against run time, as `crt converge` does, into the folder `output`.
 
-    scenes      a scene as crt.render takes it, or a list of them; values that were set must be the same for all
+    scenes      a scene as crt.render takes it, or a list of them, with the same values set in all
     backends    names; all that can run when None
     vary        a dict of keys and lists of values: each combination is measured
     references  paths of `crt reference`, or luminances of every pixel; made by the run when there are none

@@ -27,9 +27,9 @@ def run(arguments, *, answers=(0,)):
     """Runs `crt ARGUMENTS` and returns its exit code and what it printed. Codes beside `answers` raise
     crt.Error with the program's own sentences. What it says meanwhile goes to the logger `crt`. Ctrl-C ends
     it as it does in a terminal, and is raised once it has written what it has."""
-    process = subprocess.Popen([path(), *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE, encoding="utf-8", errors="replace",
-                               start_new_session=True)
+    process = subprocess.Popen([path(), *map(str, arguments)], stdin=subprocess.DEVNULL,
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8",
+                               errors="replace", start_new_session=True)
     try:
         printed, said = process.communicate()
     except BaseException:

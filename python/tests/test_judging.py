@@ -64,5 +64,6 @@ def test_a_backend_is_verified(tmp_path):
 
 def test_what_the_program_says_goes_to_the_logger(box, tmp_path, caplog):
     with caplog.at_level(logging.INFO, logger="crt"):
-        crt.converge(box, tmp_path / "run", backends=[usable()[0]], time_limit=2, replicates=4, resolution=24)
+        crt.converge(box, tmp_path / "run", backends=[usable()[0]], time_limit=2, replicates=4,
+                     resolution=24)
     assert any("wrote" in record.message for record in caplog.records)
