@@ -131,8 +131,8 @@ def test_figures_of_a_configuration_stand_in_its_row(converged, edited):
     assert row["slope"] == "−0.806−0.848 to −0.764"
     assert row["efficiency, 1/s"] == "19.313.7–27.2"
     assert row["time t₀ + c·N"] == "23.3 ms+ 10.7 ms · N"
-    assert row["error floor"] == "1.0 %0.50 % – 2.0 %"
-    assert row["time to 1 %"] == "≤ 2.41 s2.35–2.47 s; 12.0 spp"
+    assert row["error floor"] == "1.00 %0.500 % – 2.00 %"
+    assert row["time to 1 %"] == "≤ 2.41 s2.35–2.47 s 12.0 spp"
     assert row["time to 0.1 %"] == "not reached"
     last = page.row(f"{BACKEND}, sampler=sobol", "relative RMSE")
     assert last["relative RMSE"] == "15.1 %13.9–16.5 %"

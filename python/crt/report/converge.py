@@ -113,7 +113,7 @@ def floor_cell(error):
         return text.DASH, ""
     low, high = root(floor["low"]), root(floor["high"])
     if error["flattening"]:
-        return text.percent(root(floor["value"]), 2), text.percent(low, 2) + " – " + text.percent(high, 2)
+        return text.percent(root(floor["value"])), text.percent(low) + " – " + text.percent(high)
     # Without a reference the floor is where the line v/N + b² meets the axis, which is below 0 for errors
     # that fall faster.
     if error["bias_squared"] is None and error["faster_than_inverse"]:
@@ -129,7 +129,7 @@ def target_cell(target):
         return "not reached", f"≈ {text.seconds(seconds['value'], 2)} expected"
     value, interval = text.value_and_bounds(seconds, "seconds")
     samples = text.number(target["samples_per_pixel"]["value"])
-    return ("≤ " if target["at_first_point"] else "") + value, f"{interval}; {samples} spp"
+    return ("≤ " if target["at_first_point"] else "") + value, f"{interval}\n{samples} spp"
 
 
 def reference_sentence(reference):

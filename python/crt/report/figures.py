@@ -151,8 +151,8 @@ def error_against_time(scene, targets):
     for target in targets:
         if axes.get_ylim()[0] < target < axes.get_ylim()[1]:
             axes.axhline(target, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))
-            axes.annotate(percent_tick(target), (0.01, target), xycoords=("axes fraction", "data"),
-                          xytext=(0, 2), textcoords="offset points", color=MUTED, fontsize=9.5)
+            axes.annotate(percent_tick(target), (0.99, target), xycoords=("axes fraction", "data"),
+                          xytext=(0, 2), textcoords="offset points", ha="right", color=MUTED, fontsize=9.5)
     axes.set_xlabel("seconds, start-up included")
     axes.set_ylabel("relative RMSE")
     plots.set_ticks(axes.xaxis, plots.log_ticks(*axes.get_xlim()), seconds_tick)
