@@ -1,4 +1,4 @@
-// Files and report of `crt converge`, on a run that never was: 3 scenes, 2 backends, 2 variants, and
+// Files of `crt converge`, on a run that never was: 3 scenes, 2 backends, 2 variants, and
 // everything that can be wrong with them.
 //
 // Over 450 lines: one imagined run, and everything that is written of it.
@@ -8,8 +8,7 @@
 #include "judge/converge/files.h"
 #include "judge/converge/findings.h"
 #include "judge/converge/quantity_text.h"
-#include "judge/converge/report_html.h"
-#include "judge/converge/svg_plot.h"
+#include "judge/converge/report_maps.h"
 #include "base/temporary_folder.h"
 #include "file_bytes.h"
 #include "hostile_numbers.h"
@@ -18,11 +17,13 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <cctype>
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -157,46 +158,6 @@ Run syntheticStudy() {
     cuda.omitted = "no CUDA driver was found (libcuda.so.1 cannot be opened)";
     run.configurations.push_back(cuda);
     return run;
-}
-
-/// Balanced tags, quoted attributes, no bare '<' or '&': what XML asks for, so that any reader takes the
-/// page or figure alike. Empty when all is well.
-std::string whyNotWellFormed(const std::string& text) {
-    std::vector<std::string> open;
-    for (std::size_t at = 0; at < text.size(); ++at) {
-        const auto here = [&] { return " at: " + text.substr(at, 60); };
-        if (text[at] == '&') {
-            const std::size_t end = text.find(';', at);
-            if (end == std::string::npos || end - at > 8) return "bare &" + here();
-        }
-        if (text[at] != '<') continue;
-        if (text.compare(at, 2, "<!") == 0 || text.compare(at, 2, "<?") == 0) {
-            at = text.find('>', at);
-            continue;
-        }
-        const bool closing = text[at + 1] == '/';
-        std::size_t end = at + (closing ? 2 : 1);
-        const std::size_t name_begin = end;
-        while (std::isalnum(static_cast<unsigned char>(text[end])) != 0) ++end;
-        const std::string name = text.substr(name_begin, end - name_begin);
-        if (name.empty()) return "bare <" + here();
-        bool quoted = false;
-        for (; end < text.size() && (quoted || text[end] != '>'); ++end) {
-            if (text[end] == '"') quoted = !quoted;
-            if (text[end] == '<') return "< inside a tag" + here();
-        }
-        if (end == text.size()) return "a tag does not end" + here();
-        const bool empty = text[end - 1] == '/';
-        if (closing) {
-            if (open.empty() || open.back() != name)
-                return "</" + name + "> closes " + (open.empty() ? "nothing" : open.back()) + here();
-            open.pop_back();
-        } else if (!empty) {
-            open.push_back(name);
-        }
-        at = end;
-    }
-    return open.empty() ? "" : "<" + open.back() + "> is not closed";
 }
 
 bool sameRow(const Row& a, const Row& b) {
@@ -352,86 +313,74 @@ TEST_CASE("quantities are short, have units, and round up to the next unit", "[c
     CHECK(secondsText(0.9996) == "1.00 s");
     CHECK(secondsText(0.0123) == "12.3 ms");
     CHECK(secondsText(600) == "10.0 min");
-    CHECK(countText(1024) == "1024");
-    CHECK(countText(1234567) == "1\u202f234\u202f567");
     CHECK(secondsText(Estimate{2, 1.9, 2.1}) == "2.00 s (1.90–2.10)");
     CHECK(numberText(Estimate{0, -1, 1}, 1) == "0 (−1 to 1)");
 }
 
-TEST_CASE("markup in names is escaped", "[converge]") {
-    CHECK(escapeXml("<a href=\"x\">&") == "&lt;a href=&quot;x&quot;&gt;&amp;");
-    Run run = syntheticStudy();
-    for (Configuration& c : run.configurations) c.key.scene = "<b>&\"";
-    for (Row& row : run.rows) row.key.scene = "<b>&\"";
-    const TemporaryFolder folder;
-    writeReport(folder.path(), run, analyze(run));
-    const std::string html = slurp(folder / "report.html");
-    CHECK(html.find("<b>&") == std::string::npos);
-    CHECK(whyNotWellFormed(html) == "");
-}
-
-TEST_CASE("the report is one well-formed page without requests, and leaves nothing out", "[converge]") {
-    // To look at: CRT_REPORT_FIXTURE=out/fixture unit_tests "[converge]"
+TEST_CASE("the summary has what a page of every scene needs", "[converge]") {
+    // To make a page of: CRT_REPORT_FIXTURE=out/fixture unit_tests "[converge]"
     const char* kept = std::getenv("CRT_REPORT_FIXTURE");
     const TemporaryFolder temporary;
     const std::string folder = kept ? kept : temporary.path();
     fs::create_directories(folder);
     const Run run = syntheticStudy();
     const Analysis analysis = analyze(run);
-    const std::vector<std::string> files = writeReport(folder, run, analysis);
-    const std::string html = slurp(folder + "/report.html");
+    const std::vector<MapSet> maps = writeMaps(folder, run);
+    writeSummary(folder + "/summary.json", run, analysis, maps);
+    const nlohmann::json summary = nlohmann::json::parse(slurp(folder + "/summary.json"));
 
-    CHECK(whyNotWellFormed(html) == "");
-    for (const char* request :
-         {"http:", "https:", "//", "<script", "<link", "@import", "url(", "src=\"/", "<iframe", "<object"}) {
-        INFO(request);
-        // Base64 may hold "//".
-        std::string without_data;
-        for (std::size_t at = 0; at < html.size();) {
-            const std::size_t data = html.find("data:image/png;base64,", at);
-            without_data += html.substr(at, data - at);
-            at = data == std::string::npos ? html.size() : html.find('"', data);
-        }
-        CHECK(without_data.find(request) == std::string::npos);
+    CHECK(summary["format"] == "crt converge summary 1");
+    CHECK(summary["replicates"] == 16);
+    CHECK(summary["options"]["targets"] == nlohmann::json::array({0.01, 0.001}));
+    CHECK(summary["references"][0]["relative_error"].get<double>() == Approx(std::sqrt(1e-7)));
+    CHECK(summary["references"][1]["relative_error"].is_null());  // A closed form has none.
+    REQUIRE(summary["scenes"].size() == 3);
+    for (const nlohmann::json& scene : summary["scenes"]) {
+        const std::vector<Finding> findings = findingsOfScene(run, analysis, scene["scene"]);
+        REQUIRE(scene["findings"].size() == findings.size());
+        for (std::size_t i = 0; i < findings.size(); ++i)
+            CHECK(scene["findings"][i]["text"] == findings[i].text);
+        CHECK(scene["maps"]["left_out"].is_null());
     }
-    for (const Configuration& configuration : run.configurations) {
-        INFO(configuration.key.scene << ' ' << labelOf(configuration.key));
-        const std::size_t section =
-            html.find("<section id=\"scene-" +
-                      (configuration.key.scene == "cornell_box" ? "cornell-box" : configuration.key.scene));
-        REQUIRE(section != std::string::npos);
-        const std::string own = html.substr(section, html.find("</section>", section) - section);
-        CHECK_THAT(own, Contains("</span>" + labelOf(configuration.key) + "</th>"));
-        if (!configuration.omitted.empty()) CHECK_THAT(own, Contains(configuration.omitted));
-    }
-    std::size_t void_rows = 0;
-    for (const Row& row : run.rows) {
-        if (!row.isVoid()) continue;
-        ++void_rows;
-        CHECK_THAT(html, Contains("replicate\"><span>" + std::to_string(row.replicate) +
-                                  "</span></td><td class=\"num\" data-label=\"samples per pixel\"><span>" +
-                                  countText(row.samples)));
-    }
-    CHECK(void_rows == 3);
-    CHECK_THAT(html, Contains(escapeXml(run.environment.commands[0])));
-    CHECK_THAT(html, Contains("no material is a dielectric"));
-    CHECK_THAT(html, Contains(run.notes[0].substr(8)));
+    const nlohmann::json &cornell = summary["scenes"][0], &furnace = summary["scenes"][1];
+    CHECK(cornell["void_rows"].empty());
+    REQUIRE(furnace["void_rows"].size() == 3);
+    CHECK(furnace["void_rows"][0] == nlohmann::json{{"backend", "embree"},
+                                                    {"variant", "sampler=independent"},
+                                                    {"replicate", 3},
+                                                    {"samples_per_pixel", 512},
+                                                    {"invalid_samples", 1}});
+    CHECK(std::count_if(furnace["findings"].begin(), furnace["findings"].end(), [](const auto& finding) {
+              return finding["tone"] == "bad";
+          }) == 1);
+}
 
-    std::size_t svgs = 0, pngs = 0;
-    for (const std::string& file : files) {
-        INFO(file);
-        const std::string bytes = slurp(folder + "/" + file);
-        REQUIRE_FALSE(bytes.empty());
-        if (file.ends_with(".svg")) {
-            ++svgs;
-            CHECK(whyNotWellFormed(bytes) == "");
-            CHECK_THAT(bytes, Contains("xmlns=\"http://www.w3.org/2000/svg\""));
-            CHECK_THAT(bytes, !Contains("nan") && !Contains("inf"));
+TEST_CASE("maps are files of the folder, on scales that all of a scene share", "[converge]") {
+    const TemporaryFolder folder;
+    const Run run = syntheticStudy();
+    const std::vector<MapSet> maps = writeMaps(folder.path(), run);
+    writeSummary(folder / "summary.json", run, analyze(run), maps);
+    const nlohmann::json summary = nlohmann::json::parse(slurp(folder / "summary.json"));
+    std::set<std::string> files;
+    for (const nlohmann::json& scene : summary["scenes"]) {
+        const bool has_reference = scene["scene"] != "dragon";
+        CHECK(scene["maps"]["scales"].size() == (has_reference ? 3 : 1));
+        CHECK(scene["maps"]["scales"][0]["colours"].size() == 9);
+        CHECK(scene["maps"]["scales"][0]["colours"][0] == "#000004");
+        for (const nlohmann::json& of : scene["maps"]["configurations"]) {
+            CHECK(of["samples_per_pixel"] == 1024);
+            // No reference: image and standard error.
+            REQUIRE(of["pictures"].size() == (has_reference ? 5 : 2));
+            CHECK(of["pictures"][0]["title"] == "image");
+            for (const nlohmann::json& picture : of["pictures"]) {
+                CHECK(picture["width"] == 128);
+                const std::string file = picture["file"];
+                CHECK(slurp(folder / file).starts_with("\x89PNG"));
+                files.insert(file);
+            }
         }
-        pngs += file.ends_with(".png") ? 1 : 0;
     }
-    CHECK(svgs == 3 * 7 - 1);      // No reference, no bias: one figure fewer.
-    CHECK(pngs == 8 * 5 + 4 * 2);  // No reference: image and standard error.
+    CHECK(files.size() == 8 * 5 + 4 * 2);
 }
 
 TEST_CASE("findings say who is first, what is wrong and what is missing", "[converge]") {
@@ -521,17 +470,15 @@ TEST_CASE("a configuration without a valid row has a line, a verdict and no numb
           "scene backend: FAIL: 176 rows are void: samples were NaN or infinite.");
 }
 
-TEST_CASE("a run without rows still makes a report", "[converge]") {
+TEST_CASE("a run without rows still has a summary", "[converge]") {
     Run run = syntheticStudy();
     run.rows.clear();
     const TemporaryFolder folder;
-    writeReport(folder.path(), run, analyze(run));
-    CHECK(whyNotWellFormed(slurp(folder / "report.html")) == "");
-    writeSummary(folder / "summary.json", run, analyze(run));
+    writeSummary(folder / "summary.json", run, analyze(run), {});
     CHECK(nlohmann::json::parse(slurp(folder / "summary.json"))["fits"].size() == 13);
 }
 
-TEST_CASE("few replicates, few looks and no reference make a report with what there is", "[converge]") {
+TEST_CASE("few replicates, few looks and no reference make a summary with what there is", "[converge]") {
     for (const std::uint32_t replicates : {1u, 2u, 3u})
         for (const std::uint32_t looks : {1u, 4u}) {
             INFO(replicates << " replicates, " << looks << " looks");
@@ -543,21 +490,16 @@ TEST_CASE("few replicates, few looks and no reference make a report with what th
             if (replicates == 1)
                 for (Row& row : run.rows) row.between_replicates_mse.reset();
             const TemporaryFolder folder;
-            const Analysis analysis = analyze(run);
-            for (const std::string& file : writeReport(folder.path(), run, analysis)) {
-                INFO(file);
-                const std::string text = slurp(folder / file);
-                CHECK(whyNotWellFormed(text) == "");
-                for (const char* wrong :
-                     {"\"nan", "\"-nan", "\"inf", "\"-inf", " nan", " inf ", ">nan", ">inf"})
-                    CHECK_THAT(text, !Contains(wrong));
-            }
-            writeSummary(folder / "summary.json", run, analysis);
-            CHECK(nlohmann::json::parse(slurp(folder / "summary.json"))["fits"].size() == 1);
+            writeSummary(folder / "summary.json", run, analyze(run), {});
+            const nlohmann::json summary = nlohmann::json::parse(slurp(folder / "summary.json"));
+            REQUIRE(summary["fits"].size() == 1);
+            CHECK(summary["replicates"] == replicates);
+            CHECK(summary["fits"][0]["points"].size() == (replicates > 1 ? looks : 0));
+            CHECK(summary["fits"][0].contains("error") == (replicates > 1 && looks > 2));
         }
 }
 
-TEST_CASE("the report bounds an error floor, but not by 0 where errors fall faster than a floor lets them",
+TEST_CASE("the summary bounds an error floor, but not where errors fall faster than a floor lets them",
           "[converge]") {
     for (const double rate : {1.0, 1.8}) {
         SyntheticRender what;
@@ -566,18 +508,21 @@ TEST_CASE("the report bounds an error floor, but not by 0 where errors fall fast
         what.has_reference = false;
         const Run run = syntheticRun(what, 1);
         const TemporaryFolder folder;
-        writeReport(folder.path(), run, analyze(run));
-        const std::string html = slurp(folder / "report.html");
-        CHECK_THAT(html, Contains(rate == 1.0 ? "none seen<span class=\"ci\">below "
-                                              : "none seen<span class=\"ci\">falls faster than 1/√N"));
-        CHECK_THAT(html, !Contains("below 0 %"));
+        writeSummary(folder / "summary.json", run, analyze(run), {});
+        const nlohmann::json error =
+            nlohmann::json::parse(slurp(folder / "summary.json"))["fits"][0]["error"];
+        CHECK(error["bias_squared"].is_null());
+        CHECK(error["floor"] == error["fitted_bias_squared"]);
+        CHECK(error["flattening"] == false);
+        CHECK(error["faster_than_inverse"] == (rate > 1));
+        CHECK((error["floor"]["high"].get<double>() > 0) == (rate == 1));
     }
 }
 
 TEST_CASE("the summary has the fits of every configuration", "[converge]") {
     const TemporaryFolder folder;
     const Run run = syntheticStudy();
-    writeSummary(folder / "summary.json", run, analyze(run));
+    writeSummary(folder / "summary.json", run, analyze(run), {});
     const nlohmann::json summary = nlohmann::json::parse(slurp(folder / "summary.json"));
     CHECK(summary["configurations"].size() == 13);
     CHECK(summary["fits"][0]["points"].size() == 12);

@@ -66,4 +66,11 @@ std::vector<std::string> dataDirectories() {
     return folders;
 }
 
+std::string reportProgram() {
+    const fs::path tree = installedTree();
+    const fs::path folder = tree / "share" / "crt" / "report";
+    std::error_code unknown;
+    return !tree.empty() && fs::exists(folder / "__main__.py", unknown) ? folder.string() : std::string();
+}
+
 }  // namespace crt

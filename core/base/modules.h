@@ -19,4 +19,8 @@ std::vector<std::string> meshDirectories();
 /// of the tree.
 std::vector<std::string> dataDirectories();
 
+/// The folder that Python runs to make pages of reports: share/crt/report of the tree; empty where there is
+/// none.
+std::string reportProgram();
+
 }  // namespace crt

@@ -1,12 +1,16 @@
+#include "base/log.h"
 #include "base/parallel.h"
 #include "base/words.h"
 #include "cli/arguments.h"
 #include "cli/commands.h"
+#include "cli/report_page.h"
 #include "cli/shared_options.h"
 #include "cli/terminal_watch.h"
 #include "judge/converge/engine.h"
 
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -77,7 +81,7 @@ OptionGroup where(State& state) {
             {deviceOption(request.integrator), threadsOption(request.integrator),
              {.names = "-o,--output",
               .placeholder = "DIR",
-              .help = "folder for report.html, results and figures (converge)",
+              .help = "folder for results, maps and their page, report.html (converge)",
               .read = [&request](const std::string& text) { request.output = text; },
               .completion = {Completion::Kind::Folder}},
              {.names = "--resume",
@@ -93,7 +97,8 @@ constexpr const char* kNotes =
             "page: error against seconds with its interval, efficiency, bias, whether the images' own error "
             "estimates hold, where the time goes.\n"
             "Where no --reference is given, a quarter of --time makes one.\n"
-            "docs/error.md explains the terms.\n"
+            "docs/error.md explains the terms. Python makes the page, with jinja2 and matplotlib; "
+            "'python -m crt report DIR' does it later.\n"
             "\nExamples:\n"
             "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60 -o converge_box\n"
             "  crt converge scene.yaml --vary sampler=sobol,independent --vary nee=true,false --reference "
@@ -110,7 +115,15 @@ int run(State& state, const std::string& typed) {
     }
     state.request.command = typed;
     TerminalWatch watch(state.progress, TerminalWatch::Signals::Always);
-    return converge::converge(state.request, watch);
+    const int code = converge::converge(state.request, watch);
+    const std::filesystem::path folder(state.request.output);
+    if (std::filesystem::exists(folder / "summary.json")) {
+        if (const std::optional<std::string> missing = makeReportPage(state.request.output))
+            logWarning("{}", *missing);
+        else
+            logInfo("wrote {}", (folder / "report.html").string());
+    }
+    return code;
 }
 
 }  // namespace

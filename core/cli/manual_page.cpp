@@ -88,6 +88,8 @@ constexpr std::array kVariables{
     Variable{"CRT_BACKEND_PATH", "Folders searched for backends first, separated by colons."},
     Variable{"CRT_MESH_PATH", "Folders searched for meshes and spectra that are not beside the scene."},
     Variable{"CRT_DATA_PATH", "Folders searched for named data before those of crt."},
+    Variable{"CRT_PYTHON",
+             "The Python that makes the pages of converge and verify, instead of python3; empty: none."},
     Variable{"CRT_CACHE_DIR",
              "Where compiled kernels are kept, instead of crt in $XDG_CACHE_HOME or ~/.cache."},
     Variable{"CRT_KERNEL_DIR", "Kernel headers to be compiled instead of those in the program."},

@@ -6,6 +6,7 @@
 #include "base/standard_output.h"
 #include "base/unit_text.h"
 #include "cli/commands.h"
+#include "cli/report_page.h"
 #include "cli/shared_options.h"
 #include "cli/terminal_watch.h"
 #include "judge/verify/case.h"
@@ -19,6 +20,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -34,7 +36,7 @@ struct Arguments {
     std::vector<std::string>
         cases;  ///< Ids, names or groups, also several with commas; empty: all of the level.
     Level level = Level::Commit;
-    std::string output;                    ///< Directory for verify.json and verify.html; empty: none.
+    std::string output;                    ///< Directory for verify.json and its page; empty: none.
     bool list = false;
     bool markdown = false;                 ///< Print docs/stability.md with the figures of `suites` instead.
     std::vector<std::string> suites;       ///< verify.json files.
@@ -104,12 +106,6 @@ void writeWhole(const std::filesystem::path& path, const std::string& text) {
     file.commit();
 }
 
-void writeReports(const std::string& directory, const SuiteResult& suite) {
-    const std::filesystem::path folder(directory);
-    writeWhole(folder / "verify.json", suiteJson(suite));
-    writeWhole(folder / "verify.html", suiteHtml(suite));
-}
-
 /// Exit code: 0 when every case passes, is refused as documented or does not apply; 7 when one fails or is
 /// inconclusive; 128 + signal when interrupted. Throws crt::Error.
 int verify(const Arguments& arguments) {
@@ -147,8 +143,11 @@ int verify(const Arguments& arguments) {
         watch);
     printOut("{} on {}, level {}: {}\n", suite.backend, suite.device, name(suite.level), summaryText(suite));
     if (!arguments.output.empty()) {
-        writeReports(arguments.output, suite);
-        printOut("{0}/verify.html and {0}/verify.json have every figure\n", arguments.output);
+        writeWhole(std::filesystem::path(arguments.output) / "verify.json", suiteJson(suite));
+        if (const std::optional<std::string> missing = makeReportPage(arguments.output))
+            printOut("{}/verify.json has every figure; {}\n", arguments.output, *missing);
+        else
+            printOut("{0}/verify.html and {0}/verify.json have every figure\n", arguments.output);
     }
     if (suite.request) return suite.request->exit_code;
     return suite.passed() ? 0 : kFailed;
@@ -189,7 +188,7 @@ OptionGroup output(Arguments& to) {
     return {"Output",
             {{.names = "-o,--output",
               .placeholder = "DIR",
-              .help = "write verify.json and verify.html there",
+              .help = "write verify.json there, and its page, verify.html (by Python)",
               .read = [&to](const std::string& text) { to.output = text; },
               .completion = {Completion::Kind::Folder}},
              {.names = "-q,--quiet",
@@ -218,8 +217,8 @@ constexpr const char* kNotes =
             "\nExamples:\n"
             "  crt verify                                          the level for every commit, on the best "
             "backend\n"
-            "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.html and "
-            "out/verify.json\n"
+            "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.json and "
+            "out/verify.html\n"
             "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
             "  crt verify --backend mine --plugin-path build       a backend of your own\n"
             "  crt verify --list --level nightly                   everything there is\n";

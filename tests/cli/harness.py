@@ -54,6 +54,7 @@ def environment(**changes):
     # Addresses compiled in by a sanitizer build need no help from here; a cache in the home of whoever runs
     # the tests does no good.
     env["CRT_CACHE_DIR"] = os.path.join(tempfile.gettempdir(), f"crt-test-cache-{os.getuid()}")
+    env["CRT_PYTHON"] = ""  # Pages need libraries that not every Python has: tests of them ask for one.
     env.update(changes)
     return {name: value for name, value in env.items() if value is not None}
 

@@ -53,6 +53,30 @@ def png_chunks(path):
     return chunks
 
 
+def png_pixels(path):
+    """Rows of bytes of a PNG of 8 bits a channel, red, green and blue, not interlaced."""
+    chunks = png_chunks(path)
+    width, height, *kind = struct.unpack(">IIBBBBB", chunks[0][1])
+    if kind != [8, 2, 0, 0, 0]:
+        raise ValueError(f"{path} is another kind of PNG: {kind}")
+    data = zlib.decompress(b"".join(body for kind, body in chunks if kind == "IDAT"))
+    size, rows = 3 * width, [bytes(3 * width)]
+    for at in range(0, height * (size + 1), size + 1):
+        rows.append(png_row(data[at], data[at + 1:at + 1 + size], rows[-1], 3))
+    return rows[1:]
+
+
+def png_row(kind, row, above, channels):
+    """A row of bytes with its filter undone (PNG specification, 9.2)."""
+    out = bytearray(row)
+    for i in range(len(out)):
+        a, b = (out[i - channels] if i >= channels else 0), above[i]
+        c = above[i - channels] if i >= channels else 0
+        nearest = min((abs(b - c), 0, a), (abs(a - c), 1, b), (abs(a + b - 2 * c), 2, c))[2]
+        out[i] = (out[i] + (0, a, b, (a + b) // 2, nearest)[kind]) & 255
+    return bytes(out)
+
+
 def png_texts(path):
     """Keyword -> text of the tEXt, zTXt and iTXt chunks."""
     texts = {}

@@ -245,8 +245,28 @@ class Verify(CliTest):
         self.assertIn("one of the two cosines is missing", run.stdout)
         with open(os.path.join(self.directory, "out", "verify.json"), encoding="utf-8") as file:
             self.assertFalse(json.load(file)["passed"])
-        with open(os.path.join(self.directory, "out", "verify.html"), encoding="utf-8") as file:
-            self.assertIn("one of the two cosines is missing", file.read())
+        self.assertIn("out/verify.json has every figure", run.stdout)
+        self.assertFalse(os.path.exists(os.path.join(self.directory, "out", "verify.html")))
+
+    def test_the_page_is_made_by_the_python_that_is_named(self):
+        """The interpreter here is a script: of a page only its command is asked, which libraries is not."""
+        self.write("python", "#!/bin/sh\necho \"$@\" > \"$3/verify.html\"\n")
+        os.chmod(self.path("python"), 0o755)
+        arguments = ["verify", "-b", "example", "--case", "furnace", "-o", "out"]
+        run = self.crt(*arguments, CRT_PYTHON=self.path("python"))
+        self.assertIn("out/verify.html and out/verify.json have every figure", run.stdout)
+        with open(self.path("out/verify.html"), encoding="utf-8") as file:
+            first, program, folder = file.read().split()
+        self.assertEqual((first, folder), ("-B", os.path.realpath(self.path("out"))))
+        self.assertTrue(os.path.exists(os.path.join(program, "__main__.py")))
+
+    def test_without_a_page_its_command_is_said_and_the_answer_is_the_same(self):
+        for python, why in (("/nowhere/python", "cannot start '/nowhere/python': No such file or directory"),
+                            ("false", "'false' ended with code 1"),
+                            ("", "as CRT_PYTHON asks")):
+            run = self.crt("verify", "-b", "example", "--case", "furnace", "-o", "out", CRT_PYTHON=python)
+            self.assertRegex(run.stdout, f"there is no page[,:] {why}; this makes it: ")
+            self.assertRegex(run.stdout, "this makes it: .*share/crt/report out\n")
 
     def test_right_physics_passes(self):
         run = self.crt("verify", "-b", "example", "--case", "furnace,square-light")

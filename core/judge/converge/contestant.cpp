@@ -18,6 +18,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <numeric>
 
 namespace crt::converge {
@@ -124,18 +125,31 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     if (last) {
         std::vector<double> colors(image.pixels.begin(), image.pixels.end());
         tests_.add(colors);
-        last_image_ = image;
-        last_error_ = {image.width, image.height, std::vector<float>(pixels)};
-        const LuminanceVariance variance(film);
-        const double mean = row.mean_luminance;
-        const double exposure = std::exp2(developmentOf(scene_).forFloats().exposure_ev);
-        for (std::uint32_t y = 0; y < image.height; ++y)
-            for (std::uint32_t x = 0; x < image.width; ++x)
-                last_error_.values[std::size_t{y} * image.width + x] =
-                    static_cast<float>(std::sqrt(variance(x, y)) * exposure / mean);
+        keepPicture(film, image, row.mean_luminance);
     }
     looks_[row.samples][replicate] = std::move(luminance);
     return row;
+}
+
+void Contestant::keepPicture(const Film& film, const Image& image, double mean_luminance) {
+    last_image_ = image;
+    last_error_ = {image.width, image.height, std::vector<float>(film.counts.size())};
+    const LuminanceVariance variance(film);
+    const double exposure = std::exp2(developmentOf(scene_).forFloats().exposure_ev);
+    for (std::uint32_t y = 0; y < image.height; ++y)
+        for (std::uint32_t x = 0; x < image.width; ++x)
+            last_error_.values[std::size_t{y} * image.width + x] =
+                static_cast<float>(std::sqrt(variance(x, y)) * exposure / mean_luminance);
+}
+
+/// The same seed and samples are the same bits as that replicate's look was.
+void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
+    scene_.sampler.seed = seed_ + 1 + replicate;
+    session_.setScene(session_.compile(scene_));
+    session_.render({.first_sample = 0, .sample_count = samples});
+    const Film film = session_.film();
+    const Image image = resolveImage(film, developmentOf(scene_).forFloats(), 0);
+    keepPicture(film, image, stats::meanLuminance(looks_.at(samples).at(replicate)));
 }
 
 /// What only the very first sample pays, such as an OpenCL driver that makes machine code late, belongs to
@@ -220,17 +234,30 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
     return true;
 }
 
-void Contestant::finish() {
-    Configuration& c = configuration_;
+void Contestant::finish(std::uint64_t map_samples) {
     if (last_image_.pixels.empty()) return;
-    c.maps.samples = samples_reached_;
+    if (reference_ != nullptr && !reference_->fold_rgb.empty() && tests_.count() >= 2) {
+        stats::Replicates eighths(configuration_.width, configuration_.height, 3);
+        for (const std::vector<double>& fold : reference_->fold_rgb) eighths.add(fold);
+        configuration_.tests = imageTestsOf(stats::gate(tests_, eighths));
+    }
+    map_samples = std::min(map_samples, samples_reached_);
+    if (map_samples < samples_reached_)
+        renderPicture(looks_.at(samples_reached_).rbegin()->first, map_samples);
+    fillMaps(map_samples);
+}
+
+void Contestant::fillMaps(std::uint64_t samples) {
+    Configuration& c = configuration_;
+    c.maps.samples = samples;
     c.maps.image = last_image_;
     c.maps.standard_error = last_error_;
     if (reference_ == nullptr) return;
 
     const std::size_t pixels = std::size_t{c.width} * c.height;
     const std::vector<float> truth = spread(*reference_, pixels);
-    const LookPlane& luminance = looks_.at(samples_reached_).rbegin()->second;
+    const std::uint32_t replicate = looks_.at(samples_reached_).rbegin()->first;
+    const LookPlane& luminance = looks_.at(samples).at(replicate);
     const double mean = std::accumulate(truth.begin(), truth.end(), 0.0) / static_cast<double>(pixels);
     c.maps.error = {c.width, c.height, std::vector<float>(pixels)};
     c.maps.z = c.maps.error;
@@ -247,9 +274,15 @@ void Contestant::finish() {
             c.width, c.height,
             stats::flipHdr({last_image_.pixels, c.width, c.height}, {reference_->rgb, c.width, c.height})
                 .error};
-    stats::Replicates eighths(c.width, c.height, 3);
-    for (const std::vector<double>& fold : reference_->fold_rgb) eighths.add(fold);
-    if (tests_.count() >= 2) c.tests = imageTestsOf(stats::gate(tests_, eighths));
+}
+
+std::uint64_t commonSamples(const std::vector<std::unique_ptr<Contestant>>& contestants,
+                            const std::string& scene) {
+    std::uint64_t samples = std::numeric_limits<std::uint64_t>::max();
+    for (const auto& contestant : contestants)
+        if (contestant->key().scene == scene && contestant->samplesReached() > 0)
+            samples = std::min(samples, contestant->samplesReached());
+    return samples;
 }
 
 void fillBetweenReplicates(std::vector<Row>& rows, const Key& key,

@@ -46,13 +46,19 @@ public:
     double secondsOfLastReplicate() const { return seconds_of_last_; }
     /// All looks so far, by samples and replicate.
     std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks() { return looks_; }
-    /// Pictures of the last replicate, and tests of all against the reference's eighths.
-    void finish();
+    /// Pictures of the last replicate at `map_samples` samples per pixel, one of its looks, and tests of all
+    /// against the reference's eighths. Pictures of fewer samples than it reached are rendered again; where
+    /// that fails, crt::Error is thrown and the tests are there.
+    void finish(std::uint64_t map_samples);
 
 private:
     void describe(const CompiledScene& compiled, double setup_seconds);
     void warmUp(const CompiledScene& compiled);
     Row look(const Film& film, std::uint32_t replicate, bool last);
+    /// The image of a film and its own standard error, for maps.
+    void keepPicture(const Film& film, const Image& image, double mean_luminance);
+    void renderPicture(std::uint32_t replicate, std::uint64_t samples);
+    void fillMaps(std::uint64_t samples);
 
     Configuration configuration_;
     Scene scene_;
@@ -68,6 +74,10 @@ private:
     Image last_image_;
     Plane last_error_;          ///< The image's own standard error, relative to its mean.
 };
+
+/// The most samples that all contestants of a scene reached: maps of the same samples can be compared.
+std::uint64_t commonSamples(const std::vector<std::unique_ptr<Contestant>>& contestants,
+                            const std::string& scene);
 
 /// What becomes known when replicates can be compared: (R − 1)/R · mean (I_r − mean of the others)²,
 /// into the rows.

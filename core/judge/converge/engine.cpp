@@ -3,6 +3,7 @@
 
 #include "backend/loader.h"
 #include "base/atomic_file.h"
+#include "base/error.h"
 #include "base/host.h"
 #include "base/log.h"
 #include "base/unit_text.h"
@@ -12,7 +13,6 @@
 #include "judge/converge/findings.h"
 #include "judge/converge/fits.h"
 #include "judge/converge/quantity_text.h"
-#include "judge/converge/report_html.h"
 #include "judge/converge/report_maps.h"
 #include "judge/converge/variants.h"
 #include "scene/yaml/yaml_reader.h"
@@ -321,16 +321,10 @@ private:
         return done;
     }
 
-    /// Different for different keys: what a file name does not take becomes %XX.
     std::string replicateFile(const Key& key, std::uint32_t replicate) const {
-        std::string name;
-        for (const char c : fmt::format("{}-{}-{}", key.scene, key.backend, key.variant)) {
-            const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_' ||
-                               c == '.' || c == ',';
-            name += plain ? std::string(1, c) : fmt::format("%{:02x}", static_cast<unsigned char>(c));
-        }
-        return path(fmt::format("replicates/{}-{}.looks", name, replicate));
+        return path("replicates/" + replicateFileName(key, replicate));
     }
+
     /// Replicates that are whole, with a row for each of their looks; the rows of others are dropped, and
     /// rendered again.
     void resumeReplicates() {
@@ -367,7 +361,7 @@ private:
                 continue;
             }
             fillBetweenReplicates(run_.rows, entry.key, entry.contestant->looks());
-            entry.contestant->finish();
+            finish(*entry.contestant);
             run_.configurations.push_back(entry.contestant->configuration());
         }
         for (const Row& row : run_.rows) log_->append(row);
@@ -378,16 +372,30 @@ private:
 
         const Analysis analysis = analyze(run_);
         writeCsv(path("results.csv"), run_.rows);
-        writeSummary(path("summary.json"), run_, analysis);
-        std::vector<std::string> files = writeReport(request_.output, run_, analysis);
-        files.insert(files.end(), {"results.jsonl", "results.csv", "summary.json"});
+        const std::vector<MapSet> maps = writeMaps(request_.output, run_);
+        writeSummary(path("summary.json"), run_, analysis, maps);
+        std::vector<std::string> files{"results.jsonl", "results.csv", "summary.json"};
+        for (const MapSet& set : maps)
+            for (const MapSet::OfConfiguration& of : set.configurations)
+                for (const Picture& picture : of.pictures) files.push_back(picture.file);
         writeManifest(path("manifest.json"), run_, files);
 
         const bool failed = printVerdicts(analysis);
         logInfo("{} rounds of replicates in {}; wrote {}", rounds_, durationText(elapsed()),
-                path("report.html"));
+                path("summary.json"));
         if (const auto request = watch_.stopRequested()) return request->exit_code;
         return failed ? 7 : 0;
+    }
+
+    /// A device that fails now costs the maps of one configuration, not what was measured.
+    void finish(Contestant& contestant) {
+        const Key& key = contestant.key();
+        try {
+            contestant.finish(commonSamples(contestants_, key.scene));
+        } catch (const Error& error) {
+            run_.notes.push_back(
+                fmt::format("{}: there are no maps of {}: {}", key.scene, labelOf(key), error.what()));
+        }
     }
 
     /// One line for each configuration that ran, whatever came of it; whether any fails.

@@ -1,6 +1,6 @@
 /// `crt converge`: error against run time for scenes × backends × variants, within a budget of time.
 /// Replicates of all configurations take turns, so that a machine that slows down slows all of them. This
-/// file renders; fits.h says what it means, report_html.h shows it.
+/// file renders; fits.h says what it means, summary.json has it, and python/crt/report shows it.
 #pragma once
 
 #include "judge/converge/reference.h"

@@ -5,6 +5,7 @@
 
 #include "judge/converge/fits.h"
 #include "judge/converge/measurement.h"
+#include "judge/converge/report_maps.h"
 
 #include <string>
 #include <vector>
@@ -38,8 +39,10 @@ std::vector<Row> readResults(const std::string& path);
 /// One line per row, in that order, with a header.
 void writeCsv(const std::string& path, const std::vector<Row>& rows);
 
-/// Fits, verdicts, references, stages and environment.
-void writeSummary(const std::string& path, const Run& run, const Analysis& analysis);
+/// Fits, verdicts, references, stages and environment, and of every scene the findings, the void rows and
+/// the files of its maps: all that a page about the run needs.
+void writeSummary(const std::string& path, const Run& run, const Analysis& analysis,
+                  const std::vector<MapSet>& maps);
 
 /// Commands, environment, scenes and references with their hashes, and size and XXH3-128 of each of `files`,
 /// which are names relative to the manifest's folder.

@@ -70,14 +70,6 @@ std::string secondsText(double seconds, int digits) {
     return numberText(seconds / unit.size, digits) + unit.name;
 }
 
-std::string countText(std::uint64_t count) {
-    std::string text = std::to_string(count);
-    if (text.size() < 5) return text;
-    for (std::size_t at = text.size() - 3; at > 0 && at < text.size(); at -= std::min<std::size_t>(at, 3))
-        text.insert(at, "\u202f");
-    return text;
-}
-
 std::string secondsText(const Estimate& estimate, int digits) {
     return estimateText(estimate, unitOfSeconds(estimate.value), digits);
 }

@@ -1,5 +1,4 @@
-/// Numbers for people: few digits, units always, and the interval beside the value. Plain UTF-8, not yet
-/// escaped for HTML.
+/// Numbers for people: few digits, units always, and the interval beside the value. Plain UTF-8.
 #pragma once
 
 #include "judge/converge/measurement.h"
@@ -16,8 +15,6 @@ std::string numberText(double value, int digits = 3);
 std::string percentText(double value, int digits = 3);
 /// "12 ms", "3.41 s", "4.2 min", "3.1 h"
 std::string secondsText(double seconds, int digits = 3);
-/// "65 536", with narrow no-break spaces from 10 000 on.
-std::string countText(std::uint64_t count);
 
 /// "2.41 s (2.35–2.47)": the interval in the value's unit. Without bounds, "2.41 s (no interval)".
 std::string secondsText(const Estimate& estimate, int digits = 3);

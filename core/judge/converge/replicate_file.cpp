@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 
@@ -17,6 +18,16 @@ constexpr std::uint64_t kMagic = 0x32736b6f6f4c5243;  // "CRLooks2"
 using Header = std::array<std::uint64_t, 3>;          // Magic, pixels, looks.
 
 }  // namespace
+
+std::string replicateFileName(const Key& key, std::uint32_t replicate) {
+    std::string name;
+    for (const char c : fmt::format("{}-{}-{}", key.scene, key.backend, key.variant)) {
+        const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_' ||
+                           c == '.' || c == ',';
+        name += plain ? std::string(1, c) : fmt::format("%{:02x}", static_cast<unsigned char>(c));
+    }
+    return fmt::format("{}-{}.looks", name, replicate);
+}
 
 void writeReplicate(const std::string& path, const StoredReplicate& replicate) {
     if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty())

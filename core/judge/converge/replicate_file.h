@@ -2,6 +2,8 @@
 /// replicates needs, and the last image with its own standard error, which the tests and maps need.
 #pragma once
 
+#include "judge/converge/measurement.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -20,6 +22,9 @@ struct StoredReplicate {
     std::vector<float> standard_error;  ///< Of the last look, relative to its mean luminance, [pixel].
 };
 
+/// "box-embree-sampler%3dsobol-3.looks", different for different keys: what a file name does not take
+/// becomes %XX.
+std::string replicateFileName(const Key& key, std::uint32_t replicate);
 void writeReplicate(const std::string& path, const StoredReplicate& replicate);
 
 /// Nothing where there is no file. Throws crt::Error(Usage) when the file is not a replicate of so many

@@ -1,8 +1,10 @@
 #include "judge/converge/report_maps.h"
 
 #include "base/error.h"
+#include "base/log.h"
 #include "base/unit_text.h"
 #include "image/image_io.h"
+#include "judge/converge/findings.h"
 #include "judge/converge/quantity_text.h"
 
 #include <fmt/format.h>
@@ -11,7 +13,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <span>
 
@@ -53,10 +54,10 @@ Rgb colourAt(std::span<const Rgb> anchors, double position) {
     return colour;
 }
 
-std::string cssGradient(std::span<const Rgb> anchors) {
-    std::string css = "linear-gradient(to right";
-    for (const Rgb& c : anchors) css += fmt::format(",#{:02x}{:02x}{:02x}", c[0], c[1], c[2]);
-    return css + ")";
+std::vector<std::string> hexColours(std::span<const Rgb> anchors) {
+    std::vector<std::string> colours;
+    for (const Rgb& c : anchors) colours.push_back(fmt::format("#{:02x}{:02x}{:02x}", c[0], c[1], c[2]));
+    return colours;
 }
 
 /// What the writer of PNG encodes to this byte (IEC 61966-2-1).
@@ -142,27 +143,10 @@ Image reducedImage(const Image& image) {
     return small;
 }
 
-std::string base64(const std::string& bytes) {
-    static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string encoded;
-    for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        std::uint32_t group = 0;
-        for (std::size_t j = 0; j < 3; ++j)
-            group = group << 8 | (i + j < bytes.size() ? static_cast<unsigned char>(bytes[i + j]) : 0u);
-        for (std::size_t j = 0; j < 4; ++j)
-            encoded += i + j <= bytes.size() ? digits[group >> (18 - 6 * j) & 63] : '=';
-    }
-    return encoded;
-}
-
 Picture writePicture(const std::string& folder, const std::string& file, const std::string& title,
                      const Image& image) {
-    const std::string path = (fs::path(folder) / file).string();
-    writeImage(path, OutputFormat::Png, image);
-    std::ifstream stream(path, std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-    if (!stream) throw Error(ErrorKind::Output, fmt::format("cannot read back '{}'", path), {path});
-    return {file, title, "data:image/png;base64," + base64(bytes), image.width, image.height};
+    writeImage((fs::path(folder) / file).string(), OutputFormat::Png, image);
+    return {file, title, image.width, image.height};
 }
 
 /// The upper end of the error maps' scale: 99.5 % of all pixels of the scene lie below, rounded up to 1, 2
@@ -183,22 +167,7 @@ double topOfErrors(const std::vector<const Maps*>& maps) {
     return 10 * decade;
 }
 
-}  // namespace
-
-std::string slug(const std::string& name) {
-    std::string text;
-    for (const char c : name) {
-        const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-        if (plain)
-            text += c;
-        else if (!text.empty() && text.back() != '-')
-            text += '-';
-    }
-    while (!text.empty() && text.back() == '-') text.pop_back();
-    return text.empty() ? "unnamed" : text;
-}
-
-MapSet writeMaps(const std::string& folder, const Run& run, const std::string& scene) {
+MapSet mapsOfScene(const std::string& folder, const Run& run, const std::string& scene) {
     std::vector<const Maps*> all;
     for (const Configuration& configuration : run.configurations)
         if (configuration.key.scene == scene) all.push_back(&configuration.maps);
@@ -210,6 +179,7 @@ MapSet writeMaps(const std::string& folder, const Run& run, const std::string& s
     const auto flip_colour = [](double value) { return colourAt(kMagma, value); };
 
     MapSet set;
+    set.scene = scene;
     bool z = false, flip = false, errors = false;
     std::size_t number = 0;
     for (const Configuration& configuration : run.configurations) {
@@ -236,13 +206,41 @@ MapSet writeMaps(const std::string& folder, const Run& run, const std::string& s
     if (errors)
         set.keys.push_back({"error and standard error, relative to the image mean, logarithmic",
                             percentText(top / std::pow(10.0, kDecades), 1), percentText(top, 1),
-                            cssGradient(kMagma)});
+                            hexColours(kMagma)});
     if (z)
         set.keys.push_back({"z = error / standard error", fmt::format("−{} too dark", kLargestZ),
-                            fmt::format("+{} too bright", kLargestZ), cssGradient(kDiverging)});
+                            fmt::format("+{} too bright", kLargestZ), hexColours(kDiverging)});
     if (flip)
-        set.keys.push_back({"FLIP, the difference as seen", "0 none", "1 largest", cssGradient(kMagma)});
+        set.keys.push_back({"FLIP, the difference as seen", "0 none", "1 largest", hexColours(kMagma)});
     return set;
+}
+
+}  // namespace
+
+std::string slug(const std::string& name) {
+    std::string text;
+    for (const char c : name) {
+        const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+        if (plain)
+            text += c;
+        else if (!text.empty() && text.back() != '-')
+            text += '-';
+    }
+    while (!text.empty() && text.back() == '-') text.pop_back();
+    return text.empty() ? "unnamed" : text;
+}
+
+std::vector<MapSet> writeMaps(const std::string& folder, const Run& run) {
+    std::vector<MapSet> sets;
+    for (const std::string& scene : scenesOf(run)) {
+        try {
+            sets.push_back(mapsOfScene(folder, run, scene));
+        } catch (const Error& error) {
+            logWarning("there are no maps of '{}': {}", scene, error.what());
+            sets.push_back({scene, {}, {}, error.what()});
+        }
+    }
+    return sets;
 }
 
 }  // namespace crt::converge

@@ -9,22 +9,22 @@
 
 namespace crt::converge {
 
-/// One picture, written as a file and ready to be put into a page.
+/// One picture, written as a file.
 struct Picture {
     std::string file;      ///< Name within the folder.
-    std::string title;     ///< "error"
-    std::string uri;       ///< data:image/png;base64,…
+    std::string title;     ///< "image", "error", "standard error", "z" or "FLIP"
     std::uint32_t width = 0, height = 0;
 };
 
 /// A colour scale with what its ends mean.
 struct ColourKey {
     std::string title, low, high;
-    std::string css_gradient;
+    std::vector<std::string> colours;  ///< "#rrggbb", at even steps from low to high.
 };
 
 /// The maps of the configurations of one scene, on common scales.
 struct MapSet {
+    std::string scene;
     struct OfConfiguration {
         Key key;
         std::uint64_t samples = 0;
@@ -32,12 +32,13 @@ struct MapSet {
     };
     std::vector<OfConfiguration> configurations;
     std::vector<ColourKey> keys;
+    std::string left_out;  ///< Why there are none; empty where there are.
 };
 
-/// Writes map-<scene>-<n>-<what>.png into `folder` for configuration `n` of the scene, reduced to 384 pixels
-/// a side at most: errors by their root mean square, z by its largest magnitude. Throws crt::Error(Output),
-/// also when the codec module cannot be opened.
-MapSet writeMaps(const std::string& folder, const Run& run, const std::string& scene);
+/// Writes map-<scene>-<n>-<what>.png into `folder` for configuration `n` of each scene, reduced to 384
+/// pixels a side at most: errors by their root mean square, z by its largest magnitude. Hours of measuring
+/// must not be lost to a missing codec: its absence is a warning, and MapSet::left_out.
+std::vector<MapSet> writeMaps(const std::string& folder, const Run& run);
 
 /// Letters, digits and '-' of a name, for files and anchors.
 std::string slug(const std::string& name);

@@ -1,8 +1,11 @@
 // summary.json: fits, verdicts, references, stages and environment.
 #include "base/atomic_file.h"
+#include "film/luminance_error.h"
 #include "judge/converge/files.h"
+#include "judge/converge/findings.h"
 #include "judge/converge/json_parts.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace crt::converge {
@@ -35,6 +38,9 @@ Json referenceJson(const ReferenceInfo& r) {
             {"image_mean", numbers(r.image_mean)},
             {"image_mean_standard_error", numbers(r.image_mean_standard_error)},
             {"mean_variance", number(r.mean_variance)},
+            {"relative_error", r.kind == ReferenceKind::None || !(r.mean_variance > 0)
+                                   ? Json(nullptr)
+                                   : number(stats::relativeRmse(r.mean_variance, r.mean_luminance))},
             {"effective_pixels", number(r.effective_pixels)},
             {"eightfold_spread", number(r.eightfold_spread)}};
 }
@@ -93,6 +99,7 @@ Json targetJson(const Target& t) {
 
 Json fitJson(const ConfigurationFit& fit) {
     Json json = keyJson(fit.key);
+    json["omitted"] = fit.omitted;
     json["replicates"] = fit.replicates;
     json["void_rows"] = fit.void_rows;
     json["error_source"] = fit.source == ErrorSource::Reference ? "reference" : "between replicates";
@@ -112,6 +119,7 @@ Json fitJson(const ConfigurationFit& fit) {
         json["error"] = {{"variance_of_one_sample", interval(fit.error.variance)},
                          {"fitted_bias_squared", interval(fit.error.intercept)},
                          {"bias_squared", interval(fit.error.bias_squared)},
+                         {"floor", interval(fit.error.floor())},
                          {"flattening", fit.error.flattening},
                          {"faster_than_inverse", fit.error.faster_than_inverse}};
         json["slope_against_samples"] = interval(fit.slope_samples);
@@ -170,15 +178,86 @@ Json configurationJson(const Configuration& c) {
     return json;
 }
 
+const char* toneName(Tone tone) {
+    switch (tone) {
+        case Tone::Good: return "good";
+        case Tone::Warning: return "warning";
+        case Tone::Bad: return "bad";
+        case Tone::Neutral: break;
+    }
+    return "neutral";
+}
+
+/// `invalid_samples` is 0 where all were numbers, but their squared error is none.
+Json voidRowsJson(const Run& run, const std::string& scene) {
+    Json json = Json::array();
+    for (const Row& row : run.rows) {
+        if (row.key.scene != scene || !row.isVoid()) continue;
+        json.push_back({{"backend", row.key.backend},
+                        {"variant", row.key.variant},
+                        {"replicate", row.replicate},
+                        {"samples_per_pixel", row.samples},
+                        {"invalid_samples", row.invalid_samples}});
+    }
+    return json;
+}
+
+Json picturesJson(const std::vector<Picture>& pictures) {
+    Json json = Json::array();
+    for (const Picture& picture : pictures)
+        json.push_back({{"title", picture.title},
+                        {"file", picture.file},
+                        {"width", picture.width},
+                        {"height", picture.height}});
+    return json;
+}
+
+Json mapsJson(const MapSet& set) {
+    Json configurations = Json::array(), scales = Json::array();
+    for (const MapSet::OfConfiguration& of : set.configurations)
+        configurations.push_back({{"backend", of.key.backend},
+                                  {"variant", of.key.variant},
+                                  {"samples_per_pixel", of.samples},
+                                  {"pictures", picturesJson(of.pictures)}});
+    for (const ColourKey& key : set.keys)
+        scales.push_back(
+            {{"title", key.title}, {"low", key.low}, {"high", key.high}, {"colours", key.colours}});
+    return {{"left_out", set.left_out.empty() ? Json(nullptr) : Json(set.left_out)},
+            {"configurations", std::move(configurations)},
+            {"scales", std::move(scales)}};
+}
+
+Json sceneJson(const Run& run, const Analysis& analysis, const std::vector<MapSet>& maps,
+               const std::string& scene) {
+    Json json{{"scene", scene}, {"findings", Json::array()}};
+    for (const Finding& finding : findingsOfScene(run, analysis, scene))
+        json["findings"].push_back({{"tone", toneName(finding.tone)}, {"text", finding.text}});
+    json["void_rows"] = voidRowsJson(run, scene);
+    json["maps"] = nullptr;
+    for (const MapSet& set : maps)
+        if (set.scene == scene) json["maps"] = mapsJson(set);
+    return json;
+}
+
+std::uint32_t replicatesOf(const Run& run) {
+    std::uint32_t replicates = 0;
+    for (const Row& row : run.rows) replicates = std::max(replicates, row.replicate + 1);
+    return replicates;
+}
+
 }  // namespace
 
-void writeSummary(const std::string& path, const Run& run, const Analysis& analysis) {
+void writeSummary(const std::string& path, const Run& run, const Analysis& analysis,
+                  const std::vector<MapSet>& maps) {
     Json json;
+    json["format"] = "crt converge summary 1";
     json["environment"] = environmentJson(run.environment);
     json["options"] = {{"confidence", analysis.options.confidence},
                        {"verdict_confidence", analysis.options.verdict_confidence},
                        {"equivalence_margin", analysis.options.equivalence_margin},
-                       {"family_alpha", analysis.options.family_alpha}};
+                       {"family_alpha", analysis.options.family_alpha},
+                       {"targets", analysis.options.targets}};
+    json["replicates"] = replicatesOf(run);
     json["notes"] = run.notes;
     json["references"] = Json::array();
     for (const ReferenceInfo& reference : run.references)
@@ -186,6 +265,9 @@ void writeSummary(const std::string& path, const Run& run, const Analysis& analy
     json["configurations"] = Json::array();
     for (const Configuration& configuration : run.configurations)
         json["configurations"].push_back(configurationJson(configuration));
+    json["scenes"] = Json::array();
+    for (const std::string& scene : scenesOf(run))
+        json["scenes"].push_back(sceneJson(run, analysis, maps, scene));
     json["fits"] = Json::array();
     for (const ConfigurationFit& fit : analysis.fits) json["fits"].push_back(fitJson(fit));
     writeWhole(path, json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n');

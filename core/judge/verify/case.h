@@ -30,12 +30,15 @@ enum class Verdict {
     Fail,
 };
 
+/// Of every interval of an outcome.
+inline constexpr double kConfidence = 0.999;
+
 /// One question of a case and its answer.
 struct Outcome {
     std::string what;                 ///< "albedo 0.5, depth 8"
     Verdict verdict = Verdict::Fail;
     std::optional<double> expected, measured;
-    std::optional<stats::Interval> interval;  ///< 99.9 %, of `measured`, where it was estimated.
+    std::optional<stats::Interval> interval;  ///< Of kConfidence, of `measured`, where it was estimated.
     std::string tolerance;            ///< "± 0.1 %", "same bits"
     std::string
         note;  ///< A figure worth keeping, the reason why it does not apply, or the message of a refusal.

@@ -13,8 +13,6 @@
 namespace crt::verify {
 namespace {
 
-constexpr double kConfidence = 0.999;
-
 stats::Interval meanOf(const std::vector<double>& replicates) {
     return stats::meanInterval(stats::summarize(replicates), kConfidence);
 }

@@ -14,6 +14,14 @@ using Json = nlohmann::ordered_json;
 
 std::string figure(double value) { return fmt::format("{:.9g}", value); }
 
+/// "0.23946 [0.23941, 0.23951]", or nothing.
+std::string measuredText(const Outcome& o) {
+    if (!o.measured) return "";
+    std::string text = figure(*o.measured);
+    if (o.interval) text += fmt::format(" [{:.7g}, {:.7g}]", o.interval->lower, o.interval->upper);
+    return text;
+}
+
 /// What a failed outcome says, in the two or three lines under its case.
 std::string failureText(const Outcome& o) {
     std::string text = fmt::format("       {}: {}", name(o.verdict), o.what);
@@ -31,13 +39,6 @@ Json number(const std::optional<double>& value) {
 }
 
 }  // namespace
-
-std::string measuredText(const Outcome& o) {
-    if (!o.measured) return "";
-    std::string text = figure(*o.measured);
-    if (o.interval) text += fmt::format(" [{:.7g}, {:.7g}]", o.interval->lower, o.interval->upper);
-    return text;
-}
 
 std::string caseText(const CaseResult& result, bool colored) {
     const bool bad = failed(result.verdict);
@@ -67,6 +68,7 @@ std::string summaryText(const SuiteResult& suite) {
 
 std::string suiteJson(const SuiteResult& suite) {
     Json json;
+    json["format"] = "crt verify 1";
     json["crt"] = {{"version", CRT_VERSION}};
     json["backend"] = {{"name", suite.backend},
                        {"version", suite.version},
@@ -77,6 +79,7 @@ std::string suiteJson(const SuiteResult& suite) {
     json["passed"] = suite.passed();
     json["asked"] = suite.asked;
     json["interrupted"] = suite.request.has_value();
+    json["confidence"] = kConfidence;
     Json cases = Json::array();
     for (const CaseResult& c : suite.cases) {
         Json outcomes = Json::array();
@@ -93,6 +96,7 @@ std::string suiteJson(const SuiteResult& suite) {
         }
         cases.push_back({{"id", c.which->id},
                          {"name", c.which->name},
+                         {"group", groupTitle(c.which->group())},
                          {"title", c.which->title},
                          {"expected", c.which->expected},
                          {"source", c.which->source},

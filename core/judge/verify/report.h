@@ -13,13 +13,9 @@ namespace crt::verify {
 std::string caseText(const CaseResult& result, bool colored);
 /// "51 pass, 2 not applicable, 1 FAIL in 43 s".
 std::string summaryText(const SuiteResult& suite);
-/// "0.23946 [0.23941, 0.23951]", or nothing.
-std::string measuredText(const Outcome& outcome);
 
 /// verify.json
 std::string suiteJson(const SuiteResult& suite);
-/// verify.html: one file without anything from outside.
-std::string suiteHtml(const SuiteResult& suite);
 
 /// `crt verify --list`
 std::string listText(const std::vector<const Case*>& cases);
