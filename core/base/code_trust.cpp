@@ -105,7 +105,7 @@ std::string modeText(mode_t mode) {
     return text;
 }
 
-std::string quoted(const std::string& name) { return "'" + name + "'"; }
+std::string inQuotationMarks(const std::string& name) { return "'" + name + "'"; }
 
 bool isAbove(const std::string& folder, const std::string& path) {
     return folder == "/" || (path.size() > folder.size() && path.compare(0, folder.size(), folder) == 0 &&
@@ -122,11 +122,11 @@ std::string folderOf(const std::string& path) {
 std::string whyNot(const struct stat& status, const std::string& name) {
     const mode_t mode = status.st_mode;
     if (!trustedOwner(status.st_uid))
-        return quoted(name) + " belongs to another user (" + nameOfUser(status.st_uid) +
+        return inQuotationMarks(name) + " belongs to another user (" + nameOfUser(status.st_uid) +
                "), who could have put anything there";
     if (S_ISDIR(mode) && (mode & S_ISVTX) != 0) return {};
     const Program& p = program();
-    const std::string remedy = " can write to " + quoted(name) + " (mode " + modeText(mode) +
+    const std::string remedy = " can write to " + inQuotationMarks(name) + " (mode " + modeText(mode) +
                                ") and could have put anything there; chmod go-w " + name;
     if ((mode & S_IWOTH) != 0 && !(p.known && (p.status.st_mode & S_IWOTH) != 0)) return "everyone" + remedy;
     const bool group_of_program =
@@ -139,20 +139,20 @@ std::string whyNot(const struct stat& status, const std::string& name) {
 std::string whyNotByName(const std::string& path) {
     char real[PATH_MAX];
     if (::realpath(path.c_str(), real) == nullptr)
-        return quoted(path) + " cannot be opened: " + std::strerror(errno);
+        return inQuotationMarks(path) + " cannot be opened: " + std::strerror(errno);
     // On the descriptor: not blocking, for a pipe waits for who writes to it.
     const int descriptor = ::open(real, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-    if (descriptor < 0) return quoted(path) + " cannot be opened: " + std::strerror(errno);
+    if (descriptor < 0) return inQuotationMarks(path) + " cannot be opened: " + std::strerror(errno);
     struct stat status {};
     const bool known = ::fstat(descriptor, &status) == 0;
     ::close(descriptor);
-    if (!known || !S_ISREG(status.st_mode)) return quoted(path) + " is not a regular file";
+    if (!known || !S_ISREG(status.st_mode)) return inQuotationMarks(path) + " is not a regular file";
     std::string why = whyNot(status, path);
     const std::string home = homeOfUser();
     for (std::string folder = folderOf(real); why.empty(); folder = folderOf(folder)) {
         if (program().known && isAbove(folder, program().path)) break;  // So are all further up.
         if (::stat(folder.c_str(), &status) != 0)
-            return quoted(folder) + " cannot be looked at: " + std::strerror(errno);
+            return inQuotationMarks(folder) + " cannot be looked at: " + std::strerror(errno);
         why = whyNot(status, folder);
         if (folder == "/" || folder == home) break;
     }

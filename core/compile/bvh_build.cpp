@@ -30,7 +30,7 @@ struct Split {
     float cost = std::numeric_limits<float>::infinity();
 };
 
-constexpr std::uint32_t kPart = 1u << 14;    // triangles that a thread looks at, at a time
+constexpr std::uint32_t kTrianglesAtATime = 1u << 14;  // triangles that a thread looks at, at a time
 constexpr std::uint32_t kSerial = 1u << 15;  // up to so many, one thread builds a whole tree of them
 
 /// 0.5 of it is the centre.
@@ -227,11 +227,11 @@ private:
             for (std::uint32_t i = begin; i < end; ++i) add(result, triangles_[order_[i]]);
             return result;
         }
-        std::vector<Result> parts(partsOf(end - begin, kPart), nothing);
-        parallelFor(end - begin, kPart, [&](std::size_t first, std::size_t last) {
+        std::vector<Result> parts(partsOf(end - begin, kTrianglesAtATime), nothing);
+        parallelFor(end - begin, kTrianglesAtATime, [&](std::size_t first, std::size_t last) {
             Result part = nothing;
             for (std::size_t i = begin + first; i < begin + last; ++i) add(part, triangles_[order_[i]]);
-            parts[first / kPart] = part;
+            parts[first / kTrianglesAtATime] = part;
         });
         Result result = nothing;
         for (const Result& part : parts) join(result, part);
@@ -249,20 +249,20 @@ private:
             return static_cast<std::uint32_t>(std::partition(at(order, begin), at(order, end), isLeft) -
                                               order);
         // Stable: how many of each part go left says where its triangles go.
-        std::vector<std::uint32_t> left(partsOf(end - begin, kPart));
-        parallelFor(end - begin, kPart, [&](std::size_t first, std::size_t last) {
-            left[first / kPart] = static_cast<std::uint32_t>(
+        std::vector<std::uint32_t> left(partsOf(end - begin, kTrianglesAtATime));
+        parallelFor(end - begin, kTrianglesAtATime, [&](std::size_t first, std::size_t last) {
+            left[first / kTrianglesAtATime] = static_cast<std::uint32_t>(
                 std::count_if(at(order, begin + first), at(order, begin + last), isLeft));
         });
         std::uint32_t all_left = 0;
         for (std::uint32_t& count : left) all_left += std::exchange(count, all_left);
-        parallelFor(end - begin, kPart, [&](std::size_t first, std::size_t last) {
-            std::size_t to_left = begin + left[first / kPart];
-            std::size_t to_right = begin + all_left + (first - left[first / kPart]);
+        parallelFor(end - begin, kTrianglesAtATime, [&](std::size_t first, std::size_t last) {
+            std::size_t to_left = begin + left[first / kTrianglesAtATime];
+            std::size_t to_right = begin + all_left + (first - left[first / kTrianglesAtATime]);
             for (std::size_t i = begin + first; i < begin + last; ++i)
                 scratch_[isLeft(order[i]) ? to_left++ : to_right++] = order[i];
         });
-        parallelFor(end - begin, kPart, [&](std::size_t first, std::size_t last) {
+        parallelFor(end - begin, kTrianglesAtATime, [&](std::size_t first, std::size_t last) {
             std::copy(at(scratch_.data(), begin + first), at(scratch_.data(), begin + last),
                       at(order, begin + first));
         });

@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::uint32_t kWidth = 4;
 constexpr float kNodeCost = 1.5f;       // of a wide node in triangle tests; flat between 1 and 2.5
-constexpr std::uint32_t kLeafSize = 4;  // of leaves that are joined here
+constexpr std::uint32_t kJoinedLeafSize = 4;  // of leaves that are joined here
 
 /// How a subtree is best made the children of a wide node.
 struct Cut {
@@ -82,7 +82,7 @@ private:
         const float half_area = tree_[node].box.halfArea();
         const float as_node = kNodeCost * half_area + costs.of[kWidth - 1];
         const float as_leaf = half_area * static_cast<float>(costs.triangles);
-        cheapest.is_leaf = costs.triangles <= kLeafSize && as_leaf <= as_node;
+        cheapest.is_leaf = costs.triangles <= kJoinedLeafSize && as_leaf <= as_node;
         costs.of[0] = cheapest.is_leaf ? as_leaf : as_node;
         return costs;
     }

@@ -35,10 +35,10 @@ Coat makeCoat(double eta, double roughness) {
     return coat;
 }
 
-using Key = std::pair<double, double>;
+using CoatKey = std::pair<double, double>;
 
-Key keyOf(const Material& plastic) { return {plastic.eta[0], plastic.roughness}; }
-Key keyOf(const Clearcoat& coat) { return {coat.ior, coat.roughness}; }
+CoatKey coatKeyOf(const Material& plastic) { return {plastic.eta[0], plastic.roughness}; }
+CoatKey coatKeyOf(const Clearcoat& coat) { return {coat.ior, coat.roughness}; }
 
 }  // namespace
 
@@ -49,18 +49,18 @@ double coatAlbedo(double cosine, double eta, double alpha) {
         });
 }
 
-const Coat& coatOf(const Coats& coats, const Material& plastic) { return coats.at(keyOf(plastic)); }
+const Coat& coatOf(const Coats& coats, const Material& plastic) { return coats.at(coatKeyOf(plastic)); }
 
-const Coat& coatOf(const Coats& coats, const Clearcoat& clearcoat) { return coats.at(keyOf(clearcoat)); }
+const Coat& coatOf(const Coats& coats, const Clearcoat& clearcoat) { return coats.at(coatKeyOf(clearcoat)); }
 
 Coats coatsOf(const std::vector<const Material*>& materials) {
     Coats coats;
-    const auto add = [&](const Key& key) {
+    const auto add = [&](const CoatKey& key) {
         if (!coats.contains(key)) coats.emplace(key, makeCoat(key.first, key.second));
     };
     for (const Material* material : materials) {
-        if (material && material->type == MaterialType::Plastic) add(keyOf(*material));
-        if (material && hasClearcoat(*material)) add(keyOf(*material->clearcoat));
+        if (material && material->type == MaterialType::Plastic) add(coatKeyOf(*material));
+        if (material && hasClearcoat(*material)) add(coatKeyOf(*material->clearcoat));
     }
     return coats;
 }

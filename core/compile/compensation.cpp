@@ -89,17 +89,17 @@ bool isSmooth(double roughness) {
 }
 
 /// What a table depends on.
-struct Key {
+struct TableKey {
     bool refracts;
     double least, most;  ///< Index, inside over outside.
     bool textured;
     double roughness;
     double narrowing;  ///< 0: isotropic; else `roughness` is the root of the width along the tangent.
-    auto operator<=>(const Key&) const = default;
+    auto operator<=>(const TableKey&) const = default;
 };
 
-Key keyOf(const Material& material) {
-    Key key{};
+TableKey tableKeyOf(const Material& material) {
+    TableKey key{};
     key.refracts = material.type == MaterialType::RoughDielectric;
     if (key.refracts)
         std::tie(key.least, key.most) = std::pair(material.eta.min(), material.eta.max());
@@ -124,7 +124,7 @@ struct Across {
     double first = 0, step = 1;  ///< Of what the kernel looks rows up by.
 };
 
-Across acrossIndices(const Key& key) {
+Across acrossIndices(const TableKey& key) {
     Across across;
     const double range = key.most - key.least, step = key.narrowing > 0 ? kWideIndexStep : kIndexStep;
     const auto steps = static_cast<std::size_t>(std::min(kMostIndices - 1.0, std::ceil(range / step)));
@@ -214,7 +214,7 @@ struct Row {
     }
 };
 
-Compensations::Table makeTable(const Key& key, const Across& across) {
+Compensations::Table makeTable(const TableKey& key, const Across& across) {
     Compensations::Table table;
     kernel::CrtLoss& record = table.record;
     record.sides = key.refracts ? 2 : 1;
@@ -301,7 +301,7 @@ Anisotropy anisotropyOf(const Material& material) {
 
 Compensations compensationsOf(const std::vector<const Material*>& materials) {
     Compensations all;
-    std::map<Key, std::uint32_t> known;
+    std::map<TableKey, std::uint32_t> known;
     for (const Material* material : materials) {
         if (!material || (material->type != MaterialType::RoughConductor &&
                           material->type != MaterialType::RoughDielectric))
@@ -309,7 +309,7 @@ Compensations compensationsOf(const std::vector<const Material*>& materials) {
         if (material->type == MaterialType::RoughConductor && !hasThinFilm(*material) && !material->by_color)
             all.mean_reflectance[material] = meanReflectance(*material);
         if (material->roughness_texture == kNoTexture && isSmooth(material->roughness)) continue;
-        const Key key = keyOf(*material);
+        const TableKey key = tableKeyOf(*material);
         if (key.refracts && hasThinFilm(*material)) {
             all.table_of[material] = static_cast<std::uint32_t>(all.tables.size());
             all.tables.push_back(makeTable(key, acrossWavelengths(*material)));

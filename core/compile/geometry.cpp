@@ -13,7 +13,7 @@
 namespace crt {
 namespace {
 
-constexpr std::size_t kPart = std::size_t{1} << 14;  // of what a thread takes at a time
+constexpr std::size_t kFacesAtATime = std::size_t{1} << 14;  // of what a thread takes at a time
 
 /// The largest coordinate of a triangle, and the largest extent of its two edges along an axis: what
 /// rounding depends on.
@@ -194,7 +194,7 @@ double areaOf(const FlatScene& flat, std::size_t id) {
 
 void compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator,
                       std::span<kernel::CrtTriangle> triangles) {
-    parallelFor(triangles.size(), kPart, [&](std::size_t first, std::size_t end) {
+    parallelFor(triangles.size(), kFacesAtATime, [&](std::size_t first, std::size_t end) {
         for (std::size_t slot = first; slot < end; ++slot) {
             const std::uint32_t id = accelerator.id_of_slot[slot];
             std::copy(flat.positions[id].begin(), flat.positions[id].end(), triangles[slot].p);
@@ -210,7 +210,7 @@ void compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator,
 
 void compileFaces(const FlatScene& flat, const AcceleratorPart& accelerator,
                   std::span<kernel::CrtFace> faces) {
-    parallelFor(faces.size(), kPart, [&](std::size_t first, std::size_t end) {
+    parallelFor(faces.size(), kFacesAtATime, [&](std::size_t first, std::size_t end) {
         for (std::size_t slot = first; slot < end; ++slot)
             faces[slot] = faceOf(flat, accelerator.id_of_slot[slot]);
     });

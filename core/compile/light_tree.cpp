@@ -11,7 +11,7 @@
 namespace crt {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+constexpr double pi = std::numbers::pi;
 constexpr std::size_t kBuckets = 12;
 /// Below, nodes are halved by number: no arrangement of lights makes a tree deeper than that and their
 /// logarithm.
@@ -34,15 +34,15 @@ void uniteCones(const LightBounds& a, const LightBounds& b, LightBounds& both) {
     both.axis = a.axis;
     both.theta_o = a.theta_o;
     const double between = angleBetween(a.axis, b.axis);
-    if (std::min(between + b.theta_o, kPi) <= a.theta_o) return;
+    if (std::min(between + b.theta_o, pi) <= a.theta_o) return;
     both.axis = b.axis;
     both.theta_o = b.theta_o;
-    if (std::min(between + a.theta_o, kPi) <= b.theta_o) return;
+    if (std::min(between + a.theta_o, pi) <= b.theta_o) return;
     const double spread = (a.theta_o + between + b.theta_o) / 2;
-    both.theta_o = std::min(spread, kPi);
+    both.theta_o = std::min(spread, pi);
     // Opposite axes: any plane would do, and all directions are as good.
-    if (spread >= kPi || between > kPi - 1e-9)
-        both.theta_o = kPi;
+    if (spread >= pi || between > pi - 1e-9)
+        both.theta_o = pi;
     else
         both.axis = turned(a.axis, b.axis, spread - a.theta_o);
 }
@@ -54,8 +54,8 @@ double surfaceOf(const LightBounds& b) {
 
 /// Directions that are lit, weighed by the cosine (Conty Estevez and Kulla 2018, equation 1).
 double orientationOf(const LightBounds& b) {
-    const double o = b.theta_o, w = std::min(o + b.theta_e, kPi);
-    return 2 * kPi * (1 - std::cos(o)) + kPi / 2 * (2 * w * std::sin(o) - std::cos(o - 2 * w) -
+    const double o = b.theta_o, w = std::min(o + b.theta_e, pi);
+    return 2 * pi * (1 - std::cos(o)) + pi / 2 * (2 * w * std::sin(o) - std::cos(o - 2 * w) -
                                                     2 * o * std::sin(o) + std::cos(o));
 }
 

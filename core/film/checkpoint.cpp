@@ -34,7 +34,6 @@ constexpr std::size_t kHashDigits = 32;
 constexpr std::size_t kVersionBytesMax = 255;
 constexpr std::uint32_t kRecordBytesMax = 1u << 28;
 constexpr std::uint32_t kRangesMax = 1u << 20;
-constexpr std::uint32_t kSideMax = 65535;  // Of a film, as scene files have it.
 
 /// The part of fixed size.
 struct Header {
@@ -234,9 +233,9 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         refuse(path, "is damaged: its header contradicts its size");
     // A side of no pixels makes any other side fit the size; walking four thousand million empty rows would
     // take a minute.
-    if (std::min(header.width, header.height) < 1 || std::max(header.width, header.height) > kSideMax)
+    if (std::min(header.width, header.height) < 1 || std::max(header.width, header.height) > kFilmSideMax)
         refuse(path, fmt::format("is damaged: its header says {} x {} pixels, and films have 1 to {} a side",
-                                 header.width, header.height, kSideMax));
+                                 header.width, header.height, kFilmSideMax));
 
     const char* const kBadChecksum = "is damaged: its checksum does not match its content";
     Checksum checksum;

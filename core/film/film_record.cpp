@@ -30,7 +30,6 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::uint64_t kRecordVersion = 1;
-constexpr int kSideMax = 65535;  // Of a film, as scene files have it.
 
 // ---- Camera ---------------------------------------------------------------------------------------------
 
@@ -392,11 +391,11 @@ FilmRecord recordFrom(const Json& json) {
     record.date_utc = json.at("date_utc").get<std::string>();
     if (json.contains("complete")) record.complete = json.at("complete").get<bool>();
 
-    if (std::max(record.width, record.height) > kSideMax)
+    if (std::max(record.width, record.height) > static_cast<int>(kFilmSideMax))
         throw Error(ErrorKind::Usage,
                     fmt::format("has a film of {} × {} pixels, and films have up to {} a side",
                                  record.width,
-                                record.height, kSideMax));
+                                record.height, kFilmSideMax));
     const auto& [x0, y0, x1, y1] = record.window;
     if (x0 >= x1 || y0 >= y1 || x1 > record.width || y1 > record.height)
         throw Error(ErrorKind::Usage, "has a window that is none of its film");

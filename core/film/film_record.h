@@ -17,6 +17,8 @@
 
 namespace crt {
 
+inline constexpr std::uint32_t kFilmSideMax = 65535;  ///< Of a film, as scene files have it.
+
 /// One of the things that decide which samples a film holds.
 struct SceneTrait {
     std::string name;    ///< "resolution", "the camera"

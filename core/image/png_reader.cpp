@@ -30,8 +30,8 @@ std::uint32_t bigEndian(const unsigned char* bytes) {
 }
 
 /// Large arrays, not cleared.
-struct Bytes {
-    explicit Bytes(std::size_t size_) : size(size_), data(new unsigned char[size_]) {
+struct FileBytes {
+    explicit FileBytes(std::size_t size_) : size(size_), data(new unsigned char[size_]) {
         adviseHugePages(data.get(), size);
     }
     std::size_t size;
@@ -71,7 +71,7 @@ std::optional<Kind> kindOf(const unsigned char* header, const CrtTexelsInfo& inf
     return kind;
 }
 
-std::optional<Bytes> contentOf(const std::string& path, const CrtTexelsInfo& info) {
+std::optional<FileBytes> contentOf(const std::string& path, const CrtTexelsInfo& info) {
     // More than pixels take that cannot be compressed: 8 bytes each at most, and a byte a row.
     constexpr std::uint64_t kOtherChunks = std::uint64_t{16} << 20;
     const std::uint64_t pixels = std::uint64_t{info.width} * info.height;
@@ -80,7 +80,7 @@ std::optional<Bytes> contentOf(const std::string& path, const CrtTexelsInfo& inf
     const std::uint64_t size = std::filesystem::file_size(path, unknown);
     if (unknown || size < kSignatureBytes || size > most) return std::nullopt;
     std::ifstream file(path, std::ios::binary);
-    Bytes bytes(size);
+    FileBytes bytes(size);
     if (!file.read(reinterpret_cast<char*>(bytes.data.get()), static_cast<std::streamsize>(size)))
         return std::nullopt;
     return bytes;
@@ -93,7 +93,7 @@ struct Compressed {
 
 /// Nothing unless all that follows the header is as the specification has it: sound checksums, the pixels in
 /// one sequence, and nothing else that must be understood.
-std::optional<Compressed> compressedOf(Bytes& file, const CrtTexelsInfo& info) {
+std::optional<Compressed> compressedOf(FileBytes& file, const CrtTexelsInfo& info) {
     constexpr std::size_t kHead = 8, kHeader = 13, kChecksum = 4;
     unsigned char* const content = file.data.get();
     Compressed compressed;
@@ -131,7 +131,7 @@ std::optional<Compressed> compressedOf(Bytes& file, const CrtTexelsInfo& info) {
 }
 
 /// As many bytes as rows have; false unless the stream is sound, all of it.
-bool inflate(const unsigned char* stream, std::size_t stream_bytes, Bytes& filtered) {
+bool inflate(const unsigned char* stream, std::size_t stream_bytes, FileBytes& filtered) {
     // A stream may promise a window of less than 32 KiB, which zlib sees kept and libdeflate does not.
     constexpr unsigned char kDeflateWith32KiB = 0x78;
     if (stream_bytes == 0 || stream[0] != kDeflateWith32KiB) return false;
@@ -211,14 +211,14 @@ void takeColors(const Kind& kind, std::size_t channels, const unsigned char* row
 
 bool read(const std::string& path, const CrtTexelsInfo& info, unsigned char* buffer,
           std::uint64_t buffer_bytes) {
-    std::optional<Bytes> file = contentOf(path, info);
+    std::optional<FileBytes> file = contentOf(path, info);
     if (!file) return false;
     const std::optional<Compressed> compressed = compressedOf(*file, info);
     if (!compressed) return false;
     const Kind& kind = compressed->kind;
     const std::size_t row = info.channels * kind.sample_bytes * kind.width;
     if (row * kind.height != buffer_bytes) return false;
-    Bytes filtered(kind.filtered());
+    FileBytes filtered(kind.filtered());
     if (!inflate(file->data.get(), compressed->bytes, filtered)) return false;
     const std::vector<unsigned char> nothing(kind.row());
     const unsigned char* above = nothing.data();

@@ -27,10 +27,6 @@
 namespace crt {
 namespace {
 
-[[noreturn]] void fail(const std::string& sentence, const std::string& file, int line = 0) {
-    throw Error(ErrorKind::Scene, sentence, {file, line});
-}
-
 /// Puts what an OBJ says together: faces become triangles, names become materials.
 class MeshBuilder {
 public:
@@ -203,13 +199,13 @@ private:
     [[noreturn]] void failForWantOfFaces() const {
         const MeshLoss& bad = obj_.bad_positions;
         if (bad.count > 0 && (faces_without_position_ > 0 || !any_faces_))
-            fail(bad.sentence, path_, bad.line);
-        if (out_.degenerate_faces > 0) fail("no face of this mesh has an area", path_);
-        if (obj_.small_faces.count > 0) fail(obj_.small_faces.sentence, path_, obj_.small_faces.line);
+            failMesh(bad.sentence, path_, bad.line);
+        if (out_.degenerate_faces > 0) failMesh("no face of this mesh has an area", path_);
+        if (obj_.small_faces.count > 0) failMesh(obj_.small_faces.sentence, path_, obj_.small_faces.line);
         const std::vector<std::string> others = otherGeometry();
         if (!others.empty())
-            fail(fmt::format("this mesh has no faces, only {}", fmt::join(others, ", ")), path_);
-        fail("this mesh has no faces", path_);
+            failMesh(fmt::format("this mesh has no faces, only {}", fmt::join(others, ", ")), path_);
+        failMesh("this mesh has no faces", path_);
     }
 
     /// What crt has no place for.
@@ -335,14 +331,14 @@ private:
 ObjContents readContents(const std::string& path) {
     Stage stage("reading " + std::filesystem::path(path).filename().string());
     const std::string text = readTextFile(path, "mesh", kMostMeshBytes, {path});
-    if (beginsAsPly(text)) fail("this is a PLY file; name it by 'ply:' in place of 'obj:'", path);
+    if (beginsAsPly(text)) failMesh("this is a PLY file; name it by 'ply:' in place of 'obj:'", path);
     if (const std::string format = otherFormat(text); !format.empty())
-        fail(fmt::format("this is {}; crt reads OBJ", format), path);
+        failMesh(fmt::format("this is {}; crt reads OBJ", format), path);
     ObjContents obj = readObj(text, path, stage);
     const bool any_faces = std::any_of(obj.blocks.begin(), obj.blocks.end(),
                                        [](const ObjBlock& block) { return !block.faces.empty(); });
     if (!any_faces && looksLikeMtl(text))
-        fail("this is a material file (MTL); name the OBJ that uses it", path);
+        failMesh("this is a material file (MTL); name the OBJ that uses it", path);
     return obj;
 }
 

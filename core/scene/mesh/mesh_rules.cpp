@@ -1,5 +1,6 @@
 #include "scene/mesh/mesh_rules.h"
 
+#include "base/error.h"
 #include "base/parallel.h"
 
 #include <fmt/format.h>
@@ -43,6 +44,10 @@ void normaliseNormals(std::vector<Vec3d>& normals) {
             n.fill(std::numeric_limits<double>::quiet_NaN());
         }
     });
+}
+
+void failMesh(const std::string& sentence, const std::string& file, int line) {
+    throw Error(ErrorKind::Scene, sentence, {file, line});
 }
 
 std::string counted(std::uint64_t count, const char* what) {

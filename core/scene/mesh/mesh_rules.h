@@ -38,6 +38,9 @@ inline constexpr double kMostMeshUv = 1e6;  ///< Beyond it nothing is left of th
 /// Vertices and normals that cannot be read are NaN while a mesh is put together.
 inline bool isNumber(const Vec3d& v) { return !std::isnan(v[0]); }
 
+/// Throws crt::Error(Scene) at a line of the file; 0: at none.
+[[noreturn]] void failMesh(const std::string& sentence, const std::string& file, int line = 0);
+
 /// No area beyond what rounding the coordinates to double can make up: collinear points seldom give exactly
 /// zero.
 bool isDegenerate(const Vec3d& a, const Vec3d& b, const Vec3d& c);

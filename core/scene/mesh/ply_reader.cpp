@@ -28,13 +28,8 @@ using namespace ply;
 
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint64_t kMostVertices = 0xfffffffeu;  // Below kNoNormal and kNoUv.
 constexpr std::size_t kRowsAtATime = std::size_t{1} << 14;
-
-[[noreturn]] void fail(const std::string& sentence, const std::string& file, int line = 0) {
-    throw Error(ErrorKind::Scene, sentence, {file, line});
-}
 
 /// What a block of elements cost.
 struct Losses {
@@ -72,7 +67,7 @@ public:
         const PlyRows rows(content_, header_, path, rows_at_a_time);
         stage_.setAmount(static_cast<double>(vertex_.count + face_.count));
         if (vertex_.count > kMostVertices)
-            fail("the file has more than four thousand million vertices", path_, vertex_.line);
+            failMesh("the file has more than four thousand million vertices", path_, vertex_.line);
         trailing_ = rows.trailingBytes();
         readVertices(rows);
         readFaces(rows);
@@ -108,22 +103,22 @@ private:
         for (const PlyElement& e : header_.elements)
             others.push_back(fmt::format("{} of {}", e.count, inQuotes(e.name)));
         if (header_.find("tristrips") != nullptr)
-            fail(
+            failMesh(
                 "the faces of this mesh are strips of triangles (tristrips), which crt does not read; write "
                 "it with the element 'face'",
                 path_);
-        fail(fmt::format("this mesh has no element '{}', only {}", name,
+        failMesh(fmt::format("this mesh has no element '{}', only {}", name,
                          others.empty() ? "a header" : fmt::format("{}", fmt::join(others, ", "))),
              path_);
     }
 
     void requireProperties() const {
-        if (!has(vertex_slots_, kX)) fail("vertices need the numbers x, y and z", path_, vertex_.line);
+        if (!has(vertex_slots_, kX)) failMesh("vertices need the numbers x, y and z", path_, vertex_.line);
         if (!has(face_slots_, kCorners))
-            fail("faces need a list 'vertex_indices' or 'vertex_index'", path_, face_.line);
+            failMesh("faces need a list 'vertex_indices' or 'vertex_index'", path_, face_.line);
         for (const auto& [property, role] : face_slots_)
             if (role == kCorners && !isInteger(property.type))
-                fail(fmt::format("the indices of '{}' are integers, not floats", property.name), path_,
+                failMesh(fmt::format("the indices of '{}' are integers, not floats", property.name), path_,
                      face_.line);
     }
 
@@ -173,6 +168,7 @@ private:
         const Vec3d v{number[first], number[first + 1], number[first + 2]};
         if (std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2])) return v;
         loss.add(line, fmt::format("the {} of vertex {} is no finite number", what, vertex));
+        constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
         return {kNan, kNan, kNan};
     }
 
@@ -302,7 +298,7 @@ private:
             first[i] = std::exchange(triangles, triangles + parts_[i].triangles.size());
             first_uv[i] = std::exchange(uvs, uvs + parts_[i].uvs.size());
         }
-        if (uvs >= kNoUv) fail("the file has more than four thousand million texture coordinates", path_);
+        if (uvs >= kNoUv) failMesh("the file has more than four thousand million texture coordinates", path_);
         mesh.triangles.resize(triangles_);
         if (!mesh.normals.empty()) mesh.normal_index.resize(triangles_);
         if (has_wedges_) mesh.uvs.resize(uvs);
@@ -345,10 +341,10 @@ private:
 
     [[noreturn]] void failForWantOfFaces() const {
         const Losses& l = losses_;
-        if (l.faces_without_position > 0) fail(l.bad_positions.sentence, path_, l.bad_positions.line);
-        if (l.degenerate > 0) fail("no face of this mesh has an area", path_);
-        if (l.small_faces.count > 0) fail(l.small_faces.sentence, path_, l.small_faces.line);
-        fail(vertex_.count > 0 ? fmt::format("this mesh has no faces, only {} points", vertex_.count)
+        if (l.faces_without_position > 0) failMesh(l.bad_positions.sentence, path_, l.bad_positions.line);
+        if (l.degenerate > 0) failMesh("no face of this mesh has an area", path_);
+        if (l.small_faces.count > 0) failMesh(l.small_faces.sentence, path_, l.small_faces.line);
+        failMesh(vertex_.count > 0 ? fmt::format("this mesh has no faces, only {} points", vertex_.count)
                                : std::string("this mesh has no faces"),
              path_);
     }
@@ -452,11 +448,11 @@ LoadedMesh loadPly(const std::string& path, const PlyOptions& options) {
     try {
         content = readInput(path, kMostMeshBytes);
     } catch (const InputRefused& refused) {
-        fail(fmt::format("mesh '{}' {}", path, refused.what()), path);
+        failMesh(fmt::format("mesh '{}' {}", path, refused.what()), path);
     }
     if (!beginsAsPly(content)) {
         const std::string format = otherFormat(content);
-        fail(format.empty() ? "this is no PLY file, which begins with the line 'ply'; an OBJ is named by "
+        failMesh(format.empty() ? "this is no PLY file, which begins with the line 'ply'; an OBJ is named by "
                               "'obj:' in place of 'ply:'"
                             : fmt::format("this is {}; 'ply:' names a PLY", format),
              path);
