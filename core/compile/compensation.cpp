@@ -101,8 +101,7 @@ struct TableKey {
 TableKey tableKeyOf(const Material& material) {
     TableKey key{};
     key.refracts = material.type == MaterialType::RoughDielectric;
-    if (key.refracts)
-        std::tie(key.least, key.most) = std::pair(material.eta.min(), material.eta.max());
+    if (key.refracts) std::tie(key.least, key.most) = std::pair(material.eta.min(), material.eta.max());
     key.textured = material.roughness_texture != kNoTexture;
     if (!key.textured) key.roughness = material.roughness;
     if (const Anisotropy a = anisotropyOf(material); a.narrowing > 0) {
@@ -114,7 +113,7 @@ TableKey tableKeyOf(const Material& material) {
 
 /// What a row of a table is of: one index, or a film at one wavelength.
 struct Interface {
-    double index = 0;  ///< Inside over outside; 0: a metal.
+    double index = 0;                        ///< Inside over outside; 0: a metal.
     double film_index = 0, film_rounds = 0;  ///< Relative to the outside; 2 d / λ. 0: there is none.
 };
 
@@ -286,8 +285,8 @@ double microfacetLoss(double cosine, double eta, double alpha) {
 Anisotropy anisotropyOf(const Material& material) {
     Anisotropy a;
     const double width = material.roughness * material.roughness, across = 1 - material.anisotropy;
-    const bool rough = material.type == MaterialType::RoughConductor ||
-                       material.type == MaterialType::RoughDielectric;
+    const bool rough =
+        material.type == MaterialType::RoughConductor || material.type == MaterialType::RoughDielectric;
     if (!rough || !(material.anisotropy > 0) || isSmooth(material.roughness)) return a;
     a.widening = std::sqrt(2 / (1 + across * across));
     double least = CRT_ALPHA_MIN;

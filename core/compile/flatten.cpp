@@ -346,7 +346,8 @@ void flattenNormals(const Scene& scene, const FlatScene& flat, std::span<kernel:
     const std::size_t count = flat.firstShape();
     std::vector<std::size_t> first_normal(partsOf(count, kCornersAtATime));
     parallelFor(count, kCornersAtATime, [&](std::size_t first, std::size_t end) {
-        for (std::size_t i = first; i < end; ++i) first_normal[first / kCornersAtATime] += flat.triangles[i].smooth;
+        for (std::size_t i = first; i < end; ++i)
+            first_normal[first / kCornersAtATime] += flat.triangles[i].smooth;
     });
     std::size_t before = 0;
     for (std::size_t& smooth : first_normal) before += std::exchange(smooth, before);

@@ -245,8 +245,10 @@ std::vector<kernel::CrtPatch> compilePatches(const FlatScene& flat, const std::v
     std::vector<kernel::CrtPatch> patches;
     for (std::size_t i = 0; i < ids.size(); ++i) {
         auto patch = i + 1 < ids.size() ? patchOf(flat, ids[i], ids[i + 1]) : std::nullopt;
-        if (patch) ++i;
-        else patch = patchOf(flat, ids[i], CRT_NONE);
+        if (patch)
+            ++i;
+        else
+            patch = patchOf(flat, ids[i], CRT_NONE);
         patches.push_back(*patch);
     }
     return patches;

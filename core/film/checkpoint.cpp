@@ -260,9 +260,8 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     const auto make_film = [&] {
         try {
             const bool squares = header.format_version == kCheckpointVersionUnpacked;
-            return Film(
-                {header.width, header.height, header.channels, header.aovs | (squares ? kAovSquares : 0u),
-                 spectral});
+            return Film({header.width, header.height, header.channels,
+                         header.aovs | (squares ? kAovSquares : 0u), spectral});
         } catch (const Error& error) {
             if (error.kind() != ErrorKind::Internal) throw;  // Too large for this machine is not damaged.
             refuse(path, kBadChecksum);

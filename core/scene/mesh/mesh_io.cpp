@@ -52,7 +52,7 @@ private:
         /// Normals and texture coordinates where the file has any.
         std::vector<std::array<std::uint32_t, 3>> triangles, normals, uvs;
         std::vector<std::int32_t> material, part;  ///< As of ObjRun, where the file names any.
-        std::vector<std::int32_t> used;      ///< Materials, in the order in which faces use them.
+        std::vector<std::int32_t> used;            ///< Materials, in the order in which faces use them.
         MeshLoss wild_normals;
         std::uint64_t flat_faces = 0, faces_without_position = 0, degenerate = 0, crossing = 0;
         std::uint64_t triangles_without_uv = 0;

@@ -108,8 +108,8 @@ private:
                 "it with the element 'face'",
                 path_);
         failMesh(fmt::format("this mesh has no element '{}', only {}", name,
-                         others.empty() ? "a header" : fmt::format("{}", fmt::join(others, ", "))),
-             path_);
+                             others.empty() ? "a header" : fmt::format("{}", fmt::join(others, ", "))),
+                 path_);
     }
 
     void requireProperties() const {
@@ -119,7 +119,7 @@ private:
         for (const auto& [property, role] : face_slots_)
             if (role == kCorners && !isInteger(property.type))
                 failMesh(fmt::format("the indices of '{}' are integers, not floats", property.name), path_,
-                     face_.line);
+                         face_.line);
     }
 
     // ---- Vertices ----
@@ -298,7 +298,8 @@ private:
             first[i] = std::exchange(triangles, triangles + parts_[i].triangles.size());
             first_uv[i] = std::exchange(uvs, uvs + parts_[i].uvs.size());
         }
-        if (uvs >= kNoUv) failMesh("the file has more than four thousand million texture coordinates", path_);
+        if (uvs >= kNoUv)
+            failMesh("the file has more than four thousand million texture coordinates", path_);
         mesh.triangles.resize(triangles_);
         if (!mesh.normals.empty()) mesh.normal_index.resize(triangles_);
         if (has_wedges_) mesh.uvs.resize(uvs);
@@ -345,8 +346,8 @@ private:
         if (l.degenerate > 0) failMesh("no face of this mesh has an area", path_);
         if (l.small_faces.count > 0) failMesh(l.small_faces.sentence, path_, l.small_faces.line);
         failMesh(vertex_.count > 0 ? fmt::format("this mesh has no faces, only {} points", vertex_.count)
-                               : std::string("this mesh has no faces"),
-             path_);
+                                   : std::string("this mesh has no faces"),
+                 path_);
     }
 
     /// "a.ply" or "a.ply:17"
@@ -452,10 +453,11 @@ LoadedMesh loadPly(const std::string& path, const PlyOptions& options) {
     }
     if (!beginsAsPly(content)) {
         const std::string format = otherFormat(content);
-        failMesh(format.empty() ? "this is no PLY file, which begins with the line 'ply'; an OBJ is named by "
-                              "'obj:' in place of 'ply:'"
-                            : fmt::format("this is {}; 'ply:' names a PLY", format),
-             path);
+        failMesh(format.empty()
+                     ? "this is no PLY file, which begins with the line 'ply'; an OBJ is named by "
+                       "'obj:' in place of 'ply:'"
+                     : fmt::format("this is {}; 'ply:' names a PLY", format),
+                 path);
     }
     return readPly(std::move(content), path, options, stage, kRowsAtATime);
 }
