@@ -40,5 +40,6 @@ find_cuda() {
 
 # Whether scripts/setup has made an environment of Python that has what the package needs and its tests.
 python_is_usable() {
-    "$PYTHON_CACHE/bin/python3" -c 'import nanobind, numpy, pytest, tqdm, yaml' 2>/dev/null
+    local modules='nanobind, numpy, pytest, tqdm, yaml, nbclient, ipykernel, matplotlib, distributed'
+    "$PYTHON_CACHE/bin/python3" -c "import $modules" 2>/dev/null
 }

@@ -19,9 +19,9 @@ from ._crt import version as _version
 from .errors import Error, Kind, RenderFailed
 from .judging import Judgement, compare, converge, verify
 from .rendering import Result, develop, plugins, render
-from .scenes import Scene, load, scene
+from .scenes import Scene, example, examples, load, scene
 
 __version__ = _version()
 __all__ = ["Device", "Error", "ErrorEstimate", "Film", "Image", "Judgement", "Kind", "Plugin",
-           "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "develop", "load",
-           "plugins", "render", "scene", "verify"]
+           "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "develop", "example",
+           "examples", "load", "plugins", "render", "scene", "verify"]
