@@ -24,6 +24,7 @@ class Result:
         self.film = film
         self.stop = stop
         self.report = report
+        self.saved = []  # Paths, which crt.denoise keeps off.
 
     @functools.cached_property
     def image(self):
@@ -48,6 +49,7 @@ class Result:
         as .crtfilm. Raises crt.Error of kind OUTPUT."""
         path = os.fspath(path)
         (self.film.save if path.endswith(".crtfilm") else self.film.save_image)(path)
+        self.saved.append(os.path.realpath(path))
 
     def _repr_png_(self):
         """The picture of a notebook."""

@@ -43,7 +43,7 @@ def kernel(tmp_path_factory):
     spec.write_text(json.dumps({"argv": command, "display_name": "crt", "language": "python"}))
     values = {"JUPYTER_PATH": str(folder), "JUPYTER_CONFIG_DIR": str(folder / "config"),
               "JUPYTER_RUNTIME_DIR": str(folder / "runtime"), "IPYTHONDIR": str(folder / "ipython"),
-              "MPLBACKEND": "agg", "MPLCONFIGDIR": str(folder / "matplotlib"),
+              "MPLCONFIGDIR": str(folder / "matplotlib"),
               "CRT_NOTEBOOK_SCALE": "0.25"}
     with pytest.MonkeyPatch.context() as patch:
         for name, value in values.items():
