@@ -24,6 +24,7 @@ GOOD = """# One page
 `[code](nowhere.md)`
 
 ```
+```text does not end it
 [code](nowhere.md)
 # No heading
 ```
