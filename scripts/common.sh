@@ -40,5 +40,31 @@ find_cuda() {
 
 # Whether scripts/setup has made an environment of Python that has what the package needs and its tests.
 python_is_usable() {
-    "$PYTHON_CACHE/bin/python3" -c 'import nanobind, numpy, pytest, tqdm, yaml, jinja2, matplotlib' 2>/dev/null
+    local modules='nanobind, numpy, pytest, tqdm, yaml, jinja2, nbclient, ipykernel, matplotlib, distributed'
+    "$PYTHON_CACHE/bin/python3" -c "import $modules" 2>/dev/null
+}
+
+# Installs those of the packages given that are not installed.
+install_packages() {
+    local missing=() package
+    for package in "$@"; do
+        # "ii": installed; a package that was removed but not purged is known too.
+        case $(dpkg-query -W -f='${db:Status-Abbrev}' "$package" 2>/dev/null || true) in
+            ii*) ;;
+            *) missing+=("$package") ;;
+        esac
+    done
+    [ ${#missing[@]} -eq 0 ] && return 0
+
+    local as_root=()
+    if [ "$(id -u)" -ne 0 ]; then
+        command -v sudo >/dev/null ||
+            fail "these packages are missing, and this is neither root nor is there sudo:" \
+                "apt-get install ${missing[*]}"
+        as_root=(sudo)
+    fi
+    say "installing ${missing[*]}"
+    "${as_root[@]}" apt-get update -q
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -q -y --no-install-recommends "${missing[@]}"
 }

@@ -18,12 +18,14 @@ class Result:
     film     crt.Film: sums of samples; films of one scene add
     stop     why sampling ended: "samples", "time", "target" (error), "interrupted" (Ctrl-C), or "stopped"
     report   what the run did and cost, a dict: the report that `crt render --report` writes
+    saved    paths under which it was saved; crt.denoise keeps off them
     """
 
     def __init__(self, film, stop, report):
         self.film = film
         self.stop = stop
         self.report = report
+        self.saved = []
 
     @functools.cached_property
     def image(self):
@@ -48,6 +50,7 @@ class Result:
         as .crtfilm. Raises crt.Error of kind OUTPUT."""
         path = os.fspath(path)
         (self.film.save if path.endswith(".crtfilm") else self.film.save_image)(path)
+        self.saved.append(os.path.realpath(path))
 
     def _repr_png_(self):
         """The picture of a notebook."""

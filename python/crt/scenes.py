@@ -2,6 +2,7 @@
 
 import collections.abc
 import contextlib
+import difflib
 import json
 import os
 import pathlib
@@ -13,6 +14,7 @@ import numpy as np
 
 from . import _crt
 from .arrays import Arrays
+from .errors import Error, Kind
 from .messages import tell
 
 
@@ -159,6 +161,35 @@ def scene(source, directory=".", set=None, name="scene"):
                         f"{type(source).__name__}")
 
     return Scene(read, file, set)
+
+
+def examples_folder():
+    """The folder of the scenes that come with crt: in a wheel in the package, in a build tree beside it.
+    CRT_CONFIGS names another."""
+    here = pathlib.Path(__file__).parent
+    named = os.environ.get("CRT_CONFIGS")
+    places = [here / "_tree/share/crt/configs", here.parents[1] / "share/crt/configs"]
+    for place in [pathlib.Path(named)] if named else places:
+        if place.is_dir():
+            return place
+    raise Error(f"the scenes that come with crt are not where they should be: {place}", Kind.USAGE)
+
+
+def examples():
+    """The names of the scenes that come with crt, sorted."""
+    return sorted(path.stem for path in examples_folder().glob("*.yaml"))
+
+
+def example(name):
+    """The pathlib.Path of a scene that comes with crt: `crt.load(crt.example("cornell_box"))`. Raises
+    crt.Error of kind USAGE for a name that is none of crt.examples()."""
+    path = examples_folder() / f"{name}.yaml"
+    known = examples()
+    if name not in known:
+        near = difflib.get_close_matches(str(name), known, n=1)
+        meant = f"; did you mean '{near[0]}'?" if near else f"; there are {', '.join(known)}"
+        raise Error(f"no scene '{name}' comes with crt{meant}", Kind.USAGE)
+    return path
 
 
 class Folder:

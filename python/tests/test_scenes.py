@@ -151,3 +151,26 @@ def test_messages_go_to_logging(caplog):
 def test_configs_load():
     for file in sorted(pathlib.Path(os.environ["CRT_CONFIGS"]).glob("*.yaml"))[:4]:
         assert crt.load(file, set={"film.resolution": [8, 8]}).width == 8
+
+
+def test_examples_are_scenes_that_can_be_read(monkeypatch, tmp_path):
+    assert {"cornell_box", "prism", "forest"} <= set(crt.examples())
+    path = crt.example("cornell_box")
+    assert path.is_file() and crt.load(path).title == "Cornell box"
+    with pytest.raises(crt.Error, match="did you mean 'cornell_box'") as raised:
+        crt.example("cornel_box")
+    assert raised.value.kind == crt.Kind.USAGE
+    monkeypatch.setenv("CRT_CONFIGS", str(tmp_path / "none"))
+    with pytest.raises(crt.Error, match="none"):
+        crt.examples()
+
+
+def test_examples_are_found_beside_the_package(monkeypatch, tmp_path):
+    monkeypatch.delenv("CRT_CONFIGS", raising=False)
+    for package, place in (("wheel/crt", "wheel/crt/_tree/share/crt/configs"),
+                           ("build/python/crt", "build/share/crt/configs")):
+        package, place = tmp_path / package, tmp_path / place
+        place.mkdir(parents=True)
+        (place / "one.yaml").write_text("crt: 1")
+        monkeypatch.setattr(crt.scenes, "__file__", str(package / "scenes.py"))
+        assert crt.examples() == ["one"] and crt.example("one") == place / "one.yaml"
