@@ -86,15 +86,15 @@ void Developer::develop(const Snapshot& snapshot, const Display& display) {
 
 /// At the end, and before that so often that it takes a tenth of the time.
 void Developer::estimate(const Snapshot& snapshot) {
-    constexpr double kLeastPause = 0.25, kShare = 0.1;
+    constexpr double kLeastPause = 0.1, kShare = 0.1;
     constexpr std::size_t kMostPoints = 600;
     const double pause = std::max(kLeastPause, estimate_seconds_ / kShare);
     if (estimated_ && estimated_->seconds() < pause && !snapshot.complete) return;
     const Stopwatch watch;
     const auto error = estimateError(*snapshot.film, PixelSet::All, snapshot.seen->independentSamples());
     estimate_seconds_ = watch.seconds();
-    estimated_.emplace();
     if (!error || !error->known()) return;
+    estimated_.emplace();
     const ErrorPoint point{.seconds = snapshot.seconds,
                            .samples = static_cast<double>(snapshot.film->samples.count()),
                            .error = error->relative_rmse,

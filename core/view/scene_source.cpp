@@ -33,7 +33,7 @@ SceneSource::~SceneSource() {
 }
 
 void SceneSource::run() {
-    constexpr std::chrono::milliseconds kBetweenLooks{250};
+    constexpr std::chrono::milliseconds kBetweenLooks{250}, kQuiet{60};
     std::vector<std::string> files{request_.file};
     // Noted before it is read: what changes meanwhile is read again.
     FileTimes times(files);
@@ -44,7 +44,11 @@ void SceneSource::run() {
         times = FileTimes(files, times);
         lock.lock();
         while (!stopping_ && !times.changed()) stopped_.wait_for(lock, kBetweenLooks);
-        times = FileTimes(files);
+        // An editor may be writing still.
+        do {
+            times = FileTimes(files);
+            stopped_.wait_for(lock, kQuiet, [&] { return stopping_; });
+        } while (!stopping_ && times.changed());
     }
 }
 

@@ -56,8 +56,8 @@ EmbreeIntegrator::EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo
     info_.device = nullptr;  // the host's string is not ours to keep
 }
 
-/// Whether the scene that is set is given again with another camera or another size or window of the film, as
-/// viewers and bands do: then its tree is the same.
+/// Whether the scene that is set is given again with another camera or another size or window of the film,
+/// as viewers and bands do: then its tree is the same.
 bool EmbreeIntegrator::differsInViewAlone(const CrtSceneBlob& given) const {
     if (!blob_ || blob_bytes_ != given.size_bytes) return false;
     const auto* const bytes = static_cast<const unsigned char*>(given.data);

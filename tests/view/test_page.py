@@ -106,7 +106,7 @@ class Picture(PageTest):
         self.assertEqual(page.evaluate("view.status.seconds"), seconds)
 
     def test_planes_and_the_chart_of_errors(self):
-        page = self.open("--spp", "256", "--set", "film.resolution=[96,64]")
+        page = self.open("--spp", "512", "--set", "film.resolution=[96,64]")
         self.wait(page, f"{DONE} && document.querySelector('#chart .line')")
         number = self.number(page)
         page.get_by_role("button", name="depth").click()
@@ -218,14 +218,20 @@ class Trouble(PageTest):
         self.wait(page, DONE)
         before = self.pixels(page)
         self.write("scene.yaml", LIT.replace("fov: 40", "fov: wide"))
-        page.locator("#notes .bad").wait_for()
-        self.assertIn("scene.yaml:3:58: error:", page.locator("#notes .bad").inner_text())
+        page.get_by_text("scene.yaml:3:58: error:").wait_for()
         self.assertEqual(self.pixels(page), before)
         number = self.number(page)
         self.write("scene.yaml", LIT.replace("reflectance: 0.7", "reflectance: 0.2"))
         self.done_beyond(page, number)
         self.assertLess(sum(self.pixels(page)), sum(before))
         self.assertEqual(page.locator("#notes .bad").count(), 0)
+
+    def test_a_page_that_comes_late_has_nothing_to_complain_of(self):
+        self.wait(self.open(), DONE)
+        page = self.page_of(self.view)
+        self.wait(page, f"{DONE} && document.querySelector('#devices').length > 1")
+        self.assertEqual(page.locator("#notes").inner_text(), "")
+        self.assertEqual(page.locator("#live").text_content(), "live")
 
     def test_a_lost_program_is_told_and_found_again(self):
         page = self.open()

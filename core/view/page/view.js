@@ -70,6 +70,7 @@ async function look() {
   if (bytes.byteLength > 4 + length) draw(status, new Uint8ClampedArray(bytes, 4 + length));
   else if (view.picture && status.picture) view.picture = status.picture;
   if (!before || before.width !== status.width || before.height !== status.height) layOut();
+  setConnected(true);
   showStatus(status);
 }
 
@@ -80,7 +81,9 @@ function setConnected(connected, why = "") {
   live.className = connected ? "on" : "off";
   live.textContent = connected ? "live" : "connection lost";
   live.title = why;
-  if (changed && !connected) showNotes();
+  if (!changed) return;
+  showNotes();
+  if (connected) loadDevices();
 }
 
 /// For ever: what is lost may come back, at the same address.
@@ -89,8 +92,6 @@ async function keepLooking() {
   while (true) {
     try {
       await look();
-      if (!view.connected) loadDevices();
-      setConnected(true);
       pause = 250;
     } catch (error) {
       setConnected(false, error.message);
