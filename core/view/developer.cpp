@@ -93,8 +93,11 @@ void Developer::estimate(const Snapshot& snapshot) {
     const Stopwatch watch;
     const auto error = estimateError(*snapshot.film, PixelSet::All, snapshot.seen->independentSamples());
     estimate_seconds_ = watch.seconds();
-    if (!error || !error->known()) return;
-    estimated_.emplace();
+    // The first samples do not know it yet; the chart begins with the first that do.
+    constexpr std::uint64_t kFirstSamples = 8;
+    const bool known = error && error->known();
+    if (known || snapshot.film->samples.count() > kFirstSamples) estimated_.emplace();
+    if (!known) return;
     const ErrorPoint point{.seconds = snapshot.seconds,
                            .samples = static_cast<double>(snapshot.film->samples.count()),
                            .error = error->relative_rmse,
