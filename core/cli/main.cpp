@@ -35,10 +35,10 @@ int main(int argc, char** argv) {
     try {
         crt::CommandLine line;
         for (crt::Command (*command)() :
-             {crt::renderCommand, crt::infoCommand, crt::importCommand, crt::compareCommand,
-              crt::mergeCommand, crt::developCommand, crt::convergeCommand, crt::referenceCommand,
-              crt::verifyCommand,
-              crt::pluginsCommand, crt::warmCommand, crt::dataCommand, crt::schemaCommand})
+             {crt::renderCommand, crt::viewCommand, crt::infoCommand, crt::importCommand,
+              crt::compareCommand, crt::mergeCommand, crt::developCommand, crt::convergeCommand,
+              crt::referenceCommand, crt::verifyCommand, crt::pluginsCommand, crt::warmCommand,
+              crt::dataCommand, crt::schemaCommand})
             line.add(command());
         line.add(crt::helpCommand(line));
         line.add(crt::completionCommand(line));

@@ -27,19 +27,18 @@ std::uint32_t acceleratorOf(const Scene& scene, const FlatScene& flat) {
                                                                        : CRT_ACCELERATOR_BVH;
 }
 
-/// Whether the backend finds all hits itself: rays start at the camera or at a surface, and surfaces lie
-/// within 1.
-bool backendFindsHits(const Scene& scene, const FlatScene& flat, const CompileOptions& options) {
-    const double scale = std::ldexp(1.0, flat.scale_exponent);
+}  // namespace
+
+bool backendFindsHits(const Camera& camera, const Vec3d& centre, int scale_exponent,
+                      const CompileOptions& options) {
+    const double scale = std::ldexp(1.0, scale_exponent);
     double farthest = 1;
     for (std::size_t k = 0; k < 3; ++k)
-        farthest = std::max(farthest, std::abs(scene.camera.position[k] - flat.centre[k]) * scale +
-                                          scene.camera.aperture_radius * scale);
+        farthest = std::max(farthest, std::abs(camera.position[k] - centre[k]) * scale +
+                                          camera.aperture_radius * scale);
     // A little less, for what is rounded on the way to the ray.
     return farthest < options.accelerator_reach * (1 - 1e-6);
 }
-
-}  // namespace
 
 TriangleBounds boundsOf(const FlatScene& flat, std::size_t id) {
     TriangleBounds b{};
@@ -77,7 +76,8 @@ AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat,
     const std::size_t count = flat.triangles.size();
     AcceleratorPart part;
     part.kind = acceleratorOf(scene, flat);
-    part.without_nodes = part.kind == CRT_ACCELERATOR_BVH && backendFindsHits(scene, flat, options);
+    part.without_nodes = part.kind == CRT_ACCELERATOR_BVH &&
+                         backendFindsHits(scene.camera, flat.centre, flat.scale_exponent, options);
     if (part.kind == CRT_ACCELERATOR_BVH && !part.without_nodes) {
         const auto start = std::chrono::steady_clock::now();
         std::vector<TriangleBounds> bounds(count);

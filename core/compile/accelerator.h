@@ -32,6 +32,11 @@ struct MeshTrees {
 };
 MeshTrees compileMeshTrees(const FlatScene& flat);
 
+/// Whether the backend finds all hits itself: rays start at the camera or at a surface, and surfaces lie
+/// within 1.
+bool backendFindsHits(const Camera& camera, const Vec3d& centre, int scale_exponent,
+                      const CompileOptions& options);
+
 AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat, const CompileOptions& options);
 
 /// Coordinates are those of the compiled scene.

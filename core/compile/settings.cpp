@@ -27,16 +27,8 @@ std::uint32_t filmAovs(const Scene& scene, std::uint32_t aovs) {
     return (aovs & kAovsOfFirstHits) | (replicatesOf(scene) > 1 ? kAovReplicates : kAovSquares);
 }
 
-/// Sizes, crop window, channels and replicates.
-void setFilm(const Scene& scene, std::uint32_t aovs, kernel::CrtScene& header) {
-    const FilmSettings& film = scene.film;
-    header.film_width = static_cast<std::uint32_t>(film.width);
-    header.film_height = static_cast<std::uint32_t>(film.height);
-    const bool cropped = film.crop != std::array<int, 4>{0, 0, 0, 0};
-    header.crop_x = cropped ? static_cast<std::uint32_t>(film.crop[0]) : 0;
-    header.crop_y = cropped ? static_cast<std::uint32_t>(film.crop[1]) : 0;
-    header.width = cropped ? static_cast<std::uint32_t>(film.crop[2] - film.crop[0]) : header.film_width;
-    header.height = cropped ? static_cast<std::uint32_t>(film.crop[3] - film.crop[1]) : header.film_height;
+/// Channels and replicates.
+void setChannels(const Scene& scene, std::uint32_t aovs, kernel::CrtScene& header) {
     header.aovs = aovs;
     const auto replicates = static_cast<std::uint32_t>(replicatesOf(scene));
     header.channels = channelsFor(aovs, replicates) + spectralChannelsOf(scene).count();
@@ -47,16 +39,16 @@ void setFilm(const Scene& scene, std::uint32_t aovs, kernel::CrtScene& header) {
 #undef CRT_SET_CHANNEL
 }
 
-/// Centred and scaled as `flat` is.
-kernel::CrtCamera cameraOf(const Scene& scene, const FlatScene& flat) {
+/// Centred, and scaled by 2^scale_exponent.
+kernel::CrtCamera cameraOf(const Scene& scene, const Vec3d& centre, int scale_exponent) {
     const Camera& camera = scene.camera;
     const Vec3d view = normalise(camera.target - camera.position);
     const Vec3d right = normalise(cross(view, camera.up));
     const Vec3d up = cross(right, view);
-    const double scale = std::ldexp(1.0, flat.scale_exponent);
+    const double scale = std::ldexp(1.0, scale_exponent);
     kernel::CrtCamera c{};
     for (std::size_t k = 0; k < 3; ++k) {
-        c.origin[k] = static_cast<float>((camera.position[k] - flat.centre[k]) * scale);
+        c.origin[k] = static_cast<float>((camera.position[k] - centre[k]) * scale);
         c.corner[k] =
             static_cast<float>(view[k] - right[k] * camera.tan_half_width + up[k] * camera.tan_half_height);
         c.step_x[k] = static_cast<float>(right[k] * 2 * camera.tan_half_width / scene.film.width);
@@ -107,12 +99,24 @@ void setIntegrator(const Scene& scene, kernel::CrtScene& header) {
 
 }  // namespace
 
+void compileView(const Scene& scene, const Vec3d& centre, int scale_exponent, kernel::CrtScene& header) {
+    const FilmSettings& film = scene.film;
+    header.film_width = static_cast<std::uint32_t>(film.width);
+    header.film_height = static_cast<std::uint32_t>(film.height);
+    const bool cropped = film.crop != std::array<int, 4>{0, 0, 0, 0};
+    header.crop_x = cropped ? static_cast<std::uint32_t>(film.crop[0]) : 0;
+    header.crop_y = cropped ? static_cast<std::uint32_t>(film.crop[1]) : 0;
+    header.width = cropped ? static_cast<std::uint32_t>(film.crop[2] - film.crop[0]) : header.film_width;
+    header.height = cropped ? static_cast<std::uint32_t>(film.crop[3] - film.crop[1]) : header.film_height;
+    header.camera = cameraOf(scene, centre, scale_exponent);
+}
+
 kernel::CrtScene compileSettings(const Scene& scene, const FlatScene& flat, std::uint32_t aovs) {
     kernel::CrtScene header{};
     header.magic = CRT_SCENE_MAGIC;
-    setFilm(scene, filmAovs(scene, aovs), header);
+    setChannels(scene, filmAovs(scene, aovs), header);
     header.depth_scale = static_cast<float>(std::ldexp(1.0, -flat.scale_exponent));
-    header.camera = cameraOf(scene, flat);
+    compileView(scene, flat.centre, flat.scale_exponent, header);
     setIntegrator(scene, header);
     return header;
 }

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/input_file.h"
 #include "base/log.h"
+#include "base/parallel.h"
 #include "image/image_metadata.h"
 #include "image/image_module.h"
 #include "image/open_module.h"
@@ -11,6 +12,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cctype>
 #include <cerrno>
@@ -365,21 +367,22 @@ EncodedImage encodeSrgb8(const Image& image) {
     const std::size_t pixels = std::size_t{image.width} * image.height;
     EncodedImage encoded;
     encoded.rgb.resize(3 * pixels);
-    for (std::size_t p = 0; p < pixels; ++p) {
-        const float* const pixel = image.pixels.data() + p * image.channels.size();
-        Vec3d rgb{pixel[color[0]], pixel[color[1]], pixel[color[2]]};
-        if (to_srgb) rgb = multiply(*to_srgb, rgb);
-        for (std::size_t c = 0; c < 3; ++c) {
-            // Written so that NaN is outside.
-            const bool inside = rgb[c] >= 0.0 && rgb[c] <= 1.0;
-            const double value = inside ? rgb[c] : rgb[c] > 1.0 ? 1.0 : 0.0;
-            // One rounding of float in the conversion from another space is no clipping worth a warning.
-            const bool worth_counting = !(rgb[c] >= -1e-6 && rgb[c] <= 1.0 + 1e-6);
-            encoded.clipped_values += worth_counting;
-            encoded.rgb[3 * p + c] =
-                static_cast<std::uint8_t>(std::floor(linearToSrgb(value) * 255.0 + 0.5));
+    std::atomic<std::uint64_t> clipped{0};
+    parallelFor(pixels, std::size_t{1} << 14, [&](std::size_t first, std::size_t end) {
+        for (std::size_t p = first; p < end; ++p) {
+            const float* const pixel = image.pixels.data() + p * image.channels.size();
+            Vec3d rgb{pixel[color[0]], pixel[color[1]], pixel[color[2]]};
+            if (to_srgb) rgb = multiply(*to_srgb, rgb);
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double value = rgb[c] >= 0.0 ? std::min(rgb[c], 1.0) : 0.0;  // NaN is 0.
+                // One rounding of float in the conversion from another space is no clipping worth a warning.
+                if (!(rgb[c] >= -1e-6 && rgb[c] <= 1.0 + 1e-6)) ++clipped;
+                encoded.rgb[3 * p + c] =
+                    static_cast<std::uint8_t>(std::floor(linearToSrgb(value) * 255.0 + 0.5));
+            }
         }
-    }
+    });
+    encoded.clipped_values = clipped;
     return encoded;
 }
 

@@ -56,9 +56,29 @@ EmbreeIntegrator::EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo
     info_.device = nullptr;  // the host's string is not ours to keep
 }
 
+/// Whether the scene that is set is given again with another camera or another size or window of the film,
+/// as viewers and bands do: then its tree is the same.
+bool EmbreeIntegrator::differsInViewAlone(const CrtSceneBlob& given) const {
+    if (!blob_ || blob_bytes_ != given.size_bytes) return false;
+    const auto* const bytes = static_cast<const unsigned char*>(given.data);
+    kernel::CrtScene header = *reinterpret_cast<const kernel::CrtScene*>(bytes);
+    header.camera = scene().camera;
+    header.film_width = scene().film_width;
+    header.film_height = scene().film_height;
+    header.crop_x = scene().crop_x;
+    header.crop_y = scene().crop_y;
+    header.width = scene().width;
+    header.height = scene().height;
+    return std::memcmp(&header, blob(), sizeof header) == 0 &&
+           std::memcmp(bytes + sizeof header, blob() + sizeof header, blob_bytes_ - sizeof header) == 0;
+}
+
 void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
-    tree_.reset();
-    blob_.reset();
+    const bool same_tree = differsInViewAlone(scene_blob);
+    if (!same_tree) {
+        tree_.reset();
+        blob_.reset();
+    }
     build_seconds_ = render_seconds_ = 0;
     paths_ = 0;
     rays_ = {};
@@ -66,7 +86,7 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
     // From the caller's blob, before it is copied: building takes more memory than what is built.
     const auto* const bytes = static_cast<const unsigned char*>(scene_blob.data);
     const auto& given = *reinterpret_cast<const kernel::CrtScene*>(bytes);
-    if ((given.features & CRT_FEATURE_BVH) != 0) {
+    if ((given.features & CRT_FEATURE_BVH) != 0 && !same_tree) {
         const auto start = Clock::now();
         if (!device_) device_ = std::make_unique<Device>();
         const auto progress = [this](double done) { host_.cancelled(done); };
@@ -74,8 +94,9 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
         build_seconds_ = secondsSince(start);
     }
     // Not a vector: it would write zeros over hundreds of megabytes first.
-    blob_.reset(new Line[(scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line)]);
-    std::memcpy(blob_.get(), scene_blob.data, scene_blob.size_bytes);
+    if (!same_tree) blob_.reset(new Line[(scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line)]);
+    std::memcpy(blob_.get(), scene_blob.data, same_tree ? sizeof(kernel::CrtScene) : scene_blob.size_bytes);
+    blob_bytes_ = scene_blob.size_bytes;
     program_ = &chooseProgram(scene().features, info_.kernel);
 
     const std::size_t pixels = static_cast<std::size_t>(scene().width) * scene().height;

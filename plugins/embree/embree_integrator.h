@@ -34,6 +34,7 @@ private:
     struct alignas(64) Line {
         unsigned char bytes[64];
     };
+    bool differsInViewAlone(const CrtSceneBlob& given) const;
     const kernel::CrtScene& scene() const { return *reinterpret_cast<const kernel::CrtScene*>(blob_.get()); }
     const unsigned char* blob() const { return reinterpret_cast<const unsigned char*>(blob_.get()); }
     std::uint32_t tileSize(const CrtRenderRange& range) const;
@@ -47,6 +48,7 @@ private:
     std::unique_ptr<Tree> tree_;
     const Program* program_ = nullptr;
     std::unique_ptr<Line[]> blob_;
+    std::size_t blob_bytes_ = 0;
     std::vector<double> sums_;
     std::vector<kernel::u64> counts_;
     std::vector<std::uint32_t> primitives_;

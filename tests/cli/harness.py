@@ -140,8 +140,9 @@ class CliTest(unittest.TestCase):
         self.assertEqual(run.returncode, expect, f"crt {' '.join(arguments)}\n{run.stdout}{run.stderr}")
         return run
 
-    def start(self, *arguments, fault=None):
-        changes = {"CRT_FAKE_FAULT": fault} if fault else {}
+    def start(self, *arguments, fault=None, **changes):
+        if fault:
+            changes["CRT_FAKE_FAULT"] = fault
         process = subprocess.Popen(
             [CRT, *arguments],
             cwd=self.directory,

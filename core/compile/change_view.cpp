@@ -1,0 +1,25 @@
+#include "compile/change_view.h"
+
+#include "compile/accelerator.h"
+#include "compile/settings.h"
+#include "kernel/features.h"
+
+namespace crt {
+
+bool changeView(CompiledScene& compiled, const Scene& scene, const CompileOptions& options) {
+    const bool has_lens = (compiled.features & CRT_FEATURE_LENS) != 0;
+    if (has_lens != (scene.camera.aperture_radius > 0)) return false;
+    if (compiled.without_nodes &&
+        !backendFindsHits(scene.camera, compiled.centre, compiled.scale_exponent, options))
+        return false;
+    auto& header = *reinterpret_cast<kernel::CrtScene*>(compiled.blob.data());
+    kernel::CrtScene changed = header;
+    compileView(scene, compiled.centre, compiled.scale_exponent, changed);
+    header = changed;
+    compiled.width = header.width;
+    compiled.height = header.height;
+    compiled.hash.clear();
+    return true;
+}
+
+}  // namespace crt

@@ -1,0 +1,16 @@
+/// A compiled scene from another side: what a viewer changes many times a second.
+#pragma once
+
+#include "compile/compile.h"
+#include "scene/scene.h"
+
+namespace crt {
+
+/// Gives the compiled scene the camera and the film's size and crop window that `scene` has. All else of
+/// `scene`, the number of replicates too (replicatesOf), must be as it was compiled; then the bytes are
+/// those that compileScene() makes of it, but for the identity: `hash` is empty from now on. Returns false,
+/// and changes nothing, where only compileScene() can do it: when a lens comes or goes, or when rays of the
+/// new camera begin beyond the reach of the backend's own acceleration structure. Throws as compileScene().
+bool changeView(CompiledScene& compiled, const Scene& scene, const CompileOptions& options);
+
+}  // namespace crt

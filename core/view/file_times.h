@@ -1,0 +1,33 @@
+/// Whether files have changed, by the time of their last change and their size.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+class FileTimes {
+public:
+    FileTimes() = default;
+    /// Notes how the files are now; of those that `earlier` has noted, what it noted.
+    explicit FileTimes(const std::vector<std::string>& files, const FileTimes& earlier = {});
+
+    /// Whether one of them is another than it was noted to be: changed, gone, or there again.
+    bool changed() const;
+
+private:
+    struct State {
+        std::filesystem::file_time_type time{};
+        std::uintmax_t bytes = 0;
+        bool operator==(const State&) const = default;
+    };
+    static std::optional<State> stateOf(const std::string& file);
+
+    std::map<std::string, std::optional<State>> noted_;
+};
+
+}  // namespace crt

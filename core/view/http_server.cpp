@@ -1,0 +1,236 @@
+#include "view/http_server.h"
+
+#include "base/error.h"
+#include "base/listener.h"
+
+#include <fmt/format.h>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+
+#include <sys/random.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <chrono>
+#include <string_view>
+#include <utility>
+
+namespace crt {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using asio::ip::tcp;
+
+constexpr std::size_t kMostConnections = 64;
+constexpr std::uint64_t kMostBodyBytes = 65536;
+constexpr std::uint32_t kMostHeaderBytes = 16384;
+constexpr std::chrono::seconds kLongestRead{10}, kLongestWrite{30};
+
+/// "a%20b" → "a b".
+std::string decoded(std::string_view text) {
+    const auto digit = [](char c) {
+        if (c >= '0' && c <= '9') return c - '0';
+        if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+        if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+        return -1;
+    };
+    std::string out;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const bool escape =
+            text[i] == '%' && i + 2 < text.size() && digit(text[i + 1]) >= 0 && digit(text[i + 2]) >= 0;
+        if (!escape) {
+            out.push_back(text[i]);
+            continue;
+        }
+        out.push_back(static_cast<char>(16 * digit(text[i + 1]) + digit(text[i + 2])));
+        i += 2;
+    }
+    return out;
+}
+
+HttpRequest requestOf(const http::request<http::string_body>& received) {
+    HttpRequest request;
+    request.method = std::string(received.method_string());
+    request.body = received.body();
+    const std::string target(received.target());
+    const std::size_t mark = target.find('?');
+    request.path = target.substr(0, mark);
+    std::string_view rest = mark == std::string::npos ? "" : std::string_view(target).substr(mark + 1);
+    while (!rest.empty()) {
+        const std::string_view pair = rest.substr(0, rest.find('&'));
+        const std::size_t equals = pair.find('=');
+        if (equals != std::string_view::npos)
+            request.query[decoded(pair.substr(0, equals))] = decoded(pair.substr(equals + 1));
+        rest.remove_prefix(std::min(pair.size() + 1, rest.size()));
+    }
+    return request;
+}
+
+/// Takes the same time wherever they differ.
+bool sameText(const std::string& a, const std::string& b) {
+    unsigned difference = a.size() != b.size();
+    for (std::size_t i = 0; i < a.size() && i < b.size(); ++i)
+        difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
+    return difference == 0;
+}
+
+}  // namespace
+
+std::string randomToken() {
+    std::array<unsigned char, 16> bytes{};
+    if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+        throw Error(ErrorKind::Internal, "the system gives no random numbers");
+    std::string text;
+    for (const unsigned char byte : bytes) text += fmt::format("{:02x}", byte);
+    return text;
+}
+
+std::string refusal(std::uint16_t port, const std::string& host, const std::string& origin,
+                    const std::string& token, const std::string& given_token) {
+    const std::array<std::string, 2> own{fmt::format("127.0.0.1:{}", port),
+                                         fmt::format("localhost:{}", port)};
+    if (host != own[0] && host != own[1])
+        return "this address is not the one that crt view listens at: open the one that it prints";
+    if (!origin.empty() && origin != "http://" + host) return "pages of other sites are not answered";
+    if (!sameText(given_token, token))
+        return "the token is missing or another: open the address that crt view prints";
+    return {};
+}
+
+struct HttpServer::Listening {
+    asio::io_context context;
+    tcp::acceptor acceptor{context};
+};
+
+/// A stream with a context of its own: its thread waits for it, and for how long is known.
+class HttpServer::Connection {
+public:
+    tcp::socket& socket() { return stream_.socket(); }
+
+    /// False: nothing came that is a request.
+    bool read(http::request<http::string_body>& request) {
+        http::request_parser<http::string_body> parser;
+        parser.body_limit(kMostBodyBytes);
+        parser.header_limit(kMostHeaderBytes);
+        beast::flat_buffer buffer;
+        beast::error_code result;
+        stream_.expires_after(kLongestRead);
+        http::async_read(stream_, buffer, parser, [&](beast::error_code e, std::size_t) { result = e; });
+        context_.run();
+        context_.restart();
+        if (!result) request = parser.release();
+        return !result;
+    }
+    void write(http::response<http::string_body>& response) {
+        stream_.expires_after(kLongestWrite);
+        http::async_write(stream_, response, [](beast::error_code, std::size_t) {});
+        context_.run();
+        context_.restart();
+        beast::error_code none;
+        socket().shutdown(tcp::socket::shutdown_send, none);
+    }
+    /// Ends what waits. [any thread]
+    void interrupt() { ::shutdown(socket().native_handle(), SHUT_RDWR); }
+
+private:
+    asio::io_context context_;
+    beast::tcp_stream stream_{context_};
+};
+
+HttpServer::HttpServer(std::uint16_t port, std::string token,
+                       std::function<HttpReply(const HttpRequest&)> answer)
+    : token_(std::move(token)), answer_(std::move(answer)), listening_(std::make_unique<Listening>()) {
+    tcp::acceptor& acceptor = listening_->acceptor;
+    beast::error_code error;
+    acceptor.open(tcp::v4());
+    acceptor.set_option(asio::socket_base::reuse_address(true));
+    acceptor.bind({asio::ip::address_v4::loopback(), port}, error);
+    if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+    if (error)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("port {} is not to be had: {}; without --port a free one is taken", port,
+                                error.message()));
+    port_ = acceptor.local_endpoint().port();
+    thread_ = std::thread([this, listener = currentListener()] {
+        const ListenerScope scope(listener);
+        accept();
+    });
+}
+
+HttpServer::~HttpServer() {
+    {
+        const std::lock_guard lock(mutex_);
+        stopping_ = true;
+        for (Connection* connection : open_) connection->interrupt();
+    }
+    // Closing it would not wake who waits there.
+    ::shutdown(listening_->acceptor.native_handle(), SHUT_RDWR);
+    thread_.join();
+    std::unique_lock lock(mutex_);
+    closed_.wait(lock, [&] { return open_.empty(); });
+}
+
+void HttpServer::accept() {
+    while (true) {
+        auto connection = std::make_unique<Connection>();
+        beast::error_code error;
+        listening_->acceptor.accept(connection->socket(), error);
+        const std::lock_guard lock(mutex_);
+        if (stopping_) return;
+        if (error || open_.size() >= kMostConnections) {
+            if (error) std::this_thread::sleep_for(std::chrono::milliseconds(50));  // Out of descriptors.
+            continue;
+        }
+        open_.insert(connection.get());
+        std::thread([this, listener = currentListener(), own = std::move(connection)]() mutable {
+            {
+                const ListenerScope scope(listener);
+                serve(*own);
+            }
+            const std::lock_guard closing(mutex_);
+            open_.erase(own.get());
+            own.reset();
+            closed_.notify_all();
+        }).detach();
+    }
+}
+
+/// One request a connection: a browser that keeps one open would keep a thread.
+void HttpServer::serve(Connection& connection) {
+    http::request<http::string_body> received;
+    if (!connection.read(received)) return;
+    const auto header = [&](http::field field) { return std::string(received[field]); };
+    HttpReply reply = replyTo(requestOf(received), header(http::field::host), header(http::field::origin));
+    http::response<http::string_body> response{http::int_to_status(reply.status), received.version()};
+    response.set(http::field::content_type, reply.type);
+    response.set(http::field::cache_control, "no-store");
+    response.set("Referrer-Policy", "no-referrer");
+    response.set("X-Content-Type-Options", "nosniff");
+    for (const auto& [name, value] : reply.headers) response.set(name, value);
+    response.keep_alive(false);
+    response.body() = std::move(reply.body);
+    response.prepare_payload();
+    connection.write(response);
+}
+
+HttpReply HttpServer::replyTo(const HttpRequest& request, const std::string& host,
+                              const std::string& origin) {
+    const auto given = request.query.find("token");
+    const std::string why =
+        refusal(port_, host, origin, token_, given != request.query.end() ? given->second : "");
+    if (!why.empty()) return {.status = 403, .body = why + "\n"};
+    try {
+        return answer_(request);
+    } catch (const Error& error) {
+        const bool asked_wrong = error.kind() == ErrorKind::Usage;
+        return {.status = asked_wrong ? 400u : 500u, .body = error.what()};
+    } catch (const std::exception& error) {
+        return {.status = 500, .body = error.what()};
+    }
+}
+
+}  // namespace crt

@@ -1,0 +1,71 @@
+/// HTTP on 127.0.0.1, for pages of this program alone: who does not know the token, or comes from another
+/// site, is refused.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+
+namespace crt {
+
+struct HttpRequest {
+    std::string method;
+    std::string path;  ///< "/pixel"
+    std::map<std::string, std::string> query;
+    std::string body;
+};
+
+struct HttpReply {
+    unsigned status = 200;
+    std::string type = "text/plain; charset=utf-8";
+    std::string body{};
+    std::map<std::string, std::string> headers{};
+};
+
+/// Letters and digits that nobody guesses.
+std::string randomToken();
+
+/// Why a request is not answered; empty when it is. `host` and `origin` are its headers, the latter empty
+/// where there is none. A page of another site that a browser shows can send requests here, and a name that
+/// somebody gives to 127.0.0.1 makes such a page ours (DNS rebinding): hence both are looked at.
+std::string refusal(std::uint16_t port, const std::string& host, const std::string& origin,
+                    const std::string& token, const std::string& given_token);
+
+class HttpServer {
+public:
+    /// `port` 0: any that is free. `answer` is called on many threads at once, and may take its time. Throws
+    /// crt::Error(Usage) for a port that is not to be had.
+    HttpServer(std::uint16_t port, std::string token, std::function<HttpReply(const HttpRequest&)> answer);
+    /// Closes all connections and waits until every answer() has returned.
+    ~HttpServer();
+    HttpServer(const HttpServer&) = delete;
+    HttpServer& operator=(const HttpServer&) = delete;
+
+    std::uint16_t port() const { return port_; }
+
+private:
+    struct Listening;
+    class Connection;
+
+    void accept();
+    void serve(Connection& connection);
+    HttpReply replyTo(const HttpRequest& request, const std::string& host, const std::string& origin);
+
+    const std::string token_;
+    const std::function<HttpReply(const HttpRequest&)> answer_;
+    std::unique_ptr<Listening> listening_;
+    std::uint16_t port_ = 0;
+    std::mutex mutex_;
+    std::condition_variable closed_;
+    std::set<Connection*> open_;
+    bool stopping_ = false;
+    std::thread thread_;
+};
+
+}  // namespace crt

@@ -1,0 +1,32 @@
+/// What a render hands to whoever makes pictures of it: a film that does not change any more.
+#pragma once
+
+#include "film/film.h"
+#include "scene/scene.h"
+#include "view/primitive_names.h"
+
+#include <cstdint>
+#include <memory>
+
+namespace crt {
+
+/// A scene as it is seen: its camera is where hands have moved it.
+struct SeenScene {
+    std::shared_ptr<const Scene> read;  ///< As the file says.
+    Camera camera;                      ///< Instead of the file's.
+    std::shared_ptr<const PrimitiveNames> names;
+    std::uint32_t width = 0, height = 0;  ///< Of the whole film's crop window.
+
+    bool independentSamples() const { return read->sampler.type != SamplerType::Sobol; }
+};
+
+struct Snapshot {
+    std::shared_ptr<const SeenScene> seen;
+    std::shared_ptr<const Film> film;
+    unsigned divisor = 1;   ///< Of the size: of a preview more than 1.
+    std::uint64_t run = 0;  ///< Number of the restart that it belongs to.
+    bool complete = false;  ///< Has all the samples that are asked for.
+    double seconds = 0;     ///< Of rendering, since the restart.
+};
+
+}  // namespace crt

@@ -1,0 +1,198 @@
+#include "view/viewer.h"
+
+#include "base/error.h"
+#include "base/log.h"
+#include "scene/aov.h"
+#include "view/planes.h"
+#include "view/reports.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+namespace crt {
+namespace {
+
+RenderWishes wishesOf(const ViewOptions& options) {
+    RenderWishes wishes;
+    wishes.samples = options.samples;
+    wishes.backend = options.backend;
+    wishes.integrator = options.integrator;
+    return wishes;
+}
+
+std::unique_ptr<TevSender> tevOf(const ViewOptions& options, Board& board) {
+    if (!options.tev) return nullptr;
+    const std::string name = std::filesystem::path(options.scene.file).filename().string();
+    return std::make_unique<TevSender>(*options.tev, name, board);
+}
+
+/// What each film holds: which surface a pixel shows, and how far it is where a lens can be focused on it.
+std::uint32_t basicAovs(const Scene& scene) {
+    return kAovPrimitive | (scene.camera.aperture_radius > 0 ? kAovDepth : 0u);
+}
+
+}  // namespace
+
+Viewer::Viewer(const ViewOptions& options)
+    : outer_(currentListener()),
+      listener_(
+          [this](LogLevel level, std::string_view message) { hear(level, message); }, LogLevel::Debug,
+          [this](const std::string& what) { board_.update([&](Status& status) { status.stage = what; }); }),
+      scope_(listener_),
+      tev_(tevOf(options, board_)),
+      developer_(board_, options.integrator.threads),
+      renderer_(wishesOf(options), board_,
+                [this](Snapshot snapshot) {
+                    if (tev_) tev_->take(snapshot);
+                    developer_.take(std::move(snapshot));
+                }),
+      source_(options.scene, board_, [this](auto scene) { takeScene(std::move(scene)); }) {
+    board_.update([&](Status& status) { status.file = options.scene.file; });
+}
+
+Viewer::~Viewer() { stop(); }
+
+void Viewer::stop() {
+    board_.close();
+    renderer_.stop();
+}
+
+void Viewer::hear(LogLevel level, std::string_view message) {
+    {
+        const ListenerScope scope(outer_);
+        logMessage(level, message);
+    }
+    if (level != LogLevel::Warning) return;
+    constexpr std::size_t kMostWarnings = 20;
+    board_.update([&](Status& status) {
+        std::vector<std::string>& all = status.warnings;
+        if (all.size() < kMostWarnings && std::find(all.begin(), all.end(), message) == all.end())
+            all.emplace_back(message);
+    });
+}
+
+void Viewer::takeScene(std::shared_ptr<const Scene> scene) {
+    const std::lock_guard lock(mutex_);
+    // A camera that hands have moved stays, unless the file has another one now.
+    if (!scene_ || !(poseOf(scene_->camera) == poseOf(scene->camera))) pose_ = poseOf(scene->camera);
+    scene_ = std::move(scene);
+    Display display = developer_.display();
+    const std::vector<std::string> whites = whiteNames(*scene_);
+    const bool kelvin = display.white.ends_with(" K");
+    if (!kelvin && std::find(whites.begin(), whites.end(), display.white) == whites.end()) {
+        logWarning("the scene has no white '{}' any more: it is shown with its own", display.white);
+        display.white = "scene";
+        developer_.setDisplay(display);
+    }
+    renderer_.wish([&](RenderWishes& wishes) {
+        wishes.scene = scene_;
+        wishes.pose = pose_;
+        wishes.aovs = basicAovs(*scene_) | aovs_;
+        tellSettings(wishes);
+    });
+}
+
+void Viewer::change(const ViewChange& change) {
+    const std::lock_guard lock(mutex_);
+    if (!scene_ && (change.orbit || change.pan || change.dolly || change.focus || change.exposure_ev ||
+                    change.white || change.plane))
+        throw Error(ErrorKind::Usage, "there is no scene yet");
+    // Both may refuse.
+    const CameraPose pose = poseAfter(change);
+    const Display display = displayAfter(change);
+    pose_ = pose;
+    // Once looked at, the planes stay in the film: looking at another needs no other render.
+    if (aovsOfPlane(display.plane) & kAovsOfFirstHits) aovs_ = kAovsOfFirstHits;
+    if (!(display == developer_.display())) developer_.setDisplay(display);
+    renderer_.wish([&](RenderWishes& wishes) {
+        if (change.paused) wishes.paused = *change.paused;
+        if (change.samples) wishes.samples = *change.samples;
+        if (change.backend) wishes.backend = *change.backend;
+        if (change.backend || change.device) wishes.integrator.device = change.device.value_or("");
+        wishes.pose = pose_;
+        if (scene_) wishes.aovs = basicAovs(*scene_) | aovs_;
+        tellSettings(wishes);
+    });
+}
+
+CameraPose Viewer::poseAfter(const ViewChange& change) const {
+    CameraPose pose = change.reset_camera && scene_ ? poseOf(scene_->camera) : pose_;
+    if (change.focus) pose.focus_distance = focusAt(*change.focus);
+    if (change.orbit) orbit(pose, (*change.orbit)[0], (*change.orbit)[1]);
+    if (change.pan) pan(pose, scene_->camera, (*change.pan)[0], (*change.pan)[1]);
+    if (change.dolly) dolly(pose, *change.dolly);
+    return pose;
+}
+
+/// The focus distance that makes what lies there sharp.
+double Viewer::focusAt(const std::array<double, 2>& place) const {
+    if (scene_->camera.aperture_radius <= 0)
+        throw Error(ErrorKind::Usage, "the camera is a pinhole, to which all is sharp: it has no aperture");
+    const std::optional<Snapshot> now = developer_.newest();
+    const std::optional<double> distance = now ? depthAt(*now, place[0], place[1]) : std::nullopt;
+    if (!distance) throw Error(ErrorKind::Usage, "there is no surface to focus on");
+    const auto& [x0, y0, x1, y1] = scene_->film.crop;
+    const double left = x1 > x0 ? x0 : 0, right = x1 > x0 ? x1 : scene_->film.width;
+    const double top = y1 > y0 ? y0 : 0, bottom = y1 > y0 ? y1 : scene_->film.height;
+    const double x = (left + place[0] * (right - left)) / scene_->film.width;
+    const double y = (top + place[1] * (bottom - top)) / scene_->film.height;
+    return depthOfRay(scene_->camera, x, y, *distance);
+}
+
+Display Viewer::displayAfter(const ViewChange& change) const {
+    Display display = developer_.display();
+    if (change.exposure_ev) display.exposure_ev = change.exposure_ev;
+    if (change.white) {
+        display.white = *change.white;
+        developmentFor(display, *scene_);  // Refuses a white that is none.
+    }
+    if (change.plane) {
+        const std::vector<std::string>& names = planeNames();
+        if (std::find(names.begin(), names.end(), *change.plane) == names.end())
+            throw Error(ErrorKind::Usage, fmt::format("there is no plane '{}'; there are {}", *change.plane,
+                                                      fmt::join(names, ", ")));
+        display.plane = *change.plane;
+    }
+    return display;
+}
+
+/// Before anything is rendered by them.
+void Viewer::tellSettings(const RenderWishes& wishes) {
+    const Display display = developer_.display();
+    board_.update([&](Status& status) {
+        status.paused = wishes.paused;
+        status.white = display.white;
+        status.plane = display.plane;
+        if (!scene_) return;
+        status.title = scene_->title;
+        status.has_lens = scene_->camera.aperture_radius > 0;
+        status.pose = pose_;
+        status.pose_moved = !(pose_ == poseOf(scene_->camera));
+        status.exposure_ev = display.exposure_ev.value_or(scene_->film.exposure_ev);
+        status.whites = whiteNames(*scene_);
+        status.samples_wanted = wishes.samplesWanted();
+    });
+}
+
+std::string Viewer::pixel(std::uint32_t x, std::uint32_t y) const {
+    const std::optional<Snapshot> now = developer_.newest();
+    if (!now) throw Error(ErrorKind::Usage, "there is no picture yet");
+    return pixelJson(*now, x, y);
+}
+
+std::string Viewer::exr() const {
+    const std::optional<Snapshot> now = developer_.newest();
+    if (!now) throw Error(ErrorKind::Usage, "there is no picture yet");
+    return exrOf(*now);
+}
+
+std::string Viewer::devices() {
+    const std::lock_guard lock(devices_mutex_);
+    if (devices_.empty()) devices_ = devicesJson();
+    return devices_;
+}
+
+}  // namespace crt

@@ -1,0 +1,82 @@
+/// A scene on its way to pages that look at it: reader, renderer and developer at work, and what pages may
+/// ask of them. All functions may be called by any thread.
+#pragma once
+
+#include "base/listener.h"
+#include "view/board.h"
+#include "view/developer.h"
+#include "view/messages.h"
+#include "view/renderer.h"
+#include "view/scene_source.h"
+#include "view/tev_sender.h"
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+namespace crt {
+
+struct ViewOptions {
+    SceneRequest scene;
+    std::string backend = "auto";
+    IntegratorOptions integrator;
+    std::uint64_t samples = 0;  ///< Per pixel; 0: the scene's.
+    std::optional<TevAddress> tev;
+};
+
+class Viewer {
+public:
+    /// Starts everything and returns at once. What the parts have to say goes to the pages and to the
+    /// listener of the calling thread.
+    explicit Viewer(const ViewOptions& options);
+    ~Viewer();
+    Viewer(const Viewer&) = delete;
+    Viewer& operator=(const Viewer&) = delete;
+
+    Board& board() { return board_; }
+    const ListenerRef& listener() const { return listener_.ref(); }
+
+    /// Throws crt::Error(Usage) for what this scene or film cannot do; then nothing is changed.
+    void change(const ViewChange& change);
+    /// What the film knows of a pixel of the crop window, as JSON. Throws crt::Error(Usage).
+    std::string pixel(std::uint32_t x, std::uint32_t y) const;
+    /// The image as an EXR file. Throws crt::Error.
+    std::string exr() const;
+    /// Backends and devices, as JSON. Opens all of them the first time.
+    std::string devices();
+
+    /// Asks everybody to end, without waiting for them.
+    void stop();
+
+private:
+    void hear(LogLevel level, std::string_view message);
+    void takeScene(std::shared_ptr<const Scene> scene);
+    CameraPose poseAfter(const ViewChange& change) const;
+    double focusAt(const std::array<double, 2>& place) const;
+    Display displayAfter(const ViewChange& change) const;
+    void tellSettings(const RenderWishes& wishes);
+
+    const ListenerRef outer_;
+    Board board_;
+    Listener listener_;
+    const ListenerScope scope_;
+
+    mutable std::mutex mutex_;  ///< Of what follows.
+    std::shared_ptr<const Scene> scene_;
+    CameraPose pose_;
+    std::uint32_t aovs_ = 0;  ///< That were looked at.
+
+    std::mutex devices_mutex_;
+    std::string devices_;
+
+    // In the order of the data; each is gone before those that it hands on to.
+    const std::unique_ptr<TevSender> tev_;  ///< Null: nobody asked for it.
+    Developer developer_;
+    Renderer renderer_;
+    SceneSource source_;
+};
+
+}  // namespace crt

@@ -1,0 +1,92 @@
+"""A `crt view` that a test starts, and what a page of it would ask."""
+
+import json
+import struct
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
+
+import harness
+
+TOKEN = "0123456789abcdefghij"
+PATIENCE_SECONDS = 60
+
+
+class View:
+    """Of the scene.yaml of a test, at a free port unless one is given."""
+
+    def __init__(self, test, *arguments, port=0, **start):
+        self.process = test.start("view", "scene.yaml", "--no-open", "--port", str(port), "--token", TOKEN,
+                                  *arguments, **start)
+        self.address = self.process.stdout.readline().strip()
+        if not self.address:
+            raise AssertionError(f"no address: {self.process.stderr.read()}")
+        self.base = self.address.split("/?")[0]
+        self.port = int(self.base.rsplit(":", 1)[1])
+
+    def url(self, path, **query):
+        return f"{self.base}{path}?" + urllib.parse.urlencode({**query, "token": TOKEN})
+
+    def get(self, path, **query):
+        with urllib.request.urlopen(self.url(path, **query), timeout=PATIENCE_SECONDS) as reply:
+            return reply.read()
+
+    def json(self, path, **query):
+        return json.loads(self.get(path, **query))
+
+    def sight(self, after=0):
+        """The status, and the picture's bytes [height][width][4]."""
+        reply = self.get("/sight", after=after, picture=0)
+        (length,) = struct.unpack_from("<I", reply)
+        return json.loads(reply[4:4 + length]), reply[4 + length:]
+
+    def change(self, **wish):
+        request = urllib.request.Request(self.url("/change"), json.dumps(wish).encode(), method="POST")
+        with urllib.request.urlopen(request, timeout=PATIENCE_SECONDS) as reply:
+            return reply.read()
+
+    def wait(self, condition, what="what was waited for"):
+        """The first sight whose status is as wanted, and its picture."""
+        end = time.monotonic() + PATIENCE_SECONDS
+        status, pixels = self.sight()
+        while not condition(status):
+            if time.monotonic() > end:
+                raise AssertionError(f"{what} did not come: {status}")
+            status, pixels = self.sight(status["version"])
+        return status, pixels
+
+    def wait_until_done(self):
+        return self.wait(is_done, "the last sample")
+
+    def refused(self, **headers):
+        """The status with which the page itself is refused."""
+        token = headers.pop("token", TOKEN)
+        request = urllib.request.Request(f"{self.base}/?token={token}", headers=headers)
+        try:
+            with urllib.request.urlopen(request, timeout=PATIENCE_SECONDS) as reply:
+                return reply.status
+        except urllib.error.HTTPError as error:
+            with error:
+                return error.code
+
+
+def is_done(status):
+    """Whether the picture has all samples of the whole film, from where the camera is."""
+    picture = status.get("picture")
+    return (bool(picture) and picture["divisor"] == 1 and picture["of_this_camera"]
+            and status["samples"] == status["samples_wanted"] and picture["samples"] == status["samples"])
+
+
+def ppm_pixels(path):
+    """[height][width][3] of a PPM that crt wrote."""
+    content = harness.read_bytes(path)
+    kind, size, most, pixels = content.split(b"\n", 3)
+    assert (kind, most) == (b"P6", b"255"), content[:20]
+    width, height = map(int, size.split())
+    assert len(pixels) == 3 * width * height
+    return pixels
+
+
+def without_alpha(rgba):
+    return b"".join(rgba[i:i + 3] for i in range(0, len(rgba), 4))
