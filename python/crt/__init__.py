@@ -17,11 +17,12 @@ sums on every backend, however the samples are split. Films of different samples
 from ._crt import Device, ErrorEstimate, Film, Image, Plugin, bits_version
 from ._crt import version as _version
 from .errors import Error, Kind, RenderFailed
+from .importers import Imported, import_scene
 from .judging import Judgement, compare, converge, verify
 from .rendering import Result, develop, plugins, render
 from .scenes import Scene, load, scene
 
 __version__ = _version()
-__all__ = ["Device", "Error", "ErrorEstimate", "Film", "Image", "Judgement", "Kind", "Plugin",
-           "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "develop", "load",
-           "plugins", "render", "scene", "verify"]
+__all__ = ["Device", "Error", "ErrorEstimate", "Film", "Image", "Imported", "Judgement", "Kind", "Plugin",
+           "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "develop",
+           "import_scene", "load", "plugins", "render", "scene", "verify"]
