@@ -13,7 +13,8 @@ def parser():
     made = argparse.ArgumentParser(
         prog="crt import", description="write a scene that shows what a scene of another program shows",
         epilog="Models (.glb, .gltf, .obj, .ply) go to the program crt: crt import MODEL --help.")
-    made.add_argument("scene", metavar="SCENE", help="a scene of Mitsuba 3 (.xml) or pbrt-v4 (.pbrt, .pbrt.gz)")
+    made.add_argument("scene", metavar="SCENE",
+                      help="a scene of Mitsuba 3 (.xml) or pbrt-v4 (.pbrt, .pbrt.gz)")
     made.add_argument("-o", "--output", metavar="YAML", default="-",
                       help="the scene to write, with NAME.meshes beside it where there are meshes; standard "
                            "output when left out, or -")

@@ -10,12 +10,14 @@ from . import matrices, shapes
 from .losses import Losses
 
 MIRROR = matrices.scaling(-1, 1, 1)
+# What YAML and crt would take for something else than a name.
+NO_NAMES = {"true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan", "inf", "from_mtl"}
 BLACK = {"type": "diffuse", "reflectance": 0}
 
 
 @dataclasses.dataclass
 class Thing:
-    """An object: `geometry` are its keys of crt without a placement, `placements` matrices of shape (4, 4)."""
+    """An object: `geometry` are its keys of crt without a placement, `placements` matrices (4, 4)."""
 
     name: str
     geometry: dict
@@ -43,7 +45,9 @@ class Draft:
 
     def material(self, wanted, content):
         """The name of a material of this content: `wanted` where that is free."""
-        base = re.sub(r"[^A-Za-z0-9_.-]+", "_", wanted or content["type"]).strip("_") or "material"
+        base = re.sub(r"[^A-Za-z0-9_.-]+", "_", wanted or content["type"]).strip("_")
+        if not base[:1].isalpha() or base.lower() in NO_NAMES:
+            base = f"material_{base}".rstrip("_")
         name, number = base, 2
         while name in self.materials and self.materials[name] != content:
             name, number = f"{base}_{number}", number + 1
@@ -148,7 +152,8 @@ def ball(radius, stretched, *, flip=False, low=-1.0, high=1.0, phi_max=360.0):
     if phi_max < 360 or stretched:
         return meshed(shapes.sphere(radius, low, high, phi_max), flip)
     made = {"radius": radius} | ({"from_z": low * radius} if low > -1 else {})
-    return {"sphere": made | ({"to_z": high * radius} if high < 1 else {}) | ({"inward": True} if flip else {})}
+    made |= ({"to_z": high * radius} if high < 1 else {}) | ({"inward": True} if flip else {})
+    return {"sphere": made}
 
 
 def tube(radius, low, high, stretched, *, flip=False, phi_max=360.0):

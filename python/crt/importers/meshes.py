@@ -53,13 +53,16 @@ def ply_header(data):
     return kind, elements, data.index(b"\n", end) + 1
 
 
-def ply_has_normals(path):
-    """Says the header that vertices have normals? False of what is no PLY: crt will say so."""
+def ply_vertex(path):
+    """The names of a vertex's properties by the header. None of what is no PLY: crt will say so."""
     with open(path, "rb") as file:
-        head = file.read(65536)
-    return b"property" in head and any(
-        len(words) == 3 and words[0] == b"property" and words[2] == b"nx"
-        for words in map(bytes.split, head.partition(b"end_header")[0].splitlines()))
+        head = file.read(65536).partition(b"end_header")[0]
+    names = set()
+    for line in head.partition(b"element vertex")[2].partition(b"element")[0].splitlines():
+        words = line.split()
+        if len(words) == 3 and words[0] == b"property":
+            names.add(words[2].decode("latin-1"))
+    return names
 
 
 def read_ply(path):
@@ -125,6 +128,20 @@ def fans(polygons):
     return np.array(made, np.int64).reshape(-1, 3)
 
 
+def faced(mesh):
+    """Faces that their normals see from behind are turned, where normals say what the outside is."""
+    if "normals" not in mesh:
+        return mesh
+    corners = mesh["positions"][mesh["faces"]].astype(float)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    behind = (across * mesh["normals"][mesh["faces"]].astype(float).sum(1)).sum(1) < 0
+    if not behind.any():
+        return mesh
+    faces = mesh["faces"].copy()
+    faces[behind] = faces[behind][:, ::-1]
+    return mesh | {"faces": faces}
+
+
 def mesh_of(elements):
     vertices, faces = elements["vertex"], elements["face"]
     polygons = faces.get("vertex_indices", faces.get("vertex_index"))
@@ -151,6 +168,41 @@ def checked(mesh):
     if not len(faces):
         raise Damaged("it has no faces")
     return mesh
+
+
+def read_obj(path):
+    """A mesh as read_ply gives it. Faces without normals, where others have some, get those of the plane."""
+    rows, corners = {b"v": [], b"vt": [], b"vn": []}, []
+    try:
+        for line in path.read_bytes().replace(b"\\\n", b" ").splitlines():
+            word, *rest = line.split() or [b""]
+            if word in rows:
+                rows[word].append([float(number) for number in rest[:2 if word == b"vt" else 3]])
+            elif word == b"f":
+                found = [indices(corner, rows) for corner in rest]
+                corners += [found[k] for i in range(1, len(found) - 1) for k in (0, i, i + 1)]
+    except (ValueError, IndexError):
+        raise Damaged(f"it has a line that is no OBJ: {line[:60].decode('latin-1')!r}") from None
+    if not corners:
+        raise Damaged("it has no faces")
+    unique, faces = np.unique(np.array(corners), axis=0, return_inverse=True)
+    made = {"faces": faces.reshape(-1, 3)}
+    for column, (key, word) in enumerate((("positions", b"v"), ("uvs", b"vt"), ("normals", b"vn"))):
+        if key == "positions" or (len(rows[word]) and (unique[:, column] >= 0).all()):
+            table = np.array(rows[word], float)
+            if unique[:, column].max() >= len(table) or unique[:, column].min() < 0:
+                raise Damaged(f"a face names a '{word.decode()}' that is none of its {len(table)}")
+            made[key] = table[unique[:, column]]
+    return checked(made)
+
+
+def indices(corner, rows):
+    """v/vt/vn as three numbers from 0; -1 where there is none."""
+    made = []
+    for word, number in zip((b"v", b"vt", b"vn"), (corner.split(b"/") + [b"", b""])[:3]):
+        index = int(number) if number else 0
+        made.append(index - 1 if index > 0 else len(rows[word]) + index if index < 0 else -1)
+    return made
 
 
 def read_serialized(path, index):

@@ -6,14 +6,15 @@ import numpy as np
 
 from . import matrices, shapes, sky_image, spectra
 from .losses import refuse, suggestion
-from .meshes import Damaged, ply_has_normals, read_ply, read_serialized
+from .meshes import Damaged, faced, ply_vertex, read_obj, read_ply, read_serialized
 from .mitsuba_materials import Materials
 from .mitsuba_tree import Reader
 from .mitsuba_values import Values, pixels
 from .draft import BLACK, Draft, Thing, ball, meshed, plate, stretches, tube
 
 ENDLESS = 1_000_000  # Depths that Mitsuba writes as -1; Russian roulette ends paths before.
-SKY = 0.2
+SKY = 0.2  # Luminance of the even sky that stands for Mitsuba's models.
+AREA = ("area", "directionalarea")
 
 
 def read(path, parameters):
@@ -31,6 +32,7 @@ class Importer:
         self.losses = self.scene.losses
         self.values = Values(reader, self.losses)
         self.materials = Materials(reader, self.scene)
+        self.has_uvs, self.has_colors = True, False  # The mesh that is being read.
         self.groups = {}  # By the identity of a shapegroup: itself, and its instances' matrices.
 
     def scene_of(self, tree):
@@ -42,7 +44,8 @@ class Importer:
         if sensors:
             self.sensor(sensors[0])
         for emitter in tree.all("emitter"):
-            self.emitter(emitter)
+            if emitter.kind not in AREA:  # Those are there to be referred to.
+                self.emitter(emitter)
         for shape in tree.all("shape"):
             self.shape(shape)
         for group, placements in self.groups.values():
@@ -77,7 +80,8 @@ class Importer:
         depth = int(plugin.number("max_depth", -1))
         self.scene.integrator = {"max_depth": ENDLESS if depth < 0 else max(depth - 1, 0)}
         if plugin.has("rr_depth"):
-            self.scene.integrator["roulette_depth"] = min(max(int(plugin.number("rr_depth", 5)) - 1, 0), 10**9)
+            first = int(plugin.number("rr_depth", 5)) - 1
+            self.scene.integrator["roulette_depth"] = min(max(first, 0), 10**9)
         if plugin.get("hide_emitters", False):
             self.losses.add(plugin.place, "'hide_emitters'", "lights are seen")
         return self.unused(plugin)
@@ -287,11 +291,15 @@ class Importer:
             known = [name[6:] for name in dir(self) if name.startswith("shape_")]
             self.losses.add(plugin.place, f"{plugin}{suggestion(plugin.kind, known)}")
             return
+        self.has_uvs, self.has_colors = True, False
         matrix, geometry = make(plugin)
         places = [placement @ matrix for placement in placements]
         geometry = geometry(stretches(places))
-        flip_v = plugin.kind == "obj" and plugin.get("flip_tex_coords", True) is not False
-        material = self.materials.name(plugin.one("bsdf"), flip_v)
+        # What crt reads as v is 1 - v in Mitsuba's spheres, and in its OBJ files unless that is off.
+        flip_v = plugin.kind == "sphere" or (
+            plugin.kind == "obj" and plugin.get("flip_tex_coords", True) is not False)
+        material = self.materials.name(plugin.one("bsdf"), flip_v=flip_v, has_uvs=self.has_uvs,
+                                       has_colors=self.has_colors)
         emission = self.emission(plugin, in_group)
         if plugin.all("medium"):
             self.losses.add(plugin.place, "participating media", "empty space")
@@ -312,7 +320,7 @@ class Importer:
         if in_group:
             self.losses.add(emitter.place, "lights within a shapegroup", "dark surfaces")
             return None
-        if emitter.kind not in ("area", "directionalarea"):
+        if emitter.kind not in AREA:
             self.losses.add(emitter.place, f"{emitter} of a shape", "a dark surface")
             return None
         if emitter.kind == "directionalarea":
@@ -377,27 +385,35 @@ class Importer:
             return {"normals": "flat"}
         return {} if has_normals else {"normals": "smooth", "crease_angle_deg": 180}
 
+    def mesh_file(self, plugin, key, path, read, has_normals):
+        """A file as it is, unless its faces must be turned: for Mitsuba normals say where the outside is."""
+        flip = self.flip(plugin)
+        keys = self.normals(plugin, has_normals)
+        if flip or has_normals:
+            try:
+                mesh = read(path)
+            except Damaged as error:
+                refuse(plugin.values["filename"][2], f"'{path}' cannot be read: {error}")
+            turned = faced(mesh)
+            if flip or turned is not mesh:
+                return meshed(turned, flip) | keys
+        return {key: path} | ({"override": True} if key == "obj" else {}) | keys
+
     def shape_obj(self, plugin):
         path = self.file(plugin)
         with open(path, "rb") as file:
-            has_normals = any(line.startswith(b"vn ") for line in file)
-        if self.flip(plugin):
-            self.losses.add(plugin.place, f"'flip_normals' of {plugin}", "false")
-        made = {"obj": path, "override": True} | self.normals(plugin, has_normals)
+            words = {line[:3] for line in file}
+        has_normals, self.has_uvs = b"vn " in words, b"vt " in words
+        made = self.mesh_file(plugin, "obj", path, read_obj, has_normals)
         return plugin.transform(), lambda stretched: made
 
     def shape_ply(self, plugin):
         path = self.file(plugin)
-        made = self.normals(plugin, ply_has_normals(path))
         if plugin.get("flip_tex_coords", False):
             self.losses.add(plugin.place, f"'flip_tex_coords' of {plugin}", "false")
-        if not self.flip(plugin):
-            made = {"ply": path} | made
-        else:
-            try:
-                made = meshed(read_ply(path), True) | made
-            except Damaged as error:
-                refuse(plugin.values["filename"][2], f"'{path}' cannot be read: {error}")
+        names = ply_vertex(path)
+        self.has_uvs, self.has_colors = bool(names & {"u", "s", "texture_u"}), "red" in names
+        made = self.mesh_file(plugin, "ply", path, read_ply, "nx" in names)
         return plugin.transform(), lambda stretched: made
 
     def shape_serialized(self, plugin):
@@ -406,5 +422,6 @@ class Importer:
             mesh, is_flat = read_serialized(path, int(plugin.number("shape_index", 0)))
         except Damaged as error:
             refuse(plugin.values["filename"][2], f"'{path}' cannot be read: {error}")
-        made = meshed(mesh, self.flip(plugin)) | self.normals(plugin, is_flat or "normals" in mesh)
+        self.has_uvs = "uvs" in mesh
+        made = meshed(faced(mesh), self.flip(plugin)) | self.normals(plugin, is_flat or "normals" in mesh)
         return plugin.transform(), lambda stretched: made

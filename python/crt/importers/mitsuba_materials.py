@@ -44,11 +44,12 @@ class Materials:
         self.reader, self.scene, self.losses = reader, scene, scene.losses
         self.left = []
 
-    def name(self, plugin, flip_v):
-        """The name of a material for objects, or None where light passes as if nothing were there."""
+    def name(self, plugin, **mesh):
+        """The name of a material for objects, or None where light passes as if nothing were there. `mesh`:
+        what Values takes."""
         if plugin is None:
             return self.finished(Surface({"type": "diffuse", "reflectance": 0.5}, name="default"))
-        surface = self.surface(plugin, Values(self.reader, self.losses, flip_v))
+        surface = self.surface(plugin, Values(self.reader, self.losses, **mesh))
         return None if surface is None else self.finished(surface)
 
     def finished(self, surface):
@@ -217,6 +218,9 @@ class Materials:
     def of_roughplastic(self, plugin, values):
         made = self.of_plastic(plugin, values)
         widths = self.widths(plugin, values, textured=False)
+        if widths["roughness"] > 0.3:
+            self.losses.add(plugin.place, "light that a rough coat takes between its facets",
+                            "a coat that keeps it")
         return dataclasses.replace(made, content=made.content | {"roughness": widths["roughness"]})
 
     def of_pplastic(self, plugin, values):
@@ -276,9 +280,10 @@ class Materials:
         parts = (self.nested(plugin, values) * 2)[:2]
         weight = values.number(plugin, "weight", 0.5)
         weight = weight if isinstance(weight, dict) else min(max(weight, 0.0), 1.0)
-        for part, other, share in ((parts[0], parts[1], weight), (parts[1], parts[0], self.rest(plugin, weight))):
-            if part is None:
-                return None if other is None else dataclasses.replace(other, opacity=share)
+        if parts[0] is None:
+            return None if parts[1] is None else dataclasses.replace(parts[1], opacity=weight)
+        if parts[1] is None:
+            return dataclasses.replace(parts[0], opacity=self.rest(plugin, weight))
         if any(part.opacity != 1 for part in parts):
             self.losses.add(plugin.place, "a mask within bsdf 'blendbsdf'", "without the mask")
         names = [self.scene.material(part.name or f"{plugin.id}_{number}", part.content)
@@ -323,7 +328,8 @@ class Materials:
                 made[key] = values.number(plugin, name, 0.0)
         clear = bool(made.get("transmission_weight", 0) != 0)
         if made.get("coat_weight"):
-            self.losses.add(plugin.place, "'clearcoat' of bsdf 'principled'", "a coat of a quarter of that weight")
+            self.losses.add(plugin.place, "'clearcoat' of bsdf 'principled'",
+                            "a coat of a quarter of that weight")
             weight = made["coat_weight"]
             made["coat_weight"] = 0.25 if isinstance(weight, dict) else 0.25 * min(max(weight, 0), 1)
             made |= {"coat_ior": 1.5, "coat_darkening": 0}
@@ -341,13 +347,12 @@ class Materials:
 
     def of_principledthin(self, plugin, values):
         self.losses.add(plugin.place, "bsdf 'principledthin'", "bsdf 'principled' without transmission")
-        for name in ("spec_trans", "diff_trans"):
+        passing = ("spec_trans", "diff_trans")
+        for name in passing:
             plugin.values.pop(name, None)
             plugin.left.discard(name)
-        plugin.parts = [(name, part) for name, part in plugin.parts if name not in ("spec_trans", "diff_trans")]
-        self_left = {"eta", "spec_tint"}
+        plugin.parts = [(name, part) for name, part in plugin.parts if name not in passing]
         made = self.of_principled(plugin, values)
-        plugin.left -= self_left
         return dataclasses.replace(made, both=True)
 
 
@@ -358,4 +363,5 @@ def rough_mirror(color, widths):
 
 def renamed_widths(widths):
     """The keys of roughness as OpenPBR has them."""
-    return {key if key.startswith("anisotropy") else "specular_" + key: value for key, value in widths.items()}
+    return {key if key.startswith("anisotropy") else "specular_" + key: value
+            for key, value in widths.items()}

@@ -275,7 +275,7 @@ class Reader:
         return [self.floats(element, axis, (1,), str(default))[0] for axis in "xyz"]
 
     def spectrum(self, element, tag):
-        """A number; [r, g, b], linear; {"nm": …, "values": …}; {"file": path}; {"kelvin": T, "scale": s}."""
+        """A number; [r, g, b], linear; {"nm", "values"}; {"file", "place"}; or {"kelvin", "scale"}."""
         if tag == "blackbody":
             kelvin = self.attribute(element, "temperature").strip().rstrip("kK")
             scale = self.floats(element, "scale", (1,), "1")[0]

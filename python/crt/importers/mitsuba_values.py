@@ -48,10 +48,12 @@ def flat(matrix):
 
 
 class Values:
-    """`flip_v`: the v of the shape's texture coordinates, as crt reads them, is 1 - v of Mitsuba's."""
+    """`flip_v`: the v of the shape's texture coordinates, as crt reads them, is 1 - v of Mitsuba's.
+    `has_uvs`, `has_colors`: does the mesh have coordinates, and colours at its vertices?"""
 
-    def __init__(self, reader, losses, flip_v=False):
+    def __init__(self, reader, losses, flip_v=False, has_uvs=True, has_colors=False):
         self.reader, self.losses = reader, losses
+        self.has_uvs, self.has_colors = has_uvs, has_colors
         self.uv = FLIP_V if flip_v else np.eye(3)
 
     # What stands as the value of a parameter: a plugin, or a value of its own.
@@ -110,7 +112,7 @@ class Values:
         value, tag = plugin.get(name, default), plugin.values.get(name, (0, "float"))[1]
         if isinstance(value, (int, float)):
             return float(max(value, 0)) if tag == "spectrum" else spectra.d65(max(value, 0))
-        return self.form(value)
+        return spectra.rgb(value) if isinstance(value, list) else self.form(value)
 
     def plain(self, plugin, name, default):
         return self.form(plugin.get(name, default))
@@ -151,6 +153,9 @@ class Values:
         if made is None:
             self.losses.add(plugin.place, f"texture '{plugin.kind}'", "0.5")
             plugin.left.clear()
+            return 0.5
+        if plugin.kind in ("bitmap", "checkerboard") and not self.has_uvs:
+            self.losses.add(plugin.place, "a texture on a mesh without texture coordinates", "0.5")
             return 0.5
         return made(plugin, numbers)
 
@@ -225,14 +230,14 @@ class Values:
     def of_checkerboard(self, plugin, numbers):
         # Mitsuba's squares have a side of one half, and numbers come in the other order than colours.
         names = ("color1", "color0") if numbers else ("color0", "color1")
-        colors = [(self.number if numbers else self.reflectance)(plugin, name, 0.4 if name == "color0" else 0.2)
-                  for name in names]
+        read = self.number if numbers else self.reflectance
+        colors = [read(plugin, name, {"color0": 0.4, "color1": 0.2}[name]) for name in names]
         half = np.diag([2.0, 2.0, 1.0])
         return {"checker": colors} | self.placed(plugin, half @ flat(plugin.transform("to_uv")) @ self.uv)
 
     def of_mesh_attribute(self, plugin, numbers):
         name = str(plugin.get("name", "vertex_color"))
-        if numbers or "color" not in name or not name.startswith("vertex_"):
+        if numbers or not self.has_colors or "color" not in name or not name.startswith("vertex_"):
             self.losses.add(plugin.place, f"the mesh attribute '{name}'", "0.5")
             return 0.5
         return {"attribute": "colors"}

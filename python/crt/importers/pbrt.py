@@ -13,6 +13,7 @@ from .pbrt_state import State
 from .pbrt_text import Parameters
 from .pbrt_values import Values
 
+SIDED = ("dielectric", "rough_dielectric", "openpbr", "mix")  # Materials that may let light in.
 FILTERS = {"box": "box", "gaussian": "gaussian"}
 
 
@@ -139,7 +140,7 @@ class Importer:
         if window is not None and len(window) == 4:
             half = [(window[1] - window[0]) / 2, (window[3] - window[2]) / 2]
             if not np.allclose([window[0] + window[1], window[2] + window[3]], 0, atol=1e-6):
-                self.losses.add(found.place, "a screen window that is not in the middle", "one in the middle")
+                self.losses.add(found.place, "a screen window off the middle", "one in the middle")
         if not np.isclose(half[0] / max(half[1], 1e-30), width / height, rtol=0.01):
             self.losses.add(found.place, "pixels that are not square", "square pixels")
         return half
@@ -263,7 +264,7 @@ class Importer:
             material = self.scene.material("black", BLACK)
         places = [placement @ graphics.matrix for placement in placements]
         content = self.scene.materials[material]
-        sided = emitter is not None or "dielectric" in content["type"] or content["type"] in ("openpbr", "mix")
+        sided = emitter is not None or content["type"] in SIDED
         geometry = self.shapes.geometry(found, graphics.reverse, stretches(places), sided=sided,
                                         textured=pbrt_shapes.has_texture(content, self.scene.materials))
         if geometry is None:

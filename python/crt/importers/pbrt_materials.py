@@ -120,7 +120,8 @@ class Materials:
         """Roughness where crt has a number alone, the same in all directions."""
         value = widths["roughness"]
         if isinstance(value, dict) or len(widths) > 1:
-            self.losses.add(found.place, f"a texture or a direction of roughness of {found}", "one roughness")
+            self.losses.add(found.place, f"a texture or a direction of roughness of {found}",
+                            "one roughness")
         return 0.3 if isinstance(value, dict) else value
 
     # By the names of pbrt.
@@ -132,7 +133,8 @@ class Materials:
         return {"type": "diffuse", "reflectance": self.values.reflectance(found, "reflectance", 0.5)}
 
     def of_coateddiffuse(self, found):
-        made = self.of_diffuse(found) | {"type": "plastic", "roughness": self.single(found, self.widths(found))}
+        rough = self.single(found, self.widths(found))
+        made = self.of_diffuse(found) | {"type": "plastic", "roughness": rough}
         eta = self.values.unbounded(found, "eta", 1.5)
         index = eta if isinstance(eta, (int, float)) else spectra.mean(eta) or 1.5
         self.no_coat_medium(found)

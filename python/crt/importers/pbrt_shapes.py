@@ -7,7 +7,7 @@ import numpy as np
 from . import matrices, shapes
 from .draft import ball, meshed, plate, tube
 from .losses import refuse, suggestion
-from .meshes import Damaged, ply_header, read_bytes, read_ply
+from .meshes import Damaged, faced, ply_header, read_bytes, read_ply
 
 CORNERS = np.array([[0, 0], [1, 0], [1, 1]], np.float32)  # Texture coordinates of a triangle without any.
 
@@ -21,25 +21,14 @@ def has_texture(content, materials):
     return isinstance(content, list) and any(has_texture(inner, materials) for inner in content)
 
 
-def faced(mesh):
-    """Faces that their normals see from behind are turned: normals say where the outside is."""
-    if "normals" not in mesh:
-        return mesh
-    corners = mesh["positions"][mesh["faces"]].astype(float)
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    behind = (across * mesh["normals"][mesh["faces"]].astype(float).sum(1)).sum(1) < 0
-    faces = mesh["faces"].copy()
-    faces[behind] = faces[behind][:, ::-1]
-    return mesh | {"faces": faces}
-
-
 def with_corners(mesh):
     """The mesh with the texture coordinates that pbrt gives to triangles without any."""
     if "uvs" in mesh:
         return mesh
     flat = mesh["faces"].reshape(-1)
     made = {key: mesh[key][flat] for key in ("positions", "normals") if key in mesh}
-    return made | {"faces": np.arange(len(flat)).reshape(-1, 3), "uvs": np.tile(CORNERS, (len(flat) // 3, 1))}
+    return made | {"faces": np.arange(len(flat)).reshape(-1, 3),
+                   "uvs": np.tile(CORNERS, (len(flat) // 3, 1))}
 
 
 class Shapes:
@@ -47,7 +36,7 @@ class Shapes:
         self.state, self.losses = state, losses
 
     def geometry(self, found, reverse, stretched, *, sided, textured):
-        """The keys of an object; None for what crt has not. `sided`: it matters which side is the outside."""
+        """The keys of an object; None for what crt has not. `sided`: it matters which side is outside."""
         make = getattr(self, "of_" + found.name, None)
         if make is None:
             known = [name[3:] for name in dir(self) if name.startswith("of_")]
@@ -148,8 +137,8 @@ class Shapes:
         found.left.discard("emissionfilename")
         faces = mesh["faces"][:, [0, 1, 3, 2]]
         corners = mesh["positions"][faces].astype(float)
-        bent = np.abs(np.einsum("ij,ij->i", np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]),
-                                corners[:, 2] - corners[:, 0]))
+        first, last = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
+        bent = np.abs((np.cross(first, last) * (corners[:, 2] - corners[:, 0])).sum(1))
         size = np.linalg.norm(corners.max(1) - corners.min(1), axis=1)
         if np.any(bent > 1e-4 * size**3):
             self.losses.add(found.place, "bent patches", "two triangles each")
@@ -195,7 +184,8 @@ class Shapes:
 
     def ply_has_uvs(self, found, path):
         try:
-            names = {name for element, _, properties in ply_header(read_bytes(path))[1] if element == "vertex"
+            _, elements, _ = ply_header(read_bytes(path))
+            names = {name for element, _, properties in elements if element == "vertex"
                      for name, _, _ in properties}
         except Damaged as error:
             refuse(found.values["filename"][2], f"'{path}' cannot be read: {error}")

@@ -184,7 +184,8 @@ class State:
     def do_TransformEnd(self, text, place):
         now = self.graphics
         self.end("Transform", place)
-        self.graphics = dataclasses.replace(now, matrix=self.graphics.matrix, at_start=self.graphics.at_start)
+        before = self.graphics
+        self.graphics = dataclasses.replace(now, matrix=before.matrix, at_start=before.at_start)
 
     def do_ReverseOrientation(self, text, place):
         self.graphics.reverse = not self.graphics.reverse

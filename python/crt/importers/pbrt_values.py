@@ -69,7 +69,8 @@ class Values:
             metal, _, part = rest.rpartition("-")
             if metal not in spectra.METALS:
                 found = OTHER_METALS.get(metal, "Al")
-                self.losses.add(place, f"the metal '{metal}'{suggestion(metal, spectra.METALS)}", f"'{found}'")
+                close = suggestion(metal, spectra.METALS)
+                self.losses.add(place, f"the metal '{metal}'{close}", f"'{found}'")
                 metal = found
             return {"data": f"metals/{metal}/{'n' if part == 'eta' else 'k'}"}
         if family == "glass":
@@ -145,7 +146,8 @@ class Values:
     def constant(self, parameters, name, default):
         made = self.number(parameters, name, default)
         if isinstance(made, dict):
-            self.losses.add(parameters.values[name][2], f"a texture as '{name}' of {parameters}", f"{default:g}")
+            self.losses.add(parameters.values[name][2], f"a texture as '{name}' of {parameters}",
+                            f"{default:g}")
             return default
         return made
 
@@ -219,7 +221,8 @@ class Values:
             return made
         image = image * np.float32(scale)
         image = np.clip(1 - image if invert else image, 0, 1)
-        return made | {"texture": image, "color_space": "linear" if made.get("color_space") != "raw" else "raw"}
+        space = "raw" if made.get("color_space") == "raw" else "linear"
+        return made | {"texture": image, "color_space": space}
 
     @staticmethod
     def factor(made):
@@ -256,7 +259,7 @@ class Values:
         amount = self.part(found, "float", "amount", 0.5, depth)
         if all(isinstance(v, (int, float)) for v in (one, other, amount)):
             return one * (1 - amount) + other * amount
-        self.losses.add(found.place, f"{found}", "the first texture" if amount == 0 else "one of its textures")
+        self.losses.add(found.place, f"{found}", "the one of its textures that has the larger share")
         return one if isinstance(amount, float) and amount < 0.5 else other
 
     def tex_checkerboard(self, found, kind, depth):

@@ -18,7 +18,8 @@ def about_y(matrix):
     such a turn."""
     linear = matrix[:3, :3]
     angle = math.atan2(linear[0, 2], linear[2, 2])
-    turn = np.array([[math.cos(angle), 0, math.sin(angle)], [0, 1, 0], [-math.sin(angle), 0, math.cos(angle)]])
+    cos, sin = math.cos(angle), math.sin(angle)
+    turn = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
     return math.degrees(angle) if np.allclose(linear, turn, atol=1e-6) else None
 
 

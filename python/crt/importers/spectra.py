@@ -76,12 +76,13 @@ def scaled(spectrum, factor):
 def planck(kelvin, nm):
     """W·m⁻²·sr⁻¹·nm⁻¹."""
     metres = np.asarray(nm, float) * 1e-9
-    return 1.1910429724e-16 / metres**5 / np.expm1(np.minimum(0.014387768775 / (metres * kelvin), 700)) * 1e-9
+    exponent = np.minimum(0.014387768775 / (metres * kelvin), 700)
+    return 1.1910429724e-16 / metres**5 / np.expm1(exponent) * 1e-9
 
 
 def luminance(spectrum):
-    """∫ spectrum y dλ / ∫ y dλ of a spectrum of crt that is a light: what its radiance adds to the Y of an
-    image. None where it is not known (a name, a file)."""
+    """∫ spectrum y dλ / ∫ y dλ of a spectrum of crt that is a light: the Y that its radiance gives. None where
+    it is not known (a name, a file)."""
     if isinstance(spectrum, (int, float)):
         return float(spectrum)
     scale = spectrum.get("scale", 1)
