@@ -7,7 +7,7 @@ import numpy as np
 
 from . import spectra
 from .losses import suggestion
-from .mitsuba_values import Values
+from .mitsuba_values import Values, pixels
 from .draft import BLACK
 
 INDICES = {"vacuum": 1.0, "helium": 1.000036, "hydrogen": 1.000132, "air": 1.000277,
@@ -120,8 +120,8 @@ class Materials:
 
     def root_image(self, plugin, made):
         """A texture of widths as one of their square roots."""
-        from .mitsuba_values import pixels
-        found = pixels(made["texture"]) if "texture" in made else None
+        raw = made.get("color_space") == "raw"
+        found = pixels(made["texture"], raw) if "texture" in made else None
         if found is None:
             self.losses.add(plugin.place, f"a texture as 'alpha' of {plugin}", "roughness 0.3")
             return 0.3

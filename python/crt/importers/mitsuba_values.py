@@ -15,15 +15,22 @@ IMAGES = (".png", ".jpg", ".jpeg", ".tga", ".exr", ".hdr", ".rgbe", ".pfm")
 FLIP_V = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])
 
 
-def pixels(path):
-    """An image as (height, width, 3), linear; None where crt cannot read it as one."""
+BYTES = (".png", ".jpg", ".jpeg", ".tga")  # Files of 8 or 16 bits, which are sRGB-encoded.
+
+
+def pixels(path, raw=False):
+    """An image as (height, width, 3), linear, or `raw`: with the numbers of the file; None where crt cannot
+    read it as one."""
     try:
         image = _crt.Image.load(os.fspath(path))
     except Error:
         return None
     names = [name.rpartition(".")[2].upper() for name in image.channels]
     order = [names.index(c) for c in "RGB"] if set("RGB") <= set(names) else [0, 0, 0]
-    return np.array(image.pixels)[:, :, order]
+    made = np.array(image.pixels)[:, :, order]
+    if raw and path.suffix.lower() in BYTES:
+        made = np.where(made <= 0.0031308, 12.92 * made, 1.055 * made ** (1 / 2.4) - 0.055)
+    return made.astype(np.float32)
 
 
 def uv_keys(matrix):
@@ -264,6 +271,8 @@ class Values:
         made = {"texture": pathlib.Path(path)}
         if raw:
             made["color_space"] = "raw" if numbers else "linear"
+        elif numbers and path.suffix.lower() in BYTES:
+            made["color_space"] = "srgb"
         if wrap in ("mirror", "clamp"):
             made["wrap"] = wrap
         if filtering == "nearest":

@@ -107,7 +107,7 @@ class Materials:
             return made | {"checker": [min(max(v, 0), 1) ** power for v in made["checker"]]}
         image = made.get("texture")
         if image is not None and not hasattr(image, "dtype"):
-            image = pixels(image)
+            image = pixels(image, made.get("color_space") == "raw")
         if image is None:
             self.losses.add(found.place, f"a texture of roughness of {found}", "roughness 0.3")
             return 0.3

@@ -6,7 +6,7 @@ import numpy as np
 
 from . import spectra
 from .losses import refuse, suggestion
-from .mitsuba_values import IMAGES, pixels
+from .mitsuba_values import BYTES, IMAGES, pixels
 
 GLASSES = {"BK7": "N-BK7", "F10": "SF10", "F11": "SF11"}
 # Indices at 587.6 nm and Abbe's numbers of the catalogue.
@@ -200,7 +200,7 @@ class Values:
             made["color_space"] = "linear" if kind == "spectrum" else "raw"
         elif encoding not in ("", "sRGB"):
             self.losses.add(found.place, f"the encoding '{encoding}'", "sRGB")
-        elif kind == "float" and path.suffix.lower() in (".png", ".jpg", ".jpeg", ".tga"):
+        elif kind == "float" and path.suffix.lower() in BYTES:
             made["color_space"] = "srgb"
         wrap = found.string("wrap", "repeat")
         if wrap == "clamp":
@@ -215,14 +215,14 @@ class Values:
         """An image times a number, and 1 minus that."""
         if not invert and 0 <= scale <= 1:
             return made | ({"factor": scale * self.factor(made)} if scale != 1 else {})
-        image = pixels(made["texture"]) if not hasattr(made["texture"], "dtype") else made["texture"]
+        image, raw = made["texture"], made.get("color_space") == "raw"
+        image = image if hasattr(image, "dtype") else pixels(image, raw)
         if image is None:
             self.losses.add(found.place, "an image that is inverted or made brighter", "the image as it is")
             return made
         image = image * np.float32(scale)
         image = np.clip(1 - image if invert else image, 0, 1)
-        space = "raw" if made.get("color_space") == "raw" else "linear"
-        return made | {"texture": image, "color_space": space}
+        return made | {"texture": image, "color_space": "raw" if raw else "linear"}
 
     @staticmethod
     def factor(made):
