@@ -181,7 +181,7 @@ def test_materials_become_those_of_crt(tmp_path):
 
 
 def test_plastic_without_nonlinear_has_the_albedo_of_mitsubas(tmp_path):
-    """Mitsuba: T ρ (1 − F) / (1 − F_in) / n² of light from everywhere, with F of both sides of Fresnel."""
+    """What the coat lets out of crt's base and of Mitsuba's is the same after all rounds below it."""
     from crt.importers.mitsuba_materials import inner_reflectance
     inner = inner_reflectance(1.5)
     near(inner, 0.5964, 1e-3)  # Of index 1.5, as tables have it.

@@ -114,7 +114,8 @@ def test_radiance_of_area_lights(tmp_path, light, wanted):
 
 
 def test_area_of_round_lights(tmp_path):
-    for shape, area in (('"sphere" "float radius" 2', 16 * math.pi), ('"disk" "float radius" 2', 4 * math.pi),
+    for shape, area in (('"sphere" "float radius" 2', 16 * math.pi),
+                        ('"disk" "float radius" 2', 4 * math.pi),
                         ('"cylinder" "float radius" 2', 8 * math.pi)):
         light = '"rgb L" [1 1 1] "float power" 1'
         path = scene(tmp_path, lamp(f"Scale 2 2 2 Shape {shape}", light))

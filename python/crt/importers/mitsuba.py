@@ -181,7 +181,7 @@ class Importer:
         self.scene.film["filter"] = {"type": "gaussian", "sigma": sigma, "radius": 4 * sigma}
 
     def sampler(self, plugin):
-        self.scene.sampler = {"samples": max(int(plugin.number("sample_count", 4)), 1)}
+        self.scene.sampler = {"samples": min(max(int(plugin.number("sample_count", 4)), 1), 2**53)}
         if plugin.has("seed"):
             self.scene.sampler["seed"] = max(int(plugin.number("seed", 0)), 0)
         plugin.left -= {"jitter", "scramble"}

@@ -313,10 +313,8 @@ class Materials:
         aspect = math.sqrt(1 - 0.9 * min(max(values.constant(plugin, "anisotropic", 0.0), 0), 1))
         rough = values.number(plugin, "roughness", 0.5)
         made = {"type": "openpbr", "base_color": values.reflectance(plugin, "base_color")}
-        if isinstance(rough, dict) or aspect == 1:
-            made["specular_roughness"] = rough if isinstance(rough, dict) else min(max(rough, 0.0), 1.0)
-        else:
-            made |= renamed_widths(spectra.anisotropic(rough**2 / aspect, rough**2 * aspect))
+        bounded = rough if isinstance(rough, dict) else min(max(rough, 0.0), 1.0)
+        made["specular_roughness"] = bounded
         if plugin.has("eta"):
             made["specular_ior"] = values.constant(plugin, "eta", 1.5)
         elif plugin.has("specular"):
@@ -327,6 +325,14 @@ class Materials:
             if plugin.has(name):
                 made[key] = values.number(plugin, name, 0.0)
         clear = bool(made.get("transmission_weight", 0) != 0)
+        pure = 1 in (made.get("base_metalness", 0), made.get("transmission_weight", 0))
+        if isinstance(rough, dict) and (not pure or "coat_weight" in made):
+            self.losses.add(plugin.place, "a texture of roughness of what is no pure metal or glass", "0.5")
+            made["specular_roughness"] = 0.5
+        if aspect != 1 and (isinstance(rough, dict) or not pure):
+            self.losses.add(plugin.place, "'anisotropic' of what is no pure metal or glass", "0")
+        elif aspect != 1:
+            made |= renamed_widths(spectra.anisotropic(bounded**2 / aspect, bounded**2 * aspect))
         if made.get("coat_weight"):
             self.losses.add(plugin.place, "'clearcoat' of bsdf 'principled'",
                             "a coat of a quarter of that weight")

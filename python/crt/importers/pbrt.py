@@ -82,10 +82,10 @@ class Importer:
         self.filter(self.setting("PixelFilter", "gaussian"))
         film.left -= {"filename", "diagonal", "maxcomponentvalue", "savefp16"}
         self.unused(film)
-        self.scene.sampler = {"samples": max(int(sampler.number("pixelsamples", 16)), 1)}
+        samples = sampler.number("pixelsamples", 16)
         if sampler.has("xsamples"):
             samples = sampler.number("xsamples", 4) * sampler.number("ysamples", 4)
-            self.scene.sampler["samples"] = max(int(samples), 1)
+        self.scene.sampler = {"samples": int(min(max(samples, 1), 2**53))}
         if sampler.has("seed"):
             self.scene.sampler["seed"] = max(int(sampler.number("seed", 0)), 0)
         sampler.left -= {"randomization", "jitter"}

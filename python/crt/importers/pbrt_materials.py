@@ -74,7 +74,8 @@ class Materials:
     def absorbing(self, content, inside):
         """Glass with the absorption of the medium within it."""
         medium = self.state.media.get(inside)
-        if medium is None or content["type"] not in ("dielectric", "rough_dielectric"):
+        glass = content["type"] in ("dielectric", "rough_dielectric")
+        if medium is None or not glass or "opacity" in content:  # crt wants such a body closed.
             return content
         scattered = self.values.unbounded(medium, "sigma_s", 1.0)
         if medium.name != "homogeneous" or medium.has("preset") or scattered != 0:
@@ -168,6 +169,8 @@ class Materials:
 
     def of_coatedconductor(self, found):
         below = self.widths(found, "conductor.")
+        if isinstance(below["roughness"], dict):
+            below = {"roughness": self.single(found, below)}
         above = self.single(found, self.widths(found, "interface."))
         if found.has("reflectance"):
             color = self.values.reflectance(found, "reflectance", 0.5)

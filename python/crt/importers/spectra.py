@@ -81,8 +81,8 @@ def planck(kelvin, nm):
 
 
 def luminance(spectrum):
-    """∫ L y dλ / ∫ y dλ of the spectrum L of a light: the Y that its radiance gives. None where it is not
-    known (a name, a file)."""
+    """∫ L y dλ / ∫ y dλ of the spectrum L of a light: the Y that its radiance gives. None where it
+    is not known (a name, a file)."""
     if isinstance(spectrum, (int, float)):
         return float(spectrum)
     scale = spectrum.get("scale", 1)
