@@ -307,3 +307,34 @@ def test_errors_have_their_place(tmp_path, text, line, column, phrase):
     assert caught.value.kind == crt.Kind.SCENE
     assert (caught.value.file, caught.value.line, caught.value.column) == (str(path), line, column)
     assert str(caught.value).startswith(f"{path}:{line}:{column}: error: ")
+
+
+def test_grey_light_is_white(tmp_path):
+    seen = imported(scene(tmp_path, lamp('<scale value="9"/>', "2")), 256).mean((0, 1))
+    assert np.allclose(seen, 2, atol=0.02)
+
+
+CHECKER = '<bsdf type="twosided"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">' \
+          '<spectrum name="color0" value="0.1"/><spectrum name="color1" value="0.9"/></texture></bsdf></bsdf>'
+
+
+def test_textures_on_shapes_have_their_coordinates(tmp_path):
+    """Squares of Mitsuba's checkerboard have a side of one half; v goes down its spheres."""
+    path = scene(tmp_path, f'<shape type="rectangle">{CHECKER}</shape><shape type="sphere">{CHECKER}</shape>')
+    made = list(crt.import_scene(path).content["materials"].values())
+    assert made[0]["reflectance"] == {"checker": [0.1, 0.9], "scale": [2, 2]}
+    assert made[1]["reflectance"] == {"checker": [0.1, 0.9], "scale": [2, -2], "offset": [0, 2]}
+
+
+def test_a_mesh_is_smooth_where_mitsuba_works_normals_out(tmp_path):
+    written(tmp_path, "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    written(tmp_path, "n.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 2\nf 1//1 2//1 3//1\n")
+    flip = '<boolean name="flip_normals" value="true"/>'
+    path = scene(tmp_path, "".join(
+        f'<shape type="obj"><string name="filename" value="{name}"/>{more}</shape>' for name, more in
+        (("m.obj", ""), ("m.obj", '<boolean name="face_normals" value="true"/>'), ("n.obj", ""),
+         ("n.obj", flip))))
+    first, flat, own, turned_over = crt.import_scene(path).content["objects"]
+    assert (first["normals"], first["crease_angle_deg"]) == ("smooth", 180)
+    assert flat["normals"] == "flat" and "normals" not in own
+    assert turned_over["mesh"]["normals"].tolist() == [[0, 0, -2]] * 3

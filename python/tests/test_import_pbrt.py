@@ -322,3 +322,26 @@ def test_errors_have_their_place(tmp_path, text, line, column, phrase):
     assert phrase in str(caught.value)
     assert caught.value.kind == crt.Kind.SCENE
     assert (caught.value.file, caught.value.line, caught.value.column) == (str(path), line, column)
+
+
+def test_power_of_a_spot(tmp_path):
+    path = scene(tmp_path, 'LightSource "spot" "rgb I" [1 1 1] "float power" 10 "float coneangle" 60'
+                 ' "float conedeltaangle" 60')
+    light, = crt.import_scene(path).content["lights"]
+    near(light["radiant_intensity"]["scale"], 10 / (2 * math.pi * 0.25), 1e-9)
+
+
+def test_images_of_roughness_become_crts(tmp_path):
+    """Two roots: crt's roughness is the root of the width, which is the root of pbrt's roughness."""
+    written(tmp_path, "t.pfm", pfm([[[0.0625] * 3, [1] * 3]]))
+    made = material(tmp_path, 'Texture "t" "float" "imagemap" "string filename" "t.pfm"\n'
+                    'Material "conductor" "texture roughness" "t"')
+    assert np.allclose(made["roughness"]["texture"], [[0.5, 1]])
+
+
+def test_matrices_are_given_by_columns(tmp_path):
+    for word, wanted in (("Transform", [5, 6, 7]), ("ConcatTransform", [6, 6, 7])):
+        path = scene(tmp_path, f'Translate 1 0 0 {word} [1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1] Shape "sphere"',
+                     before="Scale -1 1 1\n" + LOOK)
+        matrix = crt.import_scene(path).content["objects"][0]["transform"][0]["matrix"]
+        assert matrix[3:12:4] == wanted
