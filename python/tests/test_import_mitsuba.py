@@ -275,11 +275,14 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
 <shape type="sphere"><bsdf type="hairy"/><float name="wobble" value="1"/></shape>
 <shape type="sfere"/>
 <emitter type="projector"/>
+<shape type="cube"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">
+<float name="wobble" value="2"/></texture></bsdf></shape>
 </scene>""")
     assert whats(path) == {"2": ("bsdf 'hairy'", "grey, diffuse", 2),
                            "3": ("'wobble' of shape 'sphere'", "left out", 1),
                            "4": ("shape 'sfere'; did you mean 'sphere'?", "left out", 1),
-                           "5": ("emitter 'projector'", "left out", 1)}
+                           "5": ("emitter 'projector'", "left out", 1),
+                           "7": ("'wobble' of texture 'checkerboard'", "left out", 1)}
 
 
 @pytest.mark.parametrize("text, line, column, phrase", [
@@ -315,12 +318,14 @@ def test_grey_light_is_white(tmp_path):
 
 
 CHECKER = '<bsdf type="twosided"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">' \
-          '<spectrum name="color0" value="0.1"/><spectrum name="color1" value="0.9"/></texture></bsdf></bsdf>'
+          '<spectrum name="color0" value="0.1"/><spectrum name="color1" value="0.9"/>' \
+          "</texture></bsdf></bsdf>"
 
 
 def test_textures_on_shapes_have_their_coordinates(tmp_path):
     """Squares of Mitsuba's checkerboard have a side of one half; v goes down its spheres."""
-    path = scene(tmp_path, f'<shape type="rectangle">{CHECKER}</shape><shape type="sphere">{CHECKER}</shape>')
+    path = scene(tmp_path, "".join(f'<shape type="{shape}">{CHECKER}</shape>'
+                                   for shape in ("rectangle", "sphere")))
     made = list(crt.import_scene(path).content["materials"].values())
     assert made[0]["reflectance"] == {"checker": [0.1, 0.9], "scale": [2, 2]}
     assert made[1]["reflectance"] == {"checker": [0.1, 0.9], "scale": [2, -2], "offset": [0, 2]}

@@ -339,6 +339,23 @@ def test_images_of_roughness_become_crts(tmp_path):
     assert np.allclose(made["roughness"]["texture"], [[0.5, 1]])
 
 
+def test_numbers_in_encoded_images_are_decoded(tmp_path):
+    grey = np.full((2, 2, 3), 188, np.uint8)  # 0.5029 by IEC 61966-2-1.
+    write_png(tmp_path / "t.png", grey)
+    made = material(tmp_path, 'Texture "t" "float" "imagemap" "string filename" "t.png"\n'
+                    'Attribute "shape" "texture alpha" "t"')
+    assert np.allclose(made["opacity"]["texture"], 0.5029, atol=1e-3)
+    rough = material(tmp_path, 'Texture "t" "float" "imagemap" "string filename" "t.png"'
+                     ' "string encoding" "linear"\nMaterial "conductor" "texture roughness" "t"')
+    assert np.allclose(rough["roughness"]["texture"], (188 / 255)**0.25, atol=1e-3)
+
+
+def write_png(path, pixels):
+    from crt import pictures
+    path.write_bytes(pictures.png(np.where(pixels / 255 <= 0.04045, pixels / 255 / 12.92,
+                                           ((pixels / 255 + 0.055) / 1.055)**2.4)))
+
+
 def test_matrices_are_given_by_columns(tmp_path):
     for word, wanted in (("Transform", [5, 6, 7]), ("ConcatTransform", [6, 6, 7])):
         path = scene(tmp_path, f'Translate 1 0 0 {word} [1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1] Shape "sphere"',

@@ -120,12 +120,14 @@ class Materials:
 
     def root_image(self, plugin, made):
         """A texture of widths as one of their square roots."""
-        raw = made.get("color_space") == "raw"
-        found = pixels(made["texture"], raw) if "texture" in made else None
+        found = made.get("texture")
+        if found is not None and not hasattr(found, "dtype"):
+            found = pixels(found, made.get("color_space") == "raw")
         if found is None:
             self.losses.add(plugin.place, f"a texture as 'alpha' of {plugin}", "roughness 0.3")
             return 0.3
-        return made | {"texture": np.sqrt(np.clip(found[:, :, 0], 0, 1)), "color_space": "raw"}
+        values = found[:, :, 0] if found.ndim == 3 else found
+        return made | {"texture": np.sqrt(np.clip(values, 0, 1)), "color_space": "raw"}
 
     def factor(self, plugin, values, *names):
         """A factor on what microfacets reflect or let through, which physical surfaces do not have."""

@@ -33,6 +33,15 @@ def pixels(path, raw=False):
     return made.astype(np.float32)
 
 
+def decoded(losses, place, path):
+    """The keys of a texture of numbers that are sRGB-encoded in a file, which crt takes linear alone."""
+    found = pixels(path)
+    if found is None:
+        losses.add(place, "an encoded image where crt has linear numbers", "the numbers as they are")
+        return {"texture": path}
+    return {"texture": found.mean(2), "color_space": "raw"}
+
+
 def uv_keys(matrix):
     """scale, rotation_deg and offset of crt's textures for an affine map (3, 3) of texture coordinates;
     None where it shears."""
@@ -164,7 +173,11 @@ class Values:
         if plugin.kind in ("bitmap", "checkerboard") and not self.has_uvs:
             self.losses.add(plugin.place, "a texture on a mesh without texture coordinates", "0.5")
             return 0.5
-        return made(plugin, numbers)
+        found = made(plugin, numbers)
+        for name in sorted(plugin.left - {"accel", "format", "raw"}):
+            self.losses.add(plugin.values[name][2], f"'{name}' of {plugin}")
+        plugin.left.clear()
+        return found
 
     def emitted(self, plugin):
         if plugin.kind == "bitmap":
@@ -272,7 +285,7 @@ class Values:
         if raw:
             made["color_space"] = "raw" if numbers else "linear"
         elif numbers and path.suffix.lower() in BYTES:
-            made["color_space"] = "srgb"
+            made = decoded(self.losses, plugin.place, path)
         if wrap in ("mirror", "clamp"):
             made["wrap"] = wrap
         if filtering == "nearest":

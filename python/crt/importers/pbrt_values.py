@@ -6,7 +6,7 @@ import numpy as np
 
 from . import spectra
 from .losses import refuse, suggestion
-from .mitsuba_values import BYTES, IMAGES, pixels
+from .mitsuba_values import BYTES, IMAGES, decoded, pixels
 
 GLASSES = {"BK7": "N-BK7", "F10": "SF10", "F11": "SF11"}
 # Indices at 587.6 nm and Abbe's numbers of the catalogue.
@@ -201,7 +201,7 @@ class Values:
         elif encoding not in ("", "sRGB"):
             self.losses.add(found.place, f"the encoding '{encoding}'", "sRGB")
         elif kind == "float" and path.suffix.lower() in BYTES:
-            made["color_space"] = "srgb"
+            made |= decoded(self.losses, found.place, path)
         wrap = found.string("wrap", "repeat")
         if wrap == "clamp":
             made["wrap"] = "clamp"
