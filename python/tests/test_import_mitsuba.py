@@ -300,6 +300,8 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
     ("<scene><sensor type='perspective'><film type='hdrfilm'><integer name='width' value='1000000000'/>"
      "</film></sensor></scene>", 1, 35, "65535"),
     ("<world/>", 1, 1, "<world>"),
+    ("<scene><shape type='sphere'><string name='center' value='0 0 1'/></shape></scene>", 1, 29,
+     "three numbers"),
     ('<!DOCTYPE s [<!ENTITY a "b">]><scene/>', 1, 25, "entities"),
 ])
 def test_errors_have_their_place(tmp_path, text, line, column, phrase):

@@ -123,7 +123,7 @@ def object_of(thing, name, mirror):
 
 
 def steps(matrix):
-    return [{"matrix": matrices.numbers(matrix)}]
+    return [{"matrix": [*matrices.numbers(matrix[:3]), 0.0, 0.0, 0.0, 1.0]}]
 
 
 def placed(keys, mirror):

@@ -123,7 +123,7 @@ class Importer:
 
     def fov(self, plugin, aspect):
         """Across the shorter side, as crt has it."""
-        axis = plugin.get("fov_axis", "x")
+        axis = plugin.text("fov_axis", "x")
         if plugin.has("fov"):
             tangent = math.tan(math.radians(min(max(plugin.number("fov", 50), 1e-3), 179.9)) / 2)
         else:
@@ -200,7 +200,7 @@ class Importer:
         self.unused(plugin)
 
     def light_point(self, plugin):
-        where = plugin.get("position") or matrices.point(plugin.transform(), [0, 0, 0])
+        where = plugin.triple("position", None) or matrices.point(plugin.transform(), [0, 0, 0])
         self.scene.lights.append({"type": "point", "position": where,
                                   "radiant_intensity": self.values.emission(plugin, "intensity")})
 
@@ -225,7 +225,7 @@ class Importer:
         return found
 
     def light_directional(self, plugin):
-        direction = plugin.get("direction")
+        direction = plugin.triple("direction", None)
         direction = self.forward(plugin, plugin.transform()) if direction is None else direction
         if matrices.unit(direction) is None:
             refuse(plugin.place, f"{plugin} goes nowhere: its direction is 0")
@@ -334,7 +334,7 @@ class Importer:
         return bool(plugin.get("flip_normals", False))
 
     def shape_sphere(self, plugin):
-        center, radius = plugin.get("center", [0, 0, 0]), plugin.number("radius", 1)
+        center, radius = plugin.triple("center", [0, 0, 0]), plugin.number("radius", 1)
         if radius <= 0:
             refuse(plugin.place, "a sphere has a radius above 0")
         flip = self.flip(plugin)
@@ -346,7 +346,7 @@ class Importer:
         return plugin.transform(), lambda stretched: plate(1, stretched, flip=flip)
 
     def shape_cylinder(self, plugin):
-        low, high = (np.array(plugin.get(name, default), float)
+        low, high = (np.array(plugin.triple(name, default), float)
                      for name, default in (("p0", [0, 0, 0]), ("p1", [0, 0, 1])))
         length = np.linalg.norm(high - low)
         radius = plugin.number("radius", 1)

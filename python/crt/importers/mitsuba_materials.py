@@ -105,7 +105,7 @@ class Materials:
 
     def widths(self, plugin, values, textured):
         """The keys of crt's roughness."""
-        if plugin.get("distribution", "beckmann") != "ggx":
+        if plugin.text("distribution", "beckmann") != "ggx":
             self.losses.add(plugin.place, "microfacets of Beckmann's distribution", "GGX of the same width")
         plugin.get("sample_visible")
         if plugin.has("alpha_u", "alpha_v"):
@@ -325,7 +325,8 @@ class Materials:
         for name, key in (("metallic", "base_metalness"), ("spec_trans", "transmission_weight"),
                           ("clearcoat", "coat_weight")):
             if plugin.has(name):
-                made[key] = values.number(plugin, name, 0.0)
+                weight = values.number(plugin, name, 0.0)
+                made[key] = weight if isinstance(weight, dict) else min(max(weight, 0.0), 1.0)
         clear = bool(made.get("transmission_weight", 0) != 0)
         pure = 1 in (made.get("base_metalness", 0), made.get("transmission_weight", 0))
         if isinstance(rough, dict) and (not pure or "coat_weight" in made):

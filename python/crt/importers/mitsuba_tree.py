@@ -94,6 +94,19 @@ class Plugin:
             return float(value)
         refuse(self.values[name][2], f"'{name}' of {self.tag} '{self.kind}' is a number")
 
+    def triple(self, name, default):
+        """Three numbers: of a point or a vector."""
+        value = self.get(name, default)
+        if value is default or (isinstance(value, list) and len(value) == 3):
+            return value
+        refuse(self.values[name][2], f"'{name}' of {self.tag} '{self.kind}' is three numbers")
+
+    def text(self, name, default):
+        value = self.get(name, default)
+        if isinstance(value, str):
+            return value
+        refuse(self.values[name][2], f"'{name}' of {self.tag} '{self.kind}' is a text")
+
     def transform(self, name="to_world"):
         value = self.get(name)
         return value if isinstance(value, np.ndarray) and value.shape == (4, 4) else matrices.identity()

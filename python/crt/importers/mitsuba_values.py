@@ -135,7 +135,7 @@ class Values:
 
     def form(self, value):
         """A parameter's value, as mitsuba_tree has it, in crt's form."""
-        if isinstance(value, bool) or isinstance(value, str):
+        if isinstance(value, (bool, str, np.ndarray)):
             return 0.5
         if isinstance(value, (int, float)):
             return float(value)
@@ -276,7 +276,7 @@ class Values:
     def of_bitmap(self, plugin, numbers):
         path, readable = self.image(plugin)
         raw = plugin.get("raw", False)
-        wrap, filtering = plugin.get("wrap_mode", "repeat"), plugin.get("filter_type", "bilinear")
+        wrap, filtering = plugin.text("wrap_mode", "repeat"), plugin.text("filter_type", "bilinear")
         if not readable:
             if path:
                 self.losses.add(plugin.place, f"images of type '{path.suffix}'", "0.5")
