@@ -18,11 +18,12 @@ from ._crt import Device, ErrorEstimate, Film, Image, Plugin, bits_version
 from ._crt import version as _version
 from .denoising import Denoised, denoise
 from .errors import Error, Kind, RenderFailed
+from .importers import Imported, import_scene
 from .judging import Judgement, compare, converge, verify
 from .rendering import Result, develop, plugins, render
 from .scenes import Scene, example, examples, load, scene
 
 __version__ = _version()
-__all__ = ["Denoised", "Device", "Error", "ErrorEstimate", "Film", "Image", "Judgement", "Kind", "Plugin",
-           "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "denoise", "develop",
-           "example", "examples", "load", "plugins", "render", "scene", "verify"]
+__all__ = ["Denoised", "Device", "Error", "ErrorEstimate", "Film", "Image", "Imported", "Judgement", "Kind",
+           "Plugin", "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "denoise",
+           "develop", "example", "examples", "import_scene", "load", "plugins", "render", "scene", "verify"]

@@ -24,11 +24,12 @@ class Arrays:
         """A copy of `value`, a dict or a part of one, that names files instead of arrays."""
         if isinstance(value, collections.abc.Mapping):
             copy = {key: self.written(inner) for key, inner in value.items()
-                    if key not in ("mesh", "texture")}
+                    if key not in ("mesh", "texture", "image")}
             if "mesh" in value:
                 copy.update(self.mesh(value["mesh"]))
-            if "texture" in value:
-                copy["texture"] = self.texture(value["texture"])
+            for key in ("texture", "image"):
+                if key in value:
+                    copy[key] = self.texture(value[key])
             return copy
         if isinstance(value, (list, tuple)):
             return [self.written(inner) for inner in value]

@@ -1,0 +1,50 @@
+"""`crt import`: scenes of Mitsuba and pbrt here, models by the program."""
+
+import argparse
+import os
+import sys
+
+from .. import program
+from ..errors import Error, Kind
+from . import import_scene, is_foreign, writer
+
+
+def parser():
+    made = argparse.ArgumentParser(
+        prog="crt import", description="write a scene that shows what a scene of another program shows",
+        epilog="Models (.glb, .gltf, .obj, .ply) go to the program crt: crt import MODEL --help.")
+    made.add_argument("scene", metavar="SCENE",
+                      help="a scene of Mitsuba 3 (.xml) or pbrt-v4 (.pbrt, .pbrt.gz)")
+    made.add_argument("-o", "--output", metavar="YAML", default="-",
+                      help="the scene to write, with NAME.meshes beside it where there are meshes; standard "
+                           "output when left out, or -")
+    made.add_argument("--overwrite", action="store_true", help="replace a scene that is there")
+    made.add_argument("-D", "--define", metavar="NAME=VALUE", action="append", default=[],
+                      help="the value of $NAME in a scene of Mitsuba")
+    return made
+
+
+def definitions(words):
+    for word in words:
+        if "=" not in word:
+            raise Error(f"-D takes NAME=VALUE, not '{word}'", Kind.USAGE)
+    return dict(word.split("=", 1) for word in words)
+
+
+def main(arguments):
+    if not any(map(is_foreign, arguments)) and not {"-h", "--help"} & set(arguments):
+        path = str(program.path())
+        os.execv(path, [path, "import", *arguments])
+    given = parser().parse_args(arguments)
+    made = import_scene(given.scene, definitions(given.define))
+    remarks = [f"From {os.path.basename(given.scene)}."]
+    if made.losses:
+        remarks += ["What crt has not, where it stands first, and what is used instead:",
+                    *(f"  {loss}".replace("\n", " ") for loss in made.losses)]
+    if given.output == "-":
+        sys.stdout.write(writer.to_text(made.content, remarks))
+    else:
+        writer.to_file(made.content, remarks, given.output, given.overwrite)
+    for loss in made.losses:
+        print(f"crt: warning: {loss}", file=sys.stderr)
+    return 0
