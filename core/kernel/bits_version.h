@@ -13,10 +13,11 @@
  *   4   rough_conductor and rough_dielectric give back what their microfacets lose
  *   5   interpolated normals keep the light of surfaces that reflect
  *   6   nodes of the tree of lights have four children
+ *   7   a sphere that shines is not sampled from its own surface
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 6u
+#define CRT_BITS_VERSION 7u
 
 #endif

@@ -1,8 +1,9 @@
 /*
  * shape_light.h: shapes that emit, as light.h has triangles: crt_shape_light_sample and crt_shape_light_pdf.
  * A whole sphere is sampled by the cone of directions in which it is seen; what else there is uniformly on
- * its area. From inside a sphere, and from so near that a point's weight may exceed CRT_AREA_WEIGHT_MAX,
- * scattered rays alone find it. Which of them holds is decided by the point and the light alone.
+ * its area. From inside a sphere and from its own surface, and from so near that a point's weight may exceed
+ * CRT_AREA_WEIGHT_MAX, scattered rays alone find it. Which of them holds is decided by the point and the
+ * light alone.
  */
 #ifndef CRT_SHAPE_LIGHT_H
 #define CRT_SHAPE_LIGHT_H
@@ -18,9 +19,9 @@ CRT_FN int crt_is_shape_light(const CrtContext *ctx, u32 light) {
 
 /* How a shape is sampled from a point. */
 typedef struct CrtShapeView {
-    u32 technique;  /* CRT_LIGHT_BY_… */
-    vec3 towards;   /* the centre, from the point */
-    f32 distance2;  /* squared, of the centre */
+    u32 technique;        /* CRT_LIGHT_BY_… */
+    vec3 towards;         /* the centre, from the point */
+    f32 distance2;        /* squared, of the centre */
     f32 one_minus_cosine; /* by solid angle: of the cone's edge with its axis */
 } CrtShapeView;
 
@@ -36,9 +37,10 @@ CRT_FN f32 crt_shape_distance(CRT_GLOBAL const CrtShape *shape, vec3 q) {
     return crt_sqrt(crt_fma(across, across, height * height));
 }
 
+/* clearance: of the shape, within which a point of its surface is known. */
 CRT_FN CrtShapeView crt_shape_view(CRT_GLOBAL const CrtLight *light, CRT_GLOBAL const CrtShape *shape,
-                                   vec3 p) {
-    const f32 radius2 = shape->radius * shape->radius;
+                                   f32 clearance, vec3 p) {
+    const f32 radius2 = shape->radius * shape->radius, outside = shape->radius + clearance;
     CrtShapeView v;
     v.towards = crt_load3(shape->centre) - p;
     v.distance2 = dot3(v.towards, v.towards);
@@ -46,7 +48,7 @@ CRT_FN CrtShapeView crt_shape_view(CRT_GLOBAL const CrtLight *light, CRT_GLOBAL 
     v.technique = CRT_LIGHT_BY_CHANCE;
     if (CRT_HAS(OPACITY) && (light->flags & CRT_LIGHT_UNSAMPLED) != 0u) return v;
     if (shape->kind == CRT_SHAPE_SPHERE && shape->from_z < -shape->radius && shape->to_z > shape->radius) {
-        if (!(radius2 < v.distance2)) return v;
+        if (!(outside * outside < v.distance2)) return v;
         const f32 sine2 = radius2 / v.distance2;
         v.one_minus_cosine = sine2 / (1.0f + crt_sqrt(1.0f - sine2));
         v.technique = CRT_LIGHT_BY_SOLID_ANGLE;
@@ -95,7 +97,7 @@ CRT_FN CrtLightSample crt_shape_light_sample(const CrtContext *ctx, u32 index, C
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + light->slot;
     CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + light->slot;
     CRT_GLOBAL const CrtShape *shape = crt_shape_of(ctx, record->shape - 1u);
-    const CrtShapeView view = crt_shape_view(light, shape, p);
+    const CrtShapeView view = crt_shape_view(light, shape, face->clearance, p);
     CrtLightSample s;
     s.pdf = s.reach = s.cosine = s.distance = 0.0f;
     s.point = p;
@@ -137,7 +139,9 @@ CRT_FN CrtLightSeen crt_shape_light_pdf(const CrtContext *ctx, u32 index, vec3 p
     CRT_GLOBAL const CrtLight *light = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + index;
     CRT_GLOBAL const CrtTriangle *record =
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + light->slot;
-    const CrtShapeView view = crt_shape_view(light, crt_shape_of(ctx, record->shape - 1u), p);
+    CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + light->slot;
+    const CrtShapeView view =
+        crt_shape_view(light, crt_shape_of(ctx, record->shape - 1u), face->clearance, p);
     const vec3 d = point - p;
     const f32 distance = length3(d);
     CrtLightSeen seen;

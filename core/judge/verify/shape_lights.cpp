@@ -54,6 +54,41 @@ double cylinderFactor(double radius, double half, double height) {
            kPi;
 }
 
+/// What a camera sees inside a hollow shape of reflectance 0.5 that shines with radiance 1, at depth 1.
+std::string insideLamp(const std::string& shape, const std::string& transform, const std::string& view,
+                       const std::string& integrator, const char* two_sided) {
+    return fmt::format(
+        "crt: 1\ncamera: {{{}}}\nfilm: {{resolution: [8, 8]}}\nintegrator: {}\n"
+        "materials: {{grey: {{type: diffuse, reflectance: 0.5}}}}\n"
+        "objects: [{{material: grey, {}, transform: [{}], emission: {{radiance: 1, two_sided: {}}}}}]\n",
+        view, integrator, shape, transform, two_sided);
+}
+
+/// A lamp lights itself: of a sphere every place sees all others alike (the integrating sphere), so that a
+/// part of one, a share s of its area, shows 1 + s/2.
+void lampsThatLightThemselves(Context& context) {
+    const Effort effort{.samples = 256, .most = 65536};
+    for (const auto& [technique, integrator] : kDirectTechniques)
+        for (const char* two_sided : {"false", "true"}) {
+            const auto ask = [&](const std::string& what, const std::string& shape,
+                                 const std::string& transform, const std::string& view, double expected) {
+                context.estimate(fmt::format("{}, two_sided {}, {}", what, two_sided, technique),
+                                 insideLamp(shape, transform, view, integrator, two_sided), meanRadiance,
+                                 expected, 2e-3, effort);
+            };
+            for (const auto& [place, centre] :
+                 {std::pair{"at the origin", "0, 0, 0"}, {"far from it", "148376, 1234, -223423"}})
+                ask(fmt::format("a sphere {}", place), "sphere: {radius: 3, inward: true}",
+                    fmt::format("{{translate: [{}]}}", centre),
+                    fmt::format(
+                        "position: [{0}], target: [{1}], fov: 60", centre,
+                        std::string_view(place) == "at the origin" ? "0, 0, 1" : "148376, 1234, -223422"),
+                    1.5);
+            ask("the lower half of a sphere", "sphere: {radius: 2, to_z: 0, inward: true}", "{scale: 0.5}",
+                "position: [0, 0, 0.5], target: [0, 0, -1], up: [0, 1, 0], fov: 30", 1.25);
+        }
+}
+
 void shapeLamps(Context& context) {
     const Effort effort{.samples = 256, .most = 65536};
     for (const auto& [technique, integrator] : kDirectTechniques) {
@@ -133,7 +168,13 @@ std::vector<Case> shapeLightCases() {
             "form factors (Howell)", "± 0.5 %; ± 0.2 %", Level::Commit,
             CRT_FEATURE_SHAPES | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_DIFFUSE |
                 CRT_FEATURE_LIGHT_TREE,
-            shapeLamps)};
+            shapeLamps),
+        row("G43", "lamps-that-light-themselves",
+            "Inside spheres, whole and half, of reflectance 0.5 that shine inwards or on both sides",
+            "1 + s/2 of a share s of a sphere", "integrating sphere: all places see each other alike",
+            "± 0.2 %", Level::Commit,
+            CRT_FEATURE_SHAPES | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_DIFFUSE,
+            lampsThatLightThemselves)};
 }
 
 }  // namespace crt::verify
