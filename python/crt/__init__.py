@@ -14,6 +14,7 @@ sums on every backend, however the samples are split. Films of different samples
 `a.film + b.film` has the bits of one render of all.
 """
 
+from . import pickling
 from ._crt import Device, ErrorEstimate, Film, Image, Plugin, bits_version
 from ._crt import version as _version
 from .errors import Error, Kind, RenderFailed
@@ -21,6 +22,7 @@ from .judging import Judgement, compare, converge, verify
 from .rendering import Result, develop, plugins, render
 from .scenes import Scene, load, scene
 
+pickling.register()
 __version__ = _version()
 __all__ = ["Device", "Error", "ErrorEstimate", "Film", "Image", "Judgement", "Kind", "Plugin",
            "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "develop", "load",
