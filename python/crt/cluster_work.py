@@ -88,6 +88,7 @@ class Work:
         self.client, self.scene, self.options = client, scene, options
         self.missing, self.size, self.kept = missing, size, kept
         self.checkpoint = str(checkpoint) if checkpoint is not None else None
+        self.error = None   # Of `kept`: to ask a film for it takes as long as to add one.
         self.resumed = self.samples = kept.samples if kept is not None else 0
         self.every = max(checkpoint_every, SECONDS_A_PIXEL * scene.width * scene.height)
         self.name = f"crt-{uuid.uuid4().hex[:12]}"
@@ -227,6 +228,7 @@ class Work:
         film = self.coming.result()
         self.coming = None
         self.kept = film if self.kept is None else self.kept + film
+        self.error = self.kept.error
         self.merged = time.monotonic()
         if self.checkpoint is not None:
             self.kept.save(self.checkpoint)

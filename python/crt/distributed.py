@@ -178,8 +178,7 @@ class Look:
             return False  # It was merged for a checkpoint.
         while self.next <= work.kept.samples:
             self.next *= 2
-        error = work.kept.error
-        return error is not None and error.half_width_95 <= self.target
+        return work.error is not None and work.error.half_width_95 <= self.target
 
 
 def told(work, wanted, time_limit):
@@ -188,10 +187,9 @@ def told(work, wanted, time_limit):
     fraction = work.samples / wanted
     if time_limit is not None:
         fraction = max(fraction, min(1.0, seconds / time_limit))
-    error = work.kept.error if work.kept is not None else None
     return {"samples": work.samples, "samples_wanted": wanted if wanted != ENDLESS else None,
             "seconds": seconds, "fraction": fraction, "parts": work.parts, "threads": work.threads,
-            "relative_error": error.half_width_95 if error else None}
+            "relative_error": work.error.half_width_95 if work.error else None}
 
 
 class Interrupt:

@@ -152,8 +152,10 @@ def test_checkpoint_of_another_scene_is_kept(client, box, tmp_path):
     other["sampler.seed"] = 5
     crt.render(other, spp=16, backend="embree").save(path)
     before = path.read_bytes()
+    began = time.monotonic()
     with pytest.raises(crt.Error) as refused:
         crt.distributed.render(box, client, spp=1 << 20, checkpoint=path, **ONE)
+    assert time.monotonic() - began < 40  # And not at the first checkpoint, after a minute.
     assert refused.value.kind == crt.Kind.USAGE and path.read_bytes() == before
 
 
@@ -214,22 +216,20 @@ def fail(now):
 
 def test_a_failing_device_gets_no_more_parts(threads_client, box, monkeypatch):
     """Real tasks on real workers; only the failure is made."""
-    tried, broken = [], sorted(threads_client.nthreads())[0]
+    tried = []  # The first worker that tries has the broken device.
     real = cluster_work.render
 
     def render(scene, **options):
         address = distributed.get_worker().address
         tried.append(address)
-        if address == broken:
+        if address == tried[0]:
             raise crt.RenderFailed("the device is lost", crt.Kind.DEVICE, "", 0, 0, None)
         return real(scene, **options)
 
     monkeypatch.setattr(cluster_work, "render", render)
     result = crt.distributed.render(box, threads_client, spp=96, parts=12, **ONE)
     assert same_film(result.film, crt.render(box, spp=96, backend="embree").film)
-    assert 1 <= tried.count(broken) <= 2 and result.report["distributed"]["parts_redone"] >= 1
-    broken = None
-    tried.clear()
+    assert tried.count(tried[0]) <= 3 < len(tried) and result.report["distributed"]["parts_redone"] >= 1
     monkeypatch.setattr(cluster_work, "render", lambda scene, **options: render_failing())
     with pytest.raises(crt.Error, match="the device is lost") as raised:
         crt.distributed.render(box, threads_client, spp=96, parts=12, **ONE)
