@@ -27,6 +27,9 @@ BRANCH = 8   # Films of several workers that one task adds.
 PART_SECONDS = 20
 PARTS_A_SECOND = 10   # Of all workers together: what a scheduler and this process bear with ease.
 SECONDS_A_PIXEL = 160e-6  # Between two merges: a hundred times what packing, sending and reading takes.
+PARTS_A_SECOND_AT_FIRST = 200  # As long as parts grow.
+PARTS_A_SECOND_AT_LAST = 25    # When they get smaller, so that all end together.
+PROBES = 64  # Parts at once until that can be kept: a thousand tiny ones would hold the scheduler up.
 FAILURES = 3   # Of one part, on devices that fail.
 URGENT = 10    # Sums before parts, so that films do not pile up.
 
@@ -117,12 +120,17 @@ class Work:
         self.count_threads()
         spare = 0 if seconds_left is not None else -(-self.threads // 8)
         part_seconds = max(PART_SECONDS, self.threads / PARTS_A_SECOND)
+        least = max(PART_SECONDS / 8, self.threads / PARTS_A_SECOND_AT_LAST)
         if seconds_left is not None:
             part_seconds = min(part_seconds, seconds_left)
         left = self.missing.left
         soon = until - self.samples - sum(end - first for first, end, _ in self.running.values())
-        while left > 0 and len(self.running) < self.threads + spare:
-            first, end = self.missing.take(self.size.next(part_seconds, min(soon, left), self.threads))
+        most = self.threads + spare
+        if not self.size.is_known(min(part_seconds, self.threads / PARTS_A_SECOND_AT_FIRST)):
+            most = min(most, PROBES)
+        while left > 0 and len(self.running) < most:
+            samples = self.size.next(part_seconds, least, min(soon, left), self.threads)
+            first, end = self.missing.take(samples)
             left -= end - first
             soon -= end - first
             future = self.task(rendered, self.sent, first, end, self.options, seconds_left,

@@ -57,12 +57,16 @@ class PartSize:
         self.speed = speed if self.speed is None else 0.7 * self.speed + 0.3 * speed
         self.largest = max(self.largest, self.GROWTH * samples)
 
-    def next(self, seconds, left, threads):
-        """`left` samples are to be shared by so many threads."""
+    def is_known(self, seconds):
+        """Whether parts may have the size that takes so long, not only a few times that of earlier ones."""
+        return self.fixed is not None or (self.speed is not None and self.largest >= self.speed * seconds)
+
+    def next(self, seconds, least, left, threads):
+        """`left` samples are to be shared by so many threads, in parts of at least so many seconds."""
         if self.fixed is not None:
             return self.fixed
         share = left / (2 * max(threads, 1))
         if self.speed is None:
             return max(self.FEWEST, min(self.largest, share))
         wanted = self.speed * seconds
-        return max(self.FEWEST, min(self.largest, wanted, max(share, wanted / 8)))
+        return max(self.FEWEST, min(self.largest, wanted, max(share, self.speed * least)))
