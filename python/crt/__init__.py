@@ -14,6 +14,7 @@ sums on every backend, however the samples are split. Films of different samples
 `a.film + b.film` has the bits of one render of all.
 """
 
+from . import pickling
 from ._crt import Device, ErrorEstimate, Film, Image, Plugin, bits_version
 from ._crt import version as _version
 from .denoising import Denoised, denoise
@@ -23,6 +24,7 @@ from .judging import Judgement, compare, converge, verify
 from .rendering import Result, develop, plugins, render
 from .scenes import Scene, example, examples, load, scene
 
+pickling.register()
 __version__ = _version()
 __all__ = ["Denoised", "Device", "Error", "ErrorEstimate", "Film", "Image", "Imported", "Judgement", "Kind",
            "Plugin", "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "denoise",

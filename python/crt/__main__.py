@@ -8,7 +8,7 @@ from . import program
 from .errors import Error
 
 # Command: the module whose main(arguments) it is. It returns the exit code.
-COMMANDS = {"import": ".importers.command", "report": ".report"}
+COMMANDS = {"import": ".importers.command", "report": ".report", "slurm": ".slurm"}
 
 
 def main(arguments=None):

@@ -28,6 +28,9 @@ class Error(Exception):
         self.line = line or None
         self.column = column or None
 
+    def __reduce__(self):
+        return type(self), (str(self), self.kind, self.file or "", self.line or 0, self.column or 0)
+
 
 class RenderFailed(Error):
     """The device failed after the first samples; `film` is what was rendered before."""
@@ -35,3 +38,7 @@ class RenderFailed(Error):
     def __init__(self, sentence, kind, file, line, column, film):
         super().__init__(sentence, kind, file, line, column)
         self.film = film
+
+    def __reduce__(self):
+        made, arguments = super().__reduce__()
+        return made, (*arguments, self.film)

@@ -25,11 +25,15 @@ class Scene:
     keys); a value is anything that YAML has: numbers, strings, booleans, None, lists, dicts, NumPy scalars
     and arrays of numbers. The scene is read, and its errors are raised, when it is first rendered or asked
     for anything, and again after a key was set.
+
+    A scene pickles: of a file its path, for machines that share the file, of text or a dict all of it. Files
+    that the text names are looked up where it is unpickled.
     """
 
-    def __init__(self, read, file, overrides=None):
+    def __init__(self, read, file, origin, overrides=None):
         self._read = read
         self._file = file
+        self._origin = origin  # The function and its arguments that make this scene again.
         self._overrides = {}
         self._native = None
         for key, value in (overrides or {}).items():
@@ -60,10 +64,13 @@ class Scene:
 
     def copy(self):
         """Another scene of the same text and values, to be changed apart."""
-        other = Scene(self._read, self._file)
+        other = Scene(self._read, self._file, self._origin)
         other._overrides = dict(self._overrides)
         other._native = self._native
         return other
+
+    def __reduce__(self):
+        return made_again, (*self._origin, self._overrides)
 
     @contextlib.contextmanager
     def arguments(self):
@@ -104,6 +111,12 @@ class Scene:
         return f"<crt.Scene {self.title!r}, {self.width} x {self.height} pixels>"
 
 
+def made_again(function, arguments, overrides):
+    made = function(*arguments)
+    made._overrides = dict(overrides)
+    return made
+
+
 def plain(value):
     """`value` as numbers, strings, lists and dicts, without NumPy."""
     if isinstance(value, np.ndarray):
@@ -127,7 +140,7 @@ def load(path, set=None):
     """
     where = os.fspath(path)
     return Scene(lambda overrides: _crt.Scene.from_file(where, overrides, tell),
-                 lambda: contextlib.nullcontext(where), set)
+                 lambda: contextlib.nullcontext(where), (load, (os.path.abspath(where),)), set)
 
 
 def scene(source, directory=".", set=None, name="scene"):
@@ -160,7 +173,11 @@ def scene(source, directory=".", set=None, name="scene"):
         raise TypeError("a scene is a dict or YAML text, or crt.load(path) for a file, and no "
                         f"{type(source).__name__}")
 
-    return Scene(read, file, set)
+    return Scene(read, file, (again, (source, os.path.abspath(directory), name)), set)
+
+
+def again(source, directory, name):
+    return scene(source, directory, name=name)
 
 
 def examples_folder():

@@ -1,0 +1,91 @@
+"""What a Dask cluster on one machine costs beside one plain render of the same samples: wall and processor
+seconds, in turn, and whether the bits are the same. Prints one table; nothing is written.
+
+The workers are processes of one thread each, which render with one thread each; the plain render uses all
+threads. The cluster has been started when the clock begins, without the profiler of Dask and with its
+monitors every 10 s (docs/cluster.md). With --gpus a plain render on one device is
+compared with workers that have one GPU each, as CUDA_VISIBLE_DEVICES says."""
+
+import argparse
+import os
+import statistics
+import time
+
+import dask
+import distributed
+
+import crt
+import crt.distributed
+
+
+QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "10s",
+         "distributed.worker.memory.monitor-interval": "5s"}
+
+
+def processor_seconds(client):
+    """Of this process and all workers."""
+    return time.process_time() + sum(client.run(time.process_time).values())
+
+
+def start(workers, gpus):
+    """A cluster of so many processes; each sees one GPU where `gpus` is."""
+    if not gpus:
+        return distributed.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+    specification = {index: {"cls": distributed.Nanny,
+                             "options": {"nthreads": 1, "env": {"CUDA_VISIBLE_DEVICES": str(index)}}}
+                     for index in range(workers)}
+    scheduler = {"cls": distributed.Scheduler, "options": {"dashboard": False}}
+    return distributed.SpecCluster(workers=specification, scheduler=scheduler)
+
+
+def measured(client, render):
+    """(film, wall seconds, processor seconds)."""
+    busy, begin = processor_seconds(client), time.perf_counter()
+    result = render()
+    return result, time.perf_counter() - begin, processor_seconds(client) - busy
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="bench/cluster_overhead", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scene", default="configs/cornell_box.yaml")
+    parser.add_argument("--resolution", type=int, default=512)
+    parser.add_argument("--seconds", type=float, default=60, help="of the plain render, about (60)")
+    parser.add_argument("--workers", type=int, default=4)
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--backend", default="embree")
+    parser.add_argument("--gpus", action="store_true", help="a GPU for each worker")
+    arguments = parser.parse_args()
+
+    scene = crt.load(arguments.scene, set={"film.resolution": [arguments.resolution] * 2})
+    crt.render(scene, spp=2, backend=arguments.backend)  # Kernels and caches.
+    speed = crt.render(scene, backend=arguments.backend, time_limit=arguments.seconds / 10).film.samples
+    samples = 10 * speed
+    dask.config.set(QUIET)
+    with start(arguments.workers, arguments.gpus) as cluster, distributed.Client(cluster) as client:
+        client.wait_for_workers(arguments.workers)
+        threads = 0 if arguments.gpus else 1
+        cases = {
+            "one render": lambda: crt.render(scene, spp=samples, backend=arguments.backend),
+            "Dask": lambda: crt.distributed.render(scene, client, spp=samples, backend=arguments.backend,
+                                                   threads=threads)}
+        crt.distributed.render(scene, client, spp=4 * arguments.workers, parts=2 * arguments.workers,
+                               backend=arguments.backend, threads=threads)  # Workers load what they need.
+        found, films = {name: [] for name in cases}, {}
+        for _ in range(arguments.runs):
+            for name, render in cases.items():
+                result, wall, processor = measured(client, render)
+                films[name] = result.film
+                found[name].append((wall, processor))
+                print(f"{name}: {wall:.2f} s, {processor:.2f} processor seconds, load "
+                      f"{os.getloadavg()[0]:.1f}", result.report.get("distributed", ""), flush=True)
+    same = (films["one render"].xyz == films["Dask"].xyz).all()
+    print(f"\n{samples} samples of {arguments.resolution}² pixels, {arguments.workers} workers; "
+          f"{'the same bits' if same else 'OTHER BITS'}\n\n| | wall s | processor s |\n|---|---|---|")
+    for name, runs in found.items():
+        columns = [f"{statistics.median(c):.1f} ({min(c):.1f} – {max(c):.1f})" for c in zip(*runs)]
+        print(f"| {name} | {' | '.join(columns)} |")
+    ratios = [statistics.median(d[i] / p[i] for p, d in zip(found["one render"], found["Dask"]))
+              for i in range(2)]
+    print(f"| median ratio of neighbours | {ratios[0]:.3f} | {ratios[1]:.3f} |")
+    return 0 if same else 1

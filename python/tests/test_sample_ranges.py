@@ -1,0 +1,57 @@
+"""Which samples are left, and how large parts are."""
+
+import random
+
+from crt.sample_ranges import STEP, Missing, PartSize
+
+
+def covered(ranges):
+    return [i for first, end in ranges for i in range(first, end)]
+
+
+def test_parts_are_what_is_missing_and_no_more():
+    chance = random.Random(1)
+    for _ in range(300):
+        end = chance.randrange(1, 200)
+        cuts = sorted(chance.sample(range(260), 2 * chance.randrange(4)))
+        done = list(zip(cuts[::2], cuts[1::2]))
+        missing = Missing(done, end)
+        wanted = set(range(end)) - set(covered(done))
+        assert missing.left == len(wanted)
+        parts = []
+        while (part := missing.take(chance.choice([1, 2, 7, 16, 40]))) is not None:
+            parts.append(part)
+            assert part[0] < part[1]
+        assert sorted(covered(parts)) == sorted(wanted) and missing.left == 0
+
+
+def test_a_part_that_failed_is_given_again():
+    missing = Missing([], 64)
+    first = missing.take(16)
+    missing.take(16)
+    missing.give_back(*first)
+    assert missing.left == 48 and missing.take(16) == first
+
+
+def test_parts_are_of_whole_turns():
+    missing = Missing([(0, 5)], 1000)
+    assert missing.take(20) == (5, 32)
+    while (part := missing.take(20)) is not None:
+        assert part[0] % STEP == 0 and (part[1] % STEP == 0 or part[1] == 1000)
+    assert Missing([], 9).take(3) == (0, 4)
+
+
+def test_sizes_follow_the_speed_and_shrink_towards_the_end():
+    size = PartSize()
+    assert size.next(20, 2.5, 10_000, 4) == STEP and not size.is_known(20) and PartSize(7).is_known(20)
+    size.learn(16, 1.0)
+    assert not size.is_known(20) and size.is_known(8)
+    assert size.next(20, 2.5, 10_000, 4) == 8 * 16  # Grows step by step.
+    size.learn(128, 8.0)
+    size.learn(1024, 64.0)
+    assert size.next(20, 2.5, 1e6, 4) == 320  # 16 samples a second, 20 seconds.
+    assert size.next(20, 2.5, 800, 4) == 100  # Half of each thread's share.
+    assert size.next(20, 2.5, 80, 4) == 40    # No less than 2.5 seconds.
+    assert size.next(0.01, 0.01, 80, 4) == 2
+    assert PartSize(7).next(20, 2.5, 1e6, 4) == 7
+    assert PartSize().next(20, 2.5, 8, 4) == 2
