@@ -120,9 +120,11 @@ def simulate(client, workers, seconds, speed, spread):
     scene = crt.load("configs/cornell_box.yaml", set={"film.resolution": [64, 64]})
 
     def tell(now):
-        if now["parts"] % max(1, workers) == 0:
+        if now["parts"] // workers != tell.shown:
+            tell.shown = now["parts"] // workers
             print(f"{now['seconds']:.0f} s: {now['parts']} parts, {now['fraction']:.1%}", flush=True)
 
+    tell.shown = 0
     result = crt.distributed.render(scene, client, spp=samples, on_progress=tell, progress=False)
     if Missing(result.film.sample_ranges, samples).left or result.film.samples != samples:
         raise RuntimeError("samples are missing")

@@ -14,6 +14,7 @@ import socket
 import time
 import uuid
 import warnings
+from concurrent.futures import CancelledError
 
 from distributed import KilledWorker, get_worker
 from distributed.client import ClosedClientError
@@ -31,6 +32,7 @@ PARTS_A_SECOND_AT_FIRST = 200  # As long as parts grow.
 PARTS_A_SECOND_AT_LAST = 25    # When they get smaller, so that all end together.
 PROBES = 64  # Parts at once until that can be kept: a thousand tiny ones would hold the scheduler up.
 FAILURES = 3   # Of one part, on devices that fail.
+GONE = (OSError, ClosedClientError, CancelledError)
 URGENT = 10    # Sums before parts, so that films do not pile up.
 
 
@@ -75,7 +77,11 @@ def reaching(method):
     def tried(*arguments):
         try:
             return method(*arguments)
-        except (OSError, ClosedClientError) as gone:
+        except GONE as gone:
+            raise Error(f"the Dask cluster is gone: {gone}", Kind.DEVICE) from gone
+        except RuntimeError as gone:
+            if "ConnectionPool is closed" not in str(gone):
+                raise
             raise Error(f"the Dask cluster is gone: {gone}", Kind.DEVICE) from gone
     return tried
 
@@ -257,7 +263,7 @@ class Work:
     def cancel(self):
         """Leaves nothing on the cluster."""
         left = [*self.running, *(future for pile in self.piles.values() for future in pile), self.sent]
-        with contextlib.suppress(OSError, ClosedClientError):
+        with contextlib.suppress(*GONE, RuntimeError):
             self.client.cancel(left + ([self.coming] if self.coming is not None else []))
         self.running, self.piles, self.coming = {}, {}, None
 

@@ -79,7 +79,7 @@ class Slurm:
     """A context manager: meanwhile `environment` leads sbatch and others to this Slurm."""
 
     def __enter__(self):
-        # Munge wants a folder that others cannot write to, the whole way up; /tmp has the sticky bit.
+        # Munge wants a folder that others cannot write to, the whole way up, or one with the sticky bit.
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="crt-slurm-"))
         self.processes = []
         try:
