@@ -1,6 +1,10 @@
 #include "binding.h"
 
+namespace nb = nanobind;
+
 NB_MODULE(_crt, module) {
+    // Others may keep films until the interpreter ends, as Dask does.
+    nb::set_leak_warnings(false);
     module.doc() = "libcrt for the package crt, which says what each of these means.";
     crt_python::bindErrors(module);
     crt_python::bindScene(module);
