@@ -168,8 +168,8 @@ private:
         const Vec3d v{number[first], number[first + 1], number[first + 2]};
         if (std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2])) return v;
         loss.add(line, fmt::format("the {} of vertex {} is no finite number", what, vertex));
-        constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-        return {kNan, kNan, kNan};
+        constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+        return {kNoNumber, kNoNumber, kNoNumber};
     }
 
     void setVertex(std::size_t i, const std::array<double, kNumbers>& number, int line, Losses& losses) {
