@@ -6,7 +6,7 @@ namespace crt {
 namespace {
 
 constexpr std::uint32_t kWidth = 4;
-constexpr float kNodeCost = 1.5f;       // of a wide node in triangle tests; flat between 1 and 2.5
+constexpr float kNodeCost = 1.5f;             // of a wide node in triangle tests; flat between 1 and 2.5
 constexpr std::uint32_t kJoinedLeafSize = 4;  // of leaves that are joined here
 
 /// How a subtree is best made the children of a wide node.

@@ -26,7 +26,7 @@ namespace {
 constexpr std::size_t kMostTriangles = std::size_t{1} << 28;
 bool isFinite(const Vec3d& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
 
-constexpr std::size_t kCornersAtATime = std::size_t{1} << 14;  // of what a thread takes at a time
+constexpr std::size_t kTrianglesAPart = std::size_t{1} << 14;  // of what a thread takes at a time
 
 bool hasTexture(const Scene& scene, bool of_vertices) {
     return std::any_of(scene.textures.begin(), scene.textures.end(), [&](const Texture& t) {
@@ -90,7 +90,7 @@ public:
           placements_(placementsOf(scene, only)),
           shapes_(only ? std::vector<PlacedShape>() : placedShapes(scene)),
           instances_(only ? std::vector<PlacedMesh>() : placeMeshes()),
-          parts_(partsOf(trianglesOfPlacements(), kCornersAtATime)),
+          parts_(partsOf(trianglesOfPlacements(), kTrianglesAPart)),
           stage_("placing triangles", 2 * static_cast<double>(trianglesOfPlacements())) {
         const std::size_t count = trianglesOfPlacements(), all = count + shapes_.size();
         flat_.object = only;
@@ -188,8 +188,8 @@ private:
     }
 
     void forEachPart(const std::function<void(Part&)>& work) {
-        parallelFor(flat_.triangles.size(), kCornersAtATime, [&](std::size_t first, std::size_t end) {
-            Part& part = parts_[first / kCornersAtATime];
+        parallelFor(flat_.triangles.size(), kTrianglesAPart, [&](std::size_t first, std::size_t end) {
+            Part& part = parts_[first / kTrianglesAPart];
             part.first = first;
             part.end = end;
             work(part);
@@ -344,16 +344,16 @@ FlatScene flattenScene(const Scene& scene) {
 
 void flattenNormals(const Scene& scene, const FlatScene& flat, std::span<kernel::CrtNormals> normals) {
     const std::size_t count = flat.firstShape();
-    std::vector<std::size_t> first_normal(partsOf(count, kCornersAtATime));
-    parallelFor(count, kCornersAtATime, [&](std::size_t first, std::size_t end) {
+    std::vector<std::size_t> first_normal(partsOf(count, kTrianglesAPart));
+    parallelFor(count, kTrianglesAPart, [&](std::size_t first, std::size_t end) {
         for (std::size_t i = first; i < end; ++i)
-            first_normal[first / kCornersAtATime] += flat.triangles[i].smooth;
+            first_normal[first / kTrianglesAPart] += flat.triangles[i].smooth;
     });
     std::size_t before = 0;
     for (std::size_t& smooth : first_normal) before += std::exchange(smooth, before);
     const std::vector<Placement> placements = placementsOf(scene, flat.object);
-    parallelFor(count, kCornersAtATime, [&](std::size_t first, std::size_t end) {
-        std::size_t normal = first_normal[first / kCornersAtATime];
+    parallelFor(count, kTrianglesAPart, [&](std::size_t first, std::size_t end) {
+        std::size_t normal = first_normal[first / kTrianglesAPart];
         forEachTriangle(placements, first, end,
                         [&](std::size_t i, const Placement& placement, std::size_t triangle) {
                             if (!flat.triangles[i].smooth) return;

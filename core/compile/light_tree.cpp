@@ -11,7 +11,7 @@
 namespace crt {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr std::size_t kBuckets = 12;
 /// Below, nodes are halved by number: no arrangement of lights makes a tree deeper than that and their
 /// logarithm.

@@ -369,6 +369,7 @@ EncodedImage encodeSrgb8(const Image& image) {
     encoded.rgb.resize(3 * pixels);
     std::atomic<std::uint64_t> clipped{0};
     parallelFor(pixels, std::size_t{1} << 14, [&](std::size_t first, std::size_t end) {
+        std::uint64_t clipped_here = 0;
         for (std::size_t p = first; p < end; ++p) {
             const float* const pixel = image.pixels.data() + p * image.channels.size();
             Vec3d rgb{pixel[color[0]], pixel[color[1]], pixel[color[2]]};
@@ -376,11 +377,12 @@ EncodedImage encodeSrgb8(const Image& image) {
             for (std::size_t c = 0; c < 3; ++c) {
                 const double value = rgb[c] >= 0.0 ? std::min(rgb[c], 1.0) : 0.0;  // NaN is 0.
                 // One rounding of float in the conversion from another space is no clipping worth a warning.
-                if (!(rgb[c] >= -1e-6 && rgb[c] <= 1.0 + 1e-6)) ++clipped;
+                if (!(rgb[c] >= -1e-6 && rgb[c] <= 1.0 + 1e-6)) ++clipped_here;
                 encoded.rgb[3 * p + c] =
                     static_cast<std::uint8_t>(std::floor(linearToSrgb(value) * 255.0 + 0.5));
             }
         }
+        clipped += clipped_here;
     });
     encoded.clipped_values = clipped;
     return encoded;

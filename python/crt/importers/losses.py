@@ -18,6 +18,13 @@ class Place:
         return f"{self.file}:{self.line}"
 
 
+def present(path, place):
+    """The path. Raises crt.Error at the place that names it, where there is no file."""
+    if not path.is_file():
+        refuse(place, f"'{path}' is not there")
+    return path
+
+
 def refuse(place, sentence):
     """Raises crt.Error of kind SCENE that begins with file, line and column."""
     raise Error(f"{place.file}:{place.line}:{place.column}: error: {sentence}", Kind.SCENE, place.file,

@@ -5,11 +5,12 @@ import math
 import numpy as np
 
 from . import matrices, shapes, sky_image, spectra
-from .losses import refuse, suggestion
+from .losses import present, refuse, suggestion
 from .meshes import Damaged, faced, ply_vertex, read_obj, read_ply, read_serialized
 from .mitsuba_materials import Materials
 from .mitsuba_tree import Reader
-from .mitsuba_values import Values, pixels
+from .images import pixels
+from .mitsuba_values import Values
 from .draft import BLACK, Draft, Thing, ball, meshed, plate, stretches, tube
 
 ENDLESS = 1_000_000  # Depths that Mitsuba writes as -1; Russian roulette ends paths before.
@@ -374,9 +375,7 @@ class Importer:
         name = plugin.get("filename")
         if not isinstance(name, str):
             refuse(plugin.place, f"{plugin} has no 'filename'")
-        path = self.reader.file(plugin.place, name)
-        if not path.is_file():
-            refuse(plugin.values["filename"][2], f"'{path}' is not there")
+        path = present(self.reader.file(plugin.place, name), plugin.values["filename"][2])
         return path
 
     def normals(self, plugin, has_normals):

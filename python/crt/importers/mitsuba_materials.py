@@ -6,8 +6,9 @@ import math
 import numpy as np
 
 from . import spectra
+from .images import powered
 from .losses import suggestion
-from .mitsuba_values import Values, pixels
+from .mitsuba_values import Values
 from .draft import BLACK
 
 INDICES = {"vacuum": 1.0, "helium": 1.000036, "hydrogen": 1.000132, "air": 1.000277,
@@ -114,20 +115,14 @@ class Materials:
         made = values.number(plugin, "alpha", 0.1)
         if not isinstance(made, dict):
             return {"roughness": spectra.roughness(made)}
-        if "checker" in made and all(isinstance(v, float) for v in made["checker"]) and textured:
-            return {"roughness": made | {"checker": [spectra.roughness(v) for v in made["checker"]]}}
-        return {"roughness": self.root_image(plugin, made) if textured else 0.3}
+        return {"roughness": self.rooted(plugin, made) if textured else 0.3}
 
-    def root_image(self, plugin, made):
+    def rooted(self, plugin, made):
         """A texture of widths as one of their square roots."""
-        found = made.get("texture")
-        if found is not None and not hasattr(found, "dtype"):
-            found = pixels(found, made.get("color_space") == "raw")
-        if found is None:
+        roots = powered(made, 0.5)
+        if roots is None:
             self.losses.add(plugin.place, f"a texture as 'alpha' of {plugin}", "roughness 0.3")
-            return 0.3
-        values = found[:, :, 0] if found.ndim == 3 else found
-        return made | {"texture": np.sqrt(np.clip(values, 0, 1)), "color_space": "raw"}
+        return 0.3 if roots is None else roots
 
     def factor(self, plugin, values, *names):
         """A factor on what microfacets reflect or let through, which physical surfaces do not have."""

@@ -1,36 +1,15 @@
 """Spectra and textures of Mitsuba's plugins as crt has them."""
 
 import math
-import os
 import pathlib
 
 import numpy as np
 
-from .. import _crt
-from ..errors import Error
 from . import spectra
-from .losses import refuse
+from .images import BYTES, IMAGES, pixels
+from .losses import present, refuse
 
-IMAGES = (".png", ".jpg", ".jpeg", ".tga", ".exr", ".hdr", ".rgbe", ".pfm")
 FLIP_V = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])
-
-
-BYTES = (".png", ".jpg", ".jpeg", ".tga")  # Files of 8 or 16 bits, which are sRGB-encoded.
-
-
-def pixels(path, raw=False):
-    """An image as (height, width, 3), linear, or `raw`: with the numbers of the file; None where crt cannot
-    read it as one."""
-    try:
-        image = _crt.Image.load(os.fspath(path))
-    except Error:
-        return None
-    names = [name.rpartition(".")[2].upper() for name in image.channels]
-    order = [names.index(c) for c in "RGB"] if set("RGB") <= set(names) else [0, 0, 0]
-    made = np.array(image.pixels)[:, :, order]
-    if raw and path.suffix.lower() in BYTES:
-        made = np.where(made <= 0.0031308, 12.92 * made, 1.055 * made ** (1 / 2.4) - 0.055)
-    return made.astype(np.float32)
 
 
 def decoded(losses, place, path):
@@ -268,9 +247,7 @@ class Values:
         if not isinstance(name, str):
             self.losses.add(plugin.place, "a bitmap without a file", "0.5")
             return None, False
-        path = self.reader.file(plugin.place, name)
-        if not path.is_file():
-            refuse(plugin.values["filename"][2], f"'{path}' is not there")
+        path = present(self.reader.file(plugin.place, name), plugin.values["filename"][2])
         return path, path.suffix.lower() in IMAGES
 
     def of_bitmap(self, plugin, numbers):

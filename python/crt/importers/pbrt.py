@@ -6,8 +6,8 @@ import numpy as np
 
 from . import matrices, pbrt_shapes, sky_image, spectra
 from .draft import BLACK, Draft, Thing, stretches
-from .losses import refuse, suggestion
-from .mitsuba_values import pixels
+from .losses import present, refuse, suggestion
+from .images import pixels
 from .pbrt_materials import Materials
 from .pbrt_state import State
 from .pbrt_text import Parameters
@@ -229,9 +229,7 @@ class Importer:
         if name is None:
             self.scene.environment = {"radiance": self.emission(found, "L", "illuminance", math.pi)}
             return
-        path = self.state.file(found.place, name)
-        if not path.is_file():
-            refuse(found.values["filename"][2], f"'{path}' is not there")
+        path = present(self.state.file(found.place, name), found.values["filename"][2])
         image = pixels(path)
         if image is None:
             self.losses.add(found.place, "an environment image that crt cannot read", "even light")

@@ -2,12 +2,10 @@
 
 import pathlib
 
-import numpy as np
-
 from . import spectra
-from .losses import refuse, suggestion
+from .images import powered
+from .losses import present, refuse, suggestion
 from .mitsuba_materials import renamed_widths, rough_mirror
-from .mitsuba_values import pixels
 
 GREY = {"type": "diffuse", "reflectance": 0.5}
 COPPER = {"metal": "Cu"}
@@ -63,9 +61,7 @@ class Materials:
         return made
 
     def mapped(self, found, made):
-        path = self.state.file(found.place, found.string("normalmap"))
-        if not path.is_file():
-            refuse(found.values["normalmap"][2], f"'{path}' is not there")
+        path = present(self.state.file(found.place, found.string("normalmap")), found.values["normalmap"][2])
         if made["type"] == "mix":
             self.losses.add(found.place, "the normal map of a mix", "the surface without it")
             return made
@@ -96,26 +92,18 @@ class Materials:
             if along != across:
                 self.losses.add(found.place, "two textures of roughness", "the first for both")
             made = along if isinstance(along, dict) else across
-            return {"roughness": self.root_image(found, made, 0.25 if remap else 0.5)}
+            return {"roughness": self.powered(found, made, 0.25 if remap else 0.5)}
         along, across = ((max(v, 0) ** 0.5 if remap else max(v, 0)) for v in (along, across))
         if min(along, across) == 0 or along == across:
             return {"roughness": spectra.roughness(max(along, across))}
         return spectra.anisotropic(along, across)
 
-    def root_image(self, found, made, power):
+    def powered(self, found, made, power):
         """A texture with its values to a power."""
-        if "checker" in made and all(isinstance(v, float) for v in made["checker"]):
-            return made | {"checker": [min(max(v, 0), 1) ** power for v in made["checker"]]}
-        image = made.get("texture")
-        if image is not None and not hasattr(image, "dtype"):
-            image = pixels(image, made.get("color_space") == "raw")
-        if image is None:
+        powers = powered(made, power)
+        if powers is None:
             self.losses.add(found.place, f"a texture of roughness of {found}", "roughness 0.3")
-            return 0.3
-        values = image[:, :, 0] if image.ndim == 3 else image
-        kept = {key: value for key, value in made.items() if key != "factor"}
-        return kept | {"texture": np.clip(values * made.get("factor", 1), 0, 1).astype(np.float32) ** power,
-                       "color_space": "raw"}
+        return 0.3 if powers is None else powers
 
     def single(self, found, widths):
         """Roughness where crt has a number alone, the same in all directions."""

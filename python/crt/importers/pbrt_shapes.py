@@ -6,7 +6,7 @@ import numpy as np
 
 from . import matrices, shapes
 from .draft import ball, meshed, plate, tube
-from .losses import refuse, suggestion
+from .losses import present, refuse, suggestion
 from .meshes import Damaged, faced, ply_header, read_bytes, read_ply
 
 CORNERS = np.array([[0, 0], [1, 0], [1, 1]], np.float32)  # Texture coordinates of a triangle without any.
@@ -170,9 +170,7 @@ class Shapes:
         name = found.string("filename")
         if name is None:
             refuse(found.place, "a 'plymesh' has no 'filename'")
-        path = self.state.file(found.place, name)
-        if not path.is_file():
-            refuse(found.values["filename"][2], f"'{path}' is not there")
+        path = present(self.state.file(found.place, name), found.values["filename"][2])
         for name in ("displacement", "edgelength"):
             if found.has(name):
                 self.losses.add(found.place, "displaced meshes", "the mesh as it is")

@@ -269,20 +269,21 @@ class State:
     def do_NamedMaterial(self, text, place):
         self.graphics.material = (text.string("NamedMaterial"), place)
 
-    def do_MakeNamedMaterial(self, text, place):
-        name = text.string("MakeNamedMaterial")
-        made = text.parameters("material", "", place)
-        made.inherit(self.graphics.defaults.get("material", {}))
+    def named(self, text, place, kind, default):
+        """A material or medium that later statements name: its name, and what it is."""
+        name = text.string(f"MakeNamed{kind.capitalize()}")
+        made = text.parameters(kind, "", place)
+        made.inherit(self.graphics.defaults.get(kind, {}))
         made.color_space = self.graphics.color_space
-        made.name = made.string("type", "diffuse")
+        made.name = made.string("type", default)
+        return name, made
+
+    def do_MakeNamedMaterial(self, text, place):
+        name, made = self.named(text, place, "material", "diffuse")
         self.materials[name] = made
 
     def do_MakeNamedMedium(self, text, place):
-        name = text.string("MakeNamedMedium")
-        made = text.parameters("medium", "", place)
-        made.inherit(self.graphics.defaults.get("medium", {}))
-        made.color_space = self.graphics.color_space
-        made.name = made.string("type", "homogeneous")
+        name, made = self.named(text, place, "medium", "homogeneous")
         self.media[name] = made
 
     def do_MediumInterface(self, text, place):

@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from . import spectra
-from .losses import refuse, suggestion
-from .mitsuba_values import BYTES, IMAGES, decoded, pixels
+from .losses import present, refuse, suggestion
+from .images import BYTES, IMAGES, pixels
+from .mitsuba_values import decoded
 
 GLASSES = {"BK7": "N-BK7", "F10": "SF10", "F11": "SF11"}
 # Indices at 587.6 nm and Abbe's numbers of the catalogue.
@@ -188,9 +189,7 @@ class Values:
         name = found.string("filename")
         if name is None:
             refuse(found.place, "an 'imagemap' has no 'filename'")
-        path = self.state.file(found.place, name)
-        if not path.is_file():
-            refuse(found.values["filename"][2], f"'{path}' is not there")
+        path = present(self.state.file(found.place, name), found.values["filename"][2])
         if path.suffix.lower() not in IMAGES:
             self.losses.add(found.place, f"images of type '{path.suffix}'", "0.5")
             return 0.5
