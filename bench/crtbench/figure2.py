@@ -6,7 +6,7 @@ kind made on another machine (JSON Lines with backend, resolution, spp, repeat, 
 import json
 import pathlib
 
-from .log_log import Chart, PowerLaw, ticks
+from . import log_log
 from .program import Failure, Spread, significant
 from .results import Results
 
@@ -20,6 +20,7 @@ COLOURS = {
 
 
 def measure(program, arguments):
+    log_log.library()  # What is missing is said before hours are spent.
     resolutions = (72, 144) if arguments.tiny else (1440, 2880)
     # Seconds that one render may take: a processor does not get to 1024.
     longest = 0.2 if arguments.tiny else 16.0
@@ -109,7 +110,7 @@ def line_fit(points):
 
 def slope(points):
     """d log t / d log N over the upper half of the points."""
-    return PowerLaw(points[len(points) // 2 - 1:] if len(points) > 3 else points).exponent
+    return log_log.PowerLaw(points[len(points) // 2 - 1:] if len(points) > 3 else points).exponent
 
 
 def write(program, arguments, rows, absent):
@@ -202,27 +203,23 @@ def doublings(lines, data):
 
 
 def draw(lines):
-    """Labels at the lines' ends."""
+    """{(backend, resolution): [(spp, seconds)]} as a chart, as SVG."""
+    title = "Render seconds against samples per pixel, Cornell box"
     seconds = [t for points in lines.values() for _, t in points]
-    chart = Chart(
-        (860, 520),
-        (70, 190, 24, 56),
-        (COUNTS[0], COUNTS[-1]),
-        (min(seconds) * 0.7, max(seconds) * 1.4),
-        COLOURS,
-    )
-    for n in COUNTS:
-        chart.x_tick(n, n)
-    for tick in ticks(*chart.y_range):
-        chart.y_tick(tick, f"{tick:g} s")
     largest = max(resolution for _, resolution in lines)
-    taken = []
-    for (backend, resolution), points in sorted(lines.items(), key=lambda item: chart.y(item[1][-1][1])):
-        chart.curve(backend, points, 2.2, 3, dashed=resolution == largest)
-        x, label_y = chart.x(points[-1][0]), chart.y(points[-1][1]) + 4
-        while any(abs(label_y - other) < 16 and abs(x - at) < 110 for other, at in taken):
-            label_y += 4
-        taken.append((label_y, x))
-        chart.label(backend, x + 8, label_y, f"{backend}, {resolution}²")
-    chart.x_title("samples per pixel")
-    return chart.svg("Render seconds against samples per pixel, Cornell box")
+    with log_log.style():
+        figure, axes = log_log.canvas()
+        axes.set_xscale("log", base=2)
+        axes.set(
+            title=title,
+            xlabel="samples per pixel",
+            xlim=(COUNTS[0] / 1.15, COUNTS[-1] * 1.15),
+            ylim=(min(seconds) * 0.7, max(seconds) * 2.2),
+        )
+        for (backend, resolution), points in lines.items():
+            name = f"{backend}, {resolution}²"
+            log_log.curve(axes, points, COLOURS[backend], name, dashed=resolution == largest)
+        axes.set_xticks(COUNTS, labels=map(str, COUNTS))
+        log_log.decimal_ticks(axes.yaxis, lambda value: f"{value:g} s")
+        log_log.name_above(axes)
+        return log_log.svg(figure, title, COLOURS.values())

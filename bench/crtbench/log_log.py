@@ -1,17 +1,30 @@
-"""What is drawn and fitted on two logarithmic scales: power laws through points, and a chart as an SVG of
-its own, with colours for light and for dark."""
+"""What is fitted and drawn on two logarithmic scales: power laws through points, and charts by matplotlib,
+as SVG with text as text and with colours for light and for dark."""
 
+import io
 import math
 import statistics
+import sys
 
-INK = (
-    ".ink{fill:#1a1a1a}.soft{fill:#555}.grid{stroke:#e2e2e2}.frame{stroke:#999;fill:none}"
-    ".ground{fill:#fff}.guide{stroke:#888;stroke-dasharray:2 5}"
-)
-INK_ON_DARK = (
-    ".ink{fill:#eee}.soft{fill:#b0b0b0}.grid{stroke:#343434}.frame{stroke:#777}"
-    ".ground{fill:#161616}.guide{stroke:#888}"
-)
+from .program import Failure
+
+# Colours are pairs: on light and on dark. What is drawn has the first; svg() exchanges them by their value,
+# so that no two pairs may have the first in common.
+INK, SOFT = ("#1a1a1a", "#eeeeee"), ("#555555", "#b0b0b0")
+GRID, FRAME, PAPER = ("#e2e2e2", "#343434"), ("#999999", "#777777"), ("#ffffff", "#161616")
+# The salt makes the names of a chart's parts the same whenever it is drawn.
+STYLE = {"svg.fonttype": "none", "svg.hashsalt": "crt", "path.simplify": False,
+         "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 9.5,
+         "text.color": INK[0], "axes.titlecolor": INK[0], "axes.titlesize": 12, "axes.titleweight": "bold",
+         "axes.titlelocation": "left", "axes.titlepad": 9, "axes.labelcolor": SOFT[0], "axes.labelsize": 9.5,
+         "axes.labelpad": 7, "axes.edgecolor": FRAME[0], "axes.facecolor": "none", "axes.grid": True,
+         "axes.axisbelow": True, "grid.color": GRID[0], "figure.facecolor": PAPER[0],
+         "xtick.color": FRAME[0], "ytick.color": FRAME[0], "xtick.labelcolor": SOFT[0],
+         "ytick.labelcolor": SOFT[0]}
+DASHES = (0, (4.5, 3))
+DOTS = (0, (1.2, 2.6))
+SIZE = (9, 5.6)  # Inches of 72 units, of which text has 9 to 12.
+LINE = 1.25  # From one name to the next, in sizes of their text.
 
 
 class PowerLaw:
@@ -28,82 +41,141 @@ class PowerLaw:
         return math.exp(self.offset + self.exponent * math.log(x))
 
 
-def ticks(low, high, mantissas=(1,)):
-    """Mantissa times power of ten, within [low, high]."""
-    exponents = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    return [m * 10.0**e for e in exponents for m in mantissas if low <= m * 10.0**e <= high]
+def library():
+    """matplotlib, which nothing but a chart needs. Who measures for long asks for it before."""
+    try:
+        import matplotlib.figure
+        import matplotlib.ticker
+    except ImportError:
+        raise Failure(
+            f"matplotlib draws the charts, and this Python has none: {sys.executable} -m pip install "
+            f"matplotlib"
+        ) from None
+    return matplotlib
 
 
-class Chart:
-    """`size`: width and height; `margins`: left, right, top, bottom; ranges: least and most; `colours`:
-        {kind of line: (on light, on dark)}."""
+def style():
+    """In which a chart is made, from canvas() to svg()."""
+    return library().rc_context(STYLE)
 
-    def __init__(self, size, margins, x_range, y_range, colours):
-        self.width, self.height = size
-        left, right, top, bottom = margins
-        self.left, self.right, self.top, self.bottom = left, self.width - right, top, self.height - bottom
-        self.x_range, self.y_range, self.colours = x_range, y_range, colours
-        self.shapes = []
 
-    def x(self, value):
-        low, high = self.x_range
-        return self.left + (self.right - self.left) * math.log(value / low) / math.log(high / low)
+def canvas():
+    """(figure, axes), both axes logarithmic."""
+    figure = library().figure.Figure(figsize=SIZE, dpi=72, layout="constrained")
+    return figure, figure.add_subplot(xscale="log", yscale="log")
 
-    def y(self, value):
-        low, high = self.y_range
-        return self.bottom - (self.bottom - self.top) * math.log(value / low) / math.log(high / low)
 
-    def draw(self, shape):
-        self.shapes.append(shape)
+def curve(axes, points, colour, name, thin=False, dashed=False):
+    """Points, joined; name_above() or name_beside() writes the name."""
+    xs, ys = zip(*points)
+    axes.plot(
+        xs,
+        ys,
+        color=colour[0],
+        label=name,
+        linestyle=DASHES if dashed else "-",
+        linewidth=1.1 if thin else 1.9,
+        marker="o",
+        markersize=3 if thin else 4.8,
+        markeredgewidth=0,
+    )
 
-    def x_tick(self, value, text):
-        self.draw(
-            f'<line class="grid" x1="{self.x(value):.1f}" x2="{self.x(value):.1f}" y1="{self.top}" '
-            f'y2="{self.bottom}"/>'
-            f'<text class="soft" x="{self.x(value):.1f}" y="{self.bottom + 18}" '
-            f'text-anchor="middle">{text}</text>'
+
+def decimal_ticks(axis, text):
+    """Ticks at 1, 2 and 5 times powers of ten, or at these alone where there is no room; `text(value)`
+    labels them."""
+    ticker = library().ticker
+    axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: text(value)))
+    axis.set_minor_locator(ticker.NullLocator())
+    axis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5), numticks=100))
+    axis.get_figure().draw_without_rendering()
+    if touching([label.get_window_extent() for label in axis.get_ticklabels() if label.get_text()]):
+        axis.set_major_locator(ticker.LogLocator())
+
+
+def touching(boxes):
+    """Whether neighbours overlap, or have no room of 3 units between them."""
+    return any(a.padded(3).overlaps(b) for a, b in zip(boxes, boxes[1:]))
+
+
+def name_above(axes):
+    """The names of all curves, which rise, left above their last points, higher where they would touch."""
+    axes.get_figure().draw_without_rendering()  # Then everything has its place.
+    left, placed = axes.get_window_extent().x0 + 3, []
+    for line, name in sorted(zip(*axes.get_legend_handles_labels()), key=lambda pair: last(pair[0])[1]):
+        label = axes.annotate(
+            name,
+            last(line),
+            xytext=(0, 6),
+            textcoords="offset points",
+            ha="right",
+            color=line.get_color(),
+            bbox={"facecolor": PAPER[0], "edgecolor": "none", "pad": 1},
+        )
+        box = label.get_window_extent()
+        aside, above = max(0, left - box.x0), 0
+        while any(box.translated(aside, above).overlaps(other) for other in placed):
+            above += 1
+        label.xyann = (aside, 6 + above)
+        placed.append(box.translated(aside, above))
+
+
+def name_beside(axes, size):
+    """Beside the axes the names of all curves, each level with its curve's last point or as near as it gets
+    without touching another, and joined with it."""
+    figure = axes.get_figure()
+    figure.draw_without_rendering()  # Then the axes have their height.
+    lines, names = axes.get_legend_handles_labels()
+    ends = [last(line) for line in lines]
+    wanted = [axes.transAxes.inverted().transform(axes.transData.transform(end))[1] for end in ends]
+    heights = spread(wanted, LINE * size / axes.get_window_extent().height)
+    for line, name, end, height in zip(lines, names, ends, heights):
+        axes.annotate(
+            name,
+            end,
+            xytext=(1.02, height),
+            textcoords="axes fraction",
+            va="center",
+            color=line.get_color(),
+            fontsize=size,
+            arrowprops={"arrowstyle": "-", "color": line.get_color(), "linewidth": 0.5, "alpha": 0.6,
+                        "relpos": (0, 0.5), "shrinkA": 2, "shrinkB": 4},
         )
 
-    def y_tick(self, value, text):
-        self.draw(
-            f'<line class="grid" x1="{self.left}" x2="{self.right}" y1="{self.y(value):.1f}" '
-            f'y2="{self.y(value):.1f}"/>'
-            f'<text class="soft" x="{self.left - 8}" y="{self.y(value) + 4:.1f}" '
-            f'text-anchor="end">{text}</text>'
-        )
 
-    def x_title(self, text):
-        self.draw(
-            f'<text class="soft" x="{(self.left + self.right) / 2}" y="{self.height - 15}" '
-            f'text-anchor="middle">{text}</text>'
-        )
+def last(line):
+    return line.get_xydata()[-1]
 
-    def curve(self, kind, points, width, radius, dashed):
-        """Points, joined; `kind` is one of the colours."""
-        number = list(self.colours).index(kind)
-        path = " ".join(f"{self.x(a):.1f},{self.y(b):.1f}" for a, b in points)
-        dash = ' stroke-dasharray="6 4"' if dashed else ""
-        self.draw(f'<polyline class="l{number}" stroke-width="{width}"{dash} points="{path}"/>')
-        for a, b in points:
-            self.draw(f'<circle class="t{number}" cx="{self.x(a):.1f}" cy="{self.y(b):.1f}" r="{radius}"/>')
 
-    def label(self, kind, x, y, text, size=13):
-        """Text in the colour of its line, at a place in the picture's own units."""
-        self.draw(
-            f'<text class="t{list(self.colours).index(kind)}" x="{x:.1f}" y="{y:.1f}" '
-            f'font-size="{size}">{text}</text>'
-        )
+def spread(wanted, gap):
+    """Heights as near as a label can get to where it belongs without touching its neighbour."""
+    order = sorted(range(len(wanted)), key=lambda i: wanted[i])
+    placed = [wanted[i] for i in order]
+    for _ in range(200):
+        for i in range(1, len(placed)):
+            overlap = gap - (placed[i] - placed[i - 1])
+            if overlap > 0:
+                placed[i - 1] -= overlap / 2
+                placed[i] += overlap / 2
+    result = [0.0] * len(wanted)
+    for rank, i in enumerate(order):
+        result[i] = placed[rank]
+    return result
 
-    def svg(self, title):
-        style, dark = [INK], [INK_ON_DARK]
-        for number, (light, night) in enumerate(self.colours.values()):
-            style.append(f".l{number}{{stroke:{light};fill:none}}.t{number}{{fill:{light}}}")
-            dark.append(f".l{number}{{stroke:{night}}}.t{number}{{fill:{night}}}")
-        head = [
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" '
-            f'font-family="system-ui, sans-serif" font-size="13" role="img">',
-            f"<title>{title}</title>",
-            f"<style>{''.join(style)}@media (prefers-color-scheme: dark){{{''.join(dark)}}}</style>",
-            f'<rect class="ground" width="{self.width}" height="{self.height}"/>',
-        ]
-        return "\n".join([*head, *self.shapes, "</svg>"]) + "\n"
+
+def svg(figure, title, colours):
+    """The chart as text. `colours`: the pairs of its curves; `title` is for those who do not see it."""
+    text = io.StringIO()
+    figure.savefig(
+        text,
+        format="svg",
+        metadata={"Title": title, "Date": None, "Creator": None, "Format": None, "Type": None},
+    )
+    # Viewers that know no such rule show what is for light.
+    dark = "\n".join(
+        f'[style*="{part}: {light}"]{{{part}:{night} !important}}'
+        for light, night in (INK, SOFT, GRID, FRAME, PAPER, *colours)
+        for part in ("fill", "stroke")
+    )
+    rule = f"@media (prefers-color-scheme: dark){{\n{dark}}}"
+    return text.getvalue().replace("<svg ", '<svg role="img" ', 1).replace("</style>", f"{rule}</style>", 1)

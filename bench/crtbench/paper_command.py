@@ -75,13 +75,16 @@ def main():
     arguments = parser.parse_args()
 
     def measure():
-        from . import paper, paper_page  # Not before the command line has been read: their errors are ours.
+        # Not before the command line has been read: their errors are ours.
+        from . import log_log, paper, paper_page
 
         program = program_for(arguments)
         if arguments.rows:
             rows = [row for file in arguments.rows for row in paper.read_rows(file)]
             folders = [file.parent for file in arguments.rows]
         else:
+            if "figure2" in arguments.parts and not arguments.write_rows:
+                log_log.library()  # Of the page that is made afterwards.
             folder = arguments.write_rows.resolve().parent if arguments.write_rows else program.scratch
             folder.mkdir(parents=True, exist_ok=True)
             rows, folders = paper.measure(program, arguments, folder), [folder]

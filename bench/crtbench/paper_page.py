@@ -227,8 +227,9 @@ def time_against_samples(results, found, folder):
     data = figure2.show(results, lines)
     sentences = figure2.doublings(lines, data)
     results.lines += [*sentences, ""] if sentences else []
+    chart = figure2.draw(lines)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "paper.svg").write_text(figure2.draw(lines))
+    (folder / "paper.svg").write_text(chart)
     return data
 
 

@@ -1,6 +1,7 @@
-"""What bench/peers and bench/agree need beside crt: a Python with mitsuba, numpy and PyYAML, and an LLVM
-that Mitsuba's compiler accepts. Both are put into out/ when they are missing; nothing of them is ever part
-of the product. The measurement then runs under that Python."""
+"""What bench/peers and bench/agree need beside crt: a Python with mitsuba, numpy and PyYAML, for the chart
+of bench/peers with matplotlib too, and an LLVM that Mitsuba's compiler accepts. Both are put into out/ when
+they are missing; nothing of them is ever part of the product. The measurement then runs under that
+Python."""
 
 import argparse
 import os
@@ -13,7 +14,7 @@ import venv
 from .command import REPOSITORY, add_options, exit_code, program_for
 from .program import Failure
 
-PACKAGES = ["mitsuba==3.9.1", "numpy", "pyyaml"]
+PACKAGES = ["mitsuba==3.9.1", "numpy", "pyyaml", "matplotlib"]
 OLDEST_LLVM = (
     17  # Older ones cannot select the instruction `fminimum` on x86, which Mitsuba's kernels contain.
 )

@@ -1,5 +1,7 @@
 """Error against seconds: one line for each contestant, named at its end."""
-from .log_log import Chart, ticks
+import math
+
+from . import log_log
 
 # Okabe and Ito's palette, which the colour-blind can tell apart, darkened or lightened for 4.5:1 against
 # its ground.
@@ -11,80 +13,56 @@ COLOURS = {
     ("Mitsuba", "scalar"): ("#a04878", "#e39cc4"),
     ("Mitsuba", "cuda_ad"): ("#7a4fbf", "#b79cf0"),
 }
-MANTISSAS = (1, 2, 5)
-LABEL_GAP = 17
-
-
-def spread(wanted, gap):
-    """Heights as near as a label can get to where it belongs without touching its neighbour."""
-    order = sorted(range(len(wanted)), key=lambda i: wanted[i])
-    placed = [wanted[i] for i in order]
-    for _ in range(200):
-        for i in range(1, len(placed)):
-            overlap = gap - (placed[i] - placed[i - 1])
-            if overlap > 0:
-                placed[i - 1] -= overlap / 2
-                placed[i] += overlap / 2
-    result = [0.0] * len(wanted)
-    for rank, i in enumerate(order):
-        result[i] = placed[rank]
-    return result
+SMALL = 8.5  # Text of names and notes.
 
 
 def draw(curves, target, title, x_title):
     """curves: [(contestant, [(seconds, relative error)])], none empty, all positive; relative errors as
     fractions."""
     seconds, errors = zip(*(p for _, points in curves for p in points))
-    chart = Chart(
-        (900, 560),
-        (70, 250, 54, 60),
-        (min(seconds) * 0.8, max(seconds) * 1.1),
-        (min(target, *errors) * 0.85, max(errors) * 1.15),
-        COLOURS,
-    )
-    chart.draw(f'<text class="ink" x="{chart.left}" y="28" font-size="16" font-weight="600">{title}</text>')
-    for tick in ticks(*chart.x_range, MANTISSAS):
-        chart.x_tick(tick, f"{tick:g}")
-    for tick in ticks(*chart.y_range, MANTISSAS):
-        chart.y_tick(tick, f"{100 * tick:g} %")
-    chart.draw(
-        f'<rect class="frame" x="{chart.left}" y="{chart.top}" width="{chart.right - chart.left}" '
-        f'height="{chart.bottom - chart.top}"/>'
-    )
-    draw_guide(chart)
-    chart.draw(
-        f'<line class="frame" x1="{chart.left}" x2="{chart.right}" y1="{chart.y(target):.1f}" '
-        f'y2="{chart.y(target):.1f}" stroke-width="1.5"/>'
-    )
-    heights = spread([chart.y(points[-1][1]) for _, points in curves], LABEL_GAP)
-    for (contestant, points), height in zip(curves, heights):
-        thin = contestant.replicates > 1
-        kind = (contestant.renderer, contestant.engine)
-        chart.curve(kind, points, 1.3 if thin else 2.4, 2.2 if thin else 3.4, dashed=contestant.roulette)
-        x, y = chart.x(points[-1][0]), chart.y(points[-1][1])
-        chart.draw(
-            f'<line class="l{list(COLOURS).index(kind)}" stroke-width="0.6" opacity="0.6" x1="{x + 5:.1f}" '
-            f'y1="{y:.1f}" x2="{chart.right + 6}" y2="{height:.1f}"/>'
+    with log_log.style():
+        figure, axes = log_log.canvas()
+        axes.set(
+            title=title,
+            xlabel=x_title,
+            ylabel="relative RMSE of luminance",
+            xlim=(min(seconds) * 0.8, max(seconds) * 1.1),
+            ylim=(min(target, *errors) * 0.85, max(errors) * 1.15),
         )
-        chart.label(kind, chart.right + 10, height + 4, contestant.name, 12)
-    chart.x_title(x_title)
-    chart.draw(
-        f'<text class="soft" transform="translate(18 {(chart.top + chart.bottom) / 2}) rotate(-90)" '
-        f'text-anchor="middle">relative RMSE of luminance</text>'
-    )
-    return chart.svg(title)
+        draw_guide(axes)
+        draw_target(axes, target)
+        for contestant, points in curves:
+            colour = COLOURS[contestant.renderer, contestant.engine]
+            thin = contestant.replicates > 1
+            log_log.curve(axes, points, colour, contestant.name, thin, dashed=contestant.roulette)
+        log_log.decimal_ticks(axes.xaxis, lambda value: f"{value:g}")
+        log_log.decimal_ticks(axes.yaxis, lambda value: f"{100 * value:g} %")
+        log_log.name_beside(axes, SMALL)
+        return log_log.svg(figure, title, COLOURS.values())
 
 
-def draw_guide(chart):
+def draw_guide(axes):
     """A line of slope −½ to hold the others against, in the corner that they leave free."""
-    (x_low, x_high), (y_low, y_high) = chart.x_range, chart.y_range
+    (x_low, x_high), (y_low, y_high) = axes.get_xlim(), axes.get_ylim()
     begin, end = (x_low * (x_high / x_low) ** share for share in (0.04, 0.3))
     upper = y_low * (y_high / y_low) ** 0.4
-    lower = upper * (begin / end) ** 0.5
-    chart.draw(
-        f'<line class="guide" x1="{chart.x(begin):.1f}" y1="{chart.y(upper):.1f}" x2="{chart.x(end):.1f}" '
-        f'y2="{chart.y(lower):.1f}"/>'
-        f'<text class="soft" x="{chart.x(begin):.1f}" y="{chart.y(lower) + 16:.1f}" font-size="12">slope '
-        f'−½: '
-        f'independent samples</text>'
+    lower = upper * math.sqrt(begin / end)
+    axes.plot([begin, end], [upper, lower], color=log_log.FRAME[0], linestyle=log_log.DOTS)
+    note(axes, "slope −½: independent samples", (begin, lower), va="top")
+
+
+def draw_target(axes, target):
+    axes.axhline(target, color=log_log.FRAME[0], linewidth=1.5)
+    note(axes, f"target {100 * target:g} %", (axes.get_xlim()[0], target), va="bottom")
+
+
+def note(axes, text, place, va):
+    axes.annotate(
+        text,
+        place,
+        xytext=(5, 3 if va == "bottom" else -3),
+        textcoords="offset points",
+        va=va,
+        color=log_log.SOFT[0],
+        fontsize=SMALL,
     )

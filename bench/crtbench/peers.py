@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from . import peer_agreement, peer_page, peer_scene
+from . import log_log, peer_agreement, peer_page, peer_scene
 from .peer_error import Reference, relative_error
 from .peer_lines import ROULETTE_FROM, SCENE, Crt, Mitsuba, Worker
 from .results import Results
@@ -111,6 +111,7 @@ def tournament(worker, unit, samplers, spp, replicates, reference):
 
 
 def measure(program, arguments):
+    log_log.library()  # Of the page that is made at the end.
     begin = time.monotonic()
     size = 32 if arguments.tiny else SIZE
     results = Results(program, arguments, "peers", "crt and Mitsuba 3")

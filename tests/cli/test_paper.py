@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """bench/paper makes its page of rows that were measured elsewhere: nothing is timed here."""
 
+import importlib.util
 import json
 import os
 import pathlib
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from xml.etree import ElementTree
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = None  # From the command line.
@@ -16,6 +18,8 @@ BUILD = None  # From the command line.
 MACHINE = {"part": "machine", "cpu": "A processor", "threads": 16, "os": "A system", "date": "a day",
            "commit": "0123456789", "quick": False, "busy": 0.05, "parts": ["table1", "table2"],
            "devices": {"cuda": ["0: A GPU"]}}
+TIMES = [{"part": "figure2", "backend": "cuda", "resolution": r, "spp": n, "repeat": 0,
+          "render": n * r * r / 1e9, "others": 0} for r in (100, 200) for n in (1, 2, 4, 8)]
 
 
 def row(part, seconds, **values):
@@ -36,13 +40,13 @@ class Page(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
-    def make(self, rows, code=0, name="rows.jsonl"):
+    def make(self, rows, code=0, name="rows.jsonl", environment=()):
         file = self.folder / name
         file.write_text(rows if isinstance(rows, str) else "".join(json.dumps(r) + "\n" for r in rows))
         run = subprocess.run(
             [sys.executable, ROOT / "bench" / "paper", "--no-build", "--build", BUILD, "--rows", file,
              "--results", self.folder / "results"],
-            capture_output=True, text=True, env={**os.environ, "LC_ALL": "C.UTF-8"})
+            capture_output=True, text=True, env={**os.environ, "LC_ALL": "C.UTF-8", **dict(environment)})
         self.assertEqual(run.returncode, code, run.stderr)
         page = self.folder / "results" / "paper.md"
         return " ".join(page.read_text().split()) if page.exists() else run.stderr
@@ -86,18 +90,35 @@ class Page(unittest.TestCase):
         self.assertIn("| 7140 (0.14 Mpaths/s) | cuda | 4000 | 2000 | 10 | 2 | 400 |", page)
         self.assertIn("**Disturbed:** in 3 of 3", page)
 
-    def test_curves_and_pictures_are_files_beside_the_page(self):
+    def test_pictures_are_files_beside_the_page(self):
         (self.folder / "a.ppm").write_bytes(b"P6\n720 720\n255\n" + bytes([255, 0, 128]) * 720**2)
         picture = row("picture", [2.0], of="figure3", scene="cornell_box", backend="cuda", size=720,
                       spp=1000, process_seconds=3, others=0, file="a.ppm")
-        times = [{"part": "figure2", "backend": "cuda", "resolution": r, "spp": n, "repeat": 0,
-                  "render": n * r * r / 1e9, "others": 0} for r in (100, 200) for n in (1, 2, 4, 8)]
-        page = self.make([MACHINE, picture, *times])
+        page = self.make([MACHINE, picture])
         self.assertIn("| cornell_box | 720² | 1,000 | not known | 10.8 s | cuda | 2 s | 259 |", page)
-        self.assertIn("twice the width and height costs 4 times as much", page)
         png = (self.folder / "results" / "paper-cornell_box.png").read_bytes()
         self.assertEqual(struct.unpack(">II", png[16:24]), (360, 360))
-        self.assertTrue((self.folder / "results" / "paper.svg").exists())
+
+    @unittest.skipUnless(importlib.util.find_spec("matplotlib"), "matplotlib draws the chart")
+    def test_curves_are_a_chart_with_names_as_text(self):
+        page = self.make([MACHINE, *TIMES])
+        self.assertIn("twice the width and height costs 4 times as much", page)
+        file = self.folder / "results" / "paper.svg"
+        chart = file.read_text()
+        title = ElementTree.fromstring(chart).find("{http://www.w3.org/2000/svg}title")
+        self.assertEqual(title.text, "Render seconds against samples per pixel, Cornell box")
+        for name in ("cuda, 100²", "cuda, 200²", "samples per pixel"):
+            self.assertIn(f">{name}</text>", chart)
+        self.assertIn("prefers-color-scheme: dark", chart)
+        self.make([MACHINE, *TIMES])
+        self.assertEqual(file.read_text(), chart)
+
+    def test_without_what_draws_there_is_no_half_of_a_page(self):
+        (self.folder / "matplotlib.py").write_text("raise ImportError")
+        said = self.make([MACHINE, *TIMES], code=1, environment={"PYTHONPATH": str(self.folder)})
+        self.assertIn("this Python has none", said)
+        self.assertIn("-m pip install matplotlib", said)
+        self.assertFalse((self.folder / "results").exists())
 
     def test_a_wrong_result_is_an_error(self):
         page = self.make([MACHINE, {**rows_of_sums(5000, 1e-5)[0], "right": False}], code=1)
