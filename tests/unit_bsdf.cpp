@@ -385,16 +385,28 @@ bool isDelta(const CrtBsdf& bsdf) { return crt_is_delta(&bsdf) != 0; }
 
 /// Integrals over cells of the sphere, equal in solid angle: cosine by azimuth.
 constexpr std::size_t kRows = 32, kColumns = 32, kCells = kRows * kColumns, kSteps = 24;
-std::array<double, kCells> overCells(const std::function<double(const Vec3d&)>& f) {
+constexpr std::size_t kSubRows = kRows * kSteps, kSubColumns = kColumns * kSteps;
+/// The directions of the quadrature, row by row: most of its time would be their sines.
+const std::vector<Vec3d>& cellDirections() {
+    static const std::vector<Vec3d> all = [] {
+        std::vector<Vec3d> directions;
+        for (std::size_t i = 0; i < kSubRows; ++i)
+            for (std::size_t j = 0; j < kSubColumns; ++j)
+                directions.push_back(
+                    spherical(-1 + 2 * (static_cast<double>(i) + 0.5) / kSubRows,
+                              -kPi + 2 * kPi * (static_cast<double>(j) + 0.5) / kSubColumns));
+        return directions;
+    }();
+    return all;
+}
+template <class F>
+std::array<double, kCells> overCells(const F& f) {
     std::array<double, kCells> cells{};
-    constexpr std::size_t rows = kRows * kSteps, columns = kColumns * kSteps;
-    for (std::size_t i = 0; i < rows; ++i)
-        for (std::size_t j = 0; j < columns; ++j) {
-            const double cosine = -1 + 2 * (static_cast<double>(i) + 0.5) / rows;
-            const double phi = -kPi + 2 * kPi * (static_cast<double>(j) + 0.5) / columns;
+    const std::vector<Vec3d>& directions = cellDirections();
+    for (std::size_t i = 0; i < kSubRows; ++i)
+        for (std::size_t j = 0; j < kSubColumns; ++j)
             cells[i / kSteps * kColumns + j / kSteps] +=
-                f(spherical(cosine, phi)) * 4 * kPi / (static_cast<double>(rows) * columns);
-        }
+                f(directions[i * kSubColumns + j]) * 4 * kPi / (static_cast<double>(kSubRows) * kSubColumns);
     return cells;
 }
 std::size_t cellOf(const Vec3d& w) {
@@ -419,8 +431,9 @@ void overNumbers(F&& f, u32 side = 512) {
             CrtRandom2 u, choice;
             u.x = (static_cast<f32>(i) + 0.5f) / static_cast<f32>(side);
             u.y = (static_cast<f32>(j) + 0.5f) / static_cast<f32>(side);
-            choice.x = static_cast<f32>(std::fmod(n * 0.7548776662466927, 1.0));
-            choice.y = static_cast<f32>(std::fmod(n * 0.5698402909980532, 1.0));
+            const double x = n * 0.7548776662466927, y = n * 0.5698402909980532;
+            choice.x = static_cast<f32>(x - std::floor(x));
+            choice.y = static_cast<f32>(y - std::floor(y));
             f(u, choice, 1.0 / (static_cast<double>(side) * side));
         }
 }
@@ -531,8 +544,9 @@ TEST_CASE("BSDF: about interpolated normals nothing that is reflected is lost",
                 CHECK(below == 0);
                 CHECK(worst_pdf < 1e-3);
                 if (isDelta(bsdf)) continue;
-                const auto above = [&](const std::function<double(vec3)>& f) {
-                    return overCells([&](const Vec3d& w) { return w[2] * wo[2] > 0 ? f(unitFloat(w)) : 0; });
+                const auto above = [&](const auto& f) {
+                    return overCells(
+                        [&](const Vec3d& w) -> double { return w[2] * wo[2] > 0 ? f(unitFloat(w)) : 0; });
                 };
                 const auto density = above([&](vec3 w) -> double { return crt_surface_pdf(&bsdf, w); });
                 const double lobe =

@@ -25,6 +25,9 @@ TEST_CASE("files that are not there or not text", "[scene_yaml][refused]") {
                       Contains("png.yaml:1:1: error: byte 0x89 at offset 0"));
     CHECK_THROWS_WITH(loadScene(folder.write("latin.yaml", "crt: 1\ntitle: caf\xe9\n")),
                       Contains("latin.yaml:2:11: error: byte 0xe9") && Contains("title: caf\ufffd\n"));
+    CHECK_THROWS_WITH(loadScene(folder.write("a.xml", "<scene/>")),
+                      Contains("a.xml: error: this is a scene of Mitsuba; crt's Python package makes"));
+    CHECK_THROWS_WITH(loadScene(folder.write("a.pbrt.gz", "\x1f\x8b")), Contains("a scene of pbrt; crt's"));
 }
 
 TEST_CASE("texts that are not YAML, or not the YAML of a scene", "[scene_yaml][refused]") {

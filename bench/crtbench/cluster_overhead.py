@@ -3,7 +3,7 @@ seconds, in turn, and whether the bits are the same. Prints one table; nothing i
 
 The workers are processes of one thread each, which render with one thread each; the plain render uses all
 threads. The cluster has been started when the clock begins, without the profiler of Dask and with its
-monitors every 10 s (docs/cluster.md). With --gpus a plain render on one device is
+monitors and ticks as far apart as docs/cluster.md says. With --gpus a plain render on one device is
 compared with workers that have one GPU each, as CUDA_VISIBLE_DEVICES says."""
 
 import argparse
@@ -18,7 +18,8 @@ import crt
 import crt.distributed
 
 
-QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "10s",
+QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s",
+         "distributed.admin.system-monitor.interval": "10s",
          "distributed.worker.memory.monitor-interval": "5s"}
 
 

@@ -14,7 +14,7 @@
 namespace crt {
 namespace {
 
-constexpr const char* kNotes = R"x(
+constexpr const char* kCompletionNotes = R"x(
 Packages of crt install these scripts where the shells look for them. Without a package:
   eval "$(crt completion bash)"                                      in ~/.bashrc
   eval "$(crt completion zsh)"                                       in ~/.zshrc, after compinit
@@ -40,7 +40,7 @@ Command completionCommand(const CommandLine& all) {
                            .help = "bash, zsh or fish",
                            .read = [shell](const std::string& text) { *shell = text; },
                            .completion = completeWord({"bash", "zsh", "fish"})}},
-            .notes = kNotes,
+            .notes = kCompletionNotes,
             .run = [shell, &all](const std::string&) {
                 printOut("{}", script(*shell, all.commands()));
                 return 0;

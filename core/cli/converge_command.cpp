@@ -91,7 +91,7 @@ OptionGroup where(State& state) {
              noProgressOption(state.progress)}};
 }
 
-constexpr const char* kNotes =
+constexpr const char* kConvergeNotes =
             "\nRenders every scene with every backend and variant, again and again with other seeds, looks "
             "at 1, 2, 4 ... samples, and writes one\n"
             "page: error against seconds with its interval, efficiency, bias, whether the images' own error "
@@ -138,7 +138,7 @@ Command convergeCommand() {
                            .completion = completeScene(),
                            .repeatable = true}},
             .groups = {what(*state), where(*state)},
-            .notes = kNotes,
+            .notes = kConvergeNotes,
             .run = [state](const std::string& typed) {
                 return resultWithThreads(state->request.integrator.threads,
                                          [&] { return run(*state, typed); });

@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kNotes = R"(
+constexpr const char* kDataNotes = R"(
 In a scene, wherever a spectrum can stand:
   reflectance: {data: cornell/white}
   ior: {data: glasses/SF10}
@@ -138,7 +138,7 @@ Command dataCommand() {
                           .placeholder = {},
                           .help = "the same as JSON",
                           .read = [state](const std::string&) { state->json = true; }}}}},
-            .notes = kNotes,
+            .notes = kDataNotes,
             .run = [state](const std::string&) { return show(state->name, state->json); }};
 }
 

@@ -203,7 +203,7 @@ int develop(const DevelopArguments& arguments) {
     return 0;
 }
 
-constexpr const char* kNotes =
+constexpr const char* kDevelopNotes =
             "\nA film (.crtfilm, from -o or --checkpoint) holds every sample's sum, so exposure, white "
             "balance, colour space and crop can be\n"
             "chosen after the render. No backend is opened and no scene is read. PNG and PPM get exposure "
@@ -261,7 +261,7 @@ Command developCommand() {
                       .help = "what .exr files hold beside the image (what the scene asks for), or none",
                       .read = [to](const std::string& text) { to->aovs = parseList(text, "--aovs"); }},
                      quietOption("only warnings and errors")}}},
-        .notes = kNotes,
+        .notes = kDevelopNotes,
         .run = [to](const std::string&) { return develop(*to); }};
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kNotes = R"(
+constexpr const char* kImportNotes = R"(
 The scene names the model, whose meshes and images stay where they are: materials, lights and camera are
 there to be changed. What crt does not have, and what it chose, is said in a warning and at the top of the
 scene.
@@ -44,6 +44,9 @@ void write(const std::string& path, const std::string& text, bool overwrite) {
 }
 
 int import(const Request& request) {
+    if (const std::string other = otherRendererOf(request.model); !other.empty())
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is a scene of {}; {}", request.model, other,
+                                                  importHint(request.model)));
     if (!isModel(request.model))
         throw Error(ErrorKind::Usage,
                     fmt::format("'{}' is no model: crt imports .glb, .gltf, .obj and .ply", request.model));
@@ -89,7 +92,7 @@ Command importCommand() {
                           .placeholder = {},
                           .help = "a glTF file may name buffers and images outside its folder",
                           .read = [request](const std::string&) { request->allow_outside = true; }}}}},
-            .notes = kNotes,
+            .notes = kImportNotes,
             .run = [request](const std::string&) { return import(*request); }};
 }
 

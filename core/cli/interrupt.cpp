@@ -43,7 +43,7 @@ extern "C" void onSignal(int signal) {
     // A terminal has just shown ^C on the line of the bar, so a person there gets an answer; a log file is
     // told by the report.
     if (signal == SIGINT && isatty(STDERR_FILENO) != 0 &&
-        write(STDERR_FILENO, text.data(), text.size()) < 0) {
+        ::write(STDERR_FILENO, text.data(), text.size()) < 0) {
         // Nothing can be done about it here.
     }
     errno = saved_errno;

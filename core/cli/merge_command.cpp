@@ -67,7 +67,7 @@ int mergeFilms(const MergeArguments& arguments) {
     return 0;
 }
 
-constexpr const char* kNotes =
+constexpr const char* kMergeNotes =
             "\nExamples:\n"
             "  crt merge -o all.crtfilm a.crtfilm b.crtfilm\n"
             "  crt merge -o scene.exr -o scene.png a.crtfilm b.crtfilm\n"
@@ -107,7 +107,7 @@ Command mergeCommand() {
                       .read = [to](const std::string&) { to->overwrite = true; }},
                      quietOption("only warnings and errors")}},
                    std::move(scene)},
-        .notes = kNotes,
+        .notes = kMergeNotes,
         .run = [to](const std::string&) { return mergeFilms(*to); }};
 }
 

@@ -33,7 +33,7 @@ int terminalColumns() {
 
 void writeStderr(std::string_view text) {
     while (!text.empty()) {
-        const ssize_t written = write(STDERR_FILENO, text.data(), text.size());
+        const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
         if (written <= 0) return;  // A bar that cannot be drawn is no reason to stop a render.
         text.remove_prefix(static_cast<std::size_t>(written));
     }
@@ -97,8 +97,7 @@ std::string progressBar(const ProgressState& state, int columns) {
     return "[" + bar + "] " + text;
 }
 
-Progress::Progress(ProgressMode mode)
-    : mode_(mode), listener_(currentListener()), shown_at_(Clock::now()) {
+Progress::Progress(ProgressMode mode) : mode_(mode), listener_(currentListener()), shown_at_(Clock::now()) {
     if (mode_ == ProgressMode::Auto) mode_ = terminalCanDraw() ? ProgressMode::Bar : ProgressMode::Lines;
     if (mode_ == ProgressMode::Bar) setLogHook(listener_, aroundMessage, this);
 }

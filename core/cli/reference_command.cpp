@@ -44,7 +44,7 @@ OptionGroup options(State& state) {
     return group;
 }
 
-constexpr const char* kNotes =
+constexpr const char* kReferenceNotes =
             "\nAnother seed, independent samples, no roulette, and light sampling switched: as little as "
             "possible in common with what it will judge.\n"
             "The file holds the mean and eight independent eighths of it, from which its own error "
@@ -65,7 +65,7 @@ Command referenceCommand() {
                            .read = [state](const std::string& text) { state->request.scene.file = text; },
                            .completion = completeScene()}},
             .groups = {options(*state)},
-            .notes = kNotes,
+            .notes = kReferenceNotes,
             .run = [state](const std::string&) {
                 TerminalWatch watch(state->progress, TerminalWatch::Signals::Always);
                 return converge::makeReference(state->request, watch);

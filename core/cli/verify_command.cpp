@@ -207,7 +207,7 @@ OptionGroup output(Arguments& to) {
               .repeatable = true}}};
 }
 
-constexpr const char* kNotes =
+constexpr const char* kVerifyNotes =
             "\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, "
             "deterministic quadrature, relations between\n"
             "images. A case passes, is refused as documented, does not apply (and says why), is "
@@ -231,7 +231,7 @@ Command verifyCommand() {
     return {.name = "verify",
             .summary = "render scenes whose answer is known; exit code 7 when a backend does not find it",
             .groups = {verify::asked(*to), verify::ofWhom(*to), verify::output(*to)},
-            .notes = verify::kNotes,
+            .notes = verify::kVerifyNotes,
             .run = [to](const std::string&) {
                 return resultWithThreads(to->integrator.threads, [&] { return verify::verify(*to); });
             }};

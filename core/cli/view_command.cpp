@@ -33,7 +33,7 @@ std::string parseToken(const std::string& text) {
     return text;
 }
 
-constexpr const char* kNotes =
+constexpr const char* kViewNotes =
     "\nThe page shows the image as it converges. Dragging turns the camera around its target, with Shift or "
     "the right button it is\n"
     "moved, the wheel goes nearer and farther; a click shows what the film knows of a pixel, and Ctrl with "
@@ -97,7 +97,7 @@ Command viewCommand() {
             .groups = {what(*to),
                        where(*to),
                        {"Messages", {quietOption("only the address, warnings and errors")}}},
-            .notes = kNotes,
+            .notes = kViewNotes,
             .run = [to](const std::string&) {
                 if (to->view.scene.file == "-")
                     throw Error(ErrorKind::Usage, "crt view reads its scene again and again: name a file");

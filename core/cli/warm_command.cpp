@@ -67,7 +67,7 @@ OptionGroup options(State& state) {
     return group;
 }
 
-constexpr const char* kNotes =
+constexpr const char* kWarmNotes =
             "\nA backend compiles a kernel for what a scene needs, and keeps it on disk: in CRT_CACHE_DIR, "
             "else in crt of XDG_CACHE_HOME or of ~/.cache. The first render of a kind of scene waits for "
             "the compiler, or begins with a slower kernel. This command compiles now, so that no render "
@@ -91,7 +91,7 @@ Command warmCommand() {
                            .completion = completeScene(),
                            .repeatable = true}},
             .groups = {options(*state)},
-            .notes = kNotes,
+            .notes = kWarmNotes,
             .run = [state](const std::string&) { return warmAll(*state); }};
 }
 

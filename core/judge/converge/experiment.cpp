@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "crt converge experiment 1";
 
-std::string labelOf(const Key& key) {
+std::string placeOf(const Key& key) {
     if (key == Key{}) return "the run";
     return fmt::format("{}, {}{}{}", key.scene, key.backend, key.variant.empty() ? "" : ", ", key.variant);
 }
@@ -86,10 +86,10 @@ void requireSame(const std::string& path, const Properties& then, const Properti
                                         [&key = name](const auto& value) { return value.first == key; });
         const std::string was = found == then.values.end() ? "unknown" : found->second;
         if (was != text && withoutDigest(was) == withoutDigest(text))
-            refuse(path, fmt::format("{} of {} was another ({} in both)", name, labelOf(now.key),
+            refuse(path, fmt::format("{} of {} was another ({} in both)", name, placeOf(now.key),
                                      withoutDigest(text)));
         if (was != text)
-            refuse(path, fmt::format("{} of {} was {}, and is {} now", name, labelOf(now.key),
+            refuse(path, fmt::format("{} of {} was {}, and is {} now", name, placeOf(now.key),
                                      withoutDigest(was), withoutDigest(text)));
     }
 }
@@ -154,11 +154,11 @@ void requireSameExperiment(const std::string& path, const Experiment& experiment
     const Experiment then = readExperiment(path);
     for (const Properties& p : experiment) {
         const Properties* before = find(then, p.key);
-        if (before == nullptr) refuse(path, fmt::format("it has no {}", labelOf(p.key)));
+        if (before == nullptr) refuse(path, fmt::format("it has no {}", placeOf(p.key)));
         requireSame(path, *before, p);
     }
     for (const Properties& p : then)
-        if (find(experiment, p.key) == nullptr) refuse(path, fmt::format("it has {} too", labelOf(p.key)));
+        if (find(experiment, p.key) == nullptr) refuse(path, fmt::format("it has {} too", placeOf(p.key)));
 }
 
 std::vector<std::string> namesOfScenes(const std::vector<SceneRequest>& scenes) {

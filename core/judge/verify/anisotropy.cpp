@@ -10,14 +10,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <vector>
 
 namespace crt::verify {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 void furnace(Context& context) {
     // Its tangent is the axis x, turned away from the view.

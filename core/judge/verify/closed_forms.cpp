@@ -14,7 +14,6 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
-#include <numbers>
 #include <optional>
 #include <random>
 #include <set>
@@ -22,8 +21,6 @@
 
 namespace crt::verify {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 Cube furnace(double albedo, int depth, bool nee = false) {
     Cube cube;

@@ -11,13 +11,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace crt::verify {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180;
 /// n of the glass in these cases, unless they say otherwise.
 constexpr double kIndex = 1.5;
 constexpr std::uint64_t kGlass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ENVIRONMENT;

@@ -10,15 +10,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace crt::verify {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 constexpr const char* kDown = "{position: [0.1, 2, 0.05], target: [0.1, 0, 0.05], up: [0, 0, 1], fov: 0.01}";
 

@@ -12,13 +12,11 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <numbers>
 
 namespace crt::verify {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr std::uint64_t kNeeds = CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE | CRT_FEATURE_ENVIRONMENT |
+constexpr std::uint64_t kEnvironmentNeeds = CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE | CRT_FEATURE_ENVIRONMENT |
                                  CRT_FEATURE_ENVIRONMENT_LIGHT | CRT_FEATURE_ENVIRONMENT_IMAGE;
 constexpr const char* kAlone = "{max_depth: 1, roulette: false, mis: false}";
 
@@ -225,14 +223,13 @@ std::vector<Case> environmentCases() {
     return {
         row("E20", "environment-image",
             "Latitude-longitude images over a floor: grey, a single texel, a gradient, a contrast of 1e4; "
-            "by "
-            "light sampling, alone and by chance; turned and scaled",
+            "by light sampling, alone and by chance; turned and scaled",
             "the constant environment; sums of each texel's irradiance; the texel where it belongs",
-            "closed form of a texel over level ground", "5e-4; ± 0.3 %; 2 %", Level::Commit, kNeeds,
-            images),
+            "closed form of a texel over level ground", "5e-4; ± 0.3 %; 2 %", Level::Commit,
+            kEnvironmentNeeds, images),
         row("E21", "cie-sky", "CIE general skies over a floor, by zenith luminance and by illuminance",
             "pi L for the uniform sky; the horizontal illuminance", "quadrature of ISO 15469:2004",
-            "± 0.3 %; 1 %", Level::Commit, kNeeds | CRT_FEATURE_TABLE, skies),
+            "± 0.3 %; 1 %", Level::Commit, kEnvironmentNeeds | CRT_FEATURE_TABLE, skies),
     };
 }
 

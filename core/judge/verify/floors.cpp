@@ -12,8 +12,6 @@
 namespace crt::verify {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 std::string floorInBeam(const std::string& material, const Vec3d& view, const Vec3d& light) {
     return Stage(eyeAt({view[1], view[2], view[0]}, "[0.6, 0.3, 0.1]"))
         .material("it", material)

@@ -10,12 +10,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace crt::verify {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kIndex = 1.5;
 constexpr const char* kInterface = "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]";
 

@@ -1,6 +1,7 @@
 // Group J: film and camera.
 #include "film/resolve.h"
 #include "judge/verify/context.h"
+#include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
 
 #include "base/log.h"
@@ -12,12 +13,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 namespace crt::verify {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// A room with a lamp, a mirror and a glass block, so that there is something to be seen everywhere.
 std::string room(const std::string& camera, const std::string& film) {

@@ -1,8 +1,8 @@
 // Group K: input hygiene and size. What is wrong is refused by name before anything is rendered, or borne
 // and the same image. One of each kind: every refusal has a test of its own (tests/unit_scene_yaml.cpp,
 // tests/unit_mesh_io.cpp), and every reader a fuzz target (tests/fuzz).
-#include "judge/verify/context.h"
 #include "base/temporary_folder.h"
+#include "judge/verify/context.h"
 
 #include "base/error.h"
 
@@ -114,12 +114,14 @@ void files(Context& context) {
     const TemporaryFolder folder;
     context.refused("a mesh that is not there", scene("obj: none-such.obj"), "none-such.obj");
     context.refused("a directory for a mesh", scene(fmt::format("obj: '{}'", folder.path())), "directory");
-    context.notApplicable("scenes that include each other",
-                          "scenes have no includes; an alias to itself is refused by the reader's tests");
+    const std::string other = folder.write("other.yaml", "include: one.yaml\n");
+    folder.write("one.yaml", "include: other.yaml\n");
+    context.refused("scenes that include each other",
+                    fmt::format("include: '{}'\n", other) + scene(triangle("1")), "a cycle has no end");
     context.notApplicable("disk full at write", "asked of the program from outside: tests/cli; exit code 6");
 }
 
-void sizes(Context& context) {
+void filmSizes(Context& context) {
     const auto film = [](const char* resolution) {
         return fmt::format(
             "crt: 1\ncamera: {{position: [0, 0, 0], target: [0, 0, 1], fov: 40}}\nfilm: {{resolution: "
@@ -154,9 +156,10 @@ std::vector<Case> inputCases() {
                  "refused by line; the same image", meshFiles),
         spelling("K04", "keys", "Unknown, doubled and wrong keys; no YAML; nothing", "refused by place",
                  keys),
-        spelling("K05", "files", "Meshes that are missing or directories", "refused by name", files),
+        spelling("K05", "files", "Meshes that are missing or directories; scenes that include each other",
+                 "refused by name", files),
         spelling("K06", "sizes", "Films of 0 and 2^32 pixels, indices beyond 32 bits",
-                 "refused before memory is asked for", sizes),
+                 "refused before memory is asked for", filmSizes),
     };
 }
 

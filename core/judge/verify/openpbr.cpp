@@ -18,8 +18,6 @@
 namespace crt::verify {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 void metals(Context& context) {
     const Render how{.samples = 1u << 12};
     const double edge = std::acos(1.0 / 7) / kDegree;

@@ -16,7 +16,6 @@
 namespace crt::verify {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr Effort kEffort{.samples = 1024, .most = 65536};
 
 std::string under(const Lacquer& coat, const std::string& base, double weight = 1) {
@@ -31,7 +30,7 @@ double widened(double base, double coat) {
 }
 
 /// Coats on Lambert's law, lit by beams.
-void beams(Context& context) {
+void beamsOnCoats(Context& context) {
     const Vec3d view = unit({0.6, 0.2, 0.5});
     const double base = 0.7;
     const std::string lambert = fmt::format("specular_weight: 0, base_color: {}", base);
@@ -148,7 +147,7 @@ void skies(Context& context) {
 }
 
 void coats(Context& context) {
-    beams(context);
+    beamsOnCoats(context);
     skies(context);
     const Render how{.samples = 64};
     const auto same = [&](const char* what, const std::string& material, const std::string& without) {

@@ -14,7 +14,6 @@
 
 #include <cmath>
 #include <fstream>
-#include <numbers>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -22,7 +21,6 @@
 namespace crt::verify {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr std::uint64_t kLit = CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE | CRT_FEATURE_POINT_LIGHT;
 
 double radians(double degrees) { return degrees * (kPi / 180); }

@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -20,8 +19,6 @@
 
 namespace crt::verify {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 // ---- Lenses ---------------------------------------------------------------------------------------------
 
@@ -107,7 +104,6 @@ double seen(const std::vector<Refracting>& lens, double n, const Sighting& at) {
 
 std::string lensScene(const std::string& objects, const std::string& index, const Sighting& at,
                       const std::string& film) {
-    constexpr double kDegree = kPi / 180;
     return fmt::format(
         "crt: 1\ncamera: {{position: [0, 0, -{}], target: [0, 0, 0], fov: {}}}\n"
         "film: {{resolution: [32, 32]{}}}\nintegrator: {{max_depth: 2, roulette: false}}\n"

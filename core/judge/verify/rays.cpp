@@ -15,7 +15,7 @@
 namespace crt::verify {
 namespace {
 
-constexpr std::uint64_t kNeeds = CRT_FEATURE_BVH | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_INDEPENDENT;
+constexpr std::uint64_t kRaysNeed = CRT_FEATURE_BVH | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_INDEPENDENT;
 
 void aimedRays(Context& context) {
     for (const Aim aim : {Aim::Vertex, Aim::Edge, Aim::Face}) {
@@ -304,20 +304,20 @@ std::vector<Case> rayCases() {
     return {
         row("D01", "aimed-rays",
             "Rays at the vertices, edges and faces of crumpled sheets that cover the film",
-            "none slips through", "topology", "rate of misses ≤ 1e-6 each", Level::Commit, kNeeds,
+            "none slips through", "topology", "rate of misses ≤ 1e-6 each", Level::Commit, kRaysNeed,
             aimedRays),
         row("D02", "rays-in-faces", "Rays in the planes of boxes' faces, along all axes, components of ±0",
-            "every ray meets the wall", "geometry", "rate of misses ≤ 1e-6", Level::Commit, kNeeds,
+            "every ray meets the wall", "geometry", "rate of misses ≤ 1e-6", Level::Commit, kRaysNeed,
             raysInFaces),
         row("D03", "nearly-parallel", "Directions with components of 1e-10, 1e-20, 1e-38 and 1e-42",
-            "every ray meets the wall", "geometry", "rate of misses ≤ 1e-6", Level::Commit, kNeeds,
+            "every ray meets the wall", "geometry", "rate of misses ≤ 1e-6", Level::Commit, kRaysNeed,
             nearlyParallelRays),
         row("D04", "grazing", "Rays at 1e-1 … 1e-7 rad to a mirror of 100 × 100 cells",
             "reflected to the sky, from a point of the floor", "geometry", "rate of false hits ≤ 1e-5",
-            Level::Commit, kNeeds | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AOV, grazingRays),
+            Level::Commit, kRaysNeed | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_AOV, grazingRays),
         row("D05", "starts-on-surfaces", "A camera in a face, on an edge, on a vertex",
             "segments are open: the surface is not met", "docs/decisions/0004-ray-offsets.md",
-            "none of 1024 pixels", Level::Commit, kNeeds | CRT_FEATURE_AREA_LIGHT, startsOnSurfaces),
+            "none of 1024 pixels", Level::Commit, kRaysNeed | CRT_FEATURE_AREA_LIGHT, startsOnSurfaces),
         row("D06", "rays-that-are-none", "Cameras that make rays of NaN or without direction", "refused",
             "docs/scene.md", "refused by name", Level::Commit, 0, raysThatAreNone),
         row("D07", "vertices-that-are-none", "Vertices at NaN, ±infinity, 1e999; at 1e30",

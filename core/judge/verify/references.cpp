@@ -7,12 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <numbers>
 
 namespace crt::verify {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// Of a polygon around the point, what lies on the side of the normal (Sutherland and Hodgman 1974, one
 /// plane).

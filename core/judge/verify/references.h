@@ -5,9 +5,13 @@
 
 #include <complex>
 #include <functional>
+#include <numbers>
 #include <vector>
 
 namespace crt::verify {
+
+inline constexpr double kPi = std::numbers::pi;
+inline constexpr double kDegree = kPi / 180;  ///< In radians.
 
 /// Form factor of a polygon seen from a point with a unit normal: the share of the Lambertian's hemisphere
 /// that it fills, irradiance over π·radiance. Lambert's formula (1760): (1/2π) Σ Θᵢ Γᵢ·n over the

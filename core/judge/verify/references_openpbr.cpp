@@ -4,12 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace crt::verify {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 constexpr double kEonLeast = 0.5 - 2 / (3 * kPi), kEonMean = 2.0 / 3 - 28 / (15 * kPi);
 

@@ -13,8 +13,6 @@
 namespace crt::verify {
 namespace {
 
-using Json = nlohmann::json;
-
 constexpr const char* kPreamble = R"(# Stability: what is asked of every backend
 
 <!-- Generated from the registry in core/judge/verify/. Change it there, then run
@@ -38,9 +36,9 @@ std::string cell(const std::string& text) {
 }
 
 /// Of the outcome with the largest deviation relative to what was expected: "worst 3.1e-7".
-std::string figureOf(const Json& result) {
+std::string figureOf(const nlohmann::json& result) {
     double deviation = -1;
-    for (const Json& o : result.at("outcomes")) {
+    for (const nlohmann::json& o : result.at("outcomes")) {
         if (!o.at("expected").is_number() || !o.at("measured").is_number()) continue;
         const double expected = o.at("expected"), measured = o.at("measured");
         const double d = std::abs(measured - expected) / (expected == 0 ? 1 : std::abs(expected));
@@ -64,7 +62,7 @@ std::string registryMarkdown(const std::vector<std::string>& suites) {
     std::vector<std::string> backends;
     std::map<std::pair<std::string, std::string>, std::string> figures;
     for (const std::string& suite : suites) {
-        const Json json = Json::parse(suite);
+        const nlohmann::json json = nlohmann::json::parse(suite);
         const std::string backend = json.at("backend").at("name");
         backends.push_back(backend);
         text += fmt::format(
@@ -72,7 +70,7 @@ std::string registryMarkdown(const std::vector<std::string>& suites) {
             "of a case's answers from what is expected.\n",
             backend, json.at("level").get<std::string>(), json.at("backend").at("device").get<std::string>(),
             json.at("crt").at("version").get<std::string>());
-        for (const Json& c : json.at("cases")) figures[{backend, c.at("id")}] = figureOf(c);
+        for (const nlohmann::json& c : json.at("cases")) figures[{backend, c.at("id")}] = figureOf(c);
     }
     char group = 0;
     for (const Case& c : registry()) {

@@ -19,7 +19,7 @@
 namespace crt::verify {
 namespace {
 
-constexpr std::uint32_t kNeeds =
+constexpr std::uint32_t kScaleNeeds =
     CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_INDEPENDENT;
 
 /// Mean radiance of `changed` over that of `original`, for eight seeds: the same random numbers, so that
@@ -239,7 +239,7 @@ std::vector<Case> scaleCases() {
          .source = "powers of two round nothing",
          .tolerance = "same bits",
          .level = Level::Commit,
-         .needs = kNeeds,
+         .needs = kScaleNeeds,
          .run = powersOfTwo},
         {.id = "B02",
          .name = "scale-10",
@@ -248,7 +248,7 @@ std::vector<Case> scaleCases() {
          .source = "radiance does not depend on the unit of length",
          .tolerance = "± 0.1 %",
          .level = Level::Commit,
-         .needs = kNeeds,
+         .needs = kScaleNeeds,
          .run = powersOfTen},
         {.id = "B03",
          .name = "far-away",
@@ -258,7 +258,7 @@ std::vector<Case> scaleCases() {
                    "shifts, which give the same bits, are M02",
          .tolerance = "± 0.1 %",
          .level = Level::Commit,
-         .needs = kNeeds,
+         .needs = kScaleNeeds,
          .run = farAway},
         {.id = "B04",
          .name = "embrees-far-place",
@@ -277,7 +277,7 @@ std::vector<Case> scaleCases() {
          .source = "what is far away and dark does not matter",
          .tolerance = "± 0.5 % in the mean, ± 5 % in any pixel with the same random numbers",
          .level = Level::Commit,
-         .needs = kNeeds | CRT_FEATURE_BVH,
+         .needs = kScaleNeeds | CRT_FEATURE_BVH,
          .run = mixedScale},
         {.id = "B06",
          .name = "thin-layers",
@@ -295,7 +295,7 @@ std::vector<Case> scaleCases() {
          .source = "Lambert 1760; the scene is pbrt-v4's issue 249",
          .tolerance = "± 0.3 %",
          .level = Level::Commit,
-         .needs = kNeeds,
+         .needs = kScaleNeeds,
          .run = hugeEmitter},
         {.id = "B08",
          .name = "sizes-of-a-square",
@@ -313,7 +313,7 @@ std::vector<Case> scaleCases() {
          .source = "powers of two round nothing",
          .tolerance = "same bits",
          .level = Level::Commit,
-         .needs = kNeeds,
+         .needs = kScaleNeeds,
          .run = extremeCoordinates},
         {.id = "B10",
          .name = "denormal-coordinates",
@@ -322,7 +322,7 @@ std::vector<Case> scaleCases() {
          .source = "powers of two round nothing",
          .tolerance = "same bits",
          .level = Level::Commit,
-         .needs = kNeeds,
+         .needs = kScaleNeeds,
          .run = denormalCoordinates},
     };
 }

@@ -12,13 +12,9 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <numbers>
 
 namespace crt::verify {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180;
 
 /// A roughness of what is smooth (docs/scene.md) is refused, not ignored.
 void roughnessIsRefused(Context& context, const std::string& material,

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -16,8 +15,6 @@
 
 namespace crt::verify {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// A large white floor, y = 0, seen at the origin, and what shines on it.
 std::string overFloor(const std::string& lamps, const std::string& integrator) {

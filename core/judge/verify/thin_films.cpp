@@ -14,12 +14,9 @@
 #include <cmath>
 #include <complex>
 #include <functional>
-#include <numbers>
 
 namespace crt::verify {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// Of white light the share in its luminance that `reflectance`, by nm, leaves.
 double luminous(const std::function<double(double)>& reflectance) {

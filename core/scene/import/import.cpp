@@ -55,6 +55,17 @@ bool isModel(const std::string& path) {
     return extension == ".glb" || extension == ".gltf" || extension == ".obj" || extension == ".ply";
 }
 
+std::string otherRendererOf(const std::string& path) {
+    if (extensionOf(path) == ".xml") return "Mitsuba";
+    if (path.ends_with(".pbrt") || path.ends_with(".pbrt.gz")) return "pbrt";
+    return {};
+}
+
+std::string importHint(const std::string& path) {
+    return fmt::format("crt's Python package makes a scene of it: python3 -m crt import {} -o scene.yaml",
+                       path);
+}
+
 ImportedModel importModel(GltfFiles& files, const std::string& path, const ImportOptions& options) {
     const fs::path file(path);
     const std::string folder = options.folder.empty() ? file.parent_path().string() : options.folder;

@@ -12,6 +12,11 @@ namespace crt {
 
 /// By the end of the file's name: .glb, .gltf, .obj, .ply.
 bool isModel(const std::string& path);
+/// "Mitsuba" or "pbrt", by the end of the name of a scene of theirs; empty: it is none. crt's Python package
+/// imports them.
+std::string otherRendererOf(const std::string& path);
+/// What to do with such a scene: a command.
+std::string importHint(const std::string& path);
 
 struct ImportOptions {
     std::string folder;          ///< Of the scene: names of files are relative to it. Empty: the file's own.

@@ -448,6 +448,11 @@ Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overr
         scene.parse_seconds = passed.count();
         return scene;
     }
+    const std::string other = otherRendererOf(path);
+    if (!other.empty() && std::filesystem::exists(path))
+        throw Error(ErrorKind::Scene,
+                    fmt::format("{}: error: this is a scene of {}; {}", path, other, importHint(path)),
+                    {path});
     const std::string text = readSceneText(path);
     SceneFiles files(std::filesystem::path(path).parent_path().string());
     if (path != kStandardInput) files.note(path);
