@@ -60,8 +60,8 @@ def main():
 
     scene = crt.load(arguments.scene, set={"film.resolution": [arguments.resolution] * 2})
     crt.render(scene, spp=2, backend=arguments.backend)  # Kernels and caches.
-    speed = crt.render(scene, backend=arguments.backend, time_limit=arguments.seconds / 10).film.samples
-    samples = 10 * speed
+    trial = crt.render(scene, backend=arguments.backend, time_limit=arguments.seconds / 10)
+    samples = int(trial.film.samples * arguments.seconds / trial.report["seconds"]["render"])
     dask.config.set(QUIET)
     with start(arguments.workers, arguments.gpus) as cluster, distributed.Client(cluster) as client:
         client.wait_for_workers(arguments.workers)

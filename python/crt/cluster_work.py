@@ -29,7 +29,7 @@ PART_SECONDS = 20
 PARTS_A_SECOND = 10   # Of all workers together: what a scheduler and this process bear with ease.
 SECONDS_A_PIXEL = 160e-6  # Between two merges: a hundred times what packing, sending and reading takes.
 PARTS_A_SECOND_AT_FIRST = 200  # As long as parts grow.
-PARTS_A_SECOND_AT_LAST = 25    # When they get smaller, so that all end together.
+PARTS_A_SECOND_AT_LAST = 100    # When they get smaller, so that all end together.
 PROBES = 64  # Parts at once until that can be kept: a thousand tiny ones would hold the scheduler up.
 FAILURES = 3   # Of one part, on devices that fail.
 GONE = (OSError, ClosedClientError, CancelledError)
@@ -134,13 +134,23 @@ class Work:
         most = self.threads + spare
         if not self.size.is_known(min(part_seconds, self.threads / PARTS_A_SECOND_AT_FIRST)):
             most = min(most, PROBES)
-        while left > 0 and len(self.running) < most:
+        parts = []
+        while left > 0 and len(self.running) + len(parts) < most:
             samples = self.size.next(part_seconds, least, min(soon, left), self.threads)
             first, end = self.missing.take(samples)
             left -= end - first
             soon -= end - first
-            future = self.task(rendered, self.sent, first, end, self.options, seconds_left,
-                               workers=self.good)
+            parts.append((first, end))
+        self.start(parts, seconds_left)
+
+    def start(self, parts, seconds_left):
+        """Tasks of these parts, in one message: a thousand of them would hold the scheduler up."""
+        if not parts:
+            return
+        keys = [f"crt-rendered-{self.name}-{next(self.serial)}" for _ in parts]
+        futures = self.client.map(rendered, [self.sent] * len(parts), *zip(*parts), options=self.options,
+                                  seconds=seconds_left, key=keys, workers=self.good)
+        for future, (first, end) in zip(futures, parts):
             self.running[future] = (first, end, time.monotonic())
             future.add_done_callback(self.done.put)
 
