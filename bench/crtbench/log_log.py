@@ -82,7 +82,7 @@ def curve(axes, points, colour, name, thin=False, dashed=False):
 
 
 def decimal_ticks(axis, text):
-    """Ticks at 1, 2 and 5 times powers of ten, or at these alone where there is no room; `text(value)`
+    """Ticks at 1, 2 and 5 times powers of ten, or only at the powers where there is no room; `text(value)`
     labels them."""
     ticker = library().ticker
     axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: text(value)))

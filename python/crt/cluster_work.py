@@ -29,7 +29,7 @@ PART_SECONDS = 20
 PARTS_A_SECOND = 10   # Of all workers together: what a scheduler and this process bear with ease.
 SECONDS_A_PIXEL = 160e-6  # Between two merges: a hundred times what packing, sending and reading takes.
 PARTS_A_SECOND_AT_FIRST = 200  # As long as parts grow.
-PARTS_A_SECOND_AT_LAST = 100    # When they get smaller, so that all end together.
+PARTS_A_SECOND_AT_LAST = 100  # When they get smaller, so that all end together.
 PROBES = 64  # Parts at once until that can be kept: a thousand tiny ones would hold the scheduler up.
 FAILURES = 3   # Of one part, on devices that fail.
 GONE = (OSError, ClosedClientError, CancelledError)
@@ -147,7 +147,7 @@ class Work:
         """Tasks of these parts, in one message: a thousand of them would hold the scheduler up."""
         if not parts:
             return
-        keys = [f"crt-rendered-{self.name}-{next(self.serial)}" for _ in parts]
+        keys = [self.key(rendered) for _ in parts]
         futures = self.client.map(rendered, [self.sent] * len(parts), *zip(*parts), options=self.options,
                                   seconds=seconds_left, key=keys, workers=self.good)
         for future, (first, end) in zip(futures, parts):
@@ -155,8 +155,11 @@ class Work:
             future.add_done_callback(self.done.put)
 
     def task(self, function, *arguments, **more):
-        key = f"crt-{function.__name__}-{self.name}-{next(self.serial)}"
-        return self.client.submit(function, *arguments, key=key, **more)
+        return self.client.submit(function, *arguments, key=self.key(function), **more)
+
+    def key(self, function):
+        """A name that no other task has."""
+        return f"crt-{function.__name__}-{self.name}-{next(self.serial)}"
 
     def count_threads(self):
         now = time.monotonic()

@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from . import matrices, shapes, sky_image, spectra
+from .images import pixels
 from .losses import present, refuse, suggestion
 from .meshes import Damaged, faced, ply_vertex, read_obj, read_ply, read_serialized
 from .mitsuba_materials import Materials
 from .mitsuba_tree import Reader
-from .images import pixels
 from .mitsuba_values import Values
 from .draft import BLACK, Draft, Thing, ball, meshed, plate, stretches, tube
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from . import matrices, pbrt_shapes, sky_image, spectra
 from .draft import BLACK, Draft, Thing, stretches
-from .losses import present, refuse, suggestion
 from .images import pixels
+from .losses import present, refuse, suggestion
 from .pbrt_materials import Materials
 from .pbrt_state import State
 from .pbrt_text import Parameters
