@@ -164,8 +164,9 @@ def provenance(program):
     ]
     return {"commit": git("rev-parse", "HEAD").strip(), "dirty": bool(changed),
             "compiler": version, "build_type": build_type,
-            "flags": compile_flags(program, "core/compile/compile.cpp"),
-            "embree_kernel_flags": compile_flags(program, "plugins/embree/kernels.cpp"),
+            "flags": compile_flags(program, "/core/compile/compile.cpp", "/crt_compile.dir/"),
+            "embree_kernel_flags": (compile_flags(program, "/plugins/embree/kernels.cpp")
+                                    if "embree" in statuses else ""),
             "cpu": processor_name(), "threads": os.cpu_count(), "memory_gb": round(memory_kb / 1e6, 1),
             "gpu": gpus[0] if gpus else None, "os": operating_system(), "backends": backends}
 
@@ -184,13 +185,14 @@ def operating_system():
     return f"{match[1] if match else platform.system()}, {platform.system()} {platform.release()}"
 
 
-def compile_flags(program, source):
-    """Flags of one source file as the build uses them, without its paths and definitions."""
+def compile_flags(program, *sources):
+    """Flags of the first of these files that the build compiles, without its paths and definitions. A room
+    may be compiled several files at a time, which then have another name."""
     path = program.build / "compile_commands.json"
     if not path.exists():
         return ""
     for entry in json.loads(path.read_text()):
-        if entry["file"].endswith("/" + source):
+        if any(source in entry["file"] for source in sources):
             words = shlex.split(entry["command"])
             return " ".join(w for w in words if re.match(r"-(O|m|f|std=|g)", w) and "/" not in w)
-    return ""
+    raise LookupError(f"{path} has none of {', '.join(sources)}")
