@@ -25,6 +25,7 @@ from .rendering import render
 
 PILE = 4     # Films of one worker that are added at once.
 BRANCH = 8   # Films of several workers that one task adds.
+FEW = 64     # Workers that each send one film, not several; with more the scheduler is what takes long.
 PART_SECONDS = 20
 PARTS_A_SECOND = 10   # Of all workers together: what a scheduler and this process bear with ease.
 SECONDS_A_PIXEL = 160e-6  # Between two merges: a hundred times what packing, sending and reading takes.
@@ -124,14 +125,15 @@ class Work:
         """Parts for all threads of the workers that there are, and a few more, so that none waits. They are
         to end together when `until` samples are done, or all."""
         self.count_threads()
-        spare = 0 if seconds_left is not None else -(-self.threads // 8)
         part_seconds = max(PART_SECONDS, self.threads / PARTS_A_SECOND)
         least = max(PART_SECONDS / 8, self.threads / PARTS_A_SECOND_AT_LAST)
         if seconds_left is not None:
             part_seconds = min(part_seconds, seconds_left)
         left = self.missing.left
         soon = until - self.samples - sum(end - first for first, end, _ in self.running.values())
-        most = self.threads + spare
+        # What waits behind another part ends last.
+        spare = seconds_left is None and not self.size.shrinks(part_seconds, min(soon, left), self.threads)
+        most = self.threads + (-(-self.threads // 8) if spare else 0)
         if not self.size.is_known(min(part_seconds, self.threads / PARTS_A_SECOND_AT_FIRST)):
             most = min(most, PROBES)
         parts = []
@@ -224,9 +226,7 @@ class Work:
             pile = self.piles.setdefault(worker, [])
             pile.append(future)
             if len(pile) >= PILE:
-                self.piles[worker] = [self.task(added, pile, workers=[worker], allow_other_workers=True,
-                                                priority=URGENT)]
-                self.merges += 1
+                self.piles[worker] = [self.sum_on(worker, pile)]
 
     @reaching
     def harvest(self, now):
@@ -239,9 +239,19 @@ class Work:
             self.merge()
         return False
 
+    def sum_on(self, worker, pile):
+        """The future of the sum of films that lie on this worker."""
+        if len(pile) == 1:
+            return pile[0]
+        self.merges += 1
+        return self.task(added, pile, workers=[worker], allow_other_workers=True, priority=URGENT)
+
     def merge(self):
-        futures = [future for pile in self.piles.values() for future in pile]
-        self.piles = {}
+        piles, self.piles = self.piles, {}
+        if len(piles) <= FEW:
+            futures = [self.sum_on(worker, pile) for worker, pile in piles.items()]
+        else:
+            futures = [future for pile in piles.values() for future in pile]
         while len(futures) > 1:
             groups = [futures[i:i + BRANCH] for i in range(0, len(futures), BRANCH)]
             futures = [self.task(added, group, priority=URGENT) if len(group) > 1 else group[0]

@@ -44,7 +44,9 @@ class PartSize:
     """
 
     FEWEST = 2
-    GROWTH = 8  # From part to part at most: short parts are mostly overhead, and say little of the speed.
+    # From part to part at most. What a short part wastes makes workers look slower than they are: the next
+    # part gets shorter than wanted, not longer.
+    GROWTH = 64
 
     def __init__(self, fixed=None):
         self.fixed = fixed
@@ -60,6 +62,12 @@ class PartSize:
     def is_known(self, seconds):
         """Whether parts may have the size that takes so long, not only a few times that of earlier ones."""
         return self.fixed is not None or (self.speed is not None and self.largest >= self.speed * seconds)
+
+    def shrinks(self, seconds, left, threads):
+        """Whether the end is so near that parts get shorter than `seconds`, or, of a fixed size, that each
+        thread gets two more at most."""
+        wanted = self.fixed if self.fixed is not None else (self.speed or 0) * seconds
+        return left / (2 * max(threads, 1)) < wanted
 
     def next(self, seconds, least, left, threads):
         """`left` samples are to be shared by so many threads, in parts of at least so many seconds."""

@@ -17,6 +17,7 @@ distributed = pytest.importorskip("distributed", reason="Dask is not installed (
 import crt  # noqa: E402 (after what may skip)
 import crt.distributed  # noqa: E402
 from crt import cluster_work  # noqa: E402
+from crt.sample_ranges import ENDLESS, Missing, PartSize  # noqa: E402
 from conftest import BOX  # noqa: E402
 from test_render import same  # noqa: E402
 
@@ -91,7 +92,8 @@ def test_bits_are_those_of_one_render(client, box, parts):
     result = crt.distributed.render(box, client, spp=301, parts=parts, on_progress=heard.append, **ONE)
     assert same_film(result.film, crt.render(box, spp=301, backend="embree").film)
     assert result.stop == "samples" and result.report["samples"] == {"per_pixel": 301, "resumed": 0}
-    assert result.report["distributed"]["parts"] > 4 and heard[-1]["samples"] == 301
+    told = result.report["distributed"]
+    assert told["parts"] > told["threads_most"] and told["merges"] > 0 and heard[-1]["samples"] == 301
     assert [now["samples"] for now in heard] == sorted(now["samples"] for now in heard)
     assert heard[0]["threads"] == 2
 
@@ -113,6 +115,29 @@ def test_killed_workers_change_nothing(box):
             result = crt.distributed.render(box, client, spp=2048, parts=32, on_progress=kill, **ONE)
             assert len(killed) == 2 and not set(killed) & set(client.run(os.getpid).values())
     assert same_film(result.film, crt.render(box, spp=2048, backend="embree").film)
+
+
+class FourThreads:
+    """Stands for a client."""
+
+    def submit(self, *_, **__):
+        return None
+
+    def nthreads(self):
+        return {"one": 3, "other": 1}
+
+
+@pytest.mark.parametrize("samples, running", [(10_000, 5), (2_600, 5), (2_500, 4), (300, 4)])
+def test_no_part_waits_behind_another_at_the_end(box, samples, running):
+    """As long as parts have 320 samples one more than there are threads is on its way."""
+    size = PartSize()
+    size.learn(160, 10.0)
+    work = cluster_work.Work(FourThreads(), box, {}, Missing([], samples), size, None, None, 60)
+    started = []
+    work.start = lambda parts, _: started.extend(parts)
+    work.submit(None, ENDLESS)
+    assert len(started) == running
+    assert len(set(started)) == running and min(end - first for first, end in started) > 0
 
 
 def test_late_workers_get_parts(box):

@@ -45,13 +45,15 @@ def test_sizes_follow_the_speed_and_shrink_towards_the_end():
     size = PartSize()
     assert size.next(20, 2.5, 10_000, 4) == STEP and not size.is_known(20) and PartSize(7).is_known(20)
     size.learn(16, 1.0)
-    assert not size.is_known(20) and size.is_known(8)
-    assert size.next(20, 2.5, 10_000, 4) == 8 * 16  # Grows step by step.
-    size.learn(128, 8.0)
+    assert size.is_known(64) and not size.is_known(65)
+    assert size.next(100, 2.5, 1e6, 4) == 64 * 16  # Grows step by step.
     size.learn(1024, 64.0)
     assert size.next(20, 2.5, 1e6, 4) == 320  # 16 samples a second, 20 seconds.
     assert size.next(20, 2.5, 800, 4) == 100  # Half of each thread's share.
+    assert size.shrinks(20, 2559, 4) and not size.shrinks(20, 2560, 4)
     assert size.next(20, 2.5, 80, 4) == 40    # No less than 2.5 seconds.
     assert size.next(0.01, 0.01, 80, 4) == 2
     assert PartSize(7).next(20, 2.5, 1e6, 4) == 7
+    assert PartSize(7).shrinks(20, 55, 4) and not PartSize(7).shrinks(20, 56, 4)
+    assert not PartSize().shrinks(20, 1, 4)  # Nothing is known.
     assert PartSize().next(20, 2.5, 8, 4) == 2
