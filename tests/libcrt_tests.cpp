@@ -187,6 +187,51 @@ TEST_CASE("parts of a film make the whole") {
     CHECK(kindOf([&] { sum.mean(24, 0); }) == 1);
 }
 
+TEST_CASE("renders of a session open and compile once, and give the bits of renders alone") {
+    const crt::Scene scene =
+        crt::Scene::fromText(lampYaml("idle", "sampler: {type: independent, replicates: 1}\n"));
+    Heard quiet;
+    const crt::Film whole = crt::render(scene, withSamples(20), &quiet).film;
+    crt::Session session(scene);
+    const auto part = [&](std::uint64_t first, std::uint64_t end, crt::Watch* watch) {
+        crt::RenderOptions options = withSamples(0);
+        options.sample_range = {{first, end}};
+        return session.render(options, watch).film;
+    };
+    const auto opens = [](const Heard& heard) {
+        return std::count(heard.stages.begin(), heard.stages.end(), "opening the backend");
+    };
+    Heard first, second, other, again, thrown_after;
+    crt::Film sum = part(8, 20, &first);
+    CHECK(opens(first) == 1);
+    CHECK(first.warnings.size() == 1);
+    sum.merge(part(0, 8, &second));
+    CHECK(opens(second) == 0);
+    CHECK(second.warnings.empty());  // The idle lamp is named once.
+    CHECK(sameMeans(sum, whole));
+
+    // A target error needs replicates, which this scene leaves out, and so another scene.
+    crt::RenderOptions target = withSamples(20);
+    target.target_error = 1e-6;
+    session.render(target, &other);
+    CHECK(sameMeans(session.render(withSamples(20), &again).film, whole));
+    CHECK(opens(other) == 1);
+    CHECK(opens(again) == 1);
+
+    struct Thrower : Heard {
+        void progress(const crt::Progress&) override { throw std::string("mine"); }
+    } thrower;
+    CHECK_THROWS_AS(session.render(withSamples(4), &thrower), std::string);
+    CHECK(sameMeans(session.render(withSamples(20), &thrown_after).film, whole));
+    CHECK(sameMeans(session.render(crt::Film(sum), withSamples(20), &quiet).film, whole));
+    CHECK(kindOf([&] {
+              crt::RenderOptions nowhere = withSamples(4);
+              nowhere.backend = "nowhere";
+              session.render(nowhere, &quiet);
+          }) != 0);
+    CHECK(sameMeans(session.render(withSamples(20), &quiet).film, whole));
+}
+
 TEST_CASE("a watch stops a render, which keeps what it has") {
     const crt::Scene scene = crt::Scene::fromText(lampYaml("idle"));
     Heard heard;

@@ -4,6 +4,7 @@
 #include "backend/loader.h"
 #include "catch.h"
 #include "fake_plugins/fake_pattern.h"
+#include "render/render.h"
 #include "render/sampling.h"
 #include "render/session.h"
 #include "same_film.h"
@@ -182,4 +183,26 @@ TEST_CASE("when every device has failed, the film holds what was read before", "
     CHECK(result.failure->kind() == ErrorKind::Device);
     CHECK(result.rendered == 12);
     checkSame(film, filmOfOne(12));
+}
+
+TEST_CASE("a device that failed is opened again by the next render of a scene", "[device_group]") {
+    const Scene scene =
+        parseScene("crt: 1\nfilm: {resolution: [6, 4]}\nenvironment: {radiance: 1}\n", "test", ".");
+    const RenderOptions options{
+        .backend = CRT_FAKE_PLUGIN_DIR "/crt_backend_fake.so", .spp = 12, .chunk = 4};
+    SceneOnDevices on_devices(scene, options);
+    const SamplingPlan plan = planSamples(options, scene, {});
+    Watch watch;
+    const Rendered first = on_devices.render(plan, std::nullopt, watch);
+    {
+        const DeviceFault fault("device");
+        const Rendered failed = on_devices.render(plan, std::nullopt, watch);
+        REQUIRE(failed.failure);
+        CHECK(failed.film.samples.count() == 0);
+    }
+    const Rendered again = on_devices.render(plan, std::nullopt, watch);
+    CHECK_FALSE(again.failure);
+    checkSame(again.film, first.film);
+    CHECK(first.film.samples.count() == 12);
+    CHECK(again.facts.rendered_samples == 12);
 }

@@ -76,38 +76,83 @@ Film filmOf(crt::Rendered& run) {
     return Film(std::make_unique<Film::Impl>(Film::Impl{{std::move(run.film), std::move(run.identity)}}));
 }
 
-Rendered renderOnto(const Scene& scene, std::optional<EarlierFilm> earlier, const RenderOptions& options,
-                    Watch* watch) {
+EarlierFilm earlierOf(Film& film) {
+    auto& [sums, identity] = film.impl().film;
+    return {"the earlier film", std::move(sums), std::move(identity)};
+}
+
+/// Whether a render may go on where another one was.
+bool sameDevices(const crt::RenderOptions& a, const crt::RenderOptions& b) {
+    return a.backend == b.backend && a.integrator.device == b.integrator.device &&
+           a.integrator.threads == b.integrator.threads && a.integrator.use_cache == b.integrator.use_cache;
+}
+
+}  // namespace
+
+/// A scene on the devices that were asked for last.
+struct Session::Impl {
+    explicit Impl(v0::Scene what) : scene(std::move(what)) {}
+
+    Rendered render(std::optional<EarlierFilm> earlier, const RenderOptions& options, Watch* watch);
+    /// The scene as these options want it, on their devices.
+    SceneOnDevices& devicesFor(const crt::RenderOptions& options);
+
+    v0::Scene scene;
+    std::optional<crt::Scene> with_replicates;  ///< Of the scene, which leaves them out, for a target error.
+    std::optional<crt::RenderOptions> opened;   ///< What `devices` was made for.
+    std::optional<SceneOnDevices> devices;      ///< Last: of one of the scenes.
+};
+
+SceneOnDevices& Session::Impl::devicesFor(const crt::RenderOptions& options) {
+    const bool needs_replicates = options.target_error > 0 && replicatesOf(scene.impl().scene) <= 1;
+    if (devices && needs_replicates == with_replicates.has_value() && sameDevices(*opened, options))
+        return *devices;
+    devices.reset();
+    with_replicates.reset();
+    if (needs_replicates) {
+        with_replicates = scene.impl().scene;
+        requireReplicates(*with_replicates);
+    }
+    opened = options;
+    return devices.emplace(with_replicates ? *with_replicates : scene.impl().scene, options);
+}
+
+Rendered Session::Impl::render(std::optional<EarlierFilm> earlier, const RenderOptions& options,
+                               Watch* watch) {
     return api::acrossBorder(watch, [&] {
         const Stopwatch total;
         refuseContradictions(options);
         const crt::RenderOptions inner = optionsOf(options);
-        const crt::Scene* what = &scene.impl().scene;
-        crt::Scene with_replicates;
-        if (inner.target_error > 0 && replicatesOf(*what) <= 1) {
-            with_replicates = *what;
-            requireReplicates(with_replicates);
-            what = &with_replicates;
-        }
+        SceneOnDevices& on_devices = devicesFor(inner);
         const SamplingPlan plan =
-            planSamples(inner, *what, earlier ? earlier->film.samples : SampleRanges());
+            planSamples(inner, on_devices.scene(), earlier ? earlier->film.samples : SampleRanges());
         Relay relay(watch);
-        crt::Rendered run = resultWithThreads(inner.integrator.threads, [&] {
-            return render(*what, inner, plan, std::move(earlier), relay);
-        });
+        crt::Rendered run = resultWithThreads(
+            inner.integrator.threads, [&] { return on_devices.render(plan, std::move(earlier), relay); });
         if (run.failure) {
             const v0::Error error(static_cast<ErrorKind>(run.failure->kind()), run.failure->what(), {});
             throw RenderFailed(error, filmOf(run));
         }
         run.facts.warnings = warningCount();
         run.facts.total_seconds = total.seconds();
-        std::string report = reportJson(*what, run.compiled, run.facts);
+        std::string report = reportJson(on_devices.scene(), *run.compiled, run.facts);
         const StopReason stop = reasonOf(run.facts.stop);
         return Rendered{filmOf(run), stop, std::move(report)};
     });
 }
 
-}  // namespace
+Session::Session(const Scene& scene) : impl_(std::make_unique<Impl>(scene)) {}
+Session::~Session() = default;
+Session::Session(Session&&) noexcept = default;
+Session& Session::operator=(Session&&) noexcept = default;
+
+Rendered Session::render(const RenderOptions& options, Watch* watch) {
+    return impl_->render(std::nullopt, options, watch);
+}
+
+Rendered Session::render(Film earlier, const RenderOptions& options, Watch* watch) {
+    return impl_->render(earlierOf(earlier), options, watch);
+}
 
 RenderFailed::RenderFailed(const Error& error, Film film)
     : Error(error), film_(std::make_shared<const Film>(std::move(film))) {}
@@ -116,13 +161,11 @@ RenderFailed::RenderFailed(const RenderFailed&) = default;
 RenderFailed& RenderFailed::operator=(const RenderFailed&) = default;
 
 Rendered render(const Scene& scene, const RenderOptions& options, Watch* watch) {
-    return renderOnto(scene, std::nullopt, options, watch);
+    return Session(scene).render(options, watch);
 }
 
 Rendered render(const Scene& scene, Film earlier, const RenderOptions& options, Watch* watch) {
-    auto& [film, identity] = earlier.impl().film;
-    return renderOnto(scene, EarlierFilm{"the earlier film", std::move(film), std::move(identity)}, options,
-                      watch);
+    return Session(scene).render(std::move(earlier), options, watch);
 }
 
 }  // namespace crt::v0

@@ -250,7 +250,7 @@ int runJob(const Job& job, Watch& watch) {
                       : facts.stop == StopReason::Interrupted ? facts.request.exit_code
                                                               : 0;
     if (!files.report.empty())
-        failure.attempt([&] { writeReport(files.report, reportJson(scene, run.compiled, facts)); });
+        failure.attempt([&] { writeReport(files.report, reportJson(scene, *run.compiled, facts)); });
 
     logInfo("{}", summary(facts, run.film));
     if (facts.error) tellTarget(facts);

@@ -7,7 +7,6 @@
 #include "base/stopwatch.h"
 #include "render/light_checks.h"
 #include "render/outputs.h"
-#include "render/session.h"
 
 #include <limits>
 #include <thread>
@@ -49,24 +48,6 @@ void askForReport(Session& session, RunFacts& facts) {
     facts.devices = session.group().shares();
 }
 
-/// The backend that is asked for, when it has something to do.
-std::optional<Session> openSession(const RenderOptions& options, const SamplingPlan& plan, RunFacts& facts) {
-    if (plan.ranges.empty()) return std::nullopt;
-    const Stage stage("opening the backend");
-    const Stopwatch opening;
-    std::optional<Session> session(std::in_place, options.backend, options.integrator);
-    facts.open_seconds = opening.seconds();
-    return session;
-}
-
-/// Nothing is built for a backend that brings it, nor where none will render.
-CompiledScene compileFor(const std::optional<Session>& session, const Scene& scene) {
-    constexpr double kNobodyTraces = std::numeric_limits<double>::infinity();
-    const std::uint32_t aovs = requestedAovs(scene);
-    return session ? session->compile(scene, aovs)
-                   : compileScene(scene, aovs, {.accelerator_reach = kNobodyTraces});
-}
-
 /// Who renders, and when. A film that was complete before this run is written without any backend.
 void describeRun(FilmIdentity& identity, const RunFacts& facts) {
     if (facts.backend_name.empty()) return;
@@ -77,6 +58,7 @@ void describeRun(FilmIdentity& identity, const RunFacts& facts) {
     identity.record->addRun(run);
 }
 
+/// Waits for them, and says who they are.
 void openDevices(Session& session, RunFacts& facts) {
     const LoadedBackend& backend = session.backend();
     const Stage stage("opening the device");
@@ -87,57 +69,6 @@ void openDevices(Session& session, RunFacts& facts) {
     facts.backend_path = backend.path;
     facts.backend_version = textOrEmpty(backend.table->version);
     facts.backend_build = textOrEmpty(backend.table->build);
-}
-
-void prepare(Session& session, DeviceFilm& devices, RunFacts& facts) {
-    const std::string& backend = session.backend().name;
-    std::optional<Stage> stage(std::in_place, "preparing the scene for " + backend);
-    const Stopwatch preparing;
-    devices.setScene([&](double done) {
-        stage->setAmount(1);
-        stage->at(done);
-    });
-    facts.prepare_seconds = preparing.seconds();
-    stage.reset();
-    askForReport(session, facts);
-    facts.driver = driverOf(session.devices(), facts.devices.front().name);
-    logInfo("{} on {}", backend, arrayText(facts.backend.device));
-}
-
-/// CompiledScene → Film, by a backend.
-void renderSamples(Session& session, const SamplingPlan& plan, const std::function<void()>& meanwhile,
-                   Watch& watch, const CheckpointPlan& checkpoints, Rendered& run) {
-    RunFacts& facts = run.facts;
-    openDevices(session, facts);
-    std::jthread beside;
-    if (meanwhile)
-        beside = std::jthread([&meanwhile, listener = currentListener()] {
-            const ListenerScope scope(listener);
-            meanwhile();
-        });
-    DeviceFilm devices(session.group(), run.compiled);
-    prepare(session, devices, facts);
-    SamplingPlan sampling = plan;
-    sampling.checkpoint_interval_seconds = checkpoints.interval_seconds;
-    sampling.checkpoint_possible = checkpoints.possible;
-    SamplingResult result;
-    {
-        const WatchedRendering rendering(watch);
-        result = sampleFilm(devices, run.film, sampling, watch, [&] {
-            describeRun(run.identity, facts);
-            checkpoints.save(run.film, run.identity);
-        });
-    }
-    // A device that failed is not asked again; what it said before the first sample stands.
-    if (result.stop != StopReason::Failed) askForReport(session, facts);
-    facts.devices = session.group().shares();
-    facts.film_bands = devices.bands();
-    facts.stop = result.stop;
-    facts.request = result.request;
-    facts.rendered_samples = result.rendered;
-    facts.chunks = result.chunks;
-    facts.sampling_seconds = result.seconds;
-    run.failure = result.failure;
 }
 
 /// Whether the film has all the samples that were asked for. With nothing but a time to go by, the end of
@@ -199,35 +130,119 @@ SamplingPlan planSamples(const RenderOptions& options, const Scene& scene, const
     return plan;
 }
 
-Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,
-                std::optional<EarlierFilm> earlier, Watch& watch, const CheckpointPlan& checkpoints) {
+SceneOnDevices::SceneOnDevices(const Scene& scene, const RenderOptions& options)
+    : scene_(scene), options_(options) {}
+
+SceneOnDevices::~SceneOnDevices() = default;
+
+void SceneOnDevices::close() {
+    devices_.reset();
+    session_.reset();
+}
+
+/// Begins to open the devices, which takes as long as compiling a scene.
+void SceneOnDevices::open(RunFacts& facts) {
+    if (session_) return;
+    compiled_.reset();  // Perhaps without an accelerator.
+    const Stage stage("opening the backend");
+    const Stopwatch opening;
+    session_.emplace(options_.backend, options_.integrator);
+    facts.open_seconds = opening.seconds();
+    session_->beginOpeningDevice();
+}
+
+/// What it takes to see the scene: one flat blob, and the mask of what it needs. Nothing is built for a
+/// backend that brings it, nor where none will render.
+void SceneOnDevices::compile() {
+    if (compiled_) return;
+    constexpr double kNobodyTraces = std::numeric_limits<double>::infinity();
+    const std::uint32_t aovs = requestedAovs(scene_);
+    compiled_ = std::make_shared<CompiledScene>(
+        session_ ? session_->compile(scene_, aovs)
+                 : compileScene(scene_, aovs, {.accelerator_reach = kNobodyTraces}));
+    logDebug("scene {} needs {}", compiled_->hash, featureNames(compiled_->features));
+    warnOfIdleLamps(scene_);
+}
+
+/// The scene, with an empty film, onto devices that are open.
+void SceneOnDevices::prepare(RunFacts& facts) {
+    const std::string& backend = session_->backend().name;
+    std::optional<Stage> stage(std::in_place, "preparing the scene for " + backend);
+    const Stopwatch preparing;
+    if (!devices_) devices_.emplace(session_->group(), *compiled_);
+    devices_->setScene([&](double done) {
+        stage->setAmount(1);
+        stage->at(done);
+    });
+    facts.prepare_seconds = preparing.seconds();
+    stage.reset();
+    askForReport(*session_, facts);
+    facts.driver = driverOf(session_->devices(), facts.devices.front().name);
+    logInfo("{} on {}", backend, arrayText(facts.backend.device));
+}
+
+/// CompiledScene → Film, by a backend.
+void SceneOnDevices::renderSamples(const SamplingPlan& plan, Watch& watch, const CheckpointPlan& checkpoints,
+                                   Rendered& run) {
+    RunFacts& facts = run.facts;
+    openDevices(*session_, facts);
+    std::jthread beside;
+    if (options_.meanwhile)
+        beside = std::jthread([&meanwhile = options_.meanwhile, listener = currentListener()] {
+            const ListenerScope scope(listener);
+            meanwhile();
+        });
+    prepare(facts);
+    SamplingPlan sampling = plan;
+    sampling.checkpoint_interval_seconds = checkpoints.interval_seconds;
+    sampling.checkpoint_possible = checkpoints.possible;
+    SamplingResult result;
+    {
+        const WatchedRendering rendering(watch);
+        result = sampleFilm(*devices_, run.film, sampling, watch, [&] {
+            describeRun(run.identity, facts);
+            checkpoints.save(run.film, run.identity);
+        });
+    }
+    // A device that failed is not asked again; what it said before the first sample stands.
+    if (result.stop != StopReason::Failed) askForReport(*session_, facts);
+    facts.devices = session_->group().shares();
+    facts.film_bands = devices_->bands();
+    facts.stop = result.stop;
+    facts.request = result.request;
+    facts.rendered_samples = result.rendered;
+    facts.chunks = result.chunks;
+    facts.sampling_seconds = result.seconds;
+    run.failure = result.failure;
+    if (run.failure) close();
+}
+
+Rendered SceneOnDevices::render(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
+                                const CheckpointPlan& checkpoints) {
     dateUtc();  // Refuses now a SOURCE_DATE_EPOCH that is none.
     RunFacts facts;
     facts.target_samples = plan.target;
-    facts.target_error = options.target_error;
-    std::optional<Session> session = openSession(options, plan, facts);
-
-    if (session) session->beginOpeningDevice();
-
-    // What it takes to see the scene: one flat blob, and the mask of what it needs.
-    CompiledScene compiled = compileFor(session, scene);
-    FilmIdentity identity{.scene_hash = compiled.hash, .version = CRT_VERSION, .record = recordOf(scene)};
-    logDebug("scene {} needs {}", compiled.hash, featureNames(compiled.features));
-    warnOfIdleLamps(scene);
-
-    Film film = openFilm(std::move(earlier), compiled, identity);
+    facts.target_error = plan.target_error;
+    const bool has_work = !plan.ranges.empty();
+    if (has_work) open(facts);
+    compile();
+    FilmIdentity identity{.scene_hash = compiled_->hash, .version = CRT_VERSION, .record = recordOf(scene_)};
+    Film film = openFilm(std::move(earlier), *compiled_, identity);
     facts.resumed_samples = film.samples.count();
-    Rendered run{std::move(compiled), std::move(film), std::move(identity), std::move(facts), std::nullopt};
-    if (session) {
-        renderSamples(*session, plan, options.meanwhile, watch, checkpoints, run);
-        session.reset();  // What the device held is free while files are written.
-    } else {
+    Rendered run{compiled_, std::move(film), std::move(identity), std::move(facts), std::nullopt};
+    if (has_work)
+        renderSamples(plan, watch, checkpoints, run);
+    else
         watch.renderingEnds();
-    }
     describeRun(run.identity, run.facts);
     run.identity.record->complete = isComplete(run.facts);
-    judge(run.film, scene, run.facts);
+    judge(run.film, scene_, run.facts);
     return run;
+}
+
+Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,
+                std::optional<EarlierFilm> earlier, Watch& watch, const CheckpointPlan& checkpoints) {
+    return SceneOnDevices(scene, options).render(plan, std::move(earlier), watch, checkpoints);
 }
 
 }  // namespace crt

@@ -1,18 +1,21 @@
 /// Scene → film: the way that the command line, libcrt and whatever is built on it take together.
 #pragma once
 
-#include "base/error.h"
 #include "backend/integrator.h"
+#include "base/error.h"
 #include "compile/compile.h"
 #include "film/checkpoint.h"
 #include "film/film.h"
+#include "render/device_film.h"
 #include "render/report.h"
 #include "render/sampling.h"
+#include "render/session.h"
 #include "render/watch.h"
 #include "scene/scene.h"
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -55,16 +58,48 @@ struct CheckpointPlan {
 };
 
 struct Rendered {
-    CompiledScene compiled;
+    std::shared_ptr<const CompiledScene> compiled;
     Film film;
     FilmIdentity identity;           ///< With a record, whose run is this one.
     RunFacts facts;                  ///< All but the files, the command and the total time.
     std::optional<Error> failure;    ///< The device failed while rendering; the film holds what there was.
 };
 
-/// Renders what `plan` (planSamples) says, onto `earlier` where there is one, and warns of what is odd about
-/// the light. No backend is opened when no sample is missing. Throws crt::Error for everything that goes
-/// wrong before the first sample.
+/// A scene, compiled, on open devices. Renders that follow each other pay for that once. [owner thread]
+class SceneOnDevices {
+public:
+    /// Nothing is opened yet. The scene must outlive this. Of `options` what says where and how it is
+    /// rendered.
+    SceneOnDevices(const Scene& scene, const RenderOptions& options);
+    ~SceneOnDevices();
+    SceneOnDevices(const SceneOnDevices&) = delete;
+    SceneOnDevices& operator=(const SceneOnDevices&) = delete;
+
+    const Scene& scene() const { return scene_; }
+
+    /// Renders what `plan` (planSamples) says, onto `earlier` where there is one, and warns of what is odd
+    /// about the light. No backend is opened when no sample is missing; devices that have failed are closed,
+    /// and opened again by the next call. Throws crt::Error for everything that goes wrong before the first
+    /// sample.
+    Rendered render(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
+                    const CheckpointPlan& checkpoints = {});
+
+private:
+    void open(RunFacts& facts);
+    void compile();
+    void close();
+    void prepare(RunFacts& facts);
+    void renderSamples(const SamplingPlan& plan, Watch& watch, const CheckpointPlan& checkpoints,
+                       Rendered& run);
+
+    const Scene& scene_;
+    const RenderOptions options_;
+    std::optional<Session> session_;
+    std::shared_ptr<CompiledScene> compiled_;
+    std::optional<DeviceFilm> devices_;  ///< Last: of the devices of the one and the scene of the other.
+};
+
+/// SceneOnDevices::render(), once.
 Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,
                 std::optional<EarlierFilm> earlier, Watch& watch, const CheckpointPlan& checkpoints = {});
 

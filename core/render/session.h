@@ -1,5 +1,5 @@
-/// A backend at work: everything in crt that renders does so through a Session, or through render()
-/// (render.h), which makes one.
+/// A backend at work: everything in crt that renders does so through a Session, or through SceneOnDevices
+/// (render.h), which has one.
 #pragma once
 
 #include "backend/device_group.h"

@@ -21,11 +21,12 @@ from .denoising import Denoised, denoise
 from .errors import Error, Kind, RenderFailed
 from .importers import Imported, import_scene
 from .judging import Judgement, compare, converge, verify
-from .rendering import Result, develop, plugins, render
+from .rendering import Result, Session, develop, plugins, render
 from .scenes import Scene, example, examples, load, scene
 
 pickling.register()
 __version__ = _version()
 __all__ = ["Denoised", "Device", "Error", "ErrorEstimate", "Film", "Image", "Imported", "Judgement", "Kind",
-           "Plugin", "RenderFailed", "Result", "Scene", "bits_version", "compare", "converge", "denoise",
-           "develop", "example", "examples", "import_scene", "load", "plugins", "render", "scene", "verify"]
+           "Plugin", "RenderFailed", "Result", "Scene", "Session", "bits_version", "compare", "converge",
+           "denoise", "develop", "example", "examples", "import_scene", "load", "plugins", "render", "scene",
+           "verify"]

@@ -20,8 +20,8 @@ from distributed import KilledWorker, get_worker
 from distributed.client import ClosedClientError
 
 from .errors import Error, Kind
+from .kept_sessions import kept_session
 from .messages import LOGGER
-from .rendering import render
 
 PILE = 4     # Films of one worker that are added at once.
 BRANCH = 8   # Films of several workers that one task adds.
@@ -52,7 +52,9 @@ class PartFailed(Error):
 def rendered(scene, first, end, options, seconds):
     """A task: the film of these samples, or of the first of them where `seconds` are too few."""
     try:
-        return render(scene, sample_range=(first, end), time_limit=seconds, progress=False, **options).film
+        with kept_session(scene) as session:
+            result = session.render(sample_range=(first, end), time_limit=seconds, progress=False, **options)
+        return result.film
     except Error as error:  # RenderFailed too: a part is rendered again as a whole.
         address = get_worker().address
         raise PartFailed(f"{error} (on {socket.gethostname()}, worker {address})", error.kind,

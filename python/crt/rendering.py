@@ -1,9 +1,11 @@
 """Scene to film to image."""
 
+import contextlib
 import functools
 import json
 import os
 import sys
+import threading
 
 from . import _crt
 from .errors import Error, Kind
@@ -72,7 +74,7 @@ def planes(film, aov):
 
 def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_error=None, time_limit=None,
            sample_range=None, resume=None, progress=None, use_cache=True, on_progress=None):
-    """Renders a scene: a crt.Scene, a dict, or the path of a file. Returns a Result.
+    """Renders a scene: a crt.Scene, a crt.Session, a dict, or the path of a file. Returns a Result.
 
     spp            samples a pixel; the scene's number when None
     backend        "cuda", "embree", "opencl", the path of a plugin, or "auto": the best of this machine
@@ -90,7 +92,7 @@ def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_e
     Other threads of Python run meanwhile. Ctrl-C ends sampling and keeps the film: `stop` is "interrupted".
     Raises crt.Error; crt.RenderFailed, with the film so far, when a device fails after the first samples.
     """
-    scene = as_scene(scene)  # Which keeps the files of its arrays until it has been rendered.
+    session = scene if isinstance(scene, Session) else Session(scene)
     options = _crt.RenderOptions()
     options.backend = backend
     options.device = device_text(devices)
@@ -102,17 +104,58 @@ def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_e
     options.target_error = target_error or 0.0
     if spp is not None and spp < 1:
         raise Error("spp must be 1 or more", Kind.USAGE)
-    with Bar(progress) as bar:
+    with Bar(progress) as bar, session.in_turn() as native:
         def hear(now):
             bar.show(now)
             if on_progress is not None:
                 on_progress(now)
 
         heard = hear if bar.shown or on_progress is not None else None
-        film, stop, report = _crt.render(scene.native, options, resume, heard, None, tell)
+        film, stop, report = native.render(options, resume, heard, None, tell)
     if stop == "interrupted":
         LOGGER.warning("interrupted after %d samples a pixel; the film is kept", film.samples)
     return Result(film, stop, json.loads(report))
+
+
+class Session:
+    """Renders of one scene that follow each other, as it is when the session is made: its devices stay open
+    and the scene stays compiled from one to the next, as long as backend, devices, threads and use_cache are
+    the same. Each has the bits of crt.render.
+
+        with crt.Session("box.yaml") as session:
+            parts = [session.render(sample_range=(first, first + 64)) for first in range(0, 256, 64)]
+
+    A session holds memory of its devices until it is closed or forgotten. Threads take turns.
+    """
+
+    def __init__(self, scene):
+        self.scene = as_scene(scene)  # Which keeps the files of its arrays.
+        self._native = _crt.Session(self.scene.native)
+        self._lock = threading.Lock()
+
+    def render(self, **options):
+        """What crt.render does, with its options. Raises crt.Error of kind USAGE when the session is
+        closed."""
+        return render(self, **options)
+
+    def close(self):
+        """Closes the devices."""
+        with self._lock:
+            self._native = None
+
+    @contextlib.contextmanager
+    def in_turn(self):
+        """The native session, for one thread at a time."""
+        with self._lock:
+            if self._native is None:
+                raise Error("this session is closed", Kind.USAGE)
+            yield self._native
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
 
 
 def as_scene(scene):

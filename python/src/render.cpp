@@ -24,12 +24,12 @@ const char* wordOf(crt::StopReason reason, bool interrupted) {
 }
 
 /// Film, why sampling ended, and the report as JSON.
-nb::tuple render(const crt::Scene& scene, const crt::RenderOptions& options, const crt::Film* earlier,
+nb::tuple render(crt::Session& session, const crt::RenderOptions& options, const crt::Film* earlier,
                  nb::object progress, nb::object stage, nb::object message) {
     Listener listener(std::move(progress), std::move(stage), std::move(message));
     crt::Rendered rendered = listening(listener, [&](crt::Watch* watch) {
-        return earlier != nullptr ? crt::render(scene, crt::Film(*earlier), options, watch)
-                                  : crt::render(scene, options, watch);
+        return earlier != nullptr ? session.render(crt::Film(*earlier), options, watch)
+                                  : session.render(options, watch);
     });
     return nb::make_tuple(std::move(rendered.film), wordOf(rendered.stop, listener.interrupted()),
                           rendered.report_json);
@@ -53,8 +53,10 @@ void bindRender(nb::module_& module) {
         .def_rw("sample_range", &crt::RenderOptions::sample_range)
         .def_rw("time_limit_seconds", &crt::RenderOptions::time_limit_seconds)
         .def_rw("target_error", &crt::RenderOptions::target_error);
-    module.def("render", &render, "scene"_a, "options"_a, "earlier"_a.none(), "progress"_a.none(),
-               "stage"_a.none(), "message"_a.none());
+    nb::class_<crt::Session>(module, "Session", "Renders of one scene on devices that stay open.")
+        .def(nb::init<const crt::Scene&>(), "scene"_a)
+        .def("render", &render, "options"_a, "earlier"_a.none(), "progress"_a.none(), "stage"_a.none(),
+             "message"_a.none());
 
     nb::class_<crt::Device>(module, "Device", "A device of a backend.")
         .def_ro("index", &crt::Device::index)

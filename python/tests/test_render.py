@@ -13,6 +13,8 @@ import pytest
 
 import crt
 from conftest import BOX
+from crt import kept_sessions
+from crt.kept_sessions import kept_session
 
 
 def same(a, b):
@@ -194,3 +196,50 @@ def test_bad_options(box):
 def test_plugins():
     found = {plugin.name: plugin for plugin in crt.plugins()}
     assert "embree" in found and (found["embree"].devices or found["embree"].reason)
+
+
+def test_session_has_the_bits_of_renders(box, backend):
+    whole = crt.render(box, spp=16, backend=backend)
+    with crt.Session(box) as session:
+        first = session.render(sample_range=(0, 6), backend=backend)
+        rest = crt.render(session, sample_range=(6, 16), backend=backend)
+        assert same((first.film + rest.film).xyz, whole.film.xyz)
+        assert first.report["seconds"]["open"] > 0
+        assert rest.report["seconds"]["open"] < first.report["seconds"]["open"] / 10
+    with pytest.raises(crt.Error) as refused:
+        session.render(spp=1)
+    assert refused.value.kind == crt.Kind.USAGE
+
+
+def test_threads_take_turns_with_a_session(box):
+    expected = crt.render(box, spp=4, backend="embree").film.xyz
+    found = {}
+    with crt.Session(box) as session:
+        def render(i):
+            found[i] = session.render(spp=4, backend="embree").film.xyz
+
+        threads = [threading.Thread(target=render, args=[i]) for i in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert len(found) == 4 and all(same(expected, film) for film in found.values())
+
+
+def test_kept_sessions_are_used_again_and_then_closed(box, monkeypatch):
+    monkeypatch.setattr(kept_sessions, "IDLE_SECONDS", 0.2)
+    with kept_session(box) as first:
+        with kept_session(box) as other:  # As another thread of a worker has it.
+            assert other is not first
+    with kept_session(box) as again:
+        assert again is first or again is other
+    with pytest.raises(ZeroDivisionError), kept_session(box) as spoilt:
+        1 / 0
+    with kept_session(box) as third:
+        assert third is not spoilt
+    end = time.monotonic() + 10
+    while kept_sessions._IDLE and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not kept_sessions._IDLE
+    with pytest.raises(crt.Error):
+        third.render(spp=1)

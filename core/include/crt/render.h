@@ -69,4 +69,25 @@ CRT_API Rendered render(const Scene& scene, const RenderOptions& options = {}, W
 CRT_API Rendered render(const Scene& scene, Film earlier, const RenderOptions& options = {},
                         Watch* watch = nullptr);
 
+/// Renders of one scene that follow each other, its samples in parts say: the devices stay open and the
+/// scene compiled from one to the next, as long as the backend, its devices, the threads and use_cache are
+/// the same. Each gives the bits of crt::render. One thread at a time.
+class CRT_API Session {
+public:
+    /// Opens nothing yet.
+    explicit Session(const Scene& scene);
+    ~Session();
+    Session(Session&&) noexcept;
+    Session& operator=(Session&&) noexcept;
+
+    /// As crt::render. What fails on a device closes it; the next render opens it again.
+    Rendered render(const RenderOptions& options = {}, Watch* watch = nullptr);
+    Rendered render(Film earlier, const RenderOptions& options = {}, Watch* watch = nullptr);
+
+    struct Impl;
+
+private:
+    std::unique_ptr<Impl> impl_;
+};
+
 CRT_API_NAMESPACE_END
