@@ -125,6 +125,13 @@ TEST_CASE("a scene in memory becomes an image") {
     CHECK(rendered.stop == crt::StopReason::Samples);
     CHECK(rendered.film.samples() == 32);
     CHECK(rendered.report_json.find("\"per_pixel\": 32") != std::string::npos);
+    CHECK(rendered.report_json.find("\"error\": null") == std::string::npos);
+    crt::RenderOptions without = withSamples(32);
+    without.report_error = false;
+    Heard other;
+    const crt::Rendered part = crt::render(scene, without, &other);
+    CHECK(part.report_json.find("\"error\": null") != std::string::npos);
+    CHECK(part.film.error().has_value());
     CHECK(heard.most_samples == 32);
     CHECK(heard.samples_wanted == 32);
     REQUIRE(heard.warnings.size() == 1);

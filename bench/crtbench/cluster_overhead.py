@@ -59,7 +59,8 @@ def main():
     arguments = parser.parse_args()
 
     scene = crt.load(arguments.scene, set={"film.resolution": [arguments.resolution] * 2})
-    crt.render(scene, spp=2, backend=arguments.backend)  # Kernels and caches.
+    # Kernels and caches; on a GPU the first seconds are of a kernel that is not yet lean.
+    crt.render(scene, backend=arguments.backend, time_limit=arguments.seconds / 10)
     trial = crt.render(scene, backend=arguments.backend, time_limit=arguments.seconds / 10)
     samples = int(trial.film.samples * arguments.seconds / trial.report["seconds"]["render"])
     dask.config.set(QUIET)

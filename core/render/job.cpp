@@ -237,6 +237,7 @@ int runJob(const Job& job, Watch& watch) {
     };
     Rendered run = render(scene, options, plan, std::move(earlier), watch, checkpoints);
     checkpoint.finish();
+    judgeError(run, scene);
 
     // Images, and the report of how they came about.
     RunFacts& facts = run.facts;

@@ -78,16 +78,10 @@ bool isComplete(const RunFacts& facts) {
            (facts.stop == StopReason::Time && facts.target_samples == 0);
 }
 
-/// What the film says of itself.
+/// What the film says of itself, but for its error.
 void judge(const Film& film, const Scene& scene, RunFacts& facts) {
     facts.samples = film.samples;
     facts.invalid_samples = film.invalidSamples();
-    const bool independent = scene.sampler.type != SamplerType::Sobol;
-    facts.error = estimateError(film, PixelSet::All, independent);
-    if (facts.target_error > 0) {
-        facts.deciding = estimateError(film, PixelSet::Even, independent);
-        facts.judging = estimateError(film, PixelSet::Odd, independent);
-    }
     warnOfBlackFilm(film, scene);
     if (facts.invalid_samples > 0)
         logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
@@ -238,6 +232,16 @@ Rendered SceneOnDevices::render(const SamplingPlan& plan, std::optional<EarlierF
     run.identity.record->complete = isComplete(run.facts);
     judge(run.film, scene_, run.facts);
     return run;
+}
+
+void judgeError(Rendered& run, const Scene& scene) {
+    const bool independent = scene.sampler.type != SamplerType::Sobol;
+    const auto estimate = [&](PixelSet pixels) { return estimateError(run.film, pixels, independent); };
+    run.facts.error = estimate(PixelSet::All);
+    if (run.facts.target_error > 0) {
+        run.facts.deciding = estimate(PixelSet::Even);
+        run.facts.judging = estimate(PixelSet::Odd);
+    }
 }
 
 Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,

@@ -61,7 +61,7 @@ struct Rendered {
     std::shared_ptr<const CompiledScene> compiled;
     Film film;
     FilmIdentity identity;           ///< With a record, whose run is this one.
-    RunFacts facts;                  ///< All but the files, the command and the total time.
+    RunFacts facts;                  ///< All but the error, the files, the command and the total time.
     std::optional<Error> failure;    ///< The device failed while rendering; the film holds what there was.
 };
 
@@ -98,6 +98,9 @@ private:
     std::shared_ptr<CompiledScene> compiled_;
     std::optional<DeviceFilm> devices_;  ///< Last: of the devices of the one and the scene of the other.
 };
+
+/// What the film knows of its error, into the facts of the run. It takes as long as adding a film.
+void judgeError(Rendered& run, const Scene& scene);
 
 /// SceneOnDevices::render(), once.
 Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,

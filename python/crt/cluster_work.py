@@ -31,6 +31,8 @@ PARTS_A_SECOND = 10   # Of all workers together: what a scheduler and this proce
 SECONDS_A_PIXEL = 160e-6  # Between two merges: a hundred times what packing, sending and reading takes.
 PARTS_A_SECOND_AT_FIRST = 200  # As long as parts grow.
 PARTS_A_SECOND_AT_LAST = 100  # When they get smaller, so that all end together.
+LEAST_SECONDS = 0.5  # Of the last parts, which end within that time of each other.
+LEAST_SECONDS_A_PIXEL = 3e-6  # Likewise: ten times what is no less in a part of fewer samples.
 PROBES = 64  # Parts at once until that can be kept: a thousand tiny ones would hold the scheduler up.
 FAILURES = 3   # Of one part, on devices that fail.
 GONE = (OSError, ClosedClientError, CancelledError)
@@ -53,7 +55,8 @@ def rendered(scene, first, end, options, seconds):
     """A task: the film of these samples, or of the first of them where `seconds` are too few."""
     try:
         with kept_session(scene) as session:
-            result = session.render(sample_range=(first, end), time_limit=seconds, progress=False, **options)
+            result = session.render(sample_range=(first, end), time_limit=seconds, progress=False,
+                                    report_error=False, **options)
         return result.film
     except Error as error:  # RenderFailed too: a part is rendered again as a whole.
         address = get_worker().address
@@ -128,7 +131,8 @@ class Work:
         to end together when `until` samples are done, or all."""
         self.count_threads()
         part_seconds = max(PART_SECONDS, self.threads / PARTS_A_SECOND)
-        least = max(PART_SECONDS / 8, self.threads / PARTS_A_SECOND_AT_LAST)
+        least = max(LEAST_SECONDS, LEAST_SECONDS_A_PIXEL * self.scene.width * self.scene.height,
+                    self.threads / PARTS_A_SECOND_AT_LAST)
         if seconds_left is not None:
             part_seconds = min(part_seconds, seconds_left)
         left = self.missing.left

@@ -242,20 +242,20 @@ def fail(now):
 def test_a_failing_device_gets_no_more_parts(threads_client, box, monkeypatch):
     """Real tasks on real workers; only the failure is made."""
     tried = []  # The first worker that tries has the broken device.
-    real = cluster_work.render
+    real = crt.Session.render
 
-    def render(scene, **options):
+    def render(session, **options):
         address = distributed.get_worker().address
         tried.append(address)
         if address == tried[0]:
             raise crt.RenderFailed("the device is lost", crt.Kind.DEVICE, "", 0, 0, None)
-        return real(scene, **options)
+        return real(session, **options)
 
-    monkeypatch.setattr(cluster_work, "render", render)
+    monkeypatch.setattr(crt.Session, "render", render)
     result = crt.distributed.render(box, threads_client, spp=96, parts=12, **ONE)
     assert same_film(result.film, crt.render(box, spp=96, backend="embree").film)
     assert tried.count(tried[0]) <= 3 < len(tried) and result.report["distributed"]["parts_redone"] >= 1
-    monkeypatch.setattr(cluster_work, "render", lambda scene, **options: render_failing())
+    monkeypatch.setattr(crt.Session, "render", lambda session, **options: render_failing())
     with pytest.raises(crt.Error, match="the device is lost") as raised:
         crt.distributed.render(box, threads_client, spp=96, parts=12, **ONE)
     assert raised.value.kind == crt.Kind.DEVICE

@@ -211,6 +211,13 @@ def test_session_has_the_bits_of_renders(box, backend):
     assert refused.value.kind == crt.Kind.USAGE
 
 
+def test_a_report_without_the_error(box):
+    result = crt.render(box, spp=64, backend="embree", report_error=False)
+    assert result.report["error"] is None and 0 < result.error.half_width_95 < 1
+    assert crt.render(box, spp=64, backend="embree").report["error"]["half_width_95"] == pytest.approx(
+        result.error.half_width_95)
+
+
 def test_threads_take_turns_with_a_session(box):
     expected = crt.render(box, spp=4, backend="embree").film.xyz
     found = {}
