@@ -1,5 +1,7 @@
 """What a Dask cluster on one machine costs beside one plain render of the same samples: wall and processor
-seconds, in turn, and whether the bits are the same. Prints one table; nothing is written.
+seconds, in turn, and whether the bits are the same. The same processes that render an equal share each,
+of which no film is sent or added, show what processes cost without crt.distributed. Prints one table;
+nothing is written.
 
 The workers are processes of one thread each, which render with one thread each; the plain render uses all
 threads. The cluster has been started when the clock begins, without the profiler of Dask and with its
@@ -39,8 +41,21 @@ def start(workers, gpus):
     return distributed.SpecCluster(workers=specification, scheduler=scheduler)
 
 
+def render_share(scene, first, end, options):
+    """A task whose film is thrown away."""
+    crt.render(scene, sample_range=(first, end), progress=False, **options)
+
+
+def render_shares(client, scene, samples, options):
+    """All workers, each with one range of the samples."""
+    workers = list(client.nthreads())
+    cuts = [samples * i // len(workers) for i in range(len(workers) + 1)]
+    client.gather([client.submit(render_share, scene, first, end, options, workers=[worker], pure=False)
+                   for worker, first, end in zip(workers, cuts, cuts[1:])])
+
+
 def measured(client, render):
-    """(film, wall seconds, processor seconds)."""
+    """(result, wall seconds, processor seconds)."""
     busy, begin = processor_seconds(client), time.perf_counter()
     result = render()
     return result, time.perf_counter() - begin, processor_seconds(client) - busy
@@ -67,27 +82,30 @@ def main():
     with start(arguments.workers, arguments.gpus) as cluster, distributed.Client(cluster) as client:
         client.wait_for_workers(arguments.workers)
         threads = 0 if arguments.gpus else 1
+        options = {"backend": arguments.backend, "threads": threads}
         cases = {
             "one render": lambda: crt.render(scene, spp=samples, backend=arguments.backend),
-            "Dask": lambda: crt.distributed.render(scene, client, spp=samples, backend=arguments.backend,
-                                                   threads=threads)}
+            "processes": lambda: render_shares(client, scene, samples, options),
+            "Dask": lambda: crt.distributed.render(scene, client, spp=samples, **options)}
         crt.distributed.render(scene, client, spp=4 * arguments.workers, parts=2 * arguments.workers,
-                               backend=arguments.backend, threads=threads)  # Workers load what they need.
+                               **options)  # Workers load what they need.
         found, films = {name: [] for name in cases}, {}
         for _ in range(arguments.runs):
             for name, render in cases.items():
                 result, wall, processor = measured(client, render)
-                films[name] = result.film
+                films[name] = result and result.film
                 found[name].append((wall, processor))
                 print(f"{name}: {wall:.2f} s, {processor:.2f} processor seconds, load "
-                      f"{os.getloadavg()[0]:.1f}", result.report.get("distributed", ""), flush=True)
+                      f"{os.getloadavg()[0]:.1f}", result.report.get("distributed", "") if result else "",
+                      flush=True)
     same = (films["one render"].xyz == films["Dask"].xyz).all()
     print(f"\n{samples} samples of {arguments.resolution}² pixels, {arguments.workers} workers; "
           f"{'the same bits' if same else 'OTHER BITS'}\n\n| | wall s | processor s |\n|---|---|---|")
     for name, runs in found.items():
         columns = [f"{statistics.median(c):.1f} ({min(c):.1f} – {max(c):.1f})" for c in zip(*runs)]
         print(f"| {name} | {' | '.join(columns)} |")
-    ratios = [statistics.median(d[i] / p[i] for p, d in zip(found["one render"], found["Dask"]))
-              for i in range(2)]
-    print(f"| median ratio of neighbours | {ratios[0]:.3f} | {ratios[1]:.3f} |")
+    for name in ("one render", "processes"):
+        ratios = [statistics.median(d[i] / p[i] for p, d in zip(found[name], found["Dask"]))
+                  for i in range(2)]
+        print(f"| Dask to {name}: median of the ratios of neighbours | {ratios[0]:.3f} | {ratios[1]:.3f} |")
     return 0 if same else 1

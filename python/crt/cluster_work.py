@@ -19,6 +19,7 @@ from concurrent.futures import CancelledError
 from distributed import KilledWorker, get_worker
 from distributed.client import ClosedClientError
 
+from . import _crt
 from .errors import Error, Kind
 from .kept_sessions import kept_session
 from .messages import LOGGER
@@ -66,10 +67,7 @@ def rendered(scene, first, end, options, seconds):
 
 def added(films):
     """A task: their sum."""
-    total = films[0]
-    for film in films[1:]:
-        total = total + film
-    return total
+    return _crt.sum_films(films)
 
 
 def same(value):

@@ -73,7 +73,8 @@ def planes(film, aov):
 
 
 def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_error=None, time_limit=None,
-           sample_range=None, resume=None, progress=None, use_cache=True, report_error=True, on_progress=None):
+           sample_range=None, resume=None, progress=None, use_cache=True, report_error=True,
+           on_progress=None):
     """Renders a scene: a crt.Scene, a crt.Session, a dict, or the path of a file. Returns a Result.
 
     spp            samples a pixel; the scene's number when None
@@ -86,8 +87,8 @@ def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_e
     resume         an earlier film of the scene, whose samples are not rendered again
     progress       a bar by tqdm. None: where tqdm is installed, and stderr is a terminal or this a notebook
     use_cache      of compiled kernels, on disk
-    report_error   whether the report has the error, which takes as long as adding a film; Result.error reckons
-                   it when asked
+    report_error   whether the report has the error, which takes as long as adding a film; Result.error
+                   reckons it when asked
     on_progress    called with a dict (samples, samples_wanted, seconds, fraction, seconds_left,
                    paths_per_second, relative_error) some times a second; what it raises ends the render
 

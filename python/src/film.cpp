@@ -55,6 +55,13 @@ crt::Film sumOf(const crt::Film& a, const crt::Film& b) {
     return sum;
 }
 
+/// One copy, where a + b + … makes one of each sum.
+crt::Film sumOfAll(const std::vector<const crt::Film*>& films) {
+    crt::Film sum = *films.at(0);
+    for (std::size_t i = 1; i < films.size(); ++i) sum.merge(*films[i]);
+    return sum;
+}
+
 crt::Image develop(const crt::Film& film, bool for_display, std::optional<double> exposure_ev,
                    std::vector<std::string> aovs) {
     return film.develop({for_display, exposure_ev, std::move(aovs)});
@@ -63,6 +70,8 @@ crt::Image develop(const crt::Film& film, bool for_display, std::optional<double
 }  // namespace
 
 void bindFilm(nb::module_& module) {
+    module.def("sum_films", &sumOfAll, "films"_a, nb::call_guard<nb::gil_scoped_release>());
+
     nb::class_<crt::ErrorEstimate>(module, "ErrorEstimate",
                                    "What a film knows of its own error, relative to the mean luminance.")
         .def_ro("relative_rmse", &crt::ErrorEstimate::relative_rmse)
