@@ -1,6 +1,7 @@
 #include "product.h"
 
 #include "png.h"
+#include "vectors.h"
 
 #include <algorithm>
 #include <array>
@@ -8,15 +9,12 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace crt::meshgen {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// A point of a profile: distance from the axis, and height.
 struct Point {

@@ -64,9 +64,9 @@ double costOf(const LightBounds& b) { return b.power * orientationOf(b) * surfac
 Vec3d middleOf(const LightBounds& b) { return (b.lower + b.upper) * 0.5; }
 
 /// Halves lights until they are alone; of that binary tree nodes of four children are made.
-class Builder {
+class LightTreeBuilder {
 public:
-    explicit Builder(const std::vector<LightBounds>& lights) : lights_(lights), order_(lights.size()) {
+    explicit LightTreeBuilder(const std::vector<LightBounds>& lights) : lights_(lights), order_(lights.size()) {
         std::iota(order_.begin(), order_.end(), 0u);
         halves_.reserve(2 * lights.size() - 1);
         for (const LightBounds& light : lights) whole_ += light.power;
@@ -245,6 +245,6 @@ LightBounds boundsOfBoth(const LightBounds& a, const LightBounds& b) {
     return both;
 }
 
-LightTree buildLightTree(const std::vector<LightBounds>& lights) { return Builder(lights).take(); }
+LightTree buildLightTree(const std::vector<LightBounds>& lights) { return LightTreeBuilder(lights).take(); }
 
 }  // namespace crt

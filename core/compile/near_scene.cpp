@@ -20,7 +20,7 @@ using kernel::CrtPrimitive;
 using kernel::CrtTriangle;
 using kernel::u64;  // CRT_ARRAY computes with it
 
-constexpr std::size_t kPart = std::size_t{1} << 16;  // of what a thread looks at, at a time
+constexpr std::size_t kSlotsAtOnce = std::size_t{1} << 16;  // of what a thread looks at, at a time
 
 TriangleBounds boundsOf(const CrtTriangle& triangle, float padding) {
     TriangleBounds b{};
@@ -133,12 +133,12 @@ std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kern
         }
         all = !cells.mark(middle) || all;
     }
-    std::vector<std::vector<std::uint32_t>> parts(partsOf(count, kPart));
-    parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
+    std::vector<std::vector<std::uint32_t>> parts(partsOf(count, kSlotsAtOnce));
+    parallelFor(count, kSlotsAtOnce, [&](std::size_t first, std::size_t end) {
         for (std::size_t slot = first; slot < end; ++slot)
             if (triangles[slot].shape < CRT_SLOT_INSTANCE &&
                 (all || cells.anyMarked(boundsOf(triangles[slot], reach))))
-                parts[first / kPart].push_back(static_cast<std::uint32_t>(slot));
+                parts[first / kSlotsAtOnce].push_back(static_cast<std::uint32_t>(slot));
     });
     std::vector<std::uint32_t> near;
     for (const std::vector<std::uint32_t>& part : parts) near.insert(near.end(), part.begin(), part.end());

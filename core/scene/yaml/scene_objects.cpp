@@ -3,12 +3,12 @@
 
 #include "base/log.h"
 #include "base/vec3d.h"
+#include "scene/yaml/degrees.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace crt {
 namespace {
@@ -16,17 +16,6 @@ namespace {
 bool isZero(const Vec3d& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
 bool allFinite(const Matrix4d& m) {
     return std::all_of(m.begin(), m.end(), [](double v) { return std::isfinite(v); });
-}
-
-/// Sine of an angle in degrees, exact at multiples of 90°: a box turned by a quarter stays a box.
-double sineOfDegrees(double degrees) {
-    const double turn = std::remainder(degrees, 360.0);  // −180 to 180, exact.
-    if (turn == 0 || std::abs(turn) == 180) return 0;
-    if (std::abs(turn) == 90) return std::copysign(1.0, turn);
-    return std::sin(turn * (std::numbers::pi / 180));
-}
-double cosineOfDegrees(double degrees) {
-    return sineOfDegrees(90 - std::abs(std::remainder(degrees, 360.0)));
 }
 
 /// Rodrigues' rotation about a unit axis.

@@ -50,7 +50,7 @@ KeySchema radianceKey(std::string doc) {
             .doc = std::move(doc)};
 }
 
-KeySchema typeKey(std::string word) { return schema::typeKey(std::move(word), "material"); }
+KeySchema materialType(std::string word) { return schema::typeKey(std::move(word), "material"); }
 
 SectionSchema topLevel() {
     return {"",
@@ -587,14 +587,14 @@ void addDielectrics(std::vector<SectionSchema>& all) {
     all.push_back({"material/dielectric",
                    "a dielectric material",
                    "Smooth glass or water: reflects and refracts, and may absorb.",
-                   {typeKey("dielectric"), ior, absorption, thinFilmKey()}});
+                   {materialType("dielectric"), ior, absorption, thinFilmKey()}});
     all.push_back({"material/rough_dielectric",
                    "a rough_dielectric material",
                    "Frosted glass: microfacets as of `rough_conductor`, each of which reflects and "
                    "refracts; clear glass in light from everywhere cannot be seen, however rough. Where it "
                    "would blur what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), it "
                    "is taken for smooth.",
-                   {typeKey("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption,
+                   {materialType("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption,
                     thinFilmKey()}});
     all.push_back({"material/thin_dielectric",
                    "a thin_dielectric material",
@@ -602,7 +602,7 @@ void addDielectrics(std::vector<SectionSchema>& all) {
                    "is reflected to and fro. What passes is not bent. As behind all glass, lamps light "
                    "what is behind it by the paths that happen to meet them: shadow rays do not pass. A "
                    "film is on one of the two surfaces.",
-                   {typeKey("thin_dielectric"), index("Refractive index of the pane relative to what is "
+                   {materialType("thin_dielectric"), index("Refractive index of the pane relative to what is "
                                                       "around it."),
                     thinFilmKey()}});
 }
@@ -616,7 +616,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
                                 .doc = "Fraction of light sent back, at every wavelength."};
     all.push_back(
         {"material/diffuse", "a diffuse material", "Lambert's law, or EON where it is rough.",
-         {typeKey("diffuse"), reflectance,
+         {materialType("diffuse"), reflectance,
           {.name = "roughness",
            .kind = Kind::Number,
            .range = {.min = 0, .max = 1},
@@ -626,7 +626,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
                   "towards the light's edges as in the middle. No light is lost: 1 is white in a white "
                   "room; other colours get deeper, since light is reflected more than once."}}});
     all.push_back(
-        {"material/mirror", "a mirror material", "Perfect reflection.", {typeKey("mirror"), reflectance}});
+        {"material/mirror", "a mirror material", "Perfect reflection.", {materialType("mirror"), reflectance}});
     const KeySchema metal{
         .name = "metal", .kind = Kind::Choice, .choices = metalNames(), .doc = "A measured metal."};
     const KeySchema eta{.name = "eta",
@@ -643,7 +643,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
                    "a conductor material",
                    "A smooth metal: Fresnel's equations with a complex index. Give "
                    "`metal`, or `eta` with `k`.",
-                   {typeKey("conductor"), metal, eta, k, thinFilmKey()},
+                   {materialType("conductor"), metal, eta, k, thinFilmKey()},
                    metal_or_index});
     all.push_back({"material/rough_conductor",
                    "a rough_conductor material",
@@ -651,7 +651,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
                    "are. Light that meets more than one of them, up to two thirds of it where it is "
                    "roughest, comes back diffusely and in deeper colours (Kulla and Conty 2017). Give "
                    "`metal`, or `eta` with `k`.",
-                   {typeKey("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror")),
+                   {materialType("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror")),
                     thinFilmKey()},
                    metal_or_index});
     addDielectrics(all);
@@ -661,7 +661,7 @@ void addMaterials(std::vector<SectionSchema>& all) {
                    "coat lets in is scattered below it, and what the coat sends back from below is "
                    "scattered again, which makes colours deeper; a white base sends all light back. The "
                    "model is that of Mitsuba's `roughplastic` with `nonlinear`.",
-                   {typeKey("plastic"), reflectance, roughnessKey("a polished coat", "0"),
+                   {materialType("plastic"), reflectance, roughnessKey("a polished coat", "0"),
                     {.name = "ior",
                      .kind = Kind::Number,
                      .range = {.min = 1, .max = 10},

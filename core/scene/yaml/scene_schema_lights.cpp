@@ -17,7 +17,7 @@ using namespace schema;
 
 KeySchema nameKey() { return {.name = "name", .doc = "For messages and reports."}; }
 
-KeySchema typeKey(std::string word) { return schema::typeKey(std::move(word), "light"); }
+KeySchema lightType(std::string word) { return schema::typeKey(std::move(word), "light"); }
 
 KeySchema vectorKey(std::string name, std::string doc, std::string unit = {}, bool required = false) {
     return {.name = std::move(name),
@@ -105,7 +105,7 @@ void addLights(std::vector<SectionSchema>& all) {
     all.push_back({"light/point",
                    "a point light",
                    "The same in all directions.",
-                   joined(std::vector{nameKey(), typeKey("point"), positionKey()}, intensityKeys("")),
+                   joined(std::vector{nameKey(), lightType("point"), positionKey()}, intensityKeys("")),
                    {{KeyRule::Kind::ExactlyOne, kIntensities}, noSpectrumBeside("radiant_intensity")}});
     all.push_back(
         {"light/spot",
@@ -114,7 +114,7 @@ void addLights(std::vector<SectionSchema>& all) {
          "as in pbrt-v4.",
          joined(
              std::vector{
-                 nameKey(), typeKey("spot"), positionKey(),
+                 nameKey(), lightType("spot"), positionKey(),
                  vectorKey("direction", "The way that the light goes along its axis; any length but 0."),
                  vectorKey("target", "Or a point on its axis.", "scene units"),
                  degreesKey("cone_angle_deg", {0, 180, true, false}, d.cone_angle_deg,
@@ -133,7 +133,7 @@ void addLights(std::vector<SectionSchema>& all) {
          "2019, photometry of type C, TILT=NONE or INCLUDE, which is not applied), linear in both angles "
          "between those of the file. Candelas are those of the file with its multiplier and ballast "
          "factors.",
-         {nameKey(), typeKey("ies"), positionKey(),
+         {nameKey(), lightType("ies"), positionKey(),
           {.name = "file",
            .required = true,
            .doc = "The IES file; looked up beside the scene, then in CRT_MESH_PATH."},
@@ -158,7 +158,7 @@ void addLights(std::vector<SectionSchema>& all) {
          "Collimated light: all of it in one direction, from a disk or a slit on, even across it. What lies "
          "behind where it begins is dark. Light sampling alone finds it, where nothing is in between: glass "
          "is, and so are mirrors.",
-         {nameKey(), typeKey("beam"),
+         {nameKey(), lightType("beam"),
           vectorKey("position", "The middle of the disk or slit.", "scene units", true),
           vectorKey("direction", "The way that the light goes; any length but 0."),
           vectorKey("target", "Or a point on its axis.", "scene units"),
@@ -190,7 +190,7 @@ void addLights(std::vector<SectionSchema>& all) {
         {"light/directional",
          "a directional light",
          "From infinitely far away, all of it in one direction.",
-         {nameKey(), typeKey("directional"),
+         {nameKey(), lightType("directional"),
           vectorKey("direction", "The way that the light goes; any length but 0.", "", true),
           spectralKey("irradiance", "W·m⁻²·nm⁻¹", "Irradiance of a plane that faces the light."),
           amountKey("illuminance_lx", "lx", "Illuminance of a plane that faces the light."), spectrumKey()},
@@ -199,7 +199,7 @@ void addLights(std::vector<SectionSchema>& all) {
         {"light/sun", "a sun",
          "A disk of the sky, infinitely far away and evenly bright. Cameras and mirrors see it. It stands "
          "where `direction` says, or where it stood at a time and place (0.01 degrees, without refraction).",
-         joined(std::vector{nameKey(), typeKey("sun")}, sunKeys(),
+         joined(std::vector{nameKey(), lightType("sun")}, sunKeys(),
                 degreesKey("angular_diameter_deg", {0.001, 90, false, false}, d.angular_diameter_deg,
                            "How large the disk is."),
                 spectralKey("radiance", "W·m⁻²·sr⁻¹·nm⁻¹", "Radiance of the disk."),

@@ -1,28 +1,17 @@
 #include "scene/yaml/scene_textures.h"
 
+#include "scene/yaml/degrees.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <set>
 #include <utility>
 #include <vector>
 
 namespace crt {
-namespace {
-
-/// Sine of an angle in degrees, exact at multiples of 90°.
-double sineOfDegrees(double degrees) {
-    const double turn = std::remainder(degrees, 360.0);
-    if (turn == 0 || std::abs(turn) == 180) return 0;
-    if (std::abs(turn) == 90) return std::copysign(1.0, turn);
-    return std::sin(turn * (std::numbers::pi / 180));
-}
-
-}  // namespace
-
 TextureReader::TextureReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, GltfFiles& gltf,
                              Scene& scene)
     : out_(out), files_(files), spectra_(spectra), gltf_(gltf), scene_(scene) {}
@@ -87,8 +76,7 @@ void TextureReader::readTransform(const SectionReader& form, Texture& texture) {
     }
     form.read("offset", offset);
     form.read("rotation_deg", degrees);
-    const double s = sineOfDegrees(degrees),
-                 c = sineOfDegrees(90 - std::abs(std::remainder(degrees, 360.0)));
+    const double s = sineOfDegrees(degrees), c = cosineOfDegrees(degrees);
     texture.transform = {c * scale[0], -s * scale[1], offset[0], s * scale[0], c * scale[1], offset[1]};
 }
 
