@@ -16,10 +16,10 @@
 namespace crt {
 namespace {
 
-constexpr std::size_t kSteps = static_cast<std::size_t>(CRT_LOSS_STEPS), kStride = CRT_LOSS_STRIDE;
-static_assert(kSteps + 2 == static_cast<std::size_t>(CRT_LOSS_MEAN) &&
-              kSteps + 3 == static_cast<std::size_t>(CRT_LOSS_PASSED) && kSteps + 4 < CRT_LOSS_SHARES &&
-              CRT_LOSS_SHARES + kSteps + 1 < kStride);
+constexpr std::size_t kLossSteps = static_cast<std::size_t>(CRT_LOSS_STEPS), kStride = CRT_LOSS_STRIDE;
+static_assert(kLossSteps + 2 == static_cast<std::size_t>(CRT_LOSS_MEAN) &&
+              kLossSteps + 3 == static_cast<std::size_t>(CRT_LOSS_PASSED) &&
+              kLossSteps + 4 < CRT_LOSS_SHARES && CRT_LOSS_SHARES + kLossSteps + 1 < kStride);
 
 /// Rows along a textured roughness, and the most along an index that depends on the wavelength: one for each
 /// 0.02 of it.
@@ -31,16 +31,16 @@ constexpr double kWideIndexStep = 0.1;
 /// Sets the mean of a row, 2 ∫ L c dc of what the kernel reads between its nodes: linear in t = √c,
 /// where it is 4 ∫ L t³ dt. And the shares of the steps in it.
 void integrate(float* row) {
-    std::array<double, kSteps + 1> below{};
-    for (std::size_t cell = 0; cell < kSteps; ++cell) {
+    std::array<double, kLossSteps + 1> below{};
+    for (std::size_t cell = 0; cell < kLossSteps; ++cell) {
         const double i = static_cast<double>(cell), first = row[cell], step = row[cell + 1] - first;
         below[cell + 1] = below[cell] + first * (((i + 1.5) * i + 1) * i + 0.25) +
                           step * (((i / 2 + 1) * i + 0.75) * i + 0.2);
     }
-    constexpr double n = kSteps;
-    row[kSteps + 2] = static_cast<float>(4 * below[kSteps] / (n * n * n * n));
-    for (std::size_t i = 0; i <= kSteps; ++i)
-        row[CRT_LOSS_SHARES + i] = static_cast<float>(below[i] / below[kSteps]);
+    constexpr double n = kLossSteps;
+    row[kLossSteps + 2] = static_cast<float>(4 * below[kLossSteps] / (n * n * n * n));
+    for (std::size_t i = 0; i <= kLossSteps; ++i)
+        row[CRT_LOSS_SHARES + i] = static_cast<float>(below[i] / below[kLossSteps]);
 }
 
 /// Direction of the azimuth that crt_azimuth takes for `at`, at a cosine.
@@ -69,7 +69,7 @@ std::array<double, CRT_LOSS_AZIMUTHS> azimuthShares(double narrowing) {
 void integrateAzimuths(float* rows, std::size_t step, double narrowing) {
     const auto azimuths = azimuthShares(narrowing);
     std::array<float, kStride> mean{};
-    for (std::size_t i = 0; i <= kSteps + 1; ++i) {
+    for (std::size_t i = 0; i <= kLossSteps + 1; ++i) {
         double sum = 0;
         for (std::size_t a = 0; a < azimuths.size(); ++a)
             sum += azimuths[a] * static_cast<double>(rows[a * step + i]);
@@ -77,7 +77,7 @@ void integrateAzimuths(float* rows, std::size_t step, double narrowing) {
     }
     integrate(mean.data());
     for (std::size_t a = 0; a < azimuths.size(); ++a) {
-        rows[a * step + kSteps + 2] = mean[kSteps + 2];
+        rows[a * step + kLossSteps + 2] = mean[kLossSteps + 2];
         std::copy(mean.begin() + CRT_LOSS_SHARES, mean.end(), rows + a * step + CRT_LOSS_SHARES);
     }
 }
@@ -242,19 +242,20 @@ Compensations::Table makeTable(const TableKey& key, const Across& across) {
                 rows.back().azimuth = static_cast<double>(r) / (CRT_LOSS_AZIMUTHS - 1.0);
             }
     table.rows.assign(rows.size() * kStride, 0);
-    parallelFor(rows.size() * (kSteps + 1), 8, [&](std::size_t first, std::size_t end) {
+    parallelFor(rows.size() * (kLossSteps + 1), 8, [&](std::size_t first, std::size_t end) {
         for (std::size_t n = first; n < end; ++n) {
-            const Row& row = rows[n / (kSteps + 1)];
-            const double t = static_cast<double>(n % (kSteps + 1)) / kSteps;
-            table.rows[n / (kSteps + 1) * kStride + n % (kSteps + 1)] =
+            const Row& row = rows[n / (kLossSteps + 1)];
+            const double t = static_cast<double>(n % (kLossSteps + 1)) / kLossSteps;
+            table.rows[n / (kLossSteps + 1) * kStride + n % (kLossSteps + 1)] =
                 static_cast<float>(row.loss(std::max(t * t, 1e-6)));
         }
     });
     for (std::size_t i = 0; i < rows.size(); ++i) {
         float* const values = table.rows.data() + i * kStride;
-        values[kSteps + 1] = values[kSteps];
+        values[kLossSteps + 1] = values[kLossSteps];
         integrate(values);
-        if (key.refracts) values[kSteps + 3] = static_cast<float>(1 - cosineMean(1024, rows[i].reflectance));
+        if (key.refracts)
+            values[kLossSteps + 3] = static_cast<float>(1 - cosineMean(1024, rows[i].reflectance));
     }
     if (record.by_azimuth) {
         const std::size_t step = record.sides * kStride;

@@ -66,7 +66,8 @@ Vec3d middleOf(const LightBounds& b) { return (b.lower + b.upper) * 0.5; }
 /// Halves lights until they are alone; of that binary tree nodes of four children are made.
 class LightTreeBuilder {
 public:
-    explicit LightTreeBuilder(const std::vector<LightBounds>& lights) : lights_(lights), order_(lights.size()) {
+    explicit LightTreeBuilder(const std::vector<LightBounds>& lights)
+        : lights_(lights), order_(lights.size()) {
         std::iota(order_.begin(), order_.end(), 0u);
         halves_.reserve(2 * lights.size() - 1);
         for (const LightBounds& light : lights) whole_ += light.power;

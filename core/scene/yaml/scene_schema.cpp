@@ -602,8 +602,9 @@ void addDielectrics(std::vector<SectionSchema>& all) {
                    "is reflected to and fro. What passes is not bent. As behind all glass, lamps light "
                    "what is behind it by the paths that happen to meet them: shadow rays do not pass. A "
                    "film is on one of the two surfaces.",
-                   {materialType("thin_dielectric"), index("Refractive index of the pane relative to what is "
-                                                      "around it."),
+                   {materialType("thin_dielectric"),
+                    index("Refractive index of the pane relative to what is "
+                          "around it."),
                     thinFilmKey()}});
 }
 
@@ -615,8 +616,11 @@ void addMaterials(std::vector<SectionSchema>& all) {
                                 .required = true,
                                 .doc = "Fraction of light sent back, at every wavelength."};
     all.push_back(
-        {"material/diffuse", "a diffuse material", "Lambert's law, or EON where it is rough.",
-         {materialType("diffuse"), reflectance,
+        {"material/diffuse",
+         "a diffuse material",
+         "Lambert's law, or EON where it is rough.",
+         {materialType("diffuse"),
+          reflectance,
           {.name = "roughness",
            .kind = Kind::Number,
            .range = {.min = 0, .max = 1},
@@ -625,8 +629,10 @@ void addMaterials(std::vector<SectionSchema>& all) {
                   "`base_diffuse_roughness` of OpenPBR Surface 1.1: like clay or the full moon, as bright "
                   "towards the light's edges as in the middle. No light is lost: 1 is white in a white "
                   "room; other colours get deeper, since light is reflected more than once."}}});
-    all.push_back(
-        {"material/mirror", "a mirror material", "Perfect reflection.", {materialType("mirror"), reflectance}});
+    all.push_back({"material/mirror",
+                   "a mirror material",
+                   "Perfect reflection.",
+                   {materialType("mirror"), reflectance}});
     const KeySchema metal{
         .name = "metal", .kind = Kind::Choice, .choices = metalNames(), .doc = "A measured metal."};
     const KeySchema eta{.name = "eta",
@@ -645,15 +651,15 @@ void addMaterials(std::vector<SectionSchema>& all) {
                    "`metal`, or `eta` with `k`.",
                    {materialType("conductor"), metal, eta, k, thinFilmKey()},
                    metal_or_index});
-    all.push_back({"material/rough_conductor",
-                   "a rough_conductor material",
-                   "A rough metal: microfacets of GGX's distribution, shadowed as Smith's heights "
-                   "are. Light that meets more than one of them, up to two thirds of it where it is "
-                   "roughest, comes back diffusely and in deeper colours (Kulla and Conty 2017). Give "
-                   "`metal`, or `eta` with `k`.",
-                   {materialType("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror")),
-                    thinFilmKey()},
-                   metal_or_index});
+    all.push_back(
+        {"material/rough_conductor",
+         "a rough_conductor material",
+         "A rough metal: microfacets of GGX's distribution, shadowed as Smith's heights "
+         "are. Light that meets more than one of them, up to two thirds of it where it is "
+         "roughest, comes back diffusely and in deeper colours (Kulla and Conty 2017). Give "
+         "`metal`, or `eta` with `k`.",
+         {materialType("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror")), thinFilmKey()},
+         metal_or_index});
     addDielectrics(all);
     all.push_back({"material/plastic",
                    "a plastic material",
@@ -661,7 +667,9 @@ void addMaterials(std::vector<SectionSchema>& all) {
                    "coat lets in is scattered below it, and what the coat sends back from below is "
                    "scattered again, which makes colours deeper; a white base sends all light back. The "
                    "model is that of Mitsuba's `roughplastic` with `nonlinear`.",
-                   {materialType("plastic"), reflectance, roughnessKey("a polished coat", "0"),
+                   {materialType("plastic"),
+                    reflectance,
+                    roughnessKey("a polished coat", "0"),
                     {.name = "ior",
                      .kind = Kind::Number,
                      .range = {.min = 1, .max = 10},

@@ -133,7 +133,9 @@ void addLights(std::vector<SectionSchema>& all) {
          "2019, photometry of type C, TILT=NONE or INCLUDE, which is not applied), linear in both angles "
          "between those of the file. Candelas are those of the file with its multiplier and ballast "
          "factors.",
-         {nameKey(), lightType("ies"), positionKey(),
+         {nameKey(),
+          lightType("ies"),
+          positionKey(),
           {.name = "file",
            .required = true,
            .doc = "The IES file; looked up beside the scene, then in CRT_MESH_PATH."},
@@ -147,7 +149,8 @@ void addLights(std::vector<SectionSchema>& all) {
                     "where that is the direction, when left out."),
           amountKey("scale", "", "Times the candelas of the file; 1 when left out."),
           amountKey("luminous_flux_lm", "lm", "Or what all of the light is to be."),
-          amountKey("power_w", "W", "Or its radiant flux, from 360 to 830 nm."), spectrumKey()},
+          amountKey("power_w", "W", "Or its radiant flux, from 360 to 830 nm."),
+          spectrumKey()},
          {{KeyRule::Kind::AtMostOne, {"direction", "target"}},
           {KeyRule::Kind::AtMostOne, {"scale", "luminous_flux_lm"}},
           {KeyRule::Kind::AtMostOne, {"scale", "power_w"}},
@@ -158,7 +161,8 @@ void addLights(std::vector<SectionSchema>& all) {
          "Collimated light: all of it in one direction, from a disk or a slit on, even across it. What lies "
          "behind where it begins is dark. Light sampling alone finds it, where nothing is in between: glass "
          "is, and so are mirrors.",
-         {nameKey(), lightType("beam"),
+         {nameKey(),
+          lightType("beam"),
           vectorKey("position", "The middle of the disk or slit.", "scene units", true),
           vectorKey("direction", "The way that the light goes; any length but 0."),
           vectorKey("target", "Or a point on its axis.", "scene units"),
@@ -181,7 +185,8 @@ void addLights(std::vector<SectionSchema>& all) {
           spectralKey("irradiance", "W·m⁻²·nm⁻¹", "Irradiance of a plane across it."),
           amountKey("illuminance_lx", "lx", "Illuminance of a plane across it."),
           amountKey("power_w", "W", "Radiant flux through it, from 360 to 830 nm."),
-          amountKey("luminous_flux_lm", "lm", "Luminous flux through it."), spectrumKey()},
+          amountKey("luminous_flux_lm", "lm", "Luminous flux through it."),
+          spectrumKey()},
          {{KeyRule::Kind::ExactlyOne, {"direction", "target"}},
           {KeyRule::Kind::ExactlyOne, {"radius", "size"}},
           {KeyRule::Kind::ExactlyOne, {"irradiance", "illuminance_lx", "power_w", "luminous_flux_lm"}},
