@@ -271,6 +271,14 @@ class Width(PageTest):
             self.assertLessEqual(box["x"] + box["width"], width)
             self.assertLess(abs(box["width"] / box["height"] - 24 / 16), 0.02)
 
+    def test_a_long_path_in_a_note_keeps_off_its_button(self):
+        page = self.open(width=320, height=640)
+        self.wait(page, DONE)
+        page.evaluate("document.getElementById('notes').append("
+                      "note('/' + 'folder_'.repeat(20) + 'scene.yaml:1:1: odd', '', false, true))")
+        words = page.locator("#notes > * > div").last
+        self.assertLessEqual(words.evaluate("e => e.scrollWidth - e.clientWidth"), 0)
+
     def test_both_colour_schemes_can_be_read(self):
         for scheme in ("dark", "light"):
             page = self.open(color_scheme=scheme)
