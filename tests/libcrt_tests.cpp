@@ -127,7 +127,7 @@ TEST_CASE("a scene in memory becomes an image") {
     CHECK(rendered.report_json.find("\"per_pixel\": 32") != std::string::npos);
     CHECK(rendered.report_json.find("\"error\": null") == std::string::npos);
     crt::RenderOptions without = withSamples(32);
-    without.report_error = false;
+    without.estimate_error = false;
     Heard other;
     const crt::Rendered part = crt::render(scene, without, &other);
     CHECK(part.report_json.find("\"error\": null") != std::string::npos);

@@ -2,6 +2,7 @@
 // whatever fails.
 #include "backend/device_group.h"
 #include "backend/loader.h"
+#include "base/listener.h"
 #include "catch.h"
 #include "fake_plugins/fake_pattern.h"
 #include "render/render.h"
@@ -190,6 +191,10 @@ TEST_CASE("a device that failed is opened again by the next render of a scene", 
         parseScene("crt: 1\nfilm: {resolution: [6, 4]}\nenvironment: {radiance: 1}\n", "test", ".");
     const RenderOptions options{
         .backend = CRT_FAKE_PLUGIN_DIR "/crt_backend_fake.so", .spp = 12, .chunk = 4};
+    int opens = 0;
+    const Listener listener([](LogLevel, std::string_view) {}, LogLevel::Error,
+                            [&](const std::string& stage) { opens += stage == "opening the backend"; });
+    const ListenerScope scope(listener);
     SceneOnDevices on_devices(scene, options);
     const SamplingPlan plan = planSamples(options, scene, {});
     Watch watch;
@@ -200,8 +205,16 @@ TEST_CASE("a device that failed is opened again by the next render of a scene", 
         REQUIRE(failed.failure);
         CHECK(failed.film.samples.count() == 0);
     }
+    const Rendered after_failure = on_devices.render(plan, std::nullopt, watch);
+    checkSame(after_failure.film, first.film);
+    CHECK(opens == 2);
+    {
+        const DeviceFault fault("scene_oom");
+        CHECK_THROWS_AS(on_devices.render(plan, std::nullopt, watch), Error);
+    }
     const Rendered again = on_devices.render(plan, std::nullopt, watch);
     CHECK_FALSE(again.failure);
+    CHECK(opens == 3);
     checkSame(again.film, first.film);
     CHECK(first.film.samples.count() == 12);
     CHECK(again.facts.rendered_samples == 12);

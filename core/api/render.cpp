@@ -99,13 +99,13 @@ struct Session::Impl {
 
     v0::Scene scene;
     std::optional<crt::Scene> with_replicates;  ///< Of the scene, which leaves them out, for a target error.
-    std::optional<crt::RenderOptions> opened;   ///< What `devices` was made for.
     std::optional<SceneOnDevices> devices;      ///< Last: of one of the scenes.
 };
 
 SceneOnDevices& Session::Impl::devicesFor(const crt::RenderOptions& options) {
     const bool needs_replicates = options.target_error > 0 && replicatesOf(scene.impl().scene) <= 1;
-    if (devices && needs_replicates == with_replicates.has_value() && sameDevices(*opened, options))
+    if (devices && needs_replicates == with_replicates.has_value() &&
+        sameDevices(devices->options(), options))
         return *devices;
     devices.reset();
     with_replicates.reset();
@@ -113,7 +113,6 @@ SceneOnDevices& Session::Impl::devicesFor(const crt::RenderOptions& options) {
         with_replicates = scene.impl().scene;
         requireReplicates(*with_replicates);
     }
-    opened = options;
     return devices.emplace(with_replicates ? *with_replicates : scene.impl().scene, options);
 }
 
@@ -133,7 +132,7 @@ Rendered Session::Impl::render(std::optional<EarlierFilm> earlier, const RenderO
             const v0::Error error(static_cast<ErrorKind>(run.failure->kind()), run.failure->what(), {});
             throw RenderFailed(error, filmOf(run));
         }
-        if (options.report_error) judgeError(run, on_devices.scene());
+        if (options.estimate_error) judgeError(run, on_devices.scene());
         run.facts.warnings = warningCount();
         run.facts.total_seconds = total.seconds();
         std::string report = reportJson(on_devices.scene(), *run.compiled, run.facts);

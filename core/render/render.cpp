@@ -208,11 +208,22 @@ void SceneOnDevices::renderSamples(const SamplingPlan& plan, Watch& watch, const
     facts.chunks = result.chunks;
     facts.sampling_seconds = result.seconds;
     run.failure = result.failure;
-    if (run.failure) close();
 }
 
 Rendered SceneOnDevices::render(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
                                 const CheckpointPlan& checkpoints) {
+    try {
+        Rendered run = rendered(plan, std::move(earlier), watch, checkpoints);
+        if (run.failure) close();
+        return run;
+    } catch (...) {
+        close();  // They may be lost.
+        throw;
+    }
+}
+
+Rendered SceneOnDevices::rendered(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
+                                  const CheckpointPlan& checkpoints) {
     dateUtc();  // Refuses now a SOURCE_DATE_EPOCH that is none.
     RunFacts facts;
     facts.target_samples = plan.target;

@@ -76,11 +76,12 @@ public:
     SceneOnDevices& operator=(const SceneOnDevices&) = delete;
 
     const Scene& scene() const { return scene_; }
+    const RenderOptions& options() const { return options_; }
 
     /// Renders what `plan` (planSamples) says, onto `earlier` where there is one, and warns of what is odd
-    /// about the light. No backend is opened when no sample is missing; devices that have failed are closed,
-    /// and opened again by the next call. Throws crt::Error for everything that goes wrong before the first
-    /// sample.
+    /// about the light. No backend is opened when no sample is missing; after a failure or an exception the
+    /// devices are closed, and opened again by the next call. Throws crt::Error for everything that goes
+    /// wrong before the first sample.
     Rendered render(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
                     const CheckpointPlan& checkpoints = {});
 
@@ -88,6 +89,8 @@ private:
     void open(RunFacts& facts);
     void compile();
     void close();
+    Rendered rendered(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
+                      const CheckpointPlan& checkpoints);
     void prepare(RunFacts& facts);
     void renderSamples(const SamplingPlan& plan, Watch& watch, const CheckpointPlan& checkpoints,
                        Rendered& run);

@@ -57,7 +57,7 @@ def rendered(scene, first, end, options, seconds):
     try:
         with kept_session(scene) as session:
             result = session.render(sample_range=(first, end), time_limit=seconds, progress=False,
-                                    report_error=False, **options)
+                                    estimate_error=False, **options)
         return result.film
     except Error as error:  # RenderFailed too: a part is rendered again as a whole.
         address = get_worker().address

@@ -73,7 +73,7 @@ def planes(film, aov):
 
 
 def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_error=None, time_limit=None,
-           sample_range=None, resume=None, progress=None, use_cache=True, report_error=True,
+           sample_range=None, resume=None, progress=None, use_cache=True, estimate_error=True,
            on_progress=None):
     """Renders a scene: a crt.Scene, a crt.Session, a dict, or the path of a file. Returns a Result.
 
@@ -87,8 +87,8 @@ def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_e
     resume         an earlier film of the scene, whose samples are not rendered again
     progress       a bar by tqdm. None: where tqdm is installed, and stderr is a terminal or this a notebook
     use_cache      of compiled kernels, on disk
-    report_error   whether the report has the error, which takes as long as adding a film; Result.error
-                   reckons it when asked
+    estimate_error for the report, whose "error" is None otherwise. It takes as long as adding a film;
+                   Result.error gives it at any time
     on_progress    called with a dict (samples, samples_wanted, seconds, fraction, seconds_left,
                    paths_per_second, relative_error) some times a second; what it raises ends the render
 
@@ -105,7 +105,7 @@ def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_e
     options.sample_range = tuple(sample_range) if sample_range is not None else None
     options.time_limit_seconds = time_limit or 0.0
     options.target_error = target_error or 0.0
-    options.report_error = report_error
+    options.estimate_error = estimate_error
     if spp is not None and spp < 1:
         raise Error("spp must be 1 or more", Kind.USAGE)
     with Bar(progress) as bar, session.in_turn() as native:

@@ -49,18 +49,14 @@ nb::ndarray<nb::numpy, std::uint64_t> countsOf(const crt::Film& film) {
     return arrayOf(std::move(values), {height, width});
 }
 
-crt::Film sumOf(const crt::Film& a, const crt::Film& b) {
-    crt::Film sum = a;
-    sum.merge(b);
-    return sum;
-}
-
 /// One copy, where a + b + … makes one of each sum.
 crt::Film sumOfAll(const std::vector<const crt::Film*>& films) {
     crt::Film sum = *films.at(0);
     for (std::size_t i = 1; i < films.size(); ++i) sum.merge(*films[i]);
     return sum;
 }
+
+crt::Film sumOf(const crt::Film& a, const crt::Film& b) { return sumOfAll({&a, &b}); }
 
 crt::Image develop(const crt::Film& film, bool for_display, std::optional<double> exposure_ev,
                    std::vector<std::string> aovs) {

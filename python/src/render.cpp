@@ -53,7 +53,7 @@ void bindRender(nb::module_& module) {
         .def_rw("sample_range", &crt::RenderOptions::sample_range)
         .def_rw("time_limit_seconds", &crt::RenderOptions::time_limit_seconds)
         .def_rw("target_error", &crt::RenderOptions::target_error)
-        .def_rw("report_error", &crt::RenderOptions::report_error);
+        .def_rw("estimate_error", &crt::RenderOptions::estimate_error);
     nb::class_<crt::Session>(module, "Session", "Renders of one scene on devices that stay open.")
         .def(nb::init<const crt::Scene&>(), "scene"_a)
         .def("render", &render, "options"_a, "earlier"_a.none(), "progress"_a.none(), "stage"_a.none(),

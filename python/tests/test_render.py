@@ -212,7 +212,7 @@ def test_session_has_the_bits_of_renders(box, backend):
 
 
 def test_a_report_without_the_error(box):
-    result = crt.render(box, spp=64, backend="embree", report_error=False)
+    result = crt.render(box, spp=64, backend="embree", estimate_error=False)
     assert result.report["error"] is None and 0 < result.error.half_width_95 < 1
     assert crt.render(box, spp=64, backend="embree").report["error"]["half_width_95"] == pytest.approx(
         result.error.half_width_95)

@@ -31,9 +31,9 @@ struct RenderOptions {
     double time_limit_seconds = 0;  ///< 0: none.
     double target_error = 0;        ///< Stop at this half-width, relative to the mean luminance; 0: none.
 
-    /// Whether the report has the error. Of a part of the samples it is of little use, and takes as long as
-    /// adding a film; Film::error() tells it at any time.
-    bool report_error = true;
+    /// For the report, whose "error" is null otherwise. Of a part of the samples the estimate is of little
+    /// use, and takes as long as adding a film; Film::error() gives it at any time.
+    bool estimate_error = true;
 };
 
 /// Why sampling ended.
