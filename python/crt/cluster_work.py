@@ -238,10 +238,19 @@ class Work:
         if self.coming is not None:
             return self.coming.done() and self.take_in()
         wait = max(self.every, 2 * self.threads / PARTS_A_SECOND)
-        if self.piles and (now or self.soon or time.monotonic() > self.merged + wait):
+        due = time.monotonic() > self.merged + wait and not self.ends_within(wait)
+        if self.piles and (now or self.soon or due):
             self.soon = False
             self.merge()
         return False
+
+    def ends_within(self, seconds):
+        """Whether all parts will be done so soon that what is done can come with them. A checkpoint is not
+        put off."""
+        if self.checkpoint is not None or self.size.speed is None:
+            return False
+        left = self.missing.left + sum(end - first for first, end, _ in self.running.values())
+        return left < self.size.speed * self.threads * seconds
 
     def sum_on(self, worker, pile):
         """The future of the sum of films that lie on this worker."""

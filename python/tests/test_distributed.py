@@ -140,6 +140,21 @@ def test_no_part_waits_behind_another_at_the_end(box, samples, running):
     assert len(set(started)) == running and min(end - first for first, end in started) > 0
 
 
+@pytest.mark.parametrize("samples, checkpoint, fetched", [(3_800, None, False), (3_900, None, True),
+                                                          (3_800, "box.crtfilm", True)])
+def test_films_are_not_fetched_just_before_the_end(box, samples, checkpoint, fetched):
+    """Four threads have 3,840 samples in the minute between two merges."""
+    size = PartSize()
+    size.learn(160, 10.0)
+    work = cluster_work.Work(FourThreads(), box, {}, Missing([], samples), size, None, checkpoint, 60)
+    work.piles = {"one": ["a film"]}
+    work.merged -= 61
+    merged = []
+    work.merge = lambda: merged.append(True)
+    work.harvest(False)
+    assert bool(merged) == fetched
+
+
 def test_late_workers_get_parts(box):
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
         with distributed.Client(cluster) as client:
