@@ -246,8 +246,8 @@ class Work:
 
     def ends_within(self, seconds):
         """Whether all parts will be done so soon that what is done can come with them. A checkpoint is not
-        put off."""
-        if self.checkpoint is not None or self.size.speed is None:
+        put off, nor are the films of so many workers that the end would be all sums."""
+        if self.checkpoint is not None or self.size.speed is None or len(self.piles) > FEW:
             return False
         left = self.missing.left + sum(end - first for first, end, _ in self.running.values())
         return left < self.size.speed * self.threads * seconds

@@ -140,14 +140,15 @@ def test_no_part_waits_behind_another_at_the_end(box, samples, running):
     assert len(set(started)) == running and min(end - first for first, end in started) > 0
 
 
-@pytest.mark.parametrize("samples, checkpoint, fetched", [(3_800, None, False), (3_900, None, True),
-                                                          (3_800, "box.crtfilm", True)])
-def test_films_are_not_fetched_just_before_the_end(box, samples, checkpoint, fetched):
+@pytest.mark.parametrize("samples, workers, checkpoint, fetched", [
+    (3_800, 64, None, False), (3_900, 64, None, True), (3_800, 65, None, True),
+    (3_800, 64, "box.crtfilm", True)])
+def test_films_are_not_fetched_just_before_the_end(box, samples, workers, checkpoint, fetched):
     """Four threads have 3,840 samples in the minute between two merges."""
     size = PartSize()
     size.learn(160, 10.0)
     work = cluster_work.Work(FourThreads(), box, {}, Missing([], samples), size, None, checkpoint, 60)
-    work.piles = {"one": ["a film"]}
+    work.piles = {worker: ["a film"] for worker in range(workers)}
     work.merged -= 61
     merged = []
     work.merge = lambda: merged.append(True)
