@@ -42,7 +42,7 @@ Film randomFilm(FilmShape shape, SampleRange range, std::uint32_t seed) {
     return film;
 }
 
-bool sameBits(const decltype(Film::sums)& a, const decltype(Film::sums)& b) {
+bool sameBits(const std::vector<double>& a, const std::vector<double>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 

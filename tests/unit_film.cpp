@@ -9,17 +9,11 @@
 #include "image/image_metadata.h"
 
 #include <algorithm>
-#include <cinttypes>
 #include <cmath>
-#include <cstdint>
-#include <cstdio>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <limits>
 #include <numeric>
 #include <random>
-#include <string>
 #include <vector>
 
 using namespace crt;
@@ -67,21 +61,6 @@ Film filmOf(const Vec3d& xyz) {
     film.counts[0] = 1;
     film.samples.add({0, 1});
     return film;
-}
-
-/// Flags of the mapping that holds an address, as /proc/self/smaps names them.
-std::string flagsOfMapping(const void* address) {
-    std::ifstream maps("/proc/self/smaps");
-    bool is_within = false;
-    for (std::string line; std::getline(maps, line);) {
-        std::uintptr_t first = 0, end = 0;
-        if (std::sscanf(line.c_str(), "%" SCNxPTR "-%" SCNxPTR " ", &first, &end) == 2)
-            is_within = first <= reinterpret_cast<std::uintptr_t>(address) &&
-                        reinterpret_cast<std::uintptr_t>(address) < end;
-        else if (is_within && line.starts_with("VmFlags:"))
-            return line + ' ';
-    }
-    return {};
 }
 
 }  // namespace
@@ -409,14 +388,4 @@ TEST_CASE("AOV planes carry their names, types and values", "[film]") {
     CHECK(depth.pixels[3] == 42.5f);
     CHECK(depth.integers.empty());
     CHECK_THROWS_WITH(resolveImage(Film(kOnePixel), developmentOf(scene), kAovNormal), Contains("normal"));
-}
-
-TEST_CASE("large films and their copies ask for huge pages", "[film]") {
-    if (!std::filesystem::exists("/sys/kernel/mm/transparent_hugepage")) return;
-    const FilmShape shape{512, 512, 4, kAovSquares};  // 16 MB
-    const Film film(shape);
-    const Film copy = film;
-    const std::size_t middle = film.sums.size() / 2;
-    CHECK_THAT(flagsOfMapping(&film.sums[middle]), Contains(" hg "));
-    CHECK_THAT(flagsOfMapping(&copy.sums[middle]), Contains(" hg "));
 }

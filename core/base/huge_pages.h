@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 
 namespace crt {
 
@@ -18,18 +17,5 @@ inline void adviseHugePages(void* memory, std::size_t bytes) {
                          end = (address + bytes) & ~(kHugePage - 1);
     if (first < end) (void)::madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
 }
-
-/// For vectors that are filled as a whole.
-template <class T>
-struct HugePageAllocator : std::allocator<T> {
-    HugePageAllocator() = default;
-    template <class U>
-    explicit HugePageAllocator(const HugePageAllocator<U>&) {}
-    T* allocate(std::size_t count) {
-        T* const memory = std::allocator<T>::allocate(count);
-        adviseHugePages(memory, count * sizeof(T));
-        return memory;
-    }
-};
 
 }  // namespace crt

@@ -6,7 +6,6 @@
 #pragma once
 
 #include "base/error.h"
-#include "base/huge_pages.h"
 #include "compile/compile.h"
 #include "film/film_record.h"
 #include "image/development.h"
@@ -59,10 +58,10 @@ public:
     explicit Film(FilmShape shape);
     const FilmShape& shape() const { return shape_; }
 
-    std::vector<double, HugePageAllocator<double>> sums;  ///< [height][width][channels][2]
-    std::vector<std::uint64_t> counts;                    ///< [height][width]
-    std::vector<std::uint32_t> primitives;                ///< [height][width] or empty
-    SampleRanges samples;                                 ///< Ranges asked for (every pixel has the same).
+    std::vector<double> sums;              ///< [height][width][channels][2]
+    std::vector<std::uint64_t> counts;     ///< [height][width]
+    std::vector<std::uint32_t> primitives; ///< [height][width] or empty
+    SampleRanges samples;                  ///< Ranges asked for (every pixel has the same).
 
     /// Adds another film of disjoint sample ranges. Primitive ids are taken from the film with the lower
     /// first sample. Throws crt::Error(Usage) when shapes differ or ranges overlap.

@@ -34,7 +34,7 @@ void putChecksum(std::vector<std::uint8_t>& file, bool size_too) {
 }
 
 /// A NaN is like itself.
-bool sameBits(const decltype(crt::Film::sums)& a, const decltype(crt::Film::sums)& b) {
+bool sameBits(const std::vector<double>& a, const std::vector<double>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof a[0]) == 0;
 }
 
