@@ -3,10 +3,11 @@ seconds, in turn, and whether the bits are the same. The same processes that ren
 of which no film is sent or added, show what processes cost without crt.distributed. Prints one table;
 nothing is written.
 
-The workers are processes of one thread each, which render with one thread each; the plain render uses all
-threads. The cluster has been started when the clock begins, without the profiler of Dask and with its
-monitors and ticks as far apart as docs/cluster.md says. With --gpus a plain render on one device is
-compared with workers that have one GPU each, as CUDA_VISIBLE_DEVICES says."""
+The workers are processes of one thread each, which render with one thread each; the plain render uses as
+many threads as there are workers, or all where the machine has fewer. The cluster has been started when the
+clock begins, as docs/cluster.md says for busy machines: without the profiler of Dask, with its monitors and
+ticks far apart, and with workers that keep the memory of films. With --gpus a plain render on one device
+is compared with workers that have one GPU each, as CUDA_VISIBLE_DEVICES says."""
 
 import argparse
 import os
@@ -23,6 +24,7 @@ import crt.distributed
 QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s",
          "distributed.admin.system-monitor.interval": "10s",
          "distributed.worker.memory.monitor-interval": "5s"}
+KEPT_MEMORY = {"MALLOC_ARENA_MAX": 1, "MALLOC_MMAP_MAX_": 0, "MALLOC_TRIM_THRESHOLD_": 4_000_000_000}
 
 
 def processor_seconds(client):
@@ -74,17 +76,18 @@ def main():
     arguments = parser.parse_args()
 
     scene = crt.load(arguments.scene, set={"film.resolution": [arguments.resolution] * 2})
+    threads = 0 if arguments.gpus else min(arguments.workers, len(os.sched_getaffinity(0)))
     # Kernels and caches; on a GPU the first seconds are of a kernel that is not yet lean.
-    crt.render(scene, backend=arguments.backend, time_limit=arguments.seconds / 10)
-    trial = crt.render(scene, backend=arguments.backend, time_limit=arguments.seconds / 10)
+    crt.render(scene, backend=arguments.backend, threads=threads, time_limit=arguments.seconds / 10)
+    trial = crt.render(scene, backend=arguments.backend, threads=threads, time_limit=arguments.seconds / 10)
     samples = int(trial.film.samples * arguments.seconds / trial.report["seconds"]["render"])
-    dask.config.set(QUIET)
+    dask.config.set({**QUIET, **{f"distributed.nanny.pre-spawn-environ.{name}": value
+                                 for name, value in KEPT_MEMORY.items()}})
     with start(arguments.workers, arguments.gpus) as cluster, distributed.Client(cluster) as client:
         client.wait_for_workers(arguments.workers)
-        threads = 0 if arguments.gpus else 1
-        options = {"backend": arguments.backend, "threads": threads}
+        options = {"backend": arguments.backend, "threads": 0 if arguments.gpus else 1}
         cases = {
-            "one render": lambda: crt.render(scene, spp=samples, backend=arguments.backend),
+            "one render": lambda: crt.render(scene, spp=samples, backend=arguments.backend, threads=threads),
             "processes": lambda: render_shares(client, scene, samples, options),
             "Dask": lambda: crt.distributed.render(scene, client, spp=samples, **options)}
         crt.distributed.render(scene, client, spp=4 * arguments.workers, parts=2 * arguments.workers,

@@ -10,7 +10,9 @@
 #include <bit>
 #include <cstring>
 #include <memory>
+#include <mutex>
 #include <new>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -45,6 +47,46 @@ std::array<Section<Byte>, 3> sectionsOf(AnyFilm& film) {
     return {section(film.sums, pixels), section(film.counts, pixels), section(film.primitives, pixels)};
 }
 
+/// Several planes of one block, filled at once: a walk over the block for each single plane would load each
+/// of its cache lines anew for each byte.
+class Planes {
+public:
+    static constexpr std::size_t kAtOnce = 64;  // A cache line of a record.
+
+    void resize(std::size_t records) { records_ = records; }
+
+    std::span<unsigned char> operator[](std::size_t plane) {
+        return std::span(bytes_).subspan(plane * kStride, records_);
+    }
+
+    /// The bytes byte, …, byte + count − 1 of each record of `bytes` bytes.
+    void fill(const unsigned char* block, std::size_t bytes, std::size_t byte, std::size_t count) {
+        forEachByte(count, [&](std::size_t i, std::size_t k) {
+            bytes_[k * kStride + i] = block[i * bytes + byte + k];
+        });
+    }
+    /// The way back.
+    void empty(unsigned char* block, std::size_t bytes, std::size_t byte, std::size_t count) const {
+        forEachByte(count, [&](std::size_t i, std::size_t k) {
+            block[i * bytes + byte + k] = bytes_[k * kStride + i];
+        });
+    }
+
+private:
+    // A cache line more than the pixels: at a distance of a power of two all planes would share one set of
+    // the cache.
+    static constexpr std::size_t kStride = kPackedPixels + 64;
+
+    template <class Move>
+    void forEachByte(std::size_t count, const Move& move) const {
+        for (std::size_t i = 0; i < records_; ++i)
+            for (std::size_t k = 0; k < count; ++k) move(i, k);
+    }
+
+    std::vector<unsigned char> bytes_ = std::vector<unsigned char>(kAtOnce * kStride);
+    std::size_t records_ = 0;
+};
+
 /// Packs planes of a film one after the other.
 class Packer {
 public:
@@ -57,26 +99,26 @@ public:
                                     std::size_t end) {
         bytes_.clear();
         const unsigned char* block = section.data + first * section.bytes;
-        plane_.resize(end - first);
-        for (std::size_t byte = 0; byte < section.bytes; ++byte) {
-            for (std::size_t i = 0; i < plane_.size(); ++i) plane_[i] = block[i * section.bytes + byte];
-            addPlane();
+        planes_.resize(end - first);
+        for (std::size_t byte = 0; byte < section.bytes; byte += Planes::kAtOnce) {
+            const std::size_t count = std::min(Planes::kAtOnce, section.bytes - byte);
+            planes_.fill(block, section.bytes, byte, count);
+            for (std::size_t k = 0; k < count; ++k) add(planes_[k]);
         }
-        return std::move(bytes_);
+        return bytes_;
     }
 
 private:
-    void addPlane() {
-        if (std::all_of(plane_.begin(), plane_.end(),
-                        [this](unsigned char b) { return b == plane_.front(); }))
-            return append(plane_.data(), 1);
+    void add(std::span<const unsigned char> plane) {
+        const bool all_equal = std::memcmp(plane.data(), plane.data() + 1, plane.size() - 1) == 0;
+        if (all_equal) return append(plane.data(), 1);
         const std::size_t size = ZSTD_compressCCtx(context_.get(), packed_.data(), packed_.size(),
-                                                   plane_.data(), plane_.size(), kLevel);
+                                                   plane.data(), plane.size(), kLevel);
         if (ZSTD_isError(size))
             throw Error(ErrorKind::Internal,
                         fmt::format("zstd cannot pack a film: {}", ZSTD_getErrorName(size)));
-        if (size < plane_.size()) return append(packed_.data(), size);
-        append(plane_.data(), plane_.size());
+        if (size < plane.size()) return append(packed_.data(), size);
+        append(plane.data(), plane.size());
     }
     void append(const unsigned char* bytes, std::size_t size) {
         const auto length = static_cast<std::uint32_t>(size);
@@ -86,7 +128,34 @@ private:
     }
 
     std::unique_ptr<ZSTD_CCtx, FreeContext> context_;
-    std::vector<unsigned char> plane_, packed_, bytes_;
+    Planes planes_;
+    std::vector<unsigned char> packed_, bytes_;
+};
+
+/// Packers that blocks take turns with: each takes two megabytes, which the system would clear again for
+/// each block.
+class Packers {
+public:
+    std::vector<unsigned char> pack(const Section<const unsigned char>& section, std::size_t first,
+                                    std::size_t end) {
+        std::unique_ptr<Packer> packer = take();
+        std::vector<unsigned char> packed = packer->pack(section, first, end);
+        const std::scoped_lock lock(mutex_);
+        free_.push_back(std::move(packer));
+        return packed;
+    }
+
+private:
+    std::unique_ptr<Packer> take() {
+        const std::scoped_lock lock(mutex_);
+        if (free_.empty()) return std::make_unique<Packer>();
+        std::unique_ptr<Packer> packer = std::move(free_.back());
+        free_.pop_back();
+        return packer;
+    }
+
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<Packer>> free_;
 };
 
 class Unpacker {
@@ -97,11 +166,13 @@ public:
 
     bool read(const Section<unsigned char>& section) {
         for (std::size_t first = 0; first < section.records; first += kPackedPixels) {
-            plane_.resize(std::min(kPackedPixels, section.records - first));
+            planes_.resize(std::min(kPackedPixels, section.records - first));
             unsigned char* block = section.data + first * section.bytes;
-            for (std::size_t byte = 0; byte < section.bytes; ++byte) {
-                if (!readPlane()) return false;
-                for (std::size_t i = 0; i < plane_.size(); ++i) block[i * section.bytes + byte] = plane_[i];
+            for (std::size_t byte = 0; byte < section.bytes; byte += Planes::kAtOnce) {
+                const std::size_t count = std::min(Planes::kAtOnce, section.bytes - byte);
+                for (std::size_t k = 0; k < count; ++k)
+                    if (!read(planes_[k])) return false;
+                planes_.empty(block, section.bytes, byte, count);
             }
         }
         return true;
@@ -109,7 +180,7 @@ public:
     bool atEnd() const { return rest_.empty(); }
 
 private:
-    bool readPlane() {
+    bool read(std::span<unsigned char> plane) {
         std::uint32_t size = 0;
         if (rest_.size() < kLeastPlane) return false;
         std::memcpy(&size, rest_.data(), sizeof size);
@@ -118,31 +189,32 @@ private:
         const std::span<const unsigned char> packed = rest_.first(size);
         rest_ = rest_.subspan(size);
         if (size == 1) {
-            std::fill(plane_.begin(), plane_.end(), packed.front());
+            std::fill(plane.begin(), plane.end(), packed.front());
             return true;
         }
-        if (size == plane_.size()) {
-            std::copy(packed.begin(), packed.end(), plane_.begin());
+        if (size == plane.size()) {
+            std::copy(packed.begin(), packed.end(), plane.begin());
             return true;
         }
-        return ZSTD_decompressDCtx(context_.get(), plane_.data(), plane_.size(), packed.data(), size) ==
-               plane_.size();
+        return ZSTD_decompressDCtx(context_.get(), plane.data(), plane.size(), packed.data(), size) ==
+               plane.size();
     }
 
     std::unique_ptr<ZSTD_DCtx, FreeContext> context_;
     std::span<const unsigned char> rest_;
-    std::vector<unsigned char> plane_;
+    Planes planes_;
 };
 
 }  // namespace
 
 std::vector<unsigned char> packFilm(const Film& film) {
     std::vector<unsigned char> all;
+    Packers packers;
     for (const Section<const unsigned char>& section : sectionsOf<const unsigned char>(film)) {
         // Each block is packed for itself, so that any number of threads make the same bytes.
         std::vector<std::vector<unsigned char>> blocks(partsOf(section.records, kPackedPixels));
         parallelFor(section.records, kPackedPixels, [&](std::size_t first, std::size_t end) {
-            blocks[first / kPackedPixels] = Packer().pack(section, first, end);
+            blocks[first / kPackedPixels] = packers.pack(section, first, end);
         });
         std::size_t bytes = all.size();
         for (const std::vector<unsigned char>& block : blocks) bytes += block.size();
