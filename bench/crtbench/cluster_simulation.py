@@ -1,20 +1,25 @@
-"""A thousand workers of Dask in one process, whose parts only sleep: what do scheduler, client and merges
-cost a long render? Prints a table; nothing is written.
+"""A thousand workers of Dask whose parts only sleep: what do scheduler, client and merges cost a long
+render? Prints a table; nothing is written.
 
-Real: crt.distributed with all it does, the scheduler, each worker with its own connection, and what the
-client does with a film: it reads a packed one and adds it. Made up: a part sleeps for as long as a worker of
-its speed would render (speeds differ by --spread), and gives its range of samples instead of a film, because
-a thousand nodes have room for a thousand films and one machine has not. A sum on a worker sleeps for as long
-as a node of its own would take: to add, and to pack, send (--bandwidth) and read what comes from others, as
-measured with real films when the program starts. With --real-sums each sum adds real films instead, all on
-the processors of this machine, and nothing is sent. Tasks are coroutines: otherwise a thousand threads that
-wait for one interpreter would be measured. Messages stay within the process. At the end every
-sample is there once, or the run fails."""
+Real: crt.distributed with all it does in this process, the scheduler in one of its own, each worker with its
+own connections, all messages, and what the client does with a film: it reads a packed one and adds it. The
+workers share some processes (--processes), as one machine has not a thousand nodes. Made up: a part sleeps
+for as long as a worker of its speed would render (speeds differ by --spread), and gives its range of samples
+instead of a film, because a thousand nodes have room for a thousand films and one machine has not. A sum on
+a worker sleeps for as long as a node of its own would take: to add, and to pack, send (--bandwidth) and read
+what comes from others, as measured with real films when the program starts. With --real-sums each sum adds
+real films instead, all on the processors of this machine, and none is sent. Tasks are coroutines: otherwise
+a thousand threads that wait for one interpreter would be measured. At the end every sample is there once, or
+the run fails."""
 
 import argparse
 import asyncio
+import contextlib
+import logging
+import multiprocessing
 import os
 import random
+import resource
 import statistics
 import time
 
@@ -28,6 +33,15 @@ from crt.pickling import film_bytes, film_of
 from crt.sample_ranges import Missing
 
 
+# One worker looks at its process 50 times a second; a thousand need not look at the same few.
+QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "60s",
+         "distributed.admin.tick.interval": "10s", "distributed.admin.tick.limit": "1h",
+         "distributed.worker.use-file-locking": False, "distributed.worker.memory.target": False,
+         "distributed.worker.memory.spill": False, "distributed.worker.memory.pause": False,
+         "distributed.worker.memory.terminate": False, "distributed.scheduler.dashboard.enabled": False}
+STARTED_AT_ONCE = 20  # Workers of a process.
+
+
 class Films:
     """Real films of disjoint samples, and what is done with them."""
 
@@ -35,24 +49,33 @@ class Films:
         scene = crt.load("configs/cornell_box.yaml", set={"film.resolution": [resolution] * 2})
         self.films = [crt.render(scene, sample_range=(4 * i, 4 * i + 4), backend="embree").film
                       for i in range(count)]
-        self.added, self.real_sums = 0, real_sums
         self.packed = film_bytes(self.films[0])
-        self.add_seconds = processor_seconds(lambda: self.films[0] + self.films[1])
-        self.send_seconds = (processor_seconds(lambda: film_bytes(self.films[0]))
-                             + processor_seconds(lambda: film_of(self.packed))
-                             + len(self.packed) / bandwidth)
-
-    async def add(self, count, sent):
-        """What a worker does with so many films, some of which were sent to it."""
-        if self.real_sums:
-            await asyncio.to_thread(really_added, self.films[:count])
-        else:
-            await asyncio.sleep((count - 1) * self.add_seconds + sent * self.send_seconds)
-        self.added += count - 1
+        self.sums = Sums(processor_seconds(lambda: self.films[0] + self.films[1]),
+                         processor_seconds(lambda: film_bytes(self.films[0]))
+                         + processor_seconds(lambda: film_of(self.packed)) + len(self.packed) / bandwidth,
+                         [film_bytes(film) for film in self.films] if real_sums else [])
 
     def take(self):
         """What the client does with a film that comes to it."""
         return film_of(self.packed) + self.films[1]
+
+
+class Sums:
+    """What workers do with films: packed ones that are added; none where it only takes so long."""
+
+    def __init__(self, add_seconds, send_seconds, packed):
+        self.add_seconds, self.send_seconds, self.packed = add_seconds, send_seconds, packed
+        self.films = []
+
+    def unpack(self):
+        self.films = [film_of(packed) for packed in self.packed]
+
+    async def add(self, count, sent):
+        """So many films, some of which were sent."""
+        if self.films:
+            await asyncio.to_thread(really_added, self.films[:count])
+        else:
+            await asyncio.sleep((count - 1) * self.add_seconds + sent * self.send_seconds)
 
 
 def processor_seconds(work, runs=5):
@@ -65,8 +88,9 @@ def processor_seconds(work, runs=5):
 
 
 really_added = cluster_work.added
-FILMS = None  # Tasks of workers in this process find it here.
-SPEEDS = {}
+FILMS = None  # Of the client.
+SUMS = None   # Of a process of workers, where tasks find both.
+SPEEDS = []   # Samples a second of each worker.
 
 
 class Part:
@@ -100,35 +124,106 @@ def disjoint(ranges):
 
 
 async def rendered(scene, first, end, options, seconds):
-    worker = distributed.get_worker().address
-    await asyncio.sleep((end - first) / SPEEDS[worker])
-    return Part([(first, end)], worker)
+    worker = distributed.get_worker()
+    await asyncio.sleep((end - first) / SPEEDS[worker.name])
+    return Part([(first, end)], worker.address)
 
 
 async def added(parts):
     worker = distributed.get_worker().address
-    await FILMS.add(len(parts), sum(part.worker != worker for part in parts))
+    await SUMS.add(len(parts), sum(part.worker != worker for part in parts))
     return Part(disjoint([one for part in parts for one in part.sample_ranges]), worker)
 
 
-def simulate(client, workers, seconds, speed, spread):
+def set_up():
+    """Of each process."""
+    dask.config.set(QUIET)
+    # What goes wrong ends the render here; when all is done, each worker would tell that the others go.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+
+
+def serve_scheduler(addresses):
+    """A process: the scheduler, whose address it tells."""
+    async def serve():
+        async with distributed.Scheduler(protocol="tcp", host="127.0.0.1", port=0) as scheduler:
+            addresses.put(scheduler.address)
+            await scheduler.finished()
+
+    set_up()
+    asyncio.run(serve())
+
+
+def serve_workers(scheduler, names, sums, speeds):
+    """A process: the workers of these names."""
+    global SUMS, SPEEDS
+
+    async def serve():
+        async with contextlib.AsyncExitStack() as stack:
+            workers = [distributed.Worker(scheduler, host="127.0.0.1", nthreads=1, name=name, memory_limit=0)
+                       for name in names]
+            for first in range(0, len(workers), STARTED_AT_ONCE):
+                await asyncio.gather(*(stack.enter_async_context(worker)
+                                       for worker in workers[first:first + STARTED_AT_ONCE]))
+            await asyncio.gather(*(worker.finished() for worker in workers))
+
+    SUMS, SPEEDS = sums, speeds
+    SUMS.unpack()
+    set_up()
+    asyncio.run(serve())
+
+
+@contextlib.contextmanager
+def cluster(processes, speeds):
+    """A client of a scheduler with one worker for each of these speeds, in so many processes."""
+    context = multiprocessing.get_context("spawn")
+    addresses = context.Queue()
+    started = [context.Process(target=serve_scheduler, args=(addresses,))]
+    started[0].start()
+    try:
+        scheduler = addresses.get(timeout=60)
+        names = range(len(speeds))
+        for process in range(processes):
+            started.append(context.Process(target=serve_workers, args=(scheduler, names[process::processes],
+                                                                       FILMS.sums, speeds)))
+            started[-1].start()
+        with distributed.Client(scheduler) as client:
+            client.wait_for_workers(len(speeds), timeout=300)
+            yield client
+            client.shutdown()
+    finally:
+        for process in started:
+            process.join(timeout=30)
+            process.kill()
+
+
+def processor_seconds_of(client):
+    """Those of the client, of the scheduler and of all workers: (3,)."""
+    workers = dict(client.run(own_seconds).values())
+    return time.process_time(), client.run_on_scheduler(time.process_time), sum(workers.values())
+
+
+def own_seconds():
+    """(the process, its processor seconds)."""
+    return os.getpid(), time.process_time()
+
+
+def simulate(client, seconds, speeds):
     """Returns (ideal seconds, real seconds, report)."""
-    chance = random.Random(1)
-    SPEEDS.update((address, speed * chance.uniform(1 - spread, 1 + spread))
-                  for address in client.nthreads())
-    samples = int(sum(SPEEDS.values()) * seconds)
+    samples = int(sum(speeds) * seconds)
     scene = crt.load("configs/cornell_box.yaml", set={"film.resolution": [64, 64]})
 
     def tell(now):
-        if now["parts"] // workers != tell.shown:
-            tell.shown = now["parts"] // workers
+        if now["parts"] // len(speeds) != tell.shown:
+            tell.shown = now["parts"] // len(speeds)
             print(f"{now['seconds']:.0f} s: {now['parts']} parts, {now['fraction']:.1%}", flush=True)
 
     tell.shown = 0
     result = crt.distributed.render(scene, client, spp=samples, on_progress=tell, progress=False)
     if Missing(result.film.sample_ranges, samples).left or result.film.samples != samples:
         raise RuntimeError("samples are missing")
-    return samples / sum(SPEEDS.values()), result.report["seconds"]["total"], result.report["distributed"]
+    return samples / sum(speeds), result.report["seconds"]["total"], result.report["distributed"]
 
 
 def main():
@@ -136,6 +231,8 @@ def main():
     parser = argparse.ArgumentParser(prog="bench/cluster_simulation", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--workers", type=int, default=1000)
+    parser.add_argument("--processes", type=int, default=len(os.sched_getaffinity(0)),
+                        help="that the workers share (one a processor)")
     parser.add_argument("--seconds", type=float, default=600, help="of the render on ideal workers (600)")
     parser.add_argument("--resolution", type=int, default=512, help="of the films that merges add (512)")
     parser.add_argument("--speed", type=float, default=16, help="samples a second of a worker (16)")
@@ -145,28 +242,21 @@ def main():
     arguments = parser.parse_args()
     FILMS = Films(arguments.resolution, cluster_work.BRANCH if arguments.real_sums else 2,
                   arguments.real_sums, arguments.bandwidth)
-    print(f"a film: {len(FILMS.packed) / 1e6:.1f} MB packed; {FILMS.add_seconds:.3f} s to add, "
-          f"{FILMS.send_seconds:.3f} s to pack, send and read", flush=True)
+    print(f"a film: {len(FILMS.packed) / 1e6:.1f} MB packed; {FILMS.sums.add_seconds:.3f} s to add, "
+          f"{FILMS.sums.send_seconds:.3f} s to pack, send and read", flush=True)
     cluster_work.rendered, cluster_work.added = rendered, added
-    # One worker looks at its process 50 times a second; a thousand need not look at the same one.
-    dask.config.set({"distributed.worker.profile.enabled": False,
-                     "distributed.admin.system-monitor.interval": "60s",
-                     "distributed.admin.tick.interval": "10s", "distributed.admin.tick.limit": "1h",
-                     "distributed.worker.use-file-locking": False,
-                     "distributed.worker.memory.target": False, "distributed.worker.memory.spill": False,
-                     "distributed.worker.memory.pause": False,
-                     "distributed.worker.memory.terminate": False})
+    set_up()
+    chance = random.Random(1)
+    speeds = [arguments.speed * chance.uniform(1 - arguments.spread, 1 + arguments.spread)
+              for _ in range(arguments.workers)]
     begin = time.perf_counter()
-    with distributed.Client(processes=False, n_workers=arguments.workers, threads_per_worker=1,
-                            dashboard_address=None) as client:
-        client.wait_for_workers(arguments.workers)
+    with cluster(arguments.processes, speeds) as client:
         print(f"{arguments.workers} workers after {time.perf_counter() - begin:.1f} s", flush=True)
-        before = time.process_time()
-        ideal, real, report = simulate(client, arguments.workers, arguments.seconds, arguments.speed,
-                                       arguments.spread)
-        busy = time.process_time() - before
-    print(f"\n| workers | ideal s | real s | overhead | parts | films added | processor s | load |\n"
-          f"|{'---|' * 8}\n| {arguments.workers} | {ideal:.1f} | {real:.1f} | {real / ideal - 1:.1%} "
-          f"| {report['parts']} | {FILMS.added} | {busy:.1f} | "
-          f"{os.getloadavg()[0]:.1f} |", flush=True)
+        before = processor_seconds_of(client)
+        ideal, real, report = simulate(client, arguments.seconds, speeds)
+        busy = [after - earlier for after, earlier in zip(processor_seconds_of(client), before)]
+    print(f"\n| workers | ideal s | real s | overhead | parts | sums | processor s: client | scheduler "
+          f"| workers | load |\n|{'---|' * 10}\n| {arguments.workers} | {ideal:.1f} | {real:.1f} "
+          f"| {real / ideal - 1:.1%} | {report['parts']} | {report['merges']} | {busy[0]:.1f} "
+          f"| {busy[1]:.1f} | {busy[2]:.1f} | {os.getloadavg()[0]:.1f} |", flush=True)
     return 0
