@@ -217,6 +217,14 @@ TEST_CASE("slow devices begin with small pictures, fast ones with the whole", "[
     CHECK(pace.firstDivisor(pixels) == 1);
     CHECK(pace.samplesOfChunk(pixels, false) == 30);
     CHECK(pace.samplesOfChunk(pixels, true) == 400);
+    // What it takes to show a picture is not spent on samples as well.
+    pace.handedOn(0.005);
+    CHECK(pace.samplesOfChunk(pixels, false) == 30);
+    for (int i = 0; i < 30; ++i) pace.handedOn(0.0245);
+    CHECK(pace.samplesOfChunk(pixels, false) == 20);
+    CHECK(pace.samplesOfChunk(pixels, true) == 400);
+    for (int i = 0; i < 30; ++i) pace.handedOn(0.2);
+    CHECK(pace.samplesOfChunk(pixels, false) == 15);
     // One slow chunk, of a busy machine, is not believed at once.
     pace.rendered(pixels, 1, 10);
     CHECK(pace.pathsPerSecond() > 5e8);

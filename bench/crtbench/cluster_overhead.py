@@ -3,11 +3,16 @@ seconds, in turn, and whether the bits are the same. The same processes that ren
 of which no film is sent or added, show what processes cost without crt.distributed. Prints one table;
 nothing is written.
 
+Where a machine's speed changes from minute to minute, so do the ratios of wall times. The last column does
+not: of the processors' time in that very run, what was not spent on rendering parts, to what was. It leaves
+out that processes can slow each other down, which the wall times of the shares show.
+
 The workers are processes of one thread each, which render with one thread each; the plain render uses as
 many threads as there are workers, or all where the machine has fewer. The cluster has been started when the
 clock begins, as docs/cluster.md says for busy machines: without the profiler of Dask, with its monitors and
 ticks far apart, and with workers that keep the memory of films. With --gpus a plain render on one device
-is compared with workers that have one GPU each, as CUDA_VISIBLE_DEVICES says."""
+is compared with workers that have one GPU each, as CUDA_VISIBLE_DEVICES says, and the last column is of the
+GPUs' time."""
 
 import argparse
 import os
@@ -19,7 +24,7 @@ import distributed
 
 import crt
 import crt.distributed
-
+from crt import cluster_work
 
 QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s",
          "distributed.admin.system-monitor.interval": "10s",
@@ -43,9 +48,35 @@ def start(workers, gpus):
     return distributed.SpecCluster(workers=specification, scheduler=scheduler)
 
 
+RENDERING = []  # Of a worker: seconds of its renders.
+part_rendered = cluster_work.rendered
+
+
+def clock():
+    """Seconds of this thread, which renders, or of its GPU."""
+    return time.perf_counter() if "CUDA_VISIBLE_DEVICES" in os.environ else time.thread_time()
+
+
+def timed_part(*arguments, **options):
+    """A task: a part."""
+    begin = clock()
+    film = part_rendered(*arguments, **options)
+    RENDERING.append(clock() - begin)
+    return film
+
+
 def render_share(scene, first, end, options):
     """A task whose film is thrown away."""
+    begin = clock()
     crt.render(scene, sample_range=(first, end), progress=False, **options)
+    RENDERING.append(clock() - begin)
+
+
+def seconds_of_renders():
+    """Since the last call."""
+    seconds = sum(RENDERING)
+    RENDERING.clear()
+    return seconds
 
 
 def render_shares(client, scene, samples, options):
@@ -57,10 +88,13 @@ def render_shares(client, scene, samples, options):
 
 
 def measured(client, render):
-    """(result, wall seconds, processor seconds)."""
+    """(result, wall seconds, processor seconds, seconds of the workers' renders)."""
+    client.run(seconds_of_renders)
     busy, begin = processor_seconds(client), time.perf_counter()
     result = render()
-    return result, time.perf_counter() - begin, processor_seconds(client) - busy
+    wall = time.perf_counter() - begin
+    return (result, wall, processor_seconds(client) - busy,
+            sum(client.run(seconds_of_renders).values()))
 
 
 def main():
@@ -92,23 +126,32 @@ def main():
             "Dask": lambda: crt.distributed.render(scene, client, spp=samples, **options)}
         crt.distributed.render(scene, client, spp=4 * arguments.workers, parts=2 * arguments.workers,
                                **options)  # Workers load what they need.
+        cluster_work.rendered = timed_part
         found, films = {name: [] for name in cases}, {}
         for _ in range(arguments.runs):
             for name, render in cases.items():
-                result, wall, processor = measured(client, render)
+                result, wall, processor, rendering = measured(client, render)
                 films[name] = result and result.film
-                found[name].append((wall, processor))
-                print(f"{name}: {wall:.2f} s, {processor:.2f} processor seconds, load "
-                      f"{os.getloadavg()[0]:.1f}", result.report.get("distributed", "") if result else "",
-                      flush=True)
+                if rendering:
+                    at_once = arguments.workers if arguments.gpus else threads
+                else:
+                    at_once, rendering = (1, wall) if arguments.gpus else (threads, processor)
+                found[name].append((wall, processor, at_once * wall / rendering - 1))
+                print(f"{name}: {wall:.2f} s, {processor:.2f} processor seconds, "
+                      f"{found[name][-1][2]:.2%} not of renders, load {os.getloadavg()[0]:.1f}",
+                      result.report.get("distributed", "") if result else "", flush=True)
     same = (films["one render"].xyz == films["Dask"].xyz).all()
     print(f"\n{samples} samples of {arguments.resolution}² pixels, {arguments.workers} workers; "
-          f"{'the same bits' if same else 'OTHER BITS'}\n\n| | wall s | processor s |\n|---|---|---|")
+          f"{'the same bits' if same else 'OTHER BITS'}\n\n"
+          "| | wall s | processor s | not of renders |\n|---|---|---|---|")
     for name, runs in found.items():
-        columns = [f"{statistics.median(c):.1f} ({min(c):.1f} – {max(c):.1f})" for c in zip(*runs)]
-        print(f"| {name} | {' | '.join(columns)} |")
+        wall, processor, lost = zip(*runs)
+        columns = [f"{statistics.median(c):.1f} ({min(c):.1f} – {max(c):.1f})" for c in (wall, processor)]
+        print(f"| {name} | {' | '.join(columns)} "
+              f"| {statistics.median(lost):.1%} ({min(lost):.1%} – {max(lost):.1%}) |")
     for name in ("one render", "processes"):
         ratios = [statistics.median(d[i] / p[i] for p, d in zip(found[name], found["Dask"]))
                   for i in range(2)]
-        print(f"| Dask to {name}: median of the ratios of neighbours | {ratios[0]:.3f} | {ratios[1]:.3f} |")
+        print(f"| Dask to {name}: median of the ratios of neighbours "
+              f"| {ratios[0]:.3f} | {ratios[1]:.3f} | |")
     return 0 if same else 1

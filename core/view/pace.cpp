@@ -6,8 +6,11 @@
 namespace crt {
 namespace {
 
-/// Of a picture while the camera moves: with what it costs to show it, some twenty a second.
+/// Of rendering a picture while the camera moves.
 constexpr double kPictureSeconds = 0.03;
+/// From one picture to the next, where reading it from the device leaves half of kPictureSeconds: more than
+/// twenty a second.
+constexpr double kPeriodSeconds = 0.045;
 /// Of a picture that refines a smaller one.
 constexpr double kRefineSeconds = 0.25;
 constexpr double kUnhurriedSeconds = 0.4;
@@ -21,6 +24,10 @@ void Pace::rendered(std::uint64_t pixels, std::uint64_t samples, double seconds)
     const double rate = static_cast<double>(pixels * samples) / std::max(seconds, 1e-6);
     // Small pictures keep no large device busy, so that a rise is believed at once.
     paths_per_second_ = rate > paths_per_second_ ? rate : 0.7 * paths_per_second_ + 0.3 * rate;
+}
+
+void Pace::handedOn(double seconds) {
+    hand_on_seconds_ = hand_on_seconds_ == 0 ? seconds : 0.7 * hand_on_seconds_ + 0.3 * seconds;
 }
 
 unsigned Pace::divisorWithin(std::uint64_t pixels, double seconds) const {
@@ -38,7 +45,9 @@ unsigned Pace::nextDivisor(std::uint64_t pixels, unsigned divisor) const {
 }
 
 std::uint64_t Pace::samplesOfChunk(std::uint64_t pixels, bool unhurried) const {
-    const double seconds = unhurried ? kUnhurriedSeconds : kPictureSeconds;
+    const double hurried =
+        std::clamp(kPeriodSeconds - hand_on_seconds_, kPictureSeconds / 2, kPictureSeconds);
+    const double seconds = unhurried ? kUnhurriedSeconds : hurried;
     const double affordable =
         paths_per_second_ * seconds / static_cast<double>(std::max<std::uint64_t>(pixels, 1));
     return std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::min(affordable, 1e6)));

@@ -10,8 +10,10 @@ class Pace {
 public:
     /// A picture of the film at 1/divisor of its size took so long for so many samples per pixel.
     void rendered(std::uint64_t pixels, std::uint64_t samples, double seconds);
+    /// So long it took until a picture that was rendered had left the device.
+    void handedOn(double seconds);
     /// A device of which nothing is known.
-    void forget() { paths_per_second_ = 0; }
+    void forget() { *this = {}; }
 
     /// Of the first picture of a film of so many pixels: a power of two.
     unsigned firstDivisor(std::uint64_t pixels) const;
@@ -26,7 +28,7 @@ public:
 private:
     unsigned divisorWithin(std::uint64_t pixels, double seconds) const;
 
-    double paths_per_second_ = 0;
+    double paths_per_second_ = 0, hand_on_seconds_ = 0;
 };
 
 }  // namespace crt

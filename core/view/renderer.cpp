@@ -221,7 +221,9 @@ void Renderer::renderChunk(const RenderWishes& wanted, std::uint64_t count) {
     samples_ += count;
     seconds_ += seconds;
     pace_.rendered(std::uint64_t{compiled_->width} * compiled_->height, count, seconds);
+    const Stopwatch handing;
     handOn(wanted);
+    if (divisor_ == 1) pace_.handedOn(handing.seconds());
 }
 
 std::shared_ptr<Film> Renderer::spareFilm(const FilmShape& shape) {
