@@ -124,9 +124,9 @@ def main():
             "one render": lambda: crt.render(scene, spp=samples, backend=arguments.backend, threads=threads),
             "processes": lambda: render_shares(client, scene, samples, options),
             "Dask": lambda: crt.distributed.render(scene, client, spp=samples, **options)}
+        cluster_work.rendered = timed_part
         crt.distributed.render(scene, client, spp=4 * arguments.workers, parts=2 * arguments.workers,
                                **options)  # Workers load what they need.
-        cluster_work.rendered = timed_part
         found, films = {name: [] for name in cases}, {}
         for _ in range(arguments.runs):
             for name, render in cases.items():

@@ -2,6 +2,7 @@
 
 ENDLESS = 1 << 31  # Of a render that time or error ends.
 STEP = 16  # Samples take turns between 16 sequences at most: parts of whole turns leave them equally full.
+SMALL = 4 * STEP  # Parts of fewer are not rounded to whole turns: they would be twice as long as wanted.
 
 
 class Missing:
@@ -30,7 +31,7 @@ class Missing:
         if not self.gaps:
             return None
         first, end = self.gaps.pop(0)
-        step = STEP if samples >= STEP else 2 if samples > 1 else 1
+        step = STEP if samples >= SMALL else 2 if samples > 1 else 1
         cut = min(end, -(-(first + max(1, int(samples))) // step) * step)
         self.give_back(cut, end)
         return first, cut

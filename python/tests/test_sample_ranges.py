@@ -2,6 +2,8 @@
 
 import random
 
+import pytest
+
 from crt.sample_ranges import STEP, Missing, PartSize
 
 
@@ -35,10 +37,17 @@ def test_a_part_that_failed_is_given_again():
 
 def test_parts_are_of_whole_turns():
     missing = Missing([(0, 5)], 1000)
-    assert missing.take(20) == (5, 32)
-    while (part := missing.take(20)) is not None:
+    assert missing.take(70) == (5, 80)
+    while (part := missing.take(70)) is not None:
         assert part[0] % STEP == 0 and (part[1] % STEP == 0 or part[1] == 1000)
     assert Missing([], 9).take(3) == (0, 4)
+
+
+@pytest.mark.parametrize("samples", [2, 5, 17, 33, 63, 65, 81, 1000])
+def test_parts_are_hardly_longer_than_wanted(samples):
+    """The last parts are to end together."""
+    first, end = Missing([], 10_000).take(samples)
+    assert samples <= end - first <= 1.25 * samples
 
 
 def test_sizes_follow_the_speed_and_shrink_towards_the_end():
