@@ -15,6 +15,7 @@ is compared with workers that have one GPU each, as CUDA_VISIBLE_DEVICES says, a
 GPUs' time."""
 
 import argparse
+import contextlib
 import os
 import statistics
 import time
@@ -52,24 +53,25 @@ RENDERING = []  # Of a worker: seconds of its renders.
 part_rendered = cluster_work.rendered
 
 
-def clock():
-    """Seconds of this thread, which renders, or of its GPU."""
-    return time.perf_counter() if "CUDA_VISIBLE_DEVICES" in os.environ else time.thread_time()
-
-
-def timed_part(*arguments, **options):
-    """A task: a part."""
+@contextlib.contextmanager
+def timed(options):
+    """Adds the seconds of a render: of this thread, which renders alone, or those that its GPU has."""
+    clock = time.thread_time if options["threads"] == 1 else time.perf_counter
     begin = clock()
-    film = part_rendered(*arguments, **options)
+    yield
     RENDERING.append(clock() - begin)
-    return film
+
+
+def timed_part(scene, first, end, options, seconds):
+    """A task: a part."""
+    with timed(options):
+        return part_rendered(scene, first, end, options, seconds)
 
 
 def render_share(scene, first, end, options):
     """A task whose film is thrown away."""
-    begin = clock()
-    crt.render(scene, sample_range=(first, end), progress=False, **options)
-    RENDERING.append(clock() - begin)
+    with timed(options):
+        crt.render(scene, sample_range=(first, end), progress=False, **options)
 
 
 def seconds_of_renders():
