@@ -2,7 +2,7 @@
 
 ENDLESS = 1 << 31  # Of a render that time or error ends.
 STEP = 16  # Samples take turns between 16 sequences at most: parts of whole turns leave them equally full.
-SMALL = 4 * STEP  # Parts of fewer are not rounded to whole turns: they would be twice as long as wanted.
+SMALL = 4 * STEP  # Parts of fewer are not rounded to whole turns, which made 32 samples of 17.
 
 
 class Missing:
