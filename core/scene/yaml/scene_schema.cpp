@@ -27,7 +27,7 @@ std::string trimmed(double degrees) { return fmt::format("{:.13g}", degrees); }
 /// Keys that a spectrum may have whatever its form.
 KeySchema scaleKey() {
     return {.name = "scale", .kind = Kind::Number, .range = kNotNegative, .fallback = "1",
-            .doc = "Factor on all values."};
+            .doc = "Multiplies all values."};
 }
 
 KeySchema outsideKey() {
@@ -67,12 +67,14 @@ SectionSchema topLevel() {
                  .count_min = 1,
                  .doc = "Scene files whose contents count as if they stood here; see [Shared "
                         "parts](#shared-parts)."},
-                {.name = "title", .doc = "What the scene shows; goes into image metadata and the report."},
+                {.name = "title", .doc = "What the scene shows. crt writes it into image metadata and the "
+                                         "report."},
                 {.name = "camera",
                  .kind = Kind::Section,
                  .section = "camera",
-                 .doc = "Where the picture is taken from."},
-                {.name = "film", .kind = Kind::Section, .section = "film", .doc = "What it is recorded on."},
+                 .doc = "The viewpoint."},
+                {.name = "film", .kind = Kind::Section, .section = "film", .doc = "The image: size, "
+                                                                                  "filter, colour."},
                 {.name = "integrator",
                  .kind = Kind::Section,
                  .section = "integrator",
@@ -310,7 +312,7 @@ SectionSchema filter() {
                  .kind = Kind::Number,
                  .range = {0, 16, true, false},
                  .unit = "pixels",
-                 .doc = "Half its width. 0.5 for a box, 1.5 for the others when left out."},
+                 .doc = "Half of its width. The default is 0.5 for a box and 1.5 for the others."},
                 {.name = "sigma",
                  .kind = Kind::Number,
                  .range = {0, 16, true, false},
@@ -332,8 +334,7 @@ SectionSchema integrator() {
                  .kind = Kind::Choice,
                  .choices = types,
                  .fallback = yaml(types, d.type),
-                 .doc = "Light transport by path tracing, or a picture of shading normals or of bounding "
-                        "boxes for debugging."},
+                 .doc = "Path tracing, or an image of shading normals or bounding boxes for debugging."},
                 {.name = "max_depth",
                  .kind = Kind::Integer,
                  .range = {0, 1e9, false, false},
@@ -349,24 +350,25 @@ SectionSchema integrator() {
                 {.name = "roulette",
                  .kind = Kind::Boolean,
                  .fallback = yaml(d.roulette),
-                 .doc = "Russian roulette: shorter paths, same mean, more noise per sample."},
+                 .doc = "Russian roulette ends some paths early: shorter paths, the same mean, more noise "
+                        "per sample."},
                 {.name = "nee",
                  .kind = Kind::Boolean,
                  .fallback = yaml(d.nee),
-                 .doc = "Next event estimation: every diffuse vertex samples a light; off, light is only "
-                        "found by chance."},
+                 .doc = "Next event estimation: every vertex that scatters into many directions samples a "
+                        "light. Without it, only scattered rays find light."},
                 {.name = "mis",
                  .kind = Kind::Boolean,
                  .fallback = yaml(d.mis),
-                 .doc = "Combines light sampling with scattered rays that meet lights by multiple "
-                        "importance sampling; off, direct light comes from light "
-                        "sampling alone wherever it covers a light (the same mean, more noise: for tests)."},
+                 .doc = "Multiple importance sampling combines light sampling with scattered rays that "
+                        "hit lights. Without it, direct light comes from light sampling alone wherever "
+                        "that covers a light (the same mean, more noise: for tests)."},
                 {.name = "accelerator",
                  .kind = Kind::Choice,
                  .choices = accelerators,
                  .fallback = yaml(accelerators, d.accelerator),
-                 .doc = "Hierarchy for tracing rays: chosen by scene size, a BVH, a box per object, or a "
-                        "plain loop."},
+                 .doc = "How rays find surfaces: `auto` chooses by scene size between a BVH, a box per "
+                        "object, and a plain loop."},
             }};
 }
 
@@ -386,7 +388,7 @@ SectionSchema sampler() {
                  .kind = Kind::Integer,
                  .range = kNotNegative,
                  .fallback = yaml(d.seed),
-                 .doc = "Another seed is another, equally good, noise."},
+                 .doc = "Another seed gives another, equally good, noise pattern."},
                 {.name = "samples",
                  .kind = Kind::Integer,
                  .range = {1, 9007199254740992.0, false, false},
@@ -407,7 +409,7 @@ SectionSchema sampler() {
 void addSpectra(std::vector<SectionSchema>& all) {
     all.push_back({"spectrum/table",
                    "a tabulated spectrum",
-                   "Measured values, linear between.",
+                   "Measured values, with linear interpolation.",
                    {{.name = "table",
                      .kind = Kind::Section,
                      .section = "table",
@@ -586,7 +588,7 @@ void addDielectrics(std::vector<SectionSchema>& all) {
                "is not given."};
     all.push_back({"material/dielectric",
                    "a dielectric material",
-                   "Smooth glass or water: reflects and refracts, and may absorb.",
+                   "Smooth glass or water. It reflects and refracts, and may absorb.",
                    {materialType("dielectric"), ior, absorption, thinFilmKey()}});
     all.push_back({"material/rough_dielectric",
                    "a rough_dielectric material",
@@ -617,11 +619,12 @@ void addMaterials(std::vector<SectionSchema>& all) {
                                 .range = {0, 1, false, false},
                                 .section = "texture",
                                 .required = true,
-                                .doc = "Fraction of light sent back, at every wavelength."};
+                                .doc = "The fraction of light that the surface reflects, at every "
+                                       "wavelength."};
     all.push_back(
         {"material/diffuse",
          "a diffuse material",
-         "Lambert's law, or EON where it is rough.",
+         "Lambertian reflection, or EON where it is rough.",
          {materialType("diffuse"),
           reflectance,
           {.name = "roughness",
@@ -979,7 +982,7 @@ void addObjects(std::vector<SectionSchema>& all) {
                     {.name = "two_sided",
                      .kind = Kind::Boolean,
                      .fallback = yaml(Emission{}.two_sided),
-                     .doc = "Shine on the back side too?"}}});
+                     .doc = "Whether the back side emits too."}}});
 }
 
 void addOutside(std::vector<SectionSchema>& all) {
@@ -988,7 +991,8 @@ void addOutside(std::vector<SectionSchema>& all) {
     all.push_back(
         {"environment",
          "environment",
-         "Light from infinitely far away. An image and a sky are even within each of their pixels.",
+         "Light from infinitely far away. The radiance of an image or a sky is constant within each of "
+         "its pixels.",
          {constant,
           {.name = "image",
            .doc = "An EXR, HDR or PFM file of longitudes by latitudes, twice as wide as high, the zenith at "
@@ -1034,17 +1038,17 @@ void addOutside(std::vector<SectionSchema>& all) {
                    "",
                    {{.name = "file",
                      .required = true,
-                     .doc = "Its name, as given to the file system: relative to the working directory."},
+                     .doc = "The name of the file, relative to the working directory."},
                     {.name = "format",
                      .kind = Kind::Choice,
                      .choices = {"exr", "png", "ppm", "pfm"},
-                     .doc = "By the extension of `file` when left out."},
+                     .doc = "The default follows from the extension of `file`."},
                     {.name = "aovs",
                      .kind = Kind::Choice,
                      .shape = Shape::List,
                      .choices = aovNames(),
                      .fallback = "[]",
-                     .doc = "Further channels; exr only."}}});
+                     .doc = "Additional channels, in EXR files only."}}});
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ KeySchema thinFilmKey() {
     return {.name = "thin_film",
             .kind = Kind::Section,
             .section = "thin_film",
-            .doc = "A film on its outside, whose two sides' reflections interfere."};
+            .doc = "A film on the outside. The reflections from its two sides interfere."};
 }
 
 void addThinFilm(std::vector<SectionSchema>& all) {

@@ -104,19 +104,20 @@ void addLights(std::vector<SectionSchema>& all) {
     const PointLight d;
     all.push_back({"light/point",
                    "a point light",
-                   "The same in all directions.",
+                   "The same intensity in all directions.",
                    joined(std::vector{nameKey(), lightType("point"), positionKey()}, intensityKeys("")),
                    {{KeyRule::Kind::ExactlyOne, kIntensities}, noSpectrumBeside("radiant_intensity")}});
     all.push_back(
         {"light/spot",
          "a spot light",
-         "A cone of light, even within and falling to 0 over its penumbra by Hermite's cubic of the cosine, "
-         "as in pbrt-v4.",
+         "A cone of light. The intensity is constant inside the cone and falls to 0 across the penumbra "
+         "as Hermite's cubic of the cosine, as in pbrt-v4.",
          joined(
              std::vector{
                  nameKey(), lightType("spot"), positionKey(),
-                 vectorKey("direction", "The way that the light goes along its axis; any length but 0."),
-                 vectorKey("target", "Or a point on its axis.", "scene units"),
+                 vectorKey("direction", "The direction in which the light travels along its axis; any "
+                                        "length but 0."),
+                 vectorKey("target", "Alternatively, a point on its axis.", "scene units"),
                  degreesKey("cone_angle_deg", {0, 180, true, false}, d.cone_angle_deg,
                             "From the axis to where the light ends."),
                  degreesKey("penumbra_deg", {0, 180, false, false}, d.penumbra_deg,
@@ -129,10 +130,10 @@ void addLights(std::vector<SectionSchema>& all) {
     all.push_back(
         {"light/ies",
          "an IES light",
-         "A lamp as measured: a point whose intensity by direction is that of an IES file (LM-63 of 1986 to "
-         "2019, photometry of type C, TILT=NONE or INCLUDE, which is not applied), linear in both angles "
-         "between those of the file. Candelas are those of the file with its multiplier and ballast "
-         "factors.",
+         "A measured light: a point whose intensity in each direction comes from an IES file (LM-63 of "
+         "1986 to 2019, type C photometry, TILT=NONE or INCLUDE; crt does not apply the tilt), with "
+         "linear interpolation in both angles. The candelas are those of the file times its multiplier "
+         "and ballast factors.",
          {nameKey(),
           lightType("ies"),
           positionKey(),
@@ -158,14 +159,13 @@ void addLights(std::vector<SectionSchema>& all) {
     all.push_back(
         {"light/beam",
          "a beam",
-         "Collimated light: all of it in one direction, from a disk or a slit on, even across it. What lies "
-         "behind where it begins is dark. Light sampling alone finds it, where nothing is in between: glass "
-         "is, and so are mirrors.",
+         "Collimated light: parallel rays from a disk or a slit, with the same irradiance across it. "
+         "Nothing behind the disk or slit receives light.",
          {nameKey(),
           lightType("beam"),
-          vectorKey("position", "The middle of the disk or slit.", "scene units", true),
-          vectorKey("direction", "The way that the light goes; any length but 0."),
-          vectorKey("target", "Or a point on its axis.", "scene units"),
+          vectorKey("position", "The centre of the disk or slit.", "scene units", true),
+          vectorKey("direction", "The direction in which the light travels; any length but 0."),
+          vectorKey("target", "Alternatively, a point on its axis.", "scene units"),
           {.name = "radius",
            .kind = Kind::Number,
            .range = kPositive,
@@ -194,19 +194,20 @@ void addLights(std::vector<SectionSchema>& all) {
     all.push_back(
         {"light/directional",
          "a directional light",
-         "From infinitely far away, all of it in one direction.",
+         "Parallel light from infinitely far away.",
          {nameKey(), lightType("directional"),
-          vectorKey("direction", "The way that the light goes; any length but 0.", "", true),
+          vectorKey("direction", "The direction in which the light travels; any length but 0.", "", true),
           spectralKey("irradiance", "W·m⁻²·nm⁻¹", "Irradiance of a plane that faces the light."),
           amountKey("illuminance_lx", "lx", "Illuminance of a plane that faces the light."), spectrumKey()},
          {{KeyRule::Kind::ExactlyOne, {"irradiance", "illuminance_lx"}}, noSpectrumBeside("irradiance")}});
     all.push_back(
         {"light/sun", "a sun",
-         "A disk of the sky, infinitely far away and evenly bright. Cameras and mirrors see it. It stands "
-         "where `direction` says, or where it stood at a time and place (0.01 degrees, without refraction).",
+         "A disk in the sky, infinitely far away and uniformly bright. Cameras and mirrors see it. Its "
+         "place follows from `direction`, or from a time and a place on Earth (to 0.01 degrees, without "
+         "atmospheric refraction).",
          joined(std::vector{nameKey(), lightType("sun")}, sunKeys(),
                 degreesKey("angular_diameter_deg", {0.001, 90, false, false}, d.angular_diameter_deg,
-                           "How large the disk is."),
+                           "The angular diameter of the disk."),
                 spectralKey("radiance", "W·m⁻²·sr⁻¹·nm⁻¹", "Radiance of the disk."),
                 amountKey("illuminance_lx", "lx", "Illuminance of a plane that faces the sun."),
                 spectrumKey()),
@@ -218,10 +219,9 @@ void addSky(std::vector<SectionSchema>& all) {
     const CieSky d;
     all.push_back(
         {"sky", "a sky",
-         "A CIE standard general sky (ISO 15469:2004, CIE S 011): how its brightness depends on the "
-         "direction "
-         "and on where the sun stands. Without the sun itself, which is a light of type `sun`, and black "
-         "below the horizon.",
+         "A CIE standard general sky (ISO 15469:2004, CIE S 011). It gives the luminance in each "
+         "direction, relative to the position of the sun. It does not contain the sun itself (add a light "
+         "of type `sun`) and is black below the horizon.",
          joined(
              std::vector<KeySchema>{{.name = "type",
                                      .kind = Kind::Integer,
@@ -260,12 +260,13 @@ std::vector<KeySchema> sunKeys() {
                .unit = "hours",
                .fallback = "0",
                .doc = "Of `time` from Universal Time: 1 in Berlin in winter, 2 in summer."};
-    KeySchema north = vectorKey("north", "Where north is; what points up of it does not count."),
-              up = vectorKey("up", "Where the zenith is.");
+    KeySchema north = vectorKey("north", "The direction of north; crt ignores its upward part."),
+              up = vectorKey("up", "The direction of the zenith.");
     north.fallback = "[0, 0, -1]";
     up.fallback = "[0, 1, 0]";
     return {
-        vectorKey("direction", "The way that the light of the sun's middle goes; any length but 0."),
+        vectorKey("direction", "The direction in which light from the centre of the sun travels; any "
+                               "length but 0."),
         {.name = "date", .doc = "As `2026-06-21`, from 1950 to 2050. A sun below the horizon is refused."},
         {.name = "time", .doc = "As `'14:30'` or `'14:30:00'`, in quotes."},
         offset,

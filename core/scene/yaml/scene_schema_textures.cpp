@@ -101,8 +101,8 @@ void addTextures(std::vector<SectionSchema>& all) {
         transformKeys()));
     all.push_back(with({"texture/checker",
                         "a checker",
-                        "Squares of two values in turn, of side 1 in u and v, on a surface with texture "
-                        "coordinates.",
+                        "A checkerboard of two values with squares of side 1 in u and v, on a surface "
+                        "with texture coordinates.",
                         {{.name = "checker",
                           .kind = Kind::Spectrum,
                           .shape = Shape::List,
@@ -115,7 +115,7 @@ void addTextures(std::vector<SectionSchema>& all) {
                        transformKeys()));
     all.push_back({"texture/attribute",
                    "an attribute",
-                   "What a mesh has at its vertices, linear between them at every wavelength.",
+                   "Values at the vertices of a mesh, with linear interpolation at every wavelength.",
                    {{.name = "attribute",
                      .kind = Kind::Choice,
                      .choices = {"colors"},
