@@ -43,11 +43,19 @@ std::size_t smoothTrianglesOf(const FlatScene& flat) {
     return smooth;
 }
 
+/// How many records of a kind the scene and its meshes have: one for each primitive, or none.
+template <class T>
+std::size_t recordsOf(const FlatScene& flat, std::vector<T> FlatScene::*member) {
+    std::size_t records = (flat.*member).size();
+    for (const InstancedMesh& mesh : flat.meshes) records += (mesh.flat.*member).size();
+    return records;
+}
+
 /// What the scene and its meshes have for each primitive.
 template <class T>
 kernel::CrtSpan appendOfPrimitives(BlobWriter& blob, const FlatScene& flat,
                                    std::vector<T> FlatScene::*member) {
-    if ((flat.*member).empty()) return {0, 0};
+    if (recordsOf(flat, member) == 0) return {0, 0};
     return blob.appendFilled<T>(primitivesOf(flat), [&](std::span<T> all) {
         auto next = std::copy((flat.*member).begin(), (flat.*member).end(), all.begin());
         for (const InstancedMesh& mesh : flat.meshes)
@@ -61,8 +69,9 @@ std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelera
     return kTables + accelerator.nodes.size() * sizeof(kernel::CrtNode4) +
            (primitivesOf(flat) + flat.instances.size()) *
                (sizeof(kernel::CrtTriangle) + sizeof(kernel::CrtFace) + sizeof(kernel::CrtPrimitive)) +
-           flat.smooth_triangles * sizeof(kernel::CrtNormals) + flat.uvs.size() * sizeof(kernel::CrtUvs) +
-           flat.colors.size() * sizeof(kernel::CrtVertexColors);
+           smoothTrianglesOf(flat) * sizeof(kernel::CrtNormals) +
+           recordsOf(flat, &FlatScene::uvs) * sizeof(kernel::CrtUvs) +
+           recordsOf(flat, &FlatScene::colors) * sizeof(kernel::CrtVertexColors);
 }
 
 std::vector<const Spectrum*> spectraOf(const Scene& scene, const FlatScene& flat,
