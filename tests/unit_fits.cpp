@@ -275,8 +275,23 @@ TEST_CASE("verdicts", "[fits]") {
         run.configurations[0].tests.smallest_pixel_p = 0.01;
         CHECK(verdict() == Verdict::Pass);
     }
-    SECTION("a heavy tail is not trusted") {
-        run.configurations[0].tests.largest_share = 0.2;
+    SECTION("a heavy tail is not trusted, and protects no bias that every replicate has") {
+        run.configurations[0].tests.largest_share = 0.2;  // Of few pixels: normal noise has as much.
+        CHECK(verdict() == Verdict::Pass);
+        run.configurations[0].tests.heavy_tails = true;
+        CHECK(verdict() == Verdict::Inconclusive);
+        for (const auto& [bias, expected] : {std::pair{0.5, Verdict::Fail}, {-0.5, Verdict::Inconclusive}}) {
+            what.mean_bias = bias;  // Too dark may be what has not met the rare light yet.
+            run = syntheticRun(what, 10);
+            run.configurations[0].tests.heavy_tails = true;
+            CHECK(verdict() == expected);
+            run.configurations[0].tests.heavy_tails = false;
+            CHECK(verdict() == Verdict::Fail);
+        }
+        what.mean_bias = 0.5;
+        what.replicates = 8;  // Eight signs are a coincidence of 0.4 %, and the verdict asks for 0.1 %.
+        run = syntheticRun(what, 10);
+        run.configurations[0].tests.heavy_tails = true;
         CHECK(verdict() == Verdict::Inconclusive);
     }
     SECTION("pixels that are off by more than the margin fail, though the image mean is right") {

@@ -69,7 +69,9 @@ TEST_CASE("means and moments of replicates are those of all their values", "[ima
     CHECK(replicates.pixel(80, 0).variance == Approx(1300.0));
     CHECK(replicates.pixel(79, 0).variance == Approx(13.0));
     // Deviations −3, −1, 4, and ten times that in one pixel.
-    CHECK(replicates.largestShare() == Approx(1600.0 / (26 * 80 + 2600)));
+    CHECK(replicates.largestValue().share == Approx(1600.0 / (26 * 80 + 2600)));
+    // 16/26 of its own pixel's, as two thirds at most: t(1) = √(3 · 16/26 / (2 − 3 · 16/26)) = 3.464, P = .179.
+    CHECK(replicates.largestValue().normal_p == Approx(std::min(1.0, 3 * 0.1789)).epsilon(1e-3));
     CHECK_THROWS_AS(replicates.add(std::vector<double>(80)), crt::Error);
 }
 
@@ -159,7 +161,8 @@ TEST_CASE("too few samples are inconclusive, and so is what one value decides, a
     GateOptions any_mean;
     any_mean.delta = 1e9;  // The means would pass: it is the one value alone that counts here.
     const GateResult one = gate(firefly, simulate(random, 64), any_mean);
-    CHECK(one.largest_share > 0.9);
+    CHECK(one.largest.share > 0.9);
+    CHECK(one.largest.isHeavyTailed(0.05));
     CHECK(one.verdict == Verdict::Inconclusive);
 
     image[100] = std::numeric_limits<double>::quiet_NaN();
@@ -169,6 +172,56 @@ TEST_CASE("too few samples are inconclusive, and so is what one value decides, a
     CHECK(none.not_finite == 1);
     CHECK(none.verdict == Verdict::Inconclusive);
     CHECK_THROWS_AS(gate(broken, Replicates(kWidth, kHeight, 1)), crt::Error);
+}
+
+TEST_CASE("in few lit pixels normal noise is no heavy tail, and a firefly is one", "[image-tests]") {
+    // By 1, 2 or 6 pixels of 4, 8 or 16 normal values, one value always carries more than 5 % of the squares.
+    std::mt19937_64 engine(11);
+    std::normal_distribution<double> normal;
+    constexpr int kRepeats = 300;
+    for (const std::uint32_t pixels : {1u, 2u, 6u})
+        for (const int renders : {4, 8, 16}) {
+            int alarms = 0, found = 0, large = 0;
+            for (int i = 0; i < kRepeats; ++i) {
+                Replicates usual(pixels, 1, 1), firefly(pixels, 1, 1);
+                for (int r = 0; r < renders; ++r) {
+                    std::vector<double> image;
+                    for (std::uint32_t p = 0; p < pixels; ++p) image.push_back(p + 1 + 0.01 * normal(engine));
+                    usual.add(image);
+                    if (r == 0) image[0] += 1;
+                    firefly.add(image);
+                }
+                large += usual.largestValue().share > 0.05;
+                alarms += usual.largestValue().isHeavyTailed(0.05);
+                found += firefly.largestValue().isHeavyTailed(0.05);
+            }
+            INFO(pixels << " pixels, " << renders << " renders: " << alarms << " and " << found);
+            CHECK(large > 0.9 * kRepeats);
+            CHECK(alarms <= 11);  // Of 300 at 1 %, more are a chance of 1 in 10,000.
+            // Of four values the largest carries up to three quarters whatever happens: they see less.
+            CHECK(found == kRepeats);
+        }
+}
+
+TEST_CASE("heavy tails protect no bias of which the ranks are sure", "[image-tests]") {
+    Random random(12);
+    const auto withFirefly = [&](double factor) {
+        Replicates replicates(kWidth, kHeight, kChannels);
+        for (int r = 0; r < 16; ++r) {
+            std::vector<double> image;
+            for (std::size_t i = 0; i < kValues; ++i) image.push_back(factor * (1 + 0.1 * random.exponential()));
+            if (r == 0) image[100] = 1e3;
+            replicates.add(image);
+        }
+        return replicates;
+    };
+    const Replicates fair = withFirefly(1);
+    const GateResult same = gate(withFirefly(1), fair), bright = gate(withFirefly(1.5), fair),
+                     dark = gate(withFirefly(0.5), fair);
+    for (const GateResult* result : {&same, &bright, &dark}) CHECK(result->largest.isHeavyTailed(0.05));
+    CHECK(same.verdict == Verdict::Inconclusive);
+    CHECK(bright.channels[0].separated);
+    CHECK(bright.verdict == Verdict::Fail);
 }
 
 TEST_CASE("black is equal to black alone", "[image-tests]") {

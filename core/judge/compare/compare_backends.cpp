@@ -261,7 +261,7 @@ std::string againstText(const BackendComparison& all, const BackendAgainst& b) {
                                           : fmt::format("not tested: that needs --replicates {} or more",
                                                         stats::kFewestForPixels));
         line("largest value", fmt::format("carries {:.2g} % of the squared error ({:g} % allowed)",
-                                          100 * g.largest_share, 100 * all.gate.largest_share));
+                                          100 * g.largest.share, 100 * all.gate.largest_share));
     }
     for (const std::string& reason : g.reasons) line("because", reason);
     if (b.samples_needed > 0)
@@ -300,7 +300,7 @@ nlohmann::ordered_json againstJson(const BackendAgainst& b) {
     json["tiles"] = familyJson(g.tiles);
     json["tile_p_uniformity"] = g.tile_uniformity_p;
     json["pixels"] = familyJson(g.pixels);
-    json["largest_share"] = g.largest_share;
+    json["largest_share"] = g.largest.share;
     json["invalid_samples"] = b.invalid_samples;
     json["samples_needed"] =
         b.samples_needed > 0 ? nlohmann::ordered_json(b.samples_needed) : nlohmann::ordered_json(nullptr);

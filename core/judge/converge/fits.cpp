@@ -302,7 +302,8 @@ ImageTests imageTestsOf(const stats::GateResult& gate) {
     tests.smallest_tile_p = gate.tiles.smallest_p;
     tests.tile_p_uniformity = gate.tile_uniformity_p;
     tests.smallest_pixel_p = gate.pixels.smallest_p;
-    tests.largest_share = gate.largest_share;
+    tests.largest_share = gate.largest.share;
+    tests.heavy_tails = gate.largest.isHeavyTailed(stats::GateOptions{}.largest_share);
     return tests;
 }
 

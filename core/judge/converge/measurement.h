@@ -118,8 +118,9 @@ struct ImageTests {
     std::optional<double> tile_p_uniformity;  ///< Kolmogorov–Smirnov p: are the tiles' p-values uniform?
                                               ///< (Jung et al. 2020); shown, not judged by.
     std::optional<double> smallest_pixel_p;  ///< Of all pixels and channels, Šidák-adjusted.
-    std::optional<double> largest_share;     ///< Part of the squared spread of all replicates that one value
-                                             ///< carries; trusted below 0.05.
+    std::optional<double> largest_share;     ///< Part of the squared spread of all replicates, or of the
+                                             ///< reference's eighths, that one value carries.
+    bool heavy_tails = false;  ///< It is above 0.05, and more than normal noise carries in one value.
 };
 
 /// One float per pixel, row-major, top row first.

@@ -52,7 +52,7 @@ std::vector<std::string> differingContent(const Image& reference, const Scene& s
         std::erase_if(record.traits, [](const SceneTrait& trait) {
             return trait.name == "the seed" || trait.name == "the sampler" ||
                    trait.name == "the replicates" || trait.name == "roulette" || trait.name == "nee" ||
-                   trait.name == "the AOVs of first hits";
+                   trait.name == "mis" || trait.name == "the AOVs of first hits";
         });
         return record;
     };
@@ -128,7 +128,8 @@ std::string hashOfContent(const Scene& scene) {
     Scene canonical = scene;
     canonical.sampler = {};
     canonical.integrator.roulette = false;
-    canonical.integrator.nee = true;
+    canonical.integrator.nee = canonical.integrator.mis = true;
+    if (canonical.environment) canonical.environment->light_sampling = false;
     canonical.integrator.accelerator = Accelerator::Bvh;
     // The hash alone: no ray is traced through it.
     return compileScene(canonical, 0, {.accelerator_reach = std::numeric_limits<double>::infinity()}).hash;

@@ -156,7 +156,8 @@ Json testsJson(const ImageTests& t) {
     return {{"smallest_tile_p", number(t.smallest_tile_p)},
             {"tile_p_uniformity", number(t.tile_p_uniformity)},
             {"smallest_pixel_p", number(t.smallest_pixel_p)},
-            {"largest_share", number(t.largest_share)}};
+            {"largest_share", number(t.largest_share)},
+            {"heavy_tails", t.heavy_tails}};
 }
 
 Json configurationJson(const Configuration& c) {

@@ -53,6 +53,27 @@ GateResult::Channel compareMeans(const Summary& a, const Summary& b, const GateO
     return channel;
 }
 
+/// Of replicates of one distribution, n and m of them, all of one side lie on one side of all others in 2 of
+/// C(n + m, n) orders (the extreme of Wilcoxon's rank sum test, 1945).
+bool areSeparated(const std::vector<double>& a, const std::vector<double>& b, double delta, double alpha) {
+    const double n = static_cast<double>(a.size()), m = static_cast<double>(b.size());
+    const double log_orders = std::lgamma(n + m + 1) - std::lgamma(n + 1) - std::lgamma(m + 1);
+    if (2 * std::exp(-log_orders) > alpha) return false;
+    const auto [lowest_a, highest_a] = std::minmax_element(a.begin(), a.end());
+    const auto [lowest_b, highest_b] = std::minmax_element(b.begin(), b.end());
+    return *lowest_a > *highest_b + delta * std::abs(*highest_b) ||
+           *highest_a < *lowest_b - delta * std::abs(*lowest_b);
+}
+
+/// Two-sided P that the farthest of `count` normal values, before it is known which, carries this share of the
+/// sum of their squares (Grubbs 1950, by Student's distribution).
+double outlierP(double share, std::uint64_t count) {
+    if (count < 3) return 1;
+    const double n = static_cast<double>(count), rest = (n - 1) - n * share;
+    if (!(rest > 0)) return 0;
+    return studentTwoSided(std::sqrt(n * (n - 2) * share / rest), n - 2);
+}
+
 /// Tiles of the middle channel (Y of XYZ, G of RGB) alone, since channels share their noise; and those with
 /// noise alone.
 double tileUniformity(const Replicates& a, const Replicates& b, const std::vector<double>& tile_p) {
@@ -98,14 +119,14 @@ void judge(GateResult& result, const GateOptions& options) {
     if (result.pixels.rejected > 0)
         because(fails,
                 fmt::format("{} of {} pixel tests differ", result.pixels.rejected, result.pixels.tests));
-    // A few values that carry the answer make intervals too short and too long alike: neither verdict could
-    // be trusted.
-    if (result.largest_share > options.largest_share) {
-        fails = false;
-        because(undecided,
-                fmt::format(
-                    "one value carries {:.1f} % of all squared error: too few samples for its distribution",
-                    100 * result.largest_share));
+    // A few values that carry the answer make intervals too short and too long alike: only ranks, which no
+    // tail moves, can be trusted.
+    if (result.largest.isHeavyTailed(options.largest_share)) {
+        fails = std::any_of(result.channels.begin(), result.channels.end(),
+                            [](const GateResult::Channel& channel) { return channel.separated; });
+        because(undecided, fmt::format("one value carries {:.1f} % of all squared error, which normal noise does "
+                                       "not: too few samples for its distribution",
+                                       100 * result.largest.share));
     }
     result.verdict = fails ? Verdict::Fail : undecided ? Verdict::Inconclusive : Verdict::Pass;
 }
@@ -202,14 +223,23 @@ Summary Replicates::pixel(std::size_t pixel, std::uint32_t channel) const {
     return {m.mean, count_ < 2 ? kNan : m.squares / static_cast<double>(count_ - 1), count_};
 }
 
-double Replicates::largestShare() const {
-    double sum = 0, largest = 0;
+LargestValue Replicates::largestValue() const {
+    const auto farthestSquare = [](const Moments& m) {
+        const double farthest = std::max(m.highest - m.mean, m.mean - m.lowest);
+        return farthest * farthest;
+    };
+    double sum = 0, largest = 0, of_its_pixel = 0;
     for (const Moments& m : pixels_) {
         sum += m.squares;
-        const double farthest = std::max(m.highest - m.mean, m.mean - m.lowest);
-        largest = std::max(largest, farthest * farthest);
+        if (!(farthestSquare(m) > largest)) continue;
+        largest = farthestSquare(m);
+        of_its_pixel = m.squares;
     }
-    return sum > 0 ? largest / sum : 0;
+    if (!(sum > 0)) return {};
+    const auto able = std::count_if(pixels_.begin(), pixels_.end(),
+                                    [largest](const Moments& m) { return m.squares >= largest; });
+    const double values = static_cast<double>(able) * static_cast<double>(count_);
+    return {largest / sum, std::min(1.0, values * outlierP(largest / of_its_pixel, count_))};
 }
 
 GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& options) {
@@ -226,8 +256,11 @@ GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& opt
     }
     const double alpha = 1 - options.confidence;
     const std::uint32_t channels = a.channels();
-    for (std::uint32_t c = 0; c < channels; ++c)
+    for (std::uint32_t c = 0; c < channels; ++c) {
         result.channels.push_back(compareMeans(a.imageMean(c), b.imageMean(c), options));
+        result.channels.back().separated =
+            areSeparated(a.imageMeans(c), b.imageMeans(c), options.delta, alpha / channels);
+    }
 
     // A few replicates agree by chance, exactly where samples are counted: then there seems to be no noise.
     const bool few = std::min(a.count(), b.count()) < kFewestForPixels;
@@ -246,7 +279,10 @@ GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& opt
             p.push_back(equalityP(meanOf(a.pixel(pixel, c)), meanOf(b.pixel(pixel, c))));
     result.pixels = sidakFamily(p, alpha);
 
-    result.largest_share = std::max(a.largestShare(), b.largestShare());
+    const LargestValue of_a = a.largestValue(), of_b = b.largestValue();
+    const bool heavy_a = of_a.isHeavyTailed(options.largest_share),
+               heavy_b = of_b.isHeavyTailed(options.largest_share);
+    result.largest = (heavy_a == heavy_b ? of_a.share >= of_b.share : heavy_a) ? of_a : of_b;
     judge(result, options);
     return result;
 }

@@ -41,6 +41,21 @@ TestFamily sidakFamily(std::span<const double> p_values, double alpha);
 /// Side of a square of pixels that are tested together.
 inline constexpr std::uint32_t kTileSide = 8;
 
+/// The value that lies farthest from its mean, among all values of all replicates.
+struct LargestValue {
+    double share = 0;  ///< Of Σ (I − Ī)², over all pixels, channels and replicates; 0 without any spread.
+    /// That normal noise carries as much in one value: Grubbs' test (1950) of the value among the replicates of
+    /// its own pixel, whatever the variances of the pixels, times the number of values that could carry as
+    /// much. 1 with two replicates, which cannot tell.
+    double normal_p = 1;
+
+    /// Few lit pixels carry large shares of normal noise, too; heavy tails carry more than that.
+    bool isHeavyTailed(double largest_share) const {
+        constexpr double kNotNormal = 0.01;
+        return share > largest_share && normal_p < kNotNormal;
+    }
+};
+
 /// Independent images of one scene by one estimator (other seeds, all else the same), reduced as they come
 /// to what tests need.
 class Replicates {
@@ -62,9 +77,9 @@ public:
     /// Tiles in reading order; those at the right and lower border may be smaller.
     Summary tileMean(std::size_t tile, std::uint32_t channel) const;
     Summary pixel(std::size_t pixel, std::uint32_t channel) const;
-    /// Largest part of Σ (I − Ī)², over all pixels, channels and replicates, that is one of them; 0
-    /// without any spread.
-    double largestShare() const;
+    /// [replicate]
+    const std::vector<double>& imageMeans(std::uint32_t channel) const { return image_means_[channel]; }
+    LargestValue largestValue() const;
 
 private:
     struct Moments {
@@ -85,7 +100,8 @@ struct GateOptions {
     double delta = 0.01;          ///< Means that differ by less, relative to b's, are equivalent.
     double confidence =
         0.999;  ///< Of each channel mean's interval; 1 − confidence is alpha of tiles and of pixels.
-    double largest_share = 0.05;  ///< Of the squared error that one value may carry.
+    double largest_share =
+        0.05;  ///< Of the squared error that one value may carry, or what normal noise carries if that is more.
     std::vector<std::string> channel_names;  ///< For the reasons; numbers where there are too few.
 };
 
@@ -96,20 +112,24 @@ struct GateResult {
             0;  ///< To b's mean, whose own error is left out: it would move the interval by parts of itself.
         Interval relative_interval;
         Verdict verdict = Verdict::Inconclusive;
+        /// Every replicate's mean differs from every one of the other's by more than delta, the same way; and so
+        /// many would do that by chance, whatever their distribution, as seldom as 1 − confidence allows.
+        bool separated = false;
     };
     std::vector<Channel> channels;
     TestFamily tiles, pixels;        ///< Over channels too: `worst` is place · channels + channel.
     /// That the tiles' p-values (of the middle channel, where there is noise) are uniform; to be read, not
     /// judged by.
     double tile_uniformity_p = 1;
-    double largest_share = 0;        ///< Of a or b, whichever is larger.
+    /// Of a or b: whichever is heavy-tailed, or has the larger share.
+    LargestValue largest;
     std::uint64_t not_finite = 0;
     Verdict verdict = Verdict::Inconclusive;
     std::vector<std::string> reasons;  ///< Why not Pass, one sentence each.
 };
 /// Pass: all channels' means are equivalent, no tile and no pixel differs, and no single value decides.
-/// Fail: a mean, tile or pixel differs for certain. Else Inconclusive, and so is anything with a value that
-/// is no number.
+/// Fail: a mean, tile or pixel differs for certain; where the noise has heavy tails, a mean by the ranks of the
+/// replicates alone. Else Inconclusive, and so is anything with a value that is no number.
 GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& options = {});
 
 }  // namespace crt::stats
