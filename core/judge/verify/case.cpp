@@ -80,8 +80,8 @@ const std::vector<Case>& registry() {
               pointLightCases, environmentCases, spectralFilmCases, stiffCases, scatteringCases,
               glasswareCases, thinFilmCases, anisotropyCases, openPbrCases, openPbrCoatCases,
               compositionCases, shadingNormalCases, quadricCases, instanceCases, shapeLightCases,
-              colourCases, textureCases, accumulationCases, imageCases, inputCases, backendCases,
-              exactRelationCases, mutantCases, contactCases})
+              colourCases, textureCases, accumulationCases, cameraCases, firstHitCases, imageCases,
+              inputCases, backendCases, exactRelationCases, mutantCases, contactCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

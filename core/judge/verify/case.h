@@ -113,6 +113,8 @@ std::vector<Case> shapeLightCases();     ///< G, lamps that are such
 std::vector<Case> colourCases();         ///< H
 std::vector<Case> textureCases();        ///< H, the part about textures
 std::vector<Case> accumulationCases();   ///< I
+std::vector<Case> cameraCases();         ///< J: lens and filter
+std::vector<Case> firstHitCases();       ///< D, J: what is told of first hits
 std::vector<Case> imageCases();          ///< J
 std::vector<Case> inputCases();          ///< K
 std::vector<Case> backendCases();        ///< L

@@ -2,6 +2,7 @@
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
+#include "judge/verify/shapes.h"
 
 #include "base/temporary_folder.h"
 #include "kernel/features.h"
@@ -44,6 +45,24 @@ Stage floorUnder(const std::string& environment, const std::string& integrator =
         .set("environment", "{" + environment + "}")
         .material("white", "{type: diffuse, reflectance: 1}")
         .quad("floor", "[[-4,0,-4.1],[-4,0,3.9],[4,0,3.9],[4,0,-4.1]]", "white");
+}
+
+/// A white sheet with the normal n.
+Stage sheetFacing(const Vec3d& n, const std::string& environment, const std::string& integrator) {
+    const Vec3d across = unit(cross(std::abs(n[1]) < 0.5 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0}, n)),
+                along = cross(n, across);
+    return Stage(eyeAt(n + across * 0.3, "[0.2, 0.4, 0.9]"), integrator)
+        .set("environment", "{" + environment + "}")
+        .material("white", "{type: diffuse, reflectance: 1}")
+        .quad("sheet",
+              fmt::format("[{}, {}, {}, {}]", point((across + along) * -1), point(across - along),
+                          point(across + along), point(along - across)),
+              "white");
+}
+
+/// The direction θ from the zenith, φ to the right of −z: what docs/scene.md calls the middle of an image.
+Vec3d aroundUs(double theta, double phi) {
+    return {std::sin(theta) * std::sin(phi), std::cos(theta), -std::sin(theta) * std::cos(phi)};
 }
 
 /// Of a texel over level ground, in units of its radiance: ∫ cos θ sin θ dθ dφ.
@@ -111,6 +130,26 @@ void images(Context& context) {
             context.estimate(fmt::format("{}, by chance", a.what),
                              floorUnder(image + ", light_sampling: false").yaml(), luminance, expected,
                              a.by_chance, {.samples = 1024, .most = 65536}, mistakes);
+    }
+
+    // Level ground cannot tell azimuths apart. On a wall and on a slope a texel brings
+    // ∫∫ (n·ω) sin θ dθ dφ.
+    for (const auto& [what, normal] :
+         {std::pair{"a wall", Vec3d{1, 0, 0}}, {"a slope", unit({0.5, 0.6, -0.4})},
+          {"an overhang", unit({0.4, -0.3, -0.8})}}) {
+        const double column = 2 * kPi / 32, row = kPi / 16;
+        const double expected =
+            300 / kPi * rectangleIntegral(
+                            [n = normal](double theta, double phi) {
+                                return dot(n, aroundUs(theta, phi)) * std::sin(theta);
+                            },
+                            5 * row, 6 * row, 20 * column - kPi, 21 * column - kPi);
+        for (const char* integrator : {kDirect, kAlone})
+            context.estimate(
+                fmt::format("a single bright texel on {}, {}", what, integrator),
+                sheetFacing(normal, "image: " + imageFile(folder, 16, single), integrator).yaml(), luminance,
+                expected, 0.003, {.samples = 256, .most = 65536},
+                {{0, "the texel is sampled in another azimuth than it is seen in"}});
     }
 
     // Scale and rotation: the texel of row 5 and column 20 of 32 has its middle at azimuth
@@ -199,17 +238,31 @@ void skies(Context& context) {
                    "}")
             .yaml(),
         luminance, 20000 / kPi / lumens, 0.003, {.samples = 256, .most = 65536});
-    // Seen 30 degrees above the horizon, 90 degrees of azimuth from the sun; texels are 0.7 degrees high.
-    const double theta = 60 * (kPi / 180);
-    const Film film = context.render(
-        Stage(fmt::format("{{position: [0, 0, 0], target: [0, {}, {}], fov: 1}}", std::cos(theta),
-                          std::sin(theta)))
-            .set("environment", "{sky: {type: 12, zenith_luminance_cd_m2: 1000, " + sun + "}}")
-            .yaml(),
-        {.samples = 1024});
-    context.relative(
-        "type 12 seen", luminance(film) * lumens,
-        1000 * skyLuminance(12, theta, std::acos(std::cos(theta) * std::cos(kSunTheta)), kSunTheta), 0.01);
+    // Seen 30 degrees above the horizon, all around from the sun, which stands between two axes; texels are
+    // 0.7 degrees high.
+    constexpr double kTheta = 60 * kDegree, kSunPhi = 25 * kDegree;
+    const auto towards = [](double theta, double from_x) {
+        return Vec3d{std::sin(theta) * std::cos(from_x), std::cos(theta), std::sin(theta) * std::sin(from_x)};
+    };
+    const auto luminanceAt = [&](double off) {
+        const double cosine = dot(towards(kTheta, kSunPhi + off), towards(kSunTheta, kSunPhi));
+        return 1000 * skyLuminance(12, kTheta, std::acos(cosine), kSunTheta);
+    };
+    for (const double degrees : {0.0, 60.0, 90.0, 180.0, 270.0, 300.0}) {
+        const double off = degrees * kDegree;
+        const Film film = context.render(
+            Stage(fmt::format("{{position: [0, 0, 0], target: {}, fov: 1}}",
+                              point(towards(kTheta, kSunPhi + off))))
+                .set("environment", fmt::format("{{sky: {{type: 12, zenith_luminance_cd_m2: 1000, direction: "
+                                                "{}}}}}",
+                                                point(towards(kSunTheta, kSunPhi) * -1)))
+                .yaml(),
+            {.samples = 1024});
+        context.relative(fmt::format("type 12 seen {}° beside the sun", degrees), luminance(film) * lumens,
+                         luminanceAt(off), 0.01,
+                         {{luminanceAt(kPi - off), "the sun stands on the other side"},
+                          {luminanceAt(off + 2 * kSunPhi), "the sun's azimuth is mirrored"}});
+    }
     context.refused("a sky whose sun has set",
                     floorUnder("sky: {type: 12, zenith_luminance_cd_m2: 1, "
                                "direction: [0, 1, 0]}")
@@ -223,12 +276,14 @@ std::vector<Case> environmentCases() {
     return {
         row("E20", "environment-image",
             "Latitude-longitude images over a floor: grey, a single texel, a gradient, a contrast of 1e4; "
-            "by light sampling, alone and by chance; turned and scaled",
+            "by light sampling, alone and by chance; a texel on a wall, a slope and an overhang; turned and "
+            "scaled",
             "the constant environment; sums of each texel's irradiance; the texel where it belongs",
-            "closed form of a texel over level ground", "5e-4; ± 0.3 %; 2 %", Level::Commit,
+            "closed form of a texel over level ground; quadrature", "5e-4; ± 0.3 %; 2 %", Level::Commit,
             kEnvironmentNeeds, images),
-        row("E21", "cie-sky", "CIE general skies over a floor, by zenith luminance and by illuminance",
-            "pi L for the uniform sky; the horizontal illuminance", "quadrature of ISO 15469:2004",
+        row("E21", "cie-sky", "CIE general skies over a floor, by zenith luminance and by illuminance; seen in six azimuths from "
+            "the sun",
+            "pi L for the uniform sky; the horizontal illuminance; the luminance there", "quadrature of ISO 15469:2004",
             "± 0.3 %; 1 %", Level::Commit, kEnvironmentNeeds | CRT_FEATURE_TABLE, skies),
     };
 }

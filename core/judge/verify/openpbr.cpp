@@ -288,6 +288,29 @@ void fuzz(Context& context) {
                                                      how)),
                              weight * color * sheenAlbedo(std::cos(degrees * kDegree), roughness), 2e-3);
         }
+    // From inside there is none: of a clear body of index 1 black fuzz takes its share once, where light
+    // comes in, and nothing of what is seen by an eye within.
+    for (const double degrees : {0.0, 50.0}) {
+        const double cosine = std::cos(degrees * kDegree);
+        const double kept = 1 - weight * sheenAlbedo(cosine, 0.5);
+        const auto body = [&, degrees = degrees](double distance) {
+            Stage stage(fmt::format("{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: "
+                                    "0.001}}",
+                                    distance * std::sin(degrees * kDegree), distance * cosine),
+                        "{max_depth: 8, roulette: false}");
+            return stage.set("environment", "{radiance: 1}")
+                .material("it", on("transmission_weight: 1, specular_roughness: 0, specular_ior: 1", weight, 0,
+                                   0.5))
+                .box("it", {-4, -1, -4}, {4, 0, 4}, "it")
+                .yaml();
+        };
+        context.estimate(fmt::format("black on a clear body, at {}°", degrees), body(1), meanRadiance, kept,
+                         5e-3, {.samples = 1024, .most = 65536},
+                         {{kept * kept, "there is fuzz on the inside, too"}});
+        context.estimate(fmt::format("black on a clear body, seen from within, at {}°", degrees),
+                         body(-0.5), meanRadiance, 1, 1e-3, {.samples = 1024, .most = 65536},
+                         {{kept, "there is fuzz on the inside, too"}});
+    }
     // A mirror under fuzz is seen by light sampling, too.
     for (const auto& [technique, integrator] : kDirectTechniques) {
         Stage stage(eyeAt({view[1], view[2], view[0]}, "[0.6, 0.3, 0.1]"), integrator);
@@ -336,12 +359,14 @@ std::vector<Case> openPbrCases() {
         row("G38", "fuzz",
             "Fuzz on black and white floors under beams from three directions; on what is diffuse, glossy, "
             "metal and before a merge clear, at three angles in light from everywhere; on a mirror, by "
-            "light sampling, scattered rays and both",
-            "the linearly transformed cosine and its albedo; what is below times 1 less that; 1",
+            "light sampling, scattered rays and both; on a clear body, and seen from within it",
+            "the linearly transformed cosine and its albedo; what is below times 1 less that; 1; "
+            "nothing from within",
             "Zeltner, Burley and Chiang (2022); OpenPBR Surface 1.1", "± 0.02 %, ± 0.2 %, ± 0.5 %",
             Level::Commit,
             CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT | CRT_FEATURE_FUZZ |
-                CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_DIFFUSE | CRT_FEATURE_ROUGH_CONDUCTOR,
+                CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_DIFFUSE | CRT_FEATURE_ROUGH_CONDUCTOR |
+                CRT_FEATURE_DIELECTRIC,
             fuzz),
     };
 }

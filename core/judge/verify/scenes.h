@@ -58,6 +58,8 @@ public:
                 const std::string& radiance = "");
     Stage& mesh(const std::string& name, const std::string& positions, const std::string& faces,
                 const std::string& material, const std::string& radiance = "");
+    /// Any object, by its keys: "sphere: {radius: 1}, material: glass".
+    Stage& object(const std::string& keys);
     /// Axis-parallel box with outward normals.
     Stage& box(const std::string& name, const Point& lower, const Point& upper, const std::string& material);
     std::string yaml() const;

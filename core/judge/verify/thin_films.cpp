@@ -29,14 +29,17 @@ double luminous(const std::function<double(double)>& reflectance) {
     return seen / all;
 }
 
-std::string floorBelow(double degrees, const std::string& material, bool glass) {
+std::string floorBelow(double degrees, const std::string& material, bool glass,
+                       const std::string& attributes = {}) {
     Stage stage(
         fmt::format("{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 0.001}}",
                     std::sin(degrees * kDegree), std::cos(degrees * kDegree)),
         kDirect);
     stage.set("environment", "{radiance: 1}");
     if (material.empty()) return stage.yaml();
-    stage.material("it", material).quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it");
+    stage.material("it", material)
+        .quad("it",
+              "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]" + (attributes.empty() ? "" : ", " + attributes), "it");
     if (glass)
         stage.material("black", "{type: diffuse, reflectance: 0}")
             .quad("bottom", "[[-900,-1,-900],[-900,-1,900],[900,-1,900],[900,-1,-900]]", "black");
@@ -100,6 +103,25 @@ void airy(Context& context) {
                      {expected(2, under, pane), "the way within the film counts twice"}});
             }
         }
+    // relative_thickness, as a number and by the place: the same as so much thinner a film.
+    for (const char* relative : {"0.25", "{checker: [0.25, 1], scale: 1e-3}"}) {
+        const double cosine = std::cos(60 * kDegree);
+        const auto expected = [&](double times) {
+            return luminous([&](double nm) {
+                return filmReflectance(cosine, 1.4, 480 * times, nm, std::complex(0.2, 3.0));
+            });
+        };
+        context.estimate(
+            fmt::format("480 nm, of which {}", relative),
+            {floorBelow(60,
+                        fmt::format("{{type: conductor, eta: 0.2, k: 3, thin_film: {{thickness_nm: 480, "
+                                    "relative_thickness: {}, ior: 1.4}}}}",
+                                    relative),
+                        false, "uvs: [[0.2,0.2],[0.2,0.8],[0.8,0.8],[0.8,0.2]]"),
+             floorBelow(60, "", false)},
+            ratio, expected(0.25), 0.002, effort,
+            {{expected(1), "relative_thickness is left out"}, {expected(0), "there is no film"}});
+    }
     context.refused(
         "a film of -1 nm",
         "crt: 1\nmaterials: {it: {type: dielectric, ior: 1.5, thin_film: {thickness_nm: -1, ior: "
@@ -152,10 +174,12 @@ std::vector<Case> thinFilmCases() {
     return {
         row("G19", "thin-film",
             "Films of 0 to 5000 nm and index .8 to 2.4 on glass and metals; seen on metal, glass and a pane "
-            "at 0° and 60° in white light",
+            "at 0° and 60° in white light; a quarter of a film, by a number and by a texture",
             "the reflectance of the layers' characteristic matrices, s and p, in complex double",
             "Abelès (1950); Born and Wolf, 1.6", "2e-4; ± 0.2 %, ± 1 %", Level::Commit,
-            sky | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_THIN_DIELECTRIC, airy),
+            sky | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_THIN_DIELECTRIC |
+                CRT_FEATURE_TEXTURE,
+            airy),
         row("G20", "film-furnace",
             "Films of 90 and 700 nm on panes, glass and perfect metal, smooth and rough, in a constant "
             "environment",
