@@ -261,6 +261,85 @@ TEST_CASE("an image whose light few paths carry does not know its error yet", "[
     CHECK_FALSE(reachesTarget(film, 1e9));
 }
 
+// Paths from a floor to a glossy ball to a point light: the share of them that is brighter than y falls off
+// as y^-1/2, from the brightness of the rest to that of the peak of the ball's lobe. Taken as known, 45 % of
+// these images would state an interval that does not hold their error.
+TEST_CASE("an image whose brightest paths are not yet met does not know its error", "[error]") {
+    constexpr u32 kSide = 32;
+    constexpr u64 kSamples = 64;
+    constexpr int kImages = 200;
+    constexpr double kChance = 0.003, kPeak = 1e5;
+    // y = 1/u² for u from kPeak^-1/2 to 1: E[Y] = √kPeak, E[Y²] = ∫ u^-4 du, over that range of u.
+    const double least = 1 / std::sqrt(kPeak), range = 1 - least;
+    const double mean_y = (1 / least - 1) / range, mean_y2 = (1 / (least * least * least) - 1) / 3 / range;
+    const double variance = kChance * mean_y2 - kChance * kChance * mean_y * mean_y;
+    const double truth = std::sqrt(variance / static_cast<double>(kSamples)) / (1 + kChance * mean_y);
+    std::mt19937_64 random(17);
+    std::poisson_distribution<int> paths(kChance * kSide * kSide * kSamples);
+    std::uniform_int_distribution<std::size_t> pixel(0, kSide * kSide - 1);
+    std::uniform_int_distribution<u64> sample(0, kSamples - 1);
+    std::uniform_real_distribution<double> u(least, 1);
+    int known = 0, wrong = 0;
+    for (int image = 0; image < kImages; ++image) {
+        Film film(shapeFor(kSide, kSide, 1));
+        for (std::size_t p = 0; p < kSide * kSide; ++p)
+            for (u64 s = 0; s < 2; ++s) addSample(film, p, s, kSamples / 2.0);
+        for (int n = paths(random); n > 0; --n) {
+            const double at = u(random);
+            addSample(film, pixel(random), sample(random), 1 / (at * at));
+        }
+        film.counts.assign(kSide * kSide, kSamples);
+        film.samples.add({0, kSamples});
+        const std::optional<ErrorEstimate> e = estimateError(film);
+        if (!e || !e->known()) continue;
+        ++known;
+        wrong += !e->relative_rmse_95.contains(truth);
+    }
+    INFO(known << " of " << kImages << " know their error, " << wrong << " of them wrongly");
+    CHECK(wrong <= 0.05 * kImages);
+}
+
+// What looked at the differences between neighbours alone never narrows: 6 pixels of different brightness.
+TEST_CASE("of one sequence of independent samples an interval narrows with their number", "[error]") {
+    const std::vector<double> brightness{0.5, 1, 2, 3, 5, 8};
+    constexpr std::size_t kPixels = 40;
+    const bool rare = GENERATE(false, true);
+    const double squares = rare ? 50 : 2;  // E[Y²]/E[Y]²: of exponential noise, or of one path in fifty.
+    std::mt19937_64 random(18);
+    std::exponential_distribution<double> waiting;
+    std::bernoulli_distribution hit(1 / squares);
+    double luminance = 0, variance = 0;
+    for (const double b : brightness) {
+        luminance += b;
+        variance += b * b * (squares - 1);
+    }
+    const auto estimate = [&](u64 samples) {
+        Film film(shapeFor(kPixels, 1, 0));
+        for (std::size_t p = 0; p < brightness.size(); ++p)
+            for (u64 s = 0; s < samples; ++s)
+                addSample(film, 3 * p, s, brightness[p] * (rare ? squares * hit(random) : waiting(random)));
+        film.counts.assign(kPixels, samples);
+        film.samples.add({0, samples});
+        return *estimateError(film, PixelSet::All, true);
+    };
+    constexpr u64 kFew = 2000;
+    constexpr int kImages = 200;
+    const double truth = std::sqrt(variance / kFew * kPixels) / luminance;
+    int covered = 0;
+    double width = 0;
+    for (int i = 0; i < kImages; ++i) {
+        const ErrorEstimate e = estimate(kFew);
+        REQUIRE(e.known());
+        covered += e.relative_rmse_95.contains(truth);
+        width += (e.relative_rmse_95.upper / e.relative_rmse_95.lower - 1) / kImages;
+    }
+    const ErrorEstimate many = estimate(16 * kFew);
+    INFO(covered << " of " << kImages << ", relative width " << width);
+    CHECK(covered >= 0.9 * kImages);  // 180 of 200 at 95 %: fewer in one of 400 runs.
+    CHECK(width < 1);                 // How six pixels differ gives 5.
+    CHECK(many.relative_rmse_95.upper / many.relative_rmse_95.lower - 1 == Approx(width / 4).epsilon(0.25));
+}
+
 // Which images know their error must not depend on how much light they happened to meet: where only those
 // with many bright paths do, they state too much on average: with a least of four degrees of freedom 1.12
 // times the error, where three paths an image are expected.
@@ -337,7 +416,7 @@ TEST_CASE("a forecast is an interval, from 1/N at its lower end to 1/sqrt N at i
     e.half_width_95 = 0.03;
     e.relative_rmse_95 = {0.018, 0.022};
     const stats::Interval samples = e.samplesFor(0.01, 100);
-    CHECK(samples.lower == Approx(270));       // 0.018 · 1.5 = 2.7 targets
+    CHECK(samples.lower == Approx(270));  // 0.018 · 1.5 = 2.7 targets
     CHECK(samples.upper == Approx(100 * 3.3 * 3.3));
     CHECK(e.samplesFor(1, 100).upper == 100);  // It is there.
 }

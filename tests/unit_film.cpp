@@ -319,6 +319,10 @@ TEST_CASE(
             REQUIRE(image.channels[4] == "StdError.Y");
             CHECK(image.pixels[4] == Approx(expected).epsilon(1e-4));
             CHECK(image.pixels[3] == Approx(expected * expected).epsilon(1e-4));
+            REQUIRE(image.channels[5] == "HalfWidth95.Y");
+            CHECK(image.pixels[5] == Approx(stats::studentQuantile(0.975, 15.0) * expected).epsilon(1e-4));
+            REQUIRE(image.channels[6] == "OwnVariance.Y");
+            CHECK(image.pixels[6] == image.pixels[3]);  // One pixel has no neighbours.
         }
     // The white balance of A moves this colour's luminance by much more than the tolerance above.
     scene.film.color_space = ColorSpace::LinearSrgb;
@@ -362,7 +366,8 @@ TEST_CASE("AOV planes carry their names, types and values", "[film]") {
 
     const Image image = resolveImage(film, developmentOf(scene), in_film | kAovVariance | kAovSamples);
     REQUIRE(image.channels == std::vector<std::string>{"R", "G", "B", "Albedo.R", "Albedo.G", "Albedo.B",
-                                                       "Ns.X", "Ns.Y", "Ns.Z", "Z", "Variance.Y"});
+                                                       "Ns.X", "Ns.Y", "Ns.Z", "Z", "Variance.Y",
+                                                       "OwnVariance.Y"});
     REQUIRE(image.integer_channels == std::vector<std::string>{"id.primitive", "sampleCount"});
     // A perfect white has albedo 1 whatever the exposure; the rest is as it lies in the film.
     for (int c = 3; c < 6; ++c) CHECK(image.pixels[c] == Approx(1.0).margin(2e-7));

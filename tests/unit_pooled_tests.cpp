@@ -2,10 +2,12 @@
 #include "base/statistics.h"
 #include "catch.h"
 #include "film/luminance_error.h"
+#include "film/pooled_variance.h"
 #include "judge/stats/pooled_tests.h"
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <tuple>
 #include <vector>
@@ -134,4 +136,56 @@ TEST_CASE("a window has what of it lies in the image", "[pooled-tests]") {
     CHECK(means[5] == Approx((1 + 2 + 3 + 5 + 6 + 7 + 9 + 10 + 11) / 9.0));
     CHECK(means[11] == Approx((7 + 8 + 11 + 12) / 4.0));
     CHECK(windowMeans(values, 4, 3, 0) == values);
+}
+
+TEST_CASE("a pooled variance is that of equal pixels, never 0 amid noise, and keeps what is not known",
+          "[pooled-tests]") {
+    // What is known exactly: equal variances pool to themselves, with the degrees of freedom of all of them.
+    const std::vector<double> equal(20 * 20, 2.5);
+    const PooledVariances of_equal = pooledVariances(equal, 20, 20, 1);
+    CHECK(of_equal.variances[10 * 20 + 10] == Approx(2.5));
+    CHECK(of_equal.degrees_of_freedom[10 * 20 + 10] == Approx(49));
+    CHECK(of_equal.degrees_of_freedom[0] == Approx(16));
+    // A single noisy pixel keeps its own, with its own degree of freedom; those about it get a part of it.
+    std::vector<double> one(20 * 20, 0.0);
+    one[10 * 20 + 10] = 49;
+    const PooledVariances of_one = pooledVariances(one, 20, 20, 1);
+    CHECK(of_one.variances[10 * 20 + 10] == Approx(49));
+    CHECK(of_one.variances[10 * 20 + 13] == Approx(1));
+    CHECK(of_one.variances[10 * 20 + 14] == 0);
+    CHECK(of_one.degrees_of_freedom[10 * 20 + 13] == Approx(3));
+    // What is not known adds nothing, and stays so.
+    std::vector<double> lost = equal;
+    lost[10 * 20 + 10] = std::numeric_limits<double>::infinity();
+    const PooledVariances of_lost = pooledVariances(lost, 20, 20, 1);
+    CHECK(std::isinf(of_lost.variances[10 * 20 + 10]));
+    CHECK(of_lost.variances[10 * 20 + 11] == Approx(2.5));
+    CHECK(of_lost.degrees_of_freedom[10 * 20 + 11] == Approx(48));
+}
+
+TEST_CASE("a deviation over its pooled standard error has standard deviation 1", "[pooled-tests]") {
+    // Normal noise, and each pixel's variance from two replicates. Over its own standard error the deviation
+    // is Student's with one degree of freedom, which has no standard deviation at all.
+    constexpr std::uint32_t kSide = 64;
+    std::mt19937_64 random(5);
+    double squares = 0, within = 0, count = 0;
+    for (int image = 0; image < 10; ++image) {
+        std::vector<double> deviations, variances;
+        for (std::uint32_t p = 0; p < kSide * kSide; ++p) {
+            const Mean pixel = estimated(random, 1 + 3.0 * (p % kSide) / kSide, 1);
+            deviations.push_back(pixel.value);
+            variances.push_back(pixel.variance);
+        }
+        const PooledVariances pooled = pooledVariances(variances, kSide, kSide, 1);
+        for (std::size_t p = 0; p < deviations.size(); ++p) {
+            const double z = deviations[p] / std::sqrt(pooled.variances[p]);
+            squares += z * z;
+            within += std::abs(z) <= 1.96;
+            count += 1;
+        }
+    }
+    // E[1/max(χ²₁, 1)] = P(χ²₁ < 1) + E[1/χ²₁; χ²₁ > 1] = 0.683 + 0.484 - 0.317 = 0.850: ∫ x^-3/2 e^-x/2
+    // dx/√2π from 1 on, by parts. The mean about a pixel scatters by a fifth, which adds some per cent.
+    CHECK(std::sqrt(squares / count) == Approx(0.93).epsilon(0.04));
+    CHECK(within / count > 0.94);
 }

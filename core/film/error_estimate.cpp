@@ -1,6 +1,7 @@
 #include "film/error_estimate.h"
 
 #include "base/parallel.h"
+#include "film/error_tail.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,6 +20,11 @@ constexpr double kLeastDegreesOfFreedom = 2;
 /// What the brightest pixel says of pixels as bright that no path has met yet: so many more squares like its
 /// own.
 constexpr double kUnseen = 0.5;
+
+/// E[Y⁴]/E[Y²]² is at least E[Y²]/E[Y]² whatever the distribution of Y ≥ 0 (Lyapunov's inequality), and
+/// exactly that where paths are dark or of one brightness. Exponential noise has 3 times that, the tail
+/// y^-1/2 of a glossy lobe about a light 3.9 times.
+constexpr double kKurtosis = 4;
 
 /// From so many pixels on the scatter of variances is measured; of fewer, where a measurement would be
 /// noise, replicates are taken as normal.
@@ -149,8 +155,30 @@ double measuredSpread(const Film& film, const LuminanceVariance& variance, const
     const PixelMap influence(film, [&](std::uint32_t x, std::uint32_t y) {
         return 0.5 * variances.at(x, y) / sums.sum - film.mean(x, y, 1) / luminance;
     });
-    return 4 * sums.sum * sums.sum *
-           total([&](std::uint32_t x, std::uint32_t y) { return influence.squaredDeviation(x, y, which); });
+    const double between_pixels = 4 * sums.sum * sums.sum * total([&](std::uint32_t x, std::uint32_t y) {
+                                      return influence.squaredDeviation(x, y, which);
+                                  });
+    if (variance.fromReplicates()) return between_pixels;
+    // The same from the samples of each pixel, which narrows with their number; how pixels differ does not.
+    const double of_samples = total([&](std::uint32_t x, std::uint32_t y) {
+        const double v = variances.at(x, y);
+        return v * v * kKurtosis * variance.excess(x, y);
+    });
+    const double of_luminance = sums.sum * largest / (luminance * luminance);
+    return std::min(between_pixels, of_samples + 4 * sums.sum * sums.sum * of_luminance);
+}
+
+/// Whether paths that the pixels of the set have not met yet may make their error larger than it seems.
+bool missesBrightPaths(const Film& film, const PixelMap& variances, PixelSet which, const VarianceSums& sums,
+                       double unit, double degrees_of_freedom) {
+    std::vector<NoisyPixel> noisy;
+    noisy.reserve(static_cast<std::size_t>(sums.known));
+    for (std::uint32_t y = 0; y < film.shape().height; ++y)
+        for (std::uint32_t x = 0; x < film.shape().width; ++x)
+            if (belongs(x, y, which) && variances.known(x, y))
+                noisy.push_back({x, y, variances.at(x, y) * unit});
+    return tailIsOpen(errorTail(film, noisy), degrees_of_freedom,
+                      sums.known * static_cast<double>(film.samples.count()));
 }
 
 }  // namespace
@@ -190,6 +218,12 @@ double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
     // Rounding can push the difference of nearly equal numbers below zero.
     const double spread = std::max(0.0, film_.mean(x, y, squares_) - mean * mean);
     return spread / static_cast<double>(n - 1);
+}
+
+double LuminanceVariance::excess(std::uint32_t x, std::uint32_t y) const {
+    const auto n = static_cast<double>(film_.counts[std::size_t{y} * film_.shape().width + x]);
+    const double mean = film_.mean(x, y, 1);
+    return mean != 0 ? film_.mean(x, y, squares_) / (mean * mean) / n : 0;
 }
 
 /// Var k₂ of R values is estimated without bias by (2R k₂² + (R − 1) k₄) / (R (R + 1)) (Kendall and
@@ -239,7 +273,10 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, boo
         spread = std::max(normal, measuredSpread(film, variance, variances, which, sums, unit, luminance) +
                                       (d < 3 ? kUnseen * sums.most * sums.most : 0));
     e.degrees_of_freedom = std::clamp(2 * sums.sum * sums.sum / spread, 1.0, d * sums.known);
-    if (e.known() && e.degrees_of_freedom < std::min(kLeastDegreesOfFreedom, d * sums.known))
+    const bool too_few = e.degrees_of_freedom < std::min(kLeastDegreesOfFreedom, d * sums.known);
+    if (e.known() &&
+        (too_few || (sums.known >= kPixelsToMeasure &&
+                     missesBrightPaths(film, variances, which, sums, unit, e.degrees_of_freedom))))
         e.knowledge = ErrorKnowledge::NotYet;
     e.relative_rmse_95 = {
         e.relative_rmse *

@@ -30,13 +30,15 @@ public:
     /// Variance of operator() itself, over unit² so that nothing overflows, by unbiased k-statistics:
     /// whatever the distribution of replicates. Needs four.
     double varianceOfVariance(std::uint32_t x, std::uint32_t y, double unit = 1) const;
+    /// E[Y²]/E[Y]²/n of a pixel's n samples. Needs the squares.
+    double excess(std::uint32_t x, std::uint32_t y) const;
 
 private:
     double betweenReplicates(std::uint32_t x, std::uint32_t y) const;
 
     const Film& film_;
     bool from_replicates_;
-    std::uint32_t squares_;  ///< Channel of Y²; 0: the film has none.
+    std::uint32_t squares_;             ///< Channel of Y²; 0: the film has none.
     std::array<double, 16> samples_{};  ///< Of each replicate.
     double dof_ = 0;
 };
@@ -45,7 +47,8 @@ private:
 enum class ErrorKnowledge {
     Known,   ///< Estimated, with an interval.
     Bound,   ///< Of one Sobol sequence: the true error is smaller, by an unknown factor.
-    NotYet,  ///< So few paths carry the light that neither the estimate nor an interval can be trusted.
+    NotYet,  ///< So few paths carry the noise, or brighter ones than those that were met are so likely
+             ///< (error_tail.h), that neither the estimate nor an interval can be trusted.
 };
 
 /// Relative to the image's mean luminance. Pixels are independent of each other, each with a scramble of its
@@ -53,7 +56,7 @@ enum class ErrorKnowledge {
 struct ErrorEstimate {
     ErrorKnowledge knowledge = ErrorKnowledge::Bound;
     double mean_luminance = 0;
-    double mean_standard_error = 0;    ///< Of mean_luminance.
+    double mean_standard_error = 0;  ///< Of mean_luminance.
     double relative_rmse = 0;  ///< √(mean of the pixels' variances) / mean luminance: expected root mean
                                ///< square error over the pixels.
     stats::Interval relative_rmse_95;  ///< Of that expectation: χ² with degrees_of_freedom.

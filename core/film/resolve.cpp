@@ -2,8 +2,10 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/statistics.h"
 #include "film/error_estimate.h"
 #include "film/luminance_error.h"
+#include "film/pooled_variance.h"
 #include "image/image_metadata.h"
 #include "scene/aov.h"
 
@@ -13,6 +15,8 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
+#include <vector>
 
 namespace crt {
 namespace {
@@ -39,6 +43,28 @@ void nameSpectralChannels(const SpectralChannels& spectral, Image& image) {
         image.channels.push_back(binName(spectral.bins.centre_nm(bin)));
     for (const std::string& name : spectral.responses) image.channels.push_back("Response." + name);
 }
+
+/// What the film knows of the noise of its pixels, where an image asks for it.
+struct PixelNoise {
+    std::vector<double> own;  ///< Variances of the pixels' means of Y, unbiased.
+    stats::PooledVariances pooled;
+    double degrees_of_freedom;  ///< Of each of `own`.
+
+    explicit PixelNoise(const Film& film) {
+        const LuminanceVariance variance(film);
+        degrees_of_freedom = variance.degreesOfFreedom();
+        const std::uint32_t width = film.shape().width, height = film.shape().height;
+        own.resize(std::size_t{width} * height);
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x) own[std::size_t{y} * width + x] = variance(x, y);
+        pooled = stats::pooledVariances(own, width, height, degrees_of_freedom);
+    }
+    double standardError(std::size_t pixel) const { return std::sqrt(pooled.variances[pixel]); }
+    double halfWidth(std::size_t pixel) const {
+        if (!std::isfinite(own[pixel])) return own[pixel];
+        return stats::studentQuantile(0.975, pooled.degrees_of_freedom[pixel]) * standardError(pixel);
+    }
+};
 
 }  // namespace
 
@@ -84,9 +110,14 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
         for (std::string& name : exrNames(row)) names.push_back(std::move(name));
     }
 
+    std::optional<PixelNoise> noise;
+    if ((aovs & (kAovVariance | kAovError)) != 0) {
+        noise.emplace(film);
+        if ((aovs & kAovError) != 0) image.channels.emplace_back(kHalfWidthChannel);
+        image.channels.emplace_back(kOwnVarianceChannel);
+    }
     nameSpectralChannels(spectral, image);
 
-    const LuminanceVariance variance(film);
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
     image.pixels.resize(pixels * image.channels.size());
     image.integers.resize(pixels * image.integer_channels.size());
@@ -100,9 +131,7 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
         };
         const std::size_t pixel = std::size_t{y} * shape.width + x;
         append(multiply(color, triple(0)));
-        const auto error = [&](std::uint32_t i, std::uint32_t j) {
-            return std::sqrt(variance(i, j)) * luminanceGain(triple(0));
-        };
+        const double gain = luminanceGain(triple(0));
         // In the order of the names above.
         for (const AovRow& row : kAovRows) {
             if ((aovs & row.aov) == 0) continue;
@@ -114,14 +143,16 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
                 case kAovSquares:
                 case kAovReplicates: break;
                 case kAovPrimitive: *integers++ = film.primitives[pixel]; break;
-                case kAovVariance: add(error(x, y) * error(x, y)); break;
+                case kAovVariance: add(noise->pooled.variances[pixel] * gain * gain); break;
                 case kAovSamples:
                     *integers++ = static_cast<std::uint32_t>(std::min<std::uint64_t>(
                         film.counts[pixel], std::numeric_limits<std::uint32_t>::max()));
                     break;
-                case kAovError: add(error(x, y)); break;
+                case kAovError: add(noise->standardError(pixel) * gain); break;
             }
         }
+        if ((aovs & kAovError) != 0) add(noise->halfWidth(pixel) * gain);
+        if (noise) add(noise->own[pixel] * gain * gain);
         for (std::uint32_t c = 0; c < spectral.count(); ++c) add(film.mean(x, y, shape.firstSpectral() + c));
     };
     constexpr std::size_t kRows = 16;
@@ -146,8 +177,8 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
         image.metadata.emplace_back("spectralLayoutVersion", "1.0");
         image.metadata.emplace_back("emissiveUnits", "W.m^-2.sr^-1.nm^-1");
     }
-    if ((aovs & (kAovVariance | kAovError)) && variance.degreesOfFreedom() >= 1)
-        image.metadata.emplace_back(kErrorDofKey, fmt::format("{:.6g}", variance.degreesOfFreedom()));
+    if (noise && noise->degrees_of_freedom >= 1)
+        image.metadata.emplace_back(kErrorDofKey, fmt::format("{:.6g}", noise->degrees_of_freedom));
     return image;
 }
 

@@ -23,7 +23,12 @@ inline constexpr const char* kDisplaySrgbId = "srgb_rec709_display";
 /// What display formats get, in files of floats that got neither: as the two above.
 inline constexpr const char* kDisplayExposureKey = "crt/displayExposure";
 inline constexpr const char* kDisplayWhiteBalanceKey = "crt/displayWhiteBalance";
-/// Of the variance behind one pixel's StdError.Y or Variance.Y.
+/// Student's 95 % half-width of each pixel: StdError.Y times the quantile of its degrees of freedom.
+inline constexpr const char* kHalfWidthChannel = "HalfWidth95.Y";
+/// The unbiased variance of each pixel by itself, which sums over pixels need: StdError.Y, Variance.Y and
+/// HalfWidth95.Y are pooled with those about it (film/pooled_variance.h), and too large on average.
+inline constexpr const char* kOwnVarianceChannel = "OwnVariance.Y";
+/// Of OwnVariance.Y in one pixel; in files of others, of StdError.Y or Variance.Y.
 inline constexpr const char* kErrorDofKey = "crt/errorDegreesOfFreedom";
 
 /// Value of kWhiteBalanceKey.

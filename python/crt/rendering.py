@@ -67,7 +67,9 @@ class Result:
 
 def planes(film, aov):
     pixels = film.develop(aovs=[aov])
-    own = [i for i, name in enumerate(pixels.channels) if name not in ("R", "G", "B")]
+    # These come with every plane of noise, and are channels of their own in an EXR.
+    others = ("R", "G", "B", "HalfWidth95.Y", "OwnVariance.Y")
+    own = [i for i, name in enumerate(pixels.channels) if name not in others]
     array = pixels.pixels[..., own]
     return array[..., 0] if len(own) == 1 else array
 

@@ -1,6 +1,7 @@
 #include "judge/compare/compare_noise.h"
 
 #include "base/error.h"
+#include "film/pooled_variance.h"
 #include "image/image_io.h"
 #include "judge/compare/image_noise.h"
 #include "judge/stats/pooled_tests.h"
@@ -60,7 +61,7 @@ using stats::DifferenceSums;
 using stats::PixelSums;
 
 /// Tiles about a tile, and pixels about a pixel, whose stated variances stand beside its own.
-constexpr std::uint32_t kTileWindow = 2, kPixelWindow = 3;
+constexpr std::uint32_t kTileWindow = 2, kPixelWindow = stats::kPooledRadius;
 /// Below it two replicates or four agree by chance, exactly where samples are counted, and then a pixel
 /// seems to have no noise.
 constexpr double kFewestPixelDof = 7;

@@ -75,9 +75,9 @@ void addFolds(NoisyImage& noisy, const Image& image, const std::vector<Places>& 
         }
 }
 
-/// From channels that hold it: "StdError." squared, or "Variance.".
+/// From channels that hold it: "OwnVariance.", "StdError." squared, or "Variance.".
 bool addStated(NoisyImage& noisy, const Image& image, NoiseOf what) {
-    for (const char* kind : {"StdError.", "Variance."}) {
+    for (const char* kind : {"OwnVariance.", "StdError.", "Variance."}) {
         const std::string prefix = kind;
         const std::vector<std::string> names =
             what == NoiseOf::Color ? colorNames(prefix) : std::vector<std::string>{prefix + "Y"};

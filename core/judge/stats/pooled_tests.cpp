@@ -95,22 +95,4 @@ double symmetricHalfWidth(const DifferenceSums& d, double confidence) {
     return q * std::sqrt(about_mean / (n * (n - q * q)));
 }
 
-std::vector<double> windowMeans(std::span<const double> values, std::uint32_t width, std::uint32_t height,
-                                std::uint32_t radius) {
-    // Along rows, then along columns: a mean over the square is a mean of means, every row being cut alike.
-    const auto along = [radius](std::span<const double> from, std::vector<double>& to, std::size_t first,
-                                std::size_t step, std::uint32_t count) {
-        for (std::uint32_t i = 0; i < count; ++i) {
-            const std::uint32_t begin = i > radius ? i - radius : 0, end = std::min(count, i + radius + 1);
-            double sum = 0;
-            for (std::uint32_t j = begin; j < end; ++j) sum += from[first + j * step];
-            to[first + i * step] = sum / (end - begin);
-        }
-    };
-    std::vector<double> rows(values.size()), means(values.size());
-    for (std::uint32_t y = 0; y < height; ++y) along(values, rows, std::size_t{y} * width, 1, width);
-    for (std::uint32_t x = 0; x < width; ++x) along(rows, means, x, width, height);
-    return means;
-}
-
 }  // namespace crt::stats

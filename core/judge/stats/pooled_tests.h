@@ -52,9 +52,4 @@ double symmetricHalfWidth(const DifferenceSums& differences, double confidence);
 /// Below so many pixels symmetricP has no power at the levels that are used here.
 inline constexpr std::uint64_t kFewestForSymmetry = 64;
 
-/// Mean of `values` ([height][width]) over a square of 2·radius + 1 about each place, as much of it as lies
-/// in the image.
-std::vector<double> windowMeans(std::span<const double> values, std::uint32_t width, std::uint32_t height,
-                                std::uint32_t radius);
-
 }  // namespace crt::stats

@@ -1,0 +1,61 @@
+#include "film/pooled_variance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace crt::stats {
+
+std::vector<double> windowMeans(std::span<const double> values, std::uint32_t width, std::uint32_t height,
+                                std::uint32_t radius) {
+    // Along rows, then along columns: a mean over the square is a mean of means, every row being cut alike.
+    const auto along = [radius](std::span<const double> from, std::vector<double>& to, std::size_t first,
+                                std::size_t step, std::uint32_t count) {
+        for (std::uint32_t i = 0; i < count; ++i) {
+            const std::uint32_t begin = i > radius ? i - radius : 0, end = std::min(count, i + radius + 1);
+            double sum = 0;
+            for (std::uint32_t j = begin; j < end; ++j) sum += from[first + j * step];
+            to[first + i * step] = sum / (end - begin);
+        }
+    };
+    std::vector<double> rows(values.size()), means(values.size());
+    for (std::uint32_t y = 0; y < height; ++y) along(values, rows, std::size_t{y} * width, 1, width);
+    for (std::uint32_t x = 0; x < width; ++x) along(rows, means, x, width, height);
+    return means;
+}
+
+PooledVariances pooledVariances(std::span<const double> own, std::uint32_t width, std::uint32_t height,
+                                double dof) {
+    double largest = 0;  // In units of which no square overflows.
+    for (const double v : own)
+        if (std::isfinite(v)) largest = std::max(largest, v);
+    const double unit = largest > 0 ? largest : 1;
+    const auto means = [&](const auto& of) {
+        std::vector<double> values(own.size());
+        for (std::size_t i = 0; i < own.size(); ++i)
+            values[i] = std::isfinite(own[i]) ? of(own[i] / unit) : 0;
+        return windowMeans(values, width, height, kPooledRadius);
+    };
+    const std::vector<double> known = means([](double) { return 1.0; });
+    const std::vector<double> sums = means([](double v) { return v; });
+    const std::vector<double> squares = means([](double v) { return v * v; });
+    const auto across = [](std::size_t at, std::uint32_t size) {
+        const std::size_t begin = at > kPooledRadius ? at - kPooledRadius : 0;
+        return static_cast<double>(std::min<std::size_t>(at + kPooledRadius + 1, size) - begin);
+    };
+    PooledVariances pooled;
+    pooled.variances.assign(own.begin(), own.end());
+    pooled.degrees_of_freedom.assign(own.size(), dof);
+    for (std::size_t i = 0; i < own.size(); ++i) {
+        if (!std::isfinite(own[i])) continue;
+        pooled.variances[i] = std::max(own[i], sums[i] / known[i] * unit);
+        if (!(squares[i] > 0)) continue;
+        // The estimates' squares are too large by 1 + 2/dof on average.
+        const double pixels = across(i % width, width) * across(i / width, height);
+        const double equal = pixels * sums[i] * sums[i] / squares[i] * (1 + 2 / dof);
+        pooled.degrees_of_freedom[i] = dof * std::clamp(equal, 1.0, std::max(1.0, pixels * known[i]));
+    }
+    return pooled;
+}
+
+}  // namespace crt::stats

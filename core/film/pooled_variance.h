@@ -1,0 +1,32 @@
+/// Variances of single pixels that can be used: with one degree of freedom a pixel's own is 0 by chance as
+/// often as it is too large, and neighbours have noise alike.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace crt::stats {
+
+/// Pixels on each side that are pooled: 7 × 7.
+inline constexpr std::uint32_t kPooledRadius = 3;
+
+/// Mean of `values` ([height][width]) over a square of 2·radius + 1 about each place, as much of it as lies
+/// in the image.
+std::vector<double> windowMeans(std::span<const double> values, std::uint32_t width, std::uint32_t height,
+                                std::uint32_t radius);
+
+/// Of the means of an image's pixels, [height][width].
+struct PooledVariances {
+    std::vector<double> variances;  ///< The larger of the pixel's own and of the mean about it.
+    /// Of the mean about it: so many as its equal variances would have (Satterthwaite 1946), and at least
+    /// those of one pixel.
+    std::vector<double> degrees_of_freedom;
+};
+
+/// From estimates with `dof` degrees of freedom each; infinite ones are not known, add nothing to their
+/// neighbours' and stay infinite.
+PooledVariances pooledVariances(std::span<const double> own, std::uint32_t width, std::uint32_t height,
+                                double dof);
+
+}  // namespace crt::stats
