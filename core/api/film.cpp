@@ -3,6 +3,7 @@
 #include "film/error_estimate.h"
 #include "image/image_io.h"
 #include "render/outputs.h"
+#include "render/sampling.h"
 #include "scene/aov.h"
 
 #include <fmt/format.h>
@@ -99,6 +100,11 @@ std::optional<ErrorEstimate> Film::error() const {
                          .relative_rmse_upper = found->relative_rmse_95.upper,
                          .half_width_95 = found->half_width_95,
                          .mean_luminance = found->mean_luminance};
+}
+
+bool Film::errorWithin(double target) const {
+    const auto& [film, identity] = impl_->film;
+    return reachesTarget(film, target, identity.record->independent_samples);
 }
 
 Image Film::develop(const DevelopOptions& options) const {

@@ -9,7 +9,7 @@
 
 namespace crt {
 
-std::string errorText(const ErrorEstimate& error) {
+std::string expectedErrorText(const ErrorEstimate& error) {
     if (error.knowledge == ErrorKnowledge::NotYet) return "error not yet known";
     if (error.knowledge == ErrorKnowledge::Bound) return "error below " + percentText(error.relative_rmse);
     const double lower = error.relative_rmse_95.lower * 100, upper = error.relative_rmse_95.upper * 100;
@@ -17,6 +17,13 @@ std::string errorText(const ErrorEstimate& error) {
         std::clamp(-static_cast<int>(std::floor(std::log10(std::max(upper - lower, 1e-6)))), 1, 6);
     return fmt::format("error {:.{}f} % ({:.{}f}-{:.{}f})", error.relative_rmse * 100, digits, lower, digits,
                        upper, digits);
+}
+
+std::string errorText(const ErrorEstimate& error) {
+    const std::string expected = expectedErrorText(error);
+    return error.known() ? fmt::format("{} expected, of this image at most {}", expected,
+                                       percentText(error.half_width_95))
+                         : expected;
 }
 
 std::string sampleCountText(const stats::Interval& samples) {

@@ -49,7 +49,8 @@ def render(scene, client=None, *, spp=None, parts=None, backend="auto", devices=
     parts             so many, of equal size; of a size that follows the workers' speed when None
     backend, devices, threads   as crt.render takes them, on each worker and for each of its threads
     target_error      stop at this half-width of the error, relative to the mean luminance, in (0, 1). It is
-                      looked at when the number of samples has doubled (docs/error.md), of the whole image
+                      looked at when the number of samples has doubled, of all pixels and of the even and the
+                      odd ones, as `crt render` does (docs/error.md)
     time_limit        stop after so many seconds; parts that run then end early, and count
     checkpoint        path of a .crtfilm: what there is comes into it every `checkpoint_every` seconds, and
                       at the end. Where it exists, only what it lacks is rendered
@@ -178,7 +179,7 @@ class Look:
             return False  # It was merged for a checkpoint.
         while self.next <= work.kept.samples:
             self.next *= 2
-        return work.error is not None and work.error.half_width_95 <= self.target
+        return work.kept.error_within(self.target)
 
 
 def told(work, wanted, time_limit):

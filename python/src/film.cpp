@@ -68,8 +68,12 @@ crt::Image develop(const crt::Film& film, bool for_display, std::optional<double
 void bindFilm(nb::module_& module) {
     module.def("sum_films", &sumOfAll, "films"_a, nb::call_guard<nb::gil_scoped_release>());
 
-    nb::class_<crt::ErrorEstimate>(module, "ErrorEstimate",
-                                   "What a film knows of its own error, relative to the mean luminance.")
+    nb::class_<crt::ErrorEstimate>(
+        module, "ErrorEstimate",
+        "What a film knows of its own error, relative to the mean luminance:\n"
+        "relative_rmse with relative_rmse_lower and _upper is the expected error,\n"
+        "over seeds, with its 95 % interval; half_width_95 is what the error of\n"
+        "this image is at most, with a probability of 95 %.")
         .def_ro("relative_rmse", &crt::ErrorEstimate::relative_rmse)
         .def_ro("relative_rmse_lower", &crt::ErrorEstimate::relative_rmse_lower)
         .def_ro("relative_rmse_upper", &crt::ErrorEstimate::relative_rmse_upper)
@@ -88,6 +92,10 @@ void bindFilm(nb::module_& module) {
         .def_prop_ro("xyz", &xyzOf, nb::rv_policy::automatic)
         .def_prop_ro("counts", &countsOf, nb::rv_policy::automatic)
         .def_prop_ro("error", &crt::Film::error)
+        .def("error_within", &crt::Film::errorWithin, "target"_a,
+             "Whether `crt render --target-error` would stop: half_width_95 is at most the target for all\n"
+             "pixels, and for the even and for the odd ones of a checkerboard.",
+             nb::call_guard<nb::gil_scoped_release>())
         .def("develop", &develop, "for_display"_a = false, "exposure_ev"_a = nb::none(),
              "aovs"_a = std::vector<std::string>(), nb::call_guard<nb::gil_scoped_release>())
         .def(

@@ -8,6 +8,7 @@ import sys
 import textwrap
 import threading
 import time
+import types
 
 import numpy as np
 import pytest
@@ -221,6 +222,22 @@ def test_target_error(threads_client, box):
     assert result.stop == "target" and result.error.half_width_95 <= target
     assert 2 * first <= result.film.samples < 16 * first
     assert crt.distributed.render(box, threads_client, target_error=0.5, **ONE).film.samples >= first
+
+
+def test_target_error_is_looked_at_as_by_the_program(box):
+    """The even and the odd pixels can each veto what the whole image would stop at."""
+    result = crt.render(box, spp=256, backend="embree", target_error=1e-6)
+    error = result.report["error"]
+    whole = error["half_width_95"]
+    halves = [error["judged"][name]["half_width_95"] for name in ("even_pixels", "odd_pixels")]
+    assert max(halves) > whole, "a seed that asks nothing"
+    between = 0.5 * (whole + max(halves))
+    look = crt.distributed.Look(between, result.film)
+    look.next = 1
+    assert not look.reached(types.SimpleNamespace(kept=result.film, error=result.error))
+    look.target = 1.01 * max(halves)
+    look.next = 1
+    assert look.reached(types.SimpleNamespace(kept=result.film, error=result.error))
 
 
 def test_scene_error_is_raised_once_and_here(client):

@@ -15,9 +15,10 @@
 
 CRT_API_NAMESPACE_BEGIN
 
-/// What a film knows of its own error, relative to the image's mean luminance (docs/error.md).
+/// What a film knows of its own error, relative to the image's mean luminance (docs/error.md): two numbers,
+/// one of all images that differ in their seeds alone, one of this image.
 struct ErrorEstimate {
-    /// Expected root mean square error over the pixels, and its 95 % interval.
+    /// The expected error: root mean square over the pixels and over seeds, and its 95 % interval.
     double relative_rmse = 0;
     double relative_rmse_lower = 0, relative_rmse_upper = 0;
     /// With probability 95 % the error that this image really has is at most this.
@@ -65,6 +66,9 @@ public:
     std::array<double, 3> mean(std::uint32_t x, std::uint32_t y) const;
     /// Nothing where it is not known: too few samples, or one Sobol sequence.
     std::optional<ErrorEstimate> error() const;
+    /// Whether crt render --target-error would stop: the error is known and half_width_95 at most `target`
+    /// of all pixels, and of the even and of the odd ones of a checkerboard.
+    bool errorWithin(double target) const;
 
     /// Film → image in the scene's colour space.
     Image develop(const DevelopOptions& options = {}) const;
