@@ -5,24 +5,24 @@
 //         the stated error against the real one, at many numbers of samples
 //     error_calibration price BACKEND SCENE SIDE SAMPLER SEEDS
 //         the error of an image with replicates, and of one sequence
-//     error_calibration stop BACKEND SCENE SIDE SAMPLER SEEDS TARGET MOST
-//         what --target-error stops at
 //
 // SCENE is a file, rendered at SIDE x SIDE pixels. SAMPLER: sobol or independent. The real error is the
-// spread between seeds; for `stop`, the distance from the mean of independent renders of MOST samples with
-// other seeds.
+// spread between seeds.
 #include "backend/integrator.h"
 #include "backend/loader.h"
 #include "base/log.h"
 #include "base/statistics.h"
 #include "film/error_estimate.h"
-#include "render/sampling.h"
+#include "film/pooled_variance.h"
 #include "scene/yaml/scene_yaml.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -32,9 +32,11 @@ using namespace crt;
 namespace {
 
 /// Powers of two, one more, and numbers that a time limit or Ctrl-C might leave.
-constexpr std::uint64_t kSamples[] = {32, 33, 64, 65, 100, 129, 300, 513, 700, 1000, 1024};
-constexpr std::uint64_t kReferenceSeed = 1'000'003;
-constexpr int kReferenceRenders = 8;
+constexpr std::uint64_t kSamples[] = {16, 32, 33, 64, 100, 128, 256, 300, 512, 1000, 1024};
+/// --target-error is asked for so many times the real error at the last of these.
+constexpr double kTargets[] = {0.6, 0.7, 0.8, 0.9, 1, 1.1, 1.2, 1.3};
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
 
 struct Setup {
     Integrator* integrator;
@@ -142,18 +144,122 @@ double relativeDistance(const std::vector<double>& a, const std::vector<double>&
     return std::sqrt(squares / static_cast<double>(a.size())) / meanOf(truth);
 }
 
-void stated(const Setup& setup, std::uint64_t seeds) {
-    // The last: what a merge of two machines' unequal ranges leaves.
-    std::map<std::string, std::vector<SampleRange>> kinds;
-    std::map<std::string, Images> images;
-    std::map<std::string, std::vector<ErrorEstimate>> estimates;
-    std::vector<std::string> order;
+/// What one image of one number of samples says of itself.
+struct Statement {
+    ErrorEstimate error;
+    double stops_at = 0;               ///< The least target that --target-error would have reached.
+    std::vector<double> pixel_errors;  ///< Standard errors of the pixels, as the image has them.
+};
+
+Statement statementOf(const Film& film, bool independent) {
+    Statement s;
+    const auto estimate = [&](PixelSet which) { return estimateError(film, which, independent); };
     ErrorEstimate nothing;
     nothing.knowledge = ErrorKnowledge::NotYet;
-    const auto look = [&](const std::string& name, const Film& film) {
-        if (images.find(name) == images.end()) order.push_back(name);
-        images[name].add(luminanceOf(film));
-        estimates[name].push_back(estimateError(film, PixelSet::All, setup.independent()).value_or(nothing));
+    s.error = estimate(PixelSet::All).value_or(nothing);
+    for (const PixelSet which : {PixelSet::All, PixelSet::Even, PixelSet::Odd}) {
+        const std::optional<ErrorEstimate> e = estimate(which);
+        s.stops_at = std::max(s.stops_at, e && e->known() ? e->half_width_95 : kNever);
+    }
+    const LuminanceVariance variance(film);
+    const std::uint32_t width = film.shape().width, height = film.shape().height;
+    std::vector<double> own;
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x) own.push_back(variance(x, y));
+    s.pixel_errors = stats::pooledVariances(own, width, height, variance.degreesOfFreedom()).variances;
+    for (double& v : s.pixel_errors) v = std::sqrt(v);
+    return s;
+}
+
+/// All seeds' images of one number of samples, and what they say.
+struct Looks {
+    Images images;
+    std::vector<Statement> statements;
+
+    /// The mean of the other seeds, and by what the distance to it is too large: its own error.
+    std::vector<double> others(std::size_t seed) const {
+        std::vector<double> mean = images.sum();
+        for (std::size_t k = 0; k < mean.size(); ++k)
+            mean[k] = (mean[k] - images.all()[seed][k]) / (images.count() - 1);
+        return mean;
+    }
+    double excess() const { return std::sqrt(1 + 1 / (images.count() - 1)); }
+    double ownError(std::size_t seed) const {
+        return relativeDistance(images.all()[seed], others(seed)) / excess();
+    }
+};
+
+/// Root mean square of the pixels' deviations in units of what they state, and the share within 1.96: of
+/// pixels that any seed's light reaches.
+std::pair<double, double> pixelScores(const Looks& looks) {
+    double squares = 0, within = 0, count = 0;
+    for (std::size_t i = 0; i < looks.statements.size(); ++i) {
+        const std::vector<double>&y = looks.images.all()[i], &stated = looks.statements[i].pixel_errors;
+        const std::vector<double> truth = looks.others(i);
+        for (std::size_t k = 0; k < y.size(); ++k) {
+            if (y[k] == truth[k]) continue;
+            const double z = std::abs(y[k] - truth[k]) / looks.excess() / stated[k];
+            // One that nobody near has met would be infinitely wrong: it counts as beyond, and not in the
+            // mean.
+            if (std::isfinite(z)) squares += z * z;
+            within += z <= 1.96;
+            count += 1;
+        }
+    }
+    return {std::sqrt(squares / count), within / count};
+}
+
+void printLook(const std::string& name, const Looks& looks) {
+    const double truth = looks.images.relativeRmse();
+    int known = 0, covered = 0, within = 0, mean_covered = 0;
+    double ratio = 0, squares = 0, dof = 0;
+    for (std::size_t i = 0; i < looks.statements.size(); ++i) {
+        const ErrorEstimate& e = looks.statements[i].error;
+        dof += e.degrees_of_freedom / looks.images.count();
+        squares += e.relative_rmse * e.relative_rmse / looks.images.count();
+        if (!e.known()) continue;
+        ++known;
+        covered += e.relative_rmse_95.contains(truth);
+        ratio += e.relative_rmse / truth;
+        within += looks.ownError(i) <= e.half_width_95;
+        const double mean = meanOf(looks.others(i)), seen = meanOf(looks.images.all()[i]);
+        mean_covered += std::abs(seen - mean) / looks.excess() <= e.meanInterval(0.95).halfWidth();
+    }
+    const auto [z, z_within] = pixelScores(looks);
+    fmt::print(
+        "{{\"samples\": \"{}\", \"seeds\": {}, \"true\": {}, \"true_error\": {}, \"known\": {}, "
+        "\"covered\": {}, \"within_half_width\": {}, \"mean_covered\": {}, \"ratio\": {}, "
+        "\"ratio_of_all\": {}, \"degrees_of_freedom\": {}, \"pixel_z\": {}, \"pixels_within\": {}}}\n",
+        name, looks.statements.size(), truth, looks.images.relativeError(), known, covered, within,
+        mean_covered, known > 0 ? ratio / known : 0, std::sqrt(squares) / truth, dof, z, z_within);
+}
+
+/// What --target-error would have stopped at, and how often the image was worse than its target. It looks
+/// when the number of samples is a power of two from 64 on, earlier than crt does with so few pixels.
+void printStops(const std::map<std::uint64_t, Looks>& looks) {
+    const double real = looks.rbegin()->second.images.relativeRmse();
+    for (const double target : kTargets) {
+        int stopped = 0, wrong = 0;
+        const std::size_t seeds = looks.begin()->second.statements.size();
+        for (std::size_t i = 0; i < seeds; ++i)
+            for (const auto& [samples, look] : looks) {
+                if (samples < 64 || !std::has_single_bit(samples)) continue;
+                if (look.statements[i].stops_at > target * real) continue;
+                ++stopped;
+                wrong += look.ownError(i) > target * real;
+                break;
+            }
+        fmt::print("{{\"target\": {}, \"seeds\": {}, \"stopped\": {}, \"wrong\": {}}}\n", target, seeds,
+                   stopped, wrong);
+    }
+}
+
+void stated(const Setup& setup, std::uint64_t seeds) {
+    std::map<std::uint64_t, Looks> looks;
+    Looks merged;  // What a merge of two machines' unequal ranges leaves.
+    const auto look = [&](Looks& at, const Film& film) {
+        at.images.add(luminanceOf(film));
+        at.statements.push_back(statementOf(film, setup.independent()));
     };
     for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
         Progressive progressive(setup, setup.scene(seed));
@@ -161,47 +267,16 @@ void stated(const Setup& setup, std::uint64_t seeds) {
         for (const std::uint64_t samples : kSamples) {
             progressive.render({there, samples});
             there = samples;
-            look(fmt::format("{}", samples), progressive.film());
+            look(looks[samples], progressive.film());
         }
         progressive.restart();
         progressive.render({0, 101});
         progressive.render({1000, 1233});
-        look("101 + 233", progressive.film());
+        look(merged, progressive.film());
     }
-    for (const std::string& name : order) {
-        const Images& all = images[name];
-        const double truth = all.relativeRmse();
-        int known = 0, covered = 0, within = 0;
-        double ratio = 0, squares = 0, dof = 0;
-        for (std::size_t i = 0; i < estimates[name].size(); ++i) {
-            const ErrorEstimate& e = estimates[name][i];
-            dof += e.degrees_of_freedom / all.count();
-            squares += e.relative_rmse * e.relative_rmse / all.count();
-            if (!e.known()) continue;
-            ++known;
-            covered += e.relative_rmse_95.contains(truth);
-            ratio += e.relative_rmse / truth;
-            // Against the mean of the other seeds, whose own error is 1/(seeds - 1) of this one's square.
-            std::vector<double> others = all.sum();
-            for (std::size_t k = 0; k < others.size(); ++k)
-                others[k] = (others[k] - all.all()[i][k]) / (all.count() - 1);
-            within += relativeDistance(all.all()[i], others) / std::sqrt(1 + 1 / (all.count() - 1)) <=
-                      e.half_width_95;
-        }
-        std::string rows;
-        for (const ErrorEstimate& e : estimates[name])
-            rows += fmt::format("{}[{:.6g}, {:.5g}, {:.4g}, {:.6g}]", rows.empty() ? "" : ", ",
-                                e.relative_rmse / truth, e.degrees_of_freedom,
-                                e.relative_rmse_95.lower / truth, e.relative_rmse_95.upper / truth);
-        fmt::print("{{\"rows\": [{}], ", rows);
-        fmt::print(
-            "\"samples\": \"{}\", \"seeds\": {}, \"true\": {}, \"true_error\": {}, \"known\": {}, "
-            "\"covered\": {}, \"within_half_width\": {}, \"ratio\": {}, "
-            "\"ratio_of_all\": {}, \"degrees_of_freedom\": {}}}\n",
-            name, seeds, truth, all.relativeError(), known, covered, within, known > 0 ? ratio / known : 0,
-            std::sqrt(squares) / truth, dof);
-        std::fflush(stdout);
-    }
+    for (const auto& [samples, at] : looks) printLook(fmt::format("{}", samples), at);
+    printLook("101 + 233", merged);
+    printStops(looks);
 }
 
 void price(const Setup& setup, std::uint64_t seeds) {
@@ -224,45 +299,12 @@ void price(const Setup& setup, std::uint64_t seeds) {
             without[samples].relativeError());
 }
 
-void stop(const Setup& setup, std::uint64_t seeds, double target, std::uint64_t most) {
-    std::vector<double> truth;
-    Setup independent = setup;
-    independent.sampler = "independent";
-    for (int i = 0; i < kReferenceRenders; ++i) {
-        Progressive reference(independent,
-                              independent.scene(kReferenceSeed + static_cast<std::uint64_t>(i)));
-        reference.render({0, 16 * most / kReferenceRenders});
-        const std::vector<double> y = luminanceOf(reference.film());
-        truth.resize(y.size());
-        for (std::size_t k = 0; k < y.size(); ++k) truth[k] += y[k] / kReferenceRenders;
-    }
-    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
-        Progressive progressive(setup, setup.scene(seed));
-        std::uint64_t there = 0;
-        bool reached = false;
-        Film film = progressive.film();
-        while (!reached && there < most) {
-            const std::uint64_t next = nextTargetCheck(there, film.counts.size());
-            progressive.render({there, next});
-            there = next;
-            film = progressive.film();
-            reached = reachesTarget(film, target, setup.independent());
-        }
-        fmt::print("{{\"seed\": {}, \"samples\": {}, \"reached\": {}, \"actual\": {}}}\n", seed, there,
-                   reached, relativeDistance(luminanceOf(film), truth));
-        std::fflush(stdout);
-    }
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
     const std::string mode = argc > 1 ? argv[1] : "";
-    const bool is_stop = mode == "stop";
-    if (argc != (is_stop ? 9 : 7) || (mode != "stated" && mode != "price" && !is_stop)) {
-        std::fprintf(stderr,
-                     "error_calibration stated|price BACKEND SCENE SIDE SAMPLER SEEDS\nerror_calibration "
-                     "stop BACKEND SCENE SIDE SAMPLER SEEDS TARGET MOST\n");
+    if (argc != 7 || (mode != "stated" && mode != "price")) {
+        std::fprintf(stderr, "error_calibration stated|price BACKEND SCENE SIDE SAMPLER SEEDS\n");
         return 2;
     }
     const Listener listener(standardErrorSink(), LogLevel::Error);
@@ -271,9 +313,10 @@ int main(int argc, char** argv) {
         Integrator integrator(loadBackend(argv[2]), {});
         const Setup setup{&integrator, argv[3], argv[5], std::stoi(argv[4])};
         const std::uint64_t seeds = std::stoull(argv[6]);
-        if (mode == "stated") stated(setup, seeds);
-        else if (mode == "price") price(setup, seeds);
-        else stop(setup, seeds, std::stod(argv[7]), std::stoull(argv[8]));
+        if (mode == "stated")
+            stated(setup, seeds);
+        else
+            price(setup, seeds);
         return 0;
     } catch (const Error& error) {
         std::fprintf(stderr, "error_calibration: %s\n", error.what());

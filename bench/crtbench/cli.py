@@ -39,7 +39,7 @@ COMMANDS = {
     "robustness": (robustness, "what the watertight triangle test and the offsets cost, and what they buy"),
     "calibration": (
         calibration,
-        "does the error that an image states of itself hold? 100 seeds of five scenes, many numbers of "
+        "does the error that an image states of itself hold? 40 seeds of fifteen scenes, many numbers of "
         "samples",
     ),
     "false-alarms": (
