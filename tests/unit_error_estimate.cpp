@@ -336,7 +336,7 @@ TEST_CASE("of one sequence of independent samples an interval narrows with their
     const ErrorEstimate many = estimate(16 * kFew);
     INFO(covered << " of " << kImages << ", relative width " << width);
     CHECK(covered >= 0.9 * kImages);  // 180 of 200 at 95 %: fewer in one of 400 runs.
-    CHECK(width < 1);                 // How six pixels differ gives 5.
+    CHECK(width < 1);                 // How six pixels differ gives 1.5.
     CHECK(many.relative_rmse_95.upper / many.relative_rmse_95.lower - 1 == Approx(width / 4).epsilon(0.25));
 }
 

@@ -14,13 +14,13 @@ constexpr std::size_t kNoisiest = 256, kTail = 10;
 
 /// One path carries a pixel whose standard error is at least so much of what the pixel has more or less than
 /// those about it. Exactly 1 for one path on a background without noise.
-constexpr double kOnePath = 0.25;
+constexpr double kOnePath = 0.5;
 
 /// Of the largest variance: below it a difference between replicates is rounding.
 constexpr double kRounding = 1e-12;
 
-/// Fewer pixels' share of the variance decides nothing.
-constexpr double kShare = 0.1;
+/// A tail that would have less of the variance after ten times as many paths decides nothing.
+constexpr double kMorePaths = 10, kShare = 0.1;
 
 /// Below it the sum of variances has no mean.
 constexpr double kDivergent = 1;
@@ -78,7 +78,8 @@ ErrorTail errorTail(const Film& film, std::span<NoisyPixel> pixels) {
 }
 
 bool tailIsOpen(const ErrorTail& tail, double degrees_of_freedom, double paths) {
-    if (tail.share < kShare) return false;
+    // The largest of n draws grows as n^(1/α), while the variance of all others grows as n.
+    if (tail.share * std::pow(kMorePaths, 1 / tail.index - 1) < kShare) return false;
     return (tail.index < kDivergent && degrees_of_freedom < kMetOften) ||
            (tail.index < kNearlyDivergent && paths < kFewPaths);
 }
