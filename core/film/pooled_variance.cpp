@@ -1,10 +1,25 @@
 #include "film/pooled_variance.h"
 
+#include "base/statistics.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 
 namespace crt::stats {
+namespace {
+
+/// E[1/max(χ²/dof, 1)]: by what the square of a deviation over the larger of its own variance and the true
+/// one is too small. 0.849 for one degree of freedom. Midpoint rule over the quantiles.
+double meanOfScores(double dof) {
+    constexpr int kPoints = 1000;
+    double sum = 0;
+    for (int i = 0; i < kPoints; ++i)
+        sum += 1 / std::max(1.0, chiSquaredQuantile((i + 0.5) / kPoints, dof) / dof);
+    return sum / kPoints;
+}
+
+}  // namespace
 
 std::vector<double> windowMeans(std::span<const double> values, std::uint32_t width, std::uint32_t height,
                                 std::uint32_t radius) {
@@ -43,15 +58,17 @@ PooledVariances pooledVariances(std::span<const double> own, std::uint32_t width
         const std::size_t begin = at > kPooledRadius ? at - kPooledRadius : 0;
         return static_cast<double>(std::min<std::size_t>(at + kPooledRadius + 1, size) - begin);
     };
+    const double scores = dof >= 1 ? meanOfScores(dof) : 1;
     PooledVariances pooled;
     pooled.variances.assign(own.begin(), own.end());
     pooled.degrees_of_freedom.assign(own.size(), dof);
     for (std::size_t i = 0; i < own.size(); ++i) {
         if (!std::isfinite(own[i])) continue;
-        pooled.variances[i] = std::max(own[i], sums[i] / known[i] * unit);
+        const double pixels = across(i % width, width) * across(i / width, height);
+        const double correction = 1 - (1 - scores) * (1 - 1 / (pixels * known[i]));  // 1 without neighbours.
+        pooled.variances[i] = std::max(own[i], sums[i] / known[i] * unit) * correction;
         if (!(squares[i] > 0)) continue;
         // The estimates' squares are too large by 1 + 2/dof on average.
-        const double pixels = across(i % width, width) * across(i / width, height);
         const double equal = pixels * sums[i] * sums[i] / squares[i] * (1 + 2 / dof);
         pooled.degrees_of_freedom[i] = dof * std::clamp(equal, 1.0, std::max(1.0, pixels * known[i]));
     }

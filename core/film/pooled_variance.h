@@ -18,7 +18,9 @@ std::vector<double> windowMeans(std::span<const double> values, std::uint32_t wi
 
 /// Of the means of an image's pixels, [height][width].
 struct PooledVariances {
-    std::vector<double> variances;  ///< The larger of the pixel's own and of the mean about it.
+    /// The larger of the pixel's own and of the mean about it; less the part by which the larger of two is
+    /// too large, so that among equal pixels deviations over their standard errors have mean square 1.
+    std::vector<double> variances;
     /// Of the mean about it: so many as its equal variances would have (Satterthwaite 1946), and at least
     /// those of one pixel.
     std::vector<double> degrees_of_freedom;
