@@ -27,7 +27,6 @@ using namespace conformance;
 
 namespace {
 
-/// A small box with something of everything; `extra` adds or replaces top-level parts.
 /// What glass can be beside smooth: of a scene of its own, so that others keep their bits.
 constexpr const char* kGlasswareMaterials = R"(
   frosted: {type: rough_dielectric, ior: 1.5, roughness: 0.5}
