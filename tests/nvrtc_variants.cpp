@@ -70,7 +70,7 @@ std::map<std::uint64_t, std::string> representativeMasks() {
         {mesh | CRT_FEATURE_ROUGH_DIELECTRIC | CRT_FEATURE_DISPERSION, "a mesh of dispersive rough glass"},
         {mesh | CRT_FEATURE_THIN_DIELECTRIC, "a mesh of panes"},
         {mesh | CRT_FEATURE_PLASTIC, "a mesh of plastic"},
-        {mesh | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ABSORPTION, "a mesh of absorbing glass"},
+        {mesh | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_MEDIA, "a mesh of absorbing glass"},
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT, "a mesh, sampled environment"},
         {mesh | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT | CRT_FEATURE_ENVIRONMENT_IMAGE,
          "a mesh, environment image"},

@@ -120,7 +120,7 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         other(crt::MaterialType::Plastic)(s);
         s.materials[1].roughness = 0.5;  // what its coat reflects is a table
     });
-    seen |= differs(CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ABSORPTION, 0, [&](Scene& s) {
+    seen |= differs(CRT_FEATURE_DIELECTRIC | CRT_FEATURE_MEDIA, 0, [&](Scene& s) {
         other(crt::MaterialType::Dielectric)(s);
         s.materials[1].absorption = crt::constantSpectrum(2);
     });

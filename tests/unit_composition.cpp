@@ -127,7 +127,7 @@ TEST_CASE("opacity: rays pass as often as it says, and go on behind the surface"
             ray.o = make_vec3(-0.25f, -0.5f, 1);
             ray.d = kFromFront;
             ray.reach = CRT_INFINITY;
-            if (!crt_passes(&ctx, sheet.hit, &sampler, CRT_DIM_PASS + static_cast<u32>(i & 7), &ray)) {
+            if (!crt_passes(&ctx, sheet.hit, 0u, &sampler, CRT_DIM_PASS + static_cast<u32>(i & 7), &ray)) {
                 ++stopped;
                 continue;
             }
@@ -190,6 +190,17 @@ TEST_CASE("mix: what a scene may not say", "[composition][yaml]") {
     CHECK(says(refusal("  m: {type: mix, materials: [a, veil]}\n"), "give the opacity to 'm'"));
     CHECK(says(refusal("  m: {type: diffuse, reflectance: 1, opacity: -0.1}\n"), "'opacity'"));
     CHECK(says(refusal("  m: {type: dielectric, ior: 1.5, absorption: 2, opacity: 0.5}\n"), "is closed"));
+
+    // Of glass with one inside, and with two.
+    const auto mixOf = [](const char* one, const char* other) {
+        return fmt::format("  one: {{type: dielectric, {}}}\n  other: {{type: rough_dielectric, roughness: 0.3, "
+                           "{}}}\n  inner: {{type: mix, materials: [b, other]}}\n"
+                           "  m: {{type: mix, materials: [one, inner]}}\n",
+                           one, other);
+    };
+    CHECK(refusal(mixOf("ior: 1.5, absorption: 2", "ior: 1.5, absorption: 2")).empty());
+    CHECK(says(refusal(mixOf("ior: 1.5", "ior: 1.6")), "glass 'one' and glass 'other'"));
+    CHECK(says(refusal(mixOf("ior: 1.5, absorption: 2", "ior: 1.5")), "'absorption' differ"));
 
     // Eight deep, and nine.
     std::string chain = "  m: {type: mix, materials: [a, m1]}\n";

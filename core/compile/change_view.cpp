@@ -1,6 +1,7 @@
 #include "compile/change_view.h"
 
 #include "compile/accelerator.h"
+#include "compile/camera_media.h"
 #include "compile/settings.h"
 #include "kernel/features.h"
 
@@ -16,6 +17,7 @@ bool changeView(CompiledScene& compiled, const Scene& scene, const CompileOption
     kernel::CrtScene changed = header;
     compileView(scene, compiled.centre, compiled.scale_exponent, changed);
     header = changed;
+    findCameraMedia(reinterpret_cast<unsigned char*>(compiled.blob.data()));
     compiled.width = header.width;
     compiled.height = header.height;
     compiled.hash.clear();

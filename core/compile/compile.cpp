@@ -4,6 +4,7 @@
 #include "base/stage.h"
 #include "compile/accelerator.h"
 #include "compile/blob_writer.h"
+#include "compile/camera_media.h"
 #include "compile/distributions.h"
 #include "compile/environment_image.h"
 #include "compile/flatten.h"
@@ -187,6 +188,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.mesh_nodes = blob.append(trees.nodes);
     header.instances = blob.append(compileInstances(flat, trees));
     header.materials = blob.append(materials.records);
+    header.media = blob.append(materials.media);
+    header.medium_bits = mediumBits(materials.media.size());
     header.compositions = blob.append(compileCompositions(used, texture_part));
     header.layers = blob.append(compileLayers(used, tables, spectra, texture_part));
     header.losses = appendLosses(blob, tables.compensations);
@@ -211,6 +214,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 
     CompiledScene out;
     out.blob = blob.finish(header);
+    findCameraMedia(reinterpret_cast<unsigned char*>(out.blob.data()));
     out.size_bytes = out.blob.size() * sizeof(CompiledScene::Line);
     out.features = header.features;
     out.width = header.width;

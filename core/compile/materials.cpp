@@ -1,10 +1,15 @@
 #include "compile/materials.h"
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "kernel/features.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <utility>
 
@@ -121,7 +126,6 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
         case MaterialType::Dielectric:
             record.eta = spectra.valueOf(material.eta);
             if (!material.eta.isConstant()) record.flags |= CRT_MATERIAL_DISPERSIVE;
-            if (material.absorption) record.absorption = spectra.valueOf(*material.absorption);
             break;
         case MaterialType::ThinDielectric: record.eta = spectra.valueOf(material.eta); break;
         case MaterialType::Mix:
@@ -181,6 +185,57 @@ std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material
     return all;
 }
 
+namespace {
+
+/// The glass that is behind the surface of a material, or of what it is made of; null where there is none.
+/// All glass of a mix has the same inside (ObjectReader::checkInsides).
+const Material* glassOf(const Material& material, const std::vector<const Material*>& materials) {
+    if (material.type == MaterialType::Dielectric || material.type == MaterialType::RoughDielectric)
+        return &material;
+    if (material.type != MaterialType::Mix) return nullptr;
+    for (const std::int32_t part : material.parts)
+        if (const Material* glass = glassOf(*materials[static_cast<std::size_t>(part)], materials))
+            return glass;
+    return nullptr;
+}
+
+/// Numbers the media that the materials' surfaces bound, where one of them absorbs or has holes: otherwise
+/// nobody asks. Those that absorb alike have one number; of those with holes each has its own, by which
+/// rays know whether they came in by a hole.
+void numberMedia(const std::vector<const Material*>& materials, const SpectrumTable& spectra,
+                 MaterialPart& part) {
+    std::map<std::pair<kernel::CrtValue, std::size_t>, std::uint32_t> numbers;
+    bool matter = false;
+    for (std::size_t i = 0; i < materials.size(); ++i) {
+        const Material* glass = materials[i] ? glassOf(*materials[i], materials) : nullptr;
+        if (!glass) continue;
+        const kernel::CrtValue absorption = glass->absorption ? spectra.valueOf(*glass->absorption) : 0;
+        const bool holes = !materials[i]->isOpaque();
+        matter |= absorption != 0 || holes;
+        const auto [found, fresh] = numbers.try_emplace({absorption, holes ? i + 1 : 0},
+                                                        static_cast<std::uint32_t>(part.media.size() + 1));
+        if (fresh) part.media.push_back(absorption);
+        part.records[i].medium = found->second;
+    }
+    if (!matter) {
+        part.media.clear();
+        for (kernel::CrtMaterial& record : part.records) record.medium = 0;
+        return;
+    }
+    if (part.media.size() >= std::size_t{1} << 16)
+        throw Error(ErrorKind::Scene,
+                    fmt::format("{} materials of glass absorb differently or have holes; crt tells up to "
+                                "65535 apart",
+                                part.media.size()));
+    part.features |= CRT_FEATURE_MEDIA;
+}
+
+}  // namespace
+
+std::uint32_t mediumBits(std::size_t media) {
+    return media == 0 ? 0 : std::bit_ceil(static_cast<std::uint32_t>(std::bit_width(media)));
+}
+
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const MaterialTables& tables,
                               const SpectrumTable& spectra, const TexturePart& textures) {
     MaterialPart part;
@@ -197,13 +252,13 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         }
         part.features |= 1ul << record.type;
         if ((record.flags & CRT_MATERIAL_DISPERSIVE) != 0) part.features |= CRT_FEATURE_DISPERSION;
-        if (record.absorption != 0) part.features |= CRT_FEATURE_ABSORPTION;
         if (record.film_thickness != 0) part.features |= CRT_FEATURE_THIN_FILM;
         if (record.narrowing > 0) part.features |= CRT_FEATURE_ANISOTROPY;
         if (hasFuzz(*material)) part.features |= CRT_FEATURE_FUZZ;
         if (hasClearcoat(*material)) part.features |= CRT_FEATURE_CLEARCOAT;
         if (hasRoughBase(*material)) part.features |= CRT_FEATURE_ROUGH_BASE;
     }
+    numberMedia(materials, spectra, part);
     return part;
 }
 

@@ -35,8 +35,11 @@ std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material
 
 struct MaterialPart {
     std::vector<kernel::CrtMaterial> records;
-    std::uint64_t features = 0;  ///< Of the materials that are used.
+    std::vector<kernel::CrtValue> media;  ///< What those absorb that their surfaces bound (kernel/medium.h).
+    std::uint64_t features = 0;           ///< Of the materials that are used.
 };
+/// Of the number of one of so many media in a list of them: 1, 2, 4, 8 or 16; 0 where there are none.
+std::uint32_t mediumBits(std::size_t media);
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const MaterialTables& tables,
                               const SpectrumTable& spectra, const TexturePart& textures);
 

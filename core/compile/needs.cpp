@@ -38,8 +38,7 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(traces && header.accelerator == CRT_ACCELERATOR_AABB, CRT_FEATURE_AABB);
     // The albedo of first hits is a material's, even where nothing is scattered.
     if (scatters(scene) || (header.aovs & kAovAlbedo) != 0) f |= materials.features;
-    need(isPath(scene), materials.features & (CRT_FEATURE_ABSORPTION | CRT_FEATURE_OPACITY));
-    need((f & CRT_FEATURE_ABSORPTION) != 0, materials.features & CRT_FEATURE_MIX);
+    need(isPath(scene), materials.features & (CRT_FEATURE_MEDIA | CRT_FEATURE_OPACITY));
     need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
     need(traces && header.shapes.count > 0, CRT_FEATURE_SHAPES);
     need(traces && header.instances.count > 0, CRT_FEATURE_INSTANCES);
@@ -95,7 +94,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_TEXTURE)) left_out("textures", "no value depends on the place");
     if (!has(CRT_FEATURE_DISPERSION))
         left_out("hero wavelength selection", "no index of refraction depends on wavelength");
-    if (!has(CRT_FEATURE_ABSORPTION)) left_out("absorption", "no body absorbs");
+    if (!has(CRT_FEATURE_MEDIA)) left_out("absorption", "no body absorbs");
     if (!has(CRT_FEATURE_MIX)) left_out("mixes of materials", "no material is made of others");
     if (!has(CRT_FEATURE_OPACITY)) left_out("surfaces that rays may pass", "all materials are opaque");
     if (!has(CRT_FEATURE_NORMAL_MAP)) left_out("normal maps", "no material has one");

@@ -51,7 +51,7 @@ kernel::CrtScene settingsOf(kernel::CrtScene header) {
           &header.compositions,      &header.layers,        &header.lights,     &header.point_lights,
           &header.environment_image, &header.spectral_film, &header.losses,     &header.spectra,
           &header.observer,          &header.wavelengths,   &header.filter,     &header.shapes,
-          &header.instances,         &header.mesh_nodes})
+          &header.instances,         &header.mesh_nodes,    &header.media})
         *span = {};
     return header;
 }
@@ -71,6 +71,7 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
              sizeof(CrtPrimitive));
     hash.add(CRT_ARRAY(CrtNormals, blob, header.normals), header.normals.count, sizeof(CrtNormals));
     hash.add(CRT_ARRAY(CrtMaterial, blob, header.materials), header.materials.count, sizeof(CrtMaterial));
+    hash.add(CRT_ARRAY(CrtValue, blob, header.media), header.media.count, sizeof(CrtValue));
     if (header.compositions.count > 0)
         hash.add(CRT_ARRAY(CrtComposition, blob, header.compositions), header.compositions.count,
                  sizeof(CrtComposition));

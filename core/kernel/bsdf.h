@@ -91,7 +91,6 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA | CRT_BSDF_BOUNDS;
                 if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
                 b->eta = outside ? eta : splat4(1.0f) / eta;
-                b->absorption = material.absorption;
                 if (CRT_HAS(THIN_FILM)) {
                     b->k = splat4(0.0f);
                     b->lanes = carried / sum4(carried);
@@ -106,7 +105,6 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_BOUNDS;
                 if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
                 b->eta = outside ? eta : splat4(1.0f) / eta;
-                b->absorption = material.absorption;
                 b->alpha = roughness * roughness;
                 if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
                 b->lanes = carried / sum4(carried);

@@ -9,7 +9,7 @@
 #ifndef CRT_COMPOSITION_H
 #define CRT_COMPOSITION_H
 
-#include "value.h"
+#include "medium.h"
 
 CRT_KERNEL_BEGIN
 
@@ -53,14 +53,20 @@ CRT_CALLED_FN CrtRay crt_ray_behind(CrtRay ray, vec3 p, f32 clearance, vec3 ng) 
     return behind;
 }
 
-/* Whether a ray passes the surface that it meets. If so, it becomes the ray from behind it. */
-CRT_FN int crt_passes(const CrtContext *ctx, CrtHit hit, CrtSampler *sampler, u32 dimension, CrtRay *ray) {
+/* Whether a ray, with `media` around it, passes the surface that it meets. If so, it becomes the ray from
+   behind it. A hole in the surface of a body is one in the body: a ray that came in by a hole is in no glass,
+   and goes out wherever it likes; one that is in the glass meets no hole from there. */
+CRT_FN int crt_passes(const CrtContext *ctx, CrtHit hit, u32 media, CrtSampler *sampler, u32 dimension,
+                      CrtRay *ray) {
     const u32 primitive = crt_primitive_of(ctx, hit);
     const u32 material = CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[primitive].material;
     const CrtValue opacity = crt_compositions(ctx)[material].opacity;
     if (opacity == CRT_OPAQUE) return 0;
     const CrtSurface surface = crt_surface(ctx, hit);
-    if (crt_sample_1d(sampler, dimension) < V4X(crt_value(ctx, opacity, &surface, splat4(0.0f)))) return 0;
+    const u32 medium = CRT_HAS(MEDIA) ? crt_medium_of(ctx, material) : 0u;
+    if (medium != 0u && dot3(ray->d, surface.ng) > 0.0f) {
+        if (crt_surrounds(ctx, media, medium)) return 0;
+    } else if (crt_sample_1d(sampler, dimension) < V4X(crt_value(ctx, opacity, &surface, splat4(0.0f)))) return 0;
     *ray = crt_ray_behind(*ray, surface.p, surface.clearance, surface.ng);
     return 1;
 }

@@ -249,7 +249,8 @@ typedef struct CrtMaterial {
     CrtValue roughness; /* square root of the width α of GGX */
     CrtValue coat; /* plastic: share that a rough coat reflects, by the cosine: a table; 0: smooth. OpenPBR's
                       metals: factor on their reflectance */
-    CrtValue absorption; /* dielectrics: of their inside, per scene unit */
+    u32 medium; /* of what its surface bounds: 1 + its place in CrtScene.media; 0: it bounds none, or no medium
+                   of the scene matters */
     u32 loss; /* rough conductors and dielectrics: index of their CrtLoss */
     CrtValue film_thickness; /* nm, or of film_scale nm; 0: there is no film */
     f32 film_scale;
@@ -513,10 +514,13 @@ typedef struct CrtScene {
     CrtSpan shapes;              /* CrtShape. Where slots are in the order of ids, theirs are the last */
     CrtSpan instances;           /* CrtInstance */
     CrtSpan mesh_nodes;          /* CrtNode4 of the meshes that are instanced */
+    CrtSpan media;               /* CrtValue: what each medium absorbs, per scene unit */
+    u32 medium_bits;             /* of a medium's number in a list of them (medium.h): 1, 2, 4, 8 or 16 */
+    u32 camera_media;            /* such a list: what is around the camera */
     CrtSpan patches;             /* CrtPatch, all triangles; only for brute force */
     CrtSpan occluder_patches;    /* CrtPatch: the triangles that can come between two points of the scene */
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 448);
+CRT_ASSERT_SIZE(CrtScene, 464);
 
 CRT_KERNEL_END
 

@@ -35,12 +35,13 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
     const int passable = ctx->scene->compositions.count != 0u;
     u32 dimension = CRT_DIM_PASS + 2u * CRT_PASSES_MAX * path->depth;
     u32 passed = 0u;
+    u32 media = path->media;
     rays->closest += 1u;
     for (;;) {
         CrtHit hit = crt_no_hit(ray.reach);
         if (ray.reach > 0.0f) hit = crt_trace_closest(ctx, ray);
         if (passable && hit.slot != CRT_NONE && passed < CRT_PASSES_MAX &&
-            crt_passes(ctx, hit, &path->sampler, dimension + passed, &ray)) {
+            crt_passes(ctx, hit, media, &path->sampler, dimension + passed, &ray)) {
             passed += 1u;
             continue;
         }
@@ -58,6 +59,7 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
         rays->shadow += 1u;
         answering = 1;
         ray = shadow.ray;
+        if (CRT_HAS(MEDIA)) media = shadow.media;
         dimension += CRT_PASSES_MAX;
         passed = 0u;
     }

@@ -58,7 +58,6 @@ typedef struct CrtBsdf {
     f32 lost_chance;  /* rough: of sampling what is given back */
     f32 back_share;   /* rough dielectric: of that, this side's */
     CrtLosses losses; /* rough */
-    CrtValue absorption; /* where it bounds a body: of the inside */
     f32 coat_chance;  /* plastic: of sampling the coat */
     CRT_GLOBAL const f32 *coat; /* plastic: table of what it reflects by the cosine; 0: it is smooth */
     CRT_GLOBAL const f32 *base_loss; /* plastic: table of its rough base; 0: Lambert's; otherwise: */

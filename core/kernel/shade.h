@@ -34,7 +34,7 @@ typedef struct CrtPath {
                          inside glass */
     u32 depth;        /* scattering events so far */
     int alone;        /* only the hero wavelength is alive */
-    CrtValue absorption; /* of what the ray begins in */
+    u32 media;        /* around the ray where it begins (medium.h) */
     CrtFirstHit first;
 } CrtPath;
 
@@ -62,7 +62,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     path->eta_square = 1.0f;
     path->depth = 0u;
     path->alone = 0;
-    path->absorption = 0u;
+    path->media = CRT_HAS(MEDIA) ? scene->camera_media : 0u;
     path->first.albedo = splat4(0.0f);
     path->first.normal = make_vec3(0.0f, 0.0f, 0.0f);
     path->first.depth = 0.0f;
@@ -124,11 +124,10 @@ CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path) {
 CRT_FN void crt_absorb(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface) {
     /* From where it was scattered: the ray began a clearance off. */
     const f32 distance = surface != 0 ? length3(surface->p - path->p) : CRT_INFINITY;
-    const CrtValue absorption =
-        surface != 0 ? crt_medium_before(ctx, surface, path->ray.d, path->absorption) : path->absorption;
-    if (absorption == 0u) return;
+    const u32 medium = surface != 0 ? crt_medium_before(ctx, surface, path->ray.d, path->media)
+                                    : crt_first_medium(ctx, path->media);
     path->throughput =
-        path->throughput * crt_transmittance(ctx, absorption, distance, path->wavelengths.position);
+        path->throughput * crt_transmittance(ctx, medium, distance, path->wavelengths.position);
 }
 
 /* A question that a vertex asks, and what it adds to the path's radiance if nothing is met. It is answered
@@ -136,16 +135,17 @@ CRT_FN void crt_absorb(const CrtContext *ctx, CrtPath *path, const CrtSurface *s
 typedef struct CrtShadow {
     int asked;
     CrtRay ray; /* its reach is 0 or less where nothing fits in between */
+    u32 media;  /* around it where it begins */
     vec4 radiance;
 } CrtShadow;
 
 /* What is left of the light that waits for the answer, after its way of `distance` along wi. */
 CRT_FN void crt_absorb_shadow(const CrtContext *ctx, const CrtPath *path, const CrtSurface *surface,
                               const CrtBsdf *bsdf, vec3 wi, f32 distance, CrtShadow *shadow) {
-    const CrtValue absorption = crt_medium_behind(surface, bsdf, wi, path->absorption);
-    if (absorption == 0u) return;
-    shadow->radiance = shadow->radiance *
-                       crt_transmittance(ctx, absorption, distance, path->wavelengths.position);
+    shadow->media = crt_media_behind(ctx, surface, bsdf, wi, path->media);
+    shadow->radiance =
+        shadow->radiance * crt_transmittance(ctx, crt_first_medium(ctx, shadow->media), distance,
+                                             path->wavelengths.position);
 }
 
 /* What light sampling offers a point: a direction, and the light that comes from there if nothing is in the
@@ -274,7 +274,7 @@ CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface
             : crt_value(ctx, CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].radiance, 0,
                         position);
     shadow->radiance = path->throughput * scattered * light * weight;
-    if (CRT_HAS(ABSORPTION))
+    if (CRT_HAS(MEDIA))
         crt_absorb_shadow(ctx, path, surface, bsdf, offer.wi, offer.distance, shadow);
 }
 
@@ -285,7 +285,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     shadow->asked = 0;
     if (hit.slot == CRT_NONE) {
-        if (CRT_HAS(ABSORPTION)) crt_absorb(ctx, path, 0);
+        if (CRT_HAS(MEDIA)) crt_absorb(ctx, path, 0);
         if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE) crt_add_environment(ctx, path);
         if (CRT_HAS(POINT_LIGHT) && scene->point_lights.count != 0u)
             path->radiance = path->radiance +
@@ -295,10 +295,11 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     }
     const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
     CrtSurface surface = crt_surface(ctx, hit);
+    if (CRT_HAS(MEDIA)) surface.medium = crt_medium_of(ctx, surface.material);
     if (CRT_HAS(MIX))
         surface.material =
             crt_chosen_material(ctx, &surface, path->ray.d, &path->sampler, dimension + CRT_DIM_MIX);
-    if (CRT_HAS(ABSORPTION)) crt_absorb(ctx, path, &surface);
+    if (CRT_HAS(MEDIA)) crt_absorb(ctx, path, &surface);
     if (CRT_HAS(AREA_LIGHT) && surface.light != CRT_NONE) crt_add_emission(ctx, path, &surface, hit.t);
 
     const int first = CRT_HAS(AOV) && scene->aovs != 0u && path->depth == 0u;
@@ -337,8 +338,8 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     path->scatter_cosine = crt_scatter_cosine(&bsdf, scatter.wi);
     path->p = surface.p;
     if (CRT_HAS(LIGHT_TREE)) path->side = crt_scattering_side(&bsdf);
-    if (CRT_HAS(ABSORPTION))
-        path->absorption = crt_medium_behind(&surface, &bsdf, scatter.wi, path->absorption);
+    if (CRT_HAS(MEDIA))
+        path->media = crt_media_behind(ctx, &surface, &bsdf, scatter.wi, path->media);
     path->ray.o = crt_offset_origin(surface.p, surface.clearance, surface.ng, scatter.wi);
     path->ray.d = scatter.wi;
     path->ray.reach = CRT_INFINITY;

@@ -30,11 +30,11 @@ CRT_KERNEL_BEGIN
 #define CRT_ROW_RADIANCE 3u
 #define CRT_ROW_WAVELENGTHS 4u  /* positions */
 #define CRT_ROW_POINT 5u        /* where it was scattered; with which density */
-#define CRT_ROW_REST 6u         /* scatter_cosine, eta_square, the wavelengths' number, absorption */
+#define CRT_ROW_REST 6u         /* scatter_cosine, eta_square, the wavelengths' number, media */
 #define CRT_ROW_HIT 7u          /* t, b1, b2, slot of the scene */
 #define CRT_ROW_HIT_IDS 8u      /* primitive, instance */
 #define CRT_ROW_SHADOW_ORIGIN 9u /* and reach */
-#define CRT_ROW_SHADOW_DIRECTION 10u
+#define CRT_ROW_SHADOW_DIRECTION 10u /* and the media around it */
 #define CRT_ROW_SHADOW_RADIANCE 11u
 #define CRT_ROW_SIDE 12u        /* where there is a tree of lights, or where there are AOVs, too: */
 #define CRT_ROW_ALBEDO 13u      /* first hit: */
@@ -135,7 +135,7 @@ CRT_FN void crt_store_vertex(const CrtContext *ctx, const CrtWave *wave, u32 slo
     *crt_row(wave, CRT_ROW_THROUGHPUT, slot) = path->throughput;
     *crt_row(wave, CRT_ROW_POINT, slot) = crt_row_of(path->p, path->scatter_pdf);
     *crt_row(wave, CRT_ROW_REST, slot) = make_vec4(path->scatter_cosine, path->eta_square,
-                                                   path->wavelengths.u, crt_from_bits(path->absorption));
+                                                   path->wavelengths.u, crt_from_bits(path->media));
     if (crt_has_light_tree(ctx)) *crt_row(wave, CRT_ROW_SIDE, slot) = crt_row_of(path->side, 0.0f);
 }
 
@@ -195,7 +195,7 @@ CRT_FN void crt_load_path(const CrtContext *ctx, const CrtWave *wave, u32 slot, 
     path->eta_square = V4Y(rest);
     path->depth = word & 0x1fffffffu;
     path->alone = word >> 31 != 0u;
-    path->absorption = crt_bits(V4W(rest));
+    path->media = crt_bits(V4W(rest));
 }
 
 /* Adds the sample of a path that has ended to the film. */
@@ -249,12 +249,13 @@ CRT_FN int crt_wave_next_sample(const CrtContext *ctx, const CrtWave *wave, u32 
 
 /* What a ray meets where it may pass surfaces, and *ray from behind the last that it has passed. Its random
    numbers follow `dimension` (crt_path_vertex_passing). */
-CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, CrtRay *ray) {
+CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, u32 media, CrtSampler *sampler, u32 dimension,
+                                CrtRay *ray) {
     for (u32 passed = 0u;; ++passed) {
         CrtHit hit = crt_no_hit(ray->reach);
         if (ray->reach > 0.0f) hit = crt_trace_closest(ctx, *ray);
         if (hit.slot == CRT_NONE || passed >= CRT_PASSES_MAX ||
-            !crt_passes(ctx, hit, sampler, dimension + passed, ray))
+            !crt_passes(ctx, hit, media, sampler, dimension + passed, ray))
             return hit;
     }
 }
@@ -279,7 +280,8 @@ CRT_FN void crt_wave_answer(const CrtContext *ctx, const CrtWave *wave, u32 slot
     const vec4 origin = *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot);
     CrtRay ray;
     ray.o = crt_row_vector(origin);
-    ray.d = crt_row_vector(*crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot));
+    const vec4 direction = *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot);
+    ray.d = crt_row_vector(direction);
     ray.reach = V4W(origin);
     int blocked = 0;
     if (ray.reach > 0.0f) {
@@ -288,7 +290,8 @@ CRT_FN void crt_wave_answer(const CrtContext *ctx, const CrtWave *wave, u32 slot
             /* The vertex that asked: crt_shade has counted it where the path goes on. */
             const u32 depth = crt_load_depth(wave, slot) - (state & CRT_WAVE_ENDED ? 0u : 1u);
             CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
-            blocked = crt_trace_passing(ctx, &sampler, crt_passing_dimension(depth) + CRT_PASSES_MAX, &ray)
+            blocked = crt_trace_passing(ctx, crt_bits(V4W(direction)), &sampler,
+                                        crt_passing_dimension(depth) + CRT_PASSES_MAX, &ray)
                           .slot != CRT_NONE;
             crt_store_xorshift(ctx, wave, slot, &sampler);
         } else {
@@ -307,7 +310,9 @@ CRT_FN CrtHit crt_wave_closest(const CrtContext *ctx, const CrtWave *wave, u32 s
     if (crt_wave_passable(ctx)) {
         const vec3 o = ray.o;
         CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
-        hit = crt_trace_passing(ctx, &sampler, crt_passing_dimension(crt_load_depth(wave, slot)), &ray);
+        const u32 media = crt_bits(V4W(*crt_row(wave, CRT_ROW_REST, slot)));
+        hit = crt_trace_passing(ctx, media, &sampler, crt_passing_dimension(crt_load_depth(wave, slot)),
+                                &ray);
         crt_store_xorshift(ctx, wave, slot, &sampler);
         hit.t = hit.t + dot3(ray.o - o, ray.d); /* from where the path's ray began */
     } else {
@@ -388,7 +393,7 @@ CRT_FN void crt_wave_shade(const CrtContext *ctx, const CrtWave *wave, u32 slot)
     if (CRT_HAS(NEE) && shadow.asked) {
         state |= CRT_WAVE_ASKED;
         *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot) = crt_row_of(shadow.ray.o, shadow.ray.reach);
-        *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot) = crt_row_of(shadow.ray.d, 0.0f);
+        *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot) = crt_row_of(shadow.ray.d, crt_from_bits(CRT_HAS(MEDIA) ? shadow.media : 0u));
         *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot) = shadow.radiance;
         /* What its ray takes of a state's numbers follows what the vertex took. */
         if (CRT_HAS(OPACITY) && !alive) crt_store_xorshift(ctx, wave, slot, &path.sampler);

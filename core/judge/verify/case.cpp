@@ -79,7 +79,7 @@ const std::vector<Case>& registry() {
              {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases,
               pointLightCases, environmentCases, spectralFilmCases, stiffCases, scatteringCases,
               glasswareCases, thinFilmCases, anisotropyCases, openPbrCases, openPbrCoatCases,
-              compositionCases, shadingNormalCases, quadricCases, instanceCases, shapeLightCases,
+              compositionCases, bodyCases, shadingNormalCases, quadricCases, instanceCases, shapeLightCases,
               colourCases, textureCases, accumulationCases, cameraCases, firstHitCases, imageCases,
               inputCases, backendCases, exactRelationCases, mutantCases, contactCases})
             for (Case& c : group()) all.push_back(std::move(c));

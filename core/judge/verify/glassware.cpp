@@ -382,7 +382,7 @@ std::vector<Case> glasswareCases() {
             "An absorbing slab before a lamp, from outside and inside; a floor and a lamp under water",
             "(1 − R)² A / (1 − R² A²) and A = exp(−σ d)", "Beer and Lambert; geometric series",
             "± 0.1 %; 1e-5", Level::Commit,
-            sky | light | CRT_FEATURE_NEE | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ABSORPTION | rough,
+            sky | light | CRT_FEATURE_NEE | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_MEDIA | rough,
             absorbingSlab),
     };
 }

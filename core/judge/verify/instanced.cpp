@@ -206,7 +206,7 @@ std::vector<Case> instanceCases() {
             "none gets out; exp(−σ Σd); the value at the place; the same but for edges", "topology; Beer and Lambert",
             "rate ≤ 1e-6; 1e-5; 1e-5 of the scene, but for one ray in 1,000", Level::Commit,
             CRT_FEATURE_INSTANCES | CRT_FEATURE_BVH | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_DIELECTRIC |
-                CRT_FEATURE_ABSORPTION | CRT_FEATURE_AOV | CRT_FEATURE_TEXTURE | CRT_FEATURE_OPACITY |
+                CRT_FEATURE_MEDIA | CRT_FEATURE_AOV | CRT_FEATURE_TEXTURE | CRT_FEATURE_OPACITY |
                 CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_ANISOTROPY | CRT_FEATURE_ROUGH_CONDUCTOR |
                 CRT_FEATURE_POINT_LIGHT,
             instances),

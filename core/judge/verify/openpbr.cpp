@@ -339,7 +339,7 @@ std::vector<Case> openPbrCases() {
             "OpenPBR Surface 1.1", "± 0.2 %; 0", Level::Commit,
             CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_MIX |
                 CRT_FEATURE_DIFFUSE | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ROUGH_DIELECTRIC |
-                CRT_FEATURE_ANISOTROPY | CRT_FEATURE_ABSORPTION | CRT_FEATURE_THIN_FILM |
+                CRT_FEATURE_ANISOTROPY | CRT_FEATURE_MEDIA | CRT_FEATURE_THIN_FILM |
                 CRT_FEATURE_TABLE,
             limits),
         row("G36", "openpbr-emission",

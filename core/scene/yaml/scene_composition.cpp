@@ -48,6 +48,38 @@ void ObjectReader::resolveParts() {
         checkParts({index});
         if (out_.count() != errors_before) return;  // a cycle would be told of each of its materials
     }
+    for (const auto& [index, names] : parts_) checkInsides(index, names[0].place);
+}
+
+/// The glass that a material is or is mixed of, all of it.
+std::vector<const Material*> ObjectReader::glassOf(const Material& material) const {
+    if (material.type == MaterialType::Dielectric || material.type == MaterialType::RoughDielectric)
+        return {&material};
+    std::vector<const Material*> all;
+    if (material.isComposed())
+        for (const std::int32_t part : material.parts)
+            for (const Material* glass : glassOf(scene_.materials[static_cast<std::size_t>(part)]))
+                all.push_back(glass);
+    return all;
+}
+
+/// Light enters a body by one part of a mix and may leave it by another: both must mean the same inside, or
+/// the n² that one gives is not the n² that the other takes.
+void ObjectReader::checkInsides(std::int32_t whole, const YamlPlace& place) const {
+    const Material& material = scene_.materials[static_cast<std::size_t>(whole)];
+    const std::vector<const Material*> all = glassOf(material);
+    const auto absorption = [](const Material& glass) {
+        return glass.absorption.value_or(constantSpectrum(0));
+    };
+    for (const Material* glass : all)
+        if (!(glass->eta == all[0]->eta) || !(absorption(*glass) == absorption(*all[0]))) {
+            out_.error(place,
+                       fmt::format("material '{}' is a mix of glass '{}' and glass '{}', whose 'ior' or "
+                                   "'absorption' differ: what is behind a surface has one of each",
+                                   material.name, all[0]->name, glass->name),
+                       "give both the same 'ior' and the same 'absorption'");
+            return;
+        }
 }
 
 /// Of what an openpbr material is mixed of, too, which has no names.

@@ -64,6 +64,8 @@ private:
     void readParts(const SectionReader& material);
     void resolveParts();
     void checkParts(const std::vector<std::int32_t>& way);
+    std::vector<const Material*> glassOf(const Material& material) const;
+    void checkInsides(std::int32_t whole, const YamlPlace& place) const;
     void readThinFilm(const SectionReader& section, Material& material);
     /// A diffuse material that is rough is a plastic without a coat.
     static void makeRoughDiffuse(Material& material);
