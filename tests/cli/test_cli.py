@@ -203,9 +203,9 @@ class Info(CliTest):
             "normal": "Ns.X, Ns.Y, Ns.Z",
             "depth": "Z",
             "primitive": "id.primitive",
-            "variance": "Variance.Y, OwnVariance.Y",
+            "variance": "OwnVariance.Y, Variance.Y",
             "samples": "sampleCount",
-            "error": "StdError.Y, HalfWidth95.Y, OwnVariance.Y",
+            "error": "HalfWidth95.Y, OwnVariance.Y, StdError.Y",
         }
         schema = json.loads(self.crt("schema").stdout)
         listed = re.findall(r'"aovs".*?"enum": (\[.*?\])', json.dumps(schema))
