@@ -165,6 +165,9 @@ TEST_CASE("every AOV is written by its name in a scene, alone and together", "[s
         const std::vector<std::string> own = exrNames(row);
         CHECK_FALSE(own.empty());
         if (!row.integer) channels.insert(channels.end(), own.begin(), own.end());
+        // What is said of noise comes with what makes it usable in other ways.
+        if (row.aov == kAovError) channels.emplace_back("HalfWidth95.Y");
+        if (row.aov == kAovError || row.aov == kAovVariance) channels.emplace_back("OwnVariance.Y");
         CHECK(image.channels == channels);
         CHECK(image.integer_channels == (row.integer ? own : std::vector<std::string>{}));
         CHECK(image.pixels.size() == 2 * image.channels.size());

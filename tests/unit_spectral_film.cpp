@@ -159,7 +159,7 @@ TEST_CASE("an EXR has bins and responses beside the image, whatever it is develo
         return developedImage({.file = "a", .format = format, .aovs = kAovError, .place = {}}, film,
                               identity);
     };
-    CHECK(image(OutputFormat::Pfm).channels.size() == 4);
+    CHECK(image(OutputFormat::Pfm).channels.size() == 6);  // Three of colour, three of noise.
     const std::string path = directory / "a.exr";
     writeImage(path, OutputFormat::Exr, image(OutputFormat::Exr));
     const Image back = readImage(path);
