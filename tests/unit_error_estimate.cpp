@@ -262,7 +262,7 @@ TEST_CASE("an image whose light few paths carry does not know its error yet", "[
 }
 
 // Paths from a floor to a glossy ball to a point light: the share of them that is brighter than y falls off
-// as y^-1/2, from the brightness of the rest to that of the peak of the ball's lobe. Taken as known, 45 % of
+// as y^-1/2, from the brightness of the rest to that of the peak of the ball's lobe. Taken as known, 27 % of
 // these images would state an interval that does not hold their error.
 TEST_CASE("an image whose brightest paths are not yet met does not know its error", "[error]") {
     constexpr u32 kSide = 32;

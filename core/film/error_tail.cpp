@@ -25,7 +25,7 @@ constexpr double kMorePaths = 10, kShare = 0.1;
 /// Below it the sum of variances has no mean.
 constexpr double kDivergent = 1;
 /// An estimate with more degrees of freedom has met the end of its tail, wherever that is. Of images of a
-/// point light in a glossy ball, those with two to ten have half the error that they should (decision 0058).
+/// point light in a glossy ball, those with two to ten state half their error (decision 0058).
 constexpr double kMetOften = 10;
 
 /// Fewer paths than these show too little of the tail: an index that is not clearly above 1 then counts as
