@@ -198,7 +198,7 @@ int develop(const DevelopArguments& arguments) {
     const std::optional<ErrorEstimate> error =
         estimateError(film, PixelSet::All, record.independent_samples);
     logInfo("{} × {} pixels, {} samples per pixel{}", film.shape().width, film.shape().height,
-            film.samples.count(), error ? ", " + errorText(*error) : "");
+            film.samples.count(), error ? ", " + errorText(*error, !record.missing_light.empty()) : "");
     logInfo("wrote {}", fmt::join(arguments.outputs, ", "));
     return 0;
 }

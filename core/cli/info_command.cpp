@@ -197,6 +197,7 @@ void showRecord(const FilmRecord& record) {
     std::vector<std::string> lights;
     for (const auto& [name, white] : record.whites) lights.push_back(name);
     optional_row("lights", fmt::format("{}", fmt::join(lights, ", ")));
+    optional_row("missing", fmt::format("{}", fmt::join(record.missing_light, "; ")));
     printRow("seed", std::to_string(record.seed));
     optional_row("rendered by", record.backend);
     optional_row("on", record.device);
@@ -213,7 +214,8 @@ void showFilm(const std::string& file) {
     printRow("aovs", aovText(film.shape().aovs));
     printRow("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
     printRow("invalid", counted(film.invalidSamples(), "sample", "samples"));
-    printRow("error", error ? errorText(*error).substr(6) : "unknown");
+    const bool light_is_missing = identity.record && !identity.record->missing_light.empty();
+    printRow("error", error ? errorText(*error, light_is_missing).substr(6) : "unknown");
     if (identity.record) showRecord(*identity.record);
     printRow("scene hash", identity.scene_hash);
     printRow("written by", fmt::format("crt {}, bits version {}", identity.version, identity.bits_version));

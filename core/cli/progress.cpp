@@ -71,7 +71,8 @@ std::string progressText(const ProgressState& state) {
     if (state.pathsPerSecond() > 0) text += "  " + rateText(state.pathsPerSecond(), "paths/s");
     if (state.secondsLeft() >= 0) text += "  " + clockText(state.secondsLeft()) + " left";
     // Last, because a narrow terminal cuts here.
-    if (state.error) text += "  " + expectedErrorText(*state.error) + stillNeeded(state);
+    if (state.error)
+        text += "  " + expectedErrorText(*state.error, state.light_is_missing) + stillNeeded(state);
     return text;
 }
 

@@ -47,6 +47,8 @@ OptionGroup options(State& state) {
 constexpr const char* kReferenceNotes =
             "\nAnother seed, independent samples, no roulette, and light sampling switched: as little as "
             "possible in common with what it will judge.\n"
+            "Light sampling stays on where the scene has lights that nothing else finds: point, spot, ies, "
+            "beam and directional.\n"
             "The file holds the mean and eight independent eighths of it, from which its own error "
             "follows.\n"
             "\nExamples:\n"

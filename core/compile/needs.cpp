@@ -36,8 +36,9 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(traces && header.accelerator == CRT_ACCELERATOR_BVH, CRT_FEATURE_BVH);
     need(traces && header.accelerator == CRT_ACCELERATOR_BRUTE_FORCE, CRT_FEATURE_BRUTE_FORCE);
     need(traces && header.accelerator == CRT_ACCELERATOR_AABB, CRT_FEATURE_AABB);
-    // The albedo of first hits is a material's, even where nothing is scattered.
-    if (scatters(scene) || (header.aovs & kAovAlbedo) != 0) f |= materials.features;
+    // Even where nothing is scattered, the albedo of first hits is a material's, and panes are passed.
+    const bool passes_panes = isPath(scene) && (materials.features & CRT_FEATURE_THIN_DIELECTRIC) != 0;
+    if (scatters(scene) || (header.aovs & kAovAlbedo) != 0 || passes_panes) f |= materials.features;
     need(isPath(scene), materials.features & (CRT_FEATURE_MEDIA | CRT_FEATURE_OPACITY));
     need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
     need(traces && header.shapes.count > 0, CRT_FEATURE_SHAPES);

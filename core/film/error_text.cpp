@@ -9,7 +9,13 @@
 
 namespace crt {
 
-std::string expectedErrorText(const ErrorEstimate& error) {
+namespace {
+
+std::string withMissingLight(std::string text, bool light_is_missing) {
+    return light_is_missing ? std::move(text) + " + missing light" : text;
+}
+
+std::string expectedText(const ErrorEstimate& error) {
     if (error.knowledge == ErrorKnowledge::NotYet) return "error not yet known";
     if (error.knowledge == ErrorKnowledge::Bound) return "error below " + percentText(error.relative_rmse);
     const double lower = error.relative_rmse_95.lower * 100, upper = error.relative_rmse_95.upper * 100;
@@ -19,11 +25,17 @@ std::string expectedErrorText(const ErrorEstimate& error) {
                        upper, digits);
 }
 
-std::string errorText(const ErrorEstimate& error) {
-    const std::string expected = expectedErrorText(error);
-    return error.known() ? fmt::format("{} expected, of this image at most {}", expected,
-                                       percentText(error.half_width_95))
-                         : expected;
+}  // namespace
+
+std::string expectedErrorText(const ErrorEstimate& error, bool light_is_missing) {
+    return withMissingLight(expectedText(error), light_is_missing);
+}
+
+std::string errorText(const ErrorEstimate& error, bool light_is_missing) {
+    std::string text = expectedText(error);
+    if (error.known())
+        text += fmt::format(" expected, of this image at most {}", percentText(error.half_width_95));
+    return withMissingLight(std::move(text), light_is_missing);
 }
 
 std::string sampleCountText(const stats::Interval& samples) {

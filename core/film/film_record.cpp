@@ -6,6 +6,7 @@
 #include "base/vec3d.h"
 #include "base/words.h"
 #include "scene/aov.h"
+#include "scene/missing_light.h"
 #include "scene/scene.h"
 
 #include <fmt/format.h>
@@ -386,6 +387,8 @@ FilmRecord recordFrom(const Json& json) {
     for (const Json& trait : json.at("traits"))
         record.traits.push_back({trait.at(0).get<std::string>(), trait.at(1).get<std::string>(),
                                  trait.at(2).get<std::string>()});
+    if (json.contains("missing_light"))
+        record.missing_light = json.at("missing_light").get<std::vector<std::string>>();
     record.backend = json.at("backend").get<std::string>();
     record.device = json.at("device").get<std::string>();
     record.date_utc = json.at("date_utc").get<std::string>();
@@ -420,6 +423,7 @@ FilmRecord recordOf(const Scene& scene) {
     record.whites = scene.whites;
     addCamera(record, scene.camera);
     record.traits = traitsOf(scene, record.aovs);
+    record.missing_light = missingLight(scene);
     return record;
 }
 
@@ -443,6 +447,7 @@ std::string recordText(const FilmRecord& record) {
     for (const SceneTrait& trait : record.traits)
         json["traits"].push_back({trait.name, trait.text, trait.digest});
     if (record.spectral.count() > 0) json["spectral"] = spectralJson(record.spectral);
+    if (!record.missing_light.empty()) json["missing_light"] = record.missing_light;
     if (record.complete) json["complete"] = *record.complete;
     // Titles are bytes, not necessarily UTF-8.
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -41,6 +41,7 @@ struct FilmRecord {
     RowMatrix4d
         world_to_ndc{};  ///< (0, 0) is the upper left corner of the whole film, (1, 1) the lower right.
     std::vector<SceneTrait> traits;
+    std::vector<std::string> missing_light;  ///< As missingLight() has it.
 
     // Of the run that rendered it; empty or nothing when that is not known.
     std::string backend, device;

@@ -124,13 +124,10 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
             break;
         case CRT_MATERIAL_THIN_DIELECTRIC:
             if (CRT_HAS(THIN_DIELECTRIC)) {
-                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA;
-                b->eta = crt_value(ctx, material.eta, surface, position);
-                b->lanes = carried / sum4(carried);
-                if (CRT_HAS(THIN_FILM)) {
-                    b->k = splat4(0.0f);
-                    crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
-                }
+                /* What passes is no vertex (passing.h). */
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
+                crt_prepare_pane(ctx, b, &material, surface, position);
+                b->reflectance = splat4(1.0f) - crt_pane_transmittance(b, b->pane_cosine);
             }
             break;
         case CRT_MATERIAL_PLASTIC:
@@ -204,7 +201,7 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 cho
             }
             break;
         case CRT_MATERIAL_THIN_DIELECTRIC:
-            if (CRT_HAS(THIN_DIELECTRIC)) return crt_sample_thin_dielectric(b, u.x);
+            if (CRT_HAS(THIN_DIELECTRIC)) return crt_sample_mirror_up(b, b->reflectance);
             break;
         case CRT_MATERIAL_PLASTIC:
             if (CRT_HAS(PLASTIC)) return crt_sample_plastic(b, u, choice.x);

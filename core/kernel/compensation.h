@@ -19,7 +19,7 @@
 #define CRT_COMPENSATION_H
 
 #include "anisotropy.h"
-#include "thin_film.h"
+#include "pane.h"
 
 CRT_KERNEL_BEGIN
 

@@ -30,26 +30,22 @@ CRT_FN void crt_answer(const CrtContext *ctx, CrtPath *path, const CrtShadow *sh
 CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
     CrtShadow shadow;
     CrtRay ray = path->ray;
-    int answering = 0; /* what the vertex asked */
     int alive = 0;
-    const int passable = ctx->scene->compositions.count != 0u;
-    u32 dimension = CRT_DIM_PASS + 2u * CRT_PASSES_MAX * path->depth;
-    u32 passed = 0u;
-    u32 media = path->media;
+    const int passable = crt_is_passable(ctx);
+    CrtPassage way = crt_passage(path->depth, 0, ray.d, path->wavelengths.position, path->media);
     rays->closest += 1u;
     for (;;) {
         CrtHit hit = crt_no_hit(ray.reach);
         if (ray.reach > 0.0f) hit = crt_trace_closest(ctx, ray);
-        if (passable && hit.slot != CRT_NONE && passed < CRT_PASSES_MAX &&
-            crt_passes(ctx, hit, media, &path->sampler, dimension + passed, &ray)) {
-            passed += 1u;
-            continue;
-        }
-        if (answering) {
-            if (hit.slot == CRT_NONE) path->radiance = path->radiance + shadow.radiance;
+        if (passable && hit.slot != CRT_NONE && crt_passes(ctx, hit, &path->sampler, &way, &ray)) continue;
+        if (way.shadow) { /* what the vertex asked is answered */
+            if (hit.slot == CRT_NONE) path->radiance = path->radiance + shadow.radiance * way.factor;
             return alive;
         }
         hit.t = hit.t + dot3(ray.o - path->ray.o, ray.d); /* from where the path's ray began */
+        path->throughput = path->throughput * way.factor;
+        path->met = way.material;
+        const u32 depth = path->depth;
         alive = crt_shade(ctx, path, hit, &shadow);
         if (!(CRT_HAS(NEE) && shadow.asked)) return alive;
         if (!passable || !(shadow.ray.reach > 0.0f)) {
@@ -57,18 +53,15 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
             return alive;
         }
         rays->shadow += 1u;
-        answering = 1;
         ray = shadow.ray;
-        if (CRT_HAS(MEDIA)) media = shadow.media;
-        dimension += CRT_PASSES_MAX;
-        passed = 0u;
+        way = crt_passage(depth, 1, ray.d, way.position, CRT_HAS(MEDIA) ? shadow.media : 0u);
     }
 }
 
 /* Traces the path's ray to its next vertex, shades it and answers what it asks. Returns 0 when the path has
    ended. */
 CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
-    if (CRT_HAS(OPACITY)) return crt_path_vertex_passing(ctx, path, rays);
+    if (CRT_HAS(OPACITY) || CRT_HAS(THIN_DIELECTRIC)) return crt_path_vertex_passing(ctx, path, rays);
     CrtShadow shadow;
     rays->closest += 1u;
     const int alive = crt_shade(ctx, path, crt_trace_closest(ctx, path->ray), &shadow);

@@ -29,6 +29,9 @@ CRT_KERNEL_BEGIN
    CRT_PASSES_MAX · (2 · vertex), and of the vertex's shadow ray CRT_PASSES_MAX later. */
 #define CRT_DIM_PASS 0x80000000u
 #define CRT_PASSES_MAX 4096u /* what a ray meets after so many stops it */
+/* On from there, where there are panes: whether one is passed, and which material of a mix is met. */
+#define CRT_DIM_PANE 0x20000000u
+#define CRT_DIM_PANE_MIX 0x40000000u
 
 typedef struct CrtSampler {
     u32 kind;

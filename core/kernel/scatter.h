@@ -52,8 +52,9 @@ typedef struct CrtBsdf {
     f32 alpha;        /* rough surfaces: width of GGX; anisotropic: along the tangent */
     f32 narrowing;    /* anisotropic: the width across the tangent over that along it */
     vec3 tangent;     /* anisotropic: unit, perpendicular to ns */
-    vec4 lanes;       /* dielectrics that are rough, thin or under a film: share of what the path carries in
-                         each wavelength */
+    vec4 lanes;       /* dielectrics that are rough or under a film: share of what the path carries in each
+                         wavelength */
+    f32 pane_cosine;  /* panes: crt_pane_cosine, set before a normal map turns the normal */
     vec4 through;     /* rough dielectric: what is given back to the other side */
     f32 lost_chance;  /* rough: of sampling what is given back */
     f32 back_share;   /* rough dielectric: of that, this side's */

@@ -7,6 +7,7 @@
 
 #include "light_tree.h"
 #include "normal_map.h"
+#include "passing.h"
 #include "point_light.h"
 
 CRT_KERNEL_BEGIN
@@ -34,6 +35,7 @@ typedef struct CrtPath {
                          inside glass */
     u32 depth;        /* scattering events so far */
     int alone;        /* only the hero wavelength is alive */
+    u32 met;          /* material that the ray has found a mix to be of (passing.h); or CRT_NONE */
     u32 media;        /* around the ray where it begins (medium.h) */
     CrtFirstHit first;
 } CrtPath;
@@ -62,6 +64,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     path->eta_square = 1.0f;
     path->depth = 0u;
     path->alone = 0;
+    path->met = CRT_NONE;
     path->media = CRT_HAS(MEDIA) ? scene->camera_media : 0u;
     path->first.albedo = splat4(0.0f);
     path->first.normal = make_vec3(0.0f, 0.0f, 0.0f);
@@ -298,7 +301,9 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     if (CRT_HAS(MEDIA)) surface.medium = crt_medium_of(ctx, surface.material);
     if (CRT_HAS(MIX))
         surface.material =
-            crt_chosen_material(ctx, &surface, path->ray.d, &path->sampler, dimension + CRT_DIM_MIX);
+            path->met != CRT_NONE
+                ? path->met
+                : crt_chosen_material(ctx, &surface, path->ray.d, &path->sampler, dimension + CRT_DIM_MIX);
     if (CRT_HAS(MEDIA)) crt_absorb(ctx, path, &surface);
     if (CRT_HAS(AREA_LIGHT) && surface.light != CRT_NONE) crt_add_emission(ctx, path, &surface, hit.t);
 
@@ -307,6 +312,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     CrtBsdf bsdf;
     vec3 wo = -path->ray.d;
     const vec3 ng = surface.ng;
+    if (CRT_HAS(THIN_DIELECTRIC)) bsdf.pane_cosine = crt_pane_cosine(&surface, path->ray.d);
     if (CRT_HAS(NORMAL_MAP)) crt_map_normal(ctx, &surface, hit.slot, &wo, &bsdf);
     crt_layered_prepare(ctx, &bsdf, &surface, wo, path->wavelengths.position, path->throughput, first);
     surface.ng = ng;

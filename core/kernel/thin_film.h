@@ -59,9 +59,11 @@ CRT_FN f32 crt_airy(f32 before, CrtComplex film, CrtComplex beyond, CrtComplex e
     return square > 0.0f ? crt_min(crt_complex_square(above) / square, 1.0f) : 1.0f;
 }
 
-/* Unpolarised reflectance at one wavelength and cosine of incidence. Indices are relative to the medium
-   before the film: `film` of the film, n + ik of what is under it. `rounds`: 2 d n₁ / λ. */
-CRT_FN f32 crt_film_reflectance_lane(f32 cos_i, f32 film, f32 rounds, f32 n, f32 k) {
+/* Reflectance of what is polarised across the plane of incidence, and *along of what is in it, at one
+   wavelength and cosine of incidence. Indices are relative to the medium before the film: `film` of the
+   film, n + ik of what is under it. `rounds`: 2 d n₁ / λ. */
+CRT_FN f32 crt_film_polarised(f32 cos_i, f32 film, f32 rounds, f32 n, f32 k, f32 *along) {
+    *along = 1.0f;
     if (k == 0.0f && !(crt_refraction(cos_i, n) > 0.0f)) return 1.0f;
     /* n cos θ of the media but the first: (n cos θ)² = n² − sin². */
     const f32 square = crt_refraction(cos_i, film);
@@ -81,8 +83,15 @@ CRT_FN f32 crt_film_reflectance_lane(f32 cos_i, f32 film, f32 rounds, f32 n, f32
     const f32 across = crt_airy(cos_i, inside, beyond, e);
     const f32 inverse = 1.0f / (film * film), size = crt_complex_square(index2);
     const CrtComplex conjugate = crt_complex(index2.re / size, -index2.im / size);
-    const f32 along = crt_airy(cos_i, crt_complex(inside.re * inverse, inside.im * inverse),
-                               crt_complex_product(beyond, conjugate), e);
+    *along = crt_airy(cos_i, crt_complex(inside.re * inverse, inside.im * inverse),
+                      crt_complex_product(beyond, conjugate), e);
+    return across;
+}
+
+/* The mean of both: unpolarised light. */
+CRT_FN f32 crt_film_reflectance_lane(f32 cos_i, f32 film, f32 rounds, f32 n, f32 k) {
+    f32 along;
+    const f32 across = crt_film_polarised(cos_i, film, rounds, n, k, &along);
     return 0.5f * (across + along);
 }
 
@@ -149,25 +158,6 @@ CRT_FN CrtScatter crt_sample_filmed_dielectric(const CrtBsdf *b, vec4 hero, int 
                                   CRT_HAS(DISPERSION) ? sum4(b->eta * hero) : V4X(b->eta), fresnel,
                                   splat4(1.0f) - fresnel, sum4(b->lanes * fresnel),
                                   (b->flags & CRT_BSDF_DISPERSIVE) != 0u && !alone, u);
-}
-
-/* A thin pane: two parallel interfaces, their reflections to and fro summed: R + T²R/(1 − R²) = 2R/(1 +
-   R); where a film is on one of them, R₁ + (1 − R₁)² R / (1 − R₁ R). What passes is not bent. */
-CRT_FN CrtScatter crt_sample_thin_dielectric(const CrtBsdf *b, f32 u) {
-    const f32 cos_i = crt_min(dot3(b->wo, b->ns), 1.0f);
-    const vec4 single = crt_fresnel_dielectric4(cos_i, b->eta), one = splat4(1.0f);
-    vec4 fresnel = single * 2.0f / (single + one);
-    if (crt_has_film(b)) {
-        const vec4 filmed = crt_film_reflectance(b, cos_i), passed = one - filmed;
-        fresnel = filmed + passed * passed * single / crt_max4(one - filmed * single, splat4(CRT_EPSILON));
-    }
-    const f32 reflect = sum4(b->lanes * fresnel);
-    if (u < reflect) return crt_sample_mirror(fresnel / reflect, b->wo, b->ns, b->ng);
-    CrtScatter s = crt_no_scatter();
-    s.wi = -b->wo;
-    s.weight = (one - fresnel) / (1.0f - reflect);
-    s.valid = 1;
-    return s;
 }
 
 CRT_KERNEL_END

@@ -32,7 +32,7 @@ CRT_KERNEL_BEGIN
 #define CRT_ROW_POINT 5u        /* where it was scattered; with which density */
 #define CRT_ROW_REST 6u         /* scatter_cosine, eta_square, the wavelengths' number, media */
 #define CRT_ROW_HIT 7u          /* t, b1, b2, slot of the scene */
-#define CRT_ROW_HIT_IDS 8u      /* primitive, instance */
+#define CRT_ROW_HIT_IDS 8u      /* primitive, instance, material of a mix */
 #define CRT_ROW_SHADOW_ORIGIN 9u /* and reach */
 #define CRT_ROW_SHADOW_DIRECTION 10u /* and the media around it */
 #define CRT_ROW_SHADOW_RADIANCE 11u
@@ -195,6 +195,7 @@ CRT_FN void crt_load_path(const CrtContext *ctx, const CrtWave *wave, u32 slot, 
     path->eta_square = V4Y(rest);
     path->depth = word & 0x1fffffffu;
     path->alone = word >> 31 != 0u;
+    path->met = CRT_HAS(MIX) ? crt_bits(V4Z(*crt_row(wave, CRT_ROW_HIT_IDS, slot))) : CRT_NONE;
     path->media = crt_bits(V4W(rest));
 }
 
@@ -247,25 +248,22 @@ CRT_FN int crt_wave_next_sample(const CrtContext *ctx, const CrtWave *wave, u32 
     return 1;
 }
 
-/* What a ray meets where it may pass surfaces, and *ray from behind the last that it has passed. Its random
-   numbers follow `dimension` (crt_path_vertex_passing). */
-CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, u32 media, CrtSampler *sampler, u32 dimension,
-                                CrtRay *ray) {
-    for (u32 passed = 0u;; ++passed) {
+/* What a ray meets where it may pass surfaces, and *ray from behind the last that it has passed. */
+CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, CrtSampler *sampler, CrtPassage *way, CrtRay *ray) {
+    for (;;) {
         CrtHit hit = crt_no_hit(ray->reach);
         if (ray->reach > 0.0f) hit = crt_trace_closest(ctx, *ray);
-        if (hit.slot == CRT_NONE || passed >= CRT_PASSES_MAX ||
-            !crt_passes(ctx, hit, media, sampler, dimension + passed, ray))
-            return hit;
+        if (hit.slot == CRT_NONE || !crt_passes(ctx, hit, sampler, way, ray)) return hit;
     }
 }
 
-CRT_FN int crt_wave_passable(const CrtContext *ctx) {
-    return CRT_HAS(OPACITY) && ctx->scene->compositions.count != 0u;
+/* The way of a ray of the slot's path; its wavelengths are for panes alone. */
+CRT_FN CrtPassage crt_wave_passage(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 depth,
+                                   int shadow, vec3 d, u32 media) {
+    const vec4 position =
+        crt_has_panes(ctx) ? *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) : splat4(0.0f);
+    return crt_passage(depth, shadow, d, position, media);
 }
-
-/* Where the random numbers of surfaces that the path's ray passes begin; its shadow ray's follow. */
-CRT_FN u32 crt_passing_dimension(u32 depth) { return CRT_DIM_PASS + 2u * CRT_PASSES_MAX * depth; }
 
 /* Numbers of a state that were taken while tracing. */
 CRT_FN void crt_store_xorshift(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtSampler *s) {
@@ -283,44 +281,54 @@ CRT_FN void crt_wave_answer(const CrtContext *ctx, const CrtWave *wave, u32 slot
     const vec4 direction = *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot);
     ray.d = crt_row_vector(direction);
     ray.reach = V4W(origin);
+    vec4 light = *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot);
     int blocked = 0;
     if (ray.reach > 0.0f) {
         rays->shadow += 1u;
-        if (crt_wave_passable(ctx)) {
+        if (crt_is_passable(ctx)) {
             /* The vertex that asked: crt_shade has counted it where the path goes on. */
             const u32 depth = crt_load_depth(wave, slot) - (state & CRT_WAVE_ENDED ? 0u : 1u);
             CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
-            blocked = crt_trace_passing(ctx, crt_bits(V4W(direction)), &sampler,
-                                        crt_passing_dimension(depth) + CRT_PASSES_MAX, &ray)
-                          .slot != CRT_NONE;
+            CrtPassage way = crt_wave_passage(ctx, wave, slot, depth, 1, ray.d, crt_bits(V4W(direction)));
+            blocked = crt_trace_passing(ctx, &sampler, &way, &ray).slot != CRT_NONE;
+            light = light * way.factor;
             crt_store_xorshift(ctx, wave, slot, &sampler);
         } else {
             blocked = crt_trace_any(ctx, ray);
         }
     }
     CRT_GLOBAL vec4 *radiance = crt_row(wave, CRT_ROW_RADIANCE, slot);
-    if (!blocked) *radiance = *radiance + *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot);
+    if (!blocked) *radiance = *radiance + light;
 }
 
-/* Traces the ray of the slot's path to its next vertex. */
-CRT_FN CrtHit crt_wave_closest(const CrtContext *ctx, const CrtWave *wave, u32 slot, CrtRayCount *rays) {
+/* Traces the ray of the slot's path to its next vertex. *met: as CrtPath has it. */
+CRT_FN CrtHit crt_wave_closest(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 *met,
+                               CrtRayCount *rays) {
     CrtRay ray = crt_load_path_ray(wave, slot);
     rays->closest += 1u;
     CrtHit hit;
-    if (crt_wave_passable(ctx)) {
+    *met = CRT_NONE;
+    if (crt_is_passable(ctx)) {
         const vec3 o = ray.o;
         CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
-        const u32 media = crt_bits(V4W(*crt_row(wave, CRT_ROW_REST, slot)));
-        hit = crt_trace_passing(ctx, media, &sampler, crt_passing_dimension(crt_load_depth(wave, slot)),
-                                &ray);
+        CrtPassage way = crt_wave_passage(ctx, wave, slot, crt_load_depth(wave, slot), 0, ray.d,
+                                          crt_bits(V4W(*crt_row(wave, CRT_ROW_REST, slot))));
+        hit = crt_trace_passing(ctx, &sampler, &way, &ray);
         crt_store_xorshift(ctx, wave, slot, &sampler);
         hit.t = hit.t + dot3(ray.o - o, ray.d); /* from where the path's ray began */
+        *met = way.material;
+        const vec4 off = way.factor - splat4(1.0f);
+        if (crt_has_panes(ctx) && sum4(off * off) > 0.0f) {
+            CRT_GLOBAL vec4 *throughput = crt_row(wave, CRT_ROW_THROUGHPUT, slot);
+            *throughput = *throughput * way.factor;
+        }
     } else {
         hit = crt_trace_closest(ctx, ray);
     }
     *crt_row(wave, CRT_ROW_HIT, slot) = make_vec4(hit.t, hit.b1, hit.b2, crt_from_bits(hit.slot));
     *crt_row(wave, CRT_ROW_HIT_IDS, slot) =
-        make_vec4(crt_from_bits(hit.id), crt_from_bits(CRT_HAS(INSTANCES) ? hit.instance : 0u), 0.0f, 0.0f);
+        make_vec4(crt_from_bits(hit.id), crt_from_bits(CRT_HAS(INSTANCES) ? hit.instance : 0u),
+                  crt_from_bits(*met), 0.0f);
     return hit;
 }
 
@@ -329,9 +337,10 @@ CRT_FN u32 crt_queue_of_material(const CrtContext *ctx, const CrtWave *wave, u32
 }
 
 /* Who shades what a ray has met. */
-CRT_FN u32 crt_queue_of(const CrtContext *ctx, const CrtWave *wave, CrtHit hit) {
+CRT_FN u32 crt_queue_of(const CrtContext *ctx, const CrtWave *wave, CrtHit hit, u32 met) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     if (hit.slot == CRT_NONE) return wave->queue_of_miss;
+    if (met != CRT_NONE) return crt_queue_of_material(ctx, wave, met);
     const u32 material =
         CRT_ARRAY(CrtPrimitive, ctx->blob, scene->primitives)[crt_primitive_of(ctx, hit)].material;
     if (CRT_HAS(MIX) && scene->compositions.count != 0u &&
@@ -351,7 +360,9 @@ CRT_FN u32 crt_wave_trace(const CrtContext *ctx, const CrtWave *wave, u32 slot, 
         *finished = 1u;
         return CRT_NONE;
     }
-    const u32 queue = crt_queue_of(ctx, wave, crt_wave_closest(ctx, wave, slot, rays));
+    u32 met;
+    const CrtHit hit = crt_wave_closest(ctx, wave, slot, &met, rays);
+    const u32 queue = crt_queue_of(ctx, wave, hit, met);
     if (queue == CRT_NONE) wave->state[slot] = CRT_WAVE_ENDED;
     return queue;
 }
@@ -393,10 +404,11 @@ CRT_FN void crt_wave_shade(const CrtContext *ctx, const CrtWave *wave, u32 slot)
     if (CRT_HAS(NEE) && shadow.asked) {
         state |= CRT_WAVE_ASKED;
         *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot) = crt_row_of(shadow.ray.o, shadow.ray.reach);
-        *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot) = crt_row_of(shadow.ray.d, crt_from_bits(CRT_HAS(MEDIA) ? shadow.media : 0u));
+        *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot) =
+            crt_row_of(shadow.ray.d, crt_from_bits(CRT_HAS(MEDIA) ? shadow.media : 0u));
         *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot) = shadow.radiance;
         /* What its ray takes of a state's numbers follows what the vertex took. */
-        if (CRT_HAS(OPACITY) && !alive) crt_store_xorshift(ctx, wave, slot, &path.sampler);
+        if ((CRT_HAS(OPACITY) || CRT_HAS(MIX)) && !alive) crt_store_xorshift(ctx, wave, slot, &path.sampler);
     }
     wave->state[slot] = state;
 }

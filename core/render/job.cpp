@@ -156,7 +156,7 @@ void writeReport(const std::string& path, const std::string& text) {
     file.commit();
 }
 
-std::string summary(const RunFacts& facts, const Film& film) {
+std::string summary(const RunFacts& facts, const Film& film, bool light_is_missing) {
     std::string text = fmt::format("{} samples per pixel", facts.samples.count());
     if (facts.resumed_samples > 0) text += fmt::format(", {} of them resumed", facts.resumed_samples);
     if (facts.rendered_samples > 0 && facts.sampling_seconds > 0) {
@@ -165,7 +165,7 @@ std::string summary(const RunFacts& facts, const Film& film) {
         text += fmt::format(", {}, {}", durationText(facts.sampling_seconds),
                             rateText(paths / facts.sampling_seconds, "paths/s"));
     }
-    if (facts.error) text += ", " + errorText(*facts.error);
+    if (facts.error) text += ", " + errorText(*facts.error, light_is_missing);
     return text;
 }
 
@@ -253,7 +253,7 @@ int runJob(const Job& job, Watch& watch) {
     if (!files.report.empty())
         failure.attempt([&] { writeReport(files.report, reportJson(scene, *run.compiled, facts)); });
 
-    logInfo("{}", summary(facts, run.film));
+    logInfo("{}", summary(facts, run.film, plan.light_is_missing));
     if (facts.error) tellTarget(facts);
     if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
     if (failure.get()) throw *failure.get();

@@ -2,6 +2,7 @@
 
 #include "base/log.h"
 #include "base/vec3d.h"
+#include "scene/missing_light.h"
 
 #include <fmt/format.h>
 
@@ -169,6 +170,11 @@ void warnOfIdleLamps(const Scene& scene) {
             "{} lights nothing: it emits on one side only, and neither a surface nor the camera is on that "
             "side; reverse the order of its vertices, or say 'two_sided: true'",
             lamp);
+}
+
+void warnOfMissingLight(const Scene& scene) {
+    if (const std::vector<std::string> missing = missingLight(scene); !missing.empty())
+        logWarning("{}", missingLightText(missing, scene));
 }
 
 bool isBlack(const Film& film) {

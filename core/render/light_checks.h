@@ -17,6 +17,9 @@ std::vector<std::string> idleLamps(const Scene& scene);
 /// One warning for each of them.
 void warnOfIdleLamps(const Scene& scene);
 
+/// Warns of light that the image lacks however long it renders (scene/missing_light.h).
+void warnOfMissingLight(const Scene& scene);
+
 /// Has no pixel got any light?
 bool isBlack(const Film& film);
 

@@ -84,6 +84,7 @@ Image developedImage(const Output& output, const Film& film, const FilmIdentity&
     add("crt/sceneHash", identity.scene_hash);
     add("crt/seed", std::to_string(record.seed));
     if (record.complete) add("crt/complete", *record.complete ? "1" : "0");
+    add("crt/missingLight", fmt::format("{}", fmt::join(record.missing_light, "; ")));
     add("ImageDescription", record.title);
     add("crt/backend", record.backend);
     add("crt/device", record.device);

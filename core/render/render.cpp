@@ -7,6 +7,7 @@
 #include "base/stopwatch.h"
 #include "render/light_checks.h"
 #include "render/outputs.h"
+#include "scene/missing_light.h"
 
 #include <limits>
 #include <thread>
@@ -105,6 +106,7 @@ SamplingPlan planSamples(const RenderOptions& options, const Scene& scene, const
     plan.time_limit_seconds = options.time_limit_seconds;
     plan.target_error = options.target_error;
     plan.independent_samples = scene.sampler.type != SamplerType::Sobol;
+    plan.light_is_missing = !missingLight(scene).empty();
     plan.chunk = options.chunk;
     if (options.samples) {
         // An exact range says exactly which samples are new; those that the checkpoint has already would
@@ -156,6 +158,7 @@ void SceneOnDevices::compile() {
                  : compileScene(scene_, aovs, {.accelerator_reach = kNobodyTraces}));
     logDebug("scene {} needs {}", compiled_->hash, featureNames(compiled_->features));
     warnOfIdleLamps(scene_);
+    warnOfMissingLight(scene_);
 }
 
 /// The scene, with an empty film, onto devices that are open.

@@ -2,6 +2,7 @@
 
 #include "backend/loader.h"
 #include "base/host.h"
+#include "scene/missing_light.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -188,6 +189,7 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
                         {"device_peak_bytes", b.peak_memory_bytes},
                         {"film_bands", facts.film_bands}};
     report["error"] = errorJson(facts);
+    report["missing_light"] = missingLight(scene);
     report["warnings"] = facts.warnings;
 
     Json outputs = Json::array();

@@ -162,6 +162,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
     state.target = plan.target;
     state.time_limit_seconds = plan.time_limit_seconds;
     state.target_error = plan.target_error;
+    state.light_is_missing = plan.light_is_missing;
     state.pixels = film.counts.size();
 
     std::uint64_t check_at = nextTargetCheck(resumed > 0 ? resumed - 1 : 0, film.counts.size());

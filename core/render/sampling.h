@@ -36,6 +36,7 @@ struct SamplingPlan {
     std::uint64_t target = 0;  ///< Samples per pixel in the film when all ranges are there; 0: endless.
     double time_limit_seconds = 0;       ///< 0: none. Looked at between chunks.
     bool independent_samples = false;    ///< By the scene's sampler: their spread tells the error.
+    bool light_is_missing = false;       ///< The error does not contain it: said with it.
     double target_error = 0;  ///< Stop when half_width_95 (error_estimate.h) is at most this; 0: never.
     std::uint64_t chunk = 0;             ///< Samples per chunk; 0: adaptive, at most half a second.
     double checkpoint_interval_seconds = 0;  ///< 0: never call `checkpoint`.

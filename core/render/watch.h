@@ -21,6 +21,7 @@ struct ProgressState {
                         ///< its length is unknown.
     double target_error = 0;        ///< half_width_95 to stop at; 0: none.
     std::optional<ErrorEstimate> error;  ///< Of the image so far.
+    bool light_is_missing = false;       ///< Which that error does not contain.
 
     /// Camera paths per second of this run; 0 while unknown.
     double pathsPerSecond() const;

@@ -13,6 +13,7 @@
 #include "render/output_guard.h"
 #include "render/sampling.h"
 #include "render/session.h"
+#include "scene/missing_light.h"
 #include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
@@ -120,7 +121,9 @@ Scene referenceScene(Scene scene, bool same_estimator) {
     scene.sampler.replicates = 1;
     scene.sampler.seed += kReferenceSeedOffset;
     scene.integrator.roulette = false;
-    if (!same_estimator) scene.integrator.nee = !scene.integrator.nee;
+    // Nothing but light sampling finds lights without a size: without it they would be gone.
+    const bool kept = scene.integrator.nee && !lightsWithoutSize(scene).empty();
+    if (!same_estimator && !kept) scene.integrator.nee = !scene.integrator.nee;
     return scene;
 }
 
@@ -253,7 +256,10 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     const auto started = std::chrono::steady_clock::now();
     const std::string content = hashOfContent(scene), colour = colourText(scene),
                       record = recordText(recordOf(scene));
+    const bool sampled = scene.integrator.nee;
     scene = referenceScene(std::move(scene), request.same_estimator);
+    if (sampled && scene.integrator.nee && !request.same_estimator)
+        logInfo("light sampling stays on: nothing else finds point, spot, IES, beam and directional lights");
     Session session(request.backend, request.integrator);
     const std::optional<RenderedFolds> folds = renderFolds(scene, session, request, watch);
     if (!folds) return std::nullopt;

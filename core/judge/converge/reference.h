@@ -48,8 +48,8 @@ struct MadeReference {
 };
 std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request, Watch& watch);
 
-/// The scene as a reference renders it: independent samples, another seed, light sampling switched, no
-/// roulette.
+/// The scene as a reference renders it: independent samples, another seed, no roulette, and light sampling
+/// switched; but it stays on where the scene has lights that nothing else finds.
 Scene referenceScene(Scene scene, bool same_estimator);
 
 /// Hash of what is to be seen, without how: two scenes with it have the same expected light on the film.

@@ -78,7 +78,7 @@ const std::vector<Case>& registry() {
         for (const auto group :
              {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases,
               pointLightCases, environmentCases, spectralFilmCases, stiffCases, scatteringCases,
-              glasswareCases, thinFilmCases, anisotropyCases, openPbrCases, openPbrCoatCases,
+              glasswareCases, paneCases, thinFilmCases, anisotropyCases, openPbrCases, openPbrCoatCases,
               compositionCases, bodyCases, shadingNormalCases, quadricCases, instanceCases, shapeLightCases,
               colourCases, textureCases, accumulationCases, cameraCases, firstHitCases, imageCases,
               inputCases, backendCases, exactRelationCases, mutantCases, contactCases})

@@ -101,6 +101,7 @@ std::vector<Case> spectralFilmCases();   ///< E, the part about bins and sensors
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> scatteringCases();     ///< G
 std::vector<Case> glasswareCases();      ///< G, rough glass and panes
+std::vector<Case> paneCases();           ///< G, light that crosses panes
 std::vector<Case> compositionCases();    ///< G, opacity and mixes
 std::vector<Case> bodyCases();           ///< G, bodies of glass: what is inside what, holes
 std::vector<Case> shadingNormalCases();  ///< G, interpolated normals and normal maps

@@ -166,18 +166,20 @@ void pane(Context& context) {
     const Effort effort{.samples = 4096, .most = 65536};
     for (const double ior : {1.5, 1 / 1.5})
         for (const double degrees : {0.0, 40.0, 70.0}) {
-            const double r = fresnelDielectric(std::cos(degrees * kDegree), ior);
+            const double cosine = std::cos(degrees * kDegree), r = fresnelDielectric(cosine, ior);
             context.estimate(fmt::format("n = {:.3g}, reflected at {}°", ior, degrees),
-                             reflecting(degrees, ior), meanRadiance, 2 * r / (1 + r), 0.001, effort,
-                             {{r, "only the front of the pane reflects"}});
+                             reflecting(degrees, ior), meanRadiance, 1 - paneTransmittance(cosine, ior),
+                             0.001, effort,
+                             {{r, "only the front of the pane reflects"},
+                              {2 * r / (1 + r), "light loses its polarisation between the sides"}});
         }
     // A lamp that a bent ray would miss, seen through the pane from either side.
-    const double r = fresnelDielectric(std::cos(50 * kDegree), kIndex), x = std::sin(50 * kDegree),
-                 y = std::cos(50 * kDegree);
+    const double x = std::sin(50 * kDegree), y = std::cos(50 * kDegree),
+                 r = fresnelDielectric(y, kIndex);
     for (const double side : {1.0, -1.0})
         context.estimate(
             fmt::format("through it at 50°, from {}", side > 0 ? "above" : "below"),
-            Stage(eyeAt(50, side), "{max_depth: 1, roulette: false}")
+            Stage(eyeAt(50, side), "{max_depth: 0}")
                 .material("pane", "{type: thin_dielectric, ior: 1.5}")
                 .material("black", "{type: diffuse, reflectance: 0}")
                 .quad("pane", kInterface, "pane")
@@ -187,8 +189,9 @@ void pane(Context& context) {
                                   -x - 0.001, -x + 0.001, -side * y),
                       "black", "1, two_sided: true")
                 .yaml(),
-            meanRadiance, (1 - r) / (1 + r), 0.001, effort,
+            meanRadiance, paneTransmittance(y, kIndex), 0.001, effort,
             {{0, "a pane bends what passes, or stops it"},
+             {(1 - r) / (1 + r), "light loses its polarisation between the sides"},
              {(1 - r) * (1 - r), "light reflected to and fro inside the pane is missing"}});
     // All of the light is somewhere.
     context.relative("in light from everywhere",
@@ -369,7 +372,8 @@ std::vector<Case> glasswareCases() {
             "1", "light of one wavelength knows of no other", "± 0.5 %", Level::Commit,
             sky | rough | CRT_FEATURE_DISPERSION | CRT_FEATURE_TABLE, roughDispersion),
         row("G16", "pane", "A thin pane: what it reflects, and a small lamp seen through it",
-            "R' = 2R/(1 + R), the rest straight on", "geometric series of internal reflections", "± 0.1 %",
+            "T = (1 − R)/(1 + R) of each polarisation straight on, the rest mirrored",
+            "geometric series of internal reflections (Stokes 1862)", "± 0.1 %",
             Level::Commit, sky | light | CRT_FEATURE_THIN_DIELECTRIC, pane),
         row("G17", "plastic",
             "A diffuse base of albedo .5 and 1 under a smooth and a rough coat in a constant environment, "

@@ -94,23 +94,39 @@ double fresnelDielectric(double cos_incidence, double eta) {
     return 0.5 * (rs * rs + rp * rp);
 }
 
-double filmReflectance(double cosine, double film, double thickness_nm, double wavelength_nm,
-                       std::complex<double> under) {
+std::array<double, 2> polarisedFilmReflectance(double cosine, double film, double thickness_nm,
+                                               double wavelength_nm, std::complex<double> under) {
     using Complex = std::complex<double>;
     const double sin2 = 1 - cosine * cosine;
     const Complex i(0, 1), before = cosine, beyond_cosine = std::sqrt(1.0 - sin2 / (under * under)),
                   film_cosine = std::sqrt(Complex(1 - sin2 / (film * film)));
     const Complex phase = 2 * kPi * film * thickness_nm / wavelength_nm * film_cosine;
-    double sum = 0;
-    for (const bool across : {true, false}) {
-        const auto admittance = [&](Complex n, Complex c) { return across ? n * c : n / c; };
+    std::array<double, 2> reflectance{};
+    for (std::size_t in_plane = 0; in_plane < 2; ++in_plane) {
+        const auto admittance = [&](Complex n, Complex c) { return in_plane == 0 ? n * c : n / c; };
         const Complex q1 = admittance(1, before), q2 = admittance(film, film_cosine),
                       q3 = admittance(under, beyond_cosine);
         // (B, C) = M (1, q₃), M the matrix of the film.
         const Complex b = std::cos(phase) - i * std::sin(phase) / q2 * q3,
                       c = -i * q2 * std::sin(phase) + std::cos(phase) * q3;
-        sum += std::norm((q1 * b - c) / (q1 * b + c));
+        reflectance[in_plane] = std::norm((q1 * b - c) / (q1 * b + c));
     }
+    return reflectance;
+}
+
+double filmReflectance(double cosine, double film, double thickness_nm, double wavelength_nm,
+                       std::complex<double> under) {
+    const auto [across, in_plane] =
+        polarisedFilmReflectance(cosine, film, thickness_nm, wavelength_nm, under);
+    return (across + in_plane) / 2;
+}
+
+double paneTransmittance(double cosine, double eta, double film, double thickness_nm, double wavelength_nm) {
+    if (1 - cosine * cosine >= eta * eta) return 0;
+    const auto one = polarisedFilmReflectance(cosine, film, thickness_nm, wavelength_nm, eta);
+    const auto other = polarisedFilmReflectance(cosine, 1, 0, wavelength_nm, eta);
+    double sum = 0;
+    for (std::size_t i = 0; i < 2; ++i) sum += (1 - one[i]) * (1 - other[i]) / (1 - one[i] * other[i]);
     return sum / 2;
 }
 

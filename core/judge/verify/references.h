@@ -3,6 +3,7 @@
 
 #include "spectra/spectra.h"
 
+#include <array>
 #include <complex>
 #include <functional>
 #include <numbers>
@@ -125,11 +126,19 @@ double glossyEonAlbedo(double cosine, double rho, double r, double eta);
 double sheenAlbedo(double cosine, double roughness);
 double sheenDensity(const Vec3d& view, const Vec3d& light, double roughness);
 
-/// Unpolarised reflectance of a film of real index on something of index `under`, both relative to the
-/// medium before, where light has the wavelength: by the film's characteristic matrix (Abelès 1950; Born
-/// and Wolf, 1.6), for light across and in the plane of incidence.
+/// Reflectance of a film of real index on something of index `under`, both relative to the medium
+/// before, where light has the wavelength: by the film's characteristic matrix (Abelès 1950; Born and
+/// Wolf, 1.6), for light across and in the plane of incidence.
+std::array<double, 2> polarisedFilmReflectance(double cosine, double film, double thickness_nm,
+                                               double wavelength_nm, std::complex<double> under);
+/// The mean of both.
 double filmReflectance(double cosine, double film, double thickness_nm, double wavelength_nm,
                        std::complex<double> under);
+
+/// Of unpolarised light the share that passes a pane of index eta, one of whose sides may have a film: all
+/// rounds between its sides, each polarisation by itself (Stokes 1862).
+double paneTransmittance(double cosine, double eta, double film = 1, double thickness_nm = 0,
+                         double wavelength_nm = 550);
 
 /// Planck's law in W·m⁻³·sr⁻¹ (CODATA 2018, exact constants).
 double planck_W_m3_sr(double wavelength_nm, double temperature_K);

@@ -84,9 +84,9 @@ void airy(Context& context) {
             // `times`: what thickness a mistake would find. A pane has a second surface, without a film.
             const auto expected = [&](double times, std::complex<double> under, bool pane) {
                 return luminous([&, thickness = thickness, film = film](double nm) {
-                    const double one = filmReflectance(cosine, film, times * thickness, nm, under);
-                    const double other = pane ? fresnelDielectric(cosine, under.real()) : 0;
-                    return one + (1 - one) * (1 - one) * other / (1 - one * other);
+                    if (pane)
+                        return 1 - paneTransmittance(cosine, under.real(), film, times * thickness, nm);
+                    return filmReflectance(cosine, film, times * thickness, nm, under);
                 });
             };
             for (const auto& [type, under] : {std::pair{"conductor, eta: 0.2, k: 3", std::complex(0.2, 3.0)},

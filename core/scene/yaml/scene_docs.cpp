@@ -266,9 +266,12 @@ std::string_view familyIntroduction(std::string_view family) {
         return "A light without a surface: `lights` lists them, and `type` picks one of these. How bright "
                "it is says one key, whose name gives the unit: a spectrum in absolute terms, or an amount "
                "to which `spectrum` is scaled. A scene unit counts as a metre.\n\n"
-               "Points, spots and directional lights are found by light sampling alone: cameras, mirrors "
-               "and smooth glass do not see them, their light does not pass smooth glass, and they need "
-               "`integrator.nee`. With `integrator.mis: false` they shine as ever.\n";
+               "All but suns have no size and are found by light sampling alone. They need "
+               "`integrator.nee`, and they shine through panes. Their light is missing where it comes by "
+               "way of smooth glass, mirrors, smooth metals and coats, or is mirrored by a pane: "
+               "crt warns of it, and no stated error contains it (`missing_light` in the report, "
+               "`crt/missingLight` in images). A small emitting sphere is found there. With "
+               "`integrator.mis: false` they shine as ever.\n";
     if (family == "transform")
         return "A placement is a list of steps, each a map with one key, applied in order: `[{scale: 2}, "
                "{rotate: {axis: [0, 1, 0], angle_deg: 90}}, {translate: [0, 1, 0]}]`.\n";

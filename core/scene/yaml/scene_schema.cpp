@@ -340,7 +340,8 @@ SectionSchema integrator() {
                  .range = {0, 1e9, false, false},
                  .unit = "scattering events",
                  .fallback = yaml(d.max_depth),
-                 .doc = "Longest path; 0 shows emitters only, 1 is direct light."},
+                 .doc = "Longest path; 0 shows emitters only, 1 is direct light. To pass a "
+                        "pane or a hole does not count; to cross a body of glass is 2."},
                 {.name = "roulette_depth",
                  .kind = Kind::Integer,
                  .range = {0, 1e9, false, false},
@@ -608,9 +609,11 @@ void addDielectrics(std::vector<SectionSchema>& all) {
     all.push_back({"material/thin_dielectric",
                    "a thin_dielectric material",
                    "A window pane made of one sheet of faces: two parallel surfaces, between which light "
-                   "is reflected to and fro. What passes is not bent. As behind all glass, lamps light "
-                   "what is behind it by the paths that happen to meet them: shadow rays do not pass. A "
-                   "film is on one of the two surfaces.",
+                   "is reflected to and fro, each polarisation by itself. What passes is not bent: lights "
+                   "of every kind shine through any number of panes (4096 at most), and to pass one is no "
+                   "scattering event. A normal map turns what is mirrored. AOVs of first hits are of what "
+                   "a ray is stopped by: mostly of what is seen through the pane, and of the pane in the "
+                   "share that it mirrors. A film is on one of the two surfaces.",
                    {materialType("thin_dielectric"),
                     index("Refractive index of the pane relative to what is "
                           "around it."),
