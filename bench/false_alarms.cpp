@@ -41,7 +41,9 @@ public:
         ++tally.asked;
         tally.wrong += wrong ? 1 : 0;
     }
+    /// One without bounds says nothing, and is not asked.
     void interval(const std::string& statement, const Estimate& estimate, double truth) {
+        if (!std::isfinite(estimate.high)) return;
         count(statement, 0.05, !(estimate.low <= truth && truth <= estimate.high));
     }
     void print(const std::string& situation) const {
@@ -58,22 +60,38 @@ private:
     std::vector<std::pair<std::string, Tally>> tallies_;
 };
 
+/// Of a render whose variance falls as N^−rate up to `turns_at`, and as 1/N from there on.
+double samplesTo(const SyntheticRender& what, double relative_rmse) {
+    const double mse = relative_rmse * relative_rmse, by_rate = std::pow(what.variance / mse, 1 / what.rate);
+    return by_rate <= what.turns_at ? by_rate : what.variance * std::pow(what.turns_at, 1 - what.rate) / mse;
+}
+
 /// Intervals of one configuration against what they should hold.
 void countIntervals(Tallies& tallies, const ConfigurationFit& fit, const SyntheticRender& what) {
     const double v = what.variance, b2 = what.bias * what.bias + what.mean_bias * what.mean_bias;
     const Point& last = fit.points.back();
-    const double mse =
-        v / static_cast<double>(last.samples) + (fit.source == ErrorSource::Reference ? b2 : 0);
+    const double n = static_cast<double>(last.samples),
+                 variance = v / n * std::pow(std::min(n, what.turns_at), 1 - what.rate);
+    const double mse = variance + (fit.source == ErrorSource::Reference ? b2 : 0);
     tallies.interval("relative RMSE", last.relative_rmse, std::sqrt(mse));
-    if (fit.fitted && std::isfinite(fit.error.variance.value) && (b2 == 0 || what.has_reference))
+    if (fit.fitted && std::isfinite(fit.error.variance.value) && what.rate == 1 &&
+        (b2 == 0 || what.has_reference))
         tallies.interval("v of v/N + b²", fit.error.variance, v);
     if (fit.error.bias_squared) tallies.interval("b²", *fit.error.bias_squared, b2);
     if (last.mean_bias) tallies.interval("bias of the image mean", *last.mean_bias, what.mean_bias);
-    if (fit.fitted && b2 == 0 && std::isfinite(fit.slope_samples.value))
+    if (fit.fitted && b2 == 0 && what.rate == 1 && std::isfinite(fit.slope_samples.value))
         tallies.interval("slope", fit.slope_samples, -0.5);
+    tallies.interval("seconds, start-up included", last.seconds,
+                     what.before_first_sample + what.launch_seconds +
+                         what.seconds_per_sample * static_cast<double>(last.samples));
+    if (fit.fitted && b2 == 0)
+        for (const Target& target : fit.targets)
+            if (target.samples && !target.at_first_point)
+                tallies.interval(fmt::format("samples to {} %", 100 * target.relative_rmse), *target.samples,
+                                 samplesTo(what, target.relative_rmse));
     const double predicted =
-        what.prediction * std::sqrt(v / static_cast<double>(last.samples)) * std::sqrt(1 + 0.05 * 0.05);
-    if (last.calibration && std::isfinite(last.calibration->value))
+        what.prediction * std::sqrt(v / std::pow(n, what.rate)) * std::sqrt(1 + 0.05 * 0.05);
+    if (last.calibration && what.prediction > 0 && std::isfinite(last.calibration->value))
         tallies.interval("predicted over actual error", *last.calibration, predicted / std::sqrt(mse));
 }
 
@@ -135,6 +153,19 @@ std::vector<Situation> situations() {
         [&](SyntheticRender& w) { w.bias = 0.03, w.reference_variance = own; });
     add("bias of 1.5 % in a channel below 0", false, [](SyntheticRender& w) {
         w.colour = {1.3, 0.9, -0.2}, w.colour_bias = {0, 0, 0.015};
+    });
+    for (const unsigned r : {16u, 4u})
+        for (const int rarity : {200, 2000, 20000})
+            add(fmt::format("fireflies, one path in {}, {} replicates", rarity, r), true,
+                [=](SyntheticRender& w) { w.fireflies = 1.0 / rarity, w.replicates = r; });
+    for (const double turns_at : {8.0, 64.0, 512.0, 1e300})
+        add(turns_at > 1e6 ? "error² as 1/N²"
+                           : fmt::format("error² as 1/N², from {} samples on as 1/N", turns_at),
+            true, [=](SyntheticRender& w) {
+                w.rate = 2, w.turns_at = turns_at, w.variance = 2, w.prediction = 0;
+            });
+    add("start-up ± 20 %", true, [](SyntheticRender& w) {
+        w.start_jitter = 0.2, w.launch_seconds = 0.001, w.seconds_per_sample = 0.0001;
     });
     return list;
 }

@@ -29,6 +29,8 @@ struct Scenario {
     std::uint32_t replicates = 4;  ///< The stated variance has one degree of freedom less.
     double relative_noise = 0.1;   ///< Standard error of the median pixel over its mean.
     std::uint32_t width = 64, height = 64;
+    bool coloured =
+        false;  ///< R and B have noise of their own, and G the mean of both; else they are equal.
 };
 
 /// What a planted error does to the expectation.
@@ -68,15 +70,21 @@ public:
 
 private:
     void addPixel(Image& image, const Scenario& s, double expectation, double relative_variance) {
-        const double k = s.replicates;
-        std::vector<double> values;
-        double sum = 0;
-        for (std::uint32_t r = 0; r < s.replicates; ++r)
-            sum += values.emplace_back(expectation * replicate(s.noise, k * relative_variance));
-        const double mean = sum / k;
+        const double k = s.replicates, red_of_luminance = 0.2126390 + 0.7151687 / 2;  // Of sRGB.
+        std::vector<double> luminances;
+        double red = 0, blue = 0, mean = 0;
+        for (std::uint32_t r = 0; r < s.replicates; ++r) {
+            const double of_red = expectation * replicate(s.noise, k * relative_variance);
+            const double of_blue =
+                s.coloured ? expectation * replicate(s.noise, k * relative_variance) : of_red;
+            red += of_red / k;
+            blue += of_blue / k;
+            mean +=
+                luminances.emplace_back(red_of_luminance * of_red + (1 - red_of_luminance) * of_blue) / k;
+        }
         double squares = 0;
-        for (const double v : values) squares += (v - mean) * (v - mean);
-        for (int c = 0; c < 3; ++c) image.pixels.push_back(static_cast<float>(mean));
+        for (const double v : luminances) squares += (v - mean) * (v - mean);
+        for (const double v : {red, 0.5 * (red + blue), blue}) image.pixels.push_back(static_cast<float>(v));
         image.pixels.push_back(static_cast<float>(std::sqrt(squares / (k - 1) / k)));
     }
 

@@ -6,6 +6,7 @@
 #include "film/luminance_error.h"
 #include "judge/converge/measurement.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -20,8 +21,11 @@ struct SyntheticRender {
     double bias = 0;        ///< b: of every pixel, alternately up and down, so that the image mean is right.
     double mean_bias = 0;   ///< Of every pixel, the same way.
     double rate = 1;        ///< Variance falls as N^−rate; 1 is independent sampling.
+    double turns_at = 1e300;  ///< From so many samples on it falls as 1/N again.
     double launch_seconds = 0.02, seconds_per_sample = 0.003;
-    double before_first_sample = 0.4;
+    double before_first_sample = 0.4, start_jitter = 0.02;  ///< Mean, and relative standard deviation.
+    /// Of the variance 90 % come from paths as rare as this, of lognormal brightness; 0: normal noise alone.
+    double fireflies = 0;
     double jitter = 0.02;   ///< Relative standard deviation of the time between two looks.
     double prediction = 1;  ///< Predicted over actual error.
     std::uint32_t replicates = 16, looks = 11, pixels = 64;
@@ -108,6 +112,17 @@ inline ErrorMetrics syntheticMetrics(double mse) {
     return error;
 }
 
+/// Sum over so many samples, of mean 0 and this variance a sample: a Poisson number of lognormal values.
+inline double syntheticFireflies(double probability, double variance, double samples,
+                                 std::mt19937_64& engine) {
+    if (!(probability > 0)) return 0;
+    const double square = std::exp(1.0);  // Of a lognormal value of mean 1 and σ = 1.
+    double sum = 0;
+    for (int n = std::poisson_distribution<int>(probability * samples)(engine); n > 0; --n)
+        sum += std::lognormal_distribution<double>(-0.5, 1)(engine);
+    return (sum - probability * samples) * std::sqrt(variance / (probability * square));
+}
+
 /// The image mean is 1.
 inline std::vector<Row> syntheticRows(const Key& key, const SyntheticRender& what, std::uint64_t seed,
                                       const std::vector<std::vector<double>>& folds = {}) {
@@ -120,17 +135,26 @@ inline std::vector<Row> syntheticRows(const Key& key, const SyntheticRender& wha
             reference[p] += fold[p] / static_cast<double>(folds.size());
     std::vector<std::vector<double>> sums(replicates, std::vector<double>(pixels)), images = sums;
     std::vector<double> seconds(replicates, what.launch_seconds);
+    std::vector<double> starts;
+    std::mt19937_64 clock(seed ^ 0xda942042e4dd58b5u);
+    for (std::uint32_t r = 0; r < replicates; ++r)
+        starts.push_back(what.before_first_sample * (1 + what.start_jitter * normal(clock)));
+    normal.reset();
     std::vector<Row> rows;
     for (std::uint32_t look = 0; look < what.looks; ++look) {
         const std::uint64_t samples = std::uint64_t{1} << look, before = look == 0 ? 0 : samples / 2;
         const auto n = static_cast<double>(samples);
         const double shrink =
-            std::pow(n, (1 - what.rate) / 2);  // From independent sampling's error to that of `rate`.
+            std::pow(std::min(n, what.turns_at),
+                     (1 - what.rate) / 2);  // From independent sampling's error to that of `rate`.
         std::vector<double> mean(pixels), variances(pixels);
         for (std::uint32_t r = 0; r < replicates; ++r)
             for (std::uint32_t p = 0; p < pixels; ++p) {
-                sums[r][p] += normal(engine) * std::sqrt(what.variance * syntheticShare(what, p) *
-                                                         static_cast<double>(samples - before));
+                const auto more = static_cast<double>(samples - before);
+                const double variance = what.variance * syntheticShare(what, p),
+                             rare = what.fireflies > 0 ? 0.9 : 0;
+                sums[r][p] += normal(engine) * std::sqrt((1 - rare) * variance * more) +
+                              syntheticFireflies(what.fireflies, rare * variance, more, engine);
                 images[r][p] =
                     1 + what.mean_bias + (p % 2 == 0 ? what.bias : -what.bias) + shrink * sums[r][p] / n;
                 mean[p] += images[r][p] / replicates;
@@ -147,7 +171,7 @@ inline std::vector<Row> syntheticRows(const Key& key, const SyntheticRender& wha
             row.replicate = r;
             row.samples = samples;
             row.render_wall_seconds = seconds[r];
-            row.seconds_before_first_sample = what.before_first_sample;
+            row.seconds_before_first_sample = starts[r];
             row.paths = samples * pixels;
             row.closest_rays = 5 * row.paths;
             row.shadow_rays = 3 * row.paths;

@@ -249,13 +249,9 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     lost.pixels[3] = std::numeric_limits<float>::infinity();
     Image plain = blank({"R", "G", "B"}, "9");
     plain.pixels.assign(std::size_t{3} * kWidth * kHeight, 2.0f);
-    Image other_plain = plain;
-    other_plain.metadata = {{"crt/seed", "10"}};
-    other_plain.pixels[0] = 3;
     for (const auto& [first, second, why] : {std::tuple{&a, &a, "both have seed 1"},
                                              {&lost, &b, "A does not know the noise of all"},
-                                             {&b, &lost, "B does not know the noise of all"},
-                                             {&plain, &other_plain, "neither image says"}}) {
+                                             {&b, &lost, "B does not know the noise of all"}}) {
         const NoiseComparison noise = compareNoise(*first, *second);
         CHECK_THAT(noise.unknown, Contains(why));
         CHECK(noise.channels.empty());
@@ -264,6 +260,21 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
         CHECK_THAT(json["unknown"].get<std::string>(), Contains(why));
         if (first != second) CHECK_THAT(text, Contains("Noise or bias? Not known: ") && Contains(why));
         CHECK_THROWS_WITH(writeZMap("z.pfm", noise, kWidth, kHeight), Contains(why));
+    }
+
+    // Without any stated noise the signs of the differences judge, where there are enough of them.
+    Image other_plain = plain;
+    other_plain.metadata = {{"crt/seed", "10"}};
+    for (const auto& [differing, word] :
+         {std::pair{63u, "not judged, too few pixels differ"}, {64u, "more than noise"}}) {
+        for (std::uint32_t p = 0; p < differing; ++p) other_plain.pixels[std::size_t{3} * p] = 2.5f;
+        const auto [words, figures] = said(other_plain, plain);
+        CHECK_THAT(words,
+                   Contains("Neither image states its noise") && Contains(word) && !Contains("rms z"));
+        CHECK(figures["rms_z"].is_null());
+        CHECK(figures["pixels"]["untested"].is_string());
+        CHECK_THROWS_WITH(writeZMap("z.pfm", compareNoise(other_plain, plain), kWidth, kHeight),
+                          Contains("neither image states"));
     }
 
     // Against black nothing is relative, and no NaN is printed.

@@ -3,15 +3,15 @@
 //
 // Over 450 lines: one imagined run, and everything that is written of it.
 #include "base/error.h"
+#include "base/temporary_folder.h"
 #include "base/unit_text.h"
 #include "catch.h"
+#include "file_bytes.h"
+#include "hostile_numbers.h"
 #include "judge/converge/files.h"
 #include "judge/converge/findings.h"
 #include "judge/converge/quantity_text.h"
 #include "judge/converge/report_maps.h"
-#include "base/temporary_folder.h"
-#include "file_bytes.h"
-#include "hostile_numbers.h"
 #include "synthetic_run.h"
 
 #include <fmt/format.h>
@@ -47,7 +47,7 @@ Maps syntheticMaps(double deviation, std::uint64_t seed) {
     for (std::uint32_t y = 0; y < size; ++y)
         for (std::uint32_t x = 0; x < size; ++x) {
             const float u = static_cast<float>(x) / size, v = static_cast<float>(y) / size;
-            const bool left = u < 0.18f, right = u > 0.82f, lamp = v < 0.05f && u > 0.4f && u < 0.6f;
+            const bool left = u<0.18f, right = u> 0.82f, lamp = v < 0.05f && u > 0.4f && u < 0.6f;
             const float light = lamp ? 1.0f : 0.55f / (1 + 3 * (u - 0.5f) * (u - 0.5f) + 2 * v * v);
             const float sd = static_cast<float>(deviation) * (0.3f + light + (left || right ? 0.5f : 0.0f)),
                         z = normal(engine);
@@ -350,9 +350,8 @@ TEST_CASE("the summary has what a page of every scene needs", "[converge]") {
                                                     {"replicate", 3},
                                                     {"samples_per_pixel", 512},
                                                     {"invalid_samples", 1}});
-    CHECK(std::count_if(furnace["findings"].begin(), furnace["findings"].end(), [](const auto& finding) {
-              return finding["tone"] == "bad";
-          }) == 1);
+    CHECK(std::count_if(furnace["findings"].begin(), furnace["findings"].end(),
+                        [](const auto& finding) { return finding["tone"] == "bad"; }) == 1);
 }
 
 TEST_CASE("maps are files of the folder, on scales that all of a scene share", "[converge]") {
@@ -434,6 +433,41 @@ TEST_CASE("what is not reached is not ranked, and what is not distinguishable is
     // it is 30 and more.
     CHECK(first <= 20);
     CHECK(most_efficient <= 20);
+}
+
+TEST_CASE("a race of a render with itself has no winner, however much start-up scatters", "[converge]") {
+    constexpr std::uint64_t kRepeats = 200;
+    for (const double jitter : {0.05, 0.2}) {
+        SyntheticRender what;
+        what.variance = 4;
+        what.looks = 7;
+        what.has_reference = false;
+        what.launch_seconds = 0.001;
+        what.seconds_per_sample = 0.0004;  // 26 ms of rendering after 0.4 s of start-up.
+        what.start_jitter = jitter;
+        int first = 0, missed = 0;
+        for (std::uint64_t i = 0; i < kRepeats; ++i) {
+            Run run;
+            for (std::uint64_t c = 0; c < 2; ++c) {
+                Configuration configuration;
+                configuration.key = {"scene", "backend", fmt::format("variant={}", c)};
+                configuration.width = what.pixels;
+                configuration.height = 1;
+                run.configurations.push_back(configuration);
+                for (Row& row : syntheticRows(configuration.key, what, 1000 * (2 * i + c)))
+                    run.rows.push_back(std::move(row));
+            }
+            const Analysis analysis = analyze(run);
+            for (const Finding& finding : findingsOfScene(run, analysis, "scene"))
+                first += finding.text.find("times sooner") != std::string::npos ? 1 : 0;
+            const Estimate& seconds = analysis.fits[0].points.back().seconds;
+            const double truth = 0.4 + 0.001 + 64 * 0.0004;
+            missed += seconds.low <= truth && truth <= seconds.high ? 0 : 1;
+        }
+        INFO("start-up ± " << 100 * jitter << " %: " << first << " decided, " << missed << " missed");
+        CHECK(first <= 20);  // 5 % of 200 are 10; more than 20 are a chance of 0.1 %.
+        CHECK(missed <= 20);
+    }
 }
 
 TEST_CASE("what is said of an image's own error agrees with its interval", "[converge]") {

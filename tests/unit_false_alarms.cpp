@@ -23,7 +23,7 @@ namespace {
 /// How often each kind of test rejects, at two levels. Adjusted p-values below a level are alarms at it.
 struct Alarms {
     static constexpr std::array<double, 2> kLevels{0.05, 0.001};
-    std::array<int, 2> mean{}, tiles{}, pixels{};
+    std::array<int, 2> mean{}, tiles{}, pixels{}, squares{}, colour{};
     bool pixels_tested = true;
     int repeats = 0;
 };
@@ -44,6 +44,10 @@ Alarms countAlarms(const Scenario& s, int repeats, const Planted& planted = {}, 
             alarms.mean[l] += n.channels[0].p < Alarms::kLevels[l];
             alarms.tiles[l] += n.tiles.smallest_p < Alarms::kLevels[l];
             alarms.pixels[l] += n.pixels.smallest_p < Alarms::kLevels[l];
+            alarms.squares[l] += n.rms_z_p < Alarms::kLevels[l];
+            alarms.colour[l] += std::any_of(n.colours.begin(), n.colours.end(), [&](const ColourShift& c) {
+                return 3 * c.p < Alarms::kLevels[l];
+            });
         }
         // The figure, the word and the p beside it are one.
         CHECK(n.channels[0].beyondNoise() == (n.channels[0].p < 1 - n.confidence));
@@ -51,6 +55,24 @@ Alarms countAlarms(const Scenario& s, int repeats, const Planted& planted = {}, 
         CHECK((n.pixels.rejected > 0) == (n.pixels.smallest_p < n.pixels.alpha));
     }
     return alarms;
+}
+
+bool alarmed(const NoiseComparison& n) {
+    return n.tiles.rejected > 0 || n.pixels.rejected > 0 || n.rmsBeyondNoise() ||
+           std::any_of(n.channels.begin(), n.channels.end(),
+                       [](const auto& c) { return c.beyondNoise(); }) ||
+           std::any_of(n.colours.begin(), n.colours.end(), [&](const auto& c) { return n.beyondNoise(c); });
+}
+
+/// The same image, which does not say how large its noise is.
+Image unstated(const Image& image) {
+    Image plain = image;
+    plain.channels = {"R", "G", "B"};
+    plain.pixels.clear();
+    for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
+        plain.pixels.insert(plain.pixels.end(), image.pixels.begin() + static_cast<std::ptrdiff_t>(i),
+                            image.pixels.begin() + static_cast<std::ptrdiff_t>(i + 3));
+    return plain;
 }
 
 /// Fewest alarms that are as rare as one in 10,000 test runs when they come at the stated level or below.
@@ -95,8 +117,106 @@ TEST_CASE(
                     CHECK(alarms.mean[l] < too_many);
                     CHECK(alarms.tiles[l] < too_many);
                     CHECK(alarms.pixels[l] < too_many);
+                    CHECK(alarms.squares[l] < too_many);
                 }
             }
+}
+
+TEST_CASE("noise of colour raises no more alarms of colour than is stated, with and without stated noise",
+          "[false-alarms]") {
+    constexpr int kRepeats = 60;
+    for (const Noise noise : {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies})
+        for (const bool stated : {true, false}) {
+            const Scenario s{noise, true, 2, noiseOf(noise), 40, 24, true};
+            synthetic::Maker maker(5);
+            std::array<int, 2> colour{}, mean{}, tiles{};
+            for (int i = 0; i < kRepeats; ++i) {
+                const Image a = maker.image(s), b = maker.image(s);
+                const NoiseComparison n =
+                    stated ? compareNoise(a, b) : compareNoise(unstated(a), unstated(b));
+                REQUIRE(n.stated == stated);
+                const bool rare = noise == Noise::RareLight || noise == Noise::Fireflies;
+                REQUIRE((n.colour_unjudged.empty() || rare));  // Few pixels have light in both images.
+                for (std::size_t l = 0; l < 2; ++l) {
+                    const double level = Alarms::kLevels[l] / 3;  // Of three channels any.
+                    for (const ColourShift& c : n.colours) colour[l] += c.p < level;
+                    for (const ChannelBias& c : n.channels) mean[l] += c.p < level;
+                    tiles[l] += n.tiles.smallest_p < Alarms::kLevels[l];
+                }
+            }
+            INFO(nameOf(noise) << (stated ? "" : ", not stated"));
+            for (std::size_t l = 0; l < 2; ++l) {
+                CHECK(colour[l] < tooMany(kRepeats, Alarms::kLevels[l]));
+                CHECK(mean[l] < tooMany(kRepeats, Alarms::kLevels[l]));
+                CHECK(tiles[l] < tooMany(kRepeats, Alarms::kLevels[l]));
+            }
+        }
+}
+
+TEST_CASE("what lies in few pixels, in colour or in both directions raises an alarm", "[false-alarms]") {
+    using Plant = void (*)(Image&);
+    const auto pixel = [](Image& image, std::size_t x, std::size_t y) {
+        return &image.pixels[(y * image.width + x) * image.channels.size()];
+    };
+    static const auto at = pixel;
+    const std::vector<std::pair<const char*, Plant>> plants{
+        {"one pixel brighter by 1,000 times the mean",
+         [](Image& image) {
+             for (int c = 0; c < 3; ++c) at(image, 17, 20)[c] += 1000;
+         }},
+        {"a cube of seven pixels black",
+         [](Image& image) {
+             for (std::size_t i = 0; i < 7; ++i)
+                 for (int c = 0; c < 3; ++c) at(image, 17 + i % 3, 10 + i / 3)[c] = 0;
+         }},
+        {"R doubled at the same luminance",
+         [](Image& image) {
+             for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size()) {
+                 const double more = image.pixels[i];
+                 image.pixels[i] += static_cast<float>(more);
+                 image.pixels[i + 1] -= static_cast<float>(more * 0.2126390 / 0.7151687);
+             }
+         }},
+        {"every second pixel up and the others down by half", [](Image& image) {
+             for (std::size_t i = 0, p = 0; i < image.pixels.size(); i += image.channels.size(), ++p)
+                 for (std::size_t c = 0; c < 3; ++c) image.pixels[i + c] *= p % 2 == 0 ? 1.5f : 0.5f;
+         }}};
+    for (const std::uint32_t replicates : {2u, 4u, 16u})
+        for (const auto& [what, plant] : plants) {
+            synthetic::Maker maker(replicates);
+            int found = 0, clean = 0;
+            for (int i = 0; i < 10; ++i) {
+                const Scenario s{Noise::Normal, true, replicates, 0.05, 40, 24, true};
+                Image a = maker.image(s);
+                const Image b = maker.image(s);
+                clean += alarmed(compareNoise(a, b));
+                plant(a);
+                found += alarmed(compareNoise(a, b));
+            }
+            INFO(what << ", " << replicates << " replicates");
+            CHECK(found == 10);
+            CHECK(clean <= 1);
+        }
+}
+
+TEST_CASE("light in six pixels, all of it half as bright again, raises an alarm", "[false-alarms]") {
+    for (const std::uint32_t replicates : {2u, 4u, 16u}) {
+        synthetic::Maker maker(replicates);
+        int found = 0;
+        for (int i = 0; i < 10; ++i) {
+            const Scenario s{Noise::Normal, true, replicates, 0.02, 32, 32};
+            std::array<Image, 2> images{maker.image(s), maker.image(s)};
+            for (Image& image : images)
+                for (std::size_t p = 0; p < std::size_t{32} * 32; ++p)
+                    for (std::size_t c = 0; c < 4; ++c)
+                        if (p % 170 != 5) image.pixels[4 * p + c] = 0;  // Six pixels are left.
+            for (std::size_t p = 0; p < images[0].pixels.size(); p += 4)
+                for (std::size_t c = 0; c < 3; ++c) images[0].pixels[p + c] *= 1.5f;
+            found += alarmed(compareNoise(images[0], images[1]));
+        }
+        INFO(replicates << " replicates");
+        CHECK(found == 10);
+    }
 }
 
 TEST_CASE(
@@ -110,7 +230,7 @@ TEST_CASE(
                 const int repeats = noise == Noise::Fireflies && !equal ? 400 : 60;
                 synthetic::Maker maker(7);
                 const Scenario s{noise, equal, 4, noiseOf(noise), 64, 64};
-                std::array<int, 2> mean{}, tiles{};
+                std::array<int, 2> mean{}, tiles{}, squares{};
                 for (int i = 0; i < repeats; ++i) {
                     const Image few = maker.image(s), many = maker.image(s, {}, 16);
                     const NoiseComparison n =
@@ -118,12 +238,14 @@ TEST_CASE(
                     for (std::size_t l = 0; l < 2; ++l) {
                         mean[l] += n.channels[0].p < Alarms::kLevels[l];
                         tiles[l] += n.tiles.smallest_p < Alarms::kLevels[l];
+                        squares[l] += n.rms_z_p < Alarms::kLevels[l];
                     }
                 }
                 INFO(nameOf(noise) << ", " << (equal ? "equal" : "unequal") << " pixels");
                 for (std::size_t l = 0; l < 2; ++l) {
                     CHECK(mean[l] < tooMany(repeats, Alarms::kLevels[l]));
                     CHECK(tiles[l] < tooMany(repeats, Alarms::kLevels[l]));
+                    CHECK(squares[l] < tooMany(repeats, Alarms::kLevels[l]));
                 }
             }
 }
@@ -145,9 +267,9 @@ TEST_CASE("(a table) false alarms of compare", "[.][false-alarm-table]") {
         "is wrong, at the stated levels 5 %% and 0.1 %%.\n\n",
         kRepeats);
     std::printf(
-        "| B | noise | pixels | dof | mean 5 %% | tiles 5 %% | pixels 5 %% | mean .1 %% | tiles .1 %% | "
-        "pixels .1 %% |\n"
-        "|---|---|---|---|---|---|---|---|---|---|\n");
+        "| B | noise | pixels | dof | mean 5 %% | tiles 5 %% | squares 5 %% | pixels 5 %% | mean .1 %% | "
+        "tiles .1 %% | squares .1 %% | pixels .1 %% |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (const double quality : {1.0, 16.0})
         for (const Noise noise :
              {Noise::Normal, Noise::Skewed, Noise::RareLight, Noise::Fireflies, Noise::Coverage})
@@ -158,7 +280,7 @@ TEST_CASE("(a table) false alarms of compare", "[.][false-alarm-table]") {
                     std::printf("| %s | %s | %s | %u |", quality == 1 ? "alike" : "16 times the samples",
                                 nameOf(noise), equal ? "equal" : "unequal", replicates - 1);
                     for (std::size_t l = 0; l < 2; ++l) {
-                        for (const int count : {a.mean[l], a.tiles[l]})
+                        for (const int count : {a.mean[l], a.tiles[l], a.squares[l]})
                             std::printf(" %.2f |", 100.0 * count / a.repeats);
                         std::printf(a.pixels_tested ? " %.2f |" : " - |", 100.0 * a.pixels[l] / a.repeats);
                     }

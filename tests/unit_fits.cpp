@@ -111,9 +111,13 @@ TEST_CASE("the interval of the bias of a single pixel holds 0 where there is non
         INFO(name << ": " << coverage.of(name));
         CHECK(coverage.of(name) > 0.95);
     }
-    what.mean_bias = 0.02;  // 18 standard errors of the mean at 1024 samples and 16 replicates; b² is seen
-                            // from some nine on.
-    CHECK(fitOf(what, 3).error.flattening);
+    what.mean_bias = 0.02;  // 18 standard errors of the mean at 1024 samples and 16 replicates.
+    const ConfigurationFit biased = fitOf(what, 3);
+    CHECK(biased.judgement.verdict == stats::Verdict::Fail);
+    // One pixel's squared errors scatter as those of one normal value: nothing is said of the error's size.
+    CHECK_FALSE(biased.unknown_error.empty());
+    CHECK_FALSE(biased.error.flattening);
+    CHECK(std::isinf(biased.points.back().relative_rmse.high));
 }
 
 TEST_CASE("intervals of a biased render cover the truth in 95 of 100 repeats", "[fits]") {
@@ -202,6 +206,56 @@ TEST_CASE("targets are reached, extrapolated, or met at the first look", "[fits]
     REQUIRE(fit.targets[1].samples);
     CHECK(covers(*fit.targets[1].samples, 20000));
     CHECK(covers(*fit.targets[1].seconds, 0.42 + 20000 * 0.003));
+    CHECK(fit.slope_range == std::array<double, 2>{1, 1024});
+}
+
+TEST_CASE("a forecast holds for every law from 1/N to 1/N², and where one turns into the other", "[fits]") {
+    // Measured to 256 samples, 1/N² until `turns_at` and 1/N from there on, as Sobol points have it.
+    constexpr int kRepeats = 60;
+    FitOptions options;
+    options.targets = {0.001, 0.0001};
+    for (const double turns_at : {1.0, 8.0, 64.0, 512.0, 4096.0, 1e300}) {
+        SyntheticRender what;
+        what.variance = 2;
+        what.rate = 2;
+        what.turns_at = turns_at;
+        what.looks = 9;
+        int missed = 0, asked = 0, early = 0;
+        for (int i = 0; i < kRepeats; ++i) {
+            const ConfigurationFit fit = fitOf(what, static_cast<std::uint64_t>(100 + i), options);
+            for (const Target& target : fit.targets) {
+                if (target.reached) continue;
+                REQUIRE(target.samples);
+                REQUIRE(target.powers);
+                const double mse = target.relative_rmse * target.relative_rmse,
+                             by_square = std::sqrt(what.variance / mse),
+                             truth = by_square <= turns_at ? by_square : what.variance / turns_at / mse;
+                ++asked;
+                missed += covers(*target.samples, truth) ? 0 : 1;
+                early += (*target.powers)[0] < -1.5 ? 1 : 0;
+            }
+        }
+        INFO("1/N from " << turns_at << " on: " << missed << " of " << asked << " missed");
+        CHECK(missed <= 0.05 * asked + 3.1 * std::sqrt(0.0475 * asked));
+        // Where the last points lie on 1/N, no faster law fits, and the forecast is narrow.
+        if (turns_at <= 8) CHECK(early == 0);
+    }
+}
+
+TEST_CASE("start-up that was timed once has no interval, and each replicate's own counts", "[fits]") {
+    SyntheticRender what;
+    what.looks = 7;
+    Run run = syntheticRun(what, 3);
+    const Estimate known = analyze(run).fits[0].points.back().seconds;
+    CHECK(std::isfinite(known.high));
+    for (Row& row : run.rows)
+        if (row.replicate >= 2) row.seconds_before_first_sample.reset();
+    CHECK(std::isfinite(analyze(run).fits[0].points.back().seconds.high));
+    for (Row& row : run.rows)
+        if (row.replicate >= 1) row.seconds_before_first_sample.reset();
+    const ConfigurationFit once = analyze(run).fits[0];
+    CHECK(std::isinf(once.points.back().seconds.high));
+    CHECK(std::isfinite(once.points.back().render_seconds.high));
 }
 
 TEST_CASE("the noise of the reference is subtracted", "[fits]") {

@@ -87,7 +87,8 @@ TEST_CASE("sums of symmetric differences are judged rightly whatever their tails
             const double p = symmetricP(sums);
             for (std::size_t l = 0; l < kLevels.size(); ++l) {
                 alarms[l] += p < kLevels[l];
-                outside[l] += std::abs(sums.sum) / 64 > symmetricHalfWidth(sums, 1 - kLevels[l]);
+                const double counted = static_cast<double>(sums.count);
+                outside[l] += std::abs(sums.sum) > counted * symmetricHalfWidth(sums, 1 - kLevels[l]);
             }
         }
         INFO("kind " << kind);
@@ -127,6 +128,51 @@ TEST_CASE("variances add up, and so do their degrees of freedom", "[pooled-tests
     PixelSums one;
     one.add(1, 4);
     CHECK(one.mean(3).dof == 3);
+}
+
+TEST_CASE("differences of 0 are no evidence of symmetry", "[pooled-tests]") {
+    DifferenceSums sums;
+    for (int n = 0; n < 1000; ++n) sums.add(n < 10 ? 1 : 0);
+    CHECK(sums.count == 10);
+    CHECK(std::isinf(symmetricHalfWidth(sums, 0.999)));
+}
+
+TEST_CASE("squares beyond the stated variances are found as seldom as stated where there is noise alone",
+          "[pooled-tests]") {
+    // Pixels whose variances differ a hundredfold, known with one degree of freedom or seven.
+    constexpr int kTrials = 4000;
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> normal;
+    for (const int dof : {1, 7}) {
+        std::array<int, 2> alarms{};
+        int found = 0;
+        constexpr std::array<double, 2> kLevels{0.05, 0.001};
+        for (int i = 0; i < kTrials; ++i) {
+            PixelSums squares, stated, louder;
+            for (int pixel = 0; pixel < 64; ++pixel) {
+                const double variance = pixel % 8 == 0 ? 100 : 1, d = std::sqrt(variance) * normal(random);
+                double estimate = 0;
+                for (int k = 0; k < dof; ++k) estimate += std::pow(normal(random), 2) * variance / dof;
+                squares.add(0, d * d);
+                louder.add(0, 16 * d * d);
+                stated.add(0, estimate);
+            }
+            const Mean of_noise{0, stated.variance, scatteredDof(stated.degreesOfFreedom(dof), dof)};
+            const double p = excessP(squares, of_noise);
+            for (std::size_t l = 0; l < kLevels.size(); ++l) alarms[l] += p < kLevels[l];
+            found += excessP(louder, of_noise) < 0.001;
+        }
+        INFO(dof << " degrees of freedom: " << alarms[0] << ", " << alarms[1] << " alarms, found " << found);
+        CHECK_FALSE(exceeds(alarms[0], kTrials, 0.05));
+        CHECK_FALSE(exceeds(alarms[1], kTrials, 0.001));
+        CHECK(found > (dof == 1 ? 0.1 : 0.8) * kTrials);
+    }
+    PixelSums nothing, something;
+    something.add(0, 1);
+    CHECK(excessP(nothing, {0, 0, 1}) == 1);
+    CHECK(excessP(something, {0, 0, 1}) == 0);
+    // F(1, 1) is the square of Student's t(1): P(|t| ≥ 1) = 1/2.
+    CHECK(excessP(something, {0, 1, 1}) == Approx(0.5));
 }
 
 TEST_CASE("a window has what of it lies in the image", "[pooled-tests]") {

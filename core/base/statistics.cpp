@@ -81,6 +81,16 @@ double chiSquaredQuantile(double p, double dof) {
     return boost::math::quantile(boost::math::chi_squared{dof}, p);
 }
 
+double fisherUpperTail(double x, double numerator_dof, double denominator_dof) {
+    require(numerator_dof > 0 && denominator_dof > 0,
+            "Fisher's distribution needs degrees of freedom above 0");
+    if (std::isnan(x)) return x;
+    if (!(x > 0)) return 1;
+    if (std::isinf(x)) return 0;
+    return boost::math::cdf(
+        boost::math::complement(boost::math::fisher_f{numerator_dof, denominator_dof}, x));
+}
+
 double fisherQuantile(double p, double numerator_dof, double denominator_dof) {
     requireProbability(p, "a quantile is asked for a probability between 0 and 1");
     require(numerator_dof > 0 && denominator_dof > 0,

@@ -33,6 +33,8 @@ double studentQuantile(double p, double dof);
 double chiSquaredQuantile(double p, double dof);
 /// x with P(X ≤ x) = p, X Fisher's F, the ratio of two χ²/dof.
 double fisherQuantile(double p, double numerator_dof, double denominator_dof);
+/// P(X ≥ x), X Fisher's F.
+double fisherUpperTail(double x, double numerator_dof, double denominator_dof);
 /// P(|Z| ≥ |z|).
 double normalTwoSided(double z);
 /// P(|T| ≥ |t|).

@@ -286,6 +286,38 @@ class Converging(LightTest):
         self.assertEqual(len(starts), 2)
         self.assertLess(max(starts.values()), 0.5, starts)
 
+    def test_start_up_is_measured_for_every_replicate(self):
+        self.crt("converge", "scene.yaml", "--backends", "fake", "--reference", "5", "--time", "6s", "--max-spp",
+                 "8", "-o", "out", "--set", "film.resolution=[8,8]", expect=7)
+        starts = {row["replicate"]: row["seconds_before_first_sample"] for row in self.rows("out")}
+        self.assertGreaterEqual(len(starts), 2)
+        self.assertEqual(len(set(starts.values())), len(starts), starts)
+
+    def test_a_resumed_run_keeps_all_commands_and_the_seconds_of_all(self):
+        run = ["converge", "scene.yaml", "--backends", "fake", "--reference", "5", "--max-spp", "8", "-o", "out",
+               "--set", "film.resolution=[8,8]"]
+        self.crt(*run, "--time", "3s", expect=7)
+        first = self.summary("out")["environment"]
+        self.crt(*run, "--time", "4s", "--resume", expect=7)
+        both = self.summary("out")["environment"]
+        self.assertEqual(both["commands"][:1], first["commands"])
+        self.assertIn("4s", both["commands"][1])
+        self.assertEqual(len(both["commands"]), 2)
+        self.assertGreater(both["spent_seconds"], first["spent_seconds"])
+        self.assertEqual(both["started"], first["started"])
+
+    def test_rows_of_two_processors_do_not_mix(self):
+        run = ["converge", "scene.yaml", "--backends", "fake", "--reference", "5", "--max-spp", "8", "-o", "out",
+               "--set", "film.resolution=[8,8]", "--time", "3s"]
+        self.crt(*run, expect=7)
+        with open(self.path("out/experiment.json")) as file:
+            experiment = json.load(file)
+        experiment["properties"][0]["values"]["the processor"] = "another one"
+        with open(self.path("out/experiment.json"), "w") as file:
+            json.dump(experiment, file)
+        result = self.crt(*run, "--resume", expect=2)
+        self.assertIn("the processor of the run was another one", result.stderr)
+
     def test_vary_takes_combinations_and_names_what_it_does_not_know(self):
         self.crt(
             "converge",

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -62,6 +63,9 @@ using stats::PixelSums;
 
 /// Tiles about a tile, and pixels about a pixel, whose stated variances stand beside its own.
 constexpr std::uint32_t kTileWindow = 2, kPixelWindow = stats::kPooledRadius;
+/// The largest squared differences of a tile that do not count: of fireflies two may fall into one pixel,
+/// and then its replicates agree.
+constexpr std::size_t kFirefliesOfTile = 2;
 /// Below it two replicates or four agree by chance, exactly where samples are counted, and then a pixel
 /// seems to have no noise.
 constexpr double kFewestPixelDof = 7;
@@ -74,6 +78,12 @@ struct View {
     double samples_ratio = 1;
 
     std::size_t channels() const { return a.channels.size(); }
+    bool stated() const { return !a.source.empty() || !b.source.empty(); }
+    /// A − B; 0 where that is rounding.
+    double difference(std::size_t i) const {
+        const double d = a.values[i] - b.values[i];
+        return std::abs(d) <= stats::roundingOf(a.values[i], b.values[i]) ? 0 : d;
+    }
     std::uint32_t across() const { return (width + stats::kTileSide - 1) / stats::kTileSide; }
     std::uint32_t down() const { return (height + stats::kTileSide - 1) / stats::kTileSide; }
     /// Index of tile and channel in which value `i` lies.
@@ -112,14 +122,15 @@ void learnVariance(Mean& mean, const Mean& other, double ratio) {
     mean.dof = other.dof;
 }
 
-/// Both the stated noise and the symmetry of differences must rule equality out.
+/// Both the stated noise and the symmetry of differences must rule equality out; without the former the
+/// latter alone.
 ChannelBias biasOf(const View& view, std::size_t channel, double confidence) {
     PixelSums sums_a, sums_b;
     DifferenceSums differences;
     for (std::size_t i = channel; i < view.a.values.size(); i += view.channels()) {
         sums_a.add(view.a.values[i], view.a.variances[i]);
         sums_b.add(view.b.values[i], view.b.variances[i]);
-        differences.add(view.a.values[i] - view.b.values[i]);
+        differences.add(view.difference(i));
     }
     const auto meanOf = [channel](const NoisyImage& image, const PixelSums& sums) {
         return image.fold_means.empty() ? sums.mean(image.dof)
@@ -129,11 +140,14 @@ ChannelBias biasOf(const View& view, std::size_t channel, double confidence) {
     learnVariance(a, b, view.samples_ratio);
     learnVariance(b, a, 1 / view.samples_ratio);
     ChannelBias bias{view.a.channels[channel], a.value, b.value, a.value - b.value, {}, 1};
-    bias.p = stats::carefulEqualityP(a, b);
-    double half = stats::carefulHalfWidth(a, b, confidence);
-    if (differences.count >= stats::kFewestForSymmetry) {
+    bias.p = view.stated() ? stats::carefulEqualityP(a, b) : stats::symmetricP(differences);
+    double half = view.stated() ? stats::carefulHalfWidth(a, b, confidence) : 0;
+    if (!view.stated() || differences.count >= stats::kFewestForSymmetry) {
         bias.p = std::max(bias.p, stats::symmetricP(differences));
-        half = std::max(half, stats::symmetricHalfWidth(differences, confidence));
+        // Of the differences that are not 0, spread over all pixels.
+        const double part = static_cast<double>(differences.count) / static_cast<double>(sums_a.count);
+        const double symmetric = stats::symmetricHalfWidth(differences, confidence);
+        half = std::max(half, std::isinf(symmetric) ? symmetric : part * symmetric);
     }
     bias.interval = {bias.difference - half, bias.difference + half};
     return bias;
@@ -168,31 +182,99 @@ Mean guardedMean(const View& view, const std::vector<PixelSums>& tiles, std::siz
     return mean;
 }
 
+/// Sum over `pixels` from the variance of their mean, for stats::excessP.
+Mean sumOf(const Mean& mean, std::uint64_t pixels, double dof) {
+    const auto n = static_cast<double>(pixels);
+    return {0, mean.variance * n * n, stats::scatteredDof(mean.dof, dof)};
+}
+
+/// By the squared differences of a tile without its largest.
+double tileExcessP(std::vector<double>& squares, const Mean& stated) {
+    if (squares.size() <= kFirefliesOfTile) return 1;
+    std::nth_element(squares.begin(), squares.begin() + kFirefliesOfTile, squares.end(), std::greater<>());
+    PixelSums sums;
+    for (std::size_t i = kFirefliesOfTile; i < squares.size(); ++i) sums.add(0, squares[i]);
+    return stats::excessP(sums, stated);
+}
+
 stats::TestFamily testTiles(const View& view, double alpha) {
     const std::vector<PixelSums> tiles_a = tileSums(view, view.a), tiles_b = tileSums(view, view.b);
     std::vector<DifferenceSums> differences(tiles_a.size());
-    for (std::size_t i = 0; i < view.a.values.size(); ++i)
-        differences[view.tileOf(i)].add(view.a.values[i] - view.b.values[i]);
+    std::vector<std::vector<double>> squares(tiles_a.size());
+    for (std::size_t i = 0; i < view.a.values.size(); ++i) {
+        const double difference = view.difference(i);
+        differences[view.tileOf(i)].add(difference);
+        squares[view.tileOf(i)].push_back(difference * difference);
+    }
     std::vector<double> p;
-    for (std::size_t i = 0; i < tiles_a.size(); ++i)
-        p.push_back(std::max(stats::symmetricP(differences[i]),
-                             stats::carefulEqualityP(guardedMean(view, tiles_a, i, view.a.dof),
-                                                     guardedMean(view, tiles_b, i, view.b.dof))));
+    for (std::size_t i = 0; i < tiles_a.size(); ++i) {
+        p.push_back(stats::symmetricP(differences[i]));
+        if (!view.stated()) continue;
+        const Mean a = guardedMean(view, tiles_a, i, view.a.dof),
+                   b = guardedMean(view, tiles_b, i, view.b.dof);
+        const double of_mean = std::max(p.back(), stats::carefulEqualityP(a, b));
+        const std::uint64_t pixels = tiles_a[i].count;
+        const double of_squares =
+            tileExcessP(squares[i], stats::summedVariance(sumOf(a, pixels, view.a.dof), sumOf(b, pixels, view.b.dof)));
+        // Either may raise the alarm, each at half the level.
+        p.back() = std::isnan(of_mean) ? of_mean : std::min(1.0, 2 * std::min(of_mean, of_squares));
+    }
     return stats::holmFamily(p, alpha);
+}
+
+// ---------------------------------------------------------------------------------------------- colour
+
+/// Differences of colour at equal luminance: A's colour times B's luminance less B's times A's, over the
+/// mean of both luminances. Noise of brightness cancels, and where the images differ in their seeds alone
+/// what is left is symmetric about 0.
+void judgeColour(NoiseComparison& result, const NoisyImage& a, const NoisyImage& b, const Image& image) {
+    const std::array<double, 3> weights = luminanceWeights(image);
+    const auto luminance = [&weights](const NoisyImage& of, std::size_t pixel) {
+        return weights[0] * of.values[3 * pixel] + weights[1] * of.values[3 * pixel + 1] +
+               weights[2] * of.values[3 * pixel + 2];
+    };
+    const std::size_t pixels = a.values.size() / 3;
+    double mean = 0;
+    for (std::size_t p = 0; p < pixels; ++p) mean += luminance(b, p) / static_cast<double>(pixels);
+    for (std::size_t c = 0; c < 3; ++c) {
+        DifferenceSums shifts;
+        for (std::size_t p = 0; p < pixels; ++p) {
+            const double of_a = luminance(a, p), of_b = luminance(b, p),
+                         both = std::abs(of_a) + std::abs(of_b);
+            if (!(both > 0)) continue;
+            const double first = 2 * a.values[3 * p + c] * of_b / both,
+                         second = 2 * b.values[3 * p + c] * of_a / both;
+            if (std::abs(first - second) > 8 * stats::roundingOf(first, second)) shifts.add(first - second);
+        }
+        if (shifts.count > 0 && shifts.count < stats::kFewestForSymmetry) {
+            result.colours.clear();
+            result.colour_unjudged = fmt::format(
+                "the images state the noise of luminance alone, and only {} pixels differ in colour, too "
+                "few to "
+                "judge by their signs",
+                shifts.count);
+            return;
+        }
+        const double shift =
+            mean != 0 ? shifts.sum / static_cast<double>(pixels) / std::abs(mean) : shifts.sum;
+        result.colours.push_back({a.channels[c], shift, stats::symmetricP(shifts)});
+    }
 }
 
 // ---------------------------------------------------------------------------------------------- pixels
 
-/// Means of the variances about each pixel; [pixel][channel].
-std::vector<double> variancesAround(const View& view, const NoisyImage& image) {
+/// Pooled variances of the differences; [pixel][channel].
+std::vector<double> pooledVariances(const View& view) {
     const std::size_t channels = view.channels();
-    std::vector<double> around(image.variances.size()), plane(image.variances.size() / channels);
+    const double dof = std::min(view.a.dof, view.b.dof);
+    std::vector<double> all(view.a.variances.size()), plane(all.size() / channels);
     for (std::size_t c = 0; c < channels; ++c) {
-        for (std::size_t p = 0; p < plane.size(); ++p) plane[p] = image.variances[p * channels + c];
-        const std::vector<double> means = stats::windowMeans(plane, view.width, view.height, kPixelWindow);
-        for (std::size_t p = 0; p < plane.size(); ++p) around[p * channels + c] = means[p];
+        for (std::size_t p = 0; p < plane.size(); ++p)
+            plane[p] = view.a.variances[p * channels + c] + view.b.variances[p * channels + c];
+        const stats::PooledVariances pooled = stats::pooledVariances(plane, view.width, view.height, dof);
+        for (std::size_t p = 0; p < plane.size(); ++p) all[p * channels + c] = pooled.variances[p];
     }
-    return around;
+    return all;
 }
 
 /// One value with the mean variance of the pixels about it, and the degrees of freedom of all of them.
@@ -226,19 +308,22 @@ double pixelP(const View& view, std::size_t i) {
 
 /// Fills z, rms_z and the pixels' tests.
 void testPixels(NoiseComparison& result, const View& view, double alpha) {
-    const std::vector<double> around_a = variancesAround(view, view.a),
-                              around_b = variancesAround(view, view.b);
-    double squares = 0, variances = 0;
+    const std::vector<double> pooled = pooledVariances(view);
+    PixelSums squares, of_a, of_b;
     for (std::size_t i = 0; i < view.a.values.size(); ++i) {
-        const Mean a{view.a.values[i], view.a.variances[i], view.a.dof},
-            b{view.b.values[i], view.b.variances[i], view.b.dof};
-        const double difference = a.value - b.value, own = a.variance + b.variance;
-        const double variance = std::max(own, around_a[i] + around_b[i]);
-        result.z.push_back(
-            variance == 0 && stats::carefulEqualityP(a, b) == 1 ? 0 : difference / std::sqrt(variance));
-        if (own > 0) squares += difference * difference;
-        variances += own;
+        const double difference = view.difference(i);
+        result.z.push_back(difference == 0 ? 0 : difference / std::sqrt(pooled[i]));
+        squares.add(0, difference * difference);
+        of_a.add(0, view.a.variances[i]);
+        of_b.add(0, view.b.variances[i]);
     }
+    const auto summed = [](const PixelSums& sums, double dof) {
+        return Mean{0, sums.variance, stats::scatteredDof(sums.degreesOfFreedom(dof), dof)};
+    };
+    Mean a = summed(of_a, view.a.dof), b = summed(of_b, view.b.dof);
+    learnVariance(a, b, view.samples_ratio);
+    learnVariance(b, a, 1 / view.samples_ratio);
+    result.rms_z_p = stats::excessP(squares, stats::summedVariance(a, b));
     const double fewest = std::min(view.a.dof, view.b.dof);
     if (fewest < kFewestPixelDof) {
         result.pixels_untested =
@@ -248,7 +333,8 @@ void testPixels(NoiseComparison& result, const View& view, double alpha) {
         for (std::size_t i = 0; i < view.a.values.size(); ++i) p.push_back(pixelP(view, i));
         result.pixels = stats::sidakFamily(p, alpha);
     }
-    result.rms_z = variances > 0 ? std::sqrt(squares / variances) : 0;
+    const double variances = of_a.variance + of_b.variance;
+    result.rms_z = squares.variance > 0 ? std::sqrt(squares.variance / variances) : 0;
 }
 
 }  // namespace
@@ -265,15 +351,12 @@ NoiseComparison compareNoise(const Image& a, const Image& b) {
                 name);
             return result;
         }
-    std::optional<Pair> pair = commonView(a, b);
-    if (!pair) {
-        result.unknown =
-            "neither image says how large its noise is (render with output AOV 'variance' or 'error')";
-        return result;
-    }
-    if (!pair->a) pair->a = exactly(a, *pair->b);
-    if (!pair->b) pair->b = exactly(b, *pair->a);
-    const View view{std::move(*pair->a), std::move(*pair->b), a.width, a.height, samplesRatio(a, b)};
+    NoisyImage colour;
+    colour.channels = {"R", "G", "B"};
+    Pair pair = commonView(a, b).value_or(Pair{exactly(a, colour), exactly(b, colour)});
+    if (!pair.a) pair.a = exactly(a, *pair.b);
+    if (!pair.b) pair.b = exactly(b, *pair.a);
+    const View view{std::move(*pair.a), std::move(*pair.b), a.width, a.height, samplesRatio(a, b)};
     const auto finite = [](const NoisyImage& image) {
         return std::all_of(image.values.begin(), image.values.end(),
                            [](double v) { return std::isfinite(v); });
@@ -289,7 +372,13 @@ NoiseComparison compareNoise(const Image& a, const Image& b) {
     result.tiles_across = view.across();
     const double alpha = 1 - result.confidence;
     result.tiles = testTiles(view, alpha);
-    testPixels(result, view, alpha);
+    result.stated = view.stated();
+    if (result.stated) {
+        testPixels(result, view, alpha);
+    } else {
+        result.pixels_untested = "neither image states its noise";
+    }
+    if (view.channels() == 1) judgeColour(result, exactly(a, colour), exactly(b, colour), a);
     return result;
 }
 
@@ -325,7 +414,10 @@ void writeZMap(const std::string& path, const NoiseComparison& noise, std::uint3
         throw Error(ErrorKind::Usage,
                     fmt::format("the extension of '{}' is none of .exr, .pfm, .png, .ppm", path), {path});
     if (noise.z.empty())
-        throw Error(ErrorKind::Usage, fmt::format("there is no z map to write: {}", noise.unknown), {path});
+        throw Error(ErrorKind::Usage,
+                    fmt::format("there is no z map to write: {}",
+                                noise.unknown.empty() ? noise.pixels_untested : noise.unknown),
+                    {path});
     if (*format != OutputFormat::Exr && *format != OutputFormat::Pfm) {
         writeImage(path, *format, zMap(noise, width, height));
         return;

@@ -12,10 +12,17 @@ namespace crt {
 struct ChannelBias {
     std::string channel;
     double mean_a = 0, mean_b = 0;
-    double difference = 0;          ///< mean_a − mean_b
-    stats::Interval interval;       ///< Of the difference, at NoiseComparison::confidence.
-    double p = 1;                   ///< That the means are equal.
+    double difference = 0;     ///< mean_a − mean_b
+    stats::Interval interval;  ///< Of the difference, at NoiseComparison::confidence.
+    double p = 1;              ///< That the means are equal.
     bool beyondNoise() const { return !interval.contains(0); }  ///< The same as p < 1 − confidence.
+};
+
+/// What is left of the difference when every pixel of A has B's luminance: of R, G or B.
+struct ColourShift {
+    std::string channel;
+    double relative = 0;  ///< Mean over the image, over B's mean luminance.
+    double p = 1;         ///< That there is none: by the signs of the pixels' differences.
 };
 
 /// What the images' own noise says of their difference. When nothing is wrong, an alarm of each kind (a
@@ -24,16 +31,23 @@ struct ChannelBias {
 /// degrees of freedom of the stated variances. Means and tiles are judged by the stated noise and by the
 /// signs of the pixels' differences (stats/pooled_tests.h), and both must agree. A pixel is judged by its
 /// own variance and by that of its neighbours, and not at all where its variance has fewer than seven
-/// degrees of freedom. The mean of a render of fewer samples than the other's has at least the variance that
-/// the other's says. Of images under 64 pixels, and with noise that is skewed and not alike in both, the
-/// mean is judged as if noise were normal; that of tiles is then at least the average of the tiles about
-/// them.
+/// degrees of freedom. Differences that go up and down alike, or lie in a few pixels, show in their squares
+/// (stats::excessP): over the image, and in a tile without its two largest, which may be fireflies. Where
+/// only luminance has a stated noise, colour is judged by the signs of the pixels' differences, and where
+/// neither image states any, all is. The mean of a render of fewer samples than the other's has at least the
+/// variance that the other's says. Of images under 64 pixels, and with noise that is skewed and not alike in
+/// both, the mean is judged as if noise were normal; that of tiles is then at least the average of the tiles
+/// about them.
 struct NoiseComparison {
-    std::string unknown;            ///< Why nothing is said, one sentence; then all else is empty.
-    std::string source_a, source_b; ///< Where variances are from; empty: none, the image is taken as exact.
+    std::string unknown;             ///< Why nothing is said, one sentence; then all else is empty.
+    std::string source_a, source_b;  ///< Where variances are from; empty: none, the image is taken as exact.
+    bool stated = false;             ///< One image at least says how large its noise is.
     double confidence = 0.999;
     std::vector<ChannelBias> channels;
-    stats::TestFamily tiles, pixels;   ///< Channels among them: `worst` is place · channels + channel.
+    std::vector<ColourShift>
+        colours;                  ///< R, G and B, where `channels` is luminance alone and colour is judged.
+    std::string colour_unjudged;  ///< Why it is not, one sentence without a full stop; empty when it is.
+    stats::TestFamily tiles, pixels;  ///< Channels among them: `worst` is place · channels + channel.
     std::string pixels_untested;  ///< Why single pixels are not tested, one sentence without a full stop;
                                   ///< empty when they are.
     std::uint32_t tiles_across = 0;
@@ -44,6 +58,14 @@ struct NoiseComparison {
     /// √(Σ (a − b)² / Σ stated variances): 1 when all the difference is noise, and the noise is what
     /// the images say. Unbiased with any degrees of freedom, which the mean square of single z's is not.
     double rms_z = 0;
+    double rms_z_p = 1;  ///< That noise makes it so large. Only with stated noise.
+
+    double alpha() const { return 1 - confidence; }
+    bool rmsBeyondNoise() const { return rms_z_p < alpha(); }
+    /// Of three colours any may raise the alarm.
+    bool beyondNoise(const ColourShift& colour) const {
+        return colour.p * static_cast<double>(colours.size()) < alpha();
+    }
 };
 
 /// Images of one size with R, G and B. Between pixels noise is independent, and so are the images: with one

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 namespace crt {
@@ -73,6 +74,20 @@ std::string familyText(const stats::TestFamily& family, const char* method, cons
                        family.tests, family.smallest_p, method, family.rejected > 0 ? ", " + worst : "");
 }
 
+/// Where luminance alone has a stated noise.
+void addColourLine(Lines& lines, const NoiseComparison& noise) {
+    if (!noise.colour_unjudged.empty())
+        lines.add("colour", "luminance only; colour is not judged: " + noise.colour_unjudged);
+    if (noise.colours.empty()) return;
+    const auto most = std::min_element(noise.colours.begin(), noise.colours.end(),
+                                       [](const auto& a, const auto& b) { return a.p < b.p; });
+    lines.add("colour",
+              fmt::format("at equal luminance {} differs by {:+.3g} % of the mean (p {:.2g}, by the "
+                          "signs of the pixels' differences): {}",
+                          most->channel, 100 * most->relative, most->p,
+                          noise.beyondNoise(*most) ? "more than noise" : "may be noise"));
+}
+
 void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t width) {
     if (!noise.unknown.empty()) {
         lines.heading("Noise or bias? Not known: " + noise.unknown + ".");
@@ -81,7 +96,10 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
     const auto source = [](const std::string& from) {
         return from.empty() ? std::string("none known, taken as exact") : from;
     };
-    lines.heading("Noise or bias? By the images' own noise:");
+    lines.heading(noise.stated
+                      ? "Noise or bias? By the images' own noise:"
+                      : "Noise or bias? Neither image states its noise, so by the signs of the pixels' "
+                        "differences, which are as often up as down where only the seeds differ:");
     lines.add("noise of A", source(noise.source_a));
     lines.add("noise of B", source(noise.source_b));
     for (const ChannelBias& c : noise.channels) {
@@ -90,10 +108,14 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
         const char* unit = relative ? " %" : "";
         lines.add(
             ("bias " + c.channel).c_str(),
-            fmt::format("{:+.3g}{}, {:g} % interval [{:+.3g}, {:+.3g}]{}: {}", scale * c.difference, unit,
-                        100 * noise.confidence, scale * c.interval.lower, scale * c.interval.upper, unit,
-                        c.beyondNoise() ? "more than noise" : "may be noise"));
+            std::isinf(c.interval.upper)
+                ? fmt::format("{:+.3g}{}: not judged, too few pixels differ", scale * c.difference, unit)
+                : fmt::format("{:+.3g}{}, {:g} % interval [{:+.3g}, {:+.3g}]{}: {}", scale * c.difference,
+                              unit, 100 * noise.confidence, scale * c.interval.lower,
+                              scale * c.interval.upper, unit,
+                              c.beyondNoise() ? "more than noise" : "may be noise"));
     }
+    addColourLine(lines, noise);
     const std::size_t channels = noise.channels.size();
     const auto at = [&](std::size_t place, std::uint32_t across, std::uint32_t side) {
         return fmt::format("at {},{}", place / channels % across * side, place / channels / across * side);
@@ -103,9 +125,12 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
     lines.add("pixels", noise.pixels_untested.empty()
                             ? familyText(noise.pixels, "after Sidak", at(noise.pixels.worst, width, 1))
                             : "not tested: " + noise.pixels_untested);
-    lines.add("rms z",
-              fmt::format("{:.3g} (1: all of the difference is noise, and as large as the images say)",
-                          noise.rms_z));
+    if (noise.stated)
+        lines.add("rms z",
+                  fmt::format("{:.3g} (1: all of the difference is noise, and as large as the images "
+                              "say; p {:.2g}): {}",
+                              noise.rms_z, noise.rms_z_p,
+                              noise.rmsBeyondNoise() ? "more than noise" : "may be noise"));
 }
 
 Json familyJson(const stats::TestFamily& family) {
@@ -131,7 +156,16 @@ Json noiseJson(const NoiseComparison& noise) {
     json["tiles"] = familyJson(noise.tiles);
     json["pixels"] =
         noise.pixels_untested.empty() ? familyJson(noise.pixels) : Json{{"untested", noise.pixels_untested}};
-    json["rms_z"] = noise.rms_z;
+    json["rms_z"] = noise.stated ? Json(noise.rms_z) : Json(nullptr);
+    json["rms_z_p"] = noise.stated ? Json(noise.rms_z_p) : Json(nullptr);
+    json["rms_z_beyond_noise"] = noise.rmsBeyondNoise();
+    json["colour"] = Json::array();
+    for (const ColourShift& c : noise.colours)
+        json["colour"].push_back({{"channel", c.channel},
+                                  {"relative_shift", c.relative},
+                                  {"p", c.p},
+                                  {"beyond_noise", noise.beyondNoise(c)}});
+    json["colour_unjudged"] = noise.colour_unjudged.empty() ? Json(nullptr) : Json(noise.colour_unjudged);
     return json;
 }
 

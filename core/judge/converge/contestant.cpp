@@ -1,10 +1,11 @@
-#include "film/resolve.h"
 #include "judge/converge/contestant.h"
+#include "film/resolve.h"
 
 #include "backend/loader.h"
 #include "compile/compile.h"
 #include "film/error_estimate.h"
 #include "film/luminance_error.h"
+#include "film/pooled_variance.h"
 #include "judge/converge/fits.h"
 #include "judge/stats/color_difference.h"
 #include "judge/stats/flip.h"
@@ -35,6 +36,18 @@ std::vector<float> spread(const Reference& reference, std::size_t pixels) {
     return std::vector<float>(pixels, reference.luminance.front());
 }
 
+/// Variance of the reference's luminance, pixel by pixel; 0 where it is one number.
+std::vector<double> referenceVariances(const Reference& reference, std::size_t pixels) {
+    std::vector<double> variances(pixels, 0.0);
+    if (reference.fold_luminance.empty()) return variances;
+    std::vector<double> eighths(reference.fold_luminance.size());
+    for (std::size_t p = 0; p < pixels; ++p) {
+        for (std::size_t k = 0; k < eighths.size(); ++k) eighths[k] = reference.fold_luminance[k][p];
+        variances[p] = stats::summarize(eighths).variance / static_cast<double>(eighths.size());
+    }
+    return variances;
+}
+
 double loadAverage() {
     double load = 0;
     return getloadavg(&load, 1) == 1 ? load : 0;
@@ -49,21 +62,25 @@ std::optional<double> clockMhz() {
 
 }  // namespace
 
-Contestant::Contestant(Key key, Scene scene, const Reference* reference, const IntegratorOptions& options)
-    : scene_(std::move(scene)),
-      seed_(scene_.sampler.seed),
-      reference_(reference),
-      session_(loadBackend(key.backend), options),
-      tests_(1, 1, 3) {
+Contestant::Contestant(Key key, LoadScene load, const Reference* reference, const IntegratorOptions& options)
+    : load_(std::move(load)), options_(options), reference_(reference), tests_(1, 1, 3) {
     configuration_.key = std::move(key);
-    session_.openDevice();
-    before_first_sample_ = opening_.seconds() + scene_.parse_seconds;
     configuration_.threads = options.threads;
+    open();
+    seed_ = scene_.sampler.seed;
 }
 
-void Contestant::describe(const CompiledScene& compiled, double setup_seconds) {
-    before_first_sample_ += setup_seconds;
-    const CrtBackendReport report = session_.report();
+void Contestant::open() {
+    session_.reset();
+    scene_ = load_();
+    const Stopwatch opening;
+    session_ = std::make_unique<Session>(loadBackend(configuration_.key.backend), options_);
+    session_->openDevice();
+    start_seconds_ = scene_.parse_seconds + opening.seconds();
+}
+
+void Contestant::describe(const CompiledScene& compiled) {
+    const CrtBackendReport report = session_->report();
     Configuration& c = configuration_;
     c.device = arrayText(report.device);
     c.kernel = arrayText(report.kernel);
@@ -145,9 +162,9 @@ void Contestant::keepPicture(const Film& film, const Image& image, double mean_l
 /// The same seed and samples are the same bits as that replicate's look was.
 void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
     scene_.sampler.seed = seed_ + 1 + replicate;
-    session_.setScene(session_.compile(scene_));
-    session_.render({.first_sample = 0, .sample_count = samples});
-    const Film film = session_.film();
+    session_->setScene(session_->compile(scene_));
+    session_->render({.first_sample = 0, .sample_count = samples});
+    const Film film = session_->film();
     const Image image = resolveImage(film, developmentOf(scene_).forFloats(), 0);
     keepPicture(film, image, stats::meanLuminance(looks_.at(samples).at(replicate)));
 }
@@ -156,18 +173,26 @@ void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
 /// the start and not to a replicate.
 void Contestant::warmUp(const CompiledScene& compiled) {
     const Clock::time_point start = Clock::now();
-    session_.render({.first_sample = 0, .sample_count = 1});
+    session_->render({.first_sample = 0, .sample_count = 1});
     configuration_.stages.first_sample = secondsSince(start);
-    before_first_sample_ += configuration_.stages.first_sample;
-    session_.setScene(compiled);  // An empty film again.
+    start_seconds_ += configuration_.stages.first_sample;
+    session_->setScene(compiled);
 }
 
 void Contestant::prepare() {
     const Clock::time_point setup = Clock::now();
-    const CompiledScene compiled = session_.compile(scene_);
-    session_.setScene(compiled);
-    describe(compiled, secondsSince(setup));
+    const CompiledScene compiled = session_->compile(scene_);
+    session_->setScene(compiled);
+    start_seconds_ += secondsSince(setup);
+    if (configuration_.width == 0) describe(compiled);
     warmUp(compiled);
+    start_waits_ = true;
+}
+
+void Contestant::restart() {
+    if (start_waits_) return;
+    open();
+    prepare();
 }
 
 StoredReplicate Contestant::stored(std::uint32_t replicate) const {
@@ -196,32 +221,32 @@ void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored)
 bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds,
                            const std::function<void(const Row&)>& found, const std::function<bool()>& stop) {
     scene_.sampler.seed = seed_ + 1 + replicate;
-    const CompiledScene compiled = session_.compile(scene_);
-    session_.setScene(compiled);
+    const CompiledScene compiled = session_->compile(scene_);
+    session_->setScene(compiled);
     const Clock::time_point start = Clock::now();
 
-    const CrtBackendReport before = session_.report();
+    const CrtBackendReport before = session_->report();
     const bool exploring = replicate == 0;
     double wall = 0;
     for (std::uint64_t done = 0, next = 1; done < most_samples; next *= 2) {
         if (stop()) return false;
         const Clock::time_point step = Clock::now();
-        session_.render({.first_sample = done, .sample_count = next - done});
+        session_->render({.first_sample = done, .sample_count = next - done});
         const double step_seconds = secondsSince(step);
         wall += step_seconds;
         done = next;
         if (exploring) samples_reached_ = done;
 
-        const Film film = session_.film();
+        const Film film = session_->film();
         // The next doubling takes as long as all before it, and its look some more.
         const bool last =
             done * 2 > most_samples || (exploring && secondsSince(start) + 2.2 * step_seconds > seconds);
         Row row = look(film, replicate, last);
-        const CrtBackendReport now = session_.report();
+        const CrtBackendReport now = session_->report();
         row.render_wall_seconds = wall;
         if (now.render_seconds > before.render_seconds)
             row.render_device_seconds = now.render_seconds - before.render_seconds;
-        row.seconds_before_first_sample = before_first_sample_;
+        if (start_waits_) row.seconds_before_first_sample = start_seconds_;
         row.paths = now.paths - (before.paths <= now.paths ? before.paths : 0);
         row.closest_rays = now.closest_rays - std::min(before.closest_rays, now.closest_rays);
         row.shadow_rays = now.shadow_rays - std::min(before.shadow_rays, now.shadow_rays);
@@ -230,7 +255,8 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
         if (last) break;
     }
     configuration_.stages.render_wall = wall;
-    seconds_of_last_ = secondsSince(start);
+    seconds_of_last_ = secondsSince(start) + (start_waits_ ? start_seconds_ : 0);
+    start_waits_ = false;
     return true;
 }
 
@@ -261,12 +287,16 @@ void Contestant::fillMaps(std::uint64_t samples) {
     const double mean = std::accumulate(truth.begin(), truth.end(), 0.0) / static_cast<double>(pixels);
     c.maps.error = {c.width, c.height, std::vector<float>(pixels)};
     c.maps.z = c.maps.error;
+    std::vector<double> variances = referenceVariances(*reference_, pixels);
+    for (std::size_t p = 0; p < pixels; ++p)
+        variances[p] = variances[p] / (mean * mean) + std::pow(double{last_error_.values[p]}, 2);
+    const double dof = std::max(1, replicatesOf(scene_) - 1);
+    const std::vector<double> pooled =
+        stats::pooledVariances(variances, c.width, c.height, dof).variances;
     for (std::size_t p = 0; p < pixels; ++p) {
         const double difference = (luminance[p] - truth[p]) / mean;
-        const double noise =
-            std::hypot(last_error_.values[p], std::sqrt(reference_->info.mean_variance) / mean);
         c.maps.error.values[p] = static_cast<float>(std::abs(difference));
-        c.maps.z.values[p] = noise > 0 ? static_cast<float>(difference / noise) : 0.0f;
+        c.maps.z.values[p] = pooled[p] > 0 ? static_cast<float>(difference / std::sqrt(pooled[p])) : 0.0f;
     }
     if (reference_->fold_rgb.empty()) return;
     if (scene_.film.color_space == ColorSpace::LinearSrgb)

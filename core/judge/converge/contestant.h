@@ -20,12 +20,20 @@ namespace crt::converge {
 
 class Contestant {
 public:
-    /// Loads the backend. Throws crt::Error when it cannot run.
-    Contestant(Key key, Scene scene, const Reference* reference, const IntegratorOptions& options);
+    using LoadScene = std::function<Scene()>;
+
+    /// Loads the scene and the backend. Throws crt::Error when it cannot run.
+    Contestant(Key key, LoadScene load, const Reference* reference, const IntegratorOptions& options);
 
     /// Compiles the scene and renders one sample that does not count: all that is needed before the first
-    /// replicate, and timed as the start of every one.
+    /// replicate, and timed as its start.
     void prepare();
+    /// Starts from the beginning, and times that: start-up has noise as rendering has, and a time with both
+    /// in it is known only by starts of their own for several replicates. Nothing where a start waits for
+    /// its replicate already.
+    void restart();
+    /// What the last start took.
+    double startSeconds() const { return start_seconds_; }
 
     /// Renders seed number `replicate` to N = 1, 2, 4 … and gives each look to `found`, until
     /// `most_samples`, or (on the first replicate) until the next doubling would take the replicate beyond
@@ -52,7 +60,10 @@ public:
     void finish(std::uint64_t map_samples);
 
 private:
-    void describe(const CompiledScene& compiled, double setup_seconds);
+    /// Loads the scene, the backend and opens the device.
+    void open();
+    void describe(const CompiledScene& compiled);
+    /// Renders the first sample; an empty film again.
     void warmUp(const CompiledScene& compiled);
     Row look(const Film& film, std::uint32_t replicate, bool last);
     /// The image of a film and its own standard error, for maps.
@@ -61,12 +72,14 @@ private:
     void fillMaps(std::uint64_t samples);
 
     Configuration configuration_;
+    LoadScene load_;
+    IntegratorOptions options_;
     Scene scene_;
-    std::uint64_t seed_;
+    std::uint64_t seed_ = 0;
     const Reference* reference_;
-    Stopwatch opening_;         ///< Runs from before the backend is loaded.
-    Session session_;
-    double before_first_sample_ = 0;
+    std::unique_ptr<Session> session_;
+    double start_seconds_ = 0;
+    bool start_waits_ = false;  ///< For the replicate whose own it is.
     double seconds_of_last_ = 0;
     std::uint64_t samples_reached_ = 0;
     std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>> looks_;

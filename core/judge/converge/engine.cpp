@@ -1,5 +1,5 @@
-#include "film/error_text.h"
 #include "judge/converge/engine.h"
+#include "film/error_text.h"
 
 #include "backend/loader.h"
 #include "base/atomic_file.h"
@@ -39,6 +39,9 @@ using Clock = std::chrono::steady_clock;
 constexpr double kReferenceShare = 0.25;
 /// Part of --time after which no start-up is paid twice any more.
 constexpr double kWarmUpShare = 0.4;
+
+/// Part of a replicate's time that may go into starting the program for it.
+constexpr double kStartShare = 0.5;
 
 /// One run from start to report.
 class Engine {
@@ -103,8 +106,6 @@ private:
         e.operating_system = operatingSystem();
         e.load_start = loadAverages();
         e.working_directory = fs::current_path().string();
-        e.started = utcNow();
-        e.commands = {request_.command};
         e.budget_seconds = request_.seconds;
         e.threads = request_.integrator.threads != 0 ? request_.integrator.threads
                                                      : std::thread::hardware_concurrency();
@@ -149,6 +150,28 @@ private:
             requireSameExperiment(path("experiment.json"), experiment);
         else
             writeExperiment(path("experiment.json"), experiment);
+        if (holds_rows_) sessions_ = readSessions(path("sessions.json"));
+        if (holds_rows_ && sessions_.empty())
+            run_.notes.push_back(
+                "what was typed in earlier sessions of this run, and how long they took, is not known");
+        sessions_.push_back({request_.command, utcNow(), elapsed()});
+        keepSession();
+    }
+
+    /// So that a session that is killed leaves its command and its time, too.
+    void keepSession() {
+        sessions_.back().spent_seconds = elapsed();
+        writeSessions(path("sessions.json"), sessions_);
+    }
+
+    /// Of all sessions.
+    void describeSessions() {
+        Environment& e = run_.environment;
+        e.started = sessions_.front().started;
+        for (const SessionOfRun& session : sessions_) {
+            e.commands.push_back(session.command);
+            e.spent_seconds += session.spent_seconds;
+        }
     }
 
     /// The first backend of those asked for that can run, or nothing.
@@ -181,6 +204,7 @@ private:
                 throw Error(ErrorKind::Usage, fmt::format("'{}' is missing, against which the rows of this "
                                                           "run were measured: it cannot be resumed",
                                                           request.output));
+            std::string went = "one was rendered when the run began";
             if (!holds_rows_) {
                 const std::optional<MadeReference> made = renderReference(scenes_[s], request, watch_);
                 if (!made) return;
@@ -189,14 +213,16 @@ private:
                     "made one: {} samples per pixel on {}{}",
                     names_[s], durationText(made->seconds), durationText(request_.seconds), made->samples,
                     backend, made->error ? ", its own " + crt::errorText(*made->error) : "");
+                went = fmt::format("{} of the {} of --time went into one", durationText(made->seconds),
+                                   durationText(request_.seconds));
             }
             references_[s] = std::make_unique<Reference>(readReference(request.output, scenes_[s]));
             references_[s]->info.scene = names_[s];
-            run_.notes.push_back(
-                fmt::format("{}: no reference was given, so {} % of --time went into one, made with {} and "
-                            "the scene's own light sampling; a bias that they share does not show against "
-                            "it ('crt reference' makes one that shares less)",
-                            names_[s], 100 * kReferenceShare / static_cast<double>(missing), backend));
+            run_.notes.push_back(fmt::format(
+                "{}: no reference was given, so {}, made with {} and the scene's own light sampling; a "
+                "bias that they share does not show against it ('crt reference' makes one that "
+                "shares less)",
+                names_[s], went, backend));
         }
         for (std::size_t s = 0; s < scenes_.size(); ++s) {
             ReferenceInfo none;
@@ -233,9 +259,9 @@ private:
 
     /// Libraries, drivers and caches are warm before any start-up is timed: else whoever comes first pays
     /// for all. Where starts take so long that little time would be left, it is not done, and said.
-    void warmUp(const Key& key, const Scene& scene) {
+    void warmUp(const Key& key, const Contestant::LoadScene& load) {
         if (elapsed() < (kReferenceShare + kWarmUpShare) * request_.seconds) {
-            Contestant(key, scene, nullptr, request_.integrator).prepare();
+            Contestant(key, load, nullptr, request_.integrator).prepare();
             return;
         }
         if (!left_cold_)
@@ -251,11 +277,14 @@ private:
                 for (const Variant& variant : variantsOf(request_.vary)) {
                     Key key{names_[s], backend, variant.label};
                     try {
-                        Scene scene = loadSmall(request_.scenes[s], variant.changes, request_.resolution);
+                        const auto load = [this, s, changes = variant.changes] {
+                            return loadSmall(request_.scenes[s], changes, request_.resolution);
+                        };
+                        const Scene scene = load();
                         const Reference* reference = referenceFor(s, scene, key);
-                        warmUp(key, scene);
-                        contestants_.push_back(std::make_unique<Contestant>(key, std::move(scene), reference,
-                                                                            request_.integrator));
+                        warmUp(key, [&scene] { return scene; });
+                        contestants_.push_back(
+                            std::make_unique<Contestant>(key, load, reference, request_.integrator));
                         contestants_.back()->prepare();
                         order_.push_back({key, contestants_.back().get(), {}});
                     } catch (const Error& error) {
@@ -303,8 +332,24 @@ private:
         }
     }
 
+    /// Every so many replicates begin with a start of their own: each, unless starts would take more than
+    /// kStartShare of the time.
+    std::uint32_t replicatesForAStart(const Contestant& contestant, double share) {
+        const double starts = std::ceil(contestant.startSeconds() / std::max(kStartShare * share, 1e-9));
+        const auto every = static_cast<std::uint32_t>(std::clamp(starts, 1.0, 1e6));
+        if (every >= request_.replicates && contestant.samplesReached() == 0)
+            run_.notes.push_back(fmt::format(
+                "{}: starting {} takes so long that it was timed once only: times that include it "
+                "have no interval",
+                contestant.key().scene, labelOf(contestant.key())));
+        return every;
+    }
+
     bool renderOne(Contestant& contestant, std::uint32_t replicate, double share,
                    const std::function<bool()>& stop) {
+        const std::uint32_t every = replicatesForAStart(contestant, share);
+        if (replicate % every == 0) contestant.restart();
+        share = std::max(0.0, share - contestant.startSeconds() / every);
         const std::uint64_t most = replicate == 0 ? request_.max_samples : contestant.samplesReached();
         const auto found = [&](const Row& row) {
             run_.rows.push_back(row);
@@ -318,6 +363,7 @@ private:
         };
         const bool done = contestant.replicate(replicate, most, share, found, stop);
         if (done) writeReplicate(replicateFile(contestant.key(), replicate), contestant.stored(replicate));
+        keepSession();
         return done;
     }
 
@@ -368,7 +414,8 @@ private:
         noteReferences();
         run_.environment.finished = utcNow();
         run_.environment.load_end = loadAverages();
-        run_.environment.spent_seconds = elapsed();
+        keepSession();
+        describeSessions();
 
         const Analysis analysis = analyze(run_);
         writeCsv(path("results.csv"), run_.rows);
@@ -437,6 +484,7 @@ private:
     std::vector<std::unique_ptr<Contestant>> contestants_;
     std::vector<Entry> order_;
     std::unique_ptr<ResultsLog> log_;
+    std::vector<SessionOfRun> sessions_;  ///< This one last.
     std::uint32_t rounds_ = 0;
 };
 

@@ -61,6 +61,16 @@ double meanOver(Indices replicates, const std::function<double(std::size_t)>& va
     return sum / static_cast<double>(replicates.size());
 }
 
+double meanStart(const RowList& of_replicates, Indices replicates) {
+    double sum = 0, timed = 0;
+    for (const std::size_t r : replicates)
+        if (const std::optional<double> start = of_replicates[r]->seconds_before_first_sample) {
+            sum += *start;
+            ++timed;
+        }
+    return sum / timed;
+}
+
 double logSlope(const std::vector<double>& x, const std::vector<double>& y) {
     std::vector<double> log_x, log_y;
     for (std::size_t i = 0; i < x.size(); ++i) {
@@ -249,11 +259,49 @@ double ErrorModel::samplesTo(const Resample& resample, double target, bool extra
         const double share = std::log(target / mse[i - 1]) / std::log(low / mse[i - 1]);
         return block_.samples[i - 1] * std::pow(block_.samples[i] / block_.samples[i - 1], share);
     }
-    if (!extrapolate) return kNaN;
+    return extrapolate ? samplesBeyond(resample, target, lastPower(resample)) : kNaN;
+}
+
+double ErrorModel::samplesBeyond(const Resample& resample, double target, double power) const {
+    const double last = errors(resample).back();
+    return power < kSlowestPower ? block_.samples.back() * std::pow(target / last, 1 / power) : kNaN;
+}
+
+double ErrorModel::lastPower(const Resample& resample) const {
+    const std::vector<double> mse = errors(resample);
     const auto first = static_cast<std::ptrdiff_t>(mse.size() > 4 ? mse.size() - 4 : 0);
-    const double slope =
-        logSlope({block_.samples.begin() + first, block_.samples.end()}, {mse.begin() + first, mse.end()});
-    return slope < -0.2 ? block_.samples.back() * std::pow(target / mse.back(), 1 / slope) : kNaN;
+    return logSlope({block_.samples.begin() + first, block_.samples.end()},
+                    {mse.begin() + first, mse.end()});
+}
+
+double ErrorModel::valuesOfError() const {
+    std::vector<double> squares;
+    for (const RowList& rows : block_.rows) squares.push_back(measure_.variance(*rows.back()));
+    if (squares.size() < 3) return std::numeric_limits<double>::infinity();
+    const stats::Summary summary = stats::summarize(squares);
+    double farthest = 0;
+    for (const double square : squares) farthest = std::max(farthest, std::abs(square - summary.mean));
+    const double scatter =
+        summary.variance + 0.5 * farthest * farthest / static_cast<double>(summary.count - 1);
+    return 2 * summary.mean * summary.mean / scatter;
+}
+
+double ErrorModel::variancePower(const Resample& resample) const {
+    std::vector<double> variances;
+    for (std::size_t i = 0; i < block_.columns(); ++i)
+        variances.push_back(
+            meanOver(resample.errors, [&](std::size_t r) { return measure_.variance(*block_.rows[r][i]); }));
+    return logSlope(block_.samples, variances);
+}
+
+std::array<double, 2> ErrorModel::slopeSamples() const {
+    std::array<double, 2> range{kNaN, kNaN};
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+        if (!seen_[i]) continue;
+        if (std::isnan(range[0])) range[0] = block_.samples[i];
+        range[1] = block_.samples[i];
+    }
+    return range;
 }
 
 double ErrorModel::weighted(const std::vector<double>& of_columns) const {
@@ -269,11 +317,7 @@ double ErrorModel::weighted(const std::vector<double>& of_columns) const {
 // ------------------------------------------------------------------------- TimeModel
 
 TimeModel::TimeModel(Block block) : block_(std::move(block)) {
-    std::vector<double> before;
-    for (const RowList& rows : block_.rows) before.push_back(rows.back()->seconds_before_first_sample);
-    const auto middle = before.begin() + static_cast<std::ptrdiff_t>(before.size() / 2);
-    std::nth_element(before.begin(), middle, before.end());
-    before_first_sample_ = *middle;
+    for (const RowList& rows : block_.rows) last_rows_.push_back(rows.back());
 }
 
 std::vector<double> TimeModel::renderSeconds(const Resample& resample) const {
@@ -292,11 +336,11 @@ double TimeModel::secondsTo(const Resample& resample, double samples) const {
     if (!std::isfinite(samples)) return kNaN;
     const std::vector<double> seconds = renderSeconds(resample);
     const auto right = std::lower_bound(block_.samples.begin(), block_.samples.end(), samples);
-    if (right == block_.samples.end()) return before_first_sample_ + line(resample).at(samples);
+    if (right == block_.samples.end()) return beforeFirstSample(resample) + line(resample).at(samples);
     const auto i = static_cast<std::size_t>(right - block_.samples.begin());
-    if (i == 0) return before_first_sample_ + seconds[0];
+    if (i == 0) return beforeFirstSample(resample) + seconds[0];
     const double share = (samples - block_.samples[i - 1]) / (block_.samples[i] - block_.samples[i - 1]);
-    return before_first_sample_ + seconds[i - 1] + share * (seconds[i] - seconds[i - 1]);
+    return beforeFirstSample(resample) + seconds[i - 1] + share * (seconds[i] - seconds[i - 1]);
 }
 
 }  // namespace crt::converge

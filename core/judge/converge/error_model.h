@@ -40,6 +40,9 @@ Block balancedBlock(const RowsBySamples& by_samples);
 
 double meanOver(Indices replicates, const std::function<double(std::size_t)>& value);
 
+/// Mean start-up of those of the replicates that timed one; NaN where none did.
+double meanStart(const RowList& of_replicates, Indices replicates);
+
 /// How rows of one configuration become relative errors. All are relative² where they are squares.
 class Measure {
 public:
@@ -94,6 +97,9 @@ private:
     std::vector<Part> parts_;  ///< As Resample::reference_part counts them; empty without folds.
 };
 
+/// Squared error that falls with N by no more than this power is not known to fall.
+inline constexpr double kSlowestPower = -0.2;
+
 /// Errors of the columns of a block.
 class ErrorModel {
 public:
@@ -123,6 +129,19 @@ public:
     /// logarithms; beyond the last, on the line of the last four where `extrapolate` allows it. NaN when it
     /// is not reached.
     double samplesTo(const Resample& resample, double target, bool extrapolate) const;
+    /// The same beyond the last column, where squared error falls with N to this power.
+    double samplesBeyond(const Resample& resample, double target, double power) const;
+    /// Power of N by which squared error falls over the last four columns.
+    double lastPower(const Resample& resample) const;
+    /// How many normal values of one variance would make the squared error of an image scatter as it does
+    /// between the replicates of the last column (Satterthwaite's 2 S²/Var S). With one half more of the
+    /// largest deviation's square, for paths as bright that no replicate has met. Infinite with fewer than
+    /// three replicates.
+    double valuesOfError() const;
+    /// Power of N by which the variance between replicates falls, over all columns.
+    double variancePower(const Resample& resample) const;
+    /// Samples of the first and of the last column that are in slope().
+    std::array<double, 2> slopeSamples() const;
 
 private:
     double weighted(const std::vector<double>& of_columns) const;
@@ -138,7 +157,9 @@ public:
     explicit TimeModel(Block block);
 
     std::size_t replicates() const { return block_.replicates(); }
-    double beforeFirstSample() const { return before_first_sample_; }
+    double beforeFirstSample(const Resample& resample) const {
+        return meanStart(last_rows_, resample.times);
+    }
     double lastSamples() const { return block_.samples.back(); }
     const std::vector<double>& samples() const { return block_.samples; }
 
@@ -150,7 +171,7 @@ public:
 
 private:
     Block block_;
-    double before_first_sample_ = 0;
+    RowList last_rows_;  ///< [replicate]
 };
 
 /// Slope of a straight line through logarithms, all points alike; those not above 0 are left out. NaN with

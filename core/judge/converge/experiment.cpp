@@ -1,9 +1,9 @@
 #include "judge/converge/experiment.h"
 
-#include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/input_file.h"
 #include "film/film_record.h"
+#include "judge/converge/json_parts.h"
 #include "judge/converge/reference.h"
 #include "judge/converge/report_maps.h"
 
@@ -17,7 +17,6 @@ namespace crt::converge {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "crt converge experiment 1";
 
@@ -101,6 +100,7 @@ Properties commonProperties(const BuildInfo& build, const IntegratorOptions& opt
     p.values = {{"the program",
                  fmt::format("crt {} {}{}", CRT_VERSION, build.commit, build.dirty ? " with changes" : "")},
                 {"the number of threads", options.threads == 0 ? "all" : std::to_string(options.threads)},
+                {"the processor", processorName()},
                 {"the device", options.device.empty() ? "the first" : options.device}};
     return p;
 }
@@ -147,10 +147,33 @@ void writeExperiment(const std::string& path, const Experiment& experiment) {
                                       {"variant", p.key.variant},
                                       {"values", values}});
     }
-    const std::string text = json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n';
-    AtomicFile file(path);
-    file.write(text.data(), text.size());
-    file.commit();
+    writeWhole(path, json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n');
+}
+
+std::vector<SessionOfRun> readSessions(const std::string& path) {
+    std::error_code ignored;
+    if (!fs::exists(path, ignored)) return {};
+    try {
+        std::vector<SessionOfRun> sessions;
+        for (const Json& entry : Json::parse(readInput(path, kMostTableBytes)))
+            sessions.push_back({entry.at("command"), entry.at("started"), entry.at("spent_seconds")});
+        return sessions;
+    } catch (const InputRefused& refused) {
+        throw Error(ErrorKind::Usage, fmt::format("'{}' {}", path, refused.what()), {path});
+    } catch (const nlohmann::json::exception& e) {
+        throw Error(ErrorKind::Usage,
+                    fmt::format("'{}' cannot be read ({}), so the run cannot be resumed", path, e.what()),
+                    {path});
+    }
+}
+
+void writeSessions(const std::string& path, const std::vector<SessionOfRun>& sessions) {
+    Json json = Json::array();
+    for (const SessionOfRun& session : sessions)
+        json.push_back({{"command", session.command},
+                        {"started", session.started},
+                        {"spent_seconds", session.spent_seconds}});
+    writeWhole(path, json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n');
 }
 
 void requireSameExperiment(const std::string& path, const Experiment& experiment) {

@@ -27,6 +27,16 @@ Properties commonProperties(const BuildInfo& build, const IntegratorOptions& opt
 Properties propertiesOf(const Key& key, const Scene& scene, const std::string& content,
                         const std::string& reference);
 
+/// One call of the program that rendered into the folder: the first, and those that resumed it.
+struct SessionOfRun {
+    std::string command;       ///< As typed, quoted for a shell.
+    std::string started;       ///< UTC, ISO 8601.
+    double spent_seconds = 0;  ///< As of the last replicate that it finished, or of its report.
+};
+/// Nothing where there is no such file.
+std::vector<SessionOfRun> readSessions(const std::string& path);
+void writeSessions(const std::string& path, const std::vector<SessionOfRun>& sessions);
+
 void writeExperiment(const std::string& path, const Experiment& experiment);
 
 /// Throws crt::Error(Usage) that names what differs from the experiment in the file, or says that there is

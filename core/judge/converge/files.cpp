@@ -11,10 +11,11 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include <fcntl.h>
+#include <unistd.h>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -22,7 +23,6 @@
 #include <map>
 #include <memory>
 #include <tuple>
-#include <unistd.h>
 
 namespace crt::converge {
 namespace {
@@ -109,7 +109,7 @@ Row rowOf(const Json& json) {
     row.samples = wholeNumber(json.at("samples_per_pixel"));
     row.render_wall_seconds = numberIn(json.at("render_wall_seconds"));
     row.render_device_seconds = knownNumberIn(json.at("render_device_seconds"));
-    row.seconds_before_first_sample = numberIn(json.at("seconds_before_first_sample"));
+    row.seconds_before_first_sample = knownNumberIn(json.at("seconds_before_first_sample"));
     row.paths = wholeNumber(json.at("paths"));
     row.closest_rays = wholeNumber(json.at("closest_rays"));
     row.shadow_rays = wholeNumber(json.at("shadow_rays"));

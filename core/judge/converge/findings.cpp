@@ -1,5 +1,5 @@
-#include "film/error_text.h"
 #include "judge/converge/findings.h"
+#include "film/error_text.h"
 
 #include "base/unit_text.h"
 #include "judge/converge/quantity_text.h"
@@ -185,16 +185,19 @@ std::vector<Finding> bias(const Fits& fits, double margin) {
 std::vector<Finding> slopes(const Fits& fits) {
     Fits fitted;
     for (const ConfigurationFit* fit : fits)
-        if (fit->fitted && std::isfinite(fit->slope_samples.value)) fitted.push_back(fit);
+        if (fit->fitted && fit->unknown_error.empty() && std::isfinite(fit->slope_samples.value))
+            fitted.push_back(fit);
     if (fitted.empty()) return {};
     const auto [steepest, flattest] = std::minmax_element(
         fitted.begin(), fitted.end(),
         [](const auto* a, const auto* b) { return a->slope_samples.value < b->slope_samples.value; });
-    std::string text = fmt::format("Error falls with samples to the power {} ({})",
-                                   numberText((*steepest)->slope_samples), labelOf((*steepest)->key));
+    const auto slope = [](const ConfigurationFit& fit) {
+        return fmt::format("{} from {:.0f} to {:.0f} samples ({})", numberText(fit.slope_samples),
+                           fit.slope_range[0], fit.slope_range[1], labelOf(fit.key));
+    };
+    std::string text = "Error falls with samples to the power " + slope(**steepest);
     if ((*steepest)->slope_samples.value != (*flattest)->slope_samples.value)
-        text +=
-            fmt::format(" to {} ({})", numberText((*flattest)->slope_samples), labelOf((*flattest)->key));
+        text += " to " + slope(**flattest);
     return {{Tone::Neutral, text + "; independent samples have −0.5."}};
 }
 
@@ -233,13 +236,24 @@ std::vector<Finding> trust(const Fits& fits) {
     std::vector<Key> told;
     for (const ConfigurationFit* fit : fits) {
         // An image cannot see its own bias; where there is one, that is said already.
-        if (fit->points.empty() || !fit->points.back().calibration || fit->error.flattening) continue;
+        if (fit->points.empty() || !fit->points.back().calibration || fit->error.flattening ||
+            !fit->unknown_error.empty())
+            continue;
         if (!std::isfinite(fit->points.back().calibration->value) ||
             std::find(told.begin(), told.end(), fit->key) != told.end())
             continue;
         told.insert(told.end(), fit->same_bits.begin(), fit->same_bits.end());
         findings.push_back(trustIn(*fit));
     }
+    return findings;
+}
+
+std::vector<Finding> unknownErrors(const Fits& fits) {
+    std::vector<Finding> findings;
+    for (const ConfigurationFit* fit : fits)
+        if (!fit->unknown_error.empty())
+            findings.push_back({Tone::Warning, fmt::format("The error of {} is not yet known: {}.",
+                                                           labelOf(fit->key), fit->unknown_error)});
     return findings;
 }
 
@@ -273,6 +287,7 @@ std::vector<Finding> findingsOfScene(const Run& run, const Analysis& analysis, c
     append(findings, sameBits(fits));
     append(findings, slopes(fits));
     append(findings, bias(fits, analysis.options.equivalence_margin));
+    append(findings, unknownErrors(fits));
     append(findings, trust(fits));
     append(findings, omissions(run, scene));
     return findings;
@@ -289,10 +304,14 @@ std::vector<std::string> scenesOf(const Run& run) {
 std::string verdictLine(const ConfigurationFit& fit) {
     std::string text = fmt::format("{} {}: ", fit.key.scene, labelOf(fit.key));
     if (!fit.points.empty()) {
-        text += fmt::format("error {} at {} spp", errorText(fit.points.back().relative_rmse),
-                            fit.points.back().samples);
-        if (fit.fitted && std::isfinite(fit.slope_samples.value))
-            text += fmt::format(", slope {}", numberText(fit.slope_samples));
+        if (fit.unknown_error.empty())
+            text += fmt::format("error {} at {} spp", errorText(fit.points.back().relative_rmse),
+                                fit.points.back().samples);
+        else
+            text += fmt::format("error not yet known at {} spp", fit.points.back().samples);
+        if (fit.fitted && fit.unknown_error.empty() && std::isfinite(fit.slope_samples.value))
+            text += fmt::format(", slope {} from {:.0f} spp on", numberText(fit.slope_samples),
+                                fit.slope_range[0]);
         text += ", ";
     }
     return text + fmt::format("{}: {}", stats::verdictName(fit.judgement.verdict), fit.judgement.reason);

@@ -5,6 +5,8 @@
 #include "judge/converge/judgement.h"
 #include "judge/converge/points.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -32,7 +34,6 @@ public:
     TimeFit timeFit() const {
         TimeFit fit;
         const SampleCounts counts = timeCounts();
-        fit.before_first_sample = time_.beforeFirstSample();
         const auto line = [&](const Resample& r) { return time_.line(r); };
         fit.launch = jackknife(
             counts, [&](const Resample& r) { return line(r).intercept; }, Scale::Linear,
@@ -41,6 +42,7 @@ public:
             counts, [&](const Resample& r) { return line(r).slope; }, Scale::Logarithmic,
             options_.confidence);
         const std::vector<std::size_t> all = allOf(time_.replicates());
+        fit.before_first_sample = time_.beforeFirstSample({{}, all, 0});
         fit.r2 = line({{}, all, 0}).r2;
         return fit;
     }
@@ -60,6 +62,25 @@ public:
                                 : jackknife(counts, intercept, Scale::Linear, options_.verdict_confidence);
         fit.flattening = fit.verdict_floor.low > 0;
         return fit;
+    }
+
+    /// Why no interval of the error can be trusted; empty when they can. Rare bright paths that carry the
+    /// variance are met by few of the replicates, or only as samples become more.
+    std::string unknownError() const {
+        constexpr double kFewestValues = 2;  // As an image asks for (film/error_estimate.h).
+        if (const double values = error_.valuesOfError(); values < kFewestValues)
+            return fmt::format(
+                "the squared errors of its replicates scatter as those of {:.2g} normal values, and "
+                "{} are needed",
+                values, kFewestValues);
+        const Estimate power = jackknife(
+            error_.counts(), [&](const Resample& r) { return error_.variancePower(r); }, Scale::Linear,
+            options_.verdict_confidence);
+        if (power.low > -1)
+            return "the variance between its replicates falls more slowly than 1/N, as it does where the "
+                   "rare paths "
+                   "that carry it are met only now";
+        return {};
     }
 
     Estimate slopeSamples() const {
@@ -98,7 +119,10 @@ public:
         const double measured = error_.samplesTo({all, {}, 0}, mse, false);
         target.reached = std::isfinite(measured) && measured <= time_.lastSamples();
         target.at_first_point = error_.errors({all, {}, 0}).front() <= mse;
-        if (!target.reached && error.flattening && error.floor().low >= mse) return target;
+        if (!target.reached) {
+            if (!error.flattening || error.floor().low < mse) forecast(target, mse);
+            return target;
+        }
         const Statistic samples = [&](const Resample& r) { return error_.samplesTo(r, mse, true); };
         const Estimate needed = jackknife(error_.counts(), samples, Scale::Logarithmic, options_.confidence);
         if (!std::isfinite(needed.value)) return target;
@@ -106,6 +130,39 @@ public:
         const Statistic seconds = [&](const Resample& r) { return time_.secondsTo(r, samples(r)); };
         target.seconds = jackknife(bothCounts(), seconds, Scale::Logarithmic, options_.confidence);
         return target;
+    }
+
+    /// Beyond what was measured, by all laws that fit: the power of the last columns, with its interval, and
+    /// 1/N, to which Sobol points slow down sooner or later; 1/N² is the fastest.
+    void forecast(Target& target, double mse) const {
+        constexpr double kInverse = -1, kInverseSquare = -2;
+        const Estimate power = jackknife(
+            error_.counts(), [&](const Resample& r) { return error_.lastPower(r); }, Scale::Linear,
+            options_.confidence);
+        if (!(power.value < kSlowestPower)) return;
+        const double fitting = std::max(power.value, kInverseSquare),
+                     steepest = std::clamp(power.low, kInverseSquare, std::min(kInverse, fitting)),
+                     flattest = std::max(power.high, kInverse);
+        const auto by = [&](double exponent) {
+            return
+                [this, mse, exponent](const Resample& r) { return error_.samplesBeyond(r, mse, exponent); };
+        };
+        const auto range = [&](const SampleCounts& counts, const auto& statisticBy) {
+            const auto estimate = [&](double exponent) {
+                return jackknife(counts, statisticBy(exponent), Scale::Logarithmic, options_.confidence);
+            };
+            const double high =
+                flattest < kSlowestPower ? estimate(flattest).high : std::numeric_limits<double>::infinity();
+            return Estimate{estimate(fitting).value, estimate(steepest).low, high};
+        };
+        const Estimate samples = range(error_.counts(), by);
+        if (!std::isfinite(samples.value)) return;
+        target.powers = {{steepest, flattest}};
+        target.samples = samples;
+        target.seconds = range(bothCounts(), [&](double exponent) {
+            return
+                [this, samples = by(exponent)](const Resample& r) { return time_.secondsTo(r, samples(r)); };
+        });
     }
 
     Estimate efficiency(const Target& common, const Estimate& per_sample) const {
@@ -215,6 +272,28 @@ void shareSameBits(std::vector<Subject>& subjects) {
     }
 }
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// The error is not yet known: values without bounds, and no targets.
+void forgetErrors(ConfigurationFit& fit) {
+    const auto unbounded = [](Estimate& e, double least) { e = {e.value, least, kInfinity}; };
+    unbounded(fit.error.variance, 0);
+    unbounded(fit.error.intercept, -kInfinity);
+    unbounded(fit.error.verdict_floor, -kInfinity);
+    if (fit.error.bias_squared) unbounded(*fit.error.bias_squared, -kInfinity);
+    unbounded(fit.slope_samples, -kInfinity);
+    unbounded(fit.slope_seconds, -kInfinity);
+    fit.error.flattening = fit.error.faster_than_inverse = false;
+    for (Target& target : fit.targets) target = {target.relative_rmse, false, {}, false, {}, {}};
+}
+
+void forgetErrors(Point& point) {
+    for (Estimate* e : {&point.relative_rmse, &point.efficiency}) *e = {e->value, 0, kInfinity};
+    if (point.bias_squared) *point.bias_squared = {point.bias_squared->value, -kInfinity, kInfinity};
+    if (point.calibration) *point.calibration = {point.calibration->value, 0, kInfinity};
+    point.covered = point.predicted = 0;
+}
+
 void makePoints(Subject& subject, const FitOptions& options) {
     for (const auto& [samples, of_replicates] : subject.own) {
         const auto found = subject.errors.find(samples);
@@ -222,6 +301,7 @@ void makePoints(Subject& subject, const FitOptions& options) {
         const RowList errors = rowsOf(found->second), times = rowsOf(of_replicates);
         subject.fit.points.push_back(
             makePoint(samples, errors, times, *subject.measure, subject.reference, options));
+        if (!subject.fit.unknown_error.empty()) forgetErrors(subject.fit.points.back());
     }
 }
 
@@ -237,9 +317,12 @@ void fitSubject(Subject& subject, const FitOptions& options) {
     fit.time = fitter.timeFit();
     fit.error = fitter.errorFit();
     fit.slope_samples = fitter.slopeSamples();
+    fit.slope_range = subject.error_model->slopeSamples();
     fit.slope_seconds = fitter.slopeSeconds(fit.time.launch);
     fit.targets.clear();
     for (const double target : options.targets) fit.targets.push_back(fitter.target(target, fit.error));
+    fit.unknown_error = fitter.unknownError();
+    if (!fit.unknown_error.empty()) forgetErrors(fit);
 }
 
 /// What a configuration's errors are measured by, its points and its fits. A reference that is noisier than
@@ -277,10 +360,11 @@ double leastError(const Subject& subject) {
 
 void compareAtCommonError(std::vector<Subject>& subjects, const FitOptions& options) {
     for (Subject& subject : subjects) {
-        if (!subject.fit.fitted) continue;
+        if (!subject.fit.fitted || !subject.fit.unknown_error.empty()) continue;
         double level = 0;
         for (const Subject& other : subjects)
-            if (other.fit.fitted && other.configuration->key.scene == subject.configuration->key.scene)
+            if (other.fit.fitted && other.fit.unknown_error.empty() &&
+                other.configuration->key.scene == subject.configuration->key.scene)
                 level = std::max(level, leastError(other));
         const Fitter fitter(*subject.error_model, *subject.time_model, options);
         if (std::isfinite(level)) subject.fit.common = fitter.target(level, subject.fit.error);

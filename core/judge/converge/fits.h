@@ -57,14 +57,14 @@ struct Point {
     std::optional<Estimate>
         bias_squared;  ///< mean (E I − R)², relative²; may be below 0, which is how it contains it.
     std::optional<Estimate> calibration;    ///< Predicted over actual relative RMSE.
-    std::uint32_t covered = 0, predicted = 0;  ///< Replicates whose predicted interval holds their actual
-                                               ///< error, and those that predicted.
+    std::uint32_t covered = 0, predicted = 0;  ///< Replicates whose predicted interval holds the expected
+                                               ///< error within its own interval, and those that predicted.
     std::optional<double> relmse, smape, mae, flip_mean, delta_e2000_mean;  ///< Means over replicates.
 };
 
 /// render seconds = launch + per_sample · N, by least squares with relative errors.
 struct TimeFit {
-    double before_first_sample = 0;  ///< Median over replicates, seconds.
+    double before_first_sample = 0;  ///< Mean over the replicates that timed it, seconds.
     Estimate launch;                 ///< Seconds; may be below 0.
     Estimate per_sample;             ///< c, seconds per sample per pixel.
     double r2 = 0;
@@ -89,8 +89,12 @@ struct ErrorFit {
 /// Samples and seconds to a relative RMSE.
 struct Target {
     double relative_rmse = 0;
-    bool reached = false;  ///< Measured. If not, `samples` and `seconds` extrapolate the last points; empty
-                           ///< where a floor forbids it.
+    /// Measured. If not, `samples` and `seconds` are a forecast: they range over all laws that fit, each
+    /// with its interval. Empty where a floor forbids it.
+    bool reached = false;
+    /// Of a forecast: squared error falls with N to a power between these, the steepest that the last four
+    /// points allow (−2 at most) and the flattest (−1 at least: no sampler is known to keep more).
+    std::optional<std::array<double, 2>> powers;
     bool at_first_point = false;  ///< The fewest samples measured were enough: the figures are upper bounds.
     std::optional<Estimate> samples, seconds;
 };
@@ -118,9 +122,13 @@ struct ConfigurationFit {
     std::vector<Point> points;        ///< By samples. Those with two replicates at least.
     /// Three points or more with two replicates each; else all below but the judgement is empty.
     bool fitted = false;
+    /// Why the error is not yet known, in the sense in which images say so of theirs: one sentence without a
+    /// full stop; empty when it is. Then what is below has values without bounds, and no targets.
+    std::string unknown_error;
     TimeFit time;
     ErrorFit error;
-    Estimate slope_samples;           ///< d log RMSE / d log N
+    Estimate slope_samples;               ///< d log RMSE / d log N, one line through all points
+    std::array<double, 2> slope_range{};  ///< Fewest and most samples of those points.
     Estimate slope_seconds;           ///< d log RMSE / d log(t − t0)
     std::vector<Target> targets;      ///< As in FitOptions::targets.
     /// The least error that every fitted configuration of the scene reached: where they can be compared

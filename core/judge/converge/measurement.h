@@ -62,8 +62,9 @@ struct Row {
         0;  ///< Since the first chunk of this replicate, reading the film for looks left out.
     std::optional<double> render_device_seconds;       ///< The same by the device's clock.
     /// Parse, build, compile, upload and the first sample, with libraries loaded and kernels in the cache:
-    /// every start was tried once before it was timed, so that it does not matter who is listed first.
-    double seconds_before_first_sample = 0;
+    /// every start was tried once before it was timed, so that it does not matter who is listed first. Of a
+    /// start made for this replicate; empty where it had none of its own.
+    std::optional<double> seconds_before_first_sample;
     std::uint64_t paths = 0;                           ///< Since the replicate began, as the two below.
     std::uint64_t closest_rays = 0, shadow_rays = 0;
 
@@ -136,7 +137,7 @@ struct Maps {
     Image image;           ///< R, G, B.
     Plane error;           ///< |I − R| / mean R, root mean square over the channels.
     Plane standard_error;  ///< The image's own estimate, in the same unit.
-    Plane z;               ///< (I − R) / standard error, luminance; signed.
+    Plane z;               ///< (I − R) / pooled standard error of both, luminance; signed.
     Plane flip;            ///< In [0, 1].
 };
 
@@ -198,7 +199,7 @@ struct Environment {
         commands;  ///< As typed, quoted for a shell; more than one when the run was resumed.
     std::string started, finished;         ///< UTC, ISO 8601.
     double budget_seconds = 0;             ///< --time; 0 when there was none.
-    double spent_seconds = 0;
+    double spent_seconds = 0;       ///< Of all sessions.
 };
 
 /// Everything that a report is made of.

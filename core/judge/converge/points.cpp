@@ -9,8 +9,6 @@
 namespace crt::converge {
 namespace {
 
-double secondsOf(const Row& row) { return row.seconds_before_first_sample + row.render_wall_seconds; }
-
 /// √ of a mean squared error. In logarithms where the error is known well; else from a line, which may
 /// begin at 0: below the reference's own noise there is no logarithm.
 Estimate rootOf(const SampleCounts& counts, const Statistic& mse, double confidence) {
@@ -22,6 +20,15 @@ Estimate rootOf(const SampleCounts& counts, const Statistic& mse, double confide
     if (!std::isfinite(e.value)) return e;
     const auto root_of = [](double value) { return std::sqrt(std::max(value, 0.0)); };
     return {root_of(e.value), root_of(e.low), root_of(e.high)};
+}
+
+/// Whether two positive estimates of one quantity agree: on a logarithmic scale half widths add in
+/// quadrature.
+bool holds(const Estimate& predicted, const Estimate& expected) {
+    const Estimate &less = predicted.value < expected.value ? predicted : expected,
+                   &more = predicted.value < expected.value ? expected : predicted;
+    const double apart = std::log(more.value / less.value);
+    return apart <= std::hypot(std::log(less.high / less.value), std::log(more.value / more.low));
 }
 
 template <class Value>
@@ -47,14 +54,14 @@ public:
         Point point;
         point.samples = samples;
         point.replicates = static_cast<std::uint32_t>(times_.size());
-        point.seconds = timeOf([](const Row& row) { return secondsOf(row); });
-        point.render_seconds = timeOf([](const Row& row) { return row.render_wall_seconds; });
+        point.seconds = timeOf([this](const Resample& r) { return secondsWithStart(r); });
+        point.render_seconds = timeOf([this](const Resample& r) { return renderSeconds(r); });
         point.relative_rmse = rootOf(counts(), mse(), options_.confidence);
         SampleCounts both = counts();
         both.times = times_.size();
         const Statistic squares = mse();
         const Statistic efficiency = [&](const Resample& r) {
-            return 1 / (squares(r) * meanTime(r, secondsOf));
+            return 1 / (squares(r) * secondsWithStart(r));
         };
         point.efficiency = jackknife(both, efficiency, Scale::Logarithmic, options_.confidence);
         if (measure_.hasReference()) {
@@ -80,17 +87,16 @@ private:
             });
         };
     }
-    template <class Seconds>
-    double meanTime(const Resample& resample, const Seconds& seconds) const {
-        return meanOver(resample.times, [&](std::size_t r) { return seconds(*times_[r]); });
+    double renderSeconds(const Resample& resample) const {
+        return meanOver(resample.times, [&](std::size_t r) { return times_[r]->render_wall_seconds; });
     }
-    template <class Seconds>
-    Estimate timeOf(const Seconds& seconds) const {
+    double secondsWithStart(const Resample& resample) const {
+        return meanStart(times_, resample.times) + renderSeconds(resample);
+    }
+    Estimate timeOf(const Statistic& seconds) const {
         SampleCounts counts;
         counts.times = times_.size();
-        return jackknife(
-            counts, [&](const Resample& r) { return meanTime(r, seconds); }, Scale::Logarithmic,
-            options_.confidence);
+        return jackknife(counts, seconds, Scale::Logarithmic, options_.confidence);
     }
 
     std::optional<Estimate> biasSquared() const {
@@ -110,20 +116,18 @@ private:
     }
 
     /// Predicted over actual error, both as root mean squares over replicates, and how often a prediction's
-    /// interval holds the actual error.
+    /// interval holds what it predicts: the expected error, which the replicates know with an interval of
+    /// their own.
     void calibrate(Point& point) const {
         bool all_predict = true;
+        const Estimate& expected = point.relative_rmse;
         for (const Row* row : errors_) {
             all_predict = all_predict && row->predicted_relative_rmse.has_value();
-            const bool by_reference = measure_.source() == ErrorSource::Reference;
-            const double squared =
-                by_reference ? measure_.mse(*row, 0) : point.relative_rmse.value * point.relative_rmse.value;
             // An error below the reference's noise cannot be held against a prediction.
-            if (!row->predicted_relative_rmse || !(squared > 0)) continue;
-            const Estimate& predicted = *row->predicted_relative_rmse;
+            if (!row->predicted_relative_rmse || !(expected.low > 0) || !std::isfinite(expected.high))
+                continue;
             ++point.predicted;
-            point.covered +=
-                predicted.low <= std::sqrt(squared) && std::sqrt(squared) <= predicted.high ? 1 : 0;
+            point.covered += holds(*row->predicted_relative_rmse, expected) ? 1 : 0;
         }
         if (!all_predict) return;
         const Statistic squares = mse();

@@ -22,8 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint32_t kLongestSide = 384;
-constexpr double kDecades = 3;       ///< Of the error maps' scale.
-constexpr double kLargestZ = 4;      ///< Beyond it the colour stays: 1 pixel in 16 000 when all is well.
+constexpr double kDecades = 3;  ///< Of the error maps' scale.
+/// Beyond it the colour stays. Rare when all is well, but not as rare as with a normal z: the standard error
+/// of a pixel is pooled from its surroundings, which may be quieter than it is.
+constexpr double kLargestZ = 4;
 
 using Rgb = std::array<std::uint8_t, 3>;
 

@@ -90,11 +90,13 @@ Json pointJson(const Point& p) {
 }
 
 Json targetJson(const Target& t) {
-    return {{"relative_rmse", t.relative_rmse},
-            {"reached", t.reached},
-            {"at_first_point", t.at_first_point},
-            {"samples_per_pixel", interval(t.samples)},
-            {"seconds", interval(t.seconds)}};
+    return {
+        {"relative_rmse", t.relative_rmse},
+        {"reached", t.reached},
+        {"at_first_point", t.at_first_point},
+        {"powers", t.powers ? Json::array({number((*t.powers)[0]), number((*t.powers)[1])}) : Json(nullptr)},
+        {"samples_per_pixel", interval(t.samples)},
+        {"seconds", interval(t.seconds)}};
 }
 
 Json fitJson(const ConfigurationFit& fit) {
@@ -102,6 +104,7 @@ Json fitJson(const ConfigurationFit& fit) {
     json["omitted"] = fit.omitted;
     json["replicates"] = fit.replicates;
     json["void_rows"] = fit.void_rows;
+    json["unknown_error"] = fit.unknown_error.empty() ? Json(nullptr) : Json(fit.unknown_error);
     json["error_source"] = fit.source == ErrorSource::Reference ? "reference" : "between replicates";
     json["same_bits_as"] = Json::array();
     for (const Key& key : fit.same_bits) json["same_bits_as"].push_back(key.backend);
@@ -123,6 +126,8 @@ Json fitJson(const ConfigurationFit& fit) {
                          {"flattening", fit.error.flattening},
                          {"faster_than_inverse", fit.error.faster_than_inverse}};
         json["slope_against_samples"] = interval(fit.slope_samples);
+        json["slope_samples_per_pixel"] =
+            Json::array({number(fit.slope_range[0]), number(fit.slope_range[1])});
         json["slope_against_seconds"] = interval(fit.slope_seconds);
         json["common_error"] = targetJson(fit.common);
         json["efficiency_per_second"] = interval(fit.efficiency);

@@ -22,13 +22,9 @@ double differenceDof(const Mean& a, const Mean& b) {
     return inverse > 0 ? 1 / inverse : kInfinite;
 }
 
-/// Differences up to this are rounding: without noise, say in the sky, there is no other way to tell them
-/// from bias.
-double roundingOf(const Mean& a, const Mean& b) {
-    return 0x1p-20 * std::max(std::abs(a.value), std::abs(b.value));
-}
-
 }  // namespace
+
+double roundingOf(double a, double b) { return 0x1p-20 * std::max(std::abs(a), std::abs(b)); }
 
 void PixelSums::add(double pixel_value, double pixel_variance) {
     value += pixel_value;
@@ -60,7 +56,7 @@ double carefulEqualityP(const Mean& a, const Mean& b) {
     const double difference = a.value - b.value, variance = a.variance + b.variance;
     if (!std::isfinite(difference) || !std::isfinite(variance))
         return std::numeric_limits<double>::quiet_NaN();
-    if (std::abs(difference) <= roundingOf(a, b)) return 1;
+    if (std::abs(difference) <= roundingOf(a.value, b.value)) return 1;
     if (variance == 0) return 0;
     const double t = difference / std::sqrt(variance), dof = differenceDof(a, b);
     return std::isinf(dof) ? normalTwoSided(t) : studentTwoSided(t, dof);
@@ -68,13 +64,36 @@ double carefulEqualityP(const Mean& a, const Mean& b) {
 
 double carefulHalfWidth(const Mean& a, const Mean& b, double confidence) {
     const double variance = a.variance + b.variance, tail = 0.5 + 0.5 * confidence;
-    if (variance == 0) return roundingOf(a, b);
+    if (variance == 0) return roundingOf(a.value, b.value);
     const double dof = differenceDof(a, b);
     const double quantile = std::isinf(dof) ? normalQuantile(tail) : studentQuantile(tail, dof);
-    return std::max(roundingOf(a, b), quantile * std::sqrt(variance));
+    return std::max(roundingOf(a.value, b.value), quantile * std::sqrt(variance));
+}
+
+Mean summedVariance(const Mean& a, const Mean& b) {
+    const double variance = a.variance + b.variance;
+    if (!(variance > 0)) return {0, 0, kInfinite};
+    const double share_a = a.variance / variance, share_b = b.variance / variance;
+    const double inverse = share_a * share_a / a.dof + share_b * share_b / b.dof;
+    return {0, variance, inverse > 0 ? 1 / inverse : kInfinite};
+}
+
+double excessP(const PixelSums& squares, const Mean& stated) {
+    if (std::isnan(squares.variance) || std::isnan(stated.variance))
+        return std::numeric_limits<double>::quiet_NaN();
+    if (!(squares.variance > 0)) return 1;
+    if (!(stated.variance > 0)) return 0;
+    constexpr double kAsManyAsKnown = 1e9;  // A variance that is known has infinitely many.
+    return fisherUpperTail(squares.variance / stated.variance, scatteredDof(squares.degreesOfFreedom(1), 1),
+                           std::min(stated.dof, kAsManyAsKnown));
+}
+
+double scatteredDof(double dof_of_sum, double dof) {
+    return std::isinf(dof) ? dof_of_sum : std::max(dof, dof_of_sum * dof / (dof + 2));
 }
 
 void DifferenceSums::add(double difference) {
+    if (difference == 0) return;
     sum += difference;
     squares += difference * difference;
     ++count;

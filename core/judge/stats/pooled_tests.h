@@ -35,7 +35,20 @@ double carefulEqualityP(const Mean& a, const Mean& b);
 /// Of the interval that carefulEqualityP's test inverts to.
 double carefulHalfWidth(const Mean& a, const Mean& b, double confidence);
 
-/// Sums over the differences of independent pixels.
+/// P that squared differences add to so much or more over the sum of the variances stated for them (a Mean's
+/// variance and its degrees of freedom): Fisher's F. So a few pixels that carry the sum are judged as few. It
+/// sees what changes up and down alike, and what changes in so few pixels that their signs say nothing. 0 for
+/// differences where no variance is stated at all.
+///
+/// All degrees of freedom must be Satterthwaite's without the correction for the scatter of the estimates
+/// (scatteredDof): with it, alarms are ten times as frequent as stated where few pixels carry the noise.
+double excessP(const PixelSums& squares, const Mean& stated);
+/// From the degrees of freedom of a sum of variances of `dof` each, what they are without that correction.
+double scatteredDof(double dof_of_sum, double dof);
+/// The variance of a difference of two: they add, with Satterthwaite's degrees of freedom.
+Mean summedVariance(const Mean& a, const Mean& b);
+
+/// Sums over the differences of independent pixels. Those that are 0 do not count: they have no sign.
 struct DifferenceSums {
     double sum = 0, squares = 0;
     std::uint64_t count = 0;
@@ -46,10 +59,14 @@ struct DifferenceSums {
 /// and all else the same differ symmetrically, however heavy the tails of their noise. It uses no stated
 /// variance. 1 when all are 0.
 double symmetricP(const DifferenceSums& differences);
-/// Of the interval about the mean difference that symmetricP's test inverts to; infinite with too few
-/// pixels.
+/// Of the interval about the mean of the differences that count, to which symmetricP's test inverts;
+/// infinite with too few of them.
 double symmetricHalfWidth(const DifferenceSums& differences, double confidence);
 /// Below so many pixels symmetricP has no power at the levels that are used here.
 inline constexpr std::uint64_t kFewestForSymmetry = 64;
+
+/// Two differences up to this are equal: without noise, say in the sky, there is no other way to tell
+/// rounding from bias.
+double roundingOf(double a, double b);
 
 }  // namespace crt::stats

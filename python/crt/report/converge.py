@@ -125,8 +125,9 @@ def target_cell(target):
     seconds = target["seconds"]
     if not seconds:
         return "not reached", ""
-    if not target["reached"]:
-        return "not reached", f"≈ {text.seconds(seconds['value'], 2)} expected"
+    if not target["reached"]:  # A forecast, by all laws that fit: its range says more than its middle.
+        value, interval = text.value_and_bounds(seconds, "seconds", 2)
+        return "not reached", f"≈ {value} expected{', ' + interval if interval else ''}"
     value, interval = text.value_and_bounds(seconds, "seconds")
     samples = text.number(target["samples_per_pixel"]["value"])
     return ("≤ " if target["at_first_point"] else "") + value, f"{interval}\n{samples} spp"
