@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 using namespace compile_test;
@@ -116,24 +117,39 @@ TEST_CASE("wavelength and filter tables are monotone, complete, and distributed 
     for (std::size_t i = 1; i < wavelengths.size(); ++i)
         if (wavelengths[i] < 780 && wavelengths[i] - wavelengths[i - 1] > 12)
             FAIL("a cell of " << wavelengths[i] - wavelengths[i - 1] << " nm at " << wavelengths[i]);
+}
 
+namespace {
+
+std::vector<float> filterTable(const crt::FilmSettings& film) {
+    return crt::filterTable(film, CRT_FILTER_OCTAVES, CRT_FILTER_STEPS);
+}
+
+/// The share of the filter that node i is the distance of.
+double shareOf(std::size_t i) {
+    const double step = static_cast<double>(i % CRT_FILTER_STEPS) / CRT_FILTER_STEPS;
+    const double share = i == CRT_FILTER_TABLE ? 0.5 : 1 - step / 2;
+    return std::ldexp(share, -static_cast<int>(i / CRT_FILTER_STEPS));
+}
+
+}  // namespace
+
+TEST_CASE("a pixel filter's table has its shares at its nodes", "[compile]") {
     crt::FilmSettings film;
-    CHECK(crt::filterTable(film, CRT_FILTER_TABLE).empty());  // the pixel itself
+    CHECK(filterTable(film).empty());  // the pixel itself
     film.filter_radius = 1;
-    const std::vector<float> box = crt::filterTable(film, CRT_FILTER_TABLE);
-    CHECK(box[CRT_FILTER_TABLE / 4] == Approx(-0.5));
+    const std::vector<float> box = filterTable(film);
+    CHECK(box[CRT_FILTER_STEPS] == Approx(0.5));
     film.filter_radius = 1.5;
     for (const crt::PixelFilter filter : {crt::PixelFilter::Gaussian, crt::PixelFilter::BlackmanHarris}) {
         film.filter = filter;
-        const std::vector<float> table = crt::filterTable(film, CRT_FILTER_TABLE);
+        const std::vector<float> table = filterTable(film);
         REQUIRE(table.size() == CRT_FILTER_TABLE + 1);
-        CHECK(table.front() == -1.5f);
-        CHECK(table.back() == 1.5f);
-        for (std::size_t i = 1; i < table.size(); ++i) {
-            if (!(table[i] > table[i - 1])) FAIL("offsets stand still at " << i);
-            CHECK(table[i] == Approx(-table[CRT_FILTER_TABLE - i]).margin(1e-6));
-        }
-        // Each cell holds the same part of the filter: midpoint sums of its definition up to the nodes.
+        CHECK(table.front() == 0);
+        CHECK(table.back() < 1.5f);
+        for (std::size_t i = 1; i < table.size(); ++i)
+            if (!(table[i] > table[i - 1])) FAIL("distances stand still at " << i);
+        // Midpoint sums of the definition, beyond the nodes.
         const auto value = [&](double x) {
             const double t = 3.14159265358979323846 * (x / 1.5 + 1);
             return filter == crt::PixelFilter::Gaussian
@@ -147,10 +163,50 @@ TEST_CASE("wavelength and filter tables are monotone, complete, and distributed 
             for (int i = 0; i < kSteps; ++i) sum += value(lower + (upper - lower) * (i + 0.5) / kSteps);
             return sum * (upper - lower) / kSteps;
         };
-        const double all_of_it = mass(-1.5, 1.5);
-        for (std::size_t i = 16; i < CRT_FILTER_TABLE; i += 16)
-            CHECK(mass(-1.5, table[i]) / all_of_it ==
-                  Approx(static_cast<double>(i) / CRT_FILTER_TABLE).margin(2e-6));
+        const double all_of_it = mass(0, 1.5);
+        for (std::size_t i = 0; i < 4 * CRT_FILTER_STEPS; i += 16)
+            CHECK(mass(static_cast<double>(table[i]), 1.5) / all_of_it == Approx(shareOf(i)).margin(2e-6));
+    }
+}
+
+TEST_CASE("a wide Gaussian filter has the Gaussian's tail", "[compile]") {
+    crt::FilmSettings film;
+    film.filter = crt::PixelFilter::Gaussian;
+    film.filter_radius = 8;
+    for (const double sigma : {0.5, 1.0}) {
+        film.filter_sigma = sigma;
+        const std::vector<float> table = filterTable(film);
+        for (std::size_t i = 0; i < table.size(); ++i) {
+            const double share = std::erfc(static_cast<double>(table[i]) / (sigma * std::numbers::sqrt2));
+            if (!(std::abs(share / shareOf(i) - 1) < 1e-4))
+                FAIL("beyond node " << i << " is " << share << ", not " << shareOf(i));
+        }
+        // As the kernel takes it: the moments of evenly spread numbers are those of the Gaussian.
+        Scene scene = litFloor();
+        scene.film.filter = film.filter;
+        scene.film.filter_radius = film.filter_radius;
+        scene.film.filter_sigma = sigma;
+        const CompiledScene c = compiled(scene);
+        const CrtContext ctx = contextOf(c);
+        constexpr int kNumbers = 1 << 20;
+        double sum = 0, squares = 0, fourths = 0, last = -8;
+        for (int i = 0; i < kNumbers; ++i) {
+            const auto x = static_cast<double>(
+                crt_filter_offset(&ctx, (static_cast<float>(i) + 0.5f) / static_cast<float>(kNumbers)));
+            if (x < last) FAIL("the offset falls at " << i);
+            last = x;
+            sum += x;
+            squares += x * x;
+            fourths += x * x * x * x;
+        }
+        CHECK(sum / kNumbers == Approx(0).margin(1e-6));
+        CHECK(squares / kNumbers == Approx(sigma * sigma).epsilon(2e-4));
+        CHECK(fourths / kNumbers == Approx(3 * std::pow(sigma, 4)).epsilon(5e-4));
+        CHECK(last < 6 * sigma);
+        // The ends of what a sampler gives.
+        CHECK(static_cast<double>(crt_filter_offset(&ctx, 0.0f)) > -6 * sigma);
+        CHECK(static_cast<double>(crt_filter_offset(&ctx, 1 - 0x1p-24f)) < 6 * sigma);
+        CHECK(crt_filter_offset(&ctx, 0.5f) == 0);
     }
 }
 

@@ -202,7 +202,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
         wavelengthTable(CRT_WAVELENGTH_TABLE, measures_spectra ? scene.film.spectral : SpectralFilm{}));
     if (measures_spectra)
         header.spectral_film = appendSpectralFilm(blob, scene.film.spectral, header.channels);
-    header.filter = blob.append(filterTable(scene.film, CRT_FILTER_TABLE));
+    header.filter = blob.append(filterTable(scene.film, CRT_FILTER_OCTAVES, CRT_FILTER_STEPS));
     header.shapes = blob.appendFilled<kernel::CrtShape>(flat.shapes.size(), [&](auto shapes) {
         std::transform(flat.shapes.begin(), flat.shapes.end(), shapes.begin(),
                        [](const FlatShape& shape) { return shape.record; });

@@ -108,23 +108,45 @@ std::vector<float> observerTable(std::size_t stride) {
     return table;
 }
 
-std::vector<float> filterTable(const FilmSettings& film, std::size_t cells) {
+std::vector<float> filterTable(const FilmSettings& film, std::size_t octaves, std::size_t steps) {
     const double radius = film.filter_radius;
+    std::function<double(double)> filter;
     switch (film.filter) {
         case PixelFilter::Box:
             if (radius == 0.5) return {};
-            return toFloat(inverseDistribution([](double) { return 1.0; }, -radius, radius, cells, cells));
-        case PixelFilter::Gaussian: {
-            const double edge = gaussian(radius, film.filter_sigma);
-            return toFloat(inverseDistribution(
-                [&](double x) { return std::max(0.0, gaussian(x, film.filter_sigma) - edge); }, -radius,
-                radius, 64 * cells, cells));
-        }
+            filter = [](double) { return 1.0; };
+            break;
+        case PixelFilter::Gaussian:
+            filter = [sigma = film.filter_sigma, edge = gaussian(radius, film.filter_sigma)](double x) {
+                return std::max(0.0, gaussian(x, sigma) - edge);
+            };
+            break;
         case PixelFilter::BlackmanHarris:
-            return toFloat(inverseDistribution([&](double x) { return blackmanHarris(x, radius); }, -radius,
-                                               radius, 64 * cells, cells));
+            filter = [radius](double x) { return std::max(0.0, blackmanHarris(x, radius)); };
+            break;
     }
-    return {};
+    // Summed from the edge inwards, so that the tail keeps its digits.
+    constexpr std::size_t kIntervals = std::size_t{1} << 16;
+    const double width = radius / static_cast<double>(kIntervals);
+    const auto at = [&](std::size_t i) { return radius - width * static_cast<double>(i); };
+    std::vector<double> beyond(kIntervals + 1, 0.0);
+    for (std::size_t i = 0; i < kIntervals; ++i)
+        beyond[i + 1] = beyond[i] + 0.5 * (filter(at(i)) + filter(at(i + 1))) * width;
+    const auto distance = [&](double share) {
+        const double wanted = share * beyond.back();
+        const auto above = std::upper_bound(beyond.begin(), beyond.end(), wanted);
+        if (above == beyond.end()) return 0.0;
+        const auto i = static_cast<std::size_t>(above - beyond.begin()) - 1;
+        return at(i) - width * (wanted - beyond[i]) / (beyond[i + 1] - beyond[i]);
+    };
+    std::vector<float> table;
+    for (std::size_t octave = 0; octave < octaves; ++octave)
+        for (std::size_t step = 0; step < steps; ++step) {
+            const double share = 1 - 0.5 * static_cast<double>(step) / static_cast<double>(steps);
+            table.push_back(static_cast<float>(distance(std::ldexp(share, -static_cast<int>(octave)))));
+        }
+    table.push_back(static_cast<float>(distance(std::ldexp(0.5, -static_cast<int>(octaves)))));
+    return table;
 }
 
 std::vector<std::uint64_t> choiceTable(const std::vector<double>& weights) {

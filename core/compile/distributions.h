@@ -17,9 +17,11 @@ std::vector<float> wavelengthTable(std::size_t cells, const SpectralFilm& film =
 /// `stride` times (x̄, ȳ, z̄, 0) / ∫ȳ dλ, at 360, 361, … nm; the last repeats 830 nm.
 std::vector<float> observerTable(std::size_t stride);
 
-/// cells + 1 offsets from the pixel centre, in pixels: the inverse of the distribution proportional to the
-/// film's filter along one axis. Empty for the box of radius ½, which is uniform in the pixel.
-std::vector<float> filterTable(const FilmSettings& film, std::size_t cells);
+/// Distances from the pixel centre, in pixels, that a share v of the film's filter along one axis is beyond:
+/// for v = 1 first, then `steps` for each of `octaves` halvings of v, evenly in v from one halving to the
+/// next; the last is that of half the least v, for all that is rarer. Empty for the box of radius ½, which
+/// is uniform in the pixel.
+std::vector<float> filterTable(const FilmSettings& film, std::size_t octaves, std::size_t steps);
 
 /// Shares of 2^32 proportional to `weights` (≥ 0, one of them > 0), at least 1 each: item i is chosen by
 /// the 32-bit numbers in [first[i], first[i+1]). Returns weights.size() + 1 boundaries, the last 2^32; {0}

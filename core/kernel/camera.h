@@ -18,11 +18,21 @@ typedef struct CrtRay {
 
 CRT_FN vec3 crt_load3(CRT_GLOBAL const f32 *p) { return make_vec3(p[0], p[1], p[2]); }
 
+/* Offset from the pixel centre of the uniform number u, increasing. The share of the filter that is farther
+   from the middle, `beyond`, finds its cell by exponent and leading bits, so that cells are as fine in the
+   tail, where a factor of two is a small way, as in the middle. What is rarer than a number of 24 bits can
+   be takes the last node. */
 CRT_FN f32 crt_filter_offset(const CrtContext *ctx, f32 u) {
     CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, ctx->scene->filter);
-    const f32 x = u * (f32)CRT_FILTER_TABLE;
-    const u32 cell = (u32)x;
-    return table[cell] + (x - (f32)cell) * (table[cell + 1u] - table[cell]);
+    const f32 beyond = 2.0f * (u < 0.5f ? u : 1.0f - u);
+    const u32 a_cell = 0x00800000u / CRT_FILTER_STEPS; /* steps of a float's bits */
+    const u32 steps = crt_bits(1.0f) - crt_bits(beyond);
+    const u32 cell = steps / a_cell;
+    f32 offset = table[CRT_FILTER_TABLE];
+    if (cell < CRT_FILTER_TABLE)
+        offset = table[cell] +
+                 (f32)(steps % a_cell) * (1.0f / (f32)a_cell) * (table[cell + 1u] - table[cell]);
+    return u < 0.5f ? -offset : offset;
 }
 
 /* A uniform point on the unit disk; the square's strata stay connected (Shirley and Chiu 1997). */

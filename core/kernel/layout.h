@@ -25,7 +25,11 @@ CRT_KERNEL_BEGIN
 #define CRT_WAVELENGTH_COUNT 471u     /* 360, 361, … 830 nm */
 #define CRT_SPECTRUM_STRIDE 472u      /* floats from one spectrum to the next; the last repeats 830 nm */
 #define CRT_WAVELENGTH_TABLE 1024u    /* cells of the inverse distribution of wavelengths: TABLE + 1 nodes */
-#define CRT_FILTER_TABLE 256u /* cells of the inverse distribution of the pixel filter: TABLE + 1 nodes */
+/* Cells of the inverse distribution of the pixel filter, TABLE + 1 nodes: STEPS for each halving of the share
+   of the filter that is farther from the middle, which there is in OCTAVES halvings. */
+#define CRT_FILTER_OCTAVES 24u
+#define CRT_FILTER_STEPS 64u
+#define CRT_FILTER_TABLE (CRT_FILTER_OCTAVES * CRT_FILTER_STEPS)
 
 /* An array in the blob: `offset` in units of 16 bytes from its start. */
 typedef struct CrtSpan {
@@ -507,7 +511,7 @@ typedef struct CrtScene {
     CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
     CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
     CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */
-    CrtSpan filter;              /* CRT_FILTER_TABLE + 1 nodes of the offset from the pixel centre, pixels */
+    CrtSpan filter;              /* CRT_FILTER_TABLE + 1 distances from the pixel centre, pixels */
 
     CrtCamera camera;
 

@@ -318,7 +318,7 @@ SectionSchema filter() {
                  .range = {0, 16, true, false},
                  .unit = "pixels",
                  .fallback = yaml(d.filter_sigma),
-                 .doc = "Standard deviation; gaussian only."},
+                 .doc = "Standard deviation; gaussian only. The filter is the Gaussian less its value at the radius, so that it ends at 0."},
             }};
 }
 
