@@ -107,10 +107,12 @@ FlatShape flatShape(const PlacedShape& shape, const Vec3d& centre, int scale_exp
                               ? radius
                               : std::min(to_z, radius + height) - std::max(from_z, -radius - height);
     // What ends in one circle shall overlap by rounding rather than gape; but by less than the clearance of
-    // its neighbour, whose rays would meet the lip.
-    const auto lip = static_cast<double>(kernel::crt_shape_clearance(
-                         static_cast<float>(coordinate), static_cast<float>(radius + height / 4))) /
-                     2;
+    // its neighbour, whose rays would meet the lip, and by so little of its own size that areas stay: far
+    // from the scene's centre rounding is larger than what is small.
+    constexpr double kMostLip = 0x1p-19;  // of the extent: 4e-6 of the area
+    const float rounding =
+        kernel::crt_shape_clearance(static_cast<float>(coordinate), static_cast<float>(radius + height / 4));
+    const double lip = std::min(static_cast<double>(rounding) / 2, kMostLip * extent);
     flat.margin = static_cast<float>(lip + std::min(static_cast<double>(flat.clearance), extent / 8));
     from_z -= lip;
     to_z += lip;
