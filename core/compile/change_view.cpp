@@ -1,5 +1,6 @@
 #include "compile/change_view.h"
 
+#include "base/vec3d.h"
 #include "compile/accelerator.h"
 #include "compile/camera_media.h"
 #include "compile/settings.h"
@@ -13,6 +14,8 @@ bool changeView(CompiledScene& compiled, const Scene& scene, const CompileOption
     if (compiled.without_nodes &&
         !backendFindsHits(scene.camera, compiled.centre, compiled.scale_exponent, options))
         return false;
+    // Farther away the digits would be in the wrong place (focus.h).
+    if (length(scene.camera.position - compiled.centre) > compiled.camera_reach) return false;
     auto& header = *reinterpret_cast<kernel::CrtScene*>(compiled.blob.data());
     kernel::CrtScene changed = header;
     compileView(scene, compiled.centre, compiled.scale_exponent, changed);

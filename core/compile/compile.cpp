@@ -26,6 +26,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <optional>
 
 namespace crt {
@@ -233,6 +234,9 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.texel_bytes = texture_part.texel_bytes;
     out.scale_exponent = flat.scale_exponent;
     out.centre = flat.centre;
+    out.camera_reach = std::numeric_limits<double>::infinity();
+    if (flat.focus)
+        out.camera_reach = 2 * length(scene.camera.position - flat.centre) + 64 * flat.focus->detail;
     out.without_nodes = accelerator.without_nodes;
     out.left_out = leftOut(scene, header, occluders, accelerator.without_nodes);
     out.hash = sceneIdentity(out.data(), flat.positions);
@@ -269,6 +273,12 @@ void warnOfNearSurfaces(const Scene& scene, const CompiledScene& compiled) {
             "or more towards the side that it lights, or cut a hole for it",
             objectOf(scene, compiled, found->light), objectOf(scene, compiled, found->surface),
             found->least_gap);
+    if (const CoarseLights found = findCoarseLights(compiled); found.lights > 0)
+        logWarning(
+            "{} of {} lights are so small, and so far from where the camera is and looks, that rounding moves "
+            "their edges by up to {:.1g} of their size: their light is wrong by as much; use point lights "
+            "for them, or leave out what makes the scene so large",
+            found.lights, found.asked, found.rounding);
     if (scene.integrator.max_depth > 0)
         if (const NearSurfaces found = findNearSurfaces(searched); found.near > 0)
             logWarning(

@@ -25,6 +25,7 @@ struct CompiledScene {
     std::uint64_t triangles = 0, shapes = 0, instances = 0, emitters = 0, objects = 0, nodes = 0;
     std::uint64_t instanced_triangles = 0;  ///< Of the meshes that instances show, each counted once.
     std::uint64_t images = 0, texel_bytes = 0;  ///< Of textures.
+    double camera_reach = 0;          ///< How far from `centre` a camera may be that it serves, too.
     int scale_exponent = 0;           ///< World lengths were multiplied by 2^scale_exponent after centring.
     Vec3d centre{};                   ///< In the author's units.
     bool without_nodes = false;  ///< Scenes of CRT_ACCELERATOR_BVH: left to a backend that brings its own

@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "base/stage.h"
 #include "base/vec3d.h"
+#include "compile/divide.h"
 #include "compile/instances.h"
 #include "compile/placements.h"
 #include "scene/scene_limits.h"
@@ -58,15 +59,17 @@ struct Bounds {
     }
 };
 
-/// Sets centre and scale.
+/// Sets centre and scale: the centre is the focus, or the middle of the scene where there is none.
 void measure(FlatScene& flat, const Bounds& bounds) {
-    flat.centre = {};
+    const std::optional<Focus>& focus = flat.focus;
+    flat.centre = focus ? focus->centre : Vec3d{};
     flat.scale_exponent = 0;
     double half_extent = 0;
     const auto& [lower, upper] = bounds;
     for (std::size_t k = 0; k < 3 && lower[k] <= upper[k]; ++k) {
-        flat.centre[k] = lower[k] + (upper[k] - lower[k]) / 2;
-        half_extent = std::max(half_extent, (upper[k] - lower[k]) / 2);
+        if (!focus) flat.centre[k] = lower[k] + (upper[k] - lower[k]) / 2;
+        half_extent = focus ? std::max({half_extent, upper[k] - flat.centre[k], flat.centre[k] - lower[k]})
+                            : std::max(half_extent, (upper[k] - lower[k]) / 2);
     }
     if (half_extent > 0) {
         int exponent = 0;
@@ -87,8 +90,8 @@ class Flattener {
 public:
     Flattener(const Scene& scene, std::optional<std::size_t> only)
         : scene_(scene),
-          placements_(placementsOf(scene, only)),
           shapes_(only ? std::vector<PlacedShape>() : placedShapes(scene)),
+          placements_(dividedPlacements(only)),
           instances_(only ? std::vector<PlacedMesh>() : placeMeshes()),
           parts_(partsOf(trianglesOfPlacements(), kTrianglesAPart)),
           stage_("placing triangles", 2 * static_cast<double>(trianglesOfPlacements())) {
@@ -118,6 +121,14 @@ private:
         const Placement* infinite = nullptr;  ///< The first that moves a vertex to infinity.
         std::vector<bool> seen;               ///< Empty: all are.
     };
+
+    std::vector<Placement> dividedPlacements(std::optional<std::size_t> only) {
+        std::vector<Placement> whole = placementsOf(scene_, only);
+        if (!only) flat_.focus = focusOf(scene_, whole, shapes_);
+        if (!flat_.focus) return whole;
+        flat_.divided = dividedMeshes(scene_, whole, *flat_.focus);
+        return placementsOf(scene_, only, flat_.divided);
+    }
 
     void placeTriangles() {
         forEachPart([this](Part& part) { describe(part); });
@@ -221,7 +232,7 @@ private:
                             t.material = !mesh.material.empty() && mesh.material[triangle] >= 0
                                              ? mesh.material[triangle]
                                              : object.material;
-                            t.emission = emissionIndexOf(scene_, object, triangle);
+                            t.emission = emissionIndexOf(scene_, object, mesh, triangle);
                             for (const Vec3d& p : placement.corners(triangle)) {
                                 if (!isFinite(p) && !part.infinite) part.infinite = &placement;
                                 part.bounds.add(p);
@@ -299,9 +310,9 @@ private:
     }
 
     const Scene& scene_;
-    const std::vector<Placement> placements_;
-    const std::vector<PlacedShape> shapes_;
     FlatScene flat_;
+    const std::vector<PlacedShape> shapes_;
+    const std::vector<Placement> placements_;
     const std::vector<PlacedMesh> instances_;
     std::vector<Part> parts_;
     Stage stage_;
@@ -351,7 +362,7 @@ void flattenNormals(const Scene& scene, const FlatScene& flat, std::span<kernel:
     });
     std::size_t before = 0;
     for (std::size_t& smooth : first_normal) before += std::exchange(smooth, before);
-    const std::vector<Placement> placements = placementsOf(scene, flat.object);
+    const std::vector<Placement> placements = placementsOf(scene, flat.object, flat.divided);
     parallelFor(count, kTrianglesAPart, [&](std::size_t first, std::size_t end) {
         std::size_t normal = first_normal[first / kTrianglesAPart];
         forEachTriangle(placements, first, end,

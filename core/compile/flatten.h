@@ -2,6 +2,8 @@
 /// (docs/architecture.md, "Lengths").
 #pragma once
 
+#include "compile/focus.h"
+#include "compile/placements.h"
 #include "compile/shapes.h"
 #include "kernel/layout.h"
 #include "scene/scene.h"
@@ -47,6 +49,8 @@ struct FlatScene {
     std::size_t smooth_triangles = 0;
     std::vector<kernel::CrtUvs> uvs;              ///< Of all triangles, where a texture or tangent asks.
     std::vector<kernel::CrtVertexColors> colors;  ///< Of all triangles, where a value asks for them.
+    DividedMeshes divided;                        ///< Of which the triangles are, in place of the scene's.
+    std::optional<Focus> focus;                   ///< Nothing: the centre is the middle.
     Vec3d centre{};                               ///< In the author's units.
     int scale_exponent = 0;  ///< Lengths were multiplied by 2^scale_exponent after centring.
 

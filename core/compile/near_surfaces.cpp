@@ -245,6 +245,36 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     return found;
 }
 
+CoarseLights findCoarseLights(const CompiledScene& scene) {
+    using namespace kernel;
+    constexpr double kCoarse = 1e-3;
+    const CrtContext context = contextOf(scene);
+    const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
+    const auto* primitives = CRT_ARRAY(CrtPrimitive, context.blob, context.scene->primitives);
+    const auto* shapes = CRT_ARRAY(CrtShape, context.blob, context.scene->shapes);
+    CoarseLights found;
+    if (scene.emitters == 0) return found;
+    for (std::uint32_t slot = 0; slot < context.scene->triangle_count; ++slot) {
+        const CrtTriangle& triangle = triangles[slot];
+        if (triangle.shape >= CRT_SLOT_INSTANCE || primitives[triangle.id].light == CRT_NONE) continue;
+        double coordinate = 0, size = 0;
+        for (const float p : triangle.p) coordinate = std::max(coordinate, std::abs(static_cast<double>(p)));
+        if (triangle.shape != 0) {
+            size = static_cast<double>(shapes[triangle.shape - 1].radius);
+        } else {
+            const Corners c = cornersOf(context, slot);
+            const Vec3d n = cross(c.p[1] - c.p[0], c.p[2] - c.p[0]);
+            size = length(n) / largestEdge(c);
+        }
+        if (!(size > 0)) continue;
+        ++found.asked;
+        const double rounding = coordinate * static_cast<double>(CRT_EPSILON) / size;
+        found.lights += rounding > kCoarse;
+        found.rounding = std::max(found.rounding, rounding);
+    }
+    return found;
+}
+
 NearSurfaces findNearSurfaces(const CompiledScene& scene) {
     using namespace kernel;
     const CrtContext context = contextOf(scene);
@@ -277,7 +307,7 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
             beyond.reach = largest;
             const CrtHit hit = closestWithin(context, beyond, tests);
             if (hit.slot == CRT_NONE || hit.slot == slot) continue;
-            const float clearance = std::max(faces[slot].clearance, faces[hit.slot].clearance);
+            const float clearance = std::max(faces[slot].clearance, crt_surface(&context, hit).clearance);
             if (hit.t + touching > clearance) continue;
             ++found.near;
             found.nearest_clearance = std::max(

@@ -11,11 +11,6 @@ namespace {
 /// among triangles.
 constexpr std::uint64_t kSharedFrom = std::uint64_t{1} << 22;
 
-Vec3d transformPoint(const Matrix4d& m, const Vec3d& p) {
-    return {m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
-            m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]};
-}
-
 /// Rows of the cofactor matrix of the linear part: transforms normals, and its sign is that of the
 /// determinant.
 Matrix3d cofactors(const Matrix4d& m) {
@@ -23,16 +18,21 @@ Matrix3d cofactors(const Matrix4d& m) {
     return {cross(b, c), cross(c, a), cross(a, b)};
 }
 
-Placement placementOf(const Scene& scene, const Object& object, const Matrix4d& transform, std::size_t first,
+Placement placementOf(const Mesh& mesh, const Object& object, const Matrix4d& transform, std::size_t first,
                       std::uint32_t number) {
     const Matrix3d normal_matrix = cofactors(transform);
     const Vec3d first_row{transform[0], transform[1], transform[2]};
-    return {&object,       &scene.meshes[object.mesh],           transform,
+    return {&object,       &mesh,                                transform,
             normal_matrix, dot(first_row, normal_matrix[0]) < 0, first,
             number};
 }
 
 }  // namespace
+
+Vec3d transformPoint(const Matrix4d& m, const Vec3d& p) {
+    return {m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
+            m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]};
+}
 
 std::array<Vec3d, 3> Placement::corners(std::size_t triangle) const {
     std::array<Vec3d, 3> p;
@@ -78,8 +78,13 @@ bool sharesMesh(const Scene& scene, const Object& object) {
     return !emits(scene, object);
 }
 
-std::vector<Placement> placementsOf(const Scene& scene, std::optional<std::size_t> only) {
-    if (only) return {placementOf(scene, scene.objects[*only], kIdentity4d, 0, 0)};
+std::vector<Placement> placementsOf(const Scene& scene, std::optional<std::size_t> only,
+                                    const DividedMeshes& divided) {
+    const auto mesh_of = [&](const Object& object) -> const Mesh& {
+        const auto own = divided.find(&object);
+        return own != divided.end() ? own->second : scene.meshes[object.mesh];
+    };
+    if (only) return {placementOf(mesh_of(scene.objects[*only]), scene.objects[*only], kIdentity4d, 0, 0)};
     std::vector<Placement> placements;
     std::size_t first = 0;
     std::uint32_t number = 0;
@@ -87,7 +92,7 @@ std::vector<Placement> placementsOf(const Scene& scene, std::optional<std::size_
         const bool shared = sharesMesh(scene, object);
         for (const Matrix4d& transform : object.transforms) {
             if (!shared || !canInstance(transform)) {
-                placements.push_back(placementOf(scene, object, transform, first, number));
+                placements.push_back(placementOf(mesh_of(object), object, transform, first, number));
                 first += placements.back().mesh->triangles.size();
             }
             ++number;

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -43,8 +44,15 @@ bool emits(const Scene& scene, const Object& object);
 /// Whether the object's places share one mesh. Lamps do not: each of their triangles is a light of its own.
 bool sharesMesh(const Scene& scene, const Object& object);
 
+/// In the author's units.
+Vec3d transformPoint(const Matrix4d& m, const Vec3d& p);
+
+/// Meshes that stand for those of the scene's objects (divide.h).
+using DividedMeshes = std::map<const Object*, Mesh>;
+
 /// What becomes triangles: of the scene, or of one object alone, at its origin.
-std::vector<Placement> placementsOf(const Scene& scene, std::optional<std::size_t> only);
+std::vector<Placement> placementsOf(const Scene& scene, std::optional<std::size_t> only,
+                                    const DividedMeshes& divided = {});
 
 /// Calls visit(number in the scene, placement, number in its mesh) for [first, end).
 template <class Visit>

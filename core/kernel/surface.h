@@ -78,6 +78,9 @@ CRT_FN f32 crt_edge_margin(f32 coordinate, f32 size, f32 twice_area) {
                : CRT_EDGE_MARGIN_MAX;
 }
 
+/* Of the clearance of the whole disk: what is left where nothing is rounded. */
+#define CRT_DISK_LEAST_CLEARANCE 1.5258789e-5f /* 2^-16 */
+
 /* A vector in the frame of a shape. */
 CRT_FN vec3 crt_in_frame(CRT_GLOBAL const CrtShape *shape, vec3 v) {
     return make_vec3(dot3(crt_load3(shape->x), v), dot3(crt_load3(shape->y), v),
@@ -116,6 +119,17 @@ CRT_FN void crt_shape_edges(CRT_GLOBAL const CrtShape *shape, vec3 q, vec3 *alon
     }
 }
 
+/* How far along its normal a ray must start that leaves a disk at p, b1 x + b2 y from its centre, in the
+   frame: as crt_shape_clearance, which holds for all of it, but by what is rounded at p. What is rounded in
+   an axis moves the height over the plane by the normal's part in that axis, so that a disk along two axes
+   is left from as near as its height is known, however large it is. */
+CRT_FN f32 crt_disk_clearance(CRT_GLOBAL const CrtShape *shape, vec3 p, f32 b1, f32 b2, f32 whole) {
+    const vec3 summands = abs3(p) + abs3(crt_load3(shape->centre)) + abs3(crt_load3(shape->x) * b1) +
+                          abs3(crt_load3(shape->y) * b2);
+    return crt_min(whole, crt_fma(CRT_GAMMA(16.0f), dot3(abs3(crt_load3(shape->z)), summands),
+                                  CRT_DISK_LEAST_CLEARANCE * whole));
+}
+
 /* crt_surface of a shape. Places near its edges are drawn in from them, as those of triangles are: what is
    within rounding of an edge may lie behind the shape that begins there. */
 CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtShape *shape, CrtHit hit) {
@@ -133,6 +147,7 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
         const f32 inwards = r > radius - margin ? (radius - margin) / r : 1.0f;
         s.p = crt_fma3(ex, hit.b1 * inwards, crt_fma3(ey, hit.b2 * inwards, centre));
         s.ng = ez;
+        s.clearance = crt_disk_clearance(shape, s.p, hit.b1 * inwards, hit.b2 * inwards, face->clearance);
     } else {
         if (shape->kind == CRT_SHAPE_CYLINDER) {
             const vec3 n = crt_direction_of_turn(hit.b1);

@@ -346,8 +346,8 @@ inline SpectralChannels spectralChannelsOf(const Scene& scene) {
 
 /// Emission of a triangle of the object's mesh, an index into Scene::emissions: of the file's material, of
 /// the scene's, or of the object; −1: it emits nothing.
-inline std::int32_t emissionIndexOf(const Scene& scene, const Object& object, std::size_t triangle) {
-    const Mesh& mesh = scene.meshes[object.mesh];
+inline std::int32_t emissionIndexOf(const Scene& scene, const Object& object, const Mesh& mesh,
+                                    std::size_t triangle) {
     if (!mesh.emission.empty() && mesh.emission[triangle] >= 0) return mesh.emission[triangle];
     const std::int32_t own = mesh.material.empty() ? -1 : mesh.material[triangle];
     const std::int32_t material = own >= 0 ? own : object.material;
@@ -356,6 +356,9 @@ inline std::int32_t emissionIndexOf(const Scene& scene, const Object& object, st
             shines >= 0)
             return shines;
     return object.emission;
+}
+inline std::int32_t emissionIndexOf(const Scene& scene, const Object& object, std::size_t triangle) {
+    return emissionIndexOf(scene, object, scene.meshes[object.mesh], triangle);
 }
 
 /// How many independent sequences the samples of a pixel are of (layout.h: CRT_REPLICATES_MAX); 1: the film

@@ -150,6 +150,14 @@ Tally missesOfAimedRays(Context& context, Aim aim, const Place& place, int resol
         emptyScene(resolution, seed, place.centre, place.centre + dice.direction() * place.size, 0.7);
     scene.integrator.max_depth = 0;
     scene.environment = Environment{constantSpectrum(1)};
+    // Behind the eye, so small that it alone decides whether the camera is the scene's centre (focus.h): with
+    // the sheet as without.
+    Mesh speck;
+    const Vec3d behind = place.centre * 2 - scene.camera.target;
+    const Vec3d off = behind - place.centre;
+    addTriangle(speck, place.centre + off * 0.1, place.centre + off * 0.11,
+                place.centre + off * 0.1 + Vec3d{off[1], off[2], off[0]} * 0.01);
+    addObject(scene, std::move(speck), diffuse(0));
     Scene anchored = scene;
     addAnchors(anchored, place.scene_centre, place.scene_half);
     addObject(scene, sheetOnRays(KnownRays(anchored), aim, place, resolution, dice), diffuse(0));

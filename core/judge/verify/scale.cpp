@@ -93,7 +93,7 @@ void warned(Context& context, const std::string& what, const Scene& scene) {
 }
 
 /// A screw of 10⁻³ on the ground, under a lamp, in a world of 10⁶: the ground's mesh gets finer towards
-/// it.
+/// it, or is one quad.
 Scene screwOnGround(bool whole_world, bool one_quad = false) {
     Scene scene = emptyScene(24, 1, {0, 3e-3, -3e-3}, {0, 0, 0}, 0.25);
     scene.integrator.nee = true;
@@ -121,27 +121,153 @@ Scene screwOnGround(bool whole_world, bool one_quad = false) {
 }
 
 void mixedScale(Context& context) {
-    std::vector<double> all;
-    const Scene patch = screwOnGround(false), world = screwOnGround(true);
-    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-        const Film a = context.render(patch, {.samples = 64, .seed = seed}),
-                   b = context.render(world, {.samples = 64, .seed = seed});
-        all.push_back(radiance(b) / radiance(a));
-        if (seed > 1) continue;
-        // A shadow that came off its screw would show in the pixels at its foot.
-        double worst = 0;
-        for (std::uint32_t y = 0; y < 24; ++y)
-            for (std::uint32_t x = 0; x < 24; ++x)
-                worst = fartherFrom(
-                    0, worst,
-                    std::abs(radiance(b, x, y) - radiance(a, x, y)) / std::max(radiance(a, x, y), 0.01));
-        context.absolute("any pixel, with the same random numbers", worst, 0, 0.05,
-                         {{1,
-                           "the shadow is detached from the object, or lost: is the ray's offset that of "
-                           "the largest triangle?"}});
+    const Scene patch = screwOnGround(false);
+    for (const bool one_quad : {false, true}) {
+        const char* const ground = one_quad ? "one quad of 2e6" : "a ground of 1e6";
+        std::vector<double> all;
+        const Scene world = screwOnGround(true, one_quad);
+        for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+            const Film a = context.render(patch, {.samples = 64, .seed = seed}),
+                       b = context.render(world, {.samples = 64, .seed = seed});
+            all.push_back(radiance(b) / radiance(a));
+            if (seed > 1) continue;
+            // A shadow that came off its screw would show in the pixels at its foot.
+            double worst = 0;
+            for (std::uint32_t y = 0; y < 24; ++y)
+                for (std::uint32_t x = 0; x < 24; ++x)
+                    worst = fartherFrom(
+                        0, worst,
+                        std::abs(radiance(b, x, y) - radiance(a, x, y)) / std::max(radiance(a, x, y), 0.01));
+            context.absolute(fmt::format("any pixel, with the same random numbers, on {}", ground), worst, 0,
+                             0.05,
+                             {{1,
+                               "the shadow is detached from the object, or lost: is the ray's offset that "
+                               "of the largest triangle?"}});
+        }
+        context.equivalent(fmt::format("screw of 1e-3 on {}, against the screw alone", ground), all, 1,
+                           0.005);
     }
-    context.equivalent("screw of 1e-3 on a ground of 1e6, against the screw alone", all, 1, 0.005);
-    warned(context, "the ground as one quad of 2e6", screwOnGround(true, true));
+}
+
+/// A square lamp of side 1 at height 1 over (x, 0, z), and a floor that the camera sees below it.
+std::string lampOver(const std::string& floor, double x, double z, bool nee) {
+    return fmt::format(R"(crt: 1
+camera: {{position: [{3}, 1.5, {2}], target: [{1}, 0, {2}], fov: 0.01}}
+film: {{resolution: [32, 32]}}
+integrator: {{max_depth: 1, roulette: false, nee: {4}}}
+materials: {{floor: {{type: diffuse, reflectance: 1}}, lamp: {{type: diffuse, reflectance: 0}}}}
+objects:
+  - {{{0}, material: floor}}
+  - {{rectangle: {{size: [1, 1]}}, transform: [{{rotate: {{axis: [1, 0, 0], angle_deg: 90}}}},
+      {{translate: [{1}, 1, {2}]}}], material: lamp, emission: {{radiance: 1}}}}
+)",
+                       floor, x, z, x + 3, nee);
+}
+std::string squareFloor(double half, double x, double z) {
+    return fmt::format(
+        "mesh: {{positions: [[{0},0,{2}],[{0},0,{3}],[{1},0,{3}],[{1},0,{2}]], faces: [[0,1,2,3]]}}",
+        x - half, x + half, z - half, z + half);
+}
+
+/// A floor that is far larger than what stands on it lights like one that is not.
+void hugeFloors(Context& context) {
+    struct Spot {
+        const char* name;
+        double x, z;
+    };
+    for (const double half : {1e3, 1e4, 1e5, 1e6}) {
+        if (!context.atLeast(Level::Merge) && half != 1e3 && half != 1e5) continue;
+        for (const Spot& spot : {Spot{"beside its diagonal", 0.3 * half, -0.2 * half},
+                                 Spot{"on its diagonal", 0.3 * half, 0.3 * half}})
+            for (const bool disk : {false, true}) {
+                if (disk && spot.x == spot.z) continue;
+                const std::string floor =
+                    disk ? fmt::format("disk: {{radius: {}}}, transform: [{{rotate: {{axis: [1, 0, 0], "
+                                       "angle_deg: -90}}}}]",
+                                       half)
+                         : squareFloor(half, 0, 0);
+                for (const bool nee : {true, false})
+                    context.equivalent(
+                        fmt::format("under a lamp at height 1, {} of {:g}, {}, {}", disk ? "disk" : "quad",
+                                    half, spot.name, nee ? "light sampling" : "scattered rays"),
+                        ratios(context,
+                               context.scene(lampOver(squareFloor(5, spot.x, spot.z), spot.x, spot.z, nee)),
+                               context.scene(lampOver(floor, spot.x, spot.z, nee)), nee ? 16 : 128),
+                        1, nee ? 1e-4 : 5e-4,
+                        {{1,
+                          "rays start as far above the floor, or are drawn in from its edges as far, as the "
+                          "size of the whole floor asks for"}});
+            }
+    }
+}
+
+/// A scene, and a black triangle of size 1 that stands far from it.
+Scene inFarCompany(Scene scene, double far) {
+    Mesh mesh;
+    addTriangle(mesh, {far, 0.1 * far, 0}, {far, 0.1 * far + 1, 0}, {far, 0.1 * far, 1});
+    addObject(scene, std::move(mesh), diffuse(0));
+    return scene;
+}
+
+/// A lamp of 5 mm, 1 m over a floor.
+std::string smallLamp(const std::string& lamp) {
+    return fmt::format(R"(crt: 1
+camera: {{position: [0.2, 0, 0.6], target: [0, 0, 0], fov: 0.02}}
+film: {{resolution: [16, 16]}}
+integrator: {{max_depth: 1}}
+materials: {{floor: {{type: diffuse, reflectance: 1}}, lamp: {{type: diffuse, reflectance: 0}}}}
+objects:
+  - {{rectangle: {{size: [1, 1]}}, material: floor}}
+  - {{{}, transform: [{{rotate: {{axis: [1, 0, 0], angle_deg: 180}}}}, {{translate: [0.0137, 0.0071, 1]}}],
+      material: lamp, emission: {{radiance: 1000}}}}
+)",
+                       lamp);
+}
+
+void farCompany(Context& context) {
+    const Scene room = litRoom(24, 1);
+    for (const double far : {1e3, 1e4, 1e6}) {
+        context.equivalent(fmt::format("lit room, a triangle at {:g}", far),
+                           ratios(context, room, inFarCompany(room, far), 64), 1, 1e-4,
+                           {{1, "the room is rounded as if it stood in the middle of the scene"}});
+        for (const char* lamp : {"rectangle: {size: [0.005, 0.005]}", "disk: {radius: 0.0025}",
+                                 "sphere: {radius: 0.0025}",
+                                 "cylinder: {radius: 0.0025, from_z: 0, to_z: 0.005}"}) {
+            const Scene small = context.scene(smallLamp(lamp));
+            context.equivalent(fmt::format("floor under a {}, a triangle at {:g}", lamp, far),
+                               ratios(context, small, inFarCompany(small, far), 16), 1, 1e-4,
+                               {{1, "a small light grows or shrinks by the rounding of what is far away"}});
+        }
+    }
+}
+
+/// A prism of diamond of size 1, and a lamp `distance` away whose edge is where it bends light of 550 nm to:
+/// shorter waves see the lamp.
+std::string prismAndLamp(double distance) {
+    const double sine = 0.25681879133, cosine = 0.96645957412;  // of the way out, below the axis
+    const double x = 0.08816349035 + cosine * distance, y = 0.5 - sine * distance;
+    return fmt::format(R"(crt: 1
+camera: {{position: [-4.920461360962635, -0.7840939567311649, 0],
+         target: [-0.08816349035423249, 0.5, 0], fov: 0.001}}
+film: {{resolution: [16, 16], color_space: xyz}}
+integrator: {{max_depth: 2}}
+materials: {{g: {{type: dielectric, ior: {{glass: diamond}}}}, k: {{type: diffuse, reflectance: 0}}}}
+objects:
+  - {{mesh: {{positions: [[0,1,-1], [-0.35265396141692995,-1,-1], [0.35265396141692995,-1,-1],
+      [0,1,1], [-0.35265396141692995,-1,1], [0.35265396141692995,-1,1]],
+      faces: [[0,2,1],[3,4,5],[0,1,4,3],[1,2,5,4],[0,3,5,2]]}}, material: g}}
+  - {{mesh: {{positions: [[{0},{1},-{4}],[{0},{1},{4}],[{2},{3},{4}],[{2},{3},-{4}]], faces: [[0,1,2,3]]}},
+      material: k, emission: {{radiance: 1, two_sided: true}}}}
+)",
+                       x, y, x - sine * distance, y - cosine * distance, distance);
+}
+
+void prismsLamp(Context& context) {
+    for (const double distance : {1e3, 1e5, 1e6})
+        context.equivalent(fmt::format("a prism of size 1, its lamp's edge at {:g}", distance),
+                           ratios(context, context.scene(prismAndLamp(20)),
+                                  context.scene(prismAndLamp(distance)), 256),
+                           1, 1e-3, {{1, "the prism's faces turn by the rounding of what is far away"}});
 }
 
 void layers(Context& context) {
@@ -324,6 +450,35 @@ std::vector<Case> scaleCases() {
          .level = Level::Commit,
          .needs = kScaleNeeds,
          .run = denormalCoordinates},
+        {.id = "B11",
+         .name = "huge-floors",
+         .title = "A lamp at height 1 over quads and disks of half size 1e3 and 1e5 (1e4 and 1e6 from merge "
+                  "on), off their middle",
+         .expected = "the light of a floor of 10, with the same random numbers",
+         .source = "a floor's size does not change the light that a point of it gets",
+         .tolerance = "± 1e-4 by light sampling, ± 5e-4 by scattered rays",
+         .level = Level::Commit,
+         .needs = kScaleNeeds | CRT_FEATURE_BVH | CRT_FEATURE_SHAPES,
+         .run = hugeFloors},
+        {.id = "B12",
+         .name = "far-company",
+         .title = "A lit room and lamps of 5 mm, and a black triangle at 1e3, 1e4 and 1e6",
+         .expected = "the image without the triangle, with the same random numbers",
+         .source = "what is far away and dark does not matter",
+         .tolerance = "± 1e-4",
+         .level = Level::Commit,
+         .needs = kScaleNeeds | CRT_FEATURE_BVH | CRT_FEATURE_SHAPES,
+         .run = farCompany},
+        {.id = "B13",
+         .name = "prisms-lamp",
+         .title = "A prism of diamond of size 1 that bends the light of a lamp's edge at 1e3, 1e5 and 1e6",
+         .expected = "the light of the same edge at 20, in the same direction",
+         .source = "directions do not depend on the distance",
+         .tolerance = "± 1e-3",
+         .level = Level::Commit,
+         .needs = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION | CRT_FEATURE_AREA_LIGHT |
+                  CRT_FEATURE_INDEPENDENT,
+         .run = prismsLamp},
     };
 }
 
