@@ -109,7 +109,7 @@ FlatShape flatShape(const PlacedShape& shape, const Vec3d& centre, int scale_exp
     // What ends in one circle shall overlap by rounding rather than gape; but by less than the clearance of
     // its neighbour, whose rays would meet the lip, and by so little of its own size that areas stay: far
     // from the scene's centre rounding is larger than what is small.
-    constexpr double kMostLip = 0x1p-19;  // of the extent: 4e-6 of the area
+    constexpr double kMostLip = 0x1p-11;  // of the extent: 1e-3 of the area
     const float rounding =
         kernel::crt_shape_clearance(static_cast<float>(coordinate), static_cast<float>(radius + height / 4));
     const double lip = std::min(static_cast<double>(rounding) / 2, kMostLip * extent);
