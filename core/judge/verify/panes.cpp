@@ -18,7 +18,8 @@ namespace {
 constexpr double kIndex = 1.5;
 constexpr const char* kPane = "{type: thin_dielectric, ior: 1.5}";
 
-/// A white floor under `panes` panes, seen at the origin from below them.
+/// A white floor under `panes` panes, seen at the origin from below them. They hide all of the sky but 4e-4,
+/// and are no larger: a ray goes on a clearance behind a pane, which grows with its size.
 Stage floorUnderPanes(int panes, const std::string& material, const std::string& integrator = kDirect) {
     Stage stage("{position: [0, 0.1, 0.1], target: [0, 0, 0], fov: 0.001}", integrator);
     stage.material("white", "{type: diffuse, reflectance: 1}")
@@ -29,7 +30,7 @@ Stage floorUnderPanes(int panes, const std::string& material, const std::string&
     for (int i = 0; i < panes; ++i)
         stage.quad(
             fmt::format("pane {}", i),
-            fmt::format("[[-900,{0},-900],[-900,{0},900],[900,{0},900],[900,{0},-900]]", 0.3 + 0.05 * i),
+            fmt::format("[[-20,{0},-20],[-20,{0},20],[20,{0},20],[20,{0},-20]]", 0.3 + 0.05 * i),
             "it");
     return stage;
 }
@@ -158,7 +159,7 @@ void stackOfPanes(Context& context) {
         for (int i = 0; i < panes; ++i)
             stage.quad(
                 fmt::format("pane {}", i),
-                fmt::format("[[-900,{0},-900],[-900,{0},900],[900,{0},900],[900,{0},-900]]", 0.05 * i),
+                fmt::format("[[-20,{0},-20],[-20,{0},20],[20,{0},20],[20,{0},-20]]", 0.05 * i),
                 "pane", more);
         return stage.yaml();
     };
