@@ -189,7 +189,8 @@ std::vector<Case> paneCases() {
             "A floor lit by a point, a spot, an IES lamp, a beam and a directional light behind 1, 2 and 7 "
             "panes, at 0°, 30°, 60° and 80°; panes that are there in part, in a mix, under a film",
             "Tⁿ, T = (1 − R)/(1 + R) of each polarisation", "Fresnel's equations; Stokes (1862)",
-            "1e-5 (1 + n tan θ); ± 0.3 %", Level::Commit, floor | CRT_FEATURE_POINT_LIGHT, lightsBehindPanes),
+            "1e-5 (1 + n tan θ); ± 0.3 %", Level::Commit, floor | CRT_FEATURE_POINT_LIGHT,
+            lightsBehindPanes),
         row("G51", "techniques-through-panes",
             "A floor lit by a sky, a square lamp and a sun through 1 and 3 panes; with light sampling, "
             "scattered rays, and both",
