@@ -21,6 +21,7 @@
 #include "compile/spectral_film.h"
 #include "compile/spectrum_table.h"
 #include "compile/textures.h"
+#include "compile/touching_media.h"
 #include "kernel/features.h"
 #include "kernel/layout.h"
 
@@ -216,6 +217,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     CompiledScene out;
     out.blob = blob.finish(header);
     findCameraMedia(reinterpret_cast<unsigned char*>(out.blob.data()));
+    markTouchingMedia(reinterpret_cast<unsigned char*>(out.blob.data()));
     out.size_bytes = out.blob.size() * sizeof(CompiledScene::Line);
     out.features = header.features;
     out.width = header.width;
@@ -250,7 +252,8 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 std::string objectOf(const Scene& scene, const CompiledScene& compiled, std::uint32_t primitive) {
     using namespace kernel;
     const auto* header = reinterpret_cast<const CrtScene*>(compiled.data());
-    std::uint32_t placement = CRT_ARRAY(CrtPrimitive, compiled.data(), header->primitives)[primitive].object;
+    std::uint32_t placement = CRT_ARRAY(CrtPrimitive, compiled.data(), header->primitives)[primitive].object &
+                              ~CRT_PRIMITIVE_TOUCHES;
     for (const Object& object : scene.objects) {
         if (placement < object.transforms.size())
             return object.name.empty() ? std::string("an object without a name")

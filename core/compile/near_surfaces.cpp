@@ -4,6 +4,7 @@
 
 #include "base/parallel.h"
 #include "base/vec3d.h"
+#include "compile/coplanar.h"
 
 #include <algorithm>
 #include <array>
@@ -45,76 +46,6 @@ public:
 private:
     std::uint64_t count_, step_;
 };
-
-/// An axis-aligned box.
-struct Box {
-    Vec3d lower, upper;
-
-    void add(const Vec3d& p, double padding) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            lower[k] = std::min(lower[k], p[k] - padding);
-            upper[k] = std::max(upper[k], p[k] + padding);
-        }
-    }
-};
-Box boxAround(const Vec3d& p, double padding) {
-    Box box{p, p};
-    box.add(p, padding);
-    return box;
-}
-
-/// A triangle of the compiled scene, in double.
-struct Corners {
-    std::array<Vec3d, 3> p;
-    Vec3d normal;  ///< Unit; zero without area.
-    double clearance = 0;
-};
-
-Corners cornersOf(const kernel::CrtContext& context, std::uint32_t slot) {
-    using namespace kernel;
-    const CrtTriangle& triangle = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles)[slot];
-    const CrtFace& face = CRT_ARRAY(CrtFace, context.blob, context.scene->faces)[slot];
-    Corners c;
-    for (std::size_t v = 0; v < 3; ++v) c.p[v] = {triangle.p[v], triangle.p[3 + v], triangle.p[6 + v]};
-    c.normal = {face.normal[0], face.normal[1], face.normal[2]};
-    c.clearance = static_cast<double>(face.clearance);
-    return c;
-}
-
-double largestEdge(const Corners& c) {
-    double squared = 0;
-    for (std::size_t v = 0; v < 3; ++v) {
-        const Vec3d edge = c.p[(v + 1) % 3] - c.p[v];
-        squared = std::max(squared, dot(edge, edge));
-    }
-    return std::sqrt(squared);
-}
-
-/// Whether the corners of the smaller lie in the plane of the larger, whose normal is known better, as well
-/// as rays can tell.
-bool inOnePlane(const Corners& a, const Corners& b) {
-    const Corners &large = largestEdge(a) < largestEdge(b) ? b : a, &small = &large == &a ? b : a;
-    return std::all_of(small.p.begin(), small.p.end(), [&](const Vec3d& corner) {
-        return std::abs(dot(large.normal, corner - large.p[0])) <= std::max(a.clearance, b.clearance);
-    });
-}
-
-/// Whether two triangles of one plane have area in common: by the separating axes of their edges. What
-/// merely touches has not.
-bool overlap(const Corners& a, const Corners& b) {
-    const auto apart = [](const Corners& of, const Corners& other) {
-        for (std::size_t v = 0; v < 3; ++v) {
-            const Vec3d edge = of.p[(v + 1) % 3] - of.p[v];
-            const Vec3d inwards = cross(of.normal, edge) * (1 / std::sqrt(dot(edge, edge)));
-            double farthest = -std::numeric_limits<double>::infinity();
-            for (const Vec3d& corner : other.p)
-                farthest = std::max(farthest, dot(inwards, corner - of.p[v]));
-            if (farthest <= std::max(of.clearance, other.clearance)) return true;
-        }
-        return false;
-    };
-    return dot(a.normal, a.normal) > 0 && dot(b.normal, b.normal) > 0 && !apart(a, b) && !apart(b, a);
-}
 
 /// Slots whose bounding boxes meet `box`, until `visit` returns true or no test is left in `tests`.
 /// Instances are passed over: their triangles are stored without the places where they stand.
@@ -228,14 +159,14 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     for (std::uint64_t i = 0; i < lights.size() && !found && tests > 0; ++i) {
         const std::uint32_t slot = lights[order[i]];
         const CrtPrimitive& light = primitives[triangles[slot].id];
-        const Corners own = cornersOf(context, slot);
+        const Corners own = cornersOf(context.blob, slot);
         Box box = boxAround(own.p[0], 2 * own.clearance);
         for (const Vec3d& corner : own.p) box.add(corner, 2 * own.clearance);
         visitNeighbours(context, box, tests, [&](std::uint32_t other) {
             // Of one lamp's halves, and of two lamps that shine alike, it does not matter which is seen.
             const CrtPrimitive& surface = primitives[triangles[other].id];
             if (other == slot || surface.light == light.light) return false;
-            const Corners corners = cornersOf(context, other);
+            const Corners corners = cornersOf(context.blob, other);
             if (!inOnePlane(own, corners) || !overlap(own, corners)) return false;
             const double gap = 2 * std::max(own.clearance, corners.clearance);
             found = {triangles[slot].id, triangles[other].id, std::ldexp(gap, -scene.scale_exponent)};
@@ -262,7 +193,7 @@ CoarseLights findCoarseLights(const CompiledScene& scene) {
         if (triangle.shape != 0) {
             size = static_cast<double>(shapes[triangle.shape - 1].radius);
         } else {
-            const Corners c = cornersOf(context, slot);
+            const Corners c = cornersOf(context.blob, slot);
             const Vec3d n = cross(c.p[1] - c.p[0], c.p[2] - c.p[0]);
             size = length(n) / largestEdge(c);
         }

@@ -14,10 +14,11 @@
  *   5   interpolated normals keep the light of surfaces that reflect
  *   6   nodes of the tree of lights have four children
  *   7   a sphere that shines is not sampled from its own surface
+ *   8  rays pass panes, bodies know what surrounds them, small things keep their digits in large scenes
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 7u
+#define CRT_BITS_VERSION 8u
 
 #endif

@@ -131,8 +131,10 @@ typedef struct CrtPrimitive {
     u32 material;
     u32 light;    /* index of its CrtLight, or CRT_NONE */
     u32 normals;  /* index of its CrtNormals, or CRT_NONE: flat */
-    u32 object;
+    u32 object;   /* and CRT_PRIMITIVE_TOUCHES */
 } CrtPrimitive;
+/* In `object`: another body's surface lies in the same place (medium.h). */
+#define CRT_PRIMITIVE_TOUCHES 0x80000000u
 CRT_ASSERT_SIZE(CrtPrimitive, 16);
 
 /* Unit shading normals at the three vertices: x of all, y of all, z of all. */

@@ -10,7 +10,8 @@
  *
  * A ray that meets the back of a surface whose medium is not in its list has been inside that body all along:
  * where two surfaces coincide, one of them is passed unseen. So that body has absorbed, and is in the list
- * from there on. Surfaces with holes are another matter: inside such a body without its medium in the list is
+ * from there on. Which of two it was cannot be told, so a ray that crosses a surface that touches another one
+ * (touching_media.h) keeps nothing of what was around it: the backs that it meets bring it back. Surfaces with holes are another matter: inside such a body without its medium in the list is
  * what came in by a hole, where there is no glass, and goes out as freely (composition.h).
  *
  * Bodies whose media absorb alike have one number, unless their surface has holes: it makes no difference.
@@ -79,16 +80,24 @@ CRT_FN u32 crt_medium_before(const CrtContext *ctx, const CrtSurface *surface, v
                                                                   : crt_first_medium(ctx, media);
 }
 
+/* Whether another body's surface lies in the same place. */
+CRT_FN int crt_touches(const CrtContext *ctx, CrtHit hit) {
+    const u32 primitive = crt_primitive_of(ctx, hit);
+    return (CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[primitive].object &
+            CRT_PRIMITIVE_TOUCHES) != 0u;
+}
+
 /* What is around a ray that leaves `surface` along w, where `media` were around the one that led there. */
 CRT_FN u32 crt_media_behind(const CrtContext *ctx, const CrtSurface *surface, const CrtBsdf *bsdf, vec3 w,
                             u32 media) {
     if (surface->medium == 0u || (bsdf->flags & CRT_BSDF_BOUNDS) == 0u) return media;
     const int from_inside = dot3(bsdf->wo, surface->ng) < 0.0f;
-    if (dot3(w, surface->ng) < 0.0f)
-        return from_inside && crt_surrounds(ctx, media, surface->medium)
-                   ? media
-                   : crt_entered(ctx, media, surface->medium);
-    return from_inside ? crt_left(ctx, media, surface->medium) : media;
+    if (dot3(w, surface->ng) < 0.0f) {
+        if (from_inside && crt_surrounds(ctx, media, surface->medium)) return media;
+        return crt_entered(ctx, surface->touches ? 0u : media, surface->medium);
+    }
+    if (!from_inside) return media;
+    return surface->touches ? 0u : crt_left(ctx, media, surface->medium);
 }
 
 CRT_KERNEL_END

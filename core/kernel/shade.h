@@ -298,7 +298,10 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     }
     const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
     CrtSurface surface = crt_surface(ctx, hit);
-    if (CRT_HAS(MEDIA)) surface.medium = crt_medium_of(ctx, surface.material);
+    if (CRT_HAS(MEDIA)) {
+        surface.medium = crt_medium_of(ctx, surface.material);
+        surface.touches = crt_touches(ctx, hit);
+    }
     if (CRT_HAS(MIX))
         surface.material =
             path->met != CRT_NONE

@@ -24,6 +24,7 @@ typedef struct CrtSurface {
     u32 material;
     u32 light;     /* CRT_NONE: it does not emit */
     u32 medium;    /* of what it bounds, as of CrtMaterial; for media only */
+    int touches;   /* another body's surface lies in the same place; for media only */
     u32 slot;      /* in the triangle array; for tangents only */
     u32 instance;  /* as of CrtHit; for tangents only */
     CrtFacePlace at; /* of p; for tangents and textures only */

@@ -60,6 +60,9 @@ void seenThroughLayers(Context& context) {
     const std::vector<Layer> panes{{-5, 5, 0.26}, {-3, -2.5, 0}, {1, 1.5, 0}};
     const std::vector<Layer> nested{{-5, 5, 0.1}, {-3, 3, 0.4}, {-1, 1, 1.1}};
     const std::vector<Layer> overlapping{{-3, 1, 0.2}, {-1, 4, 0.5}};
+    const std::vector<Layer> touching{{-3, 0, 0.2}, {0, 4, 0.5}}, touching_too{{0, 4, 0.5}, {-3, 0, 0.2}};
+    const std::vector<Layer> on_its_floor{{-5, 5, 0.1}, {-5, -2, 0.7}}, floor_first{{-5, -2, 0.7}, {-5, 5, 0.1}};
+    constexpr double kBlack = 1000;
     for (const Sight& it :
          {Sight{"two clear panes in water", panes, 20, -1, 0.26 * 9, 0.26 * 5.5},
           {"from between the panes", panes, 0, -1, 0.26 * 4.5, 0.26 * 2},
@@ -70,7 +73,16 @@ void seenThroughLayers(Context& context) {
           {"from inside the third", nested, 0.5, -1, 0.2 + 0.8 + 1.65, 0.2 + 0.8 + 1.65},
           // Where two overlap, that which light entered last counts.
           {"two that overlap", overlapping, 20, -1, 0.5 * 3 + 0.2 * 4, 0.5 * 5 + 0.2 * 2},
-          {"two that overlap, the other way", overlapping, -20, 1, 0.2 * 2 + 0.5 * 5, 0.2 * 4 + 0.5 * 3}})
+          {"two that overlap, the other way", overlapping, -20, 1, 0.2 * 2 + 0.5 * 5, 0.2 * 4 + 0.5 * 3},
+          // Of two surfaces in one place a ray meets either: the one of the lower number.
+          {"two that touch", touching, 20, -1, 2 + 0.6, kBlack},
+          {"two that touch, the other way", touching, -20, 1, 2 + 0.6, kBlack},
+          {"two that touch, in the other order", touching_too, 20, -1, 2 + 0.6, kBlack},
+          {"two that touch, in the other order and the other way", touching_too, -20, 1, 2 + 0.6, kBlack},
+          {"one on the floor of another", on_its_floor, 20, -1, 0.7 + 2.1, kBlack},
+          {"one on the floor of another, the other way", on_its_floor, -20, 1, 0.7 + 2.1, kBlack},
+          {"one on the floor of another, in the other order", floor_first, 20, -1, 0.7 + 2.1, kBlack},
+          {"one on the floor of another, both the other way", floor_first, -20, 1, 0.7 + 2.1, kBlack}})
         for (const char* share : {static_cast<const char*>(nullptr), "always"}) {
             if (share && it.all.size() == 2) continue;
             context.relative(fmt::format("{}{}", it.name, share ? ", instances" : ""),

@@ -18,7 +18,7 @@ constexpr double kIndex = 1.5;
 constexpr const char* kInterface = "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]";
 
 /// An eye at `distance` from the origin and `degrees` from the vertical, above or below.
-std::string eyeAt(double degrees, double side, double distance = 1) {
+std::string eyeFacing(double degrees, double side, double distance = 1) {
     return fmt::format("{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 0.001}}",
                        distance * std::sin(degrees * kDegree),
                        side * distance * std::cos(degrees * kDegree));
@@ -49,7 +49,7 @@ void roughGlassFurnace(Context& context) {
                 const double cosine = std::cos(degrees * kDegree), eta = side > 0 ? kIndex : 1 / kIndex;
                 context.estimate(fmt::format("roughness {}, seen from {}° {}", roughness, degrees,
                                              side > 0 ? "outside" : "inside"),
-                                 Stage(eyeAt(degrees, side))
+                                 Stage(eyeFacing(degrees, side))
                                      .set("environment", "{radiance: 1}")
                                      .material("glass", roughGlass(kIndex, roughness))
                                      .quad("glass", kInterface, "glass")
@@ -83,7 +83,7 @@ void roughGlassFurnace(Context& context) {
             const double cosine = std::cos(30 * kDegree);
             context.estimate(
                 fmt::format("in a glowing room, roughness {}, {}", roughness, integrator),
-                Stage(eyeAt(30, 1, 0.5), integrator)
+                Stage(eyeFacing(30, 1, 0.5), integrator)
                     .material("glass", roughGlass(kIndex, roughness))
                     .material("black", "{type: diffuse, reflectance: 0}")
                     .quad("glass", kInterface, "glass")
@@ -116,7 +116,7 @@ void roughGlassLimits(Context& context) {
     for (const double degrees : {0.0, 60.0, 80.0})
         context.estimate(
             fmt::format("roughness 0.033, reflected at {}°", degrees),
-            Stage(eyeAt(degrees, 1))
+            Stage(eyeFacing(degrees, 1))
                 .set("environment", "{radiance: 1}")
                 .material("glass", roughGlass(kIndex, 0.033))
                 .material("black", "{type: diffuse, reflectance: 0}")
@@ -155,7 +155,7 @@ void roughDispersion(Context& context) {
 
 void pane(Context& context) {
     const auto reflecting = [](double degrees, double ior) {
-        return Stage(eyeAt(degrees, 1))
+        return Stage(eyeFacing(degrees, 1))
             .set("environment", "{radiance: 1}")
             .material("pane", fmt::format("{{type: thin_dielectric, ior: {}}}", ior))
             .material("black", "{type: diffuse, reflectance: 0}")
@@ -179,7 +179,7 @@ void pane(Context& context) {
     for (const double side : {1.0, -1.0})
         context.estimate(
             fmt::format("through it at 50°, from {}", side > 0 ? "above" : "below"),
-            Stage(eyeAt(50, side), "{max_depth: 0}")
+            Stage(eyeFacing(50, side), "{max_depth: 0}")
                 .material("pane", "{type: thin_dielectric, ior: 1.5}")
                 .material("black", "{type: diffuse, reflectance: 0}")
                 .quad("pane", kInterface, "pane")
@@ -195,14 +195,14 @@ void pane(Context& context) {
              {(1 - r) * (1 - r), "light reflected to and fro inside the pane is missing"}});
     // All of the light is somewhere.
     context.relative("in light from everywhere",
-                     radiance(context.render(Stage(eyeAt(60, 1))
+                     radiance(context.render(Stage(eyeFacing(60, 1))
                                                  .set("environment", "{radiance: 1}")
                                                  .material("pane", "{type: thin_dielectric, ior: 1.5}")
                                                  .quad("pane", kInterface, "pane")
                                                  .yaml(),
                                              {.samples = 64})) /
                          radiance(context.render(
-                             Stage(eyeAt(60, 1)).set("environment", "{radiance: 1}").yaml(),
+                             Stage(eyeFacing(60, 1)).set("environment", "{radiance: 1}").yaml(),
                              {.samples = 64})),
                      1, 2e-6);
 }
@@ -210,7 +210,7 @@ void pane(Context& context) {
 void plasticFurnace(Context& context) {
     const auto floor = [](double degrees, double distance, const char* integrator, double base,
                           double roughness) {
-        return Stage(eyeAt(degrees, 1, distance), integrator)
+        return Stage(eyeFacing(degrees, 1, distance), integrator)
             .material("it",
                       fmt::format("{{type: plastic, reflectance: {}, roughness: {}}}", base, roughness))
             .quad("it", kInterface, "it");
@@ -252,12 +252,12 @@ void plasticFurnace(Context& context) {
                 {.samples = 1024, .most = 16384}, mistakes(cosine, 0.5, roughness));
         }
     context.sameBits("an index of 1 is Lambert's law",
-                     context.render(Stage(eyeAt(30, 1))
+                     context.render(Stage(eyeFacing(30, 1))
                                         .set("environment", "{radiance: 1}")
                                         .material("it", "{type: plastic, reflectance: 0.5, ior: 1}")
                                         .quad("it", kInterface, "it")
                                         .yaml()),
-                     context.render(Stage(eyeAt(30, 1))
+                     context.render(Stage(eyeFacing(30, 1))
                                         .set("environment", "{radiance: 1}")
                                         .material("it", "{type: diffuse, reflectance: 0.5}")
                                         .quad("it", kInterface, "it")

@@ -185,19 +185,19 @@ void stackOfPanes(Context& context) {
 std::vector<Case> paneCases() {
     constexpr std::uint64_t floor = CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE | CRT_FEATURE_THIN_DIELECTRIC;
     return {
-        row("G50", "lights-behind-panes",
+        row("G53", "lights-behind-panes",
             "A floor lit by a point, a spot, an IES lamp, a beam and a directional light behind 1, 2 and 7 "
             "panes, at 0°, 30°, 60° and 80°; panes that are there in part, in a mix, under a film",
             "Tⁿ, T = (1 − R)/(1 + R) of each polarisation", "Fresnel's equations; Stokes (1862)",
             "1e-5 (1 + n tan θ); ± 0.3 %", Level::Commit, floor | CRT_FEATURE_POINT_LIGHT,
             lightsBehindPanes),
-        row("G51", "techniques-through-panes",
+        row("G54", "techniques-through-panes",
             "A floor lit by a sky, a square lamp and a sun through 1 and 3 panes; with light sampling, "
             "scattered rays, and both",
             "the same of all: ∫ Tⁿ over the light", "quadrature in double", "± 0.3 %", Level::Commit,
             floor | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT | CRT_FEATURE_AREA_LIGHT,
             techniquesThroughPanes),
-        row("G52", "stack-of-panes",
+        row("G55", "stack-of-panes",
             "30 panes in light from everywhere; the sky behind 15 panes at max_depth 0; a pane that shines",
             "1; T¹⁵; T + what it emits", "conservation of energy", "2e-6; ± 1 %", Level::Commit,
             CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_THIN_DIELECTRIC, stackOfPanes),

@@ -583,14 +583,16 @@ void addDielectrics(std::vector<SectionSchema>& all) {
         .range = {.min = 0, .max = kMostRadiance},
         .unit = "1/scene unit",
         .doc = "Absorption coefficient of the inside, by the Beer–Lambert law: over a distance d the "
-               "share exp(−absorption · d) is left. The mesh must be closed. Where a body is inside another "
-               "the inner one counts, clear glass too, and behind it the outer one again; where bodies "
-               "overlap, the one that light entered last. Cameras (of a lens its middle), lamps and lights "
-               "may be inside bodies. Surfaces of two bodies must not coincide, since rounding decides which "
-               "of them light meets: let bodies that touch overlap a little. How many may be around one "
-               "place depends on how many kinds of glass absorb differently: 32 of 1, 16 of up to 3, 8 of "
-               "up to 15, 4 of up to 255; clear glass is a kind. Beyond that the outermost is forgotten. "
-               "What is around bodies absorbs nothing. 0 where it is not given."};
+               "share exp(−absorption · d) is left. The mesh must be closed. Of nested bodies the "
+               "innermost absorbs, even if it is clear; behind it the outer one absorbs again. Where "
+               "bodies overlap, the one that light entered last absorbs. Cameras (the middle of their "
+               "lens) and lights may be inside bodies. Bodies may touch. Overlap them a little where "
+               "other surfaces are inside two bodies that share a face, or where the faces that touch are "
+               "curved or belong to instances: rounding decides which of two coinciding surfaces light "
+               "meets. The number of nested bodies depends on the number of kinds of glass that absorb "
+               "differently: 32 bodies of 1 kind, 16 of up to 3, 8 of up to 15, 4 of up to 255, 2 of "
+               "more; clear glass is a kind. Beyond that crt forgets the outermost body. Nothing outside "
+               "of bodies absorbs. The default is 0."};
     all.push_back({"material/dielectric",
                    "a dielectric material",
                    "Smooth glass or water. It reflects and refracts, and may absorb.",

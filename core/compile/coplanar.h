@@ -1,0 +1,36 @@
+/// Triangles of a compiled scene that lie in one plane.
+#pragma once
+
+#include "base/vec3d.h"
+
+#include <array>
+#include <cstdint>
+
+namespace crt {
+
+/// An axis-aligned box.
+struct Box {
+    Vec3d lower, upper;
+
+    void add(const Vec3d& p, double padding);
+    bool meets(const Box& other) const;
+};
+Box boxAround(const Vec3d& p, double padding);
+
+/// A triangle of the compiled scene, in double.
+struct Corners {
+    std::array<Vec3d, 3> p;
+    Vec3d normal;  ///< Unit; zero without area.
+    double clearance = 0;
+};
+Corners cornersOf(const unsigned char* blob, std::uint32_t slot);
+double largestEdge(const Corners& c);
+
+/// Whether the corners of the smaller lie in the plane of the larger, whose normal is known better, as well
+/// as rays can tell.
+bool inOnePlane(const Corners& a, const Corners& b);
+/// Whether two triangles of one plane have area in common: by the separating axes of their edges. What
+/// merely touches has not.
+bool overlap(const Corners& a, const Corners& b);
+
+}  // namespace crt

@@ -1,0 +1,68 @@
+#include "compile/touching_media.h"
+
+#include "compile/coplanar.h"
+#include "kernel/features.h"
+#include "kernel/layout.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace crt {
+namespace {
+
+using namespace kernel;
+
+/// A triangle that bounds a medium.
+struct Bounding {
+    std::uint32_t slot, id, object;
+    Box box;
+};
+
+std::vector<Bounding> boundingTriangles(const unsigned char* blob) {
+    const auto& scene = *reinterpret_cast<const CrtScene*>(blob);
+    const auto* triangles = CRT_ARRAY(CrtTriangle, blob, scene.triangles);
+    const auto* primitives = CRT_ARRAY(CrtPrimitive, blob, scene.primitives);
+    const auto* materials = CRT_ARRAY(CrtMaterial, blob, scene.materials);
+    std::vector<Bounding> all;
+    for (std::uint32_t slot = 0; slot < scene.triangle_count; ++slot) {
+        const CrtTriangle& triangle = triangles[slot];
+        if (triangle.shape != 0) continue;  // a shape or an instance
+        const CrtPrimitive& primitive = primitives[triangle.id];
+        if (materials[primitive.material].medium == 0) continue;
+        const Corners corners = cornersOf(blob, slot);
+        Box box = boxAround(corners.p[0], corners.clearance);
+        for (const Vec3d& p : corners.p) box.add(p, corners.clearance);
+        all.push_back({slot, triangle.id, primitive.object, box});
+    }
+    return all;
+}
+
+}  // namespace
+
+void markTouchingMedia(unsigned char* blob) {
+    const auto& scene = *reinterpret_cast<const CrtScene*>(blob);
+    if ((scene.features & CRT_FEATURE_MEDIA) == 0) return;
+    std::vector<Bounding> all = boundingTriangles(blob);
+    if (std::all_of(all.begin(), all.end(),
+                    [&](const Bounding& b) { return b.object == all.front().object; }))
+        return;
+    // Sweep and prune along one axis (Baraff 1992).
+    std::sort(all.begin(), all.end(), [](const Bounding& a, const Bounding& b) {
+        return a.box.lower[0] != b.box.lower[0] ? a.box.lower[0] < b.box.lower[0] : a.id < b.id;
+    });
+    std::vector<std::uint32_t> touching;  // Ids. Marked at the end: objects are compared until then.
+    for (auto a = all.begin(); a != all.end(); ++a)
+        for (auto b = a + 1; b != all.end() && b->box.lower[0] <= a->box.upper[0]; ++b) {
+            if (a->object == b->object || !a->box.meets(b->box)) continue;
+            const Corners of_a = cornersOf(blob, a->slot), of_b = cornersOf(blob, b->slot);
+            if (!inOnePlane(of_a, of_b) || !overlap(of_a, of_b)) continue;
+            touching.push_back(a->id);
+            touching.push_back(b->id);
+        }
+    auto* primitives = const_cast<CrtPrimitive*>(CRT_ARRAY(CrtPrimitive, blob, scene.primitives));
+    for (const std::uint32_t id : touching) primitives[id].object |= CRT_PRIMITIVE_TOUCHES;
+}
+
+}  // namespace crt
