@@ -285,6 +285,63 @@ TEST_CASE("whatever makes a film another one is said in words", "[develop]") {
     }
 }
 
+TEST_CASE("a material that makes a film another one is given as the reason, whatever of it changed",
+          "[develop]") {
+    using crt::constantSpectrum;
+    using crt::Material;
+    using crt::MaterialType;
+    struct Change {
+        const char* what;
+        MaterialType type;
+        void (*change)(Material&);
+    };
+    const Change changes[] = {
+        {"type", MaterialType::Diffuse, [](Material& m) { m.type = MaterialType::Mirror; }},
+        {"reflectance", MaterialType::Diffuse, [](Material& m) { m.reflectance = constantSpectrum(0.3); }},
+        {"reflectance texture", MaterialType::Diffuse, [](Material& m) { m.reflectance_texture = 0; }},
+        {"opacity", MaterialType::Diffuse, [](Material& m) { m.opacity = 0.5; }},
+        {"opacity texture", MaterialType::Diffuse, [](Material& m) { m.opacity_texture = 0; }},
+        {"fuzz", MaterialType::Diffuse, [](Material& m) { m.fuzz = 0.5; }},
+        {"coat", MaterialType::Diffuse,
+         [](Material& m) { m.clearcoat = crt::Clearcoat{.depth = constantSpectrum(0.1)}; }},
+        {"eta", MaterialType::Conductor, [](Material& m) { m.eta = constantSpectrum(0.3); }},
+        {"k", MaterialType::Conductor, [](Material& m) { m.k = constantSpectrum(4); }},
+        {"film", MaterialType::Conductor, [](Material& m) { m.film_thickness_nm = 200; }},
+        {"roughness", MaterialType::RoughConductor, [](Material& m) { m.roughness = 0.6; }},
+        {"roughness texture", MaterialType::RoughConductor, [](Material& m) { m.roughness_texture = 0; }},
+        {"anisotropy", MaterialType::RoughConductor, [](Material& m) { m.anisotropy = 0.5; }},
+        {"colours", MaterialType::RoughConductor, [](Material& m) { m.by_color = true; }},
+        {"absorption", MaterialType::Dielectric, [](Material& m) { m.absorption = constantSpectrum(1); }},
+        {"rough base", MaterialType::Plastic,
+         [](Material& m) {
+             m.by_color = true;
+             m.diffuse_roughness = 0.5;
+         }},
+    };
+    for (const Change& c : changes) {
+        INFO(c.what);
+        Scene scene = parsed();
+        crt::Texture checker;
+        checker.kind = crt::Texture::Kind::Checker;
+        checker.values = {crt::TextureValue{constantSpectrum(0.25)},
+                          crt::TextureValue{constantSpectrum(0.75)}};
+        scene.textures.push_back(checker);
+        Material& material = scene.materials[0];
+        material.type = c.type;
+        material.reflectance = material.edge_tint = material.fuzz_color = constantSpectrum(0.5);
+        material.eta = material.film_index = constantSpectrum(1.4);
+        material.k = constantSpectrum(3);
+        material.roughness = 0.4;
+        Scene other = scene;
+        c.change(other.materials[0]);
+        CHECK(compileScene(other, requestedAovs(other)).hash !=
+              compileScene(scene, requestedAovs(scene)).hash);
+        const std::vector<std::string> differences = differingTraits(recordOf(scene), recordOf(other));
+        REQUIRE(differences.size() == 1);
+        CHECK_THAT(differences[0], Contains("the materials are others"));
+    }
+}
+
 TEST_CASE("a lamp with nothing in front of it is named, and no other", "[develop]") {
     const auto named = [](const std::vector<SceneOverride>& changes) { return idleLamps(parsed(changes)); };
     const std::vector<std::string> lamp{"'lamp'"};

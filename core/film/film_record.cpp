@@ -141,12 +141,17 @@ SceneTrait geometryTrait(const Scene& scene) {
     Digest digest;
     std::uint64_t triangles = 0, shapes = 0, placements = 0;
     for (const Mesh& mesh : scene.meshes) {
-        digest.add(mesh.positions);
-        digest.add(mesh.normals);
-        digest.add(mesh.triangles);
-        digest.add(mesh.normal_index);
-        digest.add(mesh.material);
-        digest.add(mesh.emission);
+        const auto& [positions, normals, corners, normal_index, uvs, uv_index, colors, material, emission] =
+            mesh;
+        digest.add(positions);
+        digest.add(normals);
+        digest.add(corners);
+        digest.add(normal_index);
+        digest.add(uvs);
+        digest.add(uv_index);
+        digest.add(colors);
+        digest.add(material);
+        digest.add(emission);
     }
     for (const Object& object : scene.objects) {
         digest.add(object.mesh);
@@ -171,24 +176,64 @@ SceneTrait geometryTrait(const Scene& scene) {
             digest.digits()};
 }
 
+// Structured bindings name every member: one that is added does not compile until its trait knows of it.
+
+void addClearcoat(Digest& digest, const Clearcoat& coat) {
+    const auto& [ior, roughness, depth, darkening, base_roughness] = coat;
+    for (const double number : {ior, roughness, darkening, base_roughness}) digest.add(number);
+    digest.add(depth);
+}
+
+void addMaterial(Digest& digest, const Material& material) {
+    const auto& [name, type, reflectance, eta, k, absorption, roughness, by_color, edge_tint, weight,
+                 anisotropy, anisotropy_rotation_deg, film_thickness_nm, film_index, reflectance_texture,
+                 roughness_texture, film_texture, place, opacity, opacity_texture, parts, normal_texture,
+                 normal_strength, amount, amount_texture, emission, diffuse_roughness, fuzz, fuzz_color,
+                 fuzz_roughness, clearcoat] = material;
+    digest.add(type);
+    digest.add(by_color);
+    for (const Spectrum* spectrum : {&reflectance, &eta, &k, &edge_tint, &film_index, &fuzz_color})
+        digest.add(*spectrum);
+    for (const double number : {roughness, weight, anisotropy, anisotropy_rotation_deg, film_thickness_nm,
+                                opacity, normal_strength, amount, diffuse_roughness, fuzz, fuzz_roughness})
+        digest.add(number);
+    for (const TextureIndex texture : {reflectance_texture, roughness_texture, film_texture, opacity_texture,
+                                       normal_texture, amount_texture})
+        digest.add(texture);
+    for (const std::int32_t index : {parts[0], parts[1], emission}) digest.add(index);
+    digest.add(absorption.has_value());
+    if (absorption) digest.add(*absorption);
+    digest.add(clearcoat.has_value());
+    if (clearcoat) addClearcoat(digest, *clearcoat);
+}
+
 SceneTrait materialsTrait(const Scene& scene) {
     Digest digest;
-    for (const Material& material : scene.materials) {
-        digest.add(material.type);
-        digest.add(material.emission);
-        for (const double number : {material.diffuse_roughness, material.fuzz, material.fuzz_roughness})
-            digest.add(number);
-        digest.add(material.fuzz_color);
-        if (material.clearcoat) {
-            const Clearcoat& coat = *material.clearcoat;
-            for (const double number : {coat.ior, coat.roughness, coat.darkening, coat.base_roughness})
-                digest.add(number);
-            digest.add(coat.depth);
-        }
-        for (const Spectrum* spectrum : {&material.reflectance, &material.eta, &material.k})
-            digest.add(*spectrum);
-    }
+    for (const Material& material : scene.materials) addMaterial(digest, material);
     return {"the materials", counted(scene.materials.size(), "material", "materials"), digest.digits()};
+}
+
+/// Of images their names and sizes: their texels are read by compilation alone.
+void addTexture(Digest& digest, const Texture& texture) {
+    const auto& [kind, image, filter, wrap, values, transform, place] = texture;
+    digest.add(kind);
+    digest.add(filter);
+    digest.add(wrap);
+    for (const TextureValue& value : values) {
+        digest.add(value.spectrum);
+        digest.add(value.texture);
+    }
+    for (const double number : transform) digest.add(number);
+    if (!image) return;
+    digest.add(std::vector<char>(image->file.begin(), image->file.end()));
+    for (const std::uint32_t size : {image->width, image->height}) digest.add(size);
+    digest.add(image->kind);
+}
+
+SceneTrait texturesTrait(const Scene& scene) {
+    Digest digest;
+    for (const Texture& texture : scene.textures) addTexture(digest, texture);
+    return {"the textures", counted(scene.textures.size(), "texture", "textures"), digest.digits()};
 }
 
 SceneTrait lightsTrait(const Scene& scene) {
@@ -275,6 +320,7 @@ std::vector<SceneTrait> traitsOf(const Scene& scene, std::uint32_t aovs) {
             {"the camera", cameraText(scene.camera), {}},
             geometryTrait(scene),
             materialsTrait(scene),
+            texturesTrait(scene),
             lightsTrait(scene),
             {"the AOVs of first hits", planesText(aovs), {}},
             spectralTrait(scene)};
