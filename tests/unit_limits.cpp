@@ -22,9 +22,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
@@ -35,18 +35,20 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// What is quadratic takes minutes; what runs under a sanitizer, several times as long as it should.
+// Of all processors together. What is quadratic takes minutes; what runs under a sanitizer, several times as
+// long as it should.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double kSecondsAllowed = 20;
+constexpr double kSecondsAllowed = 40;
 #else
-constexpr double kSecondsAllowed = 2;
+constexpr double kSecondsAllowed = 4;
 #endif
 
+/// Time of this process on processors: what else the machine does has no part in it.
 template <class Work>
 double secondsOf(const Work& work) {
-    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t start = std::clock();
     work();
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
 
 /// The sentence of the crt::Error that `work` throws; empty when it throws none.
@@ -95,7 +97,8 @@ TEST_CASE("only regular files are read, and a pipe is not waited for", "[limits]
     CHECK_THROWS_WITH(loadScene(pipe), Contains("for standard input write '-'"));
     const std::string mesh =
         folder.write("mesh.obj", "mtllib pipe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
-    CHECK(secondsOf([&] { refusal([&] { loadObj(mesh); }); }) < 5);
+    // Ends: who waited for a writer of the pipe would wait for ever.
+    refusal([&] { loadObj(mesh); });
 }
 
 TEST_CASE("a file that is too large is refused by its size before it is read", "[limits][input]") {
