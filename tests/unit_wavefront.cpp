@@ -127,10 +127,29 @@ TEST_CASE("what meets nothing is shaded where something shines there, without an
 }
 
 TEST_CASE("no two queues are one, and there is room for all", "[wavefront]") {
+    // One of each kind, a mix of two of them, and a sky to miss into.
     std::vector<crt::MaterialType> types;
-#define CRT_TYPE(F, bit, NAME, Name, word, scatter, text) types.push_back(crt::MaterialType::Name);
+    std::vector<std::uint32_t> kinds;
+#define CRT_TYPE(F, bit, NAME, Name, word, scatter, text) \
+    types.push_back(crt::MaterialType::Name);             \
+    kinds.push_back(CRT_MATERIAL_##NAME);
     CRT_MATERIAL_LIST(CRT_TYPE, )
 #undef CRT_TYPE
-    // One of each kind, a mix, and misses.
-    CHECK(types.size() + 2 <= CRT_WAVE_QUEUES);
+    types.push_back(crt::MaterialType::Mix);
+    crt::Scene scene = sceneOf(types);
+    for (crt::Material& material : scene.materials) {
+        material.eta = crt::constantSpectrum(1.5);
+        material.k = crt::constantSpectrum(3);
+    }
+    scene.materials.back().parts = {0, 1};
+    scene.environment = crt::Environment{};
+    scene.environment->radiance = crt::constantSpectrum(1);
+    const CompiledScene c = compiled(scene);
+    const WavePlan plan = planWave(c.data());
+    std::set<std::uint32_t> queues{plan.queue_of_mix, plan.queue_of_miss};
+    for (const std::uint32_t kind : kinds) queues.insert(plan.queue_of_kind[kind]);
+    CHECK(queues.size() == kinds.size() + 2);
+    CHECK(plan.queues() == queues.size());
+    CHECK(*queues.rbegin() < plan.queues());
+    CHECK(plan.queues() <= CRT_WAVE_QUEUES);
 }
