@@ -76,29 +76,53 @@ void furnace(Context& context) {
                      {.samples = 64, .most = 16384});
 }
 
-/// A quad about the origin, and where its tangent should be.
+/// An object that passes through the origin, by its keys, and where its tangent should be there.
 struct Sheet {
     const char* what;
-    const char* mesh;
+    std::string object;
     Vec3d normal, tangent;
 };
 
+std::string meshOf(const char* positions) {
+    return fmt::format("mesh: {{positions: {}, faces: [[0,1,2,3]]}}", positions);
+}
+
+/// A shape of radius 1 whose place q lies at the origin.
+std::string shapeAt(const char* shape, const Vec3d& q) {
+    return fmt::format("{}, transform: [{{translate: {}}}]", shape, point(q * -1));
+}
+
 void highlight(Context& context) {
     const double r = std::sqrt(0.5);
+    const Vec3d ball = unit({0.5, 0.3, 0.6}), round{0.6, 0.8, 0};
     const Sheet sheets[] = {
-        {"a floor", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", {0, 1, 0}, {1, 0, 0}},
-        {"a wall that faces x", "[[0,-2,-2],[0,2,-2],[0,2,2],[0,-2,2]]", {1, 0, 0}, {0, 0, -1}},
-        {"a slope", "[[-2,2,-2],[-2,-2,2],[2,-2,2],[2,2,-2]]", {0, r, r}, {1, 0, 0}},
+        {"a floor", meshOf("[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]"), {0, 1, 0}, {1, 0, 0}},
+        {"a wall that faces x", meshOf("[[0,-2,-2],[0,2,-2],[0,2,2],[0,-2,2]]"), {1, 0, 0}, {0, 0, -1}},
+        {"a slope", meshOf("[[-2,2,-2],[-2,-2,2],[2,-2,2],[2,2,-2]]"), {0, r, r}, {1, 0, 0}},
         // u grows with x and z, v as well: where it stays, z falls by half of what x grows.
         {"a floor with coordinates",
-         "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]], uvs: [[-4,-6],[-2,2],[4,6],[2,-2]]",
-         {0, 1, 0}, unit({2, 0, -1})},
+         meshOf("[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]], uvs: [[-4,-6],[-2,2],[4,6],[2,-2]]"),
+         {0, 1, 0},
+         unit({2, 0, -1})},
         {"a floor with mirrored coordinates",
-         "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]], uvs: [[-2,2],[2,2],[2,-2],[-2,-2]]",
-         {0, 1, 0}, {0, 0, 1}},
+         meshOf("[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]], uvs: [[-2,2],[2,2],[2,-2],[-2,-2]]"),
+         {0, 1, 0},
+         {0, 0, 1}},
         {"a floor with the same coordinates everywhere",
-         "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]], uvs: [[1,1],[1,1],[1,1],[1,1]]",
-         {0, 1, 0}, {1, 0, 0}},
+         meshOf("[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]], uvs: [[1,1],[1,1],[1,1],[1,1]]"),
+         {0, 1, 0},
+         {1, 0, 0}},
+        // On shapes u goes around the axis z, and on a disk along its x.
+        {"a ball", shapeAt("sphere: {radius: 1}", ball), ball, unit({-ball[1], ball[0], 0})},
+        {"a cylinder",
+         shapeAt("cylinder: {radius: 1, from_z: -1, to_z: 1}", round),
+         round,
+         {-round[1], round[0], 0}},
+        {"a disk that faces x",
+         "disk: {radius: 1}, transform: [{rotate: {axis: [0, 1, 0], angle_deg: 90}}, "
+         "{translate: [0, 0.3, 0.2]}]",
+         {1, 0, 0},
+         {0, 0, -1}},
     };
     const double roughness = 0.5, anisotropy = 0.7;
     const double along = 0.25 * std::sqrt(2 / 1.09), across = 0.3 * along;
@@ -131,7 +155,7 @@ void highlight(Context& context) {
                                   fmt::format("{{type: rough_conductor, eta: 1, k: 1e6, roughness: {:g}, "
                                               "roughness_anisotropy: {:g}, anisotropy_rotation_deg: {:g}}}",
                                               roughness, anisotropy, turn))
-                        .quad("it", sheet.mesh, "it")
+                        .object(sheet.object + ", material: it")
                         .set("lights", fmt::format("[{{type: directional, direction: {}, irradiance: 1}}]",
                                                    point(place(beam.light) * -1)))
                         .yaml(),
@@ -156,14 +180,13 @@ std::vector<Case> anisotropyCases() {
             "merge a cube of brushed glass",
             "1 for perfect metal and for glass; else quadrature over the normals, what is lost given back",
             "conservation of energy; Heitz (2014); Kulla and Conty (2017)", "± 0.2 %, ± 0.3 %",
-            Level::Commit,
-            CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ROUGH_DIELECTRIC | metal, furnace),
+            Level::Commit, CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ROUGH_DIELECTRIC | metal, furnace),
         row("G31", "anisotropic-highlight",
-            "Six sheets of brushed metal, with and without texture coordinates, lit by a beam from three "
-            "directions about the highlight",
+            "Six sheets of brushed metal, with and without texture coordinates, a ball, a cylinder and a "
+            "disk, lit by a beam from three directions about the highlight",
             "D G₂ / (4 cos θ_o), about the tangent that docs/scene.md names", "Heitz (2014); OpenPBR 1.1",
-            "± 0.2 %", Level::Commit,
-            CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_NEE | metal, highlight),
+            "± 0.2 %", Level::Commit, CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_SHAPES | metal,
+            highlight),
     };
 }
 

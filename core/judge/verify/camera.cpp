@@ -69,9 +69,9 @@ void lens(Context& context) {
         for (const double side : {1.0, -1.0})
             context.estimate(
                 fmt::format("in focus at 2.5, by {{{}}}: an edge {} from the middle", focus, side * 0.005),
-                {glowingHalf(fmt::format("{{position: [0, 0, 0], {}, fov: 0.0001, aperture_radius: 0.1}}",
-                                         focus),
-                             pixel, true, side * 0.005, 2.5),
+                {glowingHalf(
+                     fmt::format("{{position: [0, 0, 0], {}, fov: 0.0001, aperture_radius: 0.1}}", focus),
+                     pixel, true, side * 0.005, 2.5),
                  glowingHalf("{position: [0, 0, 0], target: [0, 0, 1], fov: 0.0001}", pixel, true, -1, 1)},
                 // What is there and what is missing: never 0, which no interval can be relative to.
                 [](const std::vector<Film>& f) { return 1 + radiance(f[0]) / radiance(f[1]); },
@@ -138,8 +138,9 @@ void pixelFilters(Context& context) {
             Stage("{position: [0, 0, 0], target: [0, 0, 1], fov: 90}", "{max_depth: 0}")
                 .set("film", fmt::format("{{resolution: [{0}, {0}], filter: {1}}}", size, filter.film))
                 .material("black", "{type: diffuse, reflectance: 0}")
-                .quad("quarter", fmt::format("[[{0},{1},1],[9,{1},1],[9,9,1],[{0},9,1]]", corner_x, corner_y),
-                      "black", "1, two_sided: true")
+                .quad("quarter",
+                      fmt::format("[[{0},{1},1],[9,{1},1],[9,9,1],[{0},9,1]]", corner_x, corner_y), "black",
+                      "1, two_sided: true")
                 .yaml();
         std::vector<Asked> asked;
         for (std::uint32_t y = 0; y < size; ++y)
@@ -156,8 +157,8 @@ void pixelFilters(Context& context) {
             context.estimated(asked, {scene}, 0.005, {.samples = 64, .most = 16384}, {});
         // Of each filter the worst pixel; one that fails before one that passes.
         const auto off = [](const Outcome& o) { return std::abs(*o.measured - *o.expected); };
-        const auto worst = std::max_element(
-            outcomes.begin(), outcomes.end(), [&](const Outcome& a, const Outcome& b) {
+        const auto worst =
+            std::max_element(outcomes.begin(), outcomes.end(), [&](const Outcome& a, const Outcome& b) {
                 return failed(a.verdict) == failed(b.verdict) ? off(a) < off(b) : failed(b.verdict);
             });
         worst->what += fmt::format(", the worst of {}", outcomes.size());

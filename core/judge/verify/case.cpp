@@ -77,9 +77,10 @@ const std::vector<Case>& registry() {
         std::vector<Case> all;
         for (const auto group :
              {closedFormCases, glassCases, scaleCases, geometryCases, rayCases, lightCases,
-              pointLightCases, environmentCases, spectralFilmCases, stiffCases, scatteringCases,
-              glasswareCases, paneCases, thinFilmCases, anisotropyCases, openPbrCases, openPbrCoatCases,
-              compositionCases, bodyCases, shadingNormalCases, quadricCases, instanceCases, shapeLightCases,
+              pointLightCases, lightTreeCases, environmentCases, spectralFilmCases, stiffCases,
+              scatteringCases, roughSurfaceCases, glasswareCases, paneCases, thinFilmCases, anisotropyCases,
+              openPbrCases, openPbrCoatCases, compositionCases, bodyCases, shadingNormalCases, quadricCases,
+              instanceCases, shapeLightCases,
               colourCases, textureCases, accumulationCases, cameraCases, firstHitCases, imageCases,
               inputCases, backendCases, exactRelationCases, mutantCases, contactCases})
             for (Case& c : group()) all.push_back(std::move(c));

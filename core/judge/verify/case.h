@@ -96,10 +96,12 @@ std::vector<Case> geometryCases();       ///< C
 std::vector<Case> rayCases();            ///< D
 std::vector<Case> lightCases();          ///< E
 std::vector<Case> pointLightCases();     ///< E, the part about lights without a surface
+std::vector<Case> lightTreeCases();      ///< E, the part about many lights
 std::vector<Case> environmentCases();    ///< E, the part about images and skies around a scene
 std::vector<Case> spectralFilmCases();   ///< E, the part about bins and sensors
 std::vector<Case> stiffCases();          ///< F
 std::vector<Case> scatteringCases();     ///< G
+std::vector<Case> roughSurfaceCases();   ///< G, microfacets
 std::vector<Case> glasswareCases();      ///< G, rough glass and panes
 std::vector<Case> paneCases();           ///< G, light that crosses panes
 std::vector<Case> compositionCases();    ///< G, opacity and mixes

@@ -1,4 +1,5 @@
 // Group G, the part about surfaces that are there in part, and materials made of others.
+#include "base/temporary_folder.h"
 #include "base/vec3d.h"
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
@@ -109,6 +110,38 @@ void texturedOpacity(Context& context) {
                     "'opacity'");
 }
 
+void cutoffs(Context& context) {
+    // Texels of 0.25, 0.5 and 0.75, those from 0.5 on there by 0.6; between the first two half of that.
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/leaf.pfm";
+    std::vector<float> rgb;
+    for (const float grey : {0.25f, 0.5f, 0.75f}) rgb.insert(rgb.end(), 3, grey);
+    writeRgb(path, OutputFormat::Pfm, 3, 1, rgb);
+    struct Place {
+        double u, there, before;  ///< The opacity; and were it cut off after filtering, or not at all.
+    };
+    for (const Place& place :
+         {Place{1.0 / 6, 0, 0.15}, {1.0 / 2, 0.6, 0.3}, {5.0 / 6, 0.6, 0.45}, {1.0 / 3, 0.3, 0}}) {
+        const double x = 16 * place.u - 8;
+        Stage stage(fmt::format("{{position: [{0}, 2, 0.05], target: [{0}, 0, 0.05], up: [0, 0, 1], fov: "
+                                "1e-4}}",
+                                x),
+                    "{max_depth: 0}");
+        stage.set("environment", "{radiance: 1}")
+            .material("leaf",
+                      black(fmt::format("{{texture: '{}', cutoff: 0.5, factor: 0.6, wrap: clamp}}", path)));
+        context.estimate(fmt::format("a cutoff of 0.5 at u = {:.3f}, seen through", place.u),
+                         sheet(stage, 1, "leaf").yaml(), meanRadiance, 1 - place.there, 0.005,
+                         {.samples = 64, .most = 65536},
+                         {{1 - place.before, "texels are not cut off, or after they are filtered"}});
+    }
+    context.refused("a cutoff of a colour",
+                    fmt::format("crt: 1\nmaterials: {{m: {{type: diffuse, reflectance: {{texture: '{}', "
+                                "cutoff: 0.5}}}}}}\n",
+                                path),
+                    "'cutoff' is for numbers");
+}
+
 void emittersWithHoles(Context& context) {
     const Effort effort{.samples = 64, .most = 65536};
     constexpr double kOpacity = 0.3;
@@ -209,6 +242,9 @@ std::vector<Case> compositionCases() {
     constexpr std::uint64_t light =
         CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_ENVIRONMENT;
     return {
+        row("G21", "cutoff", "Texels of an opacity below, at and above its cutoff, and between two of them",
+            "0 below, 1 from it on, times the factor; linear between texels", "docs/scene.md",
+            "± 0.5 %; refused", Level::Commit, light | CRT_FEATURE_OPACITY | CRT_FEATURE_TEXTURE, cutoffs),
         row("G24", "opacity",
             "Stacked sheets of opacity 0 to 1 before a sky, and over a floor that is lit by lamps, points "
             "and a sky, by light sampling and without",

@@ -134,16 +134,16 @@ void images(Context& context) {
 
     // Level ground cannot tell azimuths apart. On a wall and on a slope a texel brings
     // ∫∫ (n·ω) sin θ dθ dφ.
-    for (const auto& [what, normal] :
-         {std::pair{"a wall", Vec3d{1, 0, 0}}, {"a slope", unit({0.5, 0.6, -0.4})},
-          {"an overhang", unit({0.4, -0.3, -0.8})}}) {
+    for (const auto& [what, normal] : {std::pair{"a wall", Vec3d{1, 0, 0}},
+                                       {"a slope", unit({0.5, 0.6, -0.4})},
+                                       {"an overhang", unit({0.4, -0.3, -0.8})}}) {
         const double column = 2 * kPi / 32, row = kPi / 16;
-        const double expected =
-            300 / kPi * rectangleIntegral(
-                            [n = normal](double theta, double phi) {
-                                return dot(n, aroundUs(theta, phi)) * std::sin(theta);
-                            },
-                            5 * row, 6 * row, 20 * column - kPi, 21 * column - kPi);
+        const double expected = 300 / kPi *
+                                rectangleIntegral(
+                                    [n = normal](double theta, double phi) {
+                                        return dot(n, aroundUs(theta, phi)) * std::sin(theta);
+                                    },
+                                    5 * row, 6 * row, 20 * column - kPi, 21 * column - kPi);
         for (const char* integrator : {kDirect, kAlone})
             context.estimate(
                 fmt::format("a single bright texel on {}, {}", what, integrator),
@@ -242,7 +242,8 @@ void skies(Context& context) {
     // 0.7 degrees high.
     constexpr double kTheta = 60 * kDegree, kSunPhi = 25 * kDegree;
     const auto towards = [](double theta, double from_x) {
-        return Vec3d{std::sin(theta) * std::cos(from_x), std::cos(theta), std::sin(theta) * std::sin(from_x)};
+        return Vec3d{std::sin(theta) * std::cos(from_x), std::cos(theta),
+                     std::sin(theta) * std::sin(from_x)};
     };
     const auto luminanceAt = [&](double off) {
         const double cosine = dot(towards(kTheta, kSunPhi + off), towards(kSunTheta, kSunPhi));
@@ -253,9 +254,10 @@ void skies(Context& context) {
         const Film film = context.render(
             Stage(fmt::format("{{position: [0, 0, 0], target: {}, fov: 1}}",
                               point(towards(kTheta, kSunPhi + off))))
-                .set("environment", fmt::format("{{sky: {{type: 12, zenith_luminance_cd_m2: 1000, direction: "
-                                                "{}}}}}",
-                                                point(towards(kSunTheta, kSunPhi) * -1)))
+                .set("environment",
+                     fmt::format("{{sky: {{type: 12, zenith_luminance_cd_m2: 1000, direction: "
+                                 "{}}}}}",
+                                 point(towards(kSunTheta, kSunPhi) * -1)))
                 .yaml(),
             {.samples = 1024});
         context.relative(fmt::format("type 12 seen {}° beside the sun", degrees), luminance(film) * lumens,
@@ -281,10 +283,13 @@ std::vector<Case> environmentCases() {
             "the constant environment; sums of each texel's irradiance; the texel where it belongs",
             "closed form of a texel over level ground; quadrature", "5e-4; ± 0.3 %; 2 %", Level::Commit,
             kEnvironmentNeeds, images),
-        row("E21", "cie-sky", "CIE general skies over a floor, by zenith luminance and by illuminance; seen in six azimuths from "
+        row("E21", "cie-sky",
+            "CIE general skies over a floor, by zenith luminance and by illuminance; seen in six azimuths "
+            "from "
             "the sun",
-            "pi L for the uniform sky; the horizontal illuminance; the luminance there", "quadrature of ISO 15469:2004",
-            "± 0.3 %; 1 %", Level::Commit, kEnvironmentNeeds | CRT_FEATURE_TABLE, skies),
+            "pi L for the uniform sky; the horizontal illuminance; the luminance there",
+            "quadrature of ISO 15469:2004", "± 0.3 %; 1 %", Level::Commit,
+            kEnvironmentNeeds | CRT_FEATURE_TABLE, skies),
     };
 }
 

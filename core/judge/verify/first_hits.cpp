@@ -68,12 +68,12 @@ void normalsOfHits(Context& context) {
 
 void albedosOfHits(Context& context) {
     const auto of = [&](const std::string& material) {
-        return albedoOf(context.render(
-            context.scene(Stage(eyeAt({0.6, 0.8, 0}, "[0, 0, 1]"), "{max_depth: 0}")
-                              .material("it", material)
-                              .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
-                              .yaml()),
-            samples(16, kAovAlbedo)));
+        return albedoOf(
+            context.render(context.scene(Stage(eyeAt({0.6, 0.8, 0}, "[0, 0, 1]"), "{max_depth: 0}")
+                                             .material("it", material)
+                                             .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
+                                             .yaml()),
+                           samples(16, kAovAlbedo)));
     };
     const double white = of("{type: diffuse, reflectance: 1}");
     const double metal = fresnelConductor(1, 0.2, 3);
@@ -84,8 +84,8 @@ void albedosOfHits(Context& context) {
           {"type: rough_conductor, eta: 0.2, k: 3, roughness: 0.3", metal},
           {"type: conductor, eta: 1.5, k: 0.8", fresnelConductor(1, 1.5, 0.8)},
           {"type: dielectric, ior: 1.5", 1}})
-        context.relative(fmt::format("albedo of {{{}}}", material), of(fmt::format("{{{}}}", material)) / white,
-                         expected, 1e-5);
+        context.relative(fmt::format("albedo of {{{}}}", material),
+                         of(fmt::format("{{{}}}", material)) / white, expected, 1e-5);
 }
 
 void depthsOfHits(Context& context) {
@@ -102,20 +102,19 @@ void depthsOfHits(Context& context) {
         const auto depth = [&](const std::string& scene) {
             return channel(context.render(context.scene(scene), samples(64, kNormalAndDepth)), kAovDepth);
         };
-        context.relative(
-            fmt::format("depth of a floor of {:g}, straight ahead", 8 * size),
-            depth(floor(fmt::format("{{position: [0, {}, {}], target: [0, 0, 0], fov: 0.0001}}", 2 * size,
-                                    1.5 * size),
-                        "{resolution: [1, 1]}")),
-            2.5 * size, 1e-5);
+        context.relative(fmt::format("depth of a floor of {:g}, straight ahead", 8 * size),
+                         depth(floor(fmt::format("{{position: [0, {}, {}], target: [0, 0, 0], fov: 0.0001}}",
+                                                 2 * size, 1.5 * size),
+                                     "{resolution: [1, 1]}")),
+                         2.5 * size, 1e-5);
         // The mean over a pixel at the edge of a wide film.
         const double mean = rectangleIntegral(
             [](double x, double y) { return std::sqrt(1 + x * x + y * y); }, 1 - 2.0 / 64, 1, 0, 2.0 / 64);
         context.relative(
             fmt::format("depth of a floor of {:g}, at the edge of a film of 90°", 8 * size),
-            depth(floor(fmt::format("{{position: [0, {}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 90}}",
-                                    2 * size),
-                        "{resolution: [64, 64], crop: [0, 31, 1, 32]}")),
+            depth(floor(
+                fmt::format("{{position: [0, {}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 90}}", 2 * size),
+                "{resolution: [64, 64], crop: [0, 31, 1, 32]}")),
             2 * size * mean * (64.0 / 2) * (64.0 / 2), 1e-3,
             {{2 * size, "depth is taken along the view axis"}});
     }
@@ -137,8 +136,8 @@ void writeGreys(const std::string& path) {
     for (int row = 0; row < kGreys; ++row)
         for (int column = 0; column < kGreys; ++column)
             for (int c = 0; c < 3; ++c)
-                rgb.push_back(static_cast<float>(
-                    greyAt((column + 0.5) / kGreys, (kGreys - row - 0.5) / kGreys)));
+                rgb.push_back(
+                    static_cast<float>(greyAt((column + 0.5) / kGreys, (kGreys - row - 0.5) / kGreys)));
     writeRgb(path, OutputFormat::Pfm, kGreys, kGreys, rgb);
 }
 
@@ -157,8 +156,8 @@ public:
                                  "1"));
     }
     Shown operator()(const Vec3d& there, const Vec3d& normal, const std::string& object) {
-        const Film film = render(there, normal, object,
-                                 fmt::format("{{texture: '{}', filter: nearest}}", path_));
+        const Film film =
+            render(there, normal, object, fmt::format("{{texture: '{}', filter: nearest}}", path_));
         return {normalOf(film), albedoOf(film) / white_};
     }
 
@@ -166,12 +165,13 @@ private:
     Film render(const Vec3d& there, const Vec3d& normal, const std::string& object,
                 const std::string& reflectance) {
         return context_.render(
-            context_.scene(Stage(fmt::format("{{position: {}, target: {}, up: [0.3, 0.2, 1], fov: 0.0001}}",
-                                             point(there + normal), point(there)),
-                                 "{max_depth: 0}")
-                               .material("it", fmt::format("{{type: diffuse, reflectance: {}}}", reflectance))
-                               .object(object + ", material: it")
-                               .yaml()),
+            context_.scene(
+                Stage(fmt::format("{{position: {}, target: {}, up: [0.3, 0.2, 1], fov: 0.0001}}",
+                                  point(there + normal), point(there)),
+                      "{max_depth: 0}")
+                    .material("it", fmt::format("{{type: diffuse, reflectance: {}}}", reflectance))
+                    .object(object + ", material: it")
+                    .yaml()),
             samples(16, kAovNormal | kAovAlbedo));
     }
 
@@ -187,8 +187,8 @@ void placedAttributes(Context& context) {
     const Vec3d normal = unit({0.5, 1, -0.3});
     Shows shows(context);
     for (const auto& [name, x_row, y_row, z_row, shift] :
-         {std::tuple<const char*, Vec3d, Vec3d, Vec3d, Vec3d>
-          {"as it is", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}},
+         {std::tuple<const char*, Vec3d, Vec3d, Vec3d, Vec3d>{
+              "as it is", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}},
           {"stretched", {3, 0, 0}, {0, 0.5, 0}, {0, 0, 1}, {0.5, 0, -0.25}},
           {"turned and stretched", {0.6, -1.6, 0}, {0.8, 1.2, 0}, {0, 0, 0.7}, {0, 0.5, 0}},
           {"mirrored and sheared", {-1, 0.5, 0}, {0, 2, 0.25}, {0.5, 0, 1}, {0, 0, 0}}}) {
@@ -212,8 +212,7 @@ void placedAttributes(Context& context) {
                         "{8:.17g}, {9}, {10:.17g}, {11:.17g}, {12:.17g}, {13}, 0, 0, 0, 1]}}]",
                         point(normal), share, a[0], a[1], a[2], shift[0], b[0], b[1], b[2], shift[1], c[0],
                         c[1], c[2], shift[2]));
-                const std::string what =
-                    fmt::format("{}, share: {}, ({}, {})", name, share, u, v);
+                const std::string what = fmt::format("{}, share: {}, ({}, {})", name, share, u, v);
                 sameDirection(context, what, shown.normal, placed(normal), 2e-5,
                               {{unit(turned(normal)), "the normal goes as directions do"},
                                {up, "the normal is the geometric one"}});
@@ -279,9 +278,8 @@ std::vector<Case> firstHitCases() {
             placedAttributes),
         row("D14", "shape-coordinates",
             "Normals and texture coordinates of spheres, cylinders and disks that are turned and moved",
-            "u goes once around the axis z from x towards y, v from below; a disk's square",
-            "docs/scene.md", "2e-5; 1e-4", Level::Commit,
-            hit | CRT_FEATURE_TEXTURE | CRT_FEATURE_SHAPES, shapeCoordinates),
+            "u goes once around the axis z from x towards y, v from below; a disk's square", "docs/scene.md",
+            "2e-5; 1e-4", Level::Commit, hit | CRT_FEATURE_TEXTURE | CRT_FEATURE_SHAPES, shapeCoordinates),
     };
 }
 

@@ -338,6 +338,25 @@ void absorbingSlab(Context& context) {
         std::exp(-2 * (1 + away)), 0.002, effort,
         {{std::exp(-2.0), "a shadow ray is not absorbed"},
          {std::exp(-2 * away), "what leads to the floor is not absorbed"}});
+    // Mirrored by a glass cube that stands in water, to a lamp in the water: all of the way is absorbed.
+    const auto mirrored = [](double sigma) {
+        return Stage("{position: [-3, 3, 0], target: [0, 0, 0], fov: 0.001}",
+                     "{max_depth: 2, roulette: false}")
+            .material("water", fmt::format("{{type: dielectric, ior: 1, absorption: {}}}", sigma))
+            .material("glass", "{type: dielectric, ior: 2.5, absorption: 5}")
+            .material("black", "{type: diffuse, reflectance: 0}")
+            .box("pool", {-2, -2, -2}, {2, 2, 2}, "water")
+            .box("cube", {-1, -1, -1}, {1, 0, 1}, "glass")
+            .quad("lamp", "[[0.8,1.2,-0.3],[1.2,0.8,-0.3],[1.2,0.8,0.3],[0.8,1.2,0.3]]", "black",
+                  "1, two_sided: true")
+            .yaml();
+    };
+    const double to_cube = std::sqrt(8.0), to_lamp = std::sqrt(2.0);
+    context.estimate("mirrored under water by a glass cube: absorbing over clear",
+                     {mirrored(0.7), mirrored(0)},
+                     [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); },
+                     std::exp(-0.7 * (to_cube + to_lamp)), 0.002, effort,
+                     {{std::exp(-0.7 * to_cube), "what is mirrored forgets what it was in"}});
     context.refused("absorption -1",
                     "crt: 1\nmaterials: {it: {type: dielectric, ior: 1.5, absorption: -1}}\n", "absorption");
     context.refused("absorption of a pane",
@@ -383,7 +402,9 @@ std::vector<Case> glasswareCases() {
             "quadrature in double; conservation of energy", "2e-3", Level::Commit,
             sky | light | CRT_FEATURE_NEE | CRT_FEATURE_PLASTIC | CRT_FEATURE_TABLE, plasticFurnace),
         row("G18", "absorption",
-            "An absorbing slab before a lamp, from outside and inside; a floor and a lamp under water",
+            "An absorbing slab before a lamp, from outside and inside; a floor and a lamp under water, and "
+            "a "
+            "lamp mirrored there by a glass cube",
             "(1 − R)² A / (1 − R² A²) and A = exp(−σ d)", "Beer and Lambert; geometric series",
             "± 0.1 %; 1e-5", Level::Commit,
             sky | light | CRT_FEATURE_NEE | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_MEDIA | rough,

@@ -13,6 +13,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
+#include <tuple>
+#include <utility>
 
 namespace crt::verify {
 namespace {
@@ -233,6 +236,50 @@ void brightFiles(Context& context) {
                   fmt::format("{:.6g}; files hold single precision", largest));
 }
 
+void developing(Context& context) {
+    // A sky of illuminant A, seen. Its XYZ under D65 by Bradford's matrix as published (Lindbloom,
+    // "Chromatic Adaptation", A to D65).
+    constexpr double kBradford[3][3] = {{0.8446965, -0.1179225, 0.3948108},
+                                        {-0.1366303, 1.1041226, 0.1291718},
+                                        {0.0798489, -0.1348999, 3.1924009}};
+    const auto developed = [&](const char* light, const std::string& film, bool floats) {
+        const Scene scene = context.scene(Stage("{position: [0,0,0], target: [0,0,1], fov: 1}")
+                                              .set("environment", fmt::format("{{radiance: {}}}", light))
+                                              .set("film", fmt::format("{{resolution: [1, 1], {}}}", film))
+                                              .yaml());
+        const Film seen = context.render(scene, {.samples = 1u << 14});
+        const Development development = developmentOf(scene);
+        const Image image = resolveImage(seen, floats ? development.forFloats() : development, 0);
+        return std::pair(Vec3d{image.pixels[0], image.pixels[1], image.pixels[2]}, meanXyz(seen));
+    };
+    constexpr const char* kLamp = "{illuminant: A, scale: 0.3}";
+    const std::string balanced = "white_balance: {illuminant: A}, exposure_ev: 1.5";
+    const double brighter = std::exp2(1.5);
+    const Vec3d grey = developed(kLamp, balanced, false).first;
+    for (std::size_t k = 0; k < 3; ++k)
+        context.relative(fmt::format("A under its own white balance, 1.5 stops brighter: {}", "RGB"[k]),
+                         grey[k], 0.3 * brighter, 2e-3,
+                         {{0.3, "exposure_ev is left out"}, {0.3 * 1.5, "exposure is a factor, not stops"}});
+    // Another colour, in XYZ.
+    constexpr const char* kOther = "{rgb: [0.9, 0.4, 0.1], scale: 2}";
+    for (const auto& [film, floats, adapts, factor] :
+         {std::tuple{balanced, false, true, brighter},
+          {balanced, true, false, 1.0},
+          {balanced + ", apply_to_float: true", true, true, brighter},
+          {std::string("exposure_ev: -3"), false, false, 0.125}}) {
+        const auto [measured, xyz] = developed(kOther, film + ", color_space: xyz", floats);
+        for (std::size_t k = 0; k < 3; ++k) {
+            const double adapted =
+                adapts ? kBradford[k][0] * xyz[0] + kBradford[k][1] * xyz[1] + kBradford[k][2] * xyz[2]
+                       : xyz[k];
+            context.relative(
+                fmt::format("{{{}}}, {} file: {}", film, floats ? "in a float" : "in a PNG", "XYZ"[k]),
+                measured[k], factor * adapted, adapts ? 2e-3 : 1e-6,
+                {{factor * xyz[k], "the white is not adapted"}, {adapted, "exposure is left out"}});
+        }
+    }
+}
+
 }  // namespace
 
 std::vector<Case> imageCases() {
@@ -260,6 +307,12 @@ std::vector<Case> imageCases() {
             rooms, crops),
         row("J08", "bright-files", "Radiance 1e5, beyond half precision", "kept", "mitsuba3 #35", "finite",
             Level::Commit, CRT_FEATURE_ENVIRONMENT, brightFiles),
+        row("J12", "developing",
+            "Illuminant A and another colour under A's white balance, 1.5 stops brighter and 3 darker, as "
+            "PNG and as files of floats with and without apply_to_float",
+            "A becomes grey; Bradford's matrix; 2^EV; files of floats stay as they are",
+            "Lindbloom's published matrix from A to D65", "2e-3; 1e-6 without a white balance",
+            Level::Commit, CRT_FEATURE_ENVIRONMENT, developing),
     };
 }
 

@@ -14,6 +14,7 @@
 #include <numbers>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace crt::verify {
 namespace {
@@ -294,21 +295,22 @@ void fuzz(Context& context) {
         const double cosine = std::cos(degrees * kDegree);
         const double kept = 1 - weight * sheenAlbedo(cosine, 0.5);
         const auto body = [&, degrees = degrees](double distance) {
-            Stage stage(fmt::format("{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: "
-                                    "0.001}}",
-                                    distance * std::sin(degrees * kDegree), distance * cosine),
-                        "{max_depth: 8, roulette: false}");
+            Stage stage(
+                fmt::format("{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: "
+                            "0.001}}",
+                            distance * std::sin(degrees * kDegree), distance * cosine),
+                "{max_depth: 8, roulette: false}");
             return stage.set("environment", "{radiance: 1}")
-                .material("it", on("transmission_weight: 1, specular_roughness: 0, specular_ior: 1", weight, 0,
-                                   0.5))
+                .material("it", on("transmission_weight: 1, specular_roughness: 0, specular_ior: 1", weight,
+                                   0, 0.5))
                 .box("it", {-4, -1, -4}, {4, 0, 4}, "it")
                 .yaml();
         };
         context.estimate(fmt::format("black on a clear body, at {}°", degrees), body(1), meanRadiance, kept,
                          5e-3, {.samples = 1024, .most = 65536},
                          {{kept * kept, "there is fuzz on the inside, too"}});
-        context.estimate(fmt::format("black on a clear body, seen from within, at {}°", degrees),
-                         body(-0.5), meanRadiance, 1, 1e-3, {.samples = 1024, .most = 65536},
+        context.estimate(fmt::format("black on a clear body, seen from within, at {}°", degrees), body(-0.5),
+                         meanRadiance, 1, 1e-3, {.samples = 1024, .most = 65536},
                          {{kept, "there is fuzz on the inside, too"}});
     }
     // A mirror under fuzz is seen by light sampling, too.
@@ -322,10 +324,69 @@ void fuzz(Context& context) {
     }
 }
 
+/// The index at a wavelength of Cauchy's two terms that have n_d and Abbe's number
+/// V = (n_d − 1)/(n_F − n_C); lines at 587.6, 486.1 and 656.3 nm.
+double cauchyOfAbbe(double n_d, double abbe, double nm) {
+    const auto inverse_square = [](double line) { return 1e6 / (line * line); };
+    const double b = (n_d - 1) / abbe / (inverse_square(486.1) - inverse_square(656.3));
+    return n_d + b * (inverse_square(nm) - inverse_square(587.6));
+}
+
+void dispersion(Context& context) {
+    // What a floor mirrors straight on tells its index in each bin; black below it takes the rest.
+    constexpr double kIndex = 1.5, kAbbe = 4, kScale = 0.5, kFrom = 400, kTo = 700;
+    constexpr std::uint32_t kBins = 6;
+    const std::string scene =
+        Stage(eyeAt({0, 1, 0}, "[0, 0, 1]"), kDirect)
+            .set("film",
+                 fmt::format("{{resolution: [4, 4], spectral: {{from_nm: {}, to_nm: {}, bins: {}}}}}", kFrom,
+                             kTo, kBins))
+            .set("environment", "{radiance: 1}")
+            .material("it", fmt::format("{{type: openpbr, transmission_weight: 1, specular_roughness: 0, "
+                                        "specular_ior: {}, transmission_dispersion_scale: {}, "
+                                        "transmission_dispersion_abbe_number: {}}}",
+                                        kIndex, kScale, kAbbe))
+            .material("black", "{type: diffuse, reflectance: 0}")
+            .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
+            .quad("bottom", "[[-9,-1,-9],[-9,-1,9],[9,-1,9],[9,-1,-9]]", "black")
+            .yaml();
+    std::vector<Asked> asked;
+    for (std::uint32_t bin = 0; bin < kBins; ++bin) {
+        const double width = (kTo - kFrom) / kBins, lower = kFrom + bin * width;
+        double expected = 0;
+        constexpr int kParts = 50;
+        for (int i = 0; i < kParts; ++i)
+            expected += fresnelDielectric(
+                            1, cauchyOfAbbe(kIndex, kAbbe / kScale, lower + width * (i + 0.5) / kParts)) /
+                        kParts;
+        asked.push_back(
+            {fmt::format("Abbe's number {} / {}, {:.0f} to {:.0f} nm", kAbbe, kScale, lower, lower + width),
+             [bin](const std::vector<Film>& films) {
+                 const Film& film = films[0];
+                 double sum = 0;
+                 for (std::uint32_t y = 0; y < film.shape().height; ++y)
+                     for (std::uint32_t x = 0; x < film.shape().width; ++x)
+                         sum += film.mean(x, y, film.shape().firstSpectral() + bin);
+                 return sum / (film.shape().width * film.shape().height);
+             },
+             expected});
+    }
+    context.estimate(asked, {scene}, 0.01, {.samples = 1024, .most = 65536},
+                     {{fresnelDielectric(1, kIndex), "the index is the same at all wavelengths"}});
+}
+
 }  // namespace
 
 std::vector<Case> openPbrCases() {
     return {
+        row("G22", "openpbr-dispersion",
+            "A clear floor of index 1.5 and Abbe's number 4 at a scale of 0.5: what it mirrors straight on "
+            "in six bins of wavelengths",
+            "Fresnel's reflectance at Cauchy's index of Abbe's number 8",
+            "OpenPBR Surface 1.1; the definition of Abbe's number", "± 1 %", Level::Commit,
+            CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION |
+                CRT_FEATURE_SPECTRAL_FILM,
+            dispersion),
         row("G32", "openpbr-metal",
             "Metals by base_color, specular_color and their weights, polished at four angles, one of them "
             "82°; rough at three; white ones",
@@ -335,12 +396,11 @@ std::vector<Case> openPbrCases() {
         row("G33", "openpbr-limits",
             "Glossy bases at three angles, a mix with metal; what is left when weights are 0 or 1, beside "
             "crt's own material; what crt has not",
-            "E + (1 − E) · base_color; shares of the mix; the same bits; a refusal",
-            "OpenPBR Surface 1.1", "± 0.2 %; 0", Level::Commit,
+            "E + (1 − E) · base_color; shares of the mix; the same bits; a refusal", "OpenPBR Surface 1.1",
+            "± 0.2 %; 0", Level::Commit,
             CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_MIX |
                 CRT_FEATURE_DIFFUSE | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ROUGH_DIELECTRIC |
-                CRT_FEATURE_ANISOTROPY | CRT_FEATURE_MEDIA | CRT_FEATURE_THIN_FILM |
-                CRT_FEATURE_TABLE,
+                 CRT_FEATURE_ANISOTROPY | CRT_FEATURE_MEDIA | CRT_FEATURE_THIN_FILM | CRT_FEATURE_TABLE,
             limits),
         row("G36", "openpbr-emission",
             "A sheet of emission_luminance 300 seen from both sides, white and of a darker emission_color; "

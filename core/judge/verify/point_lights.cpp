@@ -443,66 +443,6 @@ void beams(Context& context) {
                      luminance, 900 / (kLumens_W * kPi * 16), 0.003, {.samples = 256, .most = 16384});
 }
 
-/// Sixty lamps, twenty points and a directional light over a floor: what each brings, added up.
-void manyLights(Context& context) {
-    Dice dice(26);
-    constexpr double x = 0.2, z = -0.3;
-    constexpr const char* kChance = "{max_depth: 1, roulette: false, nee: false}";
-    for (const char* const integrator : {kDirect, "{max_depth: 1, roulette: false, mis: false}", kChance}) {
-        const bool chance = integrator == kChance;
-        std::string points = "{type: directional, direction: [0.3, -1, 0.2], irradiance: 0.5}";
-        double sum = 0.5 / std::sqrt(1.13), brightest = 0;
-        std::vector<std::pair<std::string, double>> lamps;
-        std::vector<std::vector<Vec3d>> quads;
-        for (int i = 0; i < 60; ++i) {
-            // In a layer, so that none hides another; of all sizes, and turned away a little or wholly.
-            const Vec3d at{-1.75 + 0.5 * (i % 8), 1 + 0.001 * i, -1.75 + 0.5 * (i / 8)};
-            const double side = chance ? 0.2 : std::pow(10, dice.uniform(-2.5, -0.8));
-            const Vec3d a = unit(Vec3d{1, dice.uniform(-0.3, 0.3), 0}) * side,
-                        b = unit(Vec3d{0, dice.uniform(-0.3, 0.3), 1}) * side;
-            const double power = std::pow(10, dice.uniform(-1, 1)), radiance = power / (side * side);
-            const bool up = i % 7 == 0;
-            const std::vector<Vec3d> quad = up ? std::vector<Vec3d>{at, at + b, at + a + b, at + a}
-                                               : std::vector<Vec3d>{at, at + a, at + a + b, at + b};
-            quads.push_back(quad);
-            const bool both = i % 14 == 0;
-            const double brings =
-                up && !both ? 0 : kPi * radiance * polygonFormFactor({x, 0, z}, {0, 1, 0}, quad);
-            sum += brings;
-            brightest = std::max(brightest, brings);
-            lamps.emplace_back(both ? ", two_sided: true" : "", radiance);
-        }
-        for (int i = 0; i < 20 && !chance; ++i) {
-            const Vec3d at{dice.uniform(-2, 2), 0.75 + 0.01 * i, dice.uniform(-2, 2)};
-            const double intensity = std::pow(10, dice.uniform(-1, 0.5));
-            points += fmt::format(", {{type: point, position: [{}, {}, {}], radiant_intensity: {}}}", at[0],
-                                  at[1], at[2], intensity);
-            const Vec3d d = at - Vec3d{x, 0, z};
-            sum += intensity * d[1] / std::pow(dot(d, d), 1.5);
-        }
-        if (chance) sum -= 0.5 / std::sqrt(1.13);
-        // From below the lamps, lest they hide the floor.
-        Stage stage(fmt::format("{{position: [{}, 0.5, {}], target: [{}, 0, {}], fov: 0.0001}}", x + 0.4, z,
-                                x, z),
-                    integrator);
-        if (!chance) stage.set("lights", "[" + points + "]");
-        stage.material("white", "{type: diffuse, reflectance: 1}")
-            .material("black", "{type: diffuse, reflectance: 0}")
-            .quad("floor", "[[-4,0,-4.1],[-4,0,3.9],[4,0,3.9],[4,0,-4.1]]", "white");
-        for (std::size_t i = 0; i < quads.size(); ++i) {
-            std::string corners;
-            for (const Vec3d& v : quads[i])
-                corners += fmt::format("{}[{:.9g}, {:.9g}, {:.9g}]", corners.empty() ? "" : ", ", v[0],
-                                       v[1], v[2]);
-            stage.quad(fmt::format("lamp {}", i), "[" + corners + "]", "black",
-                       fmt::format("{:.9g}{}", lamps[i].second, lamps[i].first));
-        }
-        context.estimate(fmt::format("many lights, {}", integrator), stage.yaml(), meanRadiance, sum / kPi,
-                         0.004, {.samples = 1024, .most = 65536},
-                         {{(sum - brightest) / kPi, "the brightest lamp is never chosen"}});
-    }
-}
-
 }  // namespace
 
 std::vector<Case> pointLightCases() {
@@ -534,11 +474,6 @@ std::vector<Case> pointLightCases() {
             "I(θ, φ) cos θ / d², linear in both angles; the flux",
             "bilinear interpolation, ∫∫ I sin θ dθ dφ",
             "2e-5; same bits; ± 0.3 %", Level::Commit, kLit, iesLamps),
-        row("E26", "light-tree",
-            "Sixty lamps, twenty points and a directional light over a floor: with light sampling, with it "
-            "alone, and by chance",
-            "the sum of what each brings", "linearity of light, closed forms", "± 0.4 %", Level::Commit,
-            kLit | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_LIGHT_TREE, manyLights),
         row("E25", "beam",
             "Disks and slits of collimated light: within, out, behind screens and before they begin",
             "E cos θ within, 0 without; the flux", "closed forms", "1e-5; ± 0.3 %", Level::Commit, kLit,

@@ -1,5 +1,4 @@
-// Group G: surfaces at the ends of their parameters. crt has Lambert's law, mirrors, smooth and rough
-// conductors and smooth dielectrics.
+// Group G: surfaces at the ends of their parameters.
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
@@ -15,16 +14,6 @@
 
 namespace crt::verify {
 namespace {
-
-/// A roughness of what is smooth (docs/scene.md) is refused, not ignored.
-void roughnessIsRefused(Context& context, const std::string& material,
-                        std::initializer_list<double> roughnesses) {
-    for (const double roughness : roughnesses)
-        context.refused(fmt::format("{} of roughness {:g}", material, roughness),
-                        fmt::format("crt: 1\nmaterials: {{rough: {{type: {}, roughness: {:g}}}}}\n",
-                                    material, roughness),
-                        "unknown key 'roughness'");
-}
 
 std::string numbers(const Vec3d& v) { return fmt::format("[{:.17g},{:.17g},{:.17g}]", v[0], v[1], v[2]); }
 
@@ -71,8 +60,6 @@ void lambertDirections(Context& context) {
                   "directions are not distributed as the cosine: what is sampled and what is divided by are "
                   "two distributions",
                   fmt::format("χ² = {:.1f}", chi_squared));
-    for (const char* material : {"conductor, metal: Ag", "dielectric, ior: 1.5", "mirror, reflectance: 1"})
-        roughnessIsRefused(context, material, {1, 0.5, 0.1, 1e-2, 1e-3, 1e-4});
 }
 
 void viewAngles(Context& context) {
@@ -152,64 +139,6 @@ void whiteFurnaces(Context& context) {
         context.relative(fmt::format("conductor of n = 1, k = 6 at {}°", degrees),
                          whiteFurnace(context, "{type: conductor, eta: 1, k: 6}", degrees), expected, 1e-5);
     }
-}
-
-void roughFurnace(Context& context) {
-    const auto camera = [](double degrees, double distance) {
-        return fmt::format(
-            "{{position: [{:.17g}, {:.17g}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 0.001}}",
-            distance * std::sin(degrees * kDegree), distance * std::cos(degrees * kDegree));
-    };
-    const auto floor = [&](double degrees, double distance, const char* integrator, double n, double k,
-                           double roughness) {
-        return Stage(camera(degrees, distance), integrator)
-            .material("it", fmt::format("{{type: rough_conductor, eta: {:g}, k: {:g}, roughness: {:g}}}", n,
-                                        k, roughness))
-            .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it");
-    };
-    const auto mistakes = [](double once, double squared) {
-        return std::vector<Mistake>{
-            {once, "what the microfacets lose is not given back"},
-            {squared, "the width of GGX is the roughness, not its square"}};
-    };
-    const Render how{.samples = 1u << 12};
-    // Of a perfect metal nothing is lost; of another, what Fresnel's equations say of one and more rounds.
-    for (const auto& [n, k] : {std::pair{1.0, 1e6}, std::pair{0.2, 3.0}})
-        for (const double roughness : {0.0, 0.1, 0.3, 0.5, 0.7, 1.0})
-            for (const double degrees : {0.0, 60.0, 85.0, 89.0}) {
-                const double cosine = std::cos(degrees * kDegree);
-                const double expected = k == 1e6 ? 1 : roughConductorAlbedo(cosine, n, k, roughness);
-                const auto wrong = mistakes(microfacetAlbedo(cosine, n, k, roughness),
-                                            roughConductorAlbedo(cosine, n, k, std::sqrt(roughness)));
-                context.relative(
-                    fmt::format("roughness {}, n = {:g}, k = {:g}, seen from {}°", roughness, n, k,
-                                 degrees),
-                    radiance(context.render(floor(degrees, 1, kDirect, n, k, roughness)
-                                                .set("environment", "{radiance: 1}")
-                                                .yaml(),
-                                            how)),
-                    expected, 2e-3, wrong);
-            }
-    // In a glowing room, light sampling and scattered rays share the work, or one does it alone.
-    for (const char* integrator :
-         {"{max_depth: 1, roulette: false}", "{max_depth: 1, roulette: false, nee: false}"})
-        for (const double roughness : {0.5, 1.0}) {
-            const double expected = roughConductorAlbedo(std::cos(30 * kDegree), 0.2, 3, roughness);
-            context.estimate(
-                fmt::format("in a glowing room, roughness {}, {}", roughness, integrator),
-                floor(30, 0.5, integrator, 0.2, 3, roughness)
-                    .material("black", "{type: diffuse, reflectance: 0}")
-                    .mesh(
-                        "room", "[[-2,0,-2],[2,0,-2],[-2,1,-2],[2,1,-2],[-2,0,2],[2,0,2],[-2,1,2],[2,1,2]]",
-                        "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,2,6,4],[1,5,7,3]]", "black", "1, two_sided: true")
-                    .yaml(),
-                meanRadiance, expected, 0.002, {.samples = 1024, .most = 16384},
-                mistakes(microfacetAlbedo(std::cos(30 * kDegree), 0.2, 3, roughness),
-                         roughConductorAlbedo(std::cos(30 * kDegree), 0.2, 3, std::sqrt(roughness))));
-        }
-    context.refused("roughness 1.5",
-                    "crt: 1\nmaterials: {it: {type: rough_conductor, metal: Ag, roughness: 1.5}}\n",
-                    "roughness");
 }
 
 void reciprocity(Context& context) {
@@ -339,26 +268,15 @@ void albedoRange(Context& context) {
     context.refused("albedo NaN", scene(".nan"), "reflectance");
 }
 
-void roughPeak(Context& context) { roughnessIsRefused(context, "conductor, metal: Ag", {1e-3, 3e-4, 1e-4}); }
-
-void roughLimit(Context& context) {
-    roughnessIsRefused(context, "conductor, eta: 1.5, k: 0", {1e-4});
-    roughnessIsRefused(context, "dielectric, ior: 1.5", {1e-4});
-    context.refused("a material of type ggx", "crt: 1\nmaterials: {rough: {type: ggx}}\n",
-                    "diffuse, mirror, conductor, rough_conductor, dielectric");
-}
-
 }  // namespace
 
 std::vector<Case> scatteringCases() {
     constexpr std::uint64_t light = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT;
     constexpr std::uint64_t sky = CRT_FEATURE_ENVIRONMENT;
     return {
-        row("G01", "cosine-law",
-            "Scattered directions of a diffuse surface, counted "
-            "in 72 cells of a dome; a roughness of 1 to 1e-4 of what is smooth",
-            "shares by Lambert's formula; roughness is refused", "Lambert's formula; χ²", "p > 1e-3",
-            Level::Merge, light | CRT_FEATURE_INDEPENDENT, lambertDirections),
+        row("G01", "cosine-law", "Scattered directions of a diffuse surface, counted in 72 cells of a dome",
+            "shares by Lambert's formula", "Lambert's formula; χ²", "p > 1e-3", Level::Merge,
+            light | CRT_FEATURE_INDEPENDENT, lambertDirections),
         row("G02", "pdf", "A white floor in a glowing room, with and without light sampling",
             "1: the weights of both techniques add up", "normalisation", "± 0.1 %", Level::Commit,
             light | CRT_FEATURE_NEE, pdfIntegrates),
@@ -370,12 +288,6 @@ std::vector<Case> scatteringCases() {
         row("G04", "reciprocity", "A ray into glass and the same way back, at four angles",
             "n⁴ between the two", "f(i,o)/nᵢ² = f(o,i)/nₒ²", "1e-4", Level::Commit,
             CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT, reciprocity),
-        row("G05", "rough-peak",
-            "A metal of roughness 1e-3 to 1e-4, where microfacet distributions lose their precision",
-            "refused: `conductor` is smooth", "docs/scene.md", "refused", Level::Commit, 0, roughPeak),
-        row("G06", "rough-limit", "Roughness that goes to 0 of what is smooth; an unknown material",
-            "refused: these materials are smooth, or there are none", "docs/scene.md", "refused",
-            Level::Commit, 0, roughLimit),
         row("G07", "indices",
             "A clear cube of n = 1, 1 + 1e-7, 1.001, 1.5, 2.4, 100, 1000 in a constant environment",
             "it vanishes; for n = 1 to the bit; 10000 is refused", "conservation of radiance over n²",
@@ -383,20 +295,11 @@ std::vector<Case> scatteringCases() {
         row("G08", "extreme-numbers",
             "Random numbers at the ends of their range in every scattering routine", "finite, or rejected",
             "a pdf of 0 becomes NaN (pbrt-v4 #313)", "none", Level::Commit, 0, extremeNumbers),
-        row("G09", "below-one", "Words to numbers", "above 0, below 1, mean ½, mean square ⅓",
-            "arithmetic",
+        row("G09", "below-one", "Words to numbers", "above 0, below 1, mean ½, mean square ⅓", "arithmetic",
             "1e-9", Level::Commit, 0, wordsToNumbers),
         row("G10", "albedo-range", "Albedo 0, 1, 1 + 1e-7, negative, NaN",
             "black; all of the light; the others are refused", "docs/scene.md", "exactly; 2e-6",
             Level::Commit, sky | CRT_FEATURE_DIFFUSE, albedoRange),
-        row("G12", "rough-furnace",
-            "Metals of roughness 0, .1, .3, .5, .7 and 1 in a constant environment, at 0°, 60°, 85° and "
-            "89°; and in a glowing room, with and without light sampling",
-            "1 of a perfect metal; else the share of light that GGX scatters once, by quadrature in double, "
-            "and of the rest what two and more reflections leave",
-            "conservation of energy; Heitz (2014); Kulla and Conty (2017); Fresnel's equations in complex "
-            "double", "2e-3", Level::Commit,
-            sky | light | CRT_FEATURE_NEE | CRT_FEATURE_ROUGH_CONDUCTOR, roughFurnace),
         row("G11", "view-angles", "A03 seen from 30° to 89.9° off the normal, from above and from below",
             "0.2394564705 always", "Lambert's law has no angle of view", "± 0.2 %", Level::Commit,
             light | CRT_FEATURE_NEE, viewAngles),

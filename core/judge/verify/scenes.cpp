@@ -76,9 +76,9 @@ Stage& Stage::quad(const std::string& name, const std::string& corners, const st
 
 Stage& Stage::mesh(const std::string& name, const std::string& positions, const std::string& faces,
                    const std::string& material, const std::string& radiance) {
-    return object(
-        fmt::format("name: {}, mesh: {{positions: {}, faces: {}}}, material: {}{}", name, positions, faces,
-                    material, radiance.empty() ? "" : fmt::format(", emission: {{radiance: {}}}", radiance)));
+    return object(fmt::format(
+        "name: {}, mesh: {{positions: {}, faces: {}}}, material: {}{}", name, positions, faces, material,
+        radiance.empty() ? "" : fmt::format(", emission: {{radiance: {}}}", radiance)));
 }
 
 Stage& Stage::object(const std::string& keys) {
