@@ -323,8 +323,8 @@ TEST_CASE("a material that makes a film another one is given as the reason, what
         Scene scene = parsed();
         crt::Texture checker;
         checker.kind = crt::Texture::Kind::Checker;
-        checker.values = {crt::TextureValue{constantSpectrum(0.25)},
-                          crt::TextureValue{constantSpectrum(0.75)}};
+        checker.values = {crt::TextureValue{constantSpectrum(0.25), crt::kNoTexture},
+                          crt::TextureValue{constantSpectrum(0.75), crt::kNoTexture}};
         scene.textures.push_back(checker);
         Material& material = scene.materials[0];
         material.type = c.type;
