@@ -357,6 +357,25 @@ void absorbingSlab(Context& context) {
                      [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); },
                      std::exp(-0.7 * (to_cube + to_lamp)), 0.002, effort,
                      {{std::exp(-0.7 * to_cube), "what is mirrored forgets what it was in"}});
+    // Through a body that stands in water and out of it again, to a lamp in the water.
+    const auto through = [](double sigma, double inner) {
+        return Stage("{position: [0.1, 5, 0], target: [0.1, 0, 0], up: [0, 0, 1], fov: 0.001}",
+                     "{max_depth: 4, roulette: false}")
+            .material("water", fmt::format("{{type: dielectric, ior: 1, absorption: {}}}", sigma))
+            .material("jelly", fmt::format("{{type: dielectric, ior: 1, absorption: {}}}", inner))
+            .material("black", "{type: diffuse, reflectance: 0}")
+            .box("pool", {-2, -2, -2}, {2, 2, 2}, "water")
+            .box("cube", {-1, 0, -1}, {1, 0.5, 1}, "jelly")
+            .quad("lamp", "[[-1,-1,-1],[-1,-1,1],[1,-1,1],[1,-1,-1]]", "black", "1")
+            .yaml();
+    };
+    context.estimate(
+        "through a body in water to a lamp in the water: absorbing over clear",
+        {through(0.7, 1.5), through(0, 0)},
+        [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); },
+        std::exp(-0.7 * (1.5 + 1) - 1.5 * 0.5), 0.002, effort,
+        {{std::exp(-0.7 * 1.5 - 1.5 * 0.5), "behind the inner body there is nothing"},
+         {std::exp(-0.7 * 3 - 1.5 * 0.5), "the inner body absorbs as the outer one does, too"}});
     context.refused("absorption -1",
                     "crt: 1\nmaterials: {it: {type: dielectric, ior: 1.5, absorption: -1}}\n", "absorption");
     context.refused("absorption of a pane",
