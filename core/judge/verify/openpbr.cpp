@@ -334,7 +334,7 @@ double cauchyOfAbbe(double n_d, double abbe, double nm) {
 
 void dispersion(Context& context) {
     // What a floor mirrors straight on tells its index in each bin; black below it takes the rest.
-    constexpr double kIndex = 1.5, kAbbe = 4, kScale = 0.5, kFrom = 400, kTo = 700;
+    constexpr double kMiddle = 1.5, kAbbe = 4, kScale = 0.5, kFrom = 400, kTo = 700;
     constexpr std::uint32_t kBins = 6;
     const std::string scene =
         Stage(eyeAt({0, 1, 0}, "[0, 0, 1]"), kDirect)
@@ -345,7 +345,7 @@ void dispersion(Context& context) {
             .material("it", fmt::format("{{type: openpbr, transmission_weight: 1, specular_roughness: 0, "
                                         "specular_ior: {}, transmission_dispersion_scale: {}, "
                                         "transmission_dispersion_abbe_number: {}}}",
-                                        kIndex, kScale, kAbbe))
+                                        kMiddle, kScale, kAbbe))
             .material("black", "{type: diffuse, reflectance: 0}")
             .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
             .quad("bottom", "[[-9,-1,-9],[-9,-1,9],[9,-1,9],[9,-1,-9]]", "black")
@@ -357,7 +357,7 @@ void dispersion(Context& context) {
         constexpr int kParts = 50;
         for (int i = 0; i < kParts; ++i)
             expected += fresnelDielectric(
-                            1, cauchyOfAbbe(kIndex, kAbbe / kScale, lower + width * (i + 0.5) / kParts)) /
+                            1, cauchyOfAbbe(kMiddle, kAbbe / kScale, lower + width * (i + 0.5) / kParts)) /
                         kParts;
         asked.push_back(
             {fmt::format("Abbe's number {} / {}, {:.0f} to {:.0f} nm", kAbbe, kScale, lower, lower + width),
@@ -372,7 +372,7 @@ void dispersion(Context& context) {
              expected});
     }
     context.estimate(asked, {scene}, 0.01, {.samples = 1024, .most = 65536},
-                     {{fresnelDielectric(1, kIndex), "the index is the same at all wavelengths"}});
+                     {{fresnelDielectric(1, kMiddle), "the index is the same at all wavelengths"}});
 }
 
 }  // namespace
