@@ -36,6 +36,22 @@ struct Hull {
     }
 };
 
+/// The least ball around `centre` that holds a whole object: all triangles of a placement.
+double wholeObject(const std::vector<Placement>& placements, const Vec3d& centre) {
+    std::vector<double> reach(placements.size(), kNowhere);
+    parallelFor(placements.size(), 1, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) {
+            double squared = 0;
+            for (const Vec3d& p : placements[i].mesh->positions) {
+                const Vec3d way = transformPoint(placements[i].transform, p) - centre;
+                squared = std::max(squared, dot(way, way));
+            }
+            if (!placements[i].mesh->triangles.empty()) reach[i] = std::sqrt(squared);
+        }
+    });
+    return reach.empty() ? kNowhere : *std::min_element(reach.begin(), reach.end());
+}
+
 /// Boxes of what is no triangle: shapes, and meshes where they are instanced.
 std::vector<Hull> boxesOf(const Scene& scene, const std::vector<PlacedShape>& shapes) {
     std::vector<Hull> boxes;
@@ -142,7 +158,13 @@ public:
         }
         if (!(detail * kMostLost < half_extent)) return std::nullopt;
         const double unit = std::ldexp(1.0, exponent_);
-        return Focus{eye_ + centre * unit, detail * unit};
+        const Vec3d focus = eye_ + centre * unit;
+        double object = wholeObject(placements_, focus) / unit;
+        for (const Hull& thing : boxes_)
+            object = std::min(object, ballAround(Hull{fromEye(thing.lower), fromEye(thing.upper)}, centre));
+        // Fine triangles of an object that is not small lose nothing that anybody sees.
+        if (!(object * kMostLost < half_extent)) return std::nullopt;
+        return Focus{focus, detail * unit};
     }
 
 private:
