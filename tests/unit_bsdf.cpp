@@ -229,8 +229,7 @@ std::vector<Subject> subjects() {
         {"rough conductor of roughness 1", roughMetal(0.2, 3, 1), rough(0.2, 3, 1)},
         {"rough perfect metal", roughMetal(1, 1e6, 1), constant(1)},
         {"brushed metal", brushed(roughMetal(0.2, 3, 0.6), 0.7), of_brushed(0.2, 3, 0.6, 0.7, 0)},
-        {"brushed metal, turned", brushed(roughMetal(0.2, 3, 1), 0.8, 65),
-         of_brushed(0.2, 3, 1, 0.8, 65)},
+        {"brushed metal, turned", brushed(roughMetal(0.2, 3, 1), 0.8, 65), of_brushed(0.2, 3, 1, 0.8, 65)},
         {"brushed perfect metal", brushed(roughMetal(1, 1e6, 1), 0.9), constant(1)},
         {"brushed glass", brushed(roughGlass(1.5, 1.5, 0.8), 0.6, 25), constant(1)},
         {"brushed dispersive glass", brushed(roughGlass(1.7, 1.6, 0.7), 0.5), constant(1)},
@@ -239,9 +238,7 @@ std::vector<Subject> subjects() {
         {"polished metal by its colours", colored(0.6, 0.3, 0.8, 0),
          [](double cosine) { return 0.8 * crt::verify::f82Tint(std::abs(cosine), 0.6, 0.3); }},
         {"rough metal by its colours", colored(0.6, 0.3, 0.8, 0.7),
-         [](double cosine) {
-             return crt::verify::tintedMetalAlbedo(std::abs(cosine), 0.6, 0.3, 0.8, 0.7);
-         }},
+         [](double cosine) { return crt::verify::tintedMetalAlbedo(std::abs(cosine), 0.6, 0.3, 0.8, 0.7); }},
         {"white brushed metal by its colours", brushed(colored(1, 1, 1, 0.8), 0.7), constant(1)},
         {"glossy", glossy(0.6, 0.5), of_gloss(0.6, 0.5)},
         {"clay", clay(plastic(0.7, 0, 1), 0.6),

@@ -195,10 +195,11 @@ TEST_CASE("mix: what a scene may not say", "[composition][yaml]") {
 
     // Of glass with one inside, and with two.
     const auto mixOf = [](const char* one, const char* other) {
-        return fmt::format("  one: {{type: dielectric, {}}}\n  other: {{type: rough_dielectric, roughness: 0.3, "
-                           "{}}}\n  inner: {{type: mix, materials: [b, other]}}\n"
-                           "  m: {{type: mix, materials: [one, inner]}}\n",
-                           one, other);
+        return fmt::format(
+            "  one: {{type: dielectric, {}}}\n  other: {{type: rough_dielectric, roughness: 0.3, "
+            "{}}}\n  inner: {{type: mix, materials: [b, other]}}\n"
+            "  m: {{type: mix, materials: [one, inner]}}\n",
+            one, other);
     };
     CHECK(refusal(mixOf("ior: 1.5, absorption: 2", "ior: 1.5, absorption: 2")).empty());
     CHECK(says(refusal(mixOf("ior: 1.5", "ior: 1.6")), "glass 'one' and glass 'other'"));

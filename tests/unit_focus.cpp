@@ -40,7 +40,8 @@ std::optional<Focus> focusOf(const Scene& scene) {
 }
 
 /// One floor of half size `half`, divided around the origin as for details of 1.
-Mesh dividedFloor(double half, const std::function<void(Scene&)>& change = [](Scene&) {}) {
+Mesh dividedFloor(
+    double half, const std::function<void(Scene&)>& change = [](Scene&) {}) {
     Scene scene = litFloor();
     for (Vec3d& p : scene.meshes[0].positions) p = p * (half / 5);
     change(scene);

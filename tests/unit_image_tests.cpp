@@ -70,7 +70,9 @@ TEST_CASE("means and moments of replicates are those of all their values", "[ima
     CHECK(replicates.pixel(79, 0).variance == Approx(13.0));
     // Deviations −3, −1, 4, and ten times that in one pixel.
     CHECK(replicates.largestValue().share == Approx(1600.0 / (26 * 80 + 2600)));
-    // 16/26 of its own pixel's, as two thirds at most: t(1) = √(3 · 16/26 / (2 − 3 · 16/26)) = 3.464, P = .179.
+    // 16/26 of its own pixel's, as two thirds at most: t(1) = √(3 · 16/26 / (2 − 3 · 16/26))
+    // = 3.464, P =
+    // .179.
     CHECK(replicates.largestValue().normal_p == Approx(std::min(1.0, 3 * 0.1789)).epsilon(1e-3));
     CHECK_THROWS_AS(replicates.add(std::vector<double>(80)), crt::Error);
 }
@@ -175,7 +177,8 @@ TEST_CASE("too few samples are inconclusive, and so is what one value decides, a
 }
 
 TEST_CASE("in few lit pixels normal noise is no heavy tail, and a firefly is one", "[image-tests]") {
-    // By 1, 2 or 6 pixels of 4, 8 or 16 normal values, one value always carries more than 5 % of the squares.
+    // By 1, 2 or 6 pixels of 4, 8 or 16 normal values, one value always carries more than 5 % of the
+    // squares.
     std::mt19937_64 engine(11);
     std::normal_distribution<double> normal;
     constexpr int kRepeats = 300;
@@ -186,7 +189,8 @@ TEST_CASE("in few lit pixels normal noise is no heavy tail, and a firefly is one
                 Replicates usual(pixels, 1, 1), firefly(pixels, 1, 1);
                 for (int r = 0; r < renders; ++r) {
                     std::vector<double> image;
-                    for (std::uint32_t p = 0; p < pixels; ++p) image.push_back(p + 1 + 0.01 * normal(engine));
+                    for (std::uint32_t p = 0; p < pixels; ++p)
+                        image.push_back(p + 1 + 0.01 * normal(engine));
                     usual.add(image);
                     if (r == 0) image[0] += 1;
                     firefly.add(image);
@@ -209,7 +213,8 @@ TEST_CASE("heavy tails protect no bias of which the ranks are sure", "[image-tes
         Replicates replicates(kWidth, kHeight, kChannels);
         for (int r = 0; r < 16; ++r) {
             std::vector<double> image;
-            for (std::size_t i = 0; i < kValues; ++i) image.push_back(factor * (1 + 0.1 * random.exponential()));
+            for (std::size_t i = 0; i < kValues; ++i)
+                image.push_back(factor * (1 + 0.1 * random.exponential()));
             if (r == 0) image[100] = 1e3;
             replicates.add(image);
         }

@@ -1,7 +1,8 @@
 """Does the error that an image states of itself hold? Renders of fifteen scenes that differ in nothing but
 the seed, and the real error beside what each of them states: at numbers of samples from 16 to 1,024 that are
 powers of two, and such as a time limit or Ctrl-C might leave, and for a merge of two unequal ranges of
-samples. The real error is the spread between the seeds. Then what `--target-error` would have stopped at, and
+samples. The real error is the spread between the seeds. Then what `--target-error` would have
+stopped at, and
 what replicates cost against one sequence. Times nothing: it may run on a busy machine. --rows takes what
 error_calibration printed on another machine, with "mode", "scene", "side", "sampler" and "machine" added to
 each line.
@@ -190,7 +191,8 @@ def measure(program, arguments):
     results.paragraph("Rendered by " + "; ".join(sorted({r["machine"] for r in rows})) + ".")
     results.heading("All scenes")
     results.paragraph(
-        "*Known*: images that state an error; the others say “not yet known”. Of these: how often the 95 % "
+        "*Known*: images that state an error; the others say “not yet known”. Of these: how often "
+        "the 95 % "
         "interval covers the *expected error*, which is the root mean square over the seeds; how often the "
         "error that this image has, its *own error*, is within its 95 % half-width; how often the 95 % "
         "interval of the mean luminance covers the mean. *Stops*: of images that look when the number of "
@@ -212,8 +214,10 @@ def measure(program, arguments):
     if of("price"):
         results.heading("What two replicates cost")
         results.paragraph(
-            "RMSE of images with two replicates over that of images with one sequence, by samples per pixel, "
-            f"{PRICE_SEEDS} seeds each, ± one standard error. Decision 0007 says why it is what it is at 64 "
+            "RMSE of images with two replicates over that of images with one sequence, by samples "
+            "per pixel, "
+            f"{PRICE_SEEDS} seeds each, ± one standard error. Decision 0007 says why it is what it "
+            f"is at 64 "
             "samples."
         )
         price_table(results, of("price"))

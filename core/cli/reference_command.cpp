@@ -45,16 +45,16 @@ OptionGroup options(State& state) {
 }
 
 constexpr const char* kReferenceNotes =
-            "\nAnother seed, independent samples, no roulette, and light sampling switched: as little as "
-            "possible in common with what it will judge.\n"
-            "Light sampling stays on where the scene has lights that nothing else finds: point, spot, ies, "
-            "beam and directional.\n"
-            "The file holds the mean and eight independent eighths of it, from which its own error "
-            "follows.\n"
-            "\nExamples:\n"
-            "  crt reference scene.yaml -o ref.exr --time 10m\n"
-            "  crt reference scene.yaml -o ref.exr --spp 65536 --same-estimator --set "
-            "film.resolution=[128,128]\n";
+    "\nAnother seed, independent samples, no roulette, and light sampling switched: as little as "
+    "possible in common with what it will judge.\n"
+    "Light sampling stays on where the scene has lights that nothing else finds: point, spot, ies, "
+    "beam and directional.\n"
+    "The file holds the mean and eight independent eighths of it, from which its own error "
+    "follows.\n"
+    "\nExamples:\n"
+    "  crt reference scene.yaml -o ref.exr --time 10m\n"
+    "  crt reference scene.yaml -o ref.exr --spp 65536 --same-estimator --set "
+    "film.resolution=[128,128]\n";
 
 }  // namespace
 

@@ -111,8 +111,8 @@ public:
             const CrtTriangle& triangle = triangles_[slot];
             if (!mayMeet(probe, triangle)) continue;
             if ((triangle.shape & CRT_SLOT_INSTANCE) != 0)
-                meetInstance(probe, CRT_ARRAY(CrtInstance, blob_, scene_.instances)[triangle.shape -
-                                                                                  CRT_SLOT_INSTANCE]);
+                meetInstance(probe, CRT_ARRAY(CrtInstance, blob_,
+                                              scene_.instances)[triangle.shape - CRT_SLOT_INSTANCE]);
             else if (triangle.shape != 0)
                 meetShape(probe, CRT_ARRAY(CrtShape, blob_, scene_.shapes)[triangle.shape - 1],
                           mediumOf(triangle));
@@ -138,8 +138,7 @@ private:
     void meetInstance(Probe& probe, const CrtInstance& instance) const {
         const std::uint32_t first = instance.first_primitive, end = mesh_ends_.at(first);
         // The triangles of meshes are behind the slots, mesh by mesh, as their primitives are.
-        const CrtTriangle* mesh =
-            triangles_ + scene_.triangle_count + (first - mesh_ends_.begin()->first);
+        const CrtTriangle* mesh = triangles_ + scene_.triangle_count + (first - mesh_ends_.begin()->first);
         for (std::uint32_t i = 0; i < end - first; ++i) {
             const std::uint32_t medium = mediumOf(mesh[i]);
             if (medium == 0) continue;
@@ -157,7 +156,7 @@ private:
     const unsigned char* blob_;
     const CrtScene& scene_;
     const CrtTriangle* triangles_;
-    std::vector<std::uint32_t> slots_;  ///< Of those that bound media, and of instances.
+    std::vector<std::uint32_t> slots_;                  ///< Of those that bound media, and of instances.
     std::map<std::uint32_t, std::uint32_t> mesh_ends_;  ///< First primitive of a mesh → behind its last.
 };
 
@@ -188,7 +187,8 @@ void findCameraMedia(unsigned char* blob) {
     scene.camera_media = most->first;
     if (most->second < static_cast<int>(kDirections.size()))
         logWarning(
-            "rays in {} of {} directions find other bodies of glass around the camera than the rest do: a body "
+            "rays in {} of {} directions find other bodies of glass around the camera than the rest do: a "
+            "body "
             "is not closed, or several overlap there; the camera may see too much absorbed, or too little",
             static_cast<int>(kDirections.size()) - most->second, kDirections.size());
 }

@@ -252,8 +252,9 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 std::string objectOf(const Scene& scene, const CompiledScene& compiled, std::uint32_t primitive) {
     using namespace kernel;
     const auto* header = reinterpret_cast<const CrtScene*>(compiled.data());
-    std::uint32_t placement = CRT_ARRAY(CrtPrimitive, compiled.data(), header->primitives)[primitive].object &
-                              ~CRT_PRIMITIVE_TOUCHES;
+    std::uint32_t placement =
+        CRT_ARRAY(CrtPrimitive, compiled.data(), header->primitives)[primitive].object &
+        ~CRT_PRIMITIVE_TOUCHES;
     for (const Object& object : scene.objects) {
         if (placement < object.transforms.size())
             return object.name.empty() ? std::string("an object without a name")
@@ -278,7 +279,8 @@ void warnOfNearSurfaces(const Scene& scene, const CompiledScene& compiled) {
             found->least_gap);
     if (const CoarseLights found = findCoarseLights(compiled); found.lights > 0)
         logWarning(
-            "{} of {} lights are so small, and so far from where the camera is and looks, that rounding moves "
+            "{} of {} lights are so small, and so far from where the camera is and looks, that rounding "
+            "moves "
             "their edges by up to {:.1g} of their size: their light is wrong by as much; use point lights "
             "for them, or leave out what makes the scene so large",
             found.lights, found.asked, found.rounding);

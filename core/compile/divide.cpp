@@ -14,7 +14,7 @@ namespace crt {
 namespace {
 
 constexpr double kLongest = 2;      ///< Edge over its distance and the details. Below 2√3: divide.h.
-constexpr int kMostHalvings = 128;   ///< Of one triangle, one in another: far more than doubles have digits.
+constexpr int kMostHalvings = 128;  ///< Of one triangle, one in another: far more than doubles have digits.
 constexpr std::size_t kMeasuredAtATime = std::size_t{1} << 14;
 
 /// In units of the details, from the focus.

@@ -121,7 +121,7 @@ struct Seen {
 class Sight {
 public:
     Sight(const Scene& scene, const std::vector<Placement>& placements,
-         const std::vector<PlacedShape>& shapes)
+          const std::vector<PlacedShape>& shapes)
         : placements_(placements), boxes_(boxesOf(scene, shapes)), eye_(scene.camera.position) {
         const Vec3d to = scene.camera.target - eye_;
         const double most = std::max({std::abs(to[0]), std::abs(to[1]), std::abs(to[2])});

@@ -20,10 +20,11 @@ struct Focus {
     double detail;
 };
 
-/// Nothing where the middle of the scene will do: for objects of up to 2^-8 of the scene's half extent, which
-/// lose eight bits there. An object counts as a whole, however fine its triangles are. Otherwise the camera's position, or the point in the middle of its view, whichever
-/// has the finer details around it. Moving a scene by representable amounts moves the result, scaling it by
-/// a power of two scales it, and the order of triangles does not matter.
+/// Nothing where the middle of the scene will do: for objects of up to 2^-8 of the scene's half extent,
+/// which lose eight bits there. An object counts as a whole, however fine its triangles are. Otherwise the
+/// camera's position, or the point in the middle of its view, whichever has the finer details around it.
+/// Moving a scene by representable amounts moves the result, scaling it by a power of two scales it, and the
+/// order of triangles does not matter.
 std::optional<Focus> focusOf(const Scene& scene, const std::vector<Placement>& placements,
                              const std::vector<PlacedShape>& shapes);
 

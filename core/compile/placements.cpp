@@ -22,9 +22,7 @@ Placement placementOf(const Mesh& mesh, const Object& object, const Matrix4d& tr
                       std::uint32_t number) {
     const Matrix3d normal_matrix = cofactors(transform);
     const Vec3d first_row{transform[0], transform[1], transform[2]};
-    return {&object,       &mesh,                                transform,
-            normal_matrix, dot(first_row, normal_matrix[0]) < 0, first,
-            number};
+    return {&object, &mesh, transform, normal_matrix, dot(first_row, normal_matrix[0]) < 0, first, number};
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-/// Bodies whose surfaces coincide: which of two a ray meets is rounding, so its list of media (kernel/medium.h)
-/// cannot rely on either.
+/// Bodies whose surfaces coincide: which of two a ray meets is rounding, so its list of media
+/// (kernel/medium.h) cannot rely on either.
 #pragma once
 
 namespace crt {

@@ -21,7 +21,8 @@ constexpr double kLeastDegreesOfFreedom = 2;
 /// own.
 constexpr double kUnseen = 0.5;
 
-/// E[Y⁴]/E[Y²]² is at least E[Y²]/E[Y]² whatever the distribution of Y ≥ 0 (Lyapunov's inequality), and
+/// E[Y⁴]/E[Y²]² is at least E[Y²]/E[Y]² whatever the distribution of Y ≥ 0 (Lyapunov's
+/// inequality), and
 /// exactly that where paths are dark or of one brightness. Exponential noise has 3 times that, the tail
 /// y^-1/2 of a glossy lobe about a light 3.9 times.
 constexpr double kKurtosis = 4;

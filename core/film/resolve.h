@@ -9,7 +9,8 @@
 
 namespace crt {
 
-/// XYZ sums → colour image, developed as said; AOVs as asked. StdError, Variance and HalfWidth95 are of the
+/// XYZ sums → colour image, developed as said; AOVs as asked. StdError, Variance and
+/// HalfWidth95 are of the
 /// luminance that the image has, pooled (pooled_variance.h); HalfWidth95 comes with StdError, OwnVariance
 /// with any of them. The metadata is what the film and the development know. Throws crt::Error(Usage) for an
 /// AOV that the film lacks.

@@ -30,8 +30,8 @@ CRT_FN f32 crt_filter_offset(const CrtContext *ctx, f32 u) {
     const u32 cell = steps / a_cell;
     f32 offset = table[CRT_FILTER_TABLE];
     if (cell < CRT_FILTER_TABLE)
-        offset = table[cell] +
-                 (f32)(steps % a_cell) * (1.0f / (f32)a_cell) * (table[cell + 1u] - table[cell]);
+        offset =
+            table[cell] + (f32)(steps % a_cell) * (1.0f / (f32)a_cell) * (table[cell + 1u] - table[cell]);
     return u < 0.5f ? -offset : offset;
 }
 

@@ -47,9 +47,9 @@
     F(18, REPLICATES, "independent replicates, from which the image knows its error")        \
     F(20, TABLE, "values tabulated by wavelength")                                           \
     F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
-    F(26, MEDIA, "what bodies of glass hold: absorption, holes in their surface")             \
+    F(26, MEDIA, "what bodies of glass hold: absorption, holes in their surface")            \
     F(27, TEXTURE, "values that depend on the place: images, checkers, colours of vertices") \
-    F(28, POINT_LIGHT, "points, spots, directional lights, suns, IES lamps, beams")        \
+    F(28, POINT_LIGHT, "points, spots, directional lights, suns, IES lamps, beams")          \
     F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")                    \
     F(30, THIN_FILM, "thin films")                                                           \
     F(31, LIGHT_TREE, "a tree of lights: their choice depends on the shaded point")          \

@@ -25,8 +25,8 @@ CRT_KERNEL_BEGIN
 #define CRT_WAVELENGTH_COUNT 471u     /* 360, 361, … 830 nm */
 #define CRT_SPECTRUM_STRIDE 472u      /* floats from one spectrum to the next; the last repeats 830 nm */
 #define CRT_WAVELENGTH_TABLE 1024u    /* cells of the inverse distribution of wavelengths: TABLE + 1 nodes */
-/* Cells of the inverse distribution of the pixel filter, TABLE + 1 nodes: STEPS for each halving of the share
-   of the filter that is farther from the middle, which there is in OCTAVES halvings. */
+/* Cells of the inverse distribution of the pixel filter, TABLE + 1 nodes: STEPS for each halving of the
+   share of the filter that is farther from the middle, which there is in OCTAVES halvings. */
 #define CRT_FILTER_OCTAVES 24u
 #define CRT_FILTER_STEPS 64u
 #define CRT_FILTER_TABLE (CRT_FILTER_OCTAVES * CRT_FILTER_STEPS)
@@ -255,8 +255,8 @@ typedef struct CrtMaterial {
     CrtValue roughness; /* square root of the width α of GGX */
     CrtValue coat; /* plastic: share that a rough coat reflects, by the cosine: a table; 0: smooth. OpenPBR's
                       metals: factor on their reflectance */
-    u32 medium; /* of what its surface bounds: 1 + its place in CrtScene.media; 0: it bounds none, or no medium
-                   of the scene matters */
+    u32 medium;    /* of what its surface bounds: 1 + its place in CrtScene.media; 0: it bounds none, or no
+                      medium    of the scene matters */
     u32 loss; /* rough conductors and dielectrics: index of their CrtLoss */
     CrtValue film_thickness; /* nm, or of film_scale nm; 0: there is no film */
     f32 film_scale;

@@ -3,16 +3,17 @@
  * is around them does not.
  *
  * A path carries the list of the media that surround it, the one that it entered last first: numbers of
- * CrtScene.medium_bits each (a divisor of 32) in a word, 0 behind the last. Going into a body puts its medium in front, going
- * out takes it away, wherever it is in the list, so that bodies may overlap (compare Schmidt and Budge 2002,
- * whose priorities choose where here the last does). The first one absorbs. Where the word is full, the
- * outermost is forgotten.
+ * CrtScene.medium_bits each (a divisor of 32) in a word, 0 behind the last. Going into a body puts its
+ * medium in front, going out takes it away, wherever it is in the list, so that bodies may overlap (compare
+ * Schmidt and Budge 2002, whose priorities choose where here the last does). The first one absorbs. Where
+ * the word is full, the outermost is forgotten.
  *
- * A ray that meets the back of a surface whose medium is not in its list has been inside that body all along:
- * where two surfaces coincide, one of them is passed unseen. So that body has absorbed, and is in the list
- * from there on. Which of two it was cannot be told, so a ray that crosses a surface that touches another one
- * (touching_media.h) keeps nothing of what was around it: the backs that it meets bring it back. Surfaces with holes are another matter: inside such a body without its medium in the list is
- * what came in by a hole, where there is no glass, and goes out as freely (composition.h).
+ * A ray that meets the back of a surface whose medium is not in its list has been inside that body all
+ * along: where two surfaces coincide, one of them is passed unseen. So that body has absorbed, and is in the
+ * list from there on. Which of two it was cannot be told, so a ray that crosses a surface that touches
+ * another one (touching_media.h) keeps nothing of what was around it: the backs that it meets bring it back.
+ * Surfaces with holes are another matter: inside such a body without its medium in the list is what came in
+ * by a hole, where there is no glass, and goes out as freely (composition.h).
  *
  * Bodies whose media absorb alike have one number, unless their surface has holes: it makes no difference.
  */
@@ -77,7 +78,7 @@ CRT_FN vec4 crt_transmittance(const CrtContext *ctx, u32 medium, f32 distance, v
 CRT_FN u32 crt_medium_before(const CrtContext *ctx, const CrtSurface *surface, vec3 d, u32 media) {
     const int inside = surface->medium != 0u && dot3(d, surface->ng) > 0.0f;
     return inside && !crt_surrounds(ctx, media, surface->medium) ? surface->medium
-                                                                  : crt_first_medium(ctx, media);
+                                                                 : crt_first_medium(ctx, media);
 }
 
 /* Whether another body's surface lies in the same place. */

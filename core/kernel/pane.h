@@ -4,7 +4,8 @@
  *
  *     T = (1 − R₁)(1 − R₂) / (1 − R₁ R₂),
  *
- * R₁ and R₂ the reflectances of the two sides, and T of unpolarised light is the mean. What does not pass is
+ * R₁ and R₂ the reflectances of the two sides, and T of unpolarised light is the mean. What
+ * does not pass is
  * mirrored; nothing is absorbed.
  */
 #ifndef CRT_PANE_H
@@ -19,7 +20,7 @@ CRT_KERNEL_BEGIN
 CRT_FN f32 crt_pane_polarised(f32 a, f32 b, int filmed, f32 film) {
     if (!filmed) return 2.0f * a * b / (a * a + b * b);
     const f32 passed = 4.0f * a * b / ((a + b) * (a + b)); /* 1 − R₂ */
-    const f32 ends = (1.0f - film) + film * passed;         /* 1 − R₁ R₂ */
+    const f32 ends = (1.0f - film) + film * passed;        /* 1 − R₁ R₂ */
     return ends > 0.0f ? (1.0f - film) * passed / ends : 0.0f;
 }
 
@@ -38,12 +39,11 @@ CRT_FN f32 crt_pane_transmittance_lane(f32 cos_i, f32 eta, int filmed, f32 film_
 CRT_FN vec4 crt_pane_transmittance(const CrtBsdf *b, f32 cos_i) {
     const int filmed = crt_has_film(b);
     vec4 passed = splat4(0.0f);
-    CRT_ROLLED for (u32 lane = 0u; lane < 4u; ++lane)
-        passed = crt_with_lane(passed, lane,
-                               crt_pane_transmittance_lane(
-                                   cos_i, crt_lane(b->eta, lane), filmed,
-                                   CRT_HAS(THIN_FILM) && filmed ? crt_lane(b->film_eta, lane) : 0.0f,
-                                   CRT_HAS(THIN_FILM) && filmed ? crt_lane(b->film_rounds, lane) : 0.0f));
+    CRT_ROLLED for (u32 lane = 0u; lane < 4u; ++lane) passed = crt_with_lane(
+        passed, lane,
+        crt_pane_transmittance_lane(cos_i, crt_lane(b->eta, lane), filmed,
+                                    CRT_HAS(THIN_FILM) && filmed ? crt_lane(b->film_eta, lane) : 0.0f,
+                                    CRT_HAS(THIN_FILM) && filmed ? crt_lane(b->film_rounds, lane) : 0.0f));
     return passed;
 }
 

@@ -4,7 +4,8 @@
  * which light sampling and scattered rays are weighed, since both see a light through the same surfaces. It
  * counts neither for the depth nor as another ray.
  *
- * A pane lets T(θ, λ) pass (pane.h). Of a shadow ray the light that waits is multiplied by it. A path's ray
+ * A pane lets T(θ, λ) pass (pane.h). Of a shadow ray the light that waits is multiplied by
+ * it. A path's ray
  * passes with the chance q, the mean of T over its wavelengths, and carries T/q; or it is stopped, carries
  * 1/(1 − q), and crt_shade mirrors 1 − T of it.
  */
@@ -90,9 +91,9 @@ CRT_FN int crt_passes_pane(const CrtContext *ctx, const CrtSurface *surface, u32
     return 0;
 }
 
-/* Whether a ray passes a surface of which a part is there. A hole in the surface of a body is one in the body:
-   a ray that came in by a hole is in no glass, and goes out wherever it likes; one that is in the glass meets
-   no hole from there. */
+/* Whether a ray passes a surface of which a part is there. A hole in the surface of a body is one in the
+   body: a ray that came in by a hole is in no glass, and goes out wherever it likes; one that is in the
+   glass meets no hole from there. */
 CRT_FN int crt_passes_hole(const CrtContext *ctx, const CrtSurface *surface, CrtValue opacity, u32 medium,
                            CrtSampler *sampler, const CrtPassage *way, vec3 d) {
     if (medium != 0u && dot3(d, surface->ng) > 0.0f) return !crt_surrounds(ctx, way->media, medium);
@@ -111,10 +112,10 @@ CRT_FN int crt_passes(const CrtContext *ctx, CrtHit hit, CrtSampler *sampler, Cr
         if (CRT_HAS(OPACITY)) opacity = crt_compositions(ctx)[material].opacity;
         if (CRT_HAS(MIX)) kind = crt_compositions(ctx)[material].kind;
     }
-    const int pane = crt_has_panes(ctx) &&
-                     (kind != CRT_COMPOSED_PLAIN ||
-                      CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].type ==
-                          CRT_MATERIAL_THIN_DIELECTRIC);
+    const int pane =
+        crt_has_panes(ctx) && (kind != CRT_COMPOSED_PLAIN ||
+                               CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].type ==
+                                   CRT_MATERIAL_THIN_DIELECTRIC);
     if (opacity == CRT_OPAQUE && !pane) return 0;
     const CrtSurface surface = crt_surface(ctx, hit);
     const u32 dimension = way->dimension + way->passed;

@@ -146,9 +146,8 @@ typedef struct CrtShadow {
 CRT_FN void crt_absorb_shadow(const CrtContext *ctx, const CrtPath *path, const CrtSurface *surface,
                               const CrtBsdf *bsdf, vec3 wi, f32 distance, CrtShadow *shadow) {
     shadow->media = crt_media_behind(ctx, surface, bsdf, wi, path->media);
-    shadow->radiance =
-        shadow->radiance * crt_transmittance(ctx, crt_first_medium(ctx, shadow->media), distance,
-                                             path->wavelengths.position);
+    shadow->radiance = shadow->radiance * crt_transmittance(ctx, crt_first_medium(ctx, shadow->media),
+                                                            distance, path->wavelengths.position);
 }
 
 /* What light sampling offers a point: a direction, and the light that comes from there if nothing is in the
@@ -277,8 +276,7 @@ CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface
             : crt_value(ctx, CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].radiance, 0,
                         position);
     shadow->radiance = path->throughput * scattered * light * weight;
-    if (CRT_HAS(MEDIA))
-        crt_absorb_shadow(ctx, path, surface, bsdf, offer.wi, offer.distance, shadow);
+    if (CRT_HAS(MEDIA)) crt_absorb_shadow(ctx, path, surface, bsdf, offer.wi, offer.distance, shadow);
 }
 
 /* What happens to a path at `hit`, which its ray has met: it gains what is emitted there, and is scattered.
@@ -347,8 +345,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     path->scatter_cosine = crt_scatter_cosine(&bsdf, scatter.wi);
     path->p = surface.p;
     if (CRT_HAS(LIGHT_TREE)) path->side = crt_scattering_side(&bsdf);
-    if (CRT_HAS(MEDIA))
-        path->media = crt_media_behind(ctx, &surface, &bsdf, scatter.wi, path->media);
+    if (CRT_HAS(MEDIA)) path->media = crt_media_behind(ctx, &surface, &bsdf, scatter.wi, path->media);
     path->ray.o = crt_offset_origin(surface.p, surface.clearance, surface.ng, scatter.wi);
     path->ray.d = scatter.wi;
     path->ray.reach = CRT_INFINITY;

@@ -134,8 +134,8 @@ CRT_FN void crt_store_vertex(const CrtContext *ctx, const CrtWave *wave, u32 slo
     *crt_row(wave, CRT_ROW_DIRECTION, slot) = crt_row_of(path->ray.d, crt_from_bits(path->sampler.b0));
     *crt_row(wave, CRT_ROW_THROUGHPUT, slot) = path->throughput;
     *crt_row(wave, CRT_ROW_POINT, slot) = crt_row_of(path->p, path->scatter_pdf);
-    *crt_row(wave, CRT_ROW_REST, slot) = make_vec4(path->scatter_cosine, path->eta_square,
-                                                   path->wavelengths.u, crt_from_bits(path->media));
+    *crt_row(wave, CRT_ROW_REST, slot) =
+        make_vec4(path->scatter_cosine, path->eta_square, path->wavelengths.u, crt_from_bits(path->media));
     if (crt_has_light_tree(ctx)) *crt_row(wave, CRT_ROW_SIDE, slot) = crt_row_of(path->side, 0.0f);
 }
 
@@ -260,8 +260,7 @@ CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, CrtSampler *sampler, CrtP
 /* The way of a ray of the slot's path; its wavelengths are for panes alone. */
 CRT_FN CrtPassage crt_wave_passage(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 depth,
                                    int shadow, vec3 d, u32 media) {
-    const vec4 position =
-        crt_has_panes(ctx) ? *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) : splat4(0.0f);
+    const vec4 position = crt_has_panes(ctx) ? *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) : splat4(0.0f);
     return crt_passage(depth, shadow, d, position, media);
 }
 

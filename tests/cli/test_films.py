@@ -303,7 +303,8 @@ class Developing(CliTest):
         self.assertRegex(self.crt("info", "d.exr").stdout, r"channels +R, G, B, Z\n")
         self.crt("develop", "a.crtfilm", "-o", "d.exr", "--aovs", "error,samples")
         self.assertRegex(
-            self.crt("info", "d.exr").stdout, r"channels +R, G, B, HalfWidth95.Y, OwnVariance.Y, StdError.Y\n *integers +sampleCount\n"
+            self.crt("info", "d.exr").stdout,
+            r"channels +R, G, B, HalfWidth95.Y, OwnVariance.Y, StdError.Y\n *integers +sampleCount\n"
         )
         self.crt("develop", "a.crtfilm", "-o", "d.exr", "--aovs", "none")
         self.assertRegex(self.crt("info", "d.exr").stdout, r"channels +R, G, B\n")

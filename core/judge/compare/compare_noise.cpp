@@ -214,8 +214,8 @@ stats::TestFamily testTiles(const View& view, double alpha) {
                    b = guardedMean(view, tiles_b, i, view.b.dof);
         const double of_mean = std::max(p.back(), stats::carefulEqualityP(a, b));
         const std::uint64_t pixels = tiles_a[i].count;
-        const double of_squares =
-            tileExcessP(squares[i], stats::summedVariance(sumOf(a, pixels, view.a.dof), sumOf(b, pixels, view.b.dof)));
+        const double of_squares = tileExcessP(
+            squares[i], stats::summedVariance(sumOf(a, pixels, view.a.dof), sumOf(b, pixels, view.b.dof)));
         // Either may raise the alarm, each at half the level.
         p.back() = std::isnan(of_mean) ? of_mean : std::min(1.0, 2 * std::min(of_mean, of_squares));
     }

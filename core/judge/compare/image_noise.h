@@ -27,7 +27,8 @@ enum class NoiseOf { Color, Luminance };
 
 /// With NoiseOf::Color, from channels StdError.R, .G and .B, Variance.R, .G and .B, or folds. With
 /// NoiseOf::Luminance, from OwnVariance.Y, StdError.Y, Variance.Y or folds; the values are then the
-/// luminance of R, G and B by the image's primaries. Nothing when there is none of them, or they are not finite.
+/// luminance of R, G and B by the image's primaries. Nothing when there is none of them, or they are not
+/// finite.
 ///
 /// StdError and Variance are of the pixel's mean, in the image's exposure. Their degrees of freedom are in
 /// the metadata (kErrorDofKey); where they are not, they are taken as one, the fewest that an estimate can

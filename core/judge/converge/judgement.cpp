@@ -28,16 +28,17 @@ double foldsOf(const ReferenceInfo& reference) {
                                                  : static_cast<double>(reference.fold_mean_luminance.size());
 }
 
-/// Every replicate's mean lies above what is allowed, and the signs of so many are proof: the noise of light has
-/// its long tail above, so that a replicate without bias is too bright with a probability of one half at most.
-/// Too dark it may well be, where light is found by rare paths that none of them has met.
+/// Every replicate's mean lies above what is allowed, and the signs of so many are proof: the noise of light
+/// has its long tail above, so that a replicate without bias is too bright with a probability of one half at
+/// most. Too dark it may well be, where light is found by rare paths that none of them has met.
 bool surelyTooBright(const RowList& rows, const ReferenceInfo& reference, std::size_t channel,
                      const FitOptions& options) {
     if (std::exp2(-static_cast<double>(rows.size())) > (1 - options.verdict_confidence) / 3) return false;
     const double truth = reference.image_mean[channel],
                  margin = options.equivalence_margin * stats::channelScale(truth, reference.mean_luminance);
-    const double of_reference = reference.image_mean_standard_error[channel] *
-                                stats::studentQuantile(0.5 + 0.5 * options.verdict_confidence, foldsOf(reference) - 1);
+    const double of_reference =
+        reference.image_mean_standard_error[channel] *
+        stats::studentQuantile(0.5 + 0.5 * options.verdict_confidence, foldsOf(reference) - 1);
     return std::all_of(rows.begin(), rows.end(), [&](const Row* row) {
         return row->image_mean[channel] > truth + margin + of_reference;
     });
@@ -82,11 +83,12 @@ std::optional<Judgement> faultOf(const ConfigurationFit& fit, const ImageTests& 
     // A few values that carry the answer make intervals too short and too long alike: no verdict could be
     // trusted.
     if (tests.heavy_tails)
-        return Judgement{Verdict::Inconclusive,
-                         fmt::format("One value carries {:.2g} % of all squared error, which normal noise does "
-                                     "not: too much for the error bar.",
-                                     100 * tests.largest_share.value_or(0)),
-                         {}};
+        return Judgement{
+            Verdict::Inconclusive,
+            fmt::format("One value carries {:.2g} % of all squared error, which normal noise does "
+                        "not: too much for the error bar.",
+                        100 * tests.largest_share.value_or(0)),
+            {}};
     if (fit.fitted && fit.error.verdict_floor.low > margin * margin) {
         if (fit.error.floor().value < relativeVarianceOf(reference))
             return Judgement{Verdict::Inconclusive,

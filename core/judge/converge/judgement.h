@@ -13,8 +13,8 @@ namespace crt::converge {
 Estimate meanBias(const RowList& rows, const ReferenceInfo& reference, std::optional<std::size_t> channel,
                   double confidence);
 
-/// Void rows, pooled equivalence per channel, heavy tails, bias floor, tiles and pixels: the first that decides
-/// does. Where the noise has heavy tails, a bias fails only if every replicate is too bright.
+/// Void rows, pooled equivalence per channel, heavy tails, bias floor, tiles and pixels: the first that
+/// decides does. Where the noise has heavy tails, a bias fails only if every replicate is too bright.
 Judgement judge(const ConfigurationFit& fit, const ImageTests& tests, const RowsBySamples& by_samples,
                 const ReferenceInfo* reference, const FitOptions& options);
 

@@ -199,7 +199,7 @@ struct Environment {
         commands;  ///< As typed, quoted for a shell; more than one when the run was resumed.
     std::string started, finished;         ///< UTC, ISO 8601.
     double budget_seconds = 0;             ///< --time; 0 when there was none.
-    double spent_seconds = 0;       ///< Of all sessions.
+    double spent_seconds = 0;              ///< Of all sessions.
 };
 
 /// Everything that a report is made of.

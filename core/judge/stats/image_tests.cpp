@@ -65,8 +65,8 @@ bool areSeparated(const std::vector<double>& a, const std::vector<double>& b, do
            *highest_a < *lowest_b - delta * std::abs(*lowest_b);
 }
 
-/// Two-sided P that the farthest of `count` normal values, before it is known which, carries this share of the
-/// sum of their squares (Grubbs 1950, by Student's distribution).
+/// Two-sided P that the farthest of `count` normal values, before it is known which, carries this share of
+/// the sum of their squares (Grubbs 1950, by Student's distribution).
 double outlierP(double share, std::uint64_t count) {
     if (count < 3) return 1;
     const double n = static_cast<double>(count), rest = (n - 1) - n * share;
@@ -124,9 +124,10 @@ void judge(GateResult& result, const GateOptions& options) {
     if (result.largest.isHeavyTailed(options.largest_share)) {
         fails = std::any_of(result.channels.begin(), result.channels.end(),
                             [](const GateResult::Channel& channel) { return channel.separated; });
-        because(undecided, fmt::format("one value carries {:.1f} % of all squared error, which normal noise does "
-                                       "not: too few samples for its distribution",
-                                       100 * result.largest.share));
+        because(undecided,
+                fmt::format("one value carries {:.1f} % of all squared error, which normal noise does "
+                            "not: too few samples for its distribution",
+                            100 * result.largest.share));
     }
     result.verdict = fails ? Verdict::Fail : undecided ? Verdict::Inconclusive : Verdict::Pass;
 }

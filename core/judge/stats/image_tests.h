@@ -43,10 +43,11 @@ inline constexpr std::uint32_t kTileSide = 8;
 
 /// The value that lies farthest from its mean, among all values of all replicates.
 struct LargestValue {
-    double share = 0;  ///< Of Σ (I − Ī)², over all pixels, channels and replicates; 0 without any spread.
-    /// That normal noise carries as much in one value: Grubbs' test (1950) of the value among the replicates of
-    /// its own pixel, whatever the variances of the pixels, times the number of values that could carry as
-    /// much. 1 with two replicates, which cannot tell.
+    /// Of Σ (I − Ī)², over all pixels, channels and replicates; 0 without any spread.
+    double share = 0;
+    /// That normal noise carries as much in one value: Grubbs' test (1950) of the value among the replicates
+    /// of its own pixel, whatever the variances of the pixels, times the number of values that could carry
+    /// as much. 1 with two replicates, which cannot tell.
     double normal_p = 1;
 
     /// Few lit pixels carry large shares of normal noise, too; heavy tails carry more than that.
@@ -100,8 +101,8 @@ struct GateOptions {
     double delta = 0.01;          ///< Means that differ by less, relative to b's, are equivalent.
     double confidence =
         0.999;  ///< Of each channel mean's interval; 1 − confidence is alpha of tiles and of pixels.
-    double largest_share =
-        0.05;  ///< Of the squared error that one value may carry, or what normal noise carries if that is more.
+    double largest_share = 0.05;  ///< Of the squared error that one value may carry, or what normal noise
+                                  ///< carries if that is more.
     std::vector<std::string> channel_names;  ///< For the reasons; numbers where there are too few.
 };
 
@@ -112,8 +113,9 @@ struct GateResult {
             0;  ///< To b's mean, whose own error is left out: it would move the interval by parts of itself.
         Interval relative_interval;
         Verdict verdict = Verdict::Inconclusive;
-        /// Every replicate's mean differs from every one of the other's by more than delta, the same way; and so
-        /// many would do that by chance, whatever their distribution, as seldom as 1 − confidence allows.
+        /// Every replicate's mean differs from every one of the other's by more than delta, the same way;
+        /// and so many would do that by chance, whatever their distribution, as seldom as 1 − confidence
+        /// allows.
         bool separated = false;
     };
     std::vector<Channel> channels;
@@ -128,8 +130,8 @@ struct GateResult {
     std::vector<std::string> reasons;  ///< Why not Pass, one sentence each.
 };
 /// Pass: all channels' means are equivalent, no tile and no pixel differs, and no single value decides.
-/// Fail: a mean, tile or pixel differs for certain; where the noise has heavy tails, a mean by the ranks of the
-/// replicates alone. Else Inconclusive, and so is anything with a value that is no number.
+/// Fail: a mean, tile or pixel differs for certain; where the noise has heavy tails, a mean by the ranks of
+/// the replicates alone. Else Inconclusive, and so is anything with a value that is no number.
 GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& options = {});
 
 }  // namespace crt::stats

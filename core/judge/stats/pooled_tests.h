@@ -36,9 +36,9 @@ double carefulEqualityP(const Mean& a, const Mean& b);
 double carefulHalfWidth(const Mean& a, const Mean& b, double confidence);
 
 /// P that squared differences add to so much or more over the sum of the variances stated for them (a Mean's
-/// variance and its degrees of freedom): Fisher's F. So a few pixels that carry the sum are judged as few. It
-/// sees what changes up and down alike, and what changes in so few pixels that their signs say nothing. 0 for
-/// differences where no variance is stated at all.
+/// variance and its degrees of freedom): Fisher's F. So a few pixels that carry the sum are judged as few.
+/// It sees what changes up and down alike, and what changes in so few pixels that their signs say nothing. 0
+/// for differences where no variance is stated at all.
 ///
 /// All degrees of freedom must be Satterthwaite's without the correction for the scatter of the estimates
 /// (scatteredDof): with it, alarms are ten times as frequent as stated where few pixels carry the noise.

@@ -185,7 +185,8 @@ std::vector<Case> anisotropyCases() {
             "Six sheets of brushed metal, with and without texture coordinates, a ball, a cylinder and a "
             "disk, lit by a beam from three directions about the highlight",
             "D G₂ / (4 cos θ_o), about the tangent that docs/scene.md names", "Heitz (2014); OpenPBR 1.1",
-            "± 0.2 %", Level::Commit, CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_SHAPES | metal,
+            "± 0.2 %", Level::Commit,
+            CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_SHAPES | metal,
             highlight),
     };
 }

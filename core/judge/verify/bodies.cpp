@@ -42,8 +42,9 @@ std::string layers(const std::vector<Layer>& all, double eye, double towards, co
             "[[0,2,3,1],[4,5,7,6],[0,1,5,4],[2,6,7,3],[0,4,6,2],[1,3,7,5]]}}, material: m{2}",
             z0, z1, i);
         if (share)
-            text += fmt::format(", share: {}, transforms: [[{{scale: [1, 1, {}]}}, {{translate: [0, 0, {}]}}]]",
-                                share, all[i].to - all[i].from, all[i].from);
+            text +=
+                fmt::format(", share: {}, transforms: [[{{scale: [1, 1, {}]}}, {{translate: [0, 0, {}]}}]]",
+                            share, all[i].to - all[i].from, all[i].from);
         text += "}\n";
     }
     return text;
@@ -61,7 +62,8 @@ void seenThroughLayers(Context& context) {
     const std::vector<Layer> nested{{-5, 5, 0.1}, {-3, 3, 0.4}, {-1, 1, 1.1}};
     const std::vector<Layer> overlapping{{-3, 1, 0.2}, {-1, 4, 0.5}};
     const std::vector<Layer> touching{{-3, 0, 0.2}, {0, 4, 0.5}}, touching_too{{0, 4, 0.5}, {-3, 0, 0.2}};
-    const std::vector<Layer> on_its_floor{{-5, 5, 0.1}, {-5, -2, 0.7}}, floor_first{{-5, -2, 0.7}, {-5, 5, 0.1}};
+    const std::vector<Layer> on_its_floor{{-5, 5, 0.1}, {-5, -2, 0.7}},
+        floor_first{{-5, -2, 0.7}, {-5, 5, 0.1}};
     constexpr double kBlack = 1000;
     for (const Sight& it :
          {Sight{"two clear panes in water", panes, 20, -1, 0.26 * 9, 0.26 * 5.5},
@@ -113,7 +115,8 @@ std::string underWater(double sigma, const char* integrator, const char* light, 
         "  water: {{type: dielectric, ior: 1, absorption: {}}}\n  clear: {{type: dielectric, ior: 1}}\n"
         "  white: {{type: diffuse, reflectance: 1}}\n  black: {{type: diffuse, reflectance: 0}}\n"
         "{}objects:\n  - {{sphere: {{radius: 3}}, material: water}}\n"
-        "  - {{mesh: {{positions: [[-.01,0,-.01],[-.01,0,.01],[.01,0,.01],[.01,0,-.01]], faces: [[0,1,2,3]]}}, "
+        "  - {{mesh: {{positions: [[-.01,0,-.01],[-.01,0,.01],[.01,0,.01],[.01,0,-.01]], faces: "
+        "[[0,1,2,3]]}}, "
         "material: white}}\n",
         integrator, sigma, light[0] == '[' ? fmt::format("lights: {}\n", light) : "");
     if (light[0] != '[')
@@ -121,8 +124,7 @@ std::string underWater(double sigma, const char* integrator, const char* light, 
             "  - {{sphere: {{radius: 1, inward: true}}, material: black, emission: {{radiance: "
             "{}}}}}\n",
             light);
-    if (clear > 0)
-        text += fmt::format("  - {{sphere: {{radius: {}}}, material: clear}}\n", clear);
+    if (clear > 0) text += fmt::format("  - {{sphere: {{radius: {}}}, material: clear}}\n", clear);
     return text;
 }
 
@@ -138,16 +140,17 @@ void everythingUnderWater(Context& context) {
                          {{1, "a path that starts in water does not know it"},
                           {std::exp(-kSigma * mistaken), "behind the clear ball the water is forgotten"}});
     };
-    for (const auto& [technique, integrator] : {std::pair{"MIS", "{max_depth: 4, roulette: false}"},
-                                                {"scattered rays", "{max_depth: 4, roulette: false, nee: false}"},
-                                                {"light sampling", "{max_depth: 4, roulette: false, mis: false}"}}) {
+    for (const auto& [technique, integrator] :
+         {std::pair{"MIS", "{max_depth: 4, roulette: false}"},
+          {"scattered rays", "{max_depth: 4, roulette: false, nee: false}"},
+          {"light sampling", "{max_depth: 4, roulette: false, mis: false}"}}) {
         ask(fmt::format("camera, floor and lamp under water, {}", technique), integrator, "1", 0, 1.5, 1);
         ask(fmt::format("the floor in a clear ball in the water, {}", technique), integrator, "1", 0.3, 0.9,
             0.2);
     }
-    for (const char* light :
-         {"[{type: point, position: [0, 0.8, 0.6], radiant_intensity: 1}]",
-          "[{type: spot, position: [0, 0.8, 0.6], target: [0, 0, 0], cone_angle_deg: 40, radiant_intensity: 1}]"})
+    for (const char* light : {"[{type: point, position: [0, 0.8, 0.6], radiant_intensity: 1}]",
+                              "[{type: spot, position: [0, 0.8, 0.6], target: [0, 0, 0], cone_angle_deg: "
+                              "40, radiant_intensity: 1}]"})
         ask(fmt::format("camera, floor and {:.12} under water", light), "{max_depth: 4}", light, 0, 1.5, 1);
 }
 
@@ -179,12 +182,13 @@ void glassWithHoles(Context& context) {
                 for (const char* kind : {"type: dielectric", "type: rough_dielectric, roughness: 0.4"}) {
                     if (kind[6] == 'r' && opacity != 0.3 && !context.atLeast(Level::Merge)) continue;
                     context.estimate(
-                        fmt::format("{} of {{{}}}, index {}, opacity {}", body == slab ? "slab" : "ball", kind,
-                                    ior, opacity),
+                        fmt::format("{} of {{{}}}, index {}, opacity {}", body == slab ? "slab" : "ball",
+                                    kind, ior, opacity),
                         withHoles(fmt::format("{}, ior: {}, opacity: {}", kind, ior, opacity), body,
                                   "environment: {radiance: 1}", 2),
                         meanRadiance, 1, 0.003, effort,
-                        {{opacity + (1 - opacity) * ior * ior, "what comes in by a hole goes out with n²"}});
+                        {{opacity + (1 - opacity) * ior * ior,
+                        "what comes in by a hole goes out with n²"}});
                 }
     context.estimate("a mix of glass and white, opacity .4",
                      withHoles("type: mix, materials: [clear, white], amount: 0.3, opacity: 0.4", ball,
@@ -202,21 +206,22 @@ void glassWithHoles(Context& context) {
             {{(1 - opacity) * (1 - opacity) + opacity * (1 - opacity) * (1 - r) * (2.25 + 1 / 2.25),
               "a hole is one in a face, not in the body"}});
     // Light of a point passes both faces of a slab by one hole, to a floor and back to the camera.
-    context.estimate("a point over a floor under a slab of opacity .4: over none",
-                     [&] {
-                         std::vector<std::string> scenes;
-                         for (const char* opacity : {"0.4", "0"})
-                             scenes.push_back(
-                                 withHoles(fmt::format("type: dielectric, ior: 1.5, opacity: {}", opacity), slab,
-                                           "lights: [{type: point, position: [0, 0, 4], radiant_intensity: 1}]") +
-                                 "  - {mesh: {positions: [[-.05,-.17,-3],[.05,-.17,-3],[.05,-.07,-3],[-.05,-.07,"
-                                 "-3]], "
-                                 "faces: [[0,1,2,3]]}, material: white}\n");
-                         return scenes;
-                     }(),
-                     [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); },
-                     0.6 * (0.6 + 0.4 * (1 - r) / (1 + r)), 0.02, {.samples = 256, .most = 65536},
-                     {{0.36 * (0.6 + 0.4 * (1 - r) / (1 + r)), "shadow rays ask at both faces"}});
+    context.estimate(
+        "a point over a floor under a slab of opacity .4: over none",
+        [&] {
+            std::vector<std::string> scenes;
+            for (const char* opacity : {"0.4", "0"})
+                scenes.push_back(
+                    withHoles(fmt::format("type: dielectric, ior: 1.5, opacity: {}", opacity), slab,
+                              "lights: [{type: point, position: [0, 0, 4], radiant_intensity: 1}]") +
+                    "  - {mesh: {positions: [[-.05,-.17,-3],[.05,-.17,-3],[.05,-.07,-3],[-.05,-.07,"
+                    "-3]], "
+                    "faces: [[0,1,2,3]]}, material: white}\n");
+            return scenes;
+        }(),
+        [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); },
+        0.6 * (0.6 + 0.4 * (1 - r) / (1 + r)), 0.02, {.samples = 256, .most = 65536},
+        {{0.36 * (0.6 + 0.4 * (1 - r) / (1 + r)), "shadow rays ask at both faces"}});
     context.refused("holes in glass that absorbs",
                     "crt: 1\nmaterials: {it: {type: dielectric, ior: 1.5, absorption: 1, opacity: .5}}\n",
                     "opacity");
@@ -231,13 +236,17 @@ std::vector<Case> bodyCases() {
     return {
         row("G50", "nested-bodies",
             "Absorbing bodies inside one another and overlapping, and instances of them, seen through from "
-            "outside and from inside each; a floor under water, with the camera, lamps and lights there, too",
+            "outside and from inside each; a floor under water, with the camera, lamps and lights there, "
+            "too",
             "exp(−Σ σ d)", "Beer and Lambert", "± 1e-5; ± 0.2 %", Level::Commit,
-            all | CRT_FEATURE_INSTANCES, nestedBodies),
+            all | CRT_FEATURE_INSTANCES,
+            nestedBodies),
         row("G51", "glass-with-holes",
-            "Slabs and balls of glass, smooth and rough, with an opacity, in light from everywhere; before a "
+            "Slabs and balls of glass, smooth and rough, with an opacity, in light from everywhere; before "
+            "a "
             "lamp, and over a floor under a point",
-            "1; 1 − a + a (1 − R)/(1 + R)", "conservation of energy; geometric series", "± 0.3 %; ± 2 %",
+            "1; 1 − a + a (1 − R)/(1 + R)", "conservation of energy; geometric series",
+            "± 0.3 %; ± 2 %",
             Level::Commit, all | CRT_FEATURE_ROUGH_DIELECTRIC | CRT_FEATURE_OPACITY | CRT_FEATURE_MIX,
             glassWithHoles),
     };

@@ -60,7 +60,8 @@ Stage sheetFacing(const Vec3d& n, const std::string& environment, const std::str
               "white");
 }
 
-/// The direction θ from the zenith, φ to the right of −z: what docs/scene.md calls the middle of an image.
+/// The direction θ from the zenith, φ to the right of −z: what docs/scene.md calls the middle
+/// of an image.
 Vec3d aroundUs(double theta, double phi) {
     return {std::sin(theta) * std::sin(phi), std::cos(theta), -std::sin(theta) * std::cos(phi)};
 }

@@ -174,8 +174,7 @@ void pane(Context& context) {
                               {2 * r / (1 + r), "light loses its polarisation between the sides"}});
         }
     // A lamp that a bent ray would miss, seen through the pane from either side.
-    const double x = std::sin(50 * kDegree), y = std::cos(50 * kDegree),
-                 r = fresnelDielectric(y, kIndex);
+    const double x = std::sin(50 * kDegree), y = std::cos(50 * kDegree), r = fresnelDielectric(y, kIndex);
     for (const double side : {1.0, -1.0})
         context.estimate(
             fmt::format("through it at 50°, from {}", side > 0 ? "above" : "below"),
@@ -194,17 +193,17 @@ void pane(Context& context) {
              {(1 - r) / (1 + r), "light loses its polarisation between the sides"},
              {(1 - r) * (1 - r), "light reflected to and fro inside the pane is missing"}});
     // All of the light is somewhere.
-    context.relative("in light from everywhere",
-                     radiance(context.render(Stage(eyeFacing(60, 1))
-                                                 .set("environment", "{radiance: 1}")
-                                                 .material("pane", "{type: thin_dielectric, ior: 1.5}")
-                                                 .quad("pane", kInterface, "pane")
-                                                 .yaml(),
-                                             {.samples = 64})) /
-                         radiance(context.render(
-                             Stage(eyeFacing(60, 1)).set("environment", "{radiance: 1}").yaml(),
-                             {.samples = 64})),
-                     1, 2e-6);
+    context.relative(
+        "in light from everywhere",
+        radiance(context.render(Stage(eyeFacing(60, 1))
+                                    .set("environment", "{radiance: 1}")
+                                    .material("pane", "{type: thin_dielectric, ior: 1.5}")
+                                    .quad("pane", kInterface, "pane")
+                                    .yaml(),
+                                {.samples = 64})) /
+            radiance(context.render(Stage(eyeFacing(60, 1)).set("environment", "{radiance: 1}").yaml(),
+                                    {.samples = 64})),
+        1, 2e-6);
 }
 
 void plasticFurnace(Context& context) {
@@ -411,8 +410,8 @@ std::vector<Case> glasswareCases() {
             sky | rough | CRT_FEATURE_DISPERSION | CRT_FEATURE_TABLE, roughDispersion),
         row("G16", "pane", "A thin pane: what it reflects, and a small lamp seen through it",
             "T = (1 − R)/(1 + R) of each polarisation straight on, the rest mirrored",
-            "geometric series of internal reflections (Stokes 1862)", "± 0.1 %",
-            Level::Commit, sky | light | CRT_FEATURE_THIN_DIELECTRIC, pane),
+            "geometric series of internal reflections (Stokes 1862)", "± 0.1 %", Level::Commit,
+            sky | light | CRT_FEATURE_THIN_DIELECTRIC, pane),
         row("G17", "plastic",
             "A diffuse base of albedo .5 and 1 under a smooth and a rough coat in a constant environment, "
             "at 0°, 60° and 85°; and in a glowing room, with and without light sampling",

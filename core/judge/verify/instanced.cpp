@@ -159,18 +159,19 @@ void sharedAttributes(Context& context) {
     constexpr const char* tilted = "normals: [[.6,.8,0],[.6,.8,0],[.6,.8,0],[.6,.8,0]]";
     const auto seen = [&](const Attribute& it, const char* share) {
         return radiance(context.render(
-            fmt::format("crt: 1\ncamera: {{position: [0.2, 1, -0.4], target: [0.2, 0, -0.4], up: [0, 0, 1], "
-                        "fov: 0.0005}}\nfilm: {{resolution: [4, 4]}}\nintegrator: {}\n{}\nmaterials: {{it: "
-                        "{}}}\nobjects:\n  - {{mesh: {{positions: [[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]], {}, "
-                        "faces: [[0,1,2,3]]}}, material: it, share: {}, transforms: [[], [{{translate: [50, "
-                        "0, 0]}}]]}}\n",
-                        kDirect, it.surroundings, it.material, it.corners, share),
+            fmt::format(
+                "crt: 1\ncamera: {{position: [0.2, 1, -0.4], target: [0.2, 0, -0.4], up: [0, 0, 1], "
+                "fov: 0.0005}}\nfilm: {{resolution: [4, 4]}}\nintegrator: {}\n{}\nmaterials: {{it: "
+                "{}}}\nobjects:\n  - {{mesh: {{positions: [[-1,0,-1],[-1,0,1],[1,0,1],[1,0,-1]], {}, "
+                "faces: [[0,1,2,3]]}}, material: it, share: {}, transforms: [[], [{{translate: [50, "
+                "0, 0]}}]]}}\n",
+                kDirect, it.surroundings, it.material, it.corners, share),
             samples(64)));
     };
     const double white = seen({"", "{type: diffuse, reflectance: 1}", uvs, sky, 1, 1}, "never");
     for (const Attribute& it :
-         {Attribute{"texture coordinates",
-                    "{type: diffuse, reflectance: {checker: [0.9, 0.2], scale: 4}}", uvs, sky, 0.2, 0.9},
+         {Attribute{"texture coordinates", "{type: diffuse, reflectance: {checker: [0.9, 0.2], scale: 4}}",
+                    uvs, sky, 0.2, 0.9},
           {"opacity by texture coordinates",
            "{type: diffuse, reflectance: 0, opacity: {checker: [1, 0], scale: 4}}", uvs, sky, 1, 0},
           {"colours of vertices", "{type: diffuse, reflectance: {attribute: colors}}",
@@ -181,11 +182,14 @@ void sharedAttributes(Context& context) {
             context.absolute(fmt::format("{}, share: {}", it.name, share), seen(it, share) / white,
                              it.expected, 1e-4, {{it.lost, "the attribute is lost where all is shared"}});
     // The tangent, by which half of the sky lights brushed metal: none of it is as without coordinates.
-    const Attribute brushed{"", "{type: rough_conductor, metal: Al, roughness: 0.5, roughness_anisotropy: 0.9}",
+    const Attribute brushed{"",
+                            "{type: rough_conductor, metal: Al, roughness: 0.5, roughness_anisotropy: 0.9}",
                             "uvs: [[0,0],[1,1],[2,0],[1,-1]]",
-                            "lights: [{type: directional, direction: [-0.5, -1, 0], irradiance: 1}]", 1, 0};
-    context.relative("tangents, shared over written out", seen(brushed, "always") / seen(brushed, "never"), 1,
-                     1e-4);
+                            "lights: [{type: directional, direction: [-0.5, -1, 0], irradiance: 1}]",
+                            1,
+                            0};
+    context.relative("tangents, shared over written out", seen(brushed, "always") / seen(brushed, "never"),
+                     1, 1e-4);
 }
 
 void instances(Context& context) {
@@ -201,10 +205,12 @@ std::vector<Case> instanceCases() {
     return {
         row("D12", "instances",
             "Paths in closed meshes that are placed, not copied: mirrored, stretched, tiny, far away; light "
-            "through absorbing ones in a row; attributes of a scene all of whose triangles are shared; first "
+            "through absorbing ones in a row; attributes of a scene all of whose triangles are shared; "
+            "first "
             "hits and those of the same triangles written out",
-            "none gets out; exp(−σ Σd); the value at the place; the same but for edges", "topology; Beer and Lambert",
-            "rate ≤ 1e-6; 1e-5; 1e-5 of the scene, but for one ray in 1,000", Level::Commit,
+            "none gets out; exp(−σ Σd); the value at the place; the same but for edges",
+            "topology; Beer and Lambert", "rate ≤ 1e-6; 1e-5; 1e-5 of the scene, but for one ray in 1,000",
+            Level::Commit,
             CRT_FEATURE_INSTANCES | CRT_FEATURE_BVH | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_DIELECTRIC |
                 CRT_FEATURE_MEDIA | CRT_FEATURE_AOV | CRT_FEATURE_TEXTURE | CRT_FEATURE_OPACITY |
                 CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_ANISOTROPY | CRT_FEATURE_ROUGH_CONDUCTOR |

@@ -309,7 +309,8 @@ void fuzz(Context& context) {
         context.estimate(fmt::format("black on a clear body, at {}°", degrees), body(1), meanRadiance, kept,
                          5e-3, {.samples = 1024, .most = 65536},
                          {{kept * kept, "there is fuzz on the inside, too"}});
-        context.estimate(fmt::format("black on a clear body, seen from within, at {}°", degrees), body(-0.5),
+        context.estimate(fmt::format("black on a clear body, seen from within, at {}°", degrees),
+        body(-0.5),
                          meanRadiance, 1, 1e-3, {.samples = 1024, .most = 65536},
                          {{kept, "there is fuzz on the inside, too"}});
     }
@@ -396,11 +397,12 @@ std::vector<Case> openPbrCases() {
         row("G33", "openpbr-limits",
             "Glossy bases at three angles, a mix with metal; what is left when weights are 0 or 1, beside "
             "crt's own material; what crt has not",
-            "E + (1 − E) · base_color; shares of the mix; the same bits; a refusal", "OpenPBR Surface 1.1",
+            "E + (1 − E) · base_color; shares of the mix; the same bits; a refusal",
+            "OpenPBR Surface 1.1",
             "± 0.2 %; 0", Level::Commit,
             CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_MIX |
                 CRT_FEATURE_DIFFUSE | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ROUGH_DIELECTRIC |
-                 CRT_FEATURE_ANISOTROPY | CRT_FEATURE_MEDIA | CRT_FEATURE_THIN_FILM | CRT_FEATURE_TABLE,
+                CRT_FEATURE_ANISOTROPY | CRT_FEATURE_MEDIA | CRT_FEATURE_THIN_FILM | CRT_FEATURE_TABLE,
             limits),
         row("G36", "openpbr-emission",
             "A sheet of emission_luminance 300 seen from both sides, white and of a darker emission_color; "

@@ -28,10 +28,9 @@ Stage floorUnderPanes(int panes, const std::string& material, const std::string&
         .material("it", material)
         .quad("floor", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "white");
     for (int i = 0; i < panes; ++i)
-        stage.quad(
-            fmt::format("pane {}", i),
-            fmt::format("[[-20,{0},-20],[-20,{0},20],[20,{0},20],[20,{0},-20]]", 0.3 + 0.05 * i),
-            "it");
+        stage.quad(fmt::format("pane {}", i),
+                   fmt::format("[[-20,{0},-20],[-20,{0},20],[20,{0},20],[20,{0},-20]]", 0.3 + 0.05 * i),
+                   "it");
     return stage;
 }
 
@@ -157,10 +156,9 @@ void stackOfPanes(Context& context) {
             .material("pane", kPane)
             .material("black", "{type: diffuse, reflectance: 0}");
         for (int i = 0; i < panes; ++i)
-            stage.quad(
-                fmt::format("pane {}", i),
-                fmt::format("[[-20,{0},-20],[-20,{0},20],[20,{0},20],[20,{0},-20]]", 0.05 * i),
-                "pane", more);
+            stage.quad(fmt::format("pane {}", i),
+                       fmt::format("[[-20,{0},-20],[-20,{0},20],[20,{0},20],[20,{0},-20]]", 0.05 * i),
+                       "pane", more);
         return stage.yaml();
     };
     const double none = radiance(context.render(stack(0, "{max_depth: 0}", ""), {.samples = 64}));

@@ -150,8 +150,8 @@ Tally missesOfAimedRays(Context& context, Aim aim, const Place& place, int resol
         emptyScene(resolution, seed, place.centre, place.centre + dice.direction() * place.size, 0.7);
     scene.integrator.max_depth = 0;
     scene.environment = Environment{constantSpectrum(1)};
-    // Behind the eye, so small that it alone decides whether the camera is the scene's centre (focus.h): with
-    // the sheet as without.
+    // Behind the eye, so small that it alone decides whether the camera is the scene's centre (focus.h):
+    // with the sheet as without.
     Mesh speck;
     const Vec3d behind = place.centre * 2 - scene.camera.target;
     const Vec3d off = behind - place.centre;

@@ -31,9 +31,8 @@ void roughFurnace(Context& context) {
             .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it");
     };
     const auto mistakes = [](double once, double squared) {
-        return std::vector<Mistake>{
-            {once, "what the microfacets lose is not given back"},
-            {squared, "the width of GGX is the roughness, not its square"}};
+        return std::vector<Mistake>{{once, "what the microfacets lose is not given back"},
+                                    {squared, "the width of GGX is the roughness, not its square"}};
     };
     const Render how{.samples = 1u << 12};
     // Of a perfect metal nothing is lost; of another, what Fresnel's equations say of one and more rounds.
@@ -46,7 +45,7 @@ void roughFurnace(Context& context) {
                                             roughConductorAlbedo(cosine, n, k, std::sqrt(roughness)));
                 context.relative(
                     fmt::format("roughness {}, n = {:g}, k = {:g}, seen from {}°", roughness, n, k,
-                                 degrees),
+                    degrees),
                     radiance(context.render(floor(degrees, 1, kDirect, n, k, roughness)
                                                 .set("environment", "{radiance: 1}")
                                                 .yaml(),
@@ -85,7 +84,8 @@ void roughPeak(Context& context) {
     const Vec3d view = unit({0.4, 0.2, 0.7});
     for (const double roughness : {0.032, 0.04, 0.06, 0.1}) {
         for (const double degrees : {0.0, 60.0, 85.0, 89.0})
-            context.relative(fmt::format("perfect metal of roughness {}, seen from {}°", roughness, degrees),
+            context.relative(fmt::format("perfect metal of roughness {}, seen from {}°", roughness,
+            degrees),
                              radiance(context.render(floorOf(roughMetal(1, 1e6, roughness), degrees),
                                                      {.samples = 1u << 12})),
                              1, 2e-3);
@@ -151,7 +151,8 @@ std::vector<Case> roughSurfaceCases() {
                 CRT_FEATURE_DIFFUSE,
             roughPeak),
         row("G06", "rough-limit",
-            "Metal and glass whose roughness goes to 0: 0.1, 0.05, 0.032, 0.02, 0, at 0°, 60° and 85° (on "
+            "Metal and glass whose roughness goes to 0: 0.1, 0.05, 0.032, 0.02, 0, at 0°, 60° and "
+            "85° (on "
             "commits glass of 0.032 and 0.02)",
             "quadrature over the normals; below 0.03 Fresnel's reflectance",
             "Heitz (2014); Kulla and Conty (2017); Fresnel's equations; docs/scene.md", "± 0.2 %; ± 1 %",

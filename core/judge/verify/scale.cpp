@@ -182,9 +182,10 @@ void hugeFloors(Context& context) {
             for (const bool disk : {false, true}) {
                 if (disk && spot.x == spot.z) continue;
                 const std::string floor =
-                    disk ? fmt::format("disk: {{radius: {}}}, transform: [{{rotate: {{axis: [1, 0, 0], "
-                                       "angle_deg: -90}}}}]",
-                                       half)
+                    disk ? fmt::format(
+                               "disk: {{radius: {}}}, transform: [{{rotate: {{axis: [1, 0, 0], "
+                               "angle_deg: -90}}}}]",
+                               half)
                          : squareFloor(half, 0, 0);
                 for (const bool nee : {true, false})
                     context.equivalent(
@@ -230,9 +231,9 @@ void farCompany(Context& context) {
         context.equivalent(fmt::format("lit room, a triangle at {:g}", far),
                            ratios(context, room, inFarCompany(room, far), 64), 1, 1e-4,
                            {{1, "the room is rounded as if it stood in the middle of the scene"}});
-        for (const char* lamp : {"rectangle: {size: [0.005, 0.005]}", "disk: {radius: 0.0025}",
-                                 "sphere: {radius: 0.0025}",
-                                 "cylinder: {radius: 0.0025, from_z: 0, to_z: 0.005}"}) {
+        for (const char* lamp :
+             {"rectangle: {size: [0.005, 0.005]}", "disk: {radius: 0.0025}", "sphere: {radius: 0.0025}",
+              "cylinder: {radius: 0.0025, from_z: 0, to_z: 0.005}"}) {
             const Scene small = context.scene(smallLamp(lamp));
             context.equivalent(fmt::format("floor under a {}, a triangle at {:g}", lamp, far),
                                ratios(context, small, inFarCompany(small, far), 16), 1, 1e-4,
@@ -264,10 +265,10 @@ objects:
 
 void prismsLamp(Context& context) {
     for (const double distance : {1e3, 1e5, 1e6})
-        context.equivalent(fmt::format("a prism of size 1, its lamp's edge at {:g}", distance),
-                           ratios(context, context.scene(prismAndLamp(20)),
-                                  context.scene(prismAndLamp(distance)), 256),
-                           1, 1e-3, {{1, "the prism's faces turn by the rounding of what is far away"}});
+        context.equivalent(
+            fmt::format("a prism of size 1, its lamp's edge at {:g}", distance),
+            ratios(context, context.scene(prismAndLamp(20)), context.scene(prismAndLamp(distance)), 256), 1,
+            1e-3, {{1, "the prism's faces turn by the rounding of what is far away"}});
 }
 
 void layers(Context& context) {

@@ -38,8 +38,8 @@ std::string floorBelow(double degrees, const std::string& material, bool glass,
     stage.set("environment", "{radiance: 1}");
     if (material.empty()) return stage.yaml();
     stage.material("it", material)
-        .quad("it",
-              "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]" + (attributes.empty() ? "" : ", " + attributes), "it");
+        .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]" + (attributes.empty() ? "" : ", " + attributes),
+              "it");
     if (glass)
         stage.material("black", "{type: diffuse, reflectance: 0}")
             .quad("bottom", "[[-900,-1,-900],[-900,-1,900],[900,-1,900],[900,-1,-900]]", "black");

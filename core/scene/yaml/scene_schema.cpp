@@ -26,7 +26,10 @@ std::string trimmed(double degrees) { return fmt::format("{:.13g}", degrees); }
 
 /// Keys that a spectrum may have whatever its form.
 KeySchema scaleKey() {
-    return {.name = "scale", .kind = Kind::Number, .range = kNotNegative, .fallback = "1",
+    return {.name = "scale",
+            .kind = Kind::Number,
+            .range = kNotNegative,
+            .fallback = "1",
             .doc = "Multiplies all values."};
 }
 
@@ -67,14 +70,15 @@ SectionSchema topLevel() {
                  .count_min = 1,
                  .doc = "Scene files whose contents count as if they stood here; see [Shared "
                         "parts](#shared-parts)."},
-                {.name = "title", .doc = "What the scene shows. crt writes it into image metadata and the "
-                                         "report."},
-                {.name = "camera",
+                {.name = "title",
+                 .doc = "What the scene shows. crt writes it into image metadata and the "
+                        "report."},
+                {.name = "camera", .kind = Kind::Section, .section = "camera", .doc = "The viewpoint."},
+                {.name = "film",
                  .kind = Kind::Section,
-                 .section = "camera",
-                 .doc = "The viewpoint."},
-                {.name = "film", .kind = Kind::Section, .section = "film", .doc = "The image: size, "
-                                                                                  "filter, colour."},
+                 .section = "film",
+                 .doc = "The image: size, "
+                        "filter, colour."},
                 {.name = "integrator",
                  .kind = Kind::Section,
                  .section = "integrator",
@@ -318,7 +322,8 @@ SectionSchema filter() {
                  .range = {0, 16, true, false},
                  .unit = "pixels",
                  .fallback = yaml(d.filter_sigma),
-                 .doc = "Standard deviation; gaussian only. The filter is the Gaussian less its value at the radius, so that it ends at 0."},
+                 .doc = "Standard deviation; gaussian only. The filter is the Gaussian less its value at "
+                        "the radius, so that it ends at 0."},
             }};
 }
 
@@ -582,32 +587,34 @@ void addDielectrics(std::vector<SectionSchema>& all) {
         .kind = Kind::Spectrum,
         .range = {.min = 0, .max = kMostRadiance},
         .unit = "1/scene unit",
-        .doc = "Absorption coefficient of the inside, by the Beer–Lambert law: over a distance d the "
-               "share exp(−absorption · d) is left. The mesh must be closed. Of nested bodies the "
-               "innermost absorbs, even if it is clear; behind it the outer one absorbs again. Where "
-               "bodies overlap, the one that light entered last absorbs. Cameras (the middle of their "
-               "lens) and lights may be inside bodies. Bodies may touch. Overlap them a little where "
-               "other surfaces are inside two bodies that share a face, or where the faces that touch are "
-               "curved or belong to instances: rounding decides which of two coinciding surfaces light "
-               "meets. The number of nested bodies depends on the number of kinds of glass that absorb "
-               "differently: 32 bodies of 1 kind, 16 of up to 3, 8 of up to 15, 4 of up to 255, 2 of "
-               "more; clear glass is a kind. Beyond that crt forgets the outermost body. Nothing outside "
-               "of bodies absorbs. The default is 0."};
+        .doc =
+            "Absorption coefficient of the inside, by the Beer–Lambert law: over a distance d the "
+            "share exp(−absorption · d) is left. The mesh must be closed. Of nested bodies the "
+            "innermost absorbs, even if it is clear; behind it the outer one absorbs again. Where "
+            "bodies overlap, the one that light entered last absorbs. Cameras (the middle of their "
+            "lens) and lights may be inside bodies. Bodies may touch. Overlap them a little where "
+            "other surfaces are inside two bodies that share a face, or where the faces that touch are "
+            "curved or belong to instances: rounding decides which of two coinciding surfaces light "
+            "meets. The number of nested bodies depends on the number of kinds of glass that absorb "
+            "differently: 32 bodies of 1 kind, 16 of up to 3, 8 of up to 15, 4 of up to 255, 2 of "
+            "more; clear glass is a kind. Beyond that crt forgets the outermost body. Nothing outside "
+            "of bodies absorbs. The default is 0."};
     all.push_back({"material/dielectric",
                    "a dielectric material",
                    "Smooth glass or water. It reflects and refracts, and may absorb.",
                    {materialType("dielectric"), ior, absorption, thinFilmKey()}});
-    all.push_back({"material/rough_dielectric",
-                   "a rough_dielectric material",
-                   "Frosted glass: microfacets as in `rough_conductor`, each of which reflects and "
-                   "refracts. Clear glass is invisible under uniform light, at any roughness. How light "
-                   "that meets several microfacets divides between reflection and transmission is an "
-                   "approximation that loses no energy: from inside, the roughest glass reflects more straight on, "
-                   "and less at grazing angles, than a random walk on Smith's surface. Where the glass would "
-                   "blur what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), crt treats it "
-                   "as smooth.",
-                   {materialType("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption,
-                    thinFilmKey()}});
+    all.push_back(
+        {"material/rough_dielectric",
+         "a rough_dielectric material",
+         "Frosted glass: microfacets as in `rough_conductor`, each of which reflects and "
+         "refracts. Clear glass is invisible under uniform light, at any roughness. How light "
+         "that meets several microfacets divides between reflection and transmission is an "
+         "approximation that loses no energy: from inside, the roughest glass reflects more straight on, "
+         "and less at grazing angles, than a random walk on Smith's surface. Where the glass would "
+         "blur what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), crt treats it "
+         "as smooth.",
+         {materialType("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption,
+          thinFilmKey()}});
     all.push_back({"material/thin_dielectric",
                    "a thin_dielectric material",
                    "A window pane made of one sheet of faces: two parallel surfaces, between which light "
@@ -628,8 +635,9 @@ void addMaterials(std::vector<SectionSchema>& all) {
                                 .range = {0, 1, false, false},
                                 .section = "texture",
                                 .required = true,
-                                .doc = "The fraction of light that the surface reflects, at every "
-                                       "wavelength."};
+                                .doc =
+                                    "The fraction of light that the surface reflects, at every "
+                                    "wavelength."};
     all.push_back(
         {"material/diffuse",
          "a diffuse material",
@@ -677,21 +685,22 @@ void addMaterials(std::vector<SectionSchema>& all) {
          {materialType("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror")), thinFilmKey()},
          metal_or_index});
     addDielectrics(all);
-    all.push_back({"material/plastic",
-                   "a plastic material",
-                   "A diffuse base under a clear coat, as in plastics, varnished wood and glazed tiles. Light "
-                   "that the coat transmits scatters below it; light that the coat reflects back down "
-                   "scatters again, which makes colours deeper. A white base returns all light. With a "
-                   "smooth coat the model is that of Mitsuba's `roughplastic` with `nonlinear`. With a rough "
-                   "coat Mitsuba's model loses energy and is darker; this one doesn't.",
-                   {materialType("plastic"),
-                    reflectance,
-                    roughnessKey("a polished coat", "0"),
-                    {.name = "ior",
-                     .kind = Kind::Number,
-                     .range = {.min = 1, .max = 10},
-                     .fallback = "1.5",
-                     .doc = "Refractive index of the coat. 1: none, Lambert's law."}}});
+    all.push_back(
+        {"material/plastic",
+         "a plastic material",
+         "A diffuse base under a clear coat, as in plastics, varnished wood and glazed tiles. Light "
+         "that the coat transmits scatters below it; light that the coat reflects back down "
+         "scatters again, which makes colours deeper. A white base returns all light. With a "
+         "smooth coat the model is that of Mitsuba's `roughplastic` with `nonlinear`. With a rough "
+         "coat Mitsuba's model loses energy and is darker; this one doesn't.",
+         {materialType("plastic"),
+          reflectance,
+          roughnessKey("a polished coat", "0"),
+          {.name = "ior",
+           .kind = Kind::Number,
+           .range = {.min = 1, .max = 10},
+           .fallback = "1.5",
+           .doc = "Refractive index of the coat. 1: none, Lambert's law."}}});
 }
 
 void addShapes(std::vector<SectionSchema>& all) {
@@ -1023,10 +1032,7 @@ void addOutside(std::vector<SectionSchema>& all) {
            .count_max = 3,
            .fallback = "[0, 1, 0]",
            .doc = "Where the top of `image` is. Its middle is towards −z, or +y where z is up."},
-          {.name = "sky",
-           .kind = Kind::Section,
-           .section = "sky",
-           .doc = "A CIE standard general sky."},
+          {.name = "sky", .kind = Kind::Section, .section = "sky", .doc = "A CIE standard general sky."},
           {.name = "light_sampling",
            .kind = Kind::Boolean,
            .fallback = yaml(Environment{}.light_sampling),

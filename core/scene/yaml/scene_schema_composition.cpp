@@ -60,11 +60,12 @@ void addCompositions(std::vector<SectionSchema>& all) {
                  .range = {.min = 0, .max = 1},
                  .section = "texture",
                  .fallback = "1",
-                 .doc = "Share of the surface that is there, as of leaves cut out by an image; light "
-                        "passes the rest unchanged, shadow rays too. A hole in the surface of a `dielectric` "
-                        "or `rough_dielectric` is one in the body: light that comes in by a hole is in no "
-                        "glass, and goes out without meeting the surface from within; light in the glass "
-                        "meets no hole."});
+                 .doc =
+                     "Share of the surface that is there, as of leaves cut out by an image; light "
+                     "passes the rest unchanged, shadow rays too. A hole in the surface of a `dielectric` "
+                     "or `rough_dielectric` is one in the body: light that comes in by a hole is in no "
+                     "glass, and goes out without meeting the surface from within; light in the glass "
+                     "meets no hole."});
     SectionSchema map{
         "normal_map",
         "a normal map",

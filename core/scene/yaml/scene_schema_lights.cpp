@@ -113,16 +113,16 @@ void addLights(std::vector<SectionSchema>& all) {
          "A cone of light. The intensity is constant inside the cone and falls to 0 across the penumbra "
          "as Hermite's cubic of the cosine, as in pbrt-v4.",
          joined(
-             std::vector{
-                 nameKey(), lightType("spot"), positionKey(),
-                 vectorKey("direction", "The direction in which the light travels along its axis; any "
-                                        "length but 0."),
-                 vectorKey("target", "Alternatively, a point on its axis.", "scene units"),
-                 degreesKey("cone_angle_deg", {0, 180, true, false}, d.cone_angle_deg,
-                            "From the axis to where the light ends."),
-                 degreesKey("penumbra_deg", {0, 180, false, false}, d.penumbra_deg,
-                            "The outer part of that angle, in which the light falls to 0. At most "
-                            "`cone_angle_deg`, to which the default gives way.")},
+             std::vector{nameKey(), lightType("spot"), positionKey(),
+                         vectorKey("direction",
+                                   "The direction in which the light travels along its axis; any "
+                                   "length but 0."),
+                         vectorKey("target", "Alternatively, a point on its axis.", "scene units"),
+                         degreesKey("cone_angle_deg", {0, 180, true, false}, d.cone_angle_deg,
+                                    "From the axis to where the light ends."),
+                         degreesKey("penumbra_deg", {0, 180, false, false}, d.penumbra_deg,
+                                    "The outer part of that angle, in which the light falls to 0. At most "
+                                    "`cone_angle_deg`, to which the default gives way.")},
              intensityKeys(" on the axis")),
          {{KeyRule::Kind::ExactlyOne, {"direction", "target"}},
           {KeyRule::Kind::ExactlyOne, kIntensities},
@@ -230,7 +230,7 @@ void addSky(std::vector<SectionSchema>& all) {
                                      .doc = "Of the standard's table: 1 overcast, 5 uniform, 7 partly "
                                             "cloudy, 12 clear, 13 clear and polluted, 15 hazy."},
                                     amountKey("zenith_luminance_cd_m2", "cd/m²",
-                                               "Luminance of the zenith."),
+                                    "Luminance of the zenith."),
                                     amountKey("horizontal_illuminance_lx", "lx",
                                               "Illuminance of level ground under the whole sky.")},
              sunKeys(), spectrumKey(),
@@ -265,8 +265,9 @@ std::vector<KeySchema> sunKeys() {
     north.fallback = "[0, 0, -1]";
     up.fallback = "[0, 1, 0]";
     return {
-        vectorKey("direction", "The direction in which light from the centre of the sun travels; any "
-                               "length but 0."),
+        vectorKey("direction",
+                  "The direction in which light from the centre of the sun travels; any "
+                  "length but 0."),
         {.name = "date", .doc = "As `2026-06-21`, from 1950 to 2050. A sun below the horizon is refused."},
         {.name = "time", .doc = "As `'14:30'` or `'14:30:00'`, in quotes."},
         offset,
