@@ -190,8 +190,8 @@ class Camera(LightTest):
 
     def test_errors_are_known_and_belong_to_the_render(self):
         self.write("scene.yaml", LIT)
-        view = View(self, "-b", self.backend, "--spp", "64")
-        status, _ = view.wait(lambda s: s["errors"] and s["errors"][-1][1] == 64)
+        view = View(self, "-b", self.backend, "--spp", "256")
+        status, _ = view.wait(lambda s: s["errors"] and s["errors"][-1][1] == 256)
         seconds, samples, error, lower, upper = status["errors"][-1]
         self.assertTrue(0 < lower < error < upper < 1, status["errors"][-1])
 

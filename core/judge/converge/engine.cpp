@@ -1,3 +1,4 @@
+// Over 450 lines: one run from its first replicate to its report, step after step.
 #include "judge/converge/engine.h"
 #include "film/error_text.h"
 

@@ -1,6 +1,7 @@
 // Group B: scale and position. Lengths are normalised in double before anything is float
 // (core/compile/flatten.cpp), so where a scene lies and how large it is must not show; what remains is the
 // ratio of sizes within a scene.
+// Over 450 lines: cases, each a scene and its answer, that share nothing with their neighbours.
 #include "judge/verify/probes.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
