@@ -238,7 +238,7 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
             beyond.reach = largest;
             const CrtHit hit = closestWithin(context, beyond, tests);
             if (hit.slot == CRT_NONE || hit.slot == slot) continue;
-            const float clearance = std::max(faces[slot].clearance, crt_surface(&context, hit).clearance);
+            const float clearance = std::max(faces[slot].clearance, faces[hit.slot].clearance);
             if (hit.t + touching > clearance) continue;
             ++found.near;
             found.nearest_clearance = std::max(
