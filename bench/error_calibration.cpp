@@ -144,7 +144,7 @@ double relativeDistance(const std::vector<double>& a, const std::vector<double>&
     return std::sqrt(squares / static_cast<double>(a.size())) / meanOf(truth);
 }
 
-/// What one image of one number of samples says of itself.
+/// The error that one image states at one number of samples.
 struct Statement {
     ErrorEstimate error;
     double stops_at = 0;               ///< The least target that --target-error would have reached.
@@ -199,8 +199,8 @@ std::pair<double, double> pixelScores(const Looks& looks) {
         for (std::size_t k = 0; k < y.size(); ++k) {
             if (y[k] == truth[k]) continue;
             const double z = std::abs(y[k] - truth[k]) / looks.excess() / stated[k];
-            // One that nobody near has met would be infinitely wrong: it counts as beyond, and not in the
-            // mean.
+            // A pixel is infinitely far off where neither it nor its neighbours met the light: it counts as
+            // outside, and stays out of the mean.
             if (std::isfinite(z)) squares += z * z;
             within += z <= 1.96;
             count += 1;

@@ -89,7 +89,7 @@ void meetShape(Probe& probe, const CrtShape& shape, std::uint32_t medium) {
     }
 }
 
-/// What bounds media in a blob, as rays meet it.
+/// The surfaces of a blob that bound media, for intersection with rays in double precision.
 class Boundaries {
 public:
     explicit Boundaries(const unsigned char* blob)

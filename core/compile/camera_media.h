@@ -1,4 +1,4 @@
-/// What is around the camera: the bodies whose media absorb, or have holes, that it is inside of.
+/// The media around the camera: those of all bodies that contain its position and that absorb or have holes.
 #pragma once
 
 namespace crt {

@@ -70,7 +70,8 @@ std::vector<Hull> boxesOf(const Scene& scene, const std::vector<PlacedShape>& sh
     return boxes;
 }
 
-/// What there is on the way from the origin along unit `way`; how far. Möller and Trumbore 1997.
+/// Distance from the origin to the triangle along the unit vector `way`; kNowhere where the ray misses it
+/// (Möller and Trumbore 1997).
 double distanceOf(const std::array<Vec3d, 3>& p, const Vec3d& way) {
     const Vec3d a = p[1] - p[0], b = p[2] - p[0], across = cross(way, b);
     const double determinant = dot(a, across);
@@ -95,7 +96,7 @@ double distanceOf(const Hull& box, const Vec3d& way) {
 /// Radius of the ball around `centre` that holds all of it.
 double ballAround(const std::array<Vec3d, 3>& p, const Vec3d& centre) {
     const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
-    if (!(dot(n, n) > 0)) return kNowhere;  // nobody sees it
+    if (!(dot(n, n) > 0)) return kNowhere;  // no area, so it is invisible
     return std::max({length(p[0] - centre), length(p[1] - centre), length(p[2] - centre)});
 }
 double ballAround(const Hull& box, const Vec3d& centre) {

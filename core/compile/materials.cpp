@@ -199,9 +199,9 @@ const Material* glassOf(const Material& material, const std::vector<const Materi
     return nullptr;
 }
 
-/// Numbers the media that the materials' surfaces bound, where one of them absorbs or has holes: otherwise
-/// nobody asks. Those that absorb alike have one number; of those with holes each has its own, by which
-/// rays know whether they came in by a hole.
+/// Numbers the media that the surfaces of the materials bound. Without absorption and holes there are no
+/// numbers, because no ray needs them. Media that absorb equally share a number. Each medium with holes has
+/// its own, so that a ray can tell whether it entered through a hole.
 void numberMedia(const std::vector<const Material*>& materials, const SpectrumTable& spectra,
                  MaterialPart& part) {
     std::map<std::pair<kernel::CrtValue, std::size_t>, std::uint32_t> numbers;
