@@ -187,7 +187,8 @@ TEST_CASE("a window has what of it lies in the image", "[pooled-tests]") {
 TEST_CASE("a pooled variance is that of equal pixels, never 0 amid noise, and keeps what is not known",
           "[pooled-tests]") {
     // E[1/max(χ²₁, 1)] = P(χ²₁ < 1) + E[1/χ²₁; χ²₁ > 1] = 0.682689 + 0.483941 - 0.317311:
-    // ∫ x^-3/2 e^-x/2 dx/√2π from 1 on, by parts. In a window of n pixels 1/n of the correction is left out.
+    // ∫ x^-3/2 e^-x/2 dx/√2π from 1 on, by parts. In a window of n pixels 1/n of the correction is
+    // left out.
     const auto correction = [](double n) { return 1 - (1 - 0.849320) * (1 - 1 / n); };
     // Equal variances pool to themselves, with the degrees of freedom of all of them.
     const std::vector<double> equal(20 * 20, 2.5);

@@ -18,14 +18,14 @@ namespace {
 
 using namespace kernel;
 
-/// A surface that a ray from the camera meets.
+/// An intersection of a ray from the camera with a surface that bounds a medium.
 struct Crossing {
     double t;
     std::uint32_t medium;
     bool outwards;  ///< The ray comes from inside.
 };
 
-/// A ray from the camera, in no plane that scenes are built along.
+/// A ray from the camera. Its direction lies in none of the planes along which scenes are usually built.
 struct Probe {
     Vec3d o, d;
     std::vector<Crossing> crossings{};
@@ -57,8 +57,8 @@ bool mayMeet(const Probe& probe, const CrtTriangle& box) {
     return from <= to;
 }
 
-/// `corners` are relative to the probe's origin. An edge has the same value, but for its sign, in both of
-/// its triangles: a ray passes between no two.
+/// `corners` are relative to the origin of the probe. The edge function has the same value, apart from its
+/// sign, in both triangles of an edge, so no ray slips between them.
 void meetTriangle(Probe& probe, const std::array<Vec3d, 3>& corners, double facing, std::uint32_t medium) {
     const auto& [a, b, c] = corners;
     const Vec3d ab = cross(a, b), bc = cross(b, c), ca = cross(c, a);
@@ -77,7 +77,7 @@ void meetShape(Probe& probe, const CrtShape& shape, std::uint32_t medium) {
         if (dot(p, p) <= radius * radius) probe.meet(t, medium, d_z * facing > 0);
         return;
     }
-    // Of a cylinder, across its axis.
+    // For a cylinder, solve in the plane perpendicular to its axis.
     const bool cylinder = shape.kind == CRT_SHAPE_CYLINDER;
     const Vec3d across_o = cylinder ? o - axis * o_z : o, across_d = cylinder ? d - axis * d_z : d;
     const double a = dot(across_d, across_d), b = dot(across_o, across_d),
@@ -137,7 +137,7 @@ private:
 
     void meetInstance(Probe& probe, const CrtInstance& instance) const {
         const std::uint32_t first = instance.first_primitive, end = mesh_ends_.at(first);
-        // The triangles of meshes are behind the slots, mesh by mesh, as their primitives are.
+        // The triangles of instanced meshes follow the slots, in the order of their primitives.
         const CrtTriangle* mesh = triangles_ + scene_.triangle_count + (first - mesh_ends_.begin()->first);
         for (std::uint32_t i = 0; i < end - first; ++i) {
             const std::uint32_t medium = mediumOf(mesh[i]);

@@ -3,10 +3,10 @@
 
 namespace crt {
 
-/// Sets CrtScene::camera_media of a finished blob, from the scene's surfaces and the camera's position (of a
-/// lens, its middle): what light enters and leaves on its way from outside to there. Rays in seven
-/// directions count their crossings in double; where they do not agree, a body is not closed, and the
-/// majority counts, with a warning.
+/// Sets CrtScene::camera_media of a finished blob from the surfaces of the scene and the position of the
+/// camera (for a lens, its centre). Rays in seven directions count their crossings in double precision.
+/// Where they disagree, a body is not closed or bodies overlap: then the majority counts, and a warning
+/// says so.
 void findCameraMedia(unsigned char* blob);
 
 }  // namespace crt

@@ -36,7 +36,7 @@ struct Hull {
     }
 };
 
-/// The least ball around `centre` that holds a whole object: all triangles of a placement.
+/// Radius of the smallest ball around `centre` that contains a whole object: all triangles of one placement.
 double wholeObject(const std::vector<Placement>& placements, const Vec3d& centre) {
     std::vector<double> reach(placements.size(), kNowhere);
     parallelFor(placements.size(), 1, [&](std::size_t first, std::size_t end) {
@@ -52,7 +52,7 @@ double wholeObject(const std::vector<Placement>& placements, const Vec3d& centre
     return reach.empty() ? kNowhere : *std::min_element(reach.begin(), reach.end());
 }
 
-/// Boxes of what is no triangle: shapes, and meshes where they are instanced.
+/// Bounding boxes of shapes and of instances.
 std::vector<Hull> boxesOf(const Scene& scene, const std::vector<PlacedShape>& shapes) {
     std::vector<Hull> boxes;
     for (const PlacedShape& shape : shapes) boxes.push_back({shape.lower, shape.upper});
@@ -93,7 +93,7 @@ double distanceOf(const Hull& box, const Vec3d& way) {
     return enter > 0 && enter <= leave ? enter : kNowhere;
 }
 
-/// Radius of the ball around `centre` that holds all of it.
+/// Radius of the smallest ball around `centre` that contains the triangle or box.
 double ballAround(const std::array<Vec3d, 3>& p, const Vec3d& centre) {
     const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
     if (!(dot(n, n) > 0)) return kNowhere;  // no area, so it is invisible
@@ -163,7 +163,7 @@ public:
         double object = wholeObject(placements_, focus) / unit;
         for (const Hull& thing : boxes_)
             object = std::min(object, ballAround(Hull{fromEye(thing.lower), fromEye(thing.upper)}, centre));
-        // Fine triangles of an object that is not small lose nothing that anybody sees.
+        // Fine triangles alone are no reason: the objects that they form lose nothing visible.
         if (!(object * kMostLost < half_extent)) return std::nullopt;
         return Focus{focus, detail * unit};
     }

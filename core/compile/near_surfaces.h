@@ -44,8 +44,8 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene);
 /// bounded as above; `asked` says how many it was enough for.
 NearSurfaces findNearSurfaces(const CompiledScene& scene);
 
-/// Emitters whose size is known to less than a thousandth, since they are small and far from the scene's
-/// centre: their corners are rounded there.
+/// Emitters whose size is rounded by more than a thousandth, because they are small and far from the centre
+/// of the scene.
 struct CoarseLights {
     std::uint64_t lights = 0, asked = 0;  ///< Triangles and shapes.
     double rounding = 0;                  ///< The largest, over the light's height or radius.

@@ -1,12 +1,12 @@
-/// Bodies whose surfaces coincide: which of two a ray meets is rounding, so its list of media
-/// (kernel/medium.h) cannot rely on either.
+/// Bodies whose surfaces coincide. Rounding decides which of two coinciding surfaces a ray meets, so a path
+/// must not rely on having met both (kernel/medium.h).
 #pragma once
 
 namespace crt {
 
-/// Sets CRT_PRIMITIVE_TOUCHES of the triangles of a finished blob that bound a medium and lie, at least in
-/// part, in the plane of another such triangle of another object. Triangles of instances and shapes are not
-/// asked. Nothing to do, and no time, where fewer than two objects bound media.
+/// Sets CRT_PRIMITIVE_TOUCHES in a finished blob for triangles that bound a medium and overlap, in one
+/// plane, such a triangle of another object. Does not look at instances and shapes. Returns at once if
+/// fewer than two objects bound media.
 void markTouchingMedia(unsigned char* blob);
 
 }  // namespace crt

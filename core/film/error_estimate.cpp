@@ -21,10 +21,9 @@ constexpr double kLeastDegreesOfFreedom = 2;
 /// own.
 constexpr double kUnseen = 0.5;
 
-/// E[Y⁴]/E[Y²]² is at least E[Y²]/E[Y]² whatever the distribution of Y ≥ 0 (Lyapunov's
-/// inequality), and
-/// exactly that where paths are dark or of one brightness. Exponential noise has 3 times that, the tail
-/// y^-1/2 of a glossy lobe about a light 3.9 times.
+/// E[Y⁴]/E[Y²]² is at least E[Y²]/E[Y]² for any distribution of Y ≥ 0 (Lyapunov's inequality), with
+/// equality if all paths are either dark or equally bright. It is 3 times that for exponential noise, and
+/// 3.9 times that for the tail y^-1/2 of a glossy lobe around a light.
 constexpr double kKurtosis = 4;
 
 /// From so many pixels on the scatter of variances is measured; of fewer, where a measurement would be

@@ -1,21 +1,22 @@
 /*
- * medium.h: what the light crosses between surfaces. Bodies of dielectrics absorb (Beer and Lambert); what
- * is around them does not.
+ * medium.h: absorption between surfaces. Bodies of dielectrics absorb by Beer and Lambert's law; the space
+ * around them does not.
  *
- * A path carries the list of the media that surround it, the one that it entered last first: numbers of
- * CrtScene.medium_bits each (a divisor of 32) in a word, 0 behind the last. Going into a body puts its
- * medium in front, going out takes it away, wherever it is in the list, so that bodies may overlap (compare
- * Schmidt and Budge 2002, whose priorities choose where here the last does). The first one absorbs. Where
- * the word is full, the outermost is forgotten.
+ * A path carries the list of the media that surround it in one word. Each entry has CrtScene.medium_bits
+ * bits (a divisor of 32); the medium that the path entered last comes first, and zeros follow the last
+ * entry. Entering a body puts its medium in front. Leaving removes it, wherever it is in the list, so
+ * bodies may overlap (compare Schmidt and Budge 2002, who choose by priorities). The first medium absorbs.
+ * When the word is full, the path forgets the outermost medium.
  *
  * A ray that meets the back of a surface whose medium is not in its list has been inside that body all
- * along: where two surfaces coincide, one of them is passed unseen. So that body has absorbed, and is in the
- * list from there on. Which of two it was cannot be told, so a ray that crosses a surface that touches
- * another one (touching_media.h) keeps nothing of what was around it: the backs that it meets bring it back.
- * Surfaces with holes are another matter: inside such a body without its medium in the list is what came in
- * by a hole, where there is no glass, and goes out as freely (composition.h).
+ * along: the path passed one of two coinciding surfaces without meeting it. So that body absorbs on this
+ * segment, and the list contains it from there on. It is unknown which of the two surfaces a path met, so a
+ * path that crosses a surface that touches another one (touching_media.h) drops all other media from its
+ * list; their back faces restore them. Surfaces with holes differ: a ray inside such a body whose list
+ * lacks the medium came in through a hole, is in no glass, and leaves as freely (passing.h).
  *
- * Bodies whose media absorb alike have one number, unless their surface has holes: it makes no difference.
+ * Media that absorb equally share a number, unless their surfaces have holes: paths need not tell them
+ * apart.
  */
 #ifndef CRT_MEDIUM_H
 #define CRT_MEDIUM_H
@@ -24,7 +25,7 @@
 
 CRT_KERNEL_BEGIN
 
-/* What the surface of a material bounds; of one that is made of others, all of them. */
+/* The medium that the surface of a material bounds, also of a mix. */
 CRT_FN u32 crt_medium_of(const CrtContext *ctx, u32 material) {
     return CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].medium;
 }
@@ -33,7 +34,7 @@ CRT_FN u32 crt_first_medium(const CrtContext *ctx, u32 media) {
     return media & ((1u << ctx->scene->medium_bits) - 1u);
 }
 
-/* Where in the list a medium is first, in bits; 32 where it is not. */
+/* Bit position of the first entry of a medium in the list; 32 if it is not there. */
 CRT_FN u32 crt_place_of_medium(const CrtContext *ctx, u32 media, u32 medium) {
     u32 at = 0u;
     for (; media != 0u; media >>= ctx->scene->medium_bits) {
@@ -74,21 +75,21 @@ CRT_FN vec4 crt_transmittance(const CrtContext *ctx, u32 medium, f32 distance, v
                      crt_transmittance_lane(V4W(sigma), distance));
 }
 
-/* What a ray of direction d crossed before it met `surface`, among `media`. */
+/* The medium that a ray of direction d crossed before it met `surface`, given the list at its start. */
 CRT_FN u32 crt_medium_before(const CrtContext *ctx, const CrtSurface *surface, vec3 d, u32 media) {
     const int inside = surface->medium != 0u && dot3(d, surface->ng) > 0.0f;
     return inside && !crt_surrounds(ctx, media, surface->medium) ? surface->medium
                                                                  : crt_first_medium(ctx, media);
 }
 
-/* Whether another body's surface lies in the same place. */
+/* Whether the surface of another body coincides with it. */
 CRT_FN int crt_touches(const CrtContext *ctx, CrtHit hit) {
     const u32 primitive = crt_primitive_of(ctx, hit);
     return (CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[primitive].object &
             CRT_PRIMITIVE_TOUCHES) != 0u;
 }
 
-/* What is around a ray that leaves `surface` along w, where `media` were around the one that led there. */
+/* The list of a ray that leaves `surface` along w, given the list of the ray that arrived there. */
 CRT_FN u32 crt_media_behind(const CrtContext *ctx, const CrtSurface *surface, const CrtBsdf *bsdf, vec3 w,
                             u32 media) {
     if (surface->medium == 0u || (bsdf->flags & CRT_BSDF_BOUNDS) == 0u) return media;

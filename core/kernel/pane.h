@@ -1,12 +1,12 @@
 /*
- * pane.h: thin panes, two parallel interfaces so near to each other that what passes is neither bent nor
- * moved. Light goes to and fro between them and keeps its polarisation (Stokes 1862): of each polarisation
+ * pane.h: thin panes. A pane is two parallel interfaces so close together that transmitted light is neither
+ * bent nor shifted. Light is reflected back and forth between them and keeps its polarisation (Stokes
+ * 1862), so for each polarisation
  *
  *     T = (1 − R₁)(1 − R₂) / (1 − R₁ R₂),
  *
- * R₁ and R₂ the reflectances of the two sides, and T of unpolarised light is the mean. What
- * does not pass is
- * mirrored; nothing is absorbed.
+ * with R₁ and R₂ the reflectances of the two sides. T of unpolarised light is the mean of both. The pane
+ * reflects the rest and absorbs nothing.
  */
 #ifndef CRT_PANE_H
 #define CRT_PANE_H

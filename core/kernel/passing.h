@@ -1,13 +1,12 @@
 /*
- * passing.h: surfaces that a ray goes on behind, as if it had met nothing: those that are there in part
- * (opacity), and panes. That is no scattering event: the path keeps its vertex, and with it the densities by
- * which light sampling and scattered rays are weighed, since both see a light through the same surfaces. It
- * counts neither for the depth nor as another ray.
+ * passing.h: surfaces that a ray can pass without a scattering event: surfaces with opacity below 1, and
+ * panes. The path keeps its last vertex, and with it the densities that weigh light sampling against
+ * scattered rays, because both techniques see a light through the same surfaces. Passing counts neither
+ * towards the depth nor as another ray.
  *
- * A pane lets T(θ, λ) pass (pane.h). Of a shadow ray the light that waits is multiplied by
- * it. A path's ray
- * passes with the chance q, the mean of T over its wavelengths, and carries T/q; or it is stopped, carries
- * 1/(1 − q), and crt_shade mirrors 1 − T of it.
+ * A pane transmits T(θ, λ) (pane.h). A shadow ray multiplies the light that it tests by T. A path's ray
+ * passes with probability q, the mean of T over its wavelengths, and then carries T/q. Otherwise it stops,
+ * carries 1/(1 − q), and crt_shade reflects 1 − T of it.
  */
 #ifndef CRT_PASSING_H
 #define CRT_PASSING_H
@@ -27,7 +26,7 @@ CRT_FN int crt_is_passable(const CrtContext *ctx) {
     return (CRT_HAS(OPACITY) && ctx->scene->compositions.count != 0u) || crt_has_panes(ctx);
 }
 
-/* The way of a ray through what it passes. */
+/* State of a ray while it passes surfaces. */
 typedef struct CrtPassage {
     u32 dimension; /* where its random numbers begin */
     u32 passed;    /* surfaces so far */
@@ -39,7 +38,7 @@ typedef struct CrtPassage {
     vec4 factor;   /* what the ray carries, over what it carried before */
 } CrtPassage;
 
-/* That of a path's ray at a vertex, or of the shadow ray that it asks. */
+/* The state at the start of a path's ray, or of the shadow ray of its vertex. */
 CRT_FN CrtPassage crt_passage(u32 depth, int shadow, vec3 d, vec4 position, u32 media) {
     CrtPassage way;
     way.dimension = CRT_DIM_PASS + CRT_PASSES_MAX * (2u * depth + (shadow ? 1u : 0u));
@@ -66,7 +65,7 @@ CRT_CALLED_FN CrtRay crt_ray_behind(CrtRay ray, vec3 p, f32 clearance, vec3 ng) 
     return behind;
 }
 
-/* Whether a ray passes the pane that it meets, and what that leaves of what it carries. */
+/* Whether a ray passes the pane that it meets. Updates what the ray carries. */
 CRT_FN int crt_passes_pane(const CrtContext *ctx, const CrtSurface *surface, u32 material,
                            CrtSampler *sampler, u32 dimension, CrtPassage *way) {
     CRT_GLOBAL const CrtMaterial *row = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials) + material;
@@ -81,7 +80,7 @@ CRT_FN int crt_passes_pane(const CrtContext *ctx, const CrtSurface *surface, u32
         return max4(way->factor) > 0.0f;
     }
     f32 chance = 0.25f * sum4(through);
-    /* One that shines is met half of the time at least: it shines on those that stop. */
+    /* An emissive pane stops at least half of the rays: only those that stop see its emission. */
     if (CRT_HAS(AREA_LIGHT) && surface->light != CRT_NONE) chance = 0.5f * chance;
     if (crt_sample_1d(sampler, dimension + CRT_DIM_PANE) < chance) {
         way->factor = way->factor * (through / chance);
