@@ -169,13 +169,10 @@ int run(int argc, char** argv) {
         if (use.registers == 0)
             std::printf("FAILED: the assembler's log says nothing of %s:\n%s\n", entry.c_str(),
                         cubin.log.c_str());
-        // Rays that pass panes under thin films work out the films' transmittance while they are traced.
-        const std::uint64_t filmed = CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_THIN_FILM;
-        const bool passes_films = entry == "crt_trace" && (spec.features & filmed) == filmed;
-        const std::uint32_t allowed = crt::cuda::kSpillBytesAllowed * (passes_films ? 2 : 1);
-        const bool spills = use.spill_bytes > allowed;
+        constexpr std::uint32_t kAllowed = crt::cuda::kSpillBytesAllowed;
+        const bool spills = use.spill_bytes > kAllowed;
         if (spills)
-            std::printf("FAILED: %u bytes are spilled, and %u are allowed\n", use.spill_bytes, allowed);
+            std::printf("FAILED: %u bytes are spilled, and %u are allowed\n", use.spill_bytes, kAllowed);
         // The only array that a thread may keep in memory is the BVH's traversal stack. Spilled values are
         // there, too, and each is stored and loaded at least once.
         const bool array = !crt::cuda::traverses(spec) && use.stack_bytes > use.spill_bytes;

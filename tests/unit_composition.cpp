@@ -127,7 +127,7 @@ TEST_CASE("opacity: rays pass as often as it says, and go on behind the surface"
             ray.o = make_vec3(-0.25f, -0.5f, 1);
             ray.d = kFromFront;
             ray.reach = CRT_INFINITY;
-            CrtPassage way = crt_passage(0, 0, kFromFront, splat4(0), 0u);
+            CrtPassage way = crt_passage(0, 0, kFromFront, splat4(0), 0u, splat4(1));
             way.passed = static_cast<u32>(i & 7);
             if (!crt_passes(&ctx, sheet.hit, &sampler, &way, &ray)) {
                 ++stopped;

@@ -67,7 +67,7 @@ TEST_CASE("each kind of material has a shader that holds no other kind", "[wavef
     }
     CHECK(plan.queue_of_kind[CRT_MATERIAL_DIFFUSE] != plan.queue_of_kind[CRT_MATERIAL_MIRROR]);
     // There is no mix, and nothing shines from outside.
-    CHECK(plan.queue_of_mix == CRT_NONE);
+    CHECK(plan.queue_of_choice == CRT_NONE);
     CHECK(plan.queue_of_miss == CRT_NONE);
 }
 
@@ -107,11 +107,25 @@ TEST_CASE("a mix goes to the queues of what it is made of", "[wavefront]") {
     REQUIRE((c.features & CRT_FEATURE_MIX) != 0);
     const WavePlan plan = planWave(c.data());
     REQUIRE(plan.queues() == 3);
-    CHECK(plan.queue_of_mix == 2);
+    CHECK(plan.queue_of_choice == 2);
     CHECK(plan.kernels.back().entry == Entry::Choose);
     for (const KernelSpec& kernel : plan.kernels)
         if (kernel.entry == Entry::Shade)
             CHECK((kernel.features & CRT_FEATURES_MATERIALS) != CRT_FEATURES_MATERIALS);
+}
+
+TEST_CASE("whether a ray passes a pane is worked out where mixes are chosen", "[wavefront]") {
+    crt::Scene scene = sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::ThinDielectric});
+    scene.materials[1].eta = crt::constantSpectrum(1.5);
+    scene.materials[1].film_thickness_nm = 300;
+    const CompiledScene c = compiled(scene);
+    const WavePlan plan = planWave(c.data());
+    REQUIRE(plan.queues() == 3);
+    CHECK(plan.queue_of_choice == 2);
+    CHECK(plan.kernels.back().entry == Entry::Choose);
+    const std::uint64_t needed = CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_THIN_FILM;
+    CHECK((plan.kernels.back().features & needed) == needed);
+    CHECK((plan.kernels.back().features & CRT_FEATURE_DIFFUSE) == 0);
 }
 
 TEST_CASE("what meets nothing is shaded where something shines there, without any material", "[wavefront]") {
@@ -146,7 +160,7 @@ TEST_CASE("no two queues are one, and there is room for all", "[wavefront]") {
     scene.environment->radiance = crt::constantSpectrum(1);
     const CompiledScene c = compiled(scene);
     const WavePlan plan = planWave(c.data());
-    std::set<std::uint32_t> queues{plan.queue_of_mix, plan.queue_of_miss};
+    std::set<std::uint32_t> queues{plan.queue_of_choice, plan.queue_of_miss};
     for (const std::uint32_t kind : kinds) queues.insert(plan.queue_of_kind[kind]);
     CHECK(queues.size() == kinds.size() + 2);
     CHECK(plan.queues() == queues.size());

@@ -9,25 +9,6 @@
 
 namespace crt {
 
-void Box::add(const Vec3d& point, double padding) {
-    for (std::size_t k = 0; k < 3; ++k) {
-        lower[k] = std::min(lower[k], point[k] - padding);
-        upper[k] = std::max(upper[k], point[k] + padding);
-    }
-}
-
-bool Box::meets(const Box& other) const {
-    for (std::size_t k = 0; k < 3; ++k)
-        if (lower[k] > other.upper[k] || other.lower[k] > upper[k]) return false;
-    return true;
-}
-
-Box boxAround(const Vec3d& p, double padding) {
-    Box box{p, p};
-    box.add(p, padding);
-    return box;
-}
-
 Corners cornersOf(const unsigned char* blob, std::uint32_t slot) {
     using namespace kernel;
     const auto& scene = *reinterpret_cast<const CrtScene*>(blob);

@@ -8,15 +8,6 @@
 
 namespace crt {
 
-/// An axis-aligned box.
-struct Box {
-    Vec3d lower, upper;
-
-    void add(const Vec3d& p, double padding);
-    bool meets(const Box& other) const;
-};
-Box boxAround(const Vec3d& p, double padding);
-
 /// A triangle of the compiled scene, in double.
 struct Corners {
     std::array<Vec3d, 3> p;

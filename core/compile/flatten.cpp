@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "base/stage.h"
 #include "base/vec3d.h"
+#include "compile/box.h"
 #include "compile/divide.h"
 #include "compile/instances.h"
 #include "compile/placements.h"
@@ -41,26 +42,8 @@ bool hasTangents(const Scene& scene) {
                        [](const Material& m) { return m.anisotropy > 0; });
 }
 
-struct Bounds {
-    static constexpr double kInf = std::numeric_limits<double>::infinity();
-    Vec3d lower{kInf, kInf, kInf}, upper{-kInf, -kInf, -kInf};
-
-    void add(const Vec3d& p) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            lower[k] = std::min(lower[k], p[k]);
-            upper[k] = std::max(upper[k], p[k]);
-        }
-    }
-    void add(const Bounds& other) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            lower[k] = std::min(lower[k], other.lower[k]);
-            upper[k] = std::max(upper[k], other.upper[k]);
-        }
-    }
-};
-
 /// Sets centre and scale: the centre is the focus, or the middle of the scene where there is none.
-void measure(FlatScene& flat, const Bounds& bounds) {
+void measure(FlatScene& flat, const Box& bounds) {
     const std::optional<Focus>& focus = flat.focus;
     flat.centre = focus ? focus->centre : Vec3d{};
     flat.scale_exponent = 0;
@@ -115,7 +98,7 @@ public:
 private:
     struct Part {
         std::size_t first = 0, end = 0;
-        Bounds bounds;  ///< In the author's units, of the triangles that have area as far as is known.
+        Box bounds;  ///< In the author's units, of the triangles that have area as far as is known.
         std::size_t smooth = 0;
         std::uint64_t without_area = 0;
         const Placement* infinite = nullptr;  ///< The first that moves a vertex to infinity.
@@ -208,8 +191,8 @@ private:
         });
     }
 
-    Bounds boundsOfParts() const {
-        Bounds all;
+    Box boundsOfParts() const {
+        Box all;
         for (const Part& part : parts_) all.add(part.bounds);
         for (const PlacedShape& shape : shapes_) {
             all.add(shape.lower);
@@ -281,7 +264,7 @@ private:
 
     /// Positions; and which triangles have area.
     void normalise(Part& part) {
-        Bounds seen;
+        Box seen;
         forEachTriangle(placements_, part.first, part.end,
                         [&](std::size_t i, const Placement& placement, std::size_t triangle) {
                             const std::array<Vec3d, 3> corners = placement.corners(triangle);

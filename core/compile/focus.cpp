@@ -1,6 +1,7 @@
 #include "compile/focus.h"
 
 #include "base/parallel.h"
+#include "compile/box.h"
 #include "compile/instances.h"
 
 #include <algorithm>
@@ -19,23 +20,6 @@ constexpr double kMostLost = 256;  ///< The half extent over the size of details
 constexpr int kSnap = 20;          ///< Bits of the way to the point that the camera looks at.
 constexpr std::size_t kSeenAtATime = std::size_t{1} << 14;
 
-/// An axis-aligned box.
-struct Hull {
-    Vec3d lower{kNowhere, kNowhere, kNowhere}, upper{-kNowhere, -kNowhere, -kNowhere};
-
-    void add(const Vec3d& p) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            lower[k] = std::min(lower[k], p[k]);
-            upper[k] = std::max(upper[k], p[k]);
-        }
-    }
-    Vec3d corner(std::size_t i) const {
-        Vec3d p;
-        for (std::size_t k = 0; k < 3; ++k) p[k] = ((i >> k & 1) != 0 ? upper : lower)[k];
-        return p;
-    }
-};
-
 /// Radius of the smallest ball around `centre` that contains a whole object: all triangles of one placement.
 double wholeObject(const std::vector<Placement>& placements, const Vec3d& centre) {
     std::vector<double> reach(placements.size(), kNowhere);
@@ -53,16 +37,16 @@ double wholeObject(const std::vector<Placement>& placements, const Vec3d& centre
 }
 
 /// Bounding boxes of shapes and of instances.
-std::vector<Hull> boxesOf(const Scene& scene, const std::vector<PlacedShape>& shapes) {
-    std::vector<Hull> boxes;
+std::vector<Box> boxesOf(const Scene& scene, const std::vector<PlacedShape>& shapes) {
+    std::vector<Box> boxes;
     for (const PlacedShape& shape : shapes) boxes.push_back({shape.lower, shape.upper});
     for (const Object& object : scene.objects) {
         if (!sharesMesh(scene, object)) continue;
-        Hull mesh;
+        Box mesh;
         for (const Vec3d& p : scene.meshes[object.mesh].positions) mesh.add(p);
         for (const Matrix4d& transform : object.transforms) {
             if (!canInstance(transform)) continue;
-            Hull placed;
+            Box placed;
             for (std::size_t i = 0; i < 8; ++i) placed.add(transformPoint(transform, mesh.corner(i)));
             boxes.push_back(placed);
         }
@@ -81,7 +65,7 @@ double distanceOf(const std::array<Vec3d, 3>& p, const Vec3d& way) {
     return u >= 0 && v >= 0 && u + v <= 1 && t > 0 ? t : kNowhere;  // NaN: none
 }
 
-double distanceOf(const Hull& box, const Vec3d& way) {
+double distanceOf(const Box& box, const Vec3d& way) {
     double enter = 0, leave = kNowhere;
     for (std::size_t k = 0; k < 3; ++k) {
         const double a = box.lower[k] / way[k], b = box.upper[k] / way[k];
@@ -99,7 +83,7 @@ double ballAround(const std::array<Vec3d, 3>& p, const Vec3d& centre) {
     if (!(dot(n, n) > 0)) return kNowhere;  // no area, so it is invisible
     return std::max({length(p[0] - centre), length(p[1] - centre), length(p[2] - centre)});
 }
-double ballAround(const Hull& box, const Vec3d& centre) {
+double ballAround(const Box& box, const Vec3d& centre) {
     double reach = 0;
     for (std::size_t i = 0; i < 8; ++i) reach = std::max(reach, length(box.corner(i) - centre));
     return reach;
@@ -107,13 +91,12 @@ double ballAround(const Hull& box, const Vec3d& centre) {
 
 /// Of the triangles and boxes of a scene, or of some of them: seen from the camera, in units of 2^exponent.
 struct Seen {
-    Hull box;
+    Box box;
     double ahead = kNowhere;   ///< What the middle of the view shows; how far away.
     double detail = kNowhere;  ///< As of Focus, around some place.
 
     void add(const Seen& other) {
-        box.add(other.box.lower);
-        box.add(other.box.upper);
+        box.add(other.box);
         ahead = std::min(ahead, other.ahead);
         detail = std::min(detail, other.detail);
     }
@@ -131,7 +114,7 @@ public:
     }
 
     std::optional<Focus> focus() {
-        const Hull box = ofAll([](Seen& seen, const auto& thing) { addTo(seen.box, thing); }).box;
+        const Box box = ofAll([](Seen& seen, const auto& thing) { addTo(seen.box, thing); }).box;
         double half_extent = 0, farthest = 0;
         for (std::size_t k = 0; k < 3; ++k) {
             half_extent = std::max(half_extent, (box.upper[k] - box.lower[k]) / 2);
@@ -161,21 +144,18 @@ public:
         const double unit = std::ldexp(1.0, exponent_);
         const Vec3d focus = eye_ + centre * unit;
         double object = wholeObject(placements_, focus) / unit;
-        for (const Hull& thing : boxes_)
-            object = std::min(object, ballAround(Hull{fromEye(thing.lower), fromEye(thing.upper)}, centre));
+        for (const Box& thing : boxes_)
+            object = std::min(object, ballAround(fromEye(thing), centre));
         // Fine triangles alone are no reason: the objects that they form lose nothing visible.
         if (!(object * kMostLost < half_extent)) return std::nullopt;
         return Focus{focus, detail * unit};
     }
 
 private:
-    static void addTo(Hull& box, const std::array<Vec3d, 3>& p) {
+    static void addTo(Box& box, const std::array<Vec3d, 3>& p) {
         for (const Vec3d& corner : p) box.add(corner);
     }
-    static void addTo(Hull& box, const Hull& thing) {
-        box.add(thing.lower);
-        box.add(thing.upper);
-    }
+    static void addTo(Box& box, const Box& thing) { box.add(thing); }
 
     /// To so few digits that its sum with the camera's position is exact wherever that position is.
     static Vec3d snapped(const Vec3d& v, double size) {
@@ -183,6 +163,7 @@ private:
         return {std::rint(v[0] / step) * step, std::rint(v[1] / step) * step, std::rint(v[2] / step) * step};
     }
 
+    Box fromEye(const Box& box) const { return {fromEye(box.lower), fromEye(box.upper)}; }
     Vec3d fromEye(const Vec3d& p) const { return (p - eye_) * std::ldexp(1.0, -exponent_); }
 
     /// look(seen, thing) of all triangles and boxes.
@@ -202,12 +183,12 @@ private:
         });
         Seen all;
         for (const Seen& part : parts) all.add(part);
-        for (const Hull& box : boxes_) look(all, Hull{fromEye(box.lower), fromEye(box.upper)});
+        for (const Box& box : boxes_) look(all, fromEye(box));
         return all;
     }
 
     const std::vector<Placement>& placements_;
-    const std::vector<Hull> boxes_;
+    const std::vector<Box> boxes_;
     const Vec3d eye_;
     Vec3d way_{};
     int exponent_ = 0;

@@ -4,6 +4,7 @@
 
 #include "base/parallel.h"
 #include "base/vec3d.h"
+#include "compile/box.h"
 #include "compile/coplanar.h"
 
 #include <algorithm>
@@ -95,7 +96,8 @@ kernel::CrtHit closestWithin(const kernel::CrtContext& context, const kernel::Cr
         return p;
     };
     const auto reach = static_cast<double>(ray.reach);
-    Box box = boxAround(point(0), reach * 1e-3);
+    Box box;
+    box.add(point(0), reach * 1e-3);
     box.add(point(reach), reach * 1e-3);
     const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
     const CrtShear shear = crt_shear(ray);
@@ -160,7 +162,7 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
         const std::uint32_t slot = lights[order[i]];
         const CrtPrimitive& light = primitives[triangles[slot].id];
         const Corners own = cornersOf(context.blob, slot);
-        Box box = boxAround(own.p[0], 2 * own.clearance);
+        Box box;
         for (const Vec3d& corner : own.p) box.add(corner, 2 * own.clearance);
         visitNeighbours(context, box, tests, [&](std::uint32_t other) {
             // Of one lamp's halves, and of two lamps that shine alike, it does not matter which is seen.

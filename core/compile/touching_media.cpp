@@ -1,5 +1,6 @@
 #include "compile/touching_media.h"
 
+#include "compile/box.h"
 #include "compile/coplanar.h"
 #include "kernel/features.h"
 #include "kernel/layout.h"
@@ -32,7 +33,7 @@ std::vector<Bounding> boundingTriangles(const unsigned char* blob) {
         const CrtPrimitive& primitive = primitives[triangle.id];
         if (materials[primitive.material].medium == 0) continue;
         const Corners corners = cornersOf(blob, slot);
-        Box box = boxAround(corners.p[0], corners.clearance);
+        Box box;
         for (const Vec3d& p : corners.p) box.add(p, corners.clearance);
         all.push_back({slot, triangle.id, primitive.object, box});
     }

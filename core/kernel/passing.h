@@ -35,11 +35,11 @@ typedef struct CrtPassage {
     u32 material;  /* in scenes with panes, what a mix that stops the ray is found to be of; or CRT_NONE */
     vec3 d;        /* unit: a shadow ray is turned to its end behind each surface, by rounding */
     vec4 position; /* of the path's wavelengths */
-    vec4 factor;   /* what the ray carries, over what it carried before */
+    vec4 carried;  /* the throughput of the path, or the light that a shadow ray tests */
 } CrtPassage;
 
 /* The state at the start of a path's ray, or of the shadow ray of its vertex. */
-CRT_FN CrtPassage crt_passage(u32 depth, int shadow, vec3 d, vec4 position, u32 media) {
+CRT_FN CrtPassage crt_passage(u32 depth, int shadow, vec3 d, vec4 position, u32 media, vec4 carried) {
     CrtPassage way;
     way.dimension = CRT_DIM_PASS + CRT_PASSES_MAX * (2u * depth + (shadow ? 1u : 0u));
     way.passed = 0u;
@@ -48,7 +48,7 @@ CRT_FN CrtPassage crt_passage(u32 depth, int shadow, vec3 d, vec4 position, u32 
     way.material = CRT_NONE;
     way.d = d / crt_sqrt(dot3(d, d));
     way.position = position;
-    way.factor = splat4(1.0f);
+    way.carried = carried;
     return way;
 }
 
@@ -76,18 +76,30 @@ CRT_FN int crt_passes_pane(const CrtContext *ctx, const CrtSurface *surface, u32
     crt_prepare_pane(ctx, &pane, &made_of, surface, way->position);
     const vec4 through = crt_pane_transmittance(&pane, crt_pane_cosine(surface, way->d));
     if (way->shadow) {
-        way->factor = way->factor * through;
-        return max4(way->factor) > 0.0f;
+        way->carried = way->carried * through;
+        return max4(way->carried) > 0.0f;
     }
     f32 chance = 0.25f * sum4(through);
     /* An emissive pane stops at least half of the rays: only those that stop see its emission. */
     if (CRT_HAS(AREA_LIGHT) && surface->light != CRT_NONE) chance = 0.5f * chance;
     if (crt_sample_1d(sampler, dimension + CRT_DIM_PANE) < chance) {
-        way->factor = way->factor * (through / chance);
+        way->carried = way->carried * (through / chance);
         return 1;
     }
-    way->factor = way->factor / (1.0f - chance);
+    way->carried = way->carried / (1.0f - chance);
     return 0;
+}
+
+/* Whether a ray may pass what it meets, or meets a mix: crt_passes decides. */
+CRT_FN int crt_may_pass(const CrtContext *ctx, CrtHit hit) {
+    const u32 material =
+        CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[crt_primitive_of(ctx, hit)].material;
+    if ((CRT_HAS(OPACITY) || CRT_HAS(MIX)) && ctx->scene->compositions.count != 0u) {
+        CRT_GLOBAL const CrtComposition *c = crt_compositions(ctx) + material;
+        if (c->opacity != CRT_OPAQUE || c->kind != CRT_COMPOSED_PLAIN) return 1;
+    }
+    return CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].type ==
+           CRT_MATERIAL_THIN_DIELECTRIC;
 }
 
 /* Whether a ray passes a surface of which a part is there. A hole in the surface of a body is one in the

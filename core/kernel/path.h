@@ -32,18 +32,19 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
     CrtRay ray = path->ray;
     int alive = 0;
     const int passable = crt_is_passable(ctx);
-    CrtPassage way = crt_passage(path->depth, 0, ray.d, path->wavelengths.position, path->media);
+    CrtPassage way = crt_passage(path->depth, 0, ray.d, path->wavelengths.position, path->media,
+                                 path->throughput);
     rays->closest += 1u;
     for (;;) {
         CrtHit hit = crt_no_hit(ray.reach);
         if (ray.reach > 0.0f) hit = crt_trace_closest(ctx, ray);
         if (passable && hit.slot != CRT_NONE && crt_passes(ctx, hit, &path->sampler, &way, &ray)) continue;
         if (way.shadow) { /* what the vertex asked is answered */
-            if (hit.slot == CRT_NONE) path->radiance = path->radiance + shadow.radiance * way.factor;
+            if (hit.slot == CRT_NONE) path->radiance = path->radiance + way.carried;
             return alive;
         }
         hit.t = hit.t + dot3(ray.o - path->ray.o, ray.d); /* from where the path's ray began */
-        path->throughput = path->throughput * way.factor;
+        path->throughput = way.carried;
         path->met = way.material;
         const u32 depth = path->depth;
         alive = crt_shade(ctx, path, hit, &shadow);
@@ -54,7 +55,8 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
         }
         rays->shadow += 1u;
         ray = shadow.ray;
-        way = crt_passage(depth, 1, ray.d, way.position, CRT_HAS(MEDIA) ? shadow.media : 0u);
+        way = crt_passage(depth, 1, ray.d, way.position, CRT_HAS(MEDIA) ? shadow.media : 0u,
+                          shadow.radiance);
     }
 }
 

@@ -16,12 +16,13 @@ CRT_KERNEL_BEGIN
 #define CRT_WAVE_BLOCK 128u /* slots of 16 × 8 pixels, as warps of 8 × 4 */
 #define CRT_WAVE_BLOCK_WIDTH 16u
 #define CRT_WAVE_BLOCK_HEIGHT 8u
-#define CRT_WAVE_QUEUES 16u /* at most: one a kind of material, one of misses, one of mixes */
+#define CRT_WAVE_QUEUES 16u /* at most: one a kind of material, one of misses, one of choices */
 
 /* State of a slot. None: its path goes on from a vertex. */
 #define CRT_WAVE_DONE 1u  /* its samples are taken, or it has none */
 #define CRT_WAVE_ENDED 2u /* its path has ended */
 #define CRT_WAVE_ASKED 4u /* a shadow ray waits for its answer */
+#define CRT_WAVE_PASSED 8u /* the ray that it waits for goes on behind a surface that it has passed */
 
 /* Rows. */
 #define CRT_ROW_ORIGIN 0u       /* of the ray; depth, hero wavelength and `alone` */
@@ -40,10 +41,16 @@ CRT_KERNEL_BEGIN
 #define CRT_ROW_ALBEDO 13u      /* first hit: */
 #define CRT_ROW_NORMAL 14u      /* and depth */
 #define CRT_ROW_PRIMITIVE 15u
+/* Where there are panes: the origin of a path's ray behind what it has passed, or the first direction of a
+   shadow ray; and how many surfaces it has passed. */
+#define CRT_ROW_PASSED 16u
 
 /* Rows that a scene's slots have. */
-#define CRT_WAVE_ROWS(features) \
-    (((features) & CRT_FEATURE_AOV) ? 16u : ((features) & CRT_FEATURE_LIGHT_TREE) ? 13u : 12u)
+#define CRT_WAVE_ROWS(features)                     \
+    (((features) & CRT_FEATURE_THIN_DIELECTRIC) ? 17u \
+     : ((features) & CRT_FEATURE_AOV)          ? 16u \
+     : ((features) & CRT_FEATURE_LIGHT_TREE)   ? 13u \
+                                               : 12u)
 
 /* A launch: samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1), and
    where its slots are kept. */
@@ -64,7 +71,7 @@ typedef struct CrtWave {
     CRT_GLOBAL u32 *primitives;
     CRT_GLOBAL u64 *rays;     /* pairs of counters */
     u32 queue_of_kind[32];    /* by CRT_MATERIAL_… */
-    u32 queue_of_mix;         /* whose slots go on to other queues (crt_wave_choose) */
+    u32 queue_of_choice;      /* whose slots go on to other queues, or are traced on (crt_wave_choose) */
     u32 queue_of_miss;        /* CRT_NONE: nothing shines there */
 } CrtWave;
 CRT_ASSERT_SIZE(CrtWave, 264);
@@ -248,20 +255,14 @@ CRT_FN int crt_wave_next_sample(const CrtContext *ctx, const CrtWave *wave, u32 
     return 1;
 }
 
-/* What a ray meets where it may pass surfaces, and *ray from behind the last that it has passed. */
+/* What a ray meets where it may pass surfaces, and *ray from behind the last that it has passed. For scenes
+   without panes: there crt_wave_choose works out what passes, so that tracing stays short. */
 CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, CrtSampler *sampler, CrtPassage *way, CrtRay *ray) {
     for (;;) {
         CrtHit hit = crt_no_hit(ray->reach);
         if (ray->reach > 0.0f) hit = crt_trace_closest(ctx, *ray);
         if (hit.slot == CRT_NONE || !crt_passes(ctx, hit, sampler, way, ray)) return hit;
     }
-}
-
-/* The way of a ray of the slot's path; its wavelengths are for panes alone. */
-CRT_FN CrtPassage crt_wave_passage(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 depth,
-                                   int shadow, vec3 d, u32 media) {
-    const vec4 position = crt_has_panes(ctx) ? *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) : splat4(0.0f);
-    return crt_passage(depth, shadow, d, position, media);
 }
 
 /* Numbers of a state that were taken while tracing. */
@@ -271,63 +272,95 @@ CRT_FN void crt_store_xorshift(const CrtContext *ctx, const CrtWave *wave, u32 s
     *row = crt_row_of(crt_row_vector(*row), crt_from_bits(s->b0));
 }
 
-/* Traces the shadow ray that a slot waits for, and adds its light where nothing stops it. */
-CRT_FN void crt_wave_answer(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state,
-                            CrtRayCount *rays) {
+CRT_FN void crt_store_hit(const CrtWave *wave, u32 slot, CrtHit hit) {
+    *crt_row(wave, CRT_ROW_HIT, slot) = make_vec4(hit.t, hit.b1, hit.b2, crt_from_bits(hit.slot));
+    *crt_row(wave, CRT_ROW_HIT_IDS, slot) =
+        make_vec4(crt_from_bits(hit.id), crt_from_bits(CRT_HAS(INSTANCES) ? hit.instance : 0u),
+                  crt_from_bits(CRT_NONE), 0.0f);
+}
+
+CRT_FN CrtRay crt_load_shadow_ray(const CrtWave *wave, u32 slot) {
     const vec4 origin = *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot);
     CrtRay ray;
     ray.o = crt_row_vector(origin);
-    const vec4 direction = *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot);
-    ray.d = crt_row_vector(direction);
+    ray.d = crt_row_vector(*crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot));
     ray.reach = V4W(origin);
-    vec4 light = *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot);
+    return ray;
+}
+
+/* That of the vertex that asked a shadow ray: crt_shade has counted it where the path goes on. */
+CRT_FN u32 crt_asking_depth(const CrtWave *wave, u32 slot, u32 state) {
+    return crt_load_depth(wave, slot) - (state & CRT_WAVE_ENDED ? 0u : 1u);
+}
+
+/* The state of a slot's ray while it passes surfaces. `state`: of the slot. */
+CRT_FN CrtPassage crt_load_passage(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state) {
+    const int shadow = (state & CRT_WAVE_ASKED) != 0u;
+    const vec4 direction =
+        *crt_row(wave, shadow ? CRT_ROW_SHADOW_DIRECTION : CRT_ROW_DIRECTION, slot);
+    const u32 depth = shadow ? crt_asking_depth(wave, slot, state) : crt_load_depth(wave, slot);
+    const u32 media =
+        crt_bits(V4W(shadow ? direction : *crt_row(wave, CRT_ROW_REST, slot)));
+    const vec4 carried = *crt_row(wave, shadow ? CRT_ROW_SHADOW_RADIANCE : CRT_ROW_THROUGHPUT, slot);
+    const vec4 position =
+        crt_has_panes(ctx) ? *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) : splat4(0.0f);
+    CrtPassage way = crt_passage(depth, shadow, crt_row_vector(direction), position, media, carried);
+    if ((state & CRT_WAVE_PASSED) != 0u) {
+        const vec4 passed = *crt_row(wave, CRT_ROW_PASSED, slot);
+        way.passed = crt_bits(V4W(passed));
+        if (shadow) way.d = crt_row_vector(passed);
+    }
+    return way;
+}
+
+/* Traces the shadow ray that a slot waits for, and adds its light where nothing stops it. Returns 0 where
+   crt_wave_choose has to say whether it passes what it meets. */
+CRT_FN int crt_wave_answer(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state,
+                           CrtRayCount *rays) {
+    CrtRay ray = crt_load_shadow_ray(wave, slot);
     int blocked = 0;
     if (ray.reach > 0.0f) {
-        rays->shadow += 1u;
-        if (crt_is_passable(ctx)) {
-            /* The vertex that asked: crt_shade has counted it where the path goes on. */
-            const u32 depth = crt_load_depth(wave, slot) - (state & CRT_WAVE_ENDED ? 0u : 1u);
+        if ((state & CRT_WAVE_PASSED) == 0u) rays->shadow += 1u;
+        if (crt_has_panes(ctx)) {
+            const CrtHit hit = crt_trace_closest(ctx, ray);
+            blocked = hit.slot != CRT_NONE;
+            if (blocked && crt_may_pass(ctx, hit)) {
+                crt_store_hit(wave, slot, hit);
+                return 0;
+            }
+        } else if (crt_is_passable(ctx)) {
             CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
-            CrtPassage way = crt_wave_passage(ctx, wave, slot, depth, 1, ray.d, crt_bits(V4W(direction)));
+            CrtPassage way = crt_load_passage(ctx, wave, slot, state);
             blocked = crt_trace_passing(ctx, &sampler, &way, &ray).slot != CRT_NONE;
-            light = light * way.factor;
             crt_store_xorshift(ctx, wave, slot, &sampler);
         } else {
             blocked = crt_trace_any(ctx, ray);
         }
     }
     CRT_GLOBAL vec4 *radiance = crt_row(wave, CRT_ROW_RADIANCE, slot);
-    if (!blocked) *radiance = *radiance + light;
+    if (!blocked) *radiance = *radiance + *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot);
+    return 1;
 }
 
-/* Traces the ray of the slot's path to its next vertex. *met: as CrtPath has it. */
-CRT_FN CrtHit crt_wave_closest(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 *met,
+/* Traces the ray of the slot's path to its next vertex, or to a surface that it may pass. */
+CRT_FN CrtHit crt_wave_closest(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state,
                                CrtRayCount *rays) {
     CrtRay ray = crt_load_path_ray(wave, slot);
-    rays->closest += 1u;
+    const vec3 o = ray.o;
     CrtHit hit;
-    *met = CRT_NONE;
-    if (crt_is_passable(ctx)) {
-        const vec3 o = ray.o;
+    if ((state & CRT_WAVE_PASSED) != 0u) ray.o = crt_row_vector(*crt_row(wave, CRT_ROW_PASSED, slot));
+    else rays->closest += 1u;
+    if (crt_is_passable(ctx) && !crt_has_panes(ctx)) {
         CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
-        CrtPassage way = crt_wave_passage(ctx, wave, slot, crt_load_depth(wave, slot), 0, ray.d,
-                                          crt_bits(V4W(*crt_row(wave, CRT_ROW_REST, slot))));
+        CrtPassage way = crt_load_passage(ctx, wave, slot, state);
         hit = crt_trace_passing(ctx, &sampler, &way, &ray);
         crt_store_xorshift(ctx, wave, slot, &sampler);
-        hit.t = hit.t + dot3(ray.o - o, ray.d); /* from where the path's ray began */
-        *met = way.material;
-        const vec4 off = way.factor - splat4(1.0f);
-        if (crt_has_panes(ctx) && sum4(off * off) > 0.0f) {
-            CRT_GLOBAL vec4 *throughput = crt_row(wave, CRT_ROW_THROUGHPUT, slot);
-            *throughput = *throughput * way.factor;
-        }
     } else {
         hit = crt_trace_closest(ctx, ray);
     }
-    *crt_row(wave, CRT_ROW_HIT, slot) = make_vec4(hit.t, hit.b1, hit.b2, crt_from_bits(hit.slot));
-    *crt_row(wave, CRT_ROW_HIT_IDS, slot) =
-        make_vec4(crt_from_bits(hit.id), crt_from_bits(CRT_HAS(INSTANCES) ? hit.instance : 0u),
-                  crt_from_bits(*met), 0.0f);
+    /* From where the path's ray began. */
+    if (crt_is_passable(ctx)) hit.t = hit.t + dot3(ray.o - o, ray.d);
+    crt_store_hit(wave, slot, hit);
     return hit;
 }
 
@@ -335,16 +368,16 @@ CRT_FN u32 crt_queue_of_material(const CrtContext *ctx, const CrtWave *wave, u32
     return wave->queue_of_kind[CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].type];
 }
 
-/* Who shades what a ray has met. */
-CRT_FN u32 crt_queue_of(const CrtContext *ctx, const CrtWave *wave, CrtHit hit, u32 met) {
+/* Who shades what a path's ray has met, or crt_wave_choose, who finds out. */
+CRT_FN u32 crt_queue_of(const CrtContext *ctx, const CrtWave *wave, CrtHit hit) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     if (hit.slot == CRT_NONE) return wave->queue_of_miss;
-    if (met != CRT_NONE) return crt_queue_of_material(ctx, wave, met);
     const u32 material =
         CRT_ARRAY(CrtPrimitive, ctx->blob, scene->primitives)[crt_primitive_of(ctx, hit)].material;
+    if (crt_has_panes(ctx) && crt_may_pass(ctx, hit)) return wave->queue_of_choice;
     if (CRT_HAS(MIX) && scene->compositions.count != 0u &&
         crt_compositions(ctx)[material].kind != CRT_COMPOSED_PLAIN)
-        return wave->queue_of_mix;
+        return wave->queue_of_choice;
     return crt_queue_of_material(ctx, wave, material);
 }
 
@@ -352,17 +385,22 @@ CRT_FN u32 crt_queue_of(const CrtContext *ctx, const CrtWave *wave, CrtHit hit, 
    sample. Returns the queue that it belongs to, or CRT_NONE. *finished: its last sample is done. */
 CRT_FN u32 crt_wave_trace(const CrtContext *ctx, const CrtWave *wave, u32 slot, int first_pass,
                           CrtRayCount *rays, u32 *finished) {
-    const u32 state = first_pass ? CRT_WAVE_ENDED : wave->state[slot];
+    u32 state = first_pass ? CRT_WAVE_ENDED : wave->state[slot];
     if ((state & CRT_WAVE_DONE) != 0u) return CRT_NONE;
-    if ((state & CRT_WAVE_ASKED) != 0u) crt_wave_answer(ctx, wave, slot, state, rays);
-    if ((state & CRT_WAVE_ENDED) != 0u && !crt_wave_next_sample(ctx, wave, slot, first_pass)) {
-        *finished = 1u;
-        return CRT_NONE;
+    if ((state & CRT_WAVE_ASKED) != 0u) {
+        if (!crt_wave_answer(ctx, wave, slot, state, rays)) return wave->queue_of_choice;
+        state &= CRT_WAVE_ENDED;
     }
-    u32 met;
-    const CrtHit hit = crt_wave_closest(ctx, wave, slot, &met, rays);
-    const u32 queue = crt_queue_of(ctx, wave, hit, met);
+    if ((state & CRT_WAVE_ENDED) != 0u) {
+        if (!crt_wave_next_sample(ctx, wave, slot, first_pass)) {
+            *finished = 1u;
+            return CRT_NONE;
+        }
+        state = 0u;
+    }
+    const u32 queue = crt_queue_of(ctx, wave, crt_wave_closest(ctx, wave, slot, state, rays));
     if (queue == CRT_NONE) wave->state[slot] = CRT_WAVE_ENDED;
+    else if (crt_has_panes(ctx)) wave->state[slot] = state; /* crt_wave_choose reads it */
     return queue;
 }
 
@@ -378,8 +416,41 @@ CRT_FN CrtHit crt_load_hit(const CrtWave *wave, u32 slot) {
     return hit;
 }
 
-/* The queue of the material that the slot's path finds of a mix: crt_shade will find the same one. */
+/* Whether the slot's ray passes what it has met. If so, it is traced on from behind it in the next pass. A
+   shadow ray that is stopped has its answer. */
+CRT_FN int crt_wave_passes(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
+    const u32 state = wave->state[slot];
+    const int shadow = (state & CRT_WAVE_ASKED) != 0u;
+    CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
+    CrtPassage way = crt_load_passage(ctx, wave, slot, state);
+    CrtRay ray = shadow ? crt_load_shadow_ray(wave, slot) : crt_load_path_ray(wave, slot);
+    if (!shadow && (state & CRT_WAVE_PASSED) != 0u)
+        ray.o = crt_row_vector(*crt_row(wave, CRT_ROW_PASSED, slot));
+    const int passes = crt_passes(ctx, crt_load_hit(wave, slot), &sampler, &way, &ray);
+    crt_store_xorshift(ctx, wave, slot, &sampler);
+    wave->state[slot] = passes ? state | CRT_WAVE_PASSED : state & CRT_WAVE_ENDED;
+    if (shadow) {
+        *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot) = way.carried;
+        *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot) = crt_row_of(ray.o, ray.reach);
+        *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot) = crt_row_of(ray.d, crt_from_bits(way.media));
+    } else {
+        *crt_row(wave, CRT_ROW_THROUGHPUT, slot) = way.carried;
+        CRT_GLOBAL vec4 *ids = crt_row(wave, CRT_ROW_HIT_IDS, slot);
+        *ids = make_vec4(V4X(*ids), V4Y(*ids), crt_from_bits(way.material), 0.0f);
+    }
+    if (passes)
+        *crt_row(wave, CRT_ROW_PASSED, slot) = crt_row_of(shadow ? way.d : ray.o, crt_from_bits(way.passed));
+    return passes || shadow;
+}
+
+/* The queue of the material that the slot's path finds: crt_shade will find the same one. CRT_NONE where a
+   ray is traced on. */
 CRT_FN u32 crt_wave_choose(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
+    if (crt_has_panes(ctx)) {
+        if (crt_wave_passes(ctx, wave, slot)) return CRT_NONE;
+        const u32 met = crt_bits(V4Z(*crt_row(wave, CRT_ROW_HIT_IDS, slot)));
+        if (met != CRT_NONE) return crt_queue_of_material(ctx, wave, met);
+    }
     const CrtSurface surface = crt_surface(ctx, crt_load_hit(wave, slot));
     CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
     const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * crt_load_depth(wave, slot);

@@ -17,14 +17,14 @@
 namespace crt::plugin {
 
 struct WavePlan {
-    /// crt_trace; the shader of queue 0, of queue 1, …; where there are mixes, crt_choose_queue, whose
-    /// queue is the last.
+    /// crt_trace; the shader of queue 0, of queue 1, …; where there are mixes or panes, crt_choose_queue,
+    /// whose queue is the last.
     std::vector<KernelSpec> kernels;
     std::uint32_t queue_of_kind[32] = {};
-    std::uint32_t queue_of_mix = CRT_NONE, queue_of_miss = CRT_NONE;
+    std::uint32_t queue_of_choice = CRT_NONE, queue_of_miss = CRT_NONE;
     std::uint32_t queues() const { return static_cast<std::uint32_t>(kernels.size() - 1); }
-    /// Queues that are shaded: all but that of mixes.
-    std::uint32_t shaders() const { return queues() - (queue_of_mix != CRT_NONE ? 1 : 0); }
+    /// Queues that are shaded: all but that of choices.
+    std::uint32_t shaders() const { return queues() - (queue_of_choice != CRT_NONE ? 1 : 0); }
     /// That a slot of so many rows takes on the device.
     std::uint64_t bytesPerSlot(std::uint32_t rows) const {
         return rows * sizeof(kernel::vec4) +
@@ -94,9 +94,11 @@ inline WavePlan planWave(const void* blob) {
         plan.queue_of_miss = plan.queues();
         plan.kernels.push_back({Entry::Shade, others});
     }
-    if (mixes) {
-        plan.queue_of_mix = plan.queues();
-        plan.kernels.push_back({Entry::Choose, others});
+    // Whether a ray passes a pane is worked out where mixes are chosen.
+    const auto panes = kinds.find(CRT_MATERIAL_THIN_DIELECTRIC);
+    if (mixes || panes != kinds.end()) {
+        plan.queue_of_choice = plan.queues();
+        plan.kernels.push_back({Entry::Choose, others | (panes != kinds.end() ? panes->second : 0)});
     }
     return plan;
 }
@@ -112,7 +114,7 @@ inline kernel::CrtWave waveOf(const WavePlan& plan, const Launch& launch, std::u
     wave.sample_count = launch.sample_count;
     wave.slices = slices;
     std::copy(std::begin(plan.queue_of_kind), std::end(plan.queue_of_kind), wave.queue_of_kind);
-    wave.queue_of_mix = plan.queue_of_mix;
+    wave.queue_of_choice = plan.queue_of_choice;
     wave.queue_of_miss = plan.queue_of_miss;
     return wave;
 }

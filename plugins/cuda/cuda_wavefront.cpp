@@ -81,7 +81,7 @@ void Wavefront::runPass(const std::vector<Module>& kernels, kernel::CrtScene sce
     const auto most = [&](const Module& kernel) {
         return std::min(blocks, kernel.residentBlocks() * device_.multiprocessors);
     };
-    if (plan_.queue_of_mix != CRT_NONE)
+    if (plan_.queue_of_choice != CRT_NONE)
         cuda.check(cuda.cuLaunchKernel(kernels.back().kernel(), most(kernels.back()), 1, 1, kBlock, 1, 1, 0,
                                        nullptr, trace_arguments, nullptr),
                    "launching the kernel that chooses materials");

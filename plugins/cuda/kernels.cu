@@ -141,20 +141,21 @@ extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
 #endif
 
 #if CRT_ENTRIES & CRT_ENTRY_CHOOSE
-/* Hands the slots that have met a mix to the queues of the materials that they find. */
+/* Hands the slots that have met a mix or a pane to the queues of the materials that they find, unless their
+   rays pass it. */
 extern "C" __global__ void __launch_bounds__(CRT_BLOCK, CRT_BLOCKS_PER_SM)
     crt_choose_queue(const __grid_constant__ CrtScene scene, const __grid_constant__ CrtWave wave,
                      const unsigned char* blob, u32 pass) {
     CrtContext context;
     context.blob = blob;
     context.scene = &scene;
-    const u32 mix = wave.queue_of_mix;
-    const u32 length = *crt_queue_length(&wave, pass, mix);
+    const u32 choice = wave.queue_of_choice;
+    const u32 length = *crt_queue_length(&wave, pass, choice);
     for (u32 first = blockIdx.x * CRT_BLOCK; first < length; first += gridDim.x * CRT_BLOCK) {
         const u32 i = first + threadIdx.x;
         u32 slot = 0u, queue = CRT_NONE;
         if (i < length) {
-            slot = wave.queued[(u64)mix * wave.slots + i];
+            slot = wave.queued[(u64)choice * wave.slots + i];
             queue = crt_wave_choose(&context, &wave, slot);
         }
         crt_enqueue(&wave, pass, queue, slot);

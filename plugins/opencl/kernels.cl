@@ -122,20 +122,21 @@ __kernel __attribute__((reqd_work_group_size(CRT_WAVE_BLOCK, 1, 1))) void crt_tr
 #endif
 
 #if CRT_ENTRIES & CRT_ENTRY_CHOOSE
-/* Hands the slots that have met a mix to the queues of the materials that they find. */
+/* Hands the slots that have met a mix or a pane to the queues of the materials that they find, unless their
+   rays pass it. */
 __kernel __attribute__((reqd_work_group_size(CRT_WAVE_BLOCK, 1, 1))) void crt_choose_queue(
     __global const uchar* blob, __global const uchar* header, uint queues, __global float4* rows,
     __global uint* words, uint pass) {
     __local uint lengths[2u * CRT_WAVE_QUEUES];
     CrtWave wave = crt_wave_given(header, queues, rows, words);
     const CrtContext context = crt_context_of(blob);
-    const uint mix = wave.queue_of_mix, length = *crt_queue_length(&wave, pass, mix);
+    const uint choice = wave.queue_of_choice, length = *crt_queue_length(&wave, pass, choice);
     for (uint first = (uint)get_group_id(0) * CRT_WAVE_BLOCK; first < length;
          first += (uint)get_num_groups(0) * CRT_WAVE_BLOCK) {
         const uint i = first + (uint)get_local_id(0);
         uint slot = 0u, queue = CRT_NONE; /* all of a group meet at the barriers */
         if (i < length) {
-            slot = wave.queued[(ulong)mix * wave.slots + i];
+            slot = wave.queued[(ulong)choice * wave.slots + i];
             queue = crt_wave_choose(&context, &wave, slot);
         }
         crt_enqueue(&wave, pass, queue, slot, lengths);

@@ -78,7 +78,7 @@ void Wavefront::runWave(const std::vector<Program>& kernels, const kernel::CrtWa
         [&](cl_uint pass) {
             setArgument(kernels.front(), 9, pass);
             run(kernels.front(), blocks);
-            if (plan_.queue_of_mix != CRT_NONE) {
+            if (plan_.queue_of_choice != CRT_NONE) {
                 setArgument(kernels.back(), 5, pass);
                 run(kernels.back(), shading);
             }

@@ -119,7 +119,7 @@ void launchWave(const void* scene_blob, const Launch& launch, std::uint32_t slic
     wave.counts = device(film.counts);
     wave.primitives = film.primitives;
     wave.rays = device(rays);
-    wave.queue_of_mix = kShaders;
+    wave.queue_of_choice = kShaders;
     wave.queue_of_miss = scene.environment == CRT_NONE && scene.point_lights.count == 0 ? CRT_NONE : 1;
     const auto* blob = static_cast<const unsigned char*>(scene_blob);
     for (u32 pass = 0; *wave.finished < wave.slots; ++pass) {

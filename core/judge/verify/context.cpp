@@ -310,6 +310,14 @@ double radiance(const Film& film) {
     return meanOver(film, [&](std::uint32_t x, std::uint32_t y) { return radiance(film, x, y); });
 }
 
+double meanOfBin(const Film& film, std::uint32_t bin) {
+    double sum = 0;
+    for (std::uint32_t y = 0; y < film.shape().height; ++y)
+        for (std::uint32_t x = 0; x < film.shape().width; ++x)
+            sum += film.mean(x, y, film.shape().firstSpectral() + bin);
+    return sum / (film.shape().width * film.shape().height);
+}
+
 double fartherFrom(double target, double a, double b) {
     return std::isnan(a) || std::abs(a - target) > std::abs(b - target) ? a : b;
 }

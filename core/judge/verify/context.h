@@ -152,6 +152,8 @@ double radiance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean over all pixels.
 double radiance(const Film& film);
 /// The same by a name that is no overload, as a Measure.
+/// Mean over all pixels of a bin of a spectral film.
+double meanOfBin(const Film& film, std::uint32_t bin);
 inline double meanRadiance(const Film& film) { return radiance(film); }
 /// Of `a` and `b` the one that is farther from `target`; NaN when either is, which std::max would lose.
 double fartherFrom(double target, double a, double b);

@@ -126,8 +126,8 @@ void glossUnderMany(Context& context) {
                 if (!lamps_below && !context.atLeast(Level::Merge)) continue;
                 context.estimate(
                     fmt::format("{}, {} lamps below, {}", floor.material, lamps_below ? 80 : 0, technique),
-                    tiledRoom(floor.material, integrator, lamps_below), meanRadiance, floor.albedo, 0.004,
-                    {.samples = 256, .most = 65536});
+                    tiledRoom(floor.material, integrator, lamps_below), meanRadiance, floor.albedo, 0.003,
+                    {.samples = 256, .most = 262144});
             }
 }
 
@@ -144,7 +144,7 @@ std::vector<Case> lightTreeCases() {
             "Metal, plastic and a Lambertian floor in a room of eighty glowing tiles, with eighty lamps "
             "below the floor; by light sampling, scattered rays and both",
             "1 of what loses nothing; else the share that is sent on from everywhere",
-            "conservation of energy; Heitz (2014); Kulla and Conty (2017)", "± 0.4 %", Level::Commit,
+            "conservation of energy; Heitz (2014); Kulla and Conty (2017)", "± 0.3 %", Level::Commit,
             kManyLamps | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_PLASTIC, glossUnderMany),
     };
 }

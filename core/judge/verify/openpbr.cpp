@@ -362,14 +362,7 @@ void dispersion(Context& context) {
                         kParts;
         asked.push_back(
             {fmt::format("Abbe's number {} / {}, {:.0f} to {:.0f} nm", kAbbe, kScale, lower, lower + width),
-             [bin](const std::vector<Film>& films) {
-                 const Film& film = films[0];
-                 double sum = 0;
-                 for (std::uint32_t y = 0; y < film.shape().height; ++y)
-                     for (std::uint32_t x = 0; x < film.shape().width; ++x)
-                         sum += film.mean(x, y, film.shape().firstSpectral() + bin);
-                 return sum / (film.shape().width * film.shape().height);
-             },
+             [bin](const std::vector<Film>& films) { return meanOfBin(films[0], bin); },
              expected});
     }
     context.estimate(asked, {scene}, 0.01, {.samples = 1024, .most = 65536},

@@ -171,14 +171,7 @@ void lenses(Context& context) {
                 mean += seen(lens.surfaces, at_nm(lower + width * (i + 0.5) / 25), at) / 25;
             asked.push_back({fmt::format("{} of SF10, f = {:.4f} at {:.0f} nm", lens.name,
                                          lens.focalLength(at_nm(lower + width / 2)), lower + width / 2),
-                             [bin](const std::vector<Film>& films) {
-                                 const Film& film = films[0];
-                                 double sum = 0;
-                                 for (std::uint32_t y = 0; y < film.shape().height; ++y)
-                                     for (std::uint32_t x = 0; x < film.shape().width; ++x)
-                                         sum += film.mean(x, y, film.shape().firstSpectral() + bin);
-                                 return sum / (film.shape().width * film.shape().height);
-                             },
+                             [bin](const std::vector<Film>& films) { return meanOfBin(films[0], bin); },
                              mean});
         }
         context.estimate(
