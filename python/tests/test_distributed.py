@@ -226,7 +226,7 @@ def test_target_error(threads_client, box):
 
 def test_target_error_is_looked_at_as_by_the_program(box):
     """The even and the odd pixels can each veto what the whole image would stop at."""
-    result = crt.render(box, spp=256, backend="embree", target_error=1e-6)
+    result = crt.render(box, spp=4096, backend="embree", target_error=1e-6)
     error = result.report["error"]
     whole = error["half_width_95"]
     halves = [error["judged"][name]["half_width_95"] for name in ("even_pixels", "odd_pixels")]

@@ -212,9 +212,9 @@ def test_session_has_the_bits_of_renders(box, backend):
 
 
 def test_a_report_without_the_error(box):
-    result = crt.render(box, spp=64, backend="embree", estimate_error=False)
+    result = crt.render(box, spp=1024, backend="embree", estimate_error=False)
     assert result.report["error"] is None and 0 < result.error.half_width_95 < 1
-    assert crt.render(box, spp=64, backend="embree").report["error"]["half_width_95"] == pytest.approx(
+    assert crt.render(box, spp=1024, backend="embree").report["error"]["half_width_95"] == pytest.approx(
         result.error.half_width_95)
 
 
