@@ -33,7 +33,7 @@ namespace {
 
 /// Powers of two, one more, and numbers that a time limit or Ctrl-C might leave.
 constexpr std::uint64_t kSamples[] = {16, 32, 33, 64, 100, 128, 256, 300, 512, 1000, 1024};
-/// --target-error is asked for so many times the real error at the last of these.
+/// Targets of --target-error, as multiples of the real error at the last of these.
 constexpr double kTargets[] = {0.6, 0.7, 0.8, 0.9, 1, 1.1, 1.2, 1.3};
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -176,7 +176,7 @@ struct Looks {
     Images images;
     std::vector<Statement> statements;
 
-    /// The mean of the other seeds, and by what the distance to it is too large: its own error.
+    /// The mean of the other seeds, and the factor by which its own error enlarges the distance to it.
     std::vector<double> others(std::size_t seed) const {
         std::vector<double> mean = images.sum();
         for (std::size_t k = 0; k < mean.size(); ++k)

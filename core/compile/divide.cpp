@@ -41,7 +41,7 @@ private:
 using Edge = std::pair<Vec3d, Vec3d>;
 Edge edgeOf(const Vec3d& a, const Vec3d& b) { return a < b ? Edge{a, b} : Edge{b, a}; }
 
-/// Which edges are to be halved: the long ones, but for those of triangles that stay whole.
+/// The edges that must be halved: long ones, except edges of triangles that stay whole.
 class Rule {
 public:
     Rule(const Scene& scene, const std::vector<Placement>& placements, const Focus& focus)
@@ -55,7 +55,7 @@ public:
         return placement.object->transforms.size() > 1 || !placement.mesh->colors.empty();
     }
 
-    /// By the ruler.
+    /// In units of the details.
     std::array<Vec3d, 3> cornersOf(const Placement& placement, std::size_t triangle) const {
         std::array<Vec3d, 3> p = placement.corners(triangle);
         for (Vec3d& corner : p) corner = ruler_(corner);
@@ -86,7 +86,7 @@ private:
     std::set<Edge> kept_;
 };
 
-/// A corner of a piece: where it is, by the ruler, and what the mesh has of it.
+/// A corner of a piece: its position in units of the details, and its vertex in the mesh.
 struct Corner {
     Vec3d at;
     std::uint32_t position, normal, uv;
@@ -146,7 +146,7 @@ private:
         return m;
     }
 
-    /// The longest of the edges that are to be halved first. keep[k]: that from corner k to the next is not.
+    /// Halves the longest edge first. keep[k]: the edge from corner k to the next one stays whole.
     /// Next to one that stays whole only the triangle's own edges are halved: edges within it would all be
     /// long again, and pieces ever thinner.
     void divide(const std::array<Corner, 3>& t, const std::array<bool, 3>& keep, int halvings) {

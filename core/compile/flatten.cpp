@@ -42,7 +42,7 @@ bool hasTangents(const Scene& scene) {
                        [](const Material& m) { return m.anisotropy > 0; });
 }
 
-/// Sets centre and scale: the centre is the focus, or the middle of the scene where there is none.
+/// Sets centre and scale. The centre is the focus, or the middle of the scene if there is no focus.
 void measure(FlatScene& flat, const Box& bounds) {
     const std::optional<Focus>& focus = flat.focus;
     flat.centre = focus ? focus->centre : Vec3d{};

@@ -49,8 +49,8 @@ struct FlatScene {
     std::size_t smooth_triangles = 0;
     std::vector<kernel::CrtUvs> uvs;              ///< Of all triangles, where a texture or tangent asks.
     std::vector<kernel::CrtVertexColors> colors;  ///< Of all triangles, where a value asks for them.
-    DividedMeshes divided;                        ///< Of which the triangles are, in place of the scene's.
-    std::optional<Focus> focus;                   ///< Nothing: the centre is the middle.
+    DividedMeshes divided;                        ///< Meshes that replace those of the scene.
+    std::optional<Focus> focus;                   ///< If empty, the centre is the middle of the scene.
     Vec3d centre{};                               ///< In the author's units.
     int scale_exponent = 0;  ///< Lengths were multiplied by 2^scale_exponent after centring.
 

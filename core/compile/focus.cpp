@@ -89,11 +89,11 @@ double ballAround(const Box& box, const Vec3d& centre) {
     return reach;
 }
 
-/// Of the triangles and boxes of a scene, or of some of them: seen from the camera, in units of 2^exponent.
+/// Properties of a set of triangles and boxes, relative to the camera, in units of 2^exponent.
 struct Seen {
     Box box;
-    double ahead = kNowhere;   ///< What the middle of the view shows; how far away.
-    double detail = kNowhere;  ///< As of Focus, around some place.
+    double ahead = kNowhere;   ///< Distance to what the middle of the view shows.
+    double detail = kNowhere;  ///< As in Focus, around a given place.
 
     void add(const Seen& other) {
         box.add(other.box);
@@ -157,7 +157,7 @@ private:
     }
     static void addTo(Box& box, const Box& thing) { box.add(thing); }
 
-    /// To so few digits that its sum with the camera's position is exact wherever that position is.
+    /// Rounds so that the sum with any camera position is exact.
     static Vec3d snapped(const Vec3d& v, double size) {
         const double step = std::ldexp(1.0, std::ilogb(size) - kSnap);
         return {std::rint(v[0] / step) * step, std::rint(v[1] / step) * step, std::rint(v[2] / step) * step};

@@ -187,7 +187,7 @@ std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material
 
 namespace {
 
-/// The glass that is behind the surface of a material, or of what it is made of; null where there is none.
+/// The glass behind the surface of a material or of a mix; null if there is none.
 /// All glass of a mix has the same inside (ObjectReader::checkInsides).
 const Material* glassOf(const Material& material, const std::vector<const Material*>& materials) {
     if (material.type == MaterialType::Dielectric || material.type == MaterialType::RoughDielectric)

@@ -35,10 +35,10 @@ std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material
 
 struct MaterialPart {
     std::vector<kernel::CrtMaterial> records;
-    std::vector<kernel::CrtValue> media;  ///< What those absorb that their surfaces bound (kernel/medium.h).
+    std::vector<kernel::CrtValue> media;  ///< Absorption of the media that surfaces bound (kernel/medium.h).
     std::uint64_t features = 0;           ///< Of the materials that are used.
 };
-/// Of the number of one of so many media in a list of them: 1, 2, 4, 8 or 16; 0 where there are none.
+/// Bits of a medium's number in a list of media (kernel/medium.h): 1, 2, 4, 8 or 16; 0 without media.
 std::uint32_t mediumBits(std::size_t media);
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const MaterialTables& tables,
                               const SpectrumTable& spectra, const TexturePart& textures);

@@ -1,5 +1,4 @@
-/// Whether the brightest paths of an image have been met: what its noisiest pixels say of paths that are
-/// brighter still.
+/// Estimates from the noisiest pixels of an image whether paths brighter than all samples so far are likely.
 ///
 /// Where one path carries a pixel, the pixel's standard error is as large as what the path adds to the
 /// pixel, whatever the number of replicates or samples. The variances of such pixels are then squares of
@@ -25,14 +24,14 @@ struct ErrorTail {
     /// α by Hill (1975, Annals of Statistics 3), of the ten noisiest pixels that one path carries; infinite
     /// where there are fewer than two.
     double index;
-    double share;  ///< Of these pixels in the sum of all variances.
+    double share;  ///< Share of these pixels in the sum of all variances.
 };
 
-/// Of at most the 256 noisiest of `pixels`, which it reorders.
+/// Looks at the 256 noisiest of `pixels` at most, and reorders them.
 ErrorTail errorTail(const Film& film, std::span<NoisyPixel> pixels);
 
-/// Whether paths that are not yet met may make the error larger than an estimate with so many degrees of
-/// freedom, from so many paths, says.
+/// Whether paths that no sample has met yet may make the error larger than an estimate with
+/// `degrees_of_freedom` from `paths` paths.
 bool tailIsOpen(const ErrorTail& tail, double degrees_of_freedom, double paths);
 
 }  // namespace crt

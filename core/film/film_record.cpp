@@ -176,7 +176,7 @@ SceneTrait geometryTrait(const Scene& scene) {
             digest.digits()};
 }
 
-// Structured bindings name every member: one that is added does not compile until its trait knows of it.
+// Structured bindings name every member: a new member does not compile until a trait contains it.
 
 void addClearcoat(Digest& digest, const Clearcoat& coat) {
     const auto& [ior, roughness, depth, darkening, base_roughness] = coat;

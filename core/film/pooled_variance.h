@@ -1,5 +1,5 @@
-/// Variances of single pixels that can be used: with one degree of freedom a pixel's own is 0 by chance as
-/// often as it is too large, and neighbours have noise alike.
+/// Usable variances of single pixels. With one degree of freedom a pixel's own variance may be near 0 by
+/// chance; its neighbours have similar noise.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,13 @@ inline constexpr std::uint32_t kPooledRadius = 3;
 std::vector<double> windowMeans(std::span<const double> values, std::uint32_t width, std::uint32_t height,
                                 std::uint32_t radius);
 
-/// Of the means of an image's pixels, [height][width].
+/// Variances of the pixels of an image, [height][width].
 struct PooledVariances {
     /// The larger of the pixel's own and of the mean about it; less the part by which the larger of two is
     /// too large, so that among equal pixels deviations over their standard errors have mean square 1.
     std::vector<double> variances;
-    /// Of the mean about it: so many as its equal variances would have (Satterthwaite 1946), and at least
-    /// those of one pixel.
+    /// Degrees of freedom of the mean over the neighbourhood (Satterthwaite 1946), at least those of one
+    /// pixel.
     std::vector<double> degrees_of_freedom;
 };
 

@@ -67,7 +67,7 @@ private:
     std::array<double, kSteps + 1> values_;
 };
 
-/// What the film knows of the noise of its pixels, where an image asks for it.
+/// The noise of the pixels, for images that include it.
 struct PixelNoise {
     std::vector<double> own;  ///< Variances of the pixels' means of Y, unbiased.
     stats::PooledVariances pooled;

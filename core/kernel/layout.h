@@ -133,7 +133,7 @@ typedef struct CrtPrimitive {
     u32 normals;  /* index of its CrtNormals, or CRT_NONE: flat */
     u32 object;   /* and CRT_PRIMITIVE_TOUCHES */
 } CrtPrimitive;
-/* In `object`: another body's surface lies in the same place (medium.h). */
+/* In `object`: the surface of another body coincides with it (medium.h). */
 #define CRT_PRIMITIVE_TOUCHES 0x80000000u
 CRT_ASSERT_SIZE(CrtPrimitive, 16);
 
@@ -522,7 +522,7 @@ typedef struct CrtScene {
     CrtSpan mesh_nodes;          /* CrtNode4 of the meshes that are instanced */
     CrtSpan media;               /* CrtValue: what each medium absorbs, per scene unit */
     u32 medium_bits;             /* of a medium's number in a list of them (medium.h): 1, 2, 4, 8 or 16 */
-    u32 camera_media;            /* such a list: what is around the camera */
+    u32 camera_media;            /* list of the media around the camera */
     CrtSpan patches;             /* CrtPatch, all triangles; only for brute force */
     CrtSpan occluder_patches;    /* CrtPatch: the triangles that can come between two points of the scene */
 } CrtScene;

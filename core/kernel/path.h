@@ -39,7 +39,7 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
         CrtHit hit = crt_no_hit(ray.reach);
         if (ray.reach > 0.0f) hit = crt_trace_closest(ctx, ray);
         if (passable && hit.slot != CRT_NONE && crt_passes(ctx, hit, &path->sampler, &way, &ray)) continue;
-        if (way.shadow) { /* what the vertex asked is answered */
+        if (way.shadow) { /* the shadow ray of the vertex */
             if (hit.slot == CRT_NONE) path->radiance = path->radiance + way.carried;
             return alive;
         }

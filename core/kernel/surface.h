@@ -79,7 +79,7 @@ CRT_FN f32 crt_edge_margin(f32 coordinate, f32 size, f32 twice_area) {
                : CRT_EDGE_MARGIN_MAX;
 }
 
-/* Of the clearance of the whole disk: what is left where nothing is rounded. */
+/* Least share of the clearance of the whole disk: at its centre the position is not rounded. */
 #define CRT_DISK_LEAST_CLEARANCE 1.5258789e-5f /* 2^-16 */
 
 /* A vector in the frame of a shape. */

@@ -127,7 +127,7 @@ CRT_FN u32 crt_queue_of_material(const CrtContext *ctx, const CrtWave *wave, u32
     return wave->queue_of_kind[CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].type];
 }
 
-/* Who shades what a path's ray has met, or crt_wave_choose, who finds out. */
+/* The queue for what a path's ray has met: that of its material, or that of crt_wave_choose. */
 CRT_FN u32 crt_queue_of(const CrtContext *ctx, const CrtWave *wave, CrtHit hit) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     if (hit.slot == CRT_NONE) return wave->queue_of_miss;
