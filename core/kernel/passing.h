@@ -102,8 +102,9 @@ CRT_FN int crt_may_pass(const CrtContext *ctx, CrtHit hit) {
            CRT_MATERIAL_THIN_DIELECTRIC;
 }
 
-/* Whether a ray passes a surface with opacity below 1. A hole in the surface of a body is a hole in the body: a
-   ray that entered through a hole is in no glass and leaves anywhere; a ray in the glass meets no hole. */
+/* Whether a ray passes a surface with opacity below 1. A hole in the surface of a body is a hole in the
+   body: a ray that entered through a hole is in no glass and leaves anywhere; a ray in the glass meets no
+   hole. */
 CRT_FN int crt_passes_hole(const CrtContext *ctx, const CrtSurface *surface, CrtValue opacity, u32 medium,
                            CrtSampler *sampler, const CrtPassage *way, vec3 d) {
     if (medium != 0u && dot3(d, surface->ng) > 0.0f) return !crt_surrounds(ctx, way->media, medium);
