@@ -138,7 +138,7 @@ bool anyOneByOne(const CrtContext& ctx, CrtRay ray) {
     CrtHit hit;
     for (u32 slot = 0; slot < ctx.scene->triangle_count; ++slot)
         if (triangles[slot].shape < CRT_SLOT_INSTANCE &&
-            crt_slot_stops(&ctx, triangles, slot, ray, shear, &hit))
+            crt_slot_stops(&ctx, triangles, slot, ray, shear, nullptr))
             return true;
     for (u32 i = 0; i < ctx.scene->instances.count; ++i) {
         const MeshSlots slots = meshSlots(ctx, instances[i]);
@@ -201,7 +201,7 @@ TEST_CASE("trees of instances find what a loop over their triangles finds, bit b
                 wrong += !sameBits(crt_bvh_closest(&ctx, ray), expected);
                 // To half the way, to the hit and just beyond.
                 ray.reach = expected.t * std::array<f32, 3>{0.5f, 1.0f, 1.0001f}[random.below(3)];
-                wrong_any += (crt_bvh_any(&ctx, ray) != 0) != anyOneByOne(ctx, ray);
+                wrong_any += (crt_bvh_any(&ctx, ray, nullptr) != 0) != anyOneByOne(ctx, ray);
                 hits += expected.instance != 0;
                 ++rays;
             }

@@ -139,8 +139,8 @@ std::uint64_t disagreements(const ThreeWays& scene, Random& random, int rays, st
         ray.reach = expected.slot == CRT_NONE ? CRT_INFINITY
                                               : expected.t * static_cast<f32>(random.uniform(0.5, 1.5));
         const int any = expected.slot != CRT_NONE && expected.t < ray.reach;
-        wrong += crt_bvh_any(&bvh, ray) != any;
-        wrong += crt_aabb_any(&boxes, ray) != any;
+        wrong += crt_bvh_any(&bvh, ray, nullptr) != any;
+        wrong += crt_aabb_any(&boxes, ray, nullptr) != any;
     }
     return wrong;
 }
@@ -169,9 +169,9 @@ std::uint64_t shadowDisagreements(const ThreeWays& scene, Random& random, int ra
         const CrtHit expected = oneByOne(brute, ray);
         const int any = expected.slot != CRT_NONE && expected.t < ray.reach;
         *hits += static_cast<std::uint64_t>(any);
-        wrong += crt_brute_force_any(&brute, ray) != any;
-        wrong += crt_bvh_any(&bvh, ray) != any;
-        wrong += crt_aabb_any(&boxes, ray) != any;
+        wrong += crt_brute_force_any(&brute, ray, nullptr) != any;
+        wrong += crt_bvh_any(&bvh, ray, nullptr) != any;
+        wrong += crt_aabb_any(&boxes, ray, nullptr) != any;
     }
     return wrong;
 }
@@ -522,8 +522,9 @@ TEST_CASE("rays that are none hit nothing, and end", "[kernel][rays]") {
         hits += crt_brute_force_closest(&brute, ray).slot != CRT_NONE;
         hits += crt_bvh_closest(&bvh, ray).slot != CRT_NONE;
         hits += crt_aabb_closest(&boxes, ray).slot != CRT_NONE;
-        hits += static_cast<std::uint64_t>(crt_brute_force_any(&brute, ray) + crt_bvh_any(&bvh, ray) +
-                                           crt_aabb_any(&boxes, ray));
+        hits += static_cast<std::uint64_t>(crt_brute_force_any(&brute, ray, nullptr) +
+                                           crt_bvh_any(&bvh, ray, nullptr) +
+                                           crt_aabb_any(&boxes, ray, nullptr));
     }
     CHECK(hits == 0);
     // Directions of extreme but honest lengths do hit.
@@ -786,7 +787,7 @@ Walk walkIn(const crt::CompiledScene& compiled, std::uint64_t vertices, Random& 
             const CrtRay shadow = rayOf(o, light.point - o, light.reach);
             ++walk.lit;
             const CrtHit occluder = oneByOne(ctx, shadow);
-            walk.dark += crt_brute_force_any(&ctx, shadow) != 0 || occluder.slot != CRT_NONE;
+            walk.dark += crt_brute_force_any(&ctx, shadow, nullptr) != 0 || occluder.slot != CRT_NONE;
             walk.self_shadows += object_of(occluder) == 1;
         }
         const CrtScatter scatter = crt_sample_diffuse(splat4(1), ng, ng, random.pair());

@@ -455,9 +455,9 @@ TEST_CASE("trees and boxes find the shapes that a loop finds", "[shapes]") {
             different += !sameBits(hit, crt_bvh_closest(&bvh, ray));
             different += !sameBits(hit, crt_aabb_closest(&boxes, ray));
             const int stops = hit.slot != CRT_NONE;
-            blocked += (crt_brute_force_any(&brute, ray) != 0) != (stops != 0);
-            blocked += (crt_bvh_any(&bvh, ray) != 0) != (stops != 0);
-            blocked += (crt_aabb_any(&boxes, ray) != 0) != (stops != 0);
+            blocked += (crt_brute_force_any(&brute, ray, nullptr) != 0) != (stops != 0);
+            blocked += (crt_bvh_any(&bvh, ray, nullptr) != 0) != (stops != 0);
+            blocked += (crt_aabb_any(&boxes, ray, nullptr) != 0) != (stops != 0);
         }
     }
     CHECK(rays == 80000);

@@ -4,7 +4,7 @@
 #ifndef CRT_BOXES_H
 #define CRT_BOXES_H
 
-#include "intersect.h"
+#include "shadow_ray.h"
 
 CRT_KERNEL_BEGIN
 

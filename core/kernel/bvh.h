@@ -38,9 +38,8 @@ CRT_FN CrtHit crt_brute_force_closest(const CrtContext *ctx, CrtRay ray) {
 
 /* For a segment between two points of the scene: triangles that have the whole scene on one side cannot come
  * between, and are not asked. */
-CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
+CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
-    CrtHit hit;
 #if CRT_SIMD8
     CRT_GLOBAL const CrtTriangle8 *blocks = CRT_ARRAY(CrtTriangle8, ctx->blob, ctx->scene->occluders8);
     const u32 count = ctx->scene->occluders8.count;
@@ -48,24 +47,24 @@ CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray) {
     for (u32 b = 0u; b < count; ++b)
         for (u32 lanes = crt_candidates8(blocks + b, ray, slack, ray.reach); lanes != 0u;
              lanes &= lanes - 1u)
-            if (crt_intersect_triangle(triangles + blocks[b].slot[crt_lowest_bit(lanes)], crt_shear(ray),
-                                       ray.reach, &hit))
+            if (crt_triangle_stops(ctx, triangles, blocks[b].slot[crt_lowest_bit(lanes)], crt_shear(ray),
+                                   ray.reach, passable))
                 return 1;
 #else
     CRT_GLOBAL const CrtPatch *patches = CRT_ARRAY(CrtPatch, ctx->blob, ctx->scene->occluder_patches);
     const u32 count = ctx->scene->occluder_patches.count;
-    const u32 stopped = crt_patches_any(patches, count, triangles, ray);
+    const u32 stopped = crt_has_panes(ctx) ? 2u : crt_patches_any(patches, count, triangles, ray);
     if (stopped == 1u) return 1;
     if (stopped == 2u) {
         const CrtShear shear = crt_shear(ray);
         CRT_ROLLED for (u32 i = 0u; i < 2u * count; ++i) {
             const u32 slot = patches[i >> 1].slot[i & 1u];
-            if (slot != CRT_NONE && crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit))
+            if (slot != CRT_NONE && crt_triangle_stops(ctx, triangles, slot, shear, ray.reach, passable))
                 return 1;
         }
     }
 #endif
-    if (CRT_HAS(SHAPES)) return crt_last_slots_any(ctx, ray);
+    if (CRT_HAS(SHAPES)) return crt_last_slots_any(ctx, ray, passable);
     return 0;
 }
 
@@ -84,18 +83,17 @@ CRT_FN CrtHit crt_aabb_closest(const CrtContext *ctx, CrtRay ray) {
     return best;
 }
 
-CRT_FN int crt_aabb_any(const CrtContext *ctx, CrtRay ray) {
+CRT_FN int crt_aabb_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtObject *objects = CRT_ARRAY(CrtObject, ctx->blob, ctx->scene->objects);
     const CrtShear shear = crt_shear(ray);
     const CrtSlab slab = crt_slab(ray);
-    CrtHit hit;
     for (u32 k = 0u; k < ctx->scene->objects.count; ++k) {
         if (!(crt_box(objects[k].lower, objects[k].upper, ray, slab, ray.reach) < CRT_INFINITY)) continue;
         for (u32 i = 0u; i < objects[k].count; ++i)
             if (CRT_HAS_SLOTS
-                    ? crt_slot_stops(ctx, triangles, objects[k].first + i, ray, shear, &hit)
-                    : crt_intersect_triangle(triangles + objects[k].first + i, shear, ray.reach, &hit))
+                    ? crt_slot_stops(ctx, triangles, objects[k].first + i, ray, shear, passable)
+                    : crt_triangle_stops(ctx, triangles, objects[k].first + i, shear, ray.reach, passable))
                 return 1;
     }
     return 0;
@@ -146,12 +144,11 @@ CRT_FN CrtHit crt_bvh_closest(const CrtContext *ctx, CrtRay ray) {
     }
 }
 
-CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
+CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->nodes);
     const CrtShear shear = crt_shear(ray);
     const CrtNodeRay among = crt_node_ray(ray, 0.0f);
-    CrtHit hit;
     if (!crt_is_ray(ray)) return 0;
     u32 stack[CRT_BVH_STACK];
 #if CRT_SIMD8
@@ -168,8 +165,9 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
         } else {
             const u32 first = current >> 4;
             for (u32 i = 0u; i < count; ++i)
-                if (CRT_HAS_SLOTS ? crt_slot_stops(ctx, triangles, first + i, ray, shear, &hit)
-                                    : crt_intersect_triangle(triangles + first + i, shear, ray.reach, &hit))
+                if (CRT_HAS_SLOTS
+                        ? crt_slot_stops(ctx, triangles, first + i, ray, shear, passable)
+                        : crt_triangle_stops(ctx, triangles, first + i, shear, ray.reach, passable))
                     return 1;
         }
     }
@@ -187,8 +185,8 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray) {
         }
         const u32 first = current >> 4, end = first + (current & 15u);
         for (u32 slot = first; slot < end; ++slot)
-            if (CRT_HAS_SLOTS ? crt_slot_stops(ctx, triangles, slot, ray, shear, &hit)
-                              : crt_intersect_triangle(triangles + slot, shear, ray.reach, &hit))
+            if (CRT_HAS_SLOTS ? crt_slot_stops(ctx, triangles, slot, ray, shear, passable)
+                              : crt_triangle_stops(ctx, triangles, slot, shear, ray.reach, passable))
                 return 1;
         if (size == 0u) return 0;
         --size;
@@ -204,21 +202,25 @@ CRT_FN CrtHit crt_software_closest(const CrtContext *ctx, CrtRay ray) {
     return crt_no_hit(ray.reach);
 }
 
-CRT_FN int crt_software_any(const CrtContext *ctx, CrtRay ray) {
-    if (CRT_HAS(BVH) && ctx->scene->accelerator == CRT_ACCELERATOR_BVH) return crt_bvh_any(ctx, ray);
-    if (CRT_HAS(AABB) && ctx->scene->accelerator == CRT_ACCELERATOR_AABB) return crt_aabb_any(ctx, ray);
-    if (CRT_HAS(BRUTE_FORCE)) return crt_brute_force_any(ctx, ray);
+CRT_FN int crt_software_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable) {
+    if (CRT_HAS(BVH) && ctx->scene->accelerator == CRT_ACCELERATOR_BVH)
+        return crt_bvh_any(ctx, ray, passable);
+    if (CRT_HAS(AABB) && ctx->scene->accelerator == CRT_ACCELERATOR_AABB)
+        return crt_aabb_any(ctx, ray, passable);
+    if (CRT_HAS(BRUTE_FORCE)) return crt_brute_force_any(ctx, ray, passable);
     return 0;
 }
 
-/* The two hooks. A backend with a tracer of its own defines CRT_BACKEND_TRACE and both functions after
- * including path.h. */
+/* The two hooks: the first hit, and whether something stops a shadow ray. A backend with a tracer of its own
+ * defines CRT_BACKEND_TRACE and both functions after including path.h. */
 #ifdef CRT_BACKEND_TRACE
 CRT_FN CrtHit crt_trace_closest(const CrtContext *ctx, CrtRay ray);
-CRT_FN int crt_trace_any(const CrtContext *ctx, CrtRay ray);
+CRT_FN int crt_trace_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable);
 #else
 CRT_FN CrtHit crt_trace_closest(const CrtContext *ctx, CrtRay ray) { return crt_software_closest(ctx, ray); }
-CRT_FN int crt_trace_any(const CrtContext *ctx, CrtRay ray) { return crt_software_any(ctx, ray); }
+CRT_FN int crt_trace_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable) {
+    return crt_software_any(ctx, ray, passable);
+}
 #endif
 
 CRT_KERNEL_END

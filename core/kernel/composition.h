@@ -11,10 +11,6 @@
 
 CRT_KERNEL_BEGIN
 
-CRT_FN CRT_GLOBAL const CrtComposition *crt_compositions(const CrtContext *ctx) {
-    return CRT_ARRAY(CrtComposition, ctx->blob, ctx->scene->compositions);
-}
-
 /* The material that a ray of direction d finds on a surface. What is left of a random number after a choice
    makes the next one. */
 CRT_FN u32 crt_chosen_material(const CrtContext *ctx, const CrtSurface *surface, vec3 d, CrtSampler *sampler,

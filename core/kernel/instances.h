@@ -110,12 +110,25 @@ CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, C
 #endif
 }
 
-CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShear shear) {
+/* Whether a triangle of an instance stops a shadow ray. */
+CRT_FN int crt_placed_stops(const CrtContext *ctx, CRT_GLOBAL const CrtInstance *instance, u32 index,
+                            CRT_GLOBAL const CrtTriangle *triangles, u32 slot, CrtShear shear, f32 reach,
+                            CrtPassable *passable) {
+    CRT_GLOBAL const CrtTriangle *triangle = triangles + slot;
+    CrtHit hit;
+    if (!crt_intersect_placed(instance, triangle, shear, reach, &hit)) return 0;
+    hit.slot = slot;
+    hit.id = instance->first_id + (triangle->id - instance->first_primitive);
+    hit.instance = index + 1u;
+    return crt_stops(ctx, hit, 1u, passable);
+}
+
+CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShear shear,
+                            CrtPassable *passable) {
     CRT_GLOBAL const CrtInstance *instance = crt_instance(ctx, index);
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CRT_GLOBAL const CrtNode4 *nodes = CRT_ARRAY(CrtNode4, ctx->blob, ctx->scene->mesh_nodes);
     const CrtNodeRay mesh = crt_mesh_ray(instance, ray);
-    CrtHit hit;
     u32 stack[CRT_BVH_STACK];
 #if CRT_SIMD8
     u32 size = 1u;
@@ -131,7 +144,8 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
         } else {
             const u32 first = current >> 4;
             for (u32 i = 0u; i < count; ++i)
-                if (crt_intersect_placed(instance, triangles + first + i, shear, ray.reach, &hit)) return 1;
+                if (crt_placed_stops(ctx, instance, index, triangles, first + i, shear, ray.reach, passable))
+                    return 1;
         }
     }
     return 0;
@@ -148,7 +162,8 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
         }
         const u32 first = current >> 4, end = first + (current & 15u);
         for (u32 slot = first; slot < end; ++slot)
-            if (crt_intersect_placed(instance, triangles + slot, shear, ray.reach, &hit)) return 1;
+            if (crt_placed_stops(ctx, instance, index, triangles, slot, shear, ray.reach, passable))
+                return 1;
         if (size == 0u) return 0;
         --size;
         current = stack[size];

@@ -52,7 +52,7 @@ CRT_FN void crt_prepare_pane(const CrtContext *ctx, CrtBsdf *b, const CrtMateria
                              const CrtSurface *surface, vec4 position) {
     b->eta = crt_value(ctx, material->eta, surface, position);
     if (CRT_HAS(THIN_FILM)) {
-        b->k = splat4(0.0f);
+        b->k = b->film_eta = b->film_rounds = splat4(0.0f);
         crt_prepare_film(ctx, b, material, surface, position, splat4(1.0f));
     }
 }

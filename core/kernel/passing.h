@@ -17,10 +17,6 @@
 
 CRT_KERNEL_BEGIN
 
-CRT_FN int crt_has_panes(const CrtContext *ctx) {
-    return CRT_HAS(THIN_DIELECTRIC) && CRT_IN_MASK(ctx->scene->features, THIN_DIELECTRIC);
-}
-
 /* Whether the scene has surfaces that rays may pass. */
 CRT_FN int crt_is_passable(const CrtContext *ctx) {
     return (CRT_HAS(OPACITY) && ctx->scene->compositions.count != 0u) || crt_has_panes(ctx);
@@ -88,18 +84,6 @@ CRT_FN int crt_passes_pane(const CrtContext *ctx, const CrtSurface *surface, u32
     }
     way->carried = way->carried / (1.0f - chance);
     return 0;
-}
-
-/* Whether a ray may pass what it meets, or meets a mix: crt_passes decides. */
-CRT_FN int crt_may_pass(const CrtContext *ctx, CrtHit hit) {
-    const u32 material =
-        CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[crt_primitive_of(ctx, hit)].material;
-    if ((CRT_HAS(OPACITY) || CRT_HAS(MIX)) && ctx->scene->compositions.count != 0u) {
-        CRT_GLOBAL const CrtComposition *c = crt_compositions(ctx) + material;
-        if (c->opacity != CRT_OPAQUE || c->kind != CRT_COMPOSED_PLAIN) return 1;
-    }
-    return CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].type ==
-           CRT_MATERIAL_THIN_DIELECTRIC;
 }
 
 /* Whether a ray passes a surface with opacity below 1. A hole in the surface of a body is a hole in the

@@ -20,13 +20,14 @@ CRT_FN void crt_answer(const CrtContext *ctx, CrtPath *path, const CrtShadow *sh
     int blocked = 0;
     if (shadow->ray.reach > 0.0f) {
         rays->shadow += 1u;
-        blocked = crt_trace_any(ctx, shadow->ray);
+        CrtPassable none = crt_none_passable(shadow->ray.reach);
+        blocked = crt_trace_any(ctx, shadow->ray, &none);
     }
     if (!blocked) path->radiance = path->radiance + shadow->radiance;
 }
 
 /* crt_path_vertex where rays may pass surfaces. One loop traces the path's ray, then the shadow ray: both go
-   on until something stops them, and so a shadow ray has to know what it meets first. */
+   on until something stops them. */
 CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
     CrtShadow shadow;
     CrtRay ray = path->ray;
@@ -37,10 +38,25 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
     rays->closest += 1u;
     for (;;) {
         CrtHit hit = crt_no_hit(ray.reach);
-        if (ray.reach > 0.0f) hit = crt_trace_closest(ctx, ray);
-        if (passable && hit.slot != CRT_NONE && crt_passes(ctx, hit, &path->sampler, &way, &ray)) continue;
+        int stopped = 0; /* a shadow ray: by what no ray passes */
+        int last = 0;    /* a shadow ray: behind `hit` there is nothing else */
+        if (ray.reach > 0.0f) {
+            if (way.shadow && crt_has_panes(ctx)) {
+                CrtPassable met = crt_none_passable(ray.reach);
+                stopped = crt_trace_any(ctx, ray, &met);
+                hit = met.nearest;
+                last = met.count == 1u;
+            } else {
+                hit = crt_trace_closest(ctx, ray);
+            }
+        }
+        if (passable && !stopped && hit.slot != CRT_NONE &&
+            crt_passes(ctx, hit, &path->sampler, &way, &ray)) {
+            if (!last) continue;
+            hit.slot = CRT_NONE;
+        }
         if (way.shadow) { /* the shadow ray of the vertex */
-            if (hit.slot == CRT_NONE) path->radiance = path->radiance + way.carried;
+            if (!stopped && hit.slot == CRT_NONE) path->radiance = path->radiance + way.carried;
             return alive;
         }
         hit.t = hit.t + dot3(ray.o - path->ray.o, ray.d); /* from where the path's ray began */

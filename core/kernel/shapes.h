@@ -11,7 +11,7 @@
 #ifndef CRT_SHAPES_H
 #define CRT_SHAPES_H
 
-#include "intersect.h"
+#include "shadow_ray.h"
 
 CRT_KERNEL_BEGIN
 
@@ -133,10 +133,22 @@ CRT_FN void crt_last_slots_closest(const CrtContext *ctx, CrtRay ray, CrtHit *be
         crt_test_shape_closest(ctx, triangles + slot, slot, ray, best);
 }
 
-CRT_FN int crt_last_slots_any(const CrtContext *ctx, CrtRay ray) {
+/* Whether a shape stops a shadow ray, which may hit it twice. */
+CRT_FN int crt_shape_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *record, u32 slot, CrtRay ray,
+                           CrtPassable *passable) {
     CrtHit hit;
-    for (u32 i = 0u; i < ctx->scene->shapes.count; ++i)
-        if (crt_intersect_shape(crt_shape_of(ctx, i), ray, ray.reach, &hit)) return 1;
+    if (!crt_intersect_shape(crt_shape_of(ctx, record->shape - 1u), ray, ray.reach, &hit)) return 0;
+    hit.slot = slot;
+    hit.id = record->id;
+    hit.instance = 0u;
+    return crt_stops(ctx, hit, 2u, passable);
+}
+
+CRT_FN int crt_last_slots_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable) {
+    CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
+    const u32 end = ctx->scene->triangle_count;
+    for (u32 slot = end - ctx->scene->shapes.count; slot < end; ++slot)
+        if (crt_shape_stops(ctx, triangles + slot, slot, ray, passable)) return 1;
     return 0;
 }
 

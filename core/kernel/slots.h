@@ -25,16 +25,15 @@ CRT_FN void crt_test_slot(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *t
         crt_test_closest(triangles, slot, shear, best);
 }
 
-/* Whether what is in the slot stops the ray. */
+/* Whether the slot holds something that stops a shadow ray. */
 CRT_FN int crt_slot_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
-                          CrtRay ray, CrtShear shear, CrtHit *hit) {
+                          CrtRay ray, CrtShear shear, CrtPassable *passable) {
     u32 shape = 0u;
     if (CRT_HAS_SLOTS) shape = triangles[slot].shape;
     if (CRT_HAS(INSTANCES) && shape >= CRT_SLOT_INSTANCE)
-        return crt_instance_any(ctx, shape - CRT_SLOT_INSTANCE, ray, shear);
-    if (CRT_HAS(SHAPES) && shape != 0u)
-        return crt_intersect_shape(crt_shape_of(ctx, shape - 1u), ray, ray.reach, hit);
-    return crt_intersect_triangle(triangles + slot, shear, ray.reach, hit);
+        return crt_instance_any(ctx, shape - CRT_SLOT_INSTANCE, ray, shear, passable);
+    if (CRT_HAS(SHAPES) && shape != 0u) return crt_shape_stops(ctx, triangles + slot, slot, ray, passable);
+    return crt_triangle_stops(ctx, triangles, slot, shear, ray.reach, passable);
 }
 
 CRT_KERNEL_END

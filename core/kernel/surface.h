@@ -179,13 +179,6 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
     return s;
 }
 
-/* The number of the primitive that was hit, of an instance that of its mesh. */
-CRT_FN u32 crt_primitive_of(const CrtContext *ctx, CrtHit hit) {
-    if (CRT_HAS(INSTANCES) && hit.instance != 0u)
-        return CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles)[hit.slot].id;
-    return hit.id;
-}
-
 CRT_FN f32 crt_largest(vec3 v) { return crt_max(V3X(v), crt_max(V3Y(v), V3Z(v))); }
 
 /* The plane of a triangle of an instance: what CrtFace has of others, from the same rules. */

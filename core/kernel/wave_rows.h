@@ -20,6 +20,7 @@ CRT_KERNEL_BEGIN
 #define CRT_WAVE_ENDED 2u /* its path has ended */
 #define CRT_WAVE_ASKED 4u /* a shadow ray waits for its answer */
 #define CRT_WAVE_PASSED 8u /* the ray that it waits for goes on behind a surface that it has passed */
+#define CRT_WAVE_LAST 16u /* behind the surface that its shadow ray meets there is no other */
 
 /* Rows. */
 #define CRT_ROW_ORIGIN 0u       /* of the ray; depth, hero wavelength and `alone` */

@@ -81,10 +81,11 @@ CRT_FN int crt_wave_answer(const CrtContext *ctx, const CrtWave *wave, u32 slot,
     if (ray.reach > 0.0f) {
         if ((state & CRT_WAVE_PASSED) == 0u) rays->shadow += 1u;
         if (crt_has_panes(ctx)) {
-            const CrtHit hit = crt_trace_closest(ctx, ray);
-            blocked = hit.slot != CRT_NONE;
-            if (blocked && crt_may_pass(ctx, hit)) {
-                crt_store_hit(wave, slot, hit);
+            CrtPassable met = crt_none_passable(ray.reach);
+            blocked = crt_trace_any(ctx, ray, &met);
+            if (!blocked && met.count != 0u) {
+                crt_store_hit(wave, slot, met.nearest);
+                if (met.count == 1u) wave->state[slot] = state | CRT_WAVE_LAST;
                 return 0;
             }
         } else if (crt_is_passable(ctx)) {
@@ -93,7 +94,8 @@ CRT_FN int crt_wave_answer(const CrtContext *ctx, const CrtWave *wave, u32 slot,
             blocked = crt_trace_passing(ctx, &sampler, &way, &ray).slot != CRT_NONE;
             crt_store_xorshift(ctx, wave, slot, &sampler);
         } else {
-            blocked = crt_trace_any(ctx, ray);
+            CrtPassable none = crt_none_passable(ray.reach);
+            blocked = crt_trace_any(ctx, ray, &none);
         }
     }
     CRT_GLOBAL vec4 *radiance = crt_row(wave, CRT_ROW_RADIANCE, slot);
@@ -164,7 +166,7 @@ CRT_FN u32 crt_wave_trace(const CrtContext *ctx, const CrtWave *wave, u32 slot, 
 }
 
 /* Whether the slot's ray passes what it has met. If so, it is traced on from behind it in the next pass. A
-   shadow ray that is stopped has its answer. */
+   shadow ray that is stopped, or has passed the last surface, has its answer. */
 CRT_FN int crt_wave_passes(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
     const u32 state = wave->state[slot];
     const int shadow = (state & CRT_WAVE_ASKED) != 0u;
@@ -175,7 +177,13 @@ CRT_FN int crt_wave_passes(const CrtContext *ctx, const CrtWave *wave, u32 slot)
         ray.o = crt_row_vector(*crt_row(wave, CRT_ROW_PASSED, slot));
     const int passes = crt_passes(ctx, crt_load_hit(wave, slot), &sampler, &way, &ray);
     crt_store_xorshift(ctx, wave, slot, &sampler);
-    wave->state[slot] = passes ? state | CRT_WAVE_PASSED : state & CRT_WAVE_ENDED;
+    const int last = (state & CRT_WAVE_LAST) != 0u;
+    wave->state[slot] = passes && !last ? state | CRT_WAVE_PASSED : state & CRT_WAVE_ENDED;
+    if (shadow && last) {
+        CRT_GLOBAL vec4 *radiance = crt_row(wave, CRT_ROW_RADIANCE, slot);
+        if (passes) *radiance = *radiance + way.carried;
+        return 1;
+    }
     if (shadow) {
         *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot) = way.carried;
         *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot) = crt_row_of(ray.o, ray.reach);

@@ -17,9 +17,9 @@ CRT_FN CrtHit crt_trace_closest(const CrtContext* ctx, CrtRay ray) {
     return crt_software_closest(ctx, ray);
 }
 
-CRT_FN int crt_trace_any(const CrtContext* ctx, CrtRay ray) {
-    if (CRT_HAS(BVH) && ctx->tree != nullptr) return embree::anyHit(ctx, ray) ? 1 : 0;
-    return crt_software_any(ctx, ray);
+CRT_FN int crt_trace_any(const CrtContext* ctx, CrtRay ray, CrtPassable* passable) {
+    if (CRT_HAS(BVH) && ctx->tree != nullptr) return embree::anyHit(ctx, ray, passable) ? 1 : 0;
+    return crt_software_any(ctx, ray, passable);
 }
 
 }  // namespace crt::kernel

@@ -143,14 +143,26 @@ inline CrtHit closestHit(const CrtContext* ctx, const CrtRay& ray) {
     }
 }
 
-inline bool anyHit(const CrtContext* ctx, const CrtRay& ray) {
+/// Whether a triangle of a leaf stops a shadow ray.
+inline bool leafStops(const CrtContext* ctx, const Leaf8& leaf, const CrtTriangle* triangles,
+                      const CrtShear& shear, f32 reach, CrtPassable* passable) {
+    Hits8 hits;
+    u32 lanes = hitsOf(leaf, shear, reach, &hits);
+    if (!crt_has_panes(ctx)) return lanes != 0u;
+    for (; lanes != 0u; lanes &= lanes - 1u) {
+        const u32 i = crt_lowest_bit(lanes), slot = leaf.slot[i];
+        const CrtHit hit{hits.t[i], hits.b1[i], hits.b2[i], slot, triangles[slot].id, 0u};
+        if (crt_stops(ctx, hit, 1u, passable)) return true;
+    }
+    return false;
+}
+
+inline bool anyHit(const CrtContext* ctx, const CrtRay& ray, CrtPassable* passable) {
     const CrtTriangle* triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     if (!crt_is_ray(ray)) return false;
     const CrtShear shear = crt_shear(ray);
     const CrtNodeRay among = crt_node_ray(ray, 0.0f);
     Child stack[kStack];
-    Hits8 hits;
-    CrtHit hit;
     u32 size = 1u;
     stack[0] = ctx->tree->root();
     while (size != 0u) {
@@ -161,8 +173,8 @@ inline bool anyHit(const CrtContext* ctx, const CrtRay& ray) {
             for (u32 met = entered(node, among, ray.reach, &enter); met != 0u; met &= met - 1u)
                 stack[size++] = node.child[crt_lowest_bit(met)];
         } else if (!CRT_HAS_SLOTS || (current & kLeaf) != 0) {
-            if (hitsOf(leafOf(current), shear, ray.reach, &hits) != 0u) return true;
-        } else if (crt_slot_stops(ctx, triangles, slotOf(current), ray, shear, &hit)) {
+            if (leafStops(ctx, leafOf(current), triangles, shear, ray.reach, passable)) return true;
+        } else if (crt_slot_stops(ctx, triangles, slotOf(current), ray, shear, passable)) {
             return true;
         }
     }

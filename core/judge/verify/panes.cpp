@@ -68,8 +68,36 @@ void lightsBehindPanes(Context& context) {
                                   {std::pow((1 - r) / (1 + r), panes), "polarisation is lost in a pane"}});
             }
     }
+    // Every way of finding surfaces finds all panes of every form, and what is among them.
+    const std::string sun = "[{type: directional, direction: [0, -1, 0], irradiance: 1}]";
+    const std::string sphere =
+                          "{sphere: {radius: 0.1}, transform: [{translate: [0, 0.6, 0]}], material: it}",
+                      lying = "{rotate: {axis: [1, 0, 0], angle_deg: 90}}",
+                      disks = "{disk: {radius: 1}, transforms: [[" + lying +
+                              ", {translate: [0, 0.5, 0]}], [" + lying +
+                              ", {translate: [0, 0.8, 0]}]], material: it}",
+                      wall = "{mesh: {positions: [[-1,0.7,-1],[-1,0.7,1],[1,0.7,1],[1,0.7,-1]], "
+                             "faces: [[0,1,2,3]]}, material: black}";
+    for (const char* accelerator : {"bvh", "aabb", "none"})
+        for (const auto& [what, objects, crossings, stopped] :
+             {std::tuple{"a sphere", std::vector{sphere}, 2, false},
+              {"a sphere between two disks", std::vector{disks, sphere}, 4, false},
+              {"two disks and a wall between them", std::vector{disks, wall}, 0, true}}) {
+            const auto film = [&, objects = objects](bool empty) {
+                Stage stage = floorUnderPanes(empty ? 0 : 1, kPane,
+                                              fmt::format("{{max_depth: 1, accelerator: {}}}", accelerator));
+                stage.set("lights", sun);
+                for (const std::string& object : objects)
+                    if (!empty) stage.object(object.substr(1, object.size() - 2));
+                return luminance(context.render(stage.yaml(), {.samples = 16}));
+            };
+            context.absolute(fmt::format("a pane and {}, accelerator {}", what, accelerator),
+                             film(false) / film(true), stopped ? 0 : std::pow(12.0 / 13, crossings + 1),
+                             2e-5,
+                             {{std::pow(12.0 / 13, crossings), "shadow rays miss a pane"},
+                              {std::pow(12.0 / 13, crossings / 2 + 1), "a sphere is passed once"}});
+        }
     // In part a pane, or there in part: chances of their own for each surface.
-    const std::string light = "[{type: directional, direction: [0, -1, 0], irradiance: 1}]";
     constexpr double once = 12.0 / 13;
     for (const auto& [what, material, through] :
          {std::tuple{"half a pane, half black", "{type: mix, materials: [pane, black], amount: 0.5}",
@@ -78,8 +106,8 @@ void lightsBehindPanes(Context& context) {
            (1 + once) / 2}})
         for (const int panes : {1, 2})
             context.estimate(fmt::format("{}, {} of them", what, panes),
-                             {floorUnderPanes(panes, material).set("lights", light).yaml(),
-                              floorUnderPanes(0, material).set("lights", light).yaml()},
+                             {floorUnderPanes(panes, material).set("lights", sun).yaml(),
+                              floorUnderPanes(0, material).set("lights", sun).yaml()},
                              ratioOfTwo, std::pow(through, panes), 0.003, {.samples = 1024, .most = 65536},
                              {{through, "all surfaces decide alike"}});
     // A film on one side, as seen by an eye.
@@ -94,14 +122,14 @@ void lightsBehindPanes(Context& context) {
         return seen / all;
     };
     for (const double degrees : {0.0, 60.0}) {
-        const std::string sun =
+        const std::string slanting =
             fmt::format("[{{type: directional, direction: [{:.17g}, {:.17g}, 0], irradiance: 1}}]",
                         -std::sin(degrees * kDegree), -std::cos(degrees * kDegree));
         const std::string material =
             "{type: thin_dielectric, ior: 1.5, thin_film: {thickness_nm: 300, ior: 2.2}}";
         context.estimate(fmt::format("under a film, at {}°", degrees),
-                         {floorUnderPanes(1, material).set("lights", sun).yaml(),
-                          floorUnderPanes(0, material).set("lights", sun).yaml()},
+                         {floorUnderPanes(1, material).set("lights", slanting).yaml(),
+                          floorUnderPanes(0, material).set("lights", slanting).yaml()},
                          ratioOfTwo, filmed(degrees), 0.002, {.samples = 1024, .most = 65536},
                          {{paneTransmittance(std::cos(degrees * kDegree), kIndex), "there is no film"}});
     }
@@ -185,7 +213,8 @@ std::vector<Case> paneCases() {
     return {
         row("G53", "lights-behind-panes",
             "A floor lit by a point, a spot, an IES lamp, a beam and a directional light behind 1, 2 and 7 "
-            "panes, at 0°, 30°, 60° and 80°; panes that are there in part, in a mix, under a film",
+            "panes, at 0°, 30°, 60° and 80°; panes that are there in part, in a mix, under a film; a "
+            "sphere and disks of panes, and a wall among them, found by each accelerator",
             "Tⁿ, T = (1 − R)/(1 + R) of each polarisation", "Fresnel's equations; Stokes (1862)",
             "1e-5 (1 + n tan θ); ± 0.3 %", Level::Commit, floor | CRT_FEATURE_POINT_LIGHT,
             lightsBehindPanes),
