@@ -106,20 +106,11 @@ FlatShape flatShape(const PlacedShape& shape, const Vec3d& centre, int scale_exp
     const double extent = own.type == QuadricType::Disk
                               ? radius
                               : std::min(to_z, radius + height) - std::max(from_z, -radius - height);
-    // What ends in one circle shall overlap by rounding rather than gape; but by less than the clearance of
-    // its neighbour, whose rays would meet the lip, and by so little of its own size that areas stay: far
-    // from the scene's centre rounding is larger than what is small.
-    constexpr double kMostLip = 0x1p-11;  // of the extent: 1e-3 of the area
-    const float rounding =
-        kernel::crt_shape_clearance(static_cast<float>(coordinate), static_cast<float>(radius + height / 4));
-    const double lip = std::min(static_cast<double>(rounding) / 2, kMostLip * extent);
-    flat.margin = static_cast<float>(lip + std::min(static_cast<double>(flat.clearance), extent / 8));
-    from_z -= lip;
-    to_z += lip;
+    flat.margin = static_cast<float>(std::min(static_cast<double>(flat.clearance), extent / 8));
     if (sphere && own.from_z <= -own.radius) from_z = -2 * radius;
     if (sphere && own.to_z >= own.radius) to_z = 2 * radius;
     record.kind = sphere ? CRT_SHAPE_SPHERE : cylinder ? CRT_SHAPE_CYLINDER : CRT_SHAPE_DISK;
-    record.radius = static_cast<float>(own.type == QuadricType::Disk ? radius + lip : radius);
+    record.radius = static_cast<float>(radius);
     record.from_z = static_cast<float>(from_z);
     record.to_z = static_cast<float>(to_z);
     record.facing = own.inward ? -1.0f : 1.0f;

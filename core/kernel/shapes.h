@@ -146,6 +146,12 @@ CRT_FN int crt_shape_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *
 
 CRT_FN int crt_last_slots_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
+    CrtHit hit;
+    if (!crt_has_panes(ctx)) {
+        for (u32 i = 0u; i < ctx->scene->shapes.count; ++i)
+            if (crt_intersect_shape(crt_shape_of(ctx, i), ray, ray.reach, &hit)) return 1;
+        return 0;
+    }
     const u32 end = ctx->scene->triangle_count;
     for (u32 slot = end - ctx->scene->shapes.count; slot < end; ++slot)
         if (crt_shape_stops(ctx, triangles + slot, slot, ray, passable)) return 1;

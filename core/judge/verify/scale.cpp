@@ -272,6 +272,166 @@ void prismsLamp(Context& context) {
             1e-3, {{1, "the prism's faces turn by the rounding of what is far away"}});
 }
 
+// ---- Areas of shapes ------------------------------------------------------------------------------------
+
+/// A disk of radius 1, a cylinder of radius 1, or a sphere of radius 1.25 that is cut: the last two of
+/// half height 1 along y. All stand at (0, 0, D).
+Object shapeAt(QuadricType type, double distance) {
+    Object object;
+    object.shape = Quadric{.type = type,
+                           .radius = type == QuadricType::Sphere ? 1.25 : 1,
+                           .from_z = type == QuadricType::Disk ? 0.0 : -1.0,
+                           .to_z = type == QuadricType::Disk ? 0.0 : 1.0};
+    object.transforms = {type == QuadricType::Disk
+                             ? Matrix4d{-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, distance, 0, 0, 0, 1}
+                             : Matrix4d{0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, distance, 0, 0, 0, 1}};
+    return object;
+}
+
+/// It shines outwards. Seen from afar, a wall's two sides are within each other's clearance near its
+/// outline.
+void addLamp(Scene& scene, Object lamp) {
+    scene.emissions.push_back({.radiance = constantSpectrum(1)});
+    scene.materials.push_back(diffuse(0));
+    lamp.mesh = static_cast<std::uint32_t>(scene.meshes.size());
+    scene.meshes.emplace_back();
+    lamp.material = static_cast<std::int32_t>(scene.materials.size() - 1);
+    lamp.emission = static_cast<std::int32_t>(scene.emissions.size() - 1);
+    scene.objects.push_back(std::move(lamp));
+}
+
+/// Where a camera at the origin looks at a rim: pixels of a film, of which a few are kept.
+constexpr int kFilm = 16384, kKept = 16;
+
+struct Window {
+    QuadricType type;
+    double distance;
+
+    double tangent() const { return 2 / distance; }  ///< Of half the film.
+    /// Along the view, of the point of the rim that is looked at.
+    double depth() const {
+        return type == QuadricType::Disk ? distance : distance - (type == QuadricType::Sphere ? 0.75 : 1);
+    }
+    int row() const { return static_cast<int>(std::lround((1 / depth() / tangent() + 1) / 2 * kFilm)); }
+    double pixel() const { return 2 * tangent() / kFilm; }
+
+    /// Whether the ray with these slopes meets the shape, in double.
+    bool meets(double u, double v) const {
+        if (type == QuadricType::Disk) return (u * u + v * v) * distance * distance <= 1;
+        // (u² t² or (u² + v²) t²) + (t − D)² = R², solved for t − D, as D² is large.
+        const bool sphere = type == QuadricType::Sphere;
+        const double w = u * u + (sphere ? v * v : 0), radius2 = sphere ? 1.5625 : 1, a = 1 + w;
+        const double b = w * distance, root = b * b - a * (w * distance * distance - radius2);
+        if (root < 0) return false;
+        for (const double sign : {-1.0, 1.0})
+            if (std::abs(v * (distance + (sign * std::sqrt(root) - b) / a)) <= 1) return true;
+        return false;
+    }
+    /// The share of the window that shows the shape.
+    double shown() const {
+        constexpr int kSteps = 2048;
+        std::uint64_t inside = 0;
+        for (int y = 0; y < kSteps; ++y)
+            for (int x = 0; x < kSteps; ++x) {
+                const double u = ((x + 0.5) / kSteps - 0.5) * kKept * pixel();
+                const double v = (row() - kFilm / 2 + ((y + 0.5) / kSteps - 0.5) * kKept) * pixel();
+                inside += meets(u, v);
+            }
+        return static_cast<double>(inside) / kSteps / kSteps;
+    }
+    Scene scene() const {
+        Scene scene = emptyScene(kFilm, 1, {0, 0, 0}, {0, 0, distance}, tangent());
+        scene.sampler.type = SamplerType::Sobol;
+        scene.sampler.replicates = 1;
+        scene.integrator.max_depth = 0;
+        // Rows go down, and the shapes are the same upside down.
+        scene.film.crop = {kFilm / 2 - kKept / 2, row() - kKept / 2, kFilm / 2 + kKept / 2,
+                           row() + kKept / 2};
+        // What is behind the camera, and small, keeps single precision finest at the origin.
+        Mesh mesh;
+        addTriangle(mesh, {0, 0, -0x1p-10}, {0x1p-10, 0, -0x1p-10}, {0, 0x1p-10, -0x1p-10});
+        addObject(scene, std::move(mesh), diffuse(0));
+        return scene;
+    }
+};
+
+/// A floor of size 2^-3 at the origin, in the light of a lamp.
+Scene floorUnder(Object lamp) {
+    Scene scene = emptyScene(4, 1, {0, 0, 0x1p-4}, {0, 0, 0}, 0.001);
+    scene.sampler.type = SamplerType::Sobol;
+    scene.sampler.replicates = 1;
+    scene.integrator.max_depth = 1;
+    scene.integrator.nee = true;
+    scene.integrator.mis = false;  // what scattered rays find by chance would only be noise
+    Mesh mesh;
+    constexpr double kHalf = 0x1p-4;
+    addQuad(mesh, {-kHalf, -kHalf, 0}, {kHalf, -kHalf, 0}, {kHalf, kHalf, 0}, {-kHalf, kHalf, 0});
+    addObject(scene, std::move(mesh), diffuse(1));
+    addLamp(scene, std::move(lamp));
+    return scene;
+}
+
+/// ∫ cos cos / d² over the lamp, from the origin, in double.
+double irradianceFrom(QuadricType type, double distance) {
+    constexpr int kSteps = 1024;
+    double sum = 0;
+    for (int i = 0; i < kSteps; ++i)
+        for (int j = 0; j < kSteps; ++j) {
+            const double s = (i + 0.5) / kSteps, angle = 2 * kPi * (j + 0.5) / kSteps;
+            Vec3d normal{0, 0, -1}, p{0, 0, distance};
+            double area = 0;
+            if (type == QuadricType::Disk) {
+                p = p + Vec3d{s * std::cos(angle), s * std::sin(angle), 0};
+                area = 2 * kPi * s;
+            } else {
+                const double y = 2 * s - 1, radius = type == QuadricType::Sphere ? 1.25 : 1;
+                const double up = type == QuadricType::Sphere ? y / radius : 0;
+                const double across = std::sqrt(1 - up * up);
+                normal = {across * std::sin(angle), up, -across * std::cos(angle)};
+                p = p + Vec3d{normal[0] * radius, y, normal[2] * radius};
+                area = 4 * kPi * radius;
+            }
+            const double d2 = dot(p, p);
+            sum += area * std::max(0.0, -dot(normal, p)) * p[2] / (d2 * d2);
+        }
+    return sum / kSteps / kSteps;
+}
+
+void areasOfShapes(Context& context) {
+    const std::uint64_t seen = context.byLevel(1024, 4096, 4096);
+    for (const auto& [type, name] : {std::pair{QuadricType::Disk, "disk"},
+                                     {QuadricType::Cylinder, "cylinder"},
+                                     {QuadricType::Sphere, "cut sphere"}}) {
+        double nearest = 0;
+        for (const double distance : {64.0, 0x1p10, 0x1p17}) {
+            const Window window{type, distance};
+            Scene scene = window.scene(), lit = window.scene();
+            addLamp(scene, shapeAt(type, distance));
+            Object all = shapeAt(QuadricType::Disk, distance);
+            all.shape->radius = 8;
+            addLamp(lit, std::move(all));
+            const double share = radiance(context.render(scene, samples(seen))) /
+                                 radiance(context.render(lit, samples(seen)));
+            // How far the rim is from where it should be; an area grows with it, a disk's twice.
+            const double off = (share - window.shown()) * kKept * window.pixel() * window.depth();
+            context.relative(fmt::format("area of a {} as rays meet it, {:g} away", name, distance),
+                             1 + (type == QuadricType::Disk ? 2 : 1) * off, 1, 1e-5,
+                             {{1 + 0x1p-10, "rims are widened"}});
+            // Light sampling has noise of some 4e-5, and at other distances the same.
+            const double light =
+                radiance(context.render(floorUnder(shapeAt(type, distance)), samples(8192))) /
+                (irradianceFrom(type, distance) / kPi);
+            const std::vector<Mistake> mistakes = {{1 + 0x1p-10, "a lip is sampled, or counted as area"}};
+            const std::string what =
+                fmt::format("light of a {} by light sampling, {:g} away", name, distance);
+            if (nearest == 0)
+                context.relative(what, nearest = light, 1, 1e-4, mistakes);
+            else
+                context.relative(what + ", over that 64 away", light / nearest, 1, 1e-5, mistakes);
+        }
+    }
+}
+
 void layers(Context& context) {
     const std::uint64_t rays = context.byLevel(40000, 800000, 800000);
     // Below 6e-6 of their size layers of a scene of that size begin to be skipped:
@@ -481,6 +641,18 @@ std::vector<Case> scaleCases() {
          .needs = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION | CRT_FEATURE_AREA_LIGHT |
                   CRT_FEATURE_INDEPENDENT,
          .run = prismsLamp},
+        {.id = "B14",
+         .name = "areas-of-shapes",
+         .title =
+             "The rims of disks, cylinders and cut spheres, and their light by light sampling, 64, 2^10 "
+             "and 2^17 times their size from where single precision is finest",
+         .expected = "the area and the light of the shape as it is given",
+         .source = "geometry, in double; rims are 2^-24 of the size from where they should be, by rounding",
+         .tolerance = "± 1e-5; the light 64 away ± 1e-4",
+         .level = Level::Commit,
+         .needs = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_BVH |
+                  CRT_FEATURE_SHAPES,
+         .run = areasOfShapes},
     };
 }
 
