@@ -143,7 +143,7 @@ TEST_CASE("an index of exactly 1 is no surface, however grazing", "[kernel][bsdf
         const vec3 wo = normalize3(crt_to_world(frame, make_vec3(s * std::cos(phi), s * std::sin(phi), c)));
         if (!(dot3(wo, n) > 0)) continue;
         wrong += crt_fresnel_dielectric(c, 1) != 0;
-        const CrtScatter scatter = crt_sample_dielectric(splat4(1), wo, n, n, heroOf(0), 0, 0,
+        const CrtScatter scatter = crt_sample_dielectric(splat4(1), wo, n, heroOf(0), 0, 0,
                                                          crt_unit(static_cast<u32>(random.bits())));
         wrong += !scatter.valid || scatter.wi.x != -wo.x || scatter.wi.y != -wo.y || scatter.wi.z != -wo.z ||
                  V4X(scatter.weight) != 1;
@@ -168,7 +168,7 @@ TEST_CASE("a dielectric refracts by Snell's law, reflects by the mirror's, and l
             double sum = 0, reflected = 0;
             constexpr int kSteps = 20000;
             for (int k = 0; k < kSteps; ++k) {
-                const CrtScatter s = crt_sample_dielectric(splat4(eta), wo, n, n, heroOf(1), 0, 0,
+                const CrtScatter s = crt_sample_dielectric(splat4(eta), wo, n, heroOf(1), 0, 0,
                                                            static_cast<f32>((k + 0.5) / kSteps));
                 if (!s.valid) continue;
                 sum += lane(s.weight, 2) * s.eta_square / kSteps;
@@ -210,7 +210,7 @@ TEST_CASE("dispersion: on average over heroes, every wavelength is refracted wit
             std::array<double, 4> reflected{}, refracted{};
             for (u32 hero = 0; hero < 4; ++hero)
                 for (int k = 0; k < kSteps; ++k) {
-                    const CrtScatter s = crt_sample_dielectric(index, wo, n, n, heroOf(hero), 1, 0,
+                    const CrtScatter s = crt_sample_dielectric(index, wo, n, heroOf(hero), 1, 0,
                                                                static_cast<f32>((k + 0.5) / kSteps));
                     if (!s.valid) continue;
                     CHECK_FALSE((s.hero_only != 0) == (s.wi.z > 0));
@@ -234,7 +234,7 @@ TEST_CASE("dispersion: on average over heroes, every wavelength is refracted wit
         }
     }
     // Alone, the hero's own Fresnel decides, and nothing more is given up.
-    const CrtScatter alone = crt_sample_dielectric(eta, n, n, n, heroOf(3), 1, 1, 0.5f);
+    const CrtScatter alone = crt_sample_dielectric(eta, n, n, heroOf(3), 1, 1, 0.5f);
     CHECK(alone.valid);
     CHECK(alone.hero_only == 0);
     CHECK(lane(alone.weight, 3) == Approx(1 / (1.8 * 1.8)));
@@ -703,6 +703,35 @@ TEST_CASE("spectra and observer are exact at whole nanometres and linear between
             CHECK(lane(crt_value(&ctx, ctx.scene->environment, nullptr, splat4(at + 0.25f)), 0) ==
                   Approx(0.75 * s[nm] + 0.25 * s[nm + 1]).margin(1e-5));
     }
+}
+
+TEST_CASE("smooth glass sends all light to the right side of its face", "[kernel][bsdf]") {
+    Random random(5);
+    std::uint64_t lost = 0, on_the_wrong_side = 0;
+    double worst = 0;
+    const auto vectorOf = [](const Vec3d& v) {
+        return make_vec3(static_cast<f32>(v[0]), static_cast<f32>(v[1]), static_cast<f32>(v[2]));
+    };
+    for (int i = 0; i < 200000; ++i) {
+        CrtBsdf b{};
+        b.type = CRT_MATERIAL_DIELECTRIC;
+        b.flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA | CRT_BSDF_BOUNDS;
+        b.eta = splat4(i % 2 == 0 ? 1.5f : 1 / 1.5f);
+        b.ng = vectorOf(random.direction());
+        b.ns = vectorOf(random.direction());
+        b.wo = vectorOf(random.direction());
+        if (dot3(b.ns, b.ng) < 0) b.ns = -b.ns;
+        if (dot3(b.wo, b.ng) < 0) b.wo = -b.wo;
+        crt_face_viewer(&b, 1);
+        const CrtScatter s =
+            crt_sample_smooth(&b, heroOf(0), 0, static_cast<f32>(random.uniform(0, 0.999999)));
+        lost += !s.valid;
+        on_the_wrong_side += s.valid && (s.eta_square != 1.0f) != (dot3(s.wi, b.ng) < 0);
+        worst = std::max(worst, std::abs(double{V4X(s.weight)} * double{s.eta_square} - 1));
+    }
+    CHECK(lost == 0);
+    CHECK(on_the_wrong_side == 0);
+    CHECK(worst < 1e-6);
 }
 
 TEST_CASE("colours of views are the film's sRGB", "[kernel][spectrum]") {

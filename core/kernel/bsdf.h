@@ -165,9 +165,9 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
 
 /* Smooth dielectric, with or without a film. */
 CRT_FN CrtScatter crt_sample_smooth(const CrtBsdf *b, vec4 hero, int alone, f32 u) {
-    if (crt_has_film(b)) return crt_sample_filmed_dielectric(b, hero, alone, u);
-    return crt_sample_dielectric(b->eta, b->wo, b->ns, b->ng, hero, (b->flags & CRT_BSDF_DISPERSIVE) != 0u,
-                                 alone, u);
+    if (crt_has_film(b)) return crt_to_its_side(b, crt_sample_filmed_dielectric(b, hero, alone, u));
+    return crt_to_its_side(b, crt_sample_dielectric(b->eta, b->wo, b->ns, hero,
+                                                    (b->flags & CRT_BSDF_DISPERSIVE) != 0u, alone, u));
 }
 
 /* A direction w_i, distributed as the density of crt_bsdf or a delta. `choice`: two more random numbers,
@@ -196,12 +196,14 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 cho
             break;
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
             if (CRT_HAS(ROUGH_DIELECTRIC)) {
-                if ((b->flags & CRT_BSDF_DELTA) == 0u) return crt_sample_rough_dielectric(b, u, choice);
+                if ((b->flags & CRT_BSDF_DELTA) == 0u)
+                    return crt_to_its_side(b, crt_sample_rough_dielectric(b, u, choice));
                 return crt_sample_smooth(b, hero, alone, u.x);
             }
             break;
         case CRT_MATERIAL_THIN_DIELECTRIC:
-            if (CRT_HAS(THIN_DIELECTRIC)) return crt_sample_mirror_up(b, b->reflectance);
+            if (CRT_HAS(THIN_DIELECTRIC))
+                return crt_to_its_side(b, crt_sample_mirror(b->reflectance, b->wo, b->ns, b->ns));
             break;
         case CRT_MATERIAL_PLASTIC:
             if (CRT_HAS(PLASTIC)) return crt_sample_plastic(b, u, choice.x);
@@ -228,8 +230,11 @@ CRT_FN vec4 crt_bsdf(const CrtBsdf *b, vec3 wi, f32 *pdf) {
                 return crt_rough_conductor(b, wi, pdf);
             break;
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
-            if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u)
+            if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u) {
+                /* What crt_to_its_side mirrors is not of the lobe. */
+                if ((CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) && !crt_keeps_side(b, wi)) break;
                 return crt_rough_dielectric(b, wi, pdf);
+            }
             break;
         case CRT_MATERIAL_PLASTIC:
             if (CRT_HAS(PLASTIC)) return crt_plastic(b, wi, pdf);

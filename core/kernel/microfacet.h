@@ -171,11 +171,10 @@ CRT_FN CrtRefracted crt_rough_refraction(const CrtBsdf *b, vec3 wi, u32 lane) {
 }
 
 /* f·|cos| at each wavelength, and the density of w_i: the visible normals' times the share of what they
-   mirror or refract. */
+   mirror or refract. Sides are those of n_s. */
 CRT_FN vec4 crt_rough_dielectric(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     *pdf = 0.0f;
     const int mirrored = dot3(wi, b->ns) > 0.0f;
-    if (mirrored != (dot3(wi, b->ng) > 0.0f)) return splat4(0.0f);
     const int divided = crt_is_divided(b);
     if (mirrored) {
         const CrtMicrofacet m = crt_microfacet(b, wi);

@@ -10,7 +10,8 @@
  * from everywhere a surface sends on what its BSDF does. Why there is no shadowing by the walls:
  * docs/decisions/0024-normal-maps.md.
  *
- * Surfaces that transmit have no walls: there the mapped normal stands in the place of the other.
+ * Surfaces that transmit have no walls: there the mapped normal stands in the place of the other, and what
+ * would leave to the wrong side is mirrored by the face (crt_to_its_side).
  */
 #ifndef CRT_NORMAL_MAP_H
 #define CRT_NORMAL_MAP_H

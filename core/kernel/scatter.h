@@ -179,9 +179,9 @@ CRT_FN CrtScatter crt_sample_mirror(vec4 reflectance, vec3 wo, vec3 ns, vec3 ng)
 }
 
 /* At an interface as much is mirrored as `fresnel` says of each wavelength, with the chance `reflect`; the
-   rest is refracted by `eta`. `alone`: that is right for the hero only. */
-CRT_FN CrtScatter crt_reflect_or_refract(vec3 wo, vec3 ns, vec3 ng, f32 cos_i, f32 eta, vec4 fresnel,
-                                         vec4 passed, f32 reflect, int alone, f32 u) {
+   rest is refracted by `eta`. `alone`: that is right for the hero only. Sides are those of ns. */
+CRT_FN CrtScatter crt_reflect_or_refract(vec3 wo, vec3 ns, f32 cos_i, f32 eta, vec4 fresnel, vec4 passed,
+                                         f32 reflect, int alone, f32 u) {
     CrtScatter s;
     s.pdf = 0.0f;
     s.eta_square = 1.0f;
@@ -189,7 +189,7 @@ CRT_FN CrtScatter crt_reflect_or_refract(vec3 wo, vec3 ns, vec3 ng, f32 cos_i, f
     if (u < reflect) {
         s.wi = normalize3(crt_reflect(wo, ns));
         s.weight = fresnel / reflect;
-        s.valid = dot3(s.wi, ng) > 0.0f;
+        s.valid = dot3(s.wi, ns) > 0.0f;
         return s;
     }
     const f32 inverse_eta = 1.0f / eta;
@@ -201,15 +201,15 @@ CRT_FN CrtScatter crt_reflect_or_refract(vec3 wo, vec3 ns, vec3 ng, f32 cos_i, f
     s.wi = eta == 1.0f ? -wo
                        : normalize3(wo * -inverse_eta +
                                     ns * (cos_i - crt_sqrt(crt_max(refraction, 0.0f))) * inverse_eta);
-    s.valid = refraction > 0.0f && dot3(s.wi, ng) < 0.0f;
+    s.valid = refraction > 0.0f && dot3(s.wi, ns) < 0.0f;
     return s;
 }
 
 /* Smooth dielectric. `eta`: index beyond the surface / index on w_o's side. `hero`: 1 in the hero's lane, 0
    elsewhere. `dispersive`: the index differs between the path's living wavelengths. `alone`: only the hero
    is alive. */
-CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec4 hero, int dispersive,
-                                        int alone, f32 u) {
+CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec4 hero, int dispersive, int alone,
+                                        f32 u) {
     const f32 cos_i = crt_min(dot3(wo, ns), 1.0f);
     const f32 eta_hero = CRT_HAS(DISPERSION) ? sum4(eta * hero) : V4X(eta);
     const f32 fresnel_hero = crt_fresnel_dielectric(cos_i, eta_hero);
@@ -220,7 +220,7 @@ CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec3 ng, vec
         fresnel = crt_fresnel_dielectric4(cos_i, eta);
         reflect = 0.25f * sum4(fresnel);
     }
-    return crt_reflect_or_refract(wo, ns, ng, cos_i, eta_hero, fresnel, splat4(1.0f - fresnel_hero), reflect,
+    return crt_reflect_or_refract(wo, ns, cos_i, eta_hero, fresnel, splat4(1.0f - fresnel_hero), reflect,
                                   divided, u);
 }
 

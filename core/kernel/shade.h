@@ -315,6 +315,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     const vec3 ng = surface.ng;
     if (CRT_HAS(THIN_DIELECTRIC)) bsdf.pane_cosine = crt_pane_cosine(&surface, path->ray.d);
     if (CRT_HAS(NORMAL_MAP)) crt_map_normal(ctx, &surface, hit.slot, &wo, &bsdf);
+    if (crt_sees_face(ctx, surface.material, path->depth)) surface.ns = ng;
     crt_layered_prepare(ctx, &bsdf, &surface, wo, path->wavelengths.position, path->throughput, first);
     surface.ng = ng;
     if (first) {

@@ -8,6 +8,9 @@
  *   - everything else is mirrored up by the surface. That counts among the single directions beside a lobe:
  *     scattered rays alone follow it.
  *
+ * Glass keeps its light in the same way (docs/decisions/0060-glass-with-interpolated-normals.md): what it
+ * reflects to below the face is mirrored up, and what it refracts to above the face is mirrored down.
+ *
  * A viewer behind the shading normal is taken for one as far before it: what is mirrored is then mirrored by
  * the geometry, without a seam where the shading normal turns away.
  */
@@ -108,6 +111,40 @@ CRT_FN CrtScatter crt_turned_up(const CrtBsdf *b, CrtScatter s) {
     }
     s.valid = dot3(s.wi, b->ng) > 0.0f;
     return s;
+}
+
+/* Whether w leaves to the same side of the face as of n_s. */
+CRT_FN int crt_keeps_side(const CrtBsdf *b, vec3 w) {
+    const f32 side = dot3(w, b->ng);
+    return dot3(w, b->ns) > 0.0f ? side > 0.0f : side < 0.0f;
+}
+
+/* Of a BSDF that sends light to either side of n_s: a direction that is on the other side of the face is
+   mirrored by the face. So what is refracted always crosses the face, and what is reflected never does:
+   factors n² come in pairs. The direction becomes a single one, as in crt_turned_up. */
+CRT_FN CrtScatter crt_to_its_side(const CrtBsdf *b, CrtScatter s) {
+    if (!(CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) || !s.valid || crt_keeps_side(b, s.wi)) return s;
+    const int reflected = dot3(s.wi, b->ns) > 0.0f;
+    s.wi = crt_mirrored(s.wi, b->ng);
+    s.pdf = 0.0f;
+    const f32 side = dot3(s.wi, b->ng);
+    s.valid = reflected ? side > 0.0f : side < 0.0f;
+    return s;
+}
+
+/* Reflection about an interpolated normal conserves what keeps light inside by total reflection: about a
+   sphere's normals the distance at which light passes the centre. Light that such a normal let in elsewhere
+   would never leave. So from this many scattering events on, bodies of glass have the normal of the face at
+   every other vertex. */
+#define CRT_FACES_FROM_DEPTH 8u
+
+CRT_FN int crt_sees_face(const CrtContext *ctx, u32 material, u32 depth) {
+    if (!(CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) ||
+        !(CRT_HAS(DIELECTRIC) || CRT_HAS(ROUGH_DIELECTRIC)))
+        return 0;
+    if (depth < CRT_FACES_FROM_DEPTH || (depth & 1u) == 0u) return 0;
+    const u32 type = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].type;
+    return type == CRT_MATERIAL_DIELECTRIC || type == CRT_MATERIAL_ROUGH_DIELECTRIC;
 }
 
 /* The normal below which nothing is sampled: of a smooth surface, before what is below it is turned up. */

@@ -154,7 +154,7 @@ CRT_FN int crt_is_divided(const CrtBsdf *b) {
 CRT_FN CrtScatter crt_sample_filmed_dielectric(const CrtBsdf *b, vec4 hero, int alone, f32 u) {
     const f32 cos_i = crt_min(dot3(b->wo, b->ns), 1.0f);
     const vec4 fresnel = crt_film_reflectance(b, cos_i);
-    return crt_reflect_or_refract(b->wo, b->ns, b->ng, cos_i,
+    return crt_reflect_or_refract(b->wo, b->ns, cos_i,
                                   CRT_HAS(DISPERSION) ? sum4(b->eta * hero) : V4X(b->eta), fresnel,
                                   splat4(1.0f) - fresnel, sum4(b->lanes * fresnel),
                                   (b->flags & CRT_BSDF_DISPERSIVE) != 0u && !alone, u);

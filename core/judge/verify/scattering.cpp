@@ -220,7 +220,7 @@ void extremeNumbers(Context& context) {
                 for (const float eta : {1.0f, 1.0000001f, 1.5f, 1 / 1.5f, 100.0f}) {
                     const vec3 wo = make_vec3(std::sqrt(1 - cosine * cosine), 0.0f, cosine);
                     const CrtScatter glass = crt_sample_dielectric(
-                        splat4(eta), wo, normal, normal, make_vec4(1.0f, 0.0f, 0.0f, 0.0f), 0, 0, u.x);
+                        splat4(eta), wo, normal, make_vec4(1.0f, 0.0f, 0.0f, 0.0f), 0, 0, u.x);
                     bad += !glass.valid || (finite(glass.wi) && std::isfinite(V4X(glass.weight))) ? 0 : 1;
                     ++asked;
                 }

@@ -4,6 +4,7 @@
 #include "judge/verify/context.h"
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
+#include "judge/verify/shapes.h"
 
 #include "kernel/features.h"
 
@@ -167,6 +168,77 @@ void interpolatedNormalsEnergy(Context& context) {
                 }
 }
 
+/// A ball of triangles with the normals of a sphere, in light of .5 from everywhere.
+Scene roundedBall(int level, Material material) {
+    Scene scene = emptyScene(24, 11, {2.2, 1.3, 1.9}, {0, 0, 0}, 0.4);
+    scene.integrator.max_depth = 4000;
+    scene.environment = Environment{constantSpectrum(0.5)};
+    Mesh mesh = icosphere(level, 1, {0, 0, 0});
+    for (const Vec3d& p : mesh.positions) mesh.normals.push_back(unit(p));
+    mesh.normal_index = mesh.triangles;
+    addObject(scene, std::move(mesh), std::move(material));
+    return scene;
+}
+
+void interpolatedGlass(Context& context) {
+    // Each path through clear glass brings exactly the light around it, so every pixel is that of an empty
+    // scene.
+    for (const int level : {0, 1, 3})
+        for (const double index : {1.5, 2.4}) {
+            const Scene scene = roundedBall(level, glass(index));
+            Scene empty = scene;
+            empty.objects.clear();
+            context.relative(
+                fmt::format("a ball of {} triangles, index {}, the worst pixel", 20 << 2 * level, index),
+                worstRatio(context.render(scene, samples(16)), context.render(empty, samples(16))), 1, 2e-5);
+        }
+    for (const char* technique : {"MIS", "scattered rays alone"}) {
+        Material material = glass(1.5);
+        material.type = MaterialType::RoughDielectric;
+        material.roughness = 0.3;
+        Scene scene = roundedBall(0, material);
+        scene.environment->light_sampling = true;
+        scene.integrator.nee = std::string("MIS") == technique;
+        std::vector<double> means;
+        for (std::uint64_t seed = 1; seed <= 16; ++seed)
+            means.push_back(radiance(context.render(scene, {.samples = 64, .seed = seed})));
+        context.equivalent(fmt::format("a ball of 20 triangles, roughness 0.3, {}", technique), means, 0.5,
+                           0.003);
+    }
+    // Tilted normals on a sheet between two skies of 1: glass shows F of one and (1 − F)/n² of the other.
+    // A pane shows 1.
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/normals.pfm";
+    const double bright = white(context);
+    for (const bool mapped : {false, true})
+        for (const double tilt : {20.0, 50.0})
+            for (const double view : {0.0, 40.0, 70.0})
+                for (const double azimuth : {0.0, 2.8}) {
+                    const Vec3d n = spherical(tilt, azimuth), eye = spherical(view, 0);
+                    // A normal behind the viewer is replaced by that of the floor.
+                    const double cosine = dot(n, eye) > 0 ? dot(n, eye) : eye[1];
+                    const auto seen = [&](const char* material) {
+                        Stage stage = mapped ? mappedFloor(path, {n[0], -n[2], n[1]}, seenFrom(eye), kDirect,
+                                                           material)
+                                             : tiltedFloor(n, seenFrom(eye), kDirect, material);
+                        return stage.set("environment", "{radiance: 1}").yaml();
+                    };
+                    const double f = fresnelDielectric(cosine, 1.5);
+                    const std::string where =
+                        fmt::format("{} normals, tilt {}° towards {}, seen from {}°",
+                                    mapped ? "mapped" : "interpolated", tilt, azimuth, view);
+                    context.estimate("glass, " + where, seen("type: dielectric, ior: 1.5"), meanRadiance,
+                                     f + (1 - f) / 2.25, 0.005, {.samples = 256, .most = 65536},
+                                     {{(1 - f) / 2.25, "light reflected to below the face is lost"},
+                                      {f, "light refracted to above the face is lost"}});
+                    context.absolute(
+                        "a pane, " + where,
+                        radiance(context.render(seen("type: thin_dielectric, ior: 1.5"), {.samples = 64})) /
+                            bright,
+                        1, 1e-5, {{1 - f, "light reflected to below the face is lost"}});
+                }
+}
+
 void normalMap(Context& context) {
     const TemporaryFolder folder;
     const std::string path = folder.path() + "/normals.pfm";
@@ -296,6 +368,16 @@ std::vector<Case> shadingNormalCases() {
                 CRT_FEATURE_MIRROR | CRT_FEATURE_PLASTIC | CRT_FEATURE_ROUGH_CONDUCTOR |
                 CRT_FEATURE_ENVIRONMENT_LIGHT,
             interpolatedNormalsEnergy),
+        row("G52", "interpolated-glass",
+            "Balls of 20 to 1,280 triangles with the normals of a sphere, of clear glass, and of rough "
+            "glass by light sampling and without, in light from everywhere; sheets of glass and panes with "
+            "tilted interpolated and mapped normals",
+            "the light around them; F + (1 − F)/n²; 1", "conservation of energy; Fresnel's equations",
+            "2e-5 in every pixel; ± 0.3 %; ± 0.5 %; 1e-5", Level::Commit,
+            light | CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_TEXTURE |
+                CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ROUGH_DIELECTRIC | CRT_FEATURE_THIN_DIELECTRIC |
+                CRT_FEATURE_ENVIRONMENT_LIGHT,
+            interpolatedGlass),
     };
 }
 

@@ -73,8 +73,8 @@ void addCompositions(std::vector<SectionSchema>& all) {
         "components along the image's rows to the right, up its columns, and away from the surface, each "
         "from -1 (0) to 1 (the largest number), as OpenGL and glTF have them. They turn what is "
         "seen of the surface, not where it is. Coordinates that are mirrored mirror the relief. Surfaces "
-        "that reflect lose no light by it (Schüßler et al. 2017); glass loses what it would send to the "
-        "wrong side.",
+        "that reflect lose no light by it (Schüßler et al. 2017), nor does glass: what would leave to the "
+        "wrong side is mirrored by the surface.",
         {{.name = "texture",
           .required = true,
           .doc = "An image in colours: PNG, JPEG, TGA, EXR, Radiance HDR or PFM, or a glTF file or GLB, "
