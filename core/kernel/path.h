@@ -33,8 +33,10 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
     CrtRay ray = path->ray;
     int alive = 0;
     const int passable = crt_is_passable(ctx);
-    CrtPassage way = crt_passage(path->depth, 0, ray.d, path->wavelengths.position, path->media,
-                                 path->throughput);
+    CrtPassage way;
+    way.shadow = 0;
+    if (passable)
+        way = crt_passage(path->depth, 0, ray.d, path->wavelengths.position, path->media, path->throughput);
     rays->closest += 1u;
     for (;;) {
         CrtHit hit = crt_no_hit(ray.reach);
@@ -59,9 +61,11 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
             if (!stopped && hit.slot == CRT_NONE) path->radiance = path->radiance + way.carried;
             return alive;
         }
-        hit.t = hit.t + dot3(ray.o - path->ray.o, ray.d); /* from where the path's ray began */
-        path->throughput = way.carried;
-        path->met = way.material;
+        if (passable) {
+            hit.t = hit.t + dot3(ray.o - path->ray.o, ray.d); /* from where the path's ray began */
+            path->throughput = way.carried;
+            path->met = way.material;
+        }
         const u32 depth = path->depth;
         alive = crt_shade(ctx, path, hit, &shadow);
         if (!(CRT_HAS(NEE) && shadow.asked)) return alive;
