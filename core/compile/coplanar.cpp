@@ -37,6 +37,15 @@ bool inOnePlane(const Corners& a, const Corners& b) {
     });
 }
 
+bool isOn(const Vec3d& point, const Corners& c, double room) {
+    if (!(dot(c.normal, c.normal) > 0) || std::abs(dot(c.normal, point - c.p[0])) > room) return false;
+    for (std::size_t v = 0; v < 3; ++v) {
+        const Vec3d edge = c.p[(v + 1) % 3] - c.p[v];
+        if (dot(cross(c.normal, edge), point - c.p[v]) < -room * length(edge)) return false;
+    }
+    return true;
+}
+
 bool overlap(const Corners& a, const Corners& b) {
     const auto apart = [](const Corners& of, const Corners& other) {
         for (std::size_t v = 0; v < 3; ++v) {

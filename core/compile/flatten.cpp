@@ -9,6 +9,7 @@
 #include "compile/divide.h"
 #include "compile/instances.h"
 #include "compile/placements.h"
+#include "compile/rims.h"
 #include "scene/scene_limits.h"
 #include "spectra/sigmoid.h"
 
@@ -92,6 +93,7 @@ public:
         placeTriangles();
         placeShapes();
         placeInstances();
+        closeRims(flat_, shapes_);
         return std::move(flat_);
     }
 

@@ -192,6 +192,15 @@ double areaOf(const FlatScene& flat, std::size_t id) {
     return 0.5 * std::sqrt(dot(n, n));
 }
 
+Corners cornersOf(const FlatScene& flat, std::size_t triangle) {
+    const kernel::CrtFace face = faceOf(flat, triangle);
+    Corners c;
+    for (std::size_t v = 0; v < 3; ++v) c.p[v] = vertexOf(flat, triangle, v);
+    c.normal = {face.normal[0], face.normal[1], face.normal[2]};
+    c.clearance = static_cast<double>(face.clearance);
+    return c;
+}
+
 void compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator,
                       std::span<kernel::CrtTriangle> triangles) {
     parallelFor(triangles.size(), kFacesAtATime, [&](std::size_t first, std::size_t end) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compile/accelerator.h"
+#include "compile/coplanar.h"
 #include "compile/flatten.h"
 #include "kernel/layout.h"
 
@@ -15,6 +16,7 @@ namespace crt {
 /// In the coordinates of the compiled scene, in double.
 Vec3d vertexOf(const FlatScene& flat, std::size_t id, std::size_t vertex);
 double areaOf(const FlatScene& flat, std::size_t id);
+Corners cornersOf(const FlatScene& flat, std::size_t triangle);
 
 /// Fill in one a triangle or shape, by slot.
 void compileTriangles(const FlatScene& flat, const AcceleratorPart& accelerator,

@@ -106,6 +106,11 @@ FlatShape flatShape(const PlacedShape& shape, const Vec3d& centre, int scale_exp
     const double extent = own.type == QuadricType::Disk
                               ? radius
                               : std::min(to_z, radius + height) - std::max(from_z, -radius - height);
+    // What ends in one circle shall overlap by rounding rather than gape; but by less than the clearance of
+    // its neighbour, whose rays would meet the lip.
+    const float rounding =
+        kernel::crt_shape_clearance(static_cast<float>(coordinate), static_cast<float>(radius + height / 4));
+    flat.lip = static_cast<float>(std::min(static_cast<double>(rounding) / 2, extent / 8));
     flat.margin = static_cast<float>(std::min(static_cast<double>(flat.clearance), extent / 8));
     if (sphere && own.from_z <= -own.radius) from_z = -2 * radius;
     if (sphere && own.to_z >= own.radius) to_z = 2 * radius;

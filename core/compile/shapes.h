@@ -29,7 +29,8 @@ std::vector<PlacedShape> placedShapes(const Scene& scene);
 struct FlatShape {
     kernel::CrtShape record;
     float clearance;  ///< How far off it a ray must start (shapes.h).
-    float margin;     ///< How far from its edges; of ends along z, as they are compiled.
+    float margin;     ///< How far from its rims.
+    float lip;        ///< How far beyond a rim it is met, where another surface touches it (rims.h).
     std::array<float, 9> box;  ///< As CrtTriangle has it.
 };
 

@@ -71,7 +71,8 @@ CRT_ASSERT_SIZE(CrtInstance, 128);
 #define CRT_SHAPE_CYLINDER 2u /* around z, without ends */
 
 /* A surface of the second order, in a frame of unit axes that are perpendicular to each other. What is left
-   of it is where z, in the frame, is from from_z to to_z. */
+   of it is where z, in the frame, is from from_z to to_z. A rim that another surface touches has a lip: rays
+   meet the shape that much beyond it, so that none slips between the two. A lip does not shine. */
 typedef struct CrtShape {
     f32 centre[3];
     f32 radius;
@@ -82,7 +83,8 @@ typedef struct CrtShape {
     f32 z[3];
     u32 kind;   /* CRT_SHAPE_… */
     f32 facing; /* 1: normals point outwards, a disk's along z; -1: the other way */
-    f32 reserved[3];
+    f32 from_lip, to_lip; /* at from_z and at to_z; a disk's rim has to_lip; 0: nothing touches it */
+    f32 reserved;
 } CrtShape;
 CRT_ASSERT_SIZE(CrtShape, 80);
 

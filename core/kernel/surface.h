@@ -142,9 +142,11 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
     const f32 lowest = shape->from_z + margin, highest = shape->to_z - margin;
     vec3 centre = crt_load3(shape->centre);
     CrtSurface s;
+    int on_lip = 0;
     s.clearance = face->clearance;
     if (shape->kind == CRT_SHAPE_DISK) {
         const f32 r = crt_sqrt(crt_fma(hit.b1, hit.b1, hit.b2 * hit.b2));
+        on_lip = shape->to_lip > 0.0f && r > radius;
         const f32 inwards = r > radius - margin ? (radius - margin) / r : 1.0f;
         s.p = crt_fma3(ex, hit.b1 * inwards, crt_fma3(ey, hit.b2 * inwards, centre));
         s.ng = ez;
@@ -153,10 +155,13 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
         if (shape->kind == CRT_SHAPE_CYLINDER) {
             const vec3 n = crt_direction_of_turn(hit.b1);
             s.ng = ex * V3X(n) + ey * V3Y(n);
+            on_lip = hit.b2 < shape->from_z || hit.b2 > shape->to_z;
             centre = crt_fma3(ez, crt_clamp(hit.b2, lowest, highest), centre);
         } else {
             s.ng = crt_square_to_direction(hit.b1, hit.b2);
             const f32 z = dot3(s.ng, ez) * radius;
+            on_lip = (shape->from_lip > 0.0f && z < shape->from_z) ||
+                     (shape->to_lip > 0.0f && z > shape->to_z);
             if (z < lowest || z > highest) {
                 const vec3 across = s.ng - ez * (z / radius);
                 const f32 to = crt_clamp(z, lowest, highest) / radius;
@@ -168,7 +173,7 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
     s.ng = s.ng * shape->facing;
     s.ns = s.ng;
     s.material = primitive->material;
-    s.light = primitive->light;
+    s.light = on_lip ? CRT_NONE : primitive->light;
     if (CRT_HAS(ANISOTROPY)) s.slot = hit.slot;
     if (CRT_HAS(INSTANCES)) s.instance = 0u;
     if (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY)) s.at.id = hit.id;
