@@ -139,9 +139,8 @@ CRT_FN CrtScatter crt_to_its_side(const CrtBsdf *b, CrtScatter s) {
 #define CRT_FACES_FROM_DEPTH 8u
 
 CRT_FN int crt_sees_face(const CrtContext *ctx, u32 material, u32 depth) {
-    if (!(CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) ||
-        !(CRT_HAS(DIELECTRIC) || CRT_HAS(ROUGH_DIELECTRIC)))
-        return 0;
+    if (!(CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP))) return 0;
+    if (!(CRT_HAS(DIELECTRIC) || CRT_HAS(ROUGH_DIELECTRIC))) return 0;
     if (depth < CRT_FACES_FROM_DEPTH || (depth & 1u) == 0u) return 0;
     const u32 type = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[material].type;
     return type == CRT_MATERIAL_DIELECTRIC || type == CRT_MATERIAL_ROUGH_DIELECTRIC;
