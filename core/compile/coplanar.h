@@ -20,7 +20,7 @@ double largestEdge(const Corners& c);
 /// Whether the corners of the smaller lie in the plane of the larger, whose normal is known better, as well
 /// as rays can tell.
 bool inOnePlane(const Corners& a, const Corners& b);
-/// Whether the point lies on the triangle, within `room` of it.
+/// True if the distance of the point from the triangle is at most `room`.
 bool isOn(const Vec3d& point, const Corners& c, double room);
 /// Whether two triangles of one plane have area in common: by the separating axes of their edges. What
 /// merely touches has not.

@@ -74,7 +74,7 @@ private:
         return static_cast<double>(flat_.shapes[shape].clearance);
     }
 
-    /// What is stored of a shape or an instance is its box, padded.
+    /// The bounding box of a surface. The vertices of a shape or an instance span its padded box.
     Box boxOf(std::uint32_t id) const {
         Box box;
         for (std::size_t v = 0; v < 3; ++v) box.add(vertexOf(flat_, id, v));
@@ -113,7 +113,7 @@ private:
         (rim.upper ? shape.record.to_lip : shape.record.from_lip) = shape.lip;
     }
 
-    /// Whether a point of the rim lies on the surface, as well as rays can tell.
+    /// True if a point of the rim lies on the surface, within the clearances of both.
     bool touches(const Rim& rim, std::uint32_t id) const {
         if (id == flat_.firstShape() + rim.shape) return false;
         if (id >= flat_.firstInstance()) {

@@ -110,7 +110,7 @@ CRT_FN void crt_instance_closest(const CrtContext *ctx, u32 index, CrtRay ray, C
 #endif
 }
 
-/* Whether a triangle of an instance stops a shadow ray. */
+/* Returns 1 if a triangle of an instance stops a shadow ray. */
 CRT_FN int crt_placed_stops(const CrtContext *ctx, CRT_GLOBAL const CrtInstance *instance, u32 index,
                             CRT_GLOBAL const CrtTriangle *triangles, u32 slot, CrtShear shear, f32 reach,
                             CrtPassable *passable) {

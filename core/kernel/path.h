@@ -40,10 +40,10 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
     rays->closest += 1u;
     for (;;) {
         CrtHit hit = crt_no_hit(ray.reach);
-        int stopped = 0; /* a shadow ray: by what no ray passes */
-        int last = 0;    /* a shadow ray: behind `hit` there is nothing else */
+        int stopped = 0; /* 1: an opaque surface stops the shadow ray */
+        int last = 0;    /* 1: the shadow ray meets nothing behind `hit` */
         if (ray.reach > 0.0f) {
-            if (way.shadow && crt_has_panes(ctx)) {
+            if (way.shadow && (crt_has_panes(ctx) || !passable)) {
                 CrtPassable met = crt_none_passable(ray.reach);
                 stopped = crt_trace_any(ctx, ray, &met);
                 hit = met.nearest;
@@ -69,14 +69,13 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
         const u32 depth = path->depth;
         alive = crt_shade(ctx, path, hit, &shadow);
         if (!(CRT_HAS(NEE) && shadow.asked)) return alive;
-        if (!passable || !(shadow.ray.reach > 0.0f)) {
-            crt_answer(ctx, path, &shadow, rays);
-            return alive;
-        }
-        rays->shadow += 1u;
         ray = shadow.ray;
-        way = crt_passage(depth, 1, ray.d, way.position, CRT_HAS(MEDIA) ? shadow.media : 0u,
-                          shadow.radiance);
+        if (ray.reach > 0.0f) rays->shadow += 1u;
+        way.shadow = 1;
+        way.carried = shadow.radiance;
+        if (passable)
+            way = crt_passage(depth, 1, ray.d, path->wavelengths.position,
+                              CRT_HAS(MEDIA) ? shadow.media : 0u, shadow.radiance);
     }
 }
 

@@ -12,8 +12,8 @@ CRT_KERNEL_BEGIN
 
 /* The surfaces met so far that a shadow ray may pass. Only scenes with panes read and write it. */
 typedef struct CrtPassable {
-    CrtHit nearest; /* slot CRT_NONE: the ray has met none */
-    u32 count;      /* at least as many as there are up to 1; more than 1: there may be another */
+    CrtHit nearest; /* with slot CRT_NONE if there is none */
+    u32 count;      /* 0: none; 1: `nearest` is the only one; more: others may be behind it */
 } CrtPassable;
 
 CRT_FN CrtPassable crt_none_passable(f32 reach) {
@@ -50,7 +50,8 @@ CRT_FN int crt_may_pass(const CrtContext *ctx, CrtHit hit) {
            CRT_MATERIAL_THIN_DIELECTRIC;
 }
 
-/* Whether a surface that a shadow ray has hit stops it. `hits`: as often the ray may hit the surface. */
+/* Returns 1 if a surface that a shadow ray has hit stops it. The ray hits the surface at most `hits`
+   times. */
 CRT_FN int crt_stops(const CrtContext *ctx, CrtHit hit, u32 hits, CrtPassable *passable) {
     if (!crt_has_panes(ctx)) return 1;
     if (!crt_may_pass(ctx, hit)) return 1;
@@ -60,7 +61,7 @@ CRT_FN int crt_stops(const CrtContext *ctx, CrtHit hit, u32 hits, CrtPassable *p
     return 0;
 }
 
-/* Whether a triangle stops a shadow ray. */
+/* Returns 1 if a triangle stops a shadow ray. */
 CRT_FN int crt_triangle_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
                               CrtShear shear, f32 reach, CrtPassable *passable) {
     CrtHit hit;

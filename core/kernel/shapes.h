@@ -135,7 +135,7 @@ CRT_FN void crt_last_slots_closest(const CrtContext *ctx, CrtRay ray, CrtHit *be
         crt_test_shape_closest(ctx, triangles + slot, slot, ray, best);
 }
 
-/* Whether a shape stops a shadow ray, which may hit it twice. */
+/* Returns 1 if a shape stops a shadow ray. The ray may hit a sphere or a cylinder twice. */
 CRT_FN int crt_shape_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *record, u32 slot, CrtRay ray,
                            CrtPassable *passable) {
     CrtHit hit;

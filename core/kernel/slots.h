@@ -25,7 +25,7 @@ CRT_FN void crt_test_slot(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *t
         crt_test_closest(triangles, slot, shear, best);
 }
 
-/* Whether the slot holds something that stops a shadow ray. */
+/* Returns 1 if the slot holds something that stops a shadow ray. */
 CRT_FN int crt_slot_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
                           CrtRay ray, CrtShear shear, CrtPassable *passable) {
     u32 shape = 0u;

@@ -94,7 +94,7 @@ inline WavePlan planWave(const void* blob) {
         plan.queue_of_miss = plan.queues();
         plan.kernels.push_back({Entry::Shade, others});
     }
-    // Whether a ray passes a pane is worked out where mixes are chosen.
+    // crt_wave_choose also decides which rays pass a pane.
     const auto panes = kinds.find(CRT_MATERIAL_THIN_DIELECTRIC);
     if (mixes || panes != kinds.end()) {
         plan.queue_of_choice = plan.queues();

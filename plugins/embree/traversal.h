@@ -143,7 +143,7 @@ inline CrtHit closestHit(const CrtContext* ctx, const CrtRay& ray) {
     }
 }
 
-/// Whether a triangle of a leaf stops a shadow ray.
+/// Returns true if a triangle of the leaf stops the shadow ray.
 inline bool leafStops(const CrtContext* ctx, const Leaf8& leaf, const CrtTriangle* triangles,
                       const CrtShear& shear, f32 reach, CrtPassable* passable) {
     Hits8 hits;

@@ -152,9 +152,9 @@ double radiance(const Film& film, std::uint32_t x, std::uint32_t y);
 /// Mean over all pixels.
 double radiance(const Film& film);
 /// The same by a name that is no overload, as a Measure.
-/// Mean over all pixels of a bin of a spectral film.
-double meanOfBin(const Film& film, std::uint32_t bin);
 inline double meanRadiance(const Film& film) { return radiance(film); }
+/// Mean over all pixels of a bin of a spectral film, or of a response, which follow the bins.
+double meanOfBin(const Film& film, std::uint32_t bin);
 /// Of `a` and `b` the one that is farther from `target`; NaN when either is, which std::max would lose.
 double fartherFrom(double target, double a, double b);
 /// Y of a pixel of `film` over `factor` times that of the same pixel of `unit`, of all pixels the ratio that

@@ -315,7 +315,7 @@ struct Window {
     int row() const { return static_cast<int>(std::lround((1 / depth() / tangent() + 1) / 2 * kFilm)); }
     double pixel() const { return 2 * tangent() / kFilm; }
 
-    /// Whether the ray with these slopes meets the shape, in double.
+    /// True if the ray with these slopes meets the shape. Computed in double precision.
     bool meets(double u, double v) const {
         if (type == QuadricType::Disk) return (u * u + v * v) * distance * distance <= 1;
         // (u² t² or (u² + v²) t²) + (t − D)² = R², solved for t − D, as D² is large.
@@ -347,7 +347,7 @@ struct Window {
         // Rows go down, and the shapes are the same upside down.
         scene.film.crop = {kFilm / 2 - kKept / 2, row() - kKept / 2, kFilm / 2 + kKept / 2,
                            row() + kKept / 2};
-        // What is behind the camera, and small, keeps single precision finest at the origin.
+        // A tiny triangle behind the camera keeps the scene's centre at the origin.
         Mesh mesh;
         addTriangle(mesh, {0, 0, -0x1p-10}, {0x1p-10, 0, -0x1p-10}, {0, 0x1p-10, -0x1p-10});
         addObject(scene, std::move(mesh), diffuse(0));

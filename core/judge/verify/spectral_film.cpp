@@ -40,17 +40,8 @@ double integral(double from_nm, double to_nm, const Function& f) {
     return sum * step;
 }
 
-/// Mean over the pixels of a bin or, behind the bins, a response.
-double spectralMean(const Film& film, std::uint32_t which) {
-    double sum = 0;
-    for (std::uint32_t y = 0; y < film.shape().height; ++y)
-        for (std::uint32_t x = 0; x < film.shape().width; ++x)
-            sum += film.mean(x, y, film.shape().firstSpectral() + which);
-    return sum / (film.shape().width * film.shape().height);
-}
-
 Asked asked(const std::string& what, std::uint32_t which, double expected) {
-    return {what, [which](const std::vector<Film>& films) { return spectralMean(films[0], which); },
+    return {what, [which](const std::vector<Film>& films) { return meanOfBin(films[0], which); },
             expected};
 }
 
