@@ -74,8 +74,7 @@ void meetShape(Probe& probe, const CrtShape& shape, std::uint32_t medium) {
     if (shape.kind == CRT_SHAPE_DISK) {
         const double t = -o_z / d_z;
         const Vec3d p = o + d * t;
-        const double rim = radius + double{shape.to_lip};
-        if (dot(p, p) <= rim * rim) probe.meet(t, medium, d_z * facing > 0);
+        if (dot(p, p) <= double{shape.met_to} * double{shape.met_to}) probe.meet(t, medium, d_z * facing > 0);
         return;
     }
     // For a cylinder, solve in the plane perpendicular to its axis.
@@ -86,8 +85,7 @@ void meetShape(Probe& probe, const CrtShape& shape, std::uint32_t medium) {
     if (!(root > 0)) return;
     for (const double sign : {-1.0, 1.0}) {
         const double t = (sign * std::sqrt(root) - b) / a, z = o_z + d_z * t;
-        if (z >= double{shape.from_z} - double{shape.from_lip} &&
-            z <= double{shape.to_z} + double{shape.to_lip})
+        if (z >= double{shape.met_from} && z <= double{shape.met_to})
             probe.meet(t, medium, sign * facing > 0);
     }
 }

@@ -110,7 +110,8 @@ private:
 
     void setLip(const Rim& rim) {
         FlatShape& shape = flat_.shapes[rim.shape];
-        (rim.upper ? shape.record.to_lip : shape.record.from_lip) = shape.lip;
+        if (rim.upper) shape.record.met_to += shape.lip;
+        else shape.record.met_from -= shape.lip;
     }
 
     /// True if a point of the rim lies on the surface, within the clearances of both.

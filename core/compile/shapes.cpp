@@ -118,6 +118,8 @@ FlatShape flatShape(const PlacedShape& shape, const Vec3d& centre, int scale_exp
     record.radius = static_cast<float>(radius);
     record.from_z = static_cast<float>(from_z);
     record.to_z = static_cast<float>(to_z);
+    record.met_from = record.from_z;
+    record.met_to = own.type == QuadricType::Disk ? record.radius : record.to_z;
     record.facing = own.inward ? -1.0f : 1.0f;
     for (std::size_t k = 0; k < 3; ++k) {
         const float lower = static_cast<float>((shape.lower[k] - centre[k]) * scale) - 2 * flat.clearance;

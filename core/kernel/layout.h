@@ -83,7 +83,7 @@ typedef struct CrtShape {
     f32 z[3];
     u32 kind;   /* CRT_SHAPE_… */
     f32 facing; /* 1: normals point outwards, a disk's along z; -1: the other way */
-    f32 from_lip, to_lip; /* at from_z and at to_z; a disk's rim has to_lip; 0: nothing touches it */
+    f32 met_from, met_to; /* ends as rays meet them, with lips; of a disk met_to is the radius */
     f32 reserved;
 } CrtShape;
 CRT_ASSERT_SIZE(CrtShape, 80);

@@ -69,6 +69,12 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
         const u32 depth = path->depth;
         alive = crt_shade(ctx, path, hit, &shadow);
         if (!(CRT_HAS(NEE) && shadow.asked)) return alive;
+        /* On processors a search that never asks for panes is faster: 2 % of all instructions. On GPUs a
+           second copy of the search spills 400 bytes of registers. */
+        if (CRT_SIMD8 && !passable) {
+            crt_answer(ctx, path, &shadow, rays);
+            return alive;
+        }
         ray = shadow.ray;
         if (ray.reach > 0.0f) rays->shadow += 1u;
         way.shadow = 1;

@@ -64,8 +64,7 @@ CRT_FN int crt_intersect_disk(CRT_GLOBAL const CrtShape *shape, vec3 f, vec3 d, 
     if (!(t > 0.0f) || !(t < limit)) return 0;
     const vec3 p = crt_fma3(d, t, f);
     const f32 x = dot3(crt_load3(shape->x), p), y = dot3(crt_load3(shape->y), p);
-    const f32 rim = shape->radius + shape->to_lip;
-    if (!(crt_fma(x, x, y * y) <= rim * rim)) return 0;
+    if (!(crt_fma(x, x, y * y) <= shape->met_to * shape->met_to)) return 0;
     hit->t = t;
     hit->b1 = x;
     hit->b2 = y;
@@ -91,7 +90,6 @@ CRT_FN int crt_intersect_shape(CRT_GLOBAL const CrtShape *shape, CrtRay ray, f32
     const vec3 nearest = crt_fma3(d, b / a, o);
     const f32 chord2 = crt_fma(radius, radius, -dot3(nearest, nearest));
     if (!(chord2 >= 0.0f)) return 0;
-    const f32 lowest = shape->from_z - shape->from_lip, highest = shape->to_z + shape->to_lip;
     const f32 chord = crt_sqrt(chord2 / a); /* half of it, in lengths of d */
     const f32 q = b < 0.0f ? crt_fma(-chord, a, b) : crt_fma(chord, a, b);
     const f32 enter = b < 0.0f ? q / a : c / q;
@@ -101,7 +99,7 @@ CRT_FN int crt_intersect_shape(CRT_GLOBAL const CrtShape *shape, CrtRay ray, f32
         if (!(t > 0.0f) || !(t < limit)) continue;
         const vec3 p = crt_fma3(d, i == 0u ? -chord : chord, nearest);
         const f32 z = cylinder ? crt_fma(t, dot3(axis, ray.d), dot3(axis, f)) : dot3(axis, p);
-        if (!(z >= lowest) || !(z <= highest)) continue;
+        if (!(z >= shape->met_from) || !(z <= shape->met_to)) continue;
         hit->t = t;
         if (cylinder) {
             hit->b1 = crt_turn_of(V3X(p), V3Y(p));

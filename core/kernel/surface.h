@@ -146,7 +146,7 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
     s.clearance = face->clearance;
     if (shape->kind == CRT_SHAPE_DISK) {
         const f32 r = crt_sqrt(crt_fma(hit.b1, hit.b1, hit.b2 * hit.b2));
-        on_lip = shape->to_lip > 0.0f && r > radius;
+        on_lip = r > radius && shape->met_to > radius;
         const f32 inwards = r > radius - margin ? (radius - margin) / r : 1.0f;
         s.p = crt_fma3(ex, hit.b1 * inwards, crt_fma3(ey, hit.b2 * inwards, centre));
         s.ng = ez;
@@ -160,8 +160,8 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
         } else {
             s.ng = crt_square_to_direction(hit.b1, hit.b2);
             const f32 z = dot3(s.ng, ez) * radius;
-            on_lip = (shape->from_lip > 0.0f && z < shape->from_z) ||
-                     (shape->to_lip > 0.0f && z > shape->to_z);
+            on_lip = (z < shape->from_z && shape->met_from < shape->from_z) ||
+                     (z > shape->to_z && shape->met_to > shape->to_z);
             if (z < lowest || z > highest) {
                 const vec3 across = s.ng - ez * (z / radius);
                 const f32 to = crt_clamp(z, lowest, highest) / radius;
