@@ -74,7 +74,8 @@ void meetShape(Probe& probe, const CrtShape& shape, std::uint32_t medium) {
     if (shape.kind == CRT_SHAPE_DISK) {
         const double t = -o_z / d_z;
         const Vec3d p = o + d * t;
-        if (dot(p, p) <= double{shape.met_to} * double{shape.met_to}) probe.meet(t, medium, d_z * facing > 0);
+        const double rim = double{shape.met_to};
+        if (dot(p, p) <= rim * rim) probe.meet(t, medium, d_z * facing > 0);
         return;
     }
     // For a cylinder, solve in the plane perpendicular to its axis.
