@@ -71,6 +71,7 @@ public:
         film.samples = ranges_;
         return film;
     }
+    BrightestPath brightestPath() const { return brightestPathOf(compiled_); }
     void restart() {
         integrator_.setScene(compiled_);
         ranges_ = {};
@@ -151,9 +152,9 @@ struct Statement {
     std::vector<double> pixel_errors;  ///< Standard errors of the pixels, as the image has them.
 };
 
-Statement statementOf(const Film& film, bool independent) {
+Statement statementOf(const Film& film, const PathFacts& paths) {
     Statement s;
-    const auto estimate = [&](PixelSet which) { return estimateError(film, which, independent); };
+    const auto estimate = [&](PixelSet which) { return estimateError(film, which, paths); };
     ErrorEstimate nothing;
     nothing.knowledge = ErrorKnowledge::NotYet;
     s.error = estimate(PixelSet::All).value_or(nothing);
@@ -257,12 +258,14 @@ void printStops(const std::map<std::uint64_t, Looks>& looks) {
 void stated(const Setup& setup, std::uint64_t seeds) {
     std::map<std::uint64_t, Looks> looks;
     Looks merged;  // What a merge of two machines' unequal ranges leaves.
+    PathFacts paths{setup.independent(), {}};
     const auto look = [&](Looks& at, const Film& film) {
         at.images.add(luminanceOf(film));
-        at.statements.push_back(statementOf(film, setup.independent()));
+        at.statements.push_back(statementOf(film, paths));
     };
     for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
         Progressive progressive(setup, setup.scene(seed));
+        if (seed == 1) paths.brightest = progressive.brightestPath();
         std::uint64_t there = 0;
         for (const std::uint64_t samples : kSamples) {
             progressive.render({there, samples});

@@ -87,8 +87,8 @@ TEST_CASE("a record comes back from its text with every bit", "[develop]") {
     CHECK(back.device == record.device);
     CHECK(back.date_utc == record.date_utc);
     CHECK(back.complete == record.complete);
-    CHECK(back.independent_samples == record.independent_samples);
-    CHECK(readRecord(recordText(recordOf(parsed({{"sampler.type", "independent"}})))).independent_samples);
+    CHECK(back.paths.independent == record.paths.independent);
+    CHECK(readRecord(recordText(recordOf(parsed({{"sampler.type", "independent"}})))).paths.independent);
     CHECK(recordText(back) == recordText(record));
 }
 

@@ -139,7 +139,7 @@ TEST_CASE("what replicates cannot tell is not told", "[error]") {
     CHECK_FALSE(estimateError(one_sided));
     const Film single = noisyFilm({1.0}, {0.1}, 64, random, 0);
     CHECK(estimateError(single)->knowledge == ErrorKnowledge::Bound);
-    CHECK(estimateError(single, PixelSet::All, true)->knowledge == ErrorKnowledge::Known);
+    CHECK(estimateError(single, PixelSet::All, {.independent = true})->knowledge == ErrorKnowledge::Known);
     CHECK(LuminanceVariance(single).degreesOfFreedom() == 63);
     CHECK(estimateError(noisyFilm({1.0}, {0.1}, 64, random))->knowledge == ErrorKnowledge::Known);
 }
@@ -299,6 +299,61 @@ TEST_CASE("an image whose brightest paths are not yet met does not know its erro
     CHECK(wrong <= 0.05 * kImages);
 }
 
+// A mirror that sends a small light to a floor. A film shows no trace of such paths before it meets one:
+// what the scene may bring decides.
+TEST_CASE("an image that has met few of its scene's brightest paths does not know its error", "[error]") {
+    constexpr u32 kSide = 40;
+    constexpr u64 kSamples = 64;
+    constexpr int kImages = 400;
+    constexpr double kBrightest = 4000, kNoise = 1;
+    std::mt19937_64 random(19);
+    std::normal_distribution<double> noise(1, kNoise / std::sqrt(kSamples / 2.0));
+    std::uniform_int_distribution<std::size_t> pixel(0, kSide * kSide - 1);
+    std::uniform_int_distribution<u64> sample(0, kSamples - 1);
+    struct Counts {
+        int known = 0, covered = 0, within = 0;
+    };
+    // Images with so many of those paths on average, asked with what is known of the scene and without it.
+    const auto ask = [&](double expected) {
+        std::array<Counts, 2> counts;
+        std::poisson_distribution<int> paths(expected);
+        const double share = expected / (kSide * kSide * kSamples),
+                     truth = std::sqrt((share * kBrightest * kBrightest + kNoise * kNoise) / kSamples) /
+                             (1 + share * kBrightest);
+        for (int image = 0; image < kImages; ++image) {
+            Film film(shapeFor(kSide, kSide, 1));
+            for (std::size_t p = 0; p < kSide * kSide; ++p)
+                for (u64 s = 0; s < 2; ++s) addSample(film, p, s, kSamples / 2.0 * noise(random));
+            for (int n = paths(random); n > 0; --n)
+                addSample(film, pixel(random), sample(random), kBrightest);
+            film.counts.assign(kSide * kSide, kSamples);
+            film.samples.add({0, kSamples});
+            for (const bool asks_scene : {false, true}) {
+                PathFacts facts;
+                if (asks_scene) facts.brightest = {kBrightest, true};
+                const ErrorEstimate e = estimateError(film, PixelSet::All, facts).value();
+                Counts& c = counts[asks_scene];
+                c.known += e.known();
+                c.covered += e.known() && e.relative_rmse_95.contains(truth);
+                c.within += e.known() && truth <= e.half_width_95;
+            }
+        }
+        return counts;
+    };
+    const auto [blind, few] = ask(0.5);
+    CHECK(blind.known - blind.covered > 0.4 * kImages);  // Those without one, e^-½ of them.
+    CHECK(few.known < 0.05 * kImages);                   // P(3 or more) is .014.
+    const Counts many = ask(12)[1];
+    CHECK(many.known > 0.95 * kImages);  // P(fewer than 3) is 5e-4.
+    CHECK(many.covered >= 0.93 * many.known);
+    CHECK(many.within >= 0.93 * many.known);
+    // Where ordinary paths are as bright, the film has met enough of them.
+    const Film quiet = noisyFilm(std::vector<double>(64, 1), std::vector<double>(64, 1), 64, random);
+    CHECK(estimateError(quiet, PixelSet::All, {.brightest = {5, false}})->known());
+    CHECK(estimateError(quiet, PixelSet::All, {.brightest = {5, true}})->known());
+    CHECK_FALSE(estimateError(quiet, PixelSet::All, {.brightest = {500, true}})->known());
+}
+
 // What looked at the differences between neighbours alone never narrows: 6 pixels of different brightness.
 TEST_CASE("of one sequence of independent samples an interval narrows with their number", "[error]") {
     const std::vector<double> brightness{0.5, 1, 2, 3, 5, 8};
@@ -320,7 +375,7 @@ TEST_CASE("of one sequence of independent samples an interval narrows with their
                 addSample(film, 3 * p, s, brightness[p] * (rare ? squares * hit(random) : waiting(random)));
         film.counts.assign(kPixels, samples);
         film.samples.add({0, samples});
-        return *estimateError(film, PixelSet::All, true);
+        return *estimateError(film, PixelSet::All, {.independent = true});
     };
     constexpr u64 kFew = 2000;
     constexpr int kImages = 200;

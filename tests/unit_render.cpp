@@ -216,3 +216,28 @@ TEST_CASE("a render goes on from an earlier film, and opens no backend where not
                              EarlierFilm{"begun", whole.film, begun.identity}, watch),
                       Contains("begun"));
 }
+
+TEST_CASE("a render asks its scene for the brightest paths, and does not know its error before it met them",
+          "[render]") {
+    // A chrome ball over a floor: floor, ball, point light.
+    const Scene scene = parseScene(
+        "crt: 1\nfilm: {resolution: [40, 32]}\n"
+        "camera: {position: [0, 1.2, 3.2], target: [0, 0.3, 0], fov: 45}\n"
+        "materials:\n  floor: {type: diffuse, reflectance: 0.5}\n"
+        "  chrome: {type: rough_conductor, metal: Al, roughness: 0.1}\n"
+        "lights: [{type: point, position: [1.2, 2.5, 1], luminous_intensity_cd: 1000}]\nobjects:\n"
+        "  - {rectangle: {size: [6, 6]}, material: floor, transform: [{rotate: {axis: [1, 0, 0], "
+        "angle_deg: -90}}]}\n"
+        "  - {sphere: {radius: 0.5}, material: chrome, transform: [{translate: [0, 0.501, 0]}]}\n",
+        "scene.yaml", ".");
+    const RenderOptions options{.backend = CRT_TEST_BACKEND, .spp = 16};
+    Watch watch;
+    Rendered run = render(scene, options, planSamples(options, scene, {}), std::nullopt, watch);
+    const BrightestPath brightest = run.identity.record->paths.brightest;
+    CHECK(brightest.rare);
+    judgeError(run);
+    CHECK(run.facts.error->knowledge == ErrorKnowledge::NotYet);
+    CHECK(run.facts.error->rare_paths * run.facts.error->mean_luminance == Approx(brightest.luminance));
+    CHECK(run.facts.error->rare_paths > 1000);
+    CHECK(readRecord(recordText(*run.identity.record)).paths.brightest == brightest);
+}

@@ -93,7 +93,7 @@ std::array<double, 3> Film::mean(std::uint32_t x, std::uint32_t y) const {
 
 std::optional<ErrorEstimate> Film::error() const {
     const auto& [film, identity] = impl_->film;
-    const auto found = estimateError(film, PixelSet::All, identity.record->independent_samples);
+    const auto found = estimateError(film, PixelSet::All, identity.record->paths);
     if (!found || !found->known()) return std::nullopt;
     return ErrorEstimate{.relative_rmse = found->relative_rmse,
                          .relative_rmse_lower = found->relative_rmse_95.lower,
@@ -104,7 +104,7 @@ std::optional<ErrorEstimate> Film::error() const {
 
 bool Film::errorWithin(double target) const {
     const auto& [film, identity] = impl_->film;
-    return reachesTarget(film, target, identity.record->independent_samples);
+    return reachesTarget(film, target, identity.record->paths);
 }
 
 Image Film::develop(const DevelopOptions& options) const {

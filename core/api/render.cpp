@@ -132,7 +132,7 @@ Rendered Session::Impl::render(std::optional<EarlierFilm> earlier, const RenderO
             const v0::Error error(static_cast<ErrorKind>(run.failure->kind()), run.failure->what(), {});
             throw RenderFailed(error, filmOf(run));
         }
-        if (options.estimate_error) judgeError(run, on_devices.scene());
+        if (options.estimate_error) judgeError(run);
         run.facts.warnings = warningCount();
         run.facts.total_seconds = total.seconds();
         std::string report = reportJson(on_devices.scene(), *run.compiled, run.facts);

@@ -196,7 +196,7 @@ int develop(const DevelopArguments& arguments) {
     if (film.samples.count() > 0 && isBlack(film))
         logWarning("the image is black: no path met a light while the film was rendered");
     const std::optional<ErrorEstimate> error =
-        estimateError(film, PixelSet::All, record.independent_samples);
+        estimateError(film, PixelSet::All, record.paths);
     logInfo("{} × {} pixels, {} samples per pixel{}", film.shape().width, film.shape().height,
             film.samples.count(), error ? ", " + errorText(*error, !record.missing_light.empty()) : "");
     logInfo("wrote {}", fmt::join(arguments.outputs, ", "));

@@ -198,6 +198,8 @@ void showRecord(const FilmRecord& record) {
     for (const auto& [name, white] : record.whites) lights.push_back(name);
     optional_row("lights", fmt::format("{}", fmt::join(lights, ", ")));
     optional_row("missing", fmt::format("{}", fmt::join(record.missing_light, "; ")));
+    if (record.paths.brightest.rare)
+        printRow("rare paths", fmt::format("of a luminance of {:.3g}", record.paths.brightest.luminance));
     printRow("seed", std::to_string(record.seed));
     optional_row("rendered by", record.backend);
     optional_row("on", record.device);
@@ -206,8 +208,8 @@ void showRecord(const FilmRecord& record) {
 
 void showFilm(const std::string& file) {
     const auto [film, identity] = readCheckpoint(file);
-    const bool independent = identity.record && identity.record->independent_samples;
-    const std::optional<ErrorEstimate> error = estimateError(film, PixelSet::All, independent);
+    const std::optional<ErrorEstimate> error = estimateError(
+        film, PixelSet::All, identity.record ? identity.record->paths : PathFacts{});
     printOut("{}: {}\n", file,
              identity.record && identity.record->complete == true ? "film" : "partial render");
     printRow("film", fmt::format("{} x {} pixels", film.shape().width, film.shape().height));

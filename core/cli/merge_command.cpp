@@ -48,10 +48,10 @@ int mergeFilms(const MergeArguments& arguments) {
     films.requireRoom(film.samples.count());
     if (has_scene) {
         FilmRecord record = recordOf(scene);
+        const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
+        record.paths.brightest = brightestPathOf(compiled);
         requireSameScene(arguments.parts.front(), identity,
-                         {.scene_hash = compileScene(scene, requestedAovs(scene)).hash,
-                          .version = CRT_VERSION,
-                          .record = record});
+                         {.scene_hash = compiled.hash, .version = CRT_VERSION, .record = record});
         if (identity.record) record.addRun(*identity.record);
         identity.record = std::move(record);
     }

@@ -17,6 +17,12 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 /// more degrees of freedom have met more than their share (decision 0007).
 constexpr double kLeastDegreesOfFreedom = 2;
 
+/// Rule of three: of what has not been met, no more than this is expected, with 95 % (Hanley and
+/// Lippman-Hand 1983, JAMA 249). The upper ends of intervals count so many more pixels that are as noisy as
+/// the noisiest, or paths as bright as the scene's brightest; their lower ends, where such paths are rare, as
+/// many fewer.
+constexpr double kUnmet = 3;
+
 /// What the brightest pixel says of pixels as bright that no path has met yet: so many more squares like its
 /// own.
 constexpr double kUnseen = 0.5;
@@ -168,6 +174,20 @@ double measuredSpread(const Film& film, const LuminanceVariance& variance, const
     return std::min(between_pixels, of_samples + 4 * sums.sum * sums.sum * of_luminance);
 }
 
+/// What one path brings at most to the variance of the noisiest pixel of the set. Of replicates, all of it;
+/// where the squares of samples are known, the share of one of the paths that carry the pixel.
+double noisiestPath(const Film& film, const LuminanceVariance& variance, const PixelMap& variances,
+                    PixelSet which) {
+    double most = 0;
+    for (std::uint32_t y = 0; y < film.shape().height; ++y)
+        for (std::uint32_t x = 0; x < film.shape().width; ++x)
+            if (belongs(x, y, which) && variances.known(x, y))
+                most = std::max(most, variances.at(x, y) * (variance.fromReplicates()
+                                                                ? 1
+                                                                : std::min(variance.excess(x, y), 1.0)));
+    return most;
+}
+
 /// Whether paths that the pixels of the set have not met yet may make their error larger than it seems.
 bool missesBrightPaths(const Film& film, const PixelMap& variances, PixelSet which, const VarianceSums& sums,
                        double unit, double degrees_of_freedom) {
@@ -242,7 +262,7 @@ double LuminanceVariance::varianceOfVariance(std::uint32_t x, std::uint32_t y, d
     return (2 * r * k2 * k2 + (r - 1) * k4) / (r * (r + 1)) / (r * r);
 }
 
-std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, bool independent_samples) {
+std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, const PathFacts& paths) {
     const LuminanceVariance variance(film);
     const double d = variance.degreesOfFreedom();
     PixelMap variances(film, variance);
@@ -257,8 +277,9 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, boo
 
     ErrorEstimate e;
     e.knowledge =
-        variance.fromReplicates() || independent_samples ? ErrorKnowledge::Known : ErrorKnowledge::Bound;
+        variance.fromReplicates() || paths.independent ? ErrorKnowledge::Known : ErrorKnowledge::Bound;
     e.mean_luminance = luminance / static_cast<double>(film.counts.size());
+    if (paths.brightest.rare) e.rare_paths = paths.brightest.luminance / e.mean_luminance;
     e.mean_standard_error = std::sqrt(total / sums.known / sums.pixels);
     e.relative_rmse = std::sqrt(total / sums.known) / e.mean_luminance;
     if (!(total > 0)) {  // Every sample the same: a furnace.
@@ -274,21 +295,32 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, boo
                                       (d < 3 ? kUnseen * sums.most * sums.most : 0));
     e.degrees_of_freedom = std::clamp(2 * sums.sum * sums.sum / spread, 1.0, d * sums.known);
     const bool too_few = e.degrees_of_freedom < std::min(kLeastDegreesOfFreedom, d * sums.known);
-    if (e.known() &&
-        (too_few || (sums.known >= kPixelsToMeasure &&
-                     missesBrightPaths(film, variances, which, sums, unit, e.degrees_of_freedom))))
+    // One path as bright as the scene's brightest adds so much to the sum of variances.
+    const double brightest = paths.brightest.luminance / static_cast<double>(film.samples.count()),
+                 of_brightest = brightest * brightest;
+    const bool met_brightest = total >= kUnmet * of_brightest;
+    const auto open_tail = [&] {
+        return sums.known >= kPixelsToMeasure &&
+               missesBrightPaths(film, variances, which, sums, unit, e.degrees_of_freedom);
+    };
+    if (e.known() && (too_few || (!met_brightest && (paths.brightest.rare || open_tail()))))
         e.knowledge = ErrorKnowledge::NotYet;
-    e.relative_rmse_95 = {
-        e.relative_rmse *
-            std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.975, e.degrees_of_freedom)),
-        e.relative_rmse *
-            std::sqrt(e.degrees_of_freedom / stats::chiSquaredQuantile(0.025, e.degrees_of_freedom))};
+    const double noisiest =
+        sums.known >= kPixelsToMeasure ? noisiestPath(film, variance, variances, which) * unit : 0;
+    const double rare = paths.brightest.rare ? of_brightest : 0,
+                 chance = kUnmet * rare / total, unmet = kUnmet * std::max(noisiest, rare) / total;
+    const auto squared = [&](double probability) {
+        return e.degrees_of_freedom / stats::chiSquaredQuantile(probability, e.degrees_of_freedom);
+    };
+    e.relative_rmse_95 = {e.relative_rmse * std::sqrt(std::max(0.0, squared(0.975) - chance)),
+                          e.relative_rmse * std::sqrt(squared(0.025) + unmet)};
     // The squared error that the image has scatters like the normal part of one degree of freedom a pixel,
     // and the tails' part.
     const double squared_error =
         std::clamp(2 * sums.sum * sums.sum / (d * normal + (spread - normal)), 1.0, sums.known);
     e.half_width_95 =
-        e.relative_rmse * std::sqrt(stats::fisherQuantile(0.95, squared_error, e.degrees_of_freedom));
+        e.relative_rmse *
+        std::sqrt(stats::fisherQuantile(0.95, squared_error, e.degrees_of_freedom) + unmet);
     return e;
 }
 

@@ -6,6 +6,7 @@
 
 #include "base/statistics.h"
 #include "film/film.h"
+#include "film/path_facts.h"
 
 #include <array>
 #include <cstdint>
@@ -48,7 +49,8 @@ enum class ErrorKnowledge {
     Known,   ///< Estimated, with an interval.
     Bound,   ///< Of one Sobol sequence: the true error is smaller, by an unknown factor.
     NotYet,  ///< So few paths carry the noise, or brighter ones than those that were met are so likely
-             ///< (error_tail.h), that neither the estimate nor an interval can be trusted.
+             ///< (error_tail.h, compile/brightest_path.h), that neither the estimate nor an interval can be
+             ///< trusted.
 };
 
 /// Relative to the image's mean luminance. Pixels are independent of each other, each with a scramble of its
@@ -67,6 +69,8 @@ struct ErrorEstimate {
     /// Of the mean's variance S: 2 S² / Var S (Satterthwaite 1946), where Var S is measured and not taken
     /// from the normal distribution.
     double degrees_of_freedom = 0;
+    /// Times the mean luminance that single paths may bring which are met by rare chance; 0: no such paths.
+    double rare_paths = 0;
 
     bool known() const { return knowledge == ErrorKnowledge::Known; }
     /// Student's interval of the image's mean luminance.
@@ -77,9 +81,8 @@ struct ErrorEstimate {
 };
 
 /// Nothing where nothing is known: too few samples, replicates that are not about equally full (nor squares
-/// in the film), or no light found yet. With `independent_samples` the spread between samples is no mere
-/// bound.
+/// in the film), or no light found yet.
 std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which = PixelSet::All,
-                                           bool independent_samples = false);
+                                           const PathFacts& paths = {});
 
 }  // namespace crt

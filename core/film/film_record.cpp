@@ -17,6 +17,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <ctime>
 #include <limits>
@@ -419,7 +420,13 @@ FilmRecord recordFrom(const Json& json) {
     FilmRecord record;
     record.title = json.at("title").get<std::string>();
     record.seed = wholeNumber(json.at("seed"));
-    record.independent_samples = json.at("independent_samples").get<bool>();
+    record.paths.independent = json.at("independent_samples").get<bool>();
+    if (json.contains("brightest_path")) {
+        const Json& brightest = json.at("brightest_path");
+        record.paths.brightest = {brightest.at("luminance").get<double>(), brightest.at("rare").get<bool>()};
+        if (!(record.paths.brightest.luminance > 0))
+            throw Error(ErrorKind::Usage, "has a brightest path without light");
+    }
     record.width = pixelsFrom(json.at("resolution").at(0));
     record.height = pixelsFrom(json.at("resolution").at(1));
     for (std::size_t i = 0; i < record.window.size(); ++i)
@@ -457,7 +464,7 @@ FilmRecord recordOf(const Scene& scene) {
     FilmRecord record;
     record.title = scene.title;
     record.seed = scene.sampler.seed;
-    record.independent_samples = scene.sampler.type != SamplerType::Sobol;
+    record.paths.independent = scene.sampler.type != SamplerType::Sobol;
     record.width = scene.film.width;
     record.height = scene.film.height;
     record.window = scene.film.crop[2] > scene.film.crop[0]
@@ -477,7 +484,7 @@ std::string recordText(const FilmRecord& record) {
     Json json{{"record", kRecordVersion},
               {"title", record.title},
               {"seed", record.seed},
-              {"independent_samples", record.independent_samples},
+              {"independent_samples", record.paths.independent},
               {"resolution", {record.width, record.height}},
               {"window", record.window},
               {"aovs", aovNamesOf(record.aovs)},
@@ -494,6 +501,8 @@ std::string recordText(const FilmRecord& record) {
         json["traits"].push_back({trait.name, trait.text, trait.digest});
     if (record.spectral.count() > 0) json["spectral"] = spectralJson(record.spectral);
     if (!record.missing_light.empty()) json["missing_light"] = record.missing_light;
+    if (const BrightestPath& brightest = record.paths.brightest; std::isfinite(brightest.luminance))
+        json["brightest_path"] = {{"luminance", brightest.luminance}, {"rare", brightest.rare}};
     if (record.complete) json["complete"] = *record.complete;
     // Titles are bytes, not necessarily UTF-8.
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -3,6 +3,7 @@
 /// (checkpoint.h).
 #pragma once
 
+#include "film/path_facts.h"
 #include "image/development.h"
 #include "image/image.h"
 #include "scene/spectral_film.h"
@@ -30,7 +31,7 @@ struct SceneTrait {
 struct FilmRecord {
     std::string title;
     std::uint64_t seed = 0;
-    bool independent_samples = false;     ///< Not of a Sobol sequence; error estimates ask for it.
+    PathFacts paths;                      ///< Error estimates ask for it.
     int width = 0, height = 0;            ///< Of the whole film.
     std::array<int, 4> window{};          ///< What the film holds of it: x0, y0, x1, y1, half open.
     std::uint32_t aovs = 0;               ///< Bits of Aov that the scene's EXR files ask for.
@@ -56,7 +57,8 @@ struct FilmRecord {
 
 struct Scene;
 
-/// The part that follows from the scene. Throws crt::Error(Scene) as developmentOf().
+/// The part that follows from the scene, but for `paths.brightest`. Throws crt::Error(Scene) as
+/// developmentOf().
 FilmRecord recordOf(const Scene& scene);
 
 /// JSON, and back. Throws crt::Error(Usage), a sentence without a place, for text that no crt wrote.

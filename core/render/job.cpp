@@ -179,6 +179,10 @@ void tellTarget(const RunFacts& facts) {
         logInfo(
             "target error {:.3g} % reached: 95 % half-width {}, of the even pixels {}, of the odd ones {}",
             target * 100, half_width(facts.error), half_width(facts.deciding), half_width(facts.judging));
+    else if (!facts.error->known() && facts.error->rare_paths > 0)
+        logInfo("the error is not yet known: surfaces mirror a light or scatter it into a narrow lobe, "
+                "single paths may bring {:.2g} times the mean luminance, and too few of them were met",
+                facts.error->rare_paths);
     else if (facts.target_error > 0 && !facts.error->known())
         logInfo("whether the target error is reached cannot be told: too few paths carry the light");
     if (!facts.error->known() || facts.error->half_width_95 <= target || facts.rendered_samples == 0) return;
@@ -237,7 +241,7 @@ int runJob(const Job& job, Watch& watch) {
     };
     Rendered run = render(scene, options, plan, std::move(earlier), watch, checkpoints);
     checkpoint.finish();
-    judgeError(run, scene);
+    judgeError(run);
 
     // Images, and the report of how they came about.
     RunFacts& facts = run.facts;

@@ -105,7 +105,6 @@ SamplingPlan planSamples(const RenderOptions& options, const Scene& scene, const
     SamplingPlan plan;
     plan.time_limit_seconds = options.time_limit_seconds;
     plan.target_error = options.target_error;
-    plan.independent_samples = scene.sampler.type != SamplerType::Sobol;
     plan.light_is_missing = !missingLight(scene).empty();
     plan.chunk = options.chunk;
     if (options.samples) {
@@ -156,6 +155,10 @@ void SceneOnDevices::compile() {
     compiled_ = std::make_shared<CompiledScene>(
         session_ ? session_->compile(scene_, aovs)
                  : compileScene(scene_, aovs, {.accelerator_reach = kNobodyTraces}));
+    const Stopwatch looking;
+    brightest_path_ = brightestPathOf(*compiled_);
+    logDebug("the brightest paths have a luminance of {:.3g}{} ({:.3f} s)", brightest_path_.luminance,
+             brightest_path_.rare ? ", and are rare" : "", looking.seconds());
     logDebug("scene {} needs {}", compiled_->hash, featureNames(compiled_->features));
     warnOfIdleLamps(scene_);
     warnOfMissingLight(scene_);
@@ -191,6 +194,7 @@ void SceneOnDevices::renderSamples(const SamplingPlan& plan, Watch& watch, const
         });
     prepare(facts);
     SamplingPlan sampling = plan;
+    sampling.paths = run.identity.record->paths;
     sampling.checkpoint_interval_seconds = checkpoints.interval_seconds;
     sampling.checkpoint_possible = checkpoints.possible;
     SamplingResult result;
@@ -235,6 +239,7 @@ Rendered SceneOnDevices::rendered(const SamplingPlan& plan, std::optional<Earlie
     if (has_work) open(facts);
     compile();
     FilmIdentity identity{.scene_hash = compiled_->hash, .version = CRT_VERSION, .record = recordOf(scene_)};
+    identity.record->paths.brightest = brightest_path_;
     Film film = openFilm(std::move(earlier), *compiled_, identity);
     facts.resumed_samples = film.samples.count();
     Rendered run{compiled_, std::move(film), std::move(identity), std::move(facts), std::nullopt};
@@ -248,9 +253,9 @@ Rendered SceneOnDevices::rendered(const SamplingPlan& plan, std::optional<Earlie
     return run;
 }
 
-void judgeError(Rendered& run, const Scene& scene) {
-    const bool independent = scene.sampler.type != SamplerType::Sobol;
-    const auto estimate = [&](PixelSet pixels) { return estimateError(run.film, pixels, independent); };
+void judgeError(Rendered& run) {
+    const PathFacts& paths = run.identity.record->paths;
+    const auto estimate = [&](PixelSet pixels) { return estimateError(run.film, pixels, paths); };
     run.facts.error = estimate(PixelSet::All);
     if (run.facts.target_error > 0) {
         run.facts.deciding = estimate(PixelSet::Even);

@@ -99,11 +99,12 @@ private:
     const RenderOptions options_;
     std::optional<Session> session_;
     std::shared_ptr<CompiledScene> compiled_;
+    BrightestPath brightest_path_;  ///< Of `compiled_`.
     std::optional<DeviceFilm> devices_;  ///< Last: of the devices of the one and the scene of the other.
 };
 
 /// What the film knows of its error, into the facts of the run. It takes as long as adding a film.
-void judgeError(Rendered& run, const Scene& scene);
+void judgeError(Rendered& run);
 
 /// SceneOnDevices::render(), once.
 Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,

@@ -47,6 +47,7 @@ Json estimateJson(const std::optional<ErrorEstimate>& error) {
     Json json{{"knowledge", knowledgeName(error->knowledge)},
               {"mean_luminance", error->mean_luminance},
               {"degrees_of_freedom", error->degrees_of_freedom}};
+    if (error->rare_paths > 0) json["rare_paths"] = error->rare_paths;
     // A number that cannot be trusted must not be read as one that can.
     if (error->knowledge == ErrorKnowledge::NotYet) return json;
     const stats::Interval mean = error->meanInterval(0.95);

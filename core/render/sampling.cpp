@@ -58,10 +58,10 @@ private:
 /// The film on the host, kept close behind the one on the device.
 class FilmReader {
 public:
-    FilmReader(DeviceFilm& devices, Film& film, bool independent_samples)
+    FilmReader(DeviceFilm& devices, Film& film, const PathFacts& paths)
         : devices_(devices),
           film_(film),
-          independent_samples_(independent_samples),
+          paths_(paths),
           read_seconds_(static_cast<double>(film.sums.size() * sizeof(double)) / kReadBytesPerSecond) {
         // A film that begins empty need not be kept twice, nor one that only ever grows.
         if (film.samples.count() > 0 && !devices.inBands()) before_ = film;
@@ -104,13 +104,13 @@ public:
 
 private:
     void estimate() {
-        error_ = estimateError(film_, PixelSet::All, independent_samples_);
+        error_ = estimateError(film_, PixelSet::All, paths_);
         read_at_ = Clock::now();
     }
 
     DeviceFilm& devices_;
     Film& film_;
-    bool independent_samples_;
+    PathFacts paths_;
     std::optional<Film> before_, next_;
     double read_seconds_;
     std::optional<ErrorEstimate> error_;
@@ -127,9 +127,9 @@ std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels) {
     return samples < first ? first : std::bit_floor(samples) * 2;
 }
 
-bool reachesTarget(const Film& film, double target, bool independent_samples) {
+bool reachesTarget(const Film& film, double target, const PathFacts& paths) {
     const auto reached = [&](PixelSet which) {
-        const std::optional<ErrorEstimate> error = estimateError(film, which, independent_samples);
+        const std::optional<ErrorEstimate> error = estimateError(film, which, paths);
         return error && error->known() && error->half_width_95 <= target;
     };
     const bool one_pixel = film.counts.size() == 1;
@@ -154,7 +154,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
     Clock::time_point checkpoint_at = start;
     SamplingResult result;
     ChunkSizer sizer(plan.chunk);
-    FilmReader reader(devices, film, plan.independent_samples);
+    FilmReader reader(devices, film, plan.paths);
 
     ProgressState state;
     const std::uint64_t resumed = film.samples.count();
@@ -170,7 +170,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         if (plan.target_error <= 0 || resumed + result.rendered < check_at) return false;
         check_at = nextTargetCheck(resumed + result.rendered, film.counts.size());
         if (!reader.current()) reader.read();
-        return reachesTarget(film, plan.target_error, plan.independent_samples);
+        return reachesTarget(film, plan.target_error, plan.paths);
     };
 
     // Why to stop before the samples are there; nothing while there is no reason.

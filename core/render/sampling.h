@@ -35,7 +35,7 @@ struct SamplingPlan {
     std::vector<SampleRange> ranges;     ///< To render, in order.
     std::uint64_t target = 0;  ///< Samples per pixel in the film when all ranges are there; 0: endless.
     double time_limit_seconds = 0;       ///< 0: none. Looked at between chunks.
-    bool independent_samples = false;    ///< By the scene's sampler: their spread tells the error.
+    PathFacts paths;                     ///< For the error of the film.
     bool light_is_missing = false;       ///< The error does not contain it: said with it.
     double target_error = 0;  ///< Stop when half_width_95 (error_estimate.h) is at most this; 0: never.
     std::uint64_t chunk = 0;             ///< Samples per chunk; 0: adaptive, at most half a second.
@@ -62,7 +62,7 @@ std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels);
 /// each: of two halves that are independent of each other, each can veto what the other would have stopped
 /// at by luck. An error that is not known (error_estimate.h) stops nothing; and the wider the pixels'
 /// variances scatter, the farther the half-width lies above the estimate.
-bool reachesTarget(const Film& film, double target, bool independent_samples = false);
+bool reachesTarget(const Film& film, double target, const PathFacts& paths = {});
 
 /// Adds the plan's samples to `film`. When the last device fails, `film` holds what was last read from it,
 /// at most a small part of the run behind: a backend that failed cannot be asked for its film any more.

@@ -91,7 +91,7 @@ void Developer::estimate(const Snapshot& snapshot) {
     const double pause = std::max(kLeastPause, estimate_seconds_ / kShare);
     if (estimated_ && estimated_->seconds() < pause && !snapshot.complete) return;
     const Stopwatch watch;
-    const auto error = estimateError(*snapshot.film, PixelSet::All, snapshot.seen->independentSamples());
+    const auto error = estimateError(*snapshot.film, PixelSet::All, snapshot.seen->paths);
     estimate_seconds_ = watch.seconds();
     // The first samples do not know it yet; the chart begins with the first that do.
     constexpr std::uint64_t kFirstSamples = 8;

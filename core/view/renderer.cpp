@@ -161,6 +161,7 @@ void Renderer::compile(const RenderWishes& wanted, const Scene& scene) {
     compiled_of_ = wanted.scene;
     compiled_aovs_ = wanted.aovs;
     names_ = std::make_shared<const PrimitiveNames>(*compiled_, scene);
+    paths_ = {scene.sampler.type != SamplerType::Sobol, brightestPathOf(*compiled_)};
     devices_.emplace(session_->group(), *compiled_);
 }
 
@@ -173,7 +174,8 @@ void Renderer::seeScene(const RenderWishes& wanted) {
                    .camera = withPose(wanted.scene->camera, wanted.pose),
                    .names = names_,
                    .width = static_cast<std::uint32_t>(wanted.scene->film.width),
-                   .height = static_cast<std::uint32_t>(wanted.scene->film.height)};
+                   .height = static_cast<std::uint32_t>(wanted.scene->film.height),
+                   .paths = paths_};
     if (const auto& [x0, y0, x1, y1] = wanted.scene->film.crop; x1 > x0) {
         seen.width = static_cast<std::uint32_t>(x1 - x0);
         seen.height = static_cast<std::uint32_t>(y1 - y0);

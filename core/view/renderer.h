@@ -88,6 +88,7 @@ private:
     std::uint32_t compiled_aovs_ = 0;
     std::optional<DeviceFilm> devices_;
     std::shared_ptr<const PrimitiveNames> names_;
+    PathFacts paths_;
     std::shared_ptr<const SeenScene> seen_;
     std::vector<std::shared_ptr<Film>> films_;  ///< Kept, as memory that is new costs as much as filling it.
     Pace pace_;

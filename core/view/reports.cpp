@@ -94,6 +94,7 @@ std::string exrOf(const Snapshot& snapshot) {
     FilmIdentity identity{.scene_hash = compileScene(scene, aovs, {.accelerator_reach = kNobodyTraces}).hash,
                           .version = CRT_VERSION,
                           .record = recordOf(scene)};
+    identity.record->paths = snapshot.seen->paths;
     identity.record->complete = snapshot.complete;
     identity.record->date_utc = dateUtc();
     const TemporaryFolder folder;

@@ -1,6 +1,7 @@
 /// What a render hands to whoever makes pictures of it: a film that does not change any more.
 #pragma once
 
+#include "film/error_estimate.h"
 #include "film/film.h"
 #include "scene/scene.h"
 #include "view/primitive_names.h"
@@ -16,8 +17,7 @@ struct SeenScene {
     Camera camera;                      ///< Instead of the file's.
     std::shared_ptr<const PrimitiveNames> names;
     std::uint32_t width = 0, height = 0;  ///< Of the whole film's crop window.
-
-    bool independentSamples() const { return read->sampler.type != SamplerType::Sobol; }
+    PathFacts paths;
 };
 
 struct Snapshot {

@@ -80,6 +80,7 @@ void Contestant::open() {
 }
 
 void Contestant::describe(const CompiledScene& compiled) {
+    paths_ = {scene_.sampler.type != SamplerType::Sobol, brightestPathOf(compiled)};
     const CrtBackendReport report = session_->report();
     Configuration& c = configuration_;
     c.device = arrayText(report.device);
@@ -118,8 +119,7 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     for (std::size_t p = 0; p < pixels; ++p)
         for (std::size_t c = 0; c < 3; ++c)
             row.image_mean[c] += image.pixels[3 * p + c] / static_cast<double>(pixels);
-    const bool independent = scene_.sampler.type != SamplerType::Sobol;
-    if (const std::optional<ErrorEstimate> own = estimateError(film, PixelSet::All, independent);
+    if (const std::optional<ErrorEstimate> own = estimateError(film, PixelSet::All, paths_);
         own && own->known())
         row.predicted_relative_rmse = {own->relative_rmse, own->relative_rmse_95.lower,
                                        own->relative_rmse_95.upper};

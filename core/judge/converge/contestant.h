@@ -75,6 +75,7 @@ private:
     LoadScene load_;
     IntegratorOptions options_;
     Scene scene_;
+    PathFacts paths_;
     std::uint64_t seed_ = 0;
     const Reference* reference_;
     std::unique_ptr<Session> session_;

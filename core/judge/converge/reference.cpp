@@ -170,6 +170,7 @@ namespace {
 struct RenderedFolds {
     Film film;
     std::vector<Image> images;
+    PathFacts paths;
 };
 
 /// Each eighth has samples of its own. The first also finds out how many fit into the time. Nothing when a
@@ -186,7 +187,7 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, Session& session,
     const auto elapsed = [started] {
         return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     };
-    RenderedFolds folds{Film(shape), {}};
+    RenderedFolds folds{Film(shape), {}, {true, brightestPathOf(compiled)}};
     std::uint64_t per_fold = request.samples / kFolds;
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
         session.setScene(compiled);
@@ -274,7 +275,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     writeImage(request.output, OutputFormat::Exr, file);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     return MadeReference{folds->film.samples.count(), estimatorText(scene), seconds,
-                         estimateError(folds->film, PixelSet::All, true)};
+                         estimateError(folds->film, PixelSet::All, folds->paths)};
 }
 
 Reference readReference(const std::string& text, const Scene& scene) {

@@ -1,0 +1,264 @@
+#include "compile/brightest_path.h"
+
+#include "kernel/path.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace crt {
+namespace {
+
+using namespace kernel;
+
+constexpr std::size_t kPlaces = 2048;       ///< About so many, the same number on each material,
+constexpr std::size_t kMostOfMaterial = 64;  ///< but no more than this.
+constexpr std::uint32_t kLightsPerPlace = 4;
+constexpr std::uint32_t kSamplesOfBsdf = 8;
+/// Tests of surfaces against shadow rays: a tenth of a second.
+constexpr std::uint64_t kTests = 10'000'000;
+constexpr std::uint64_t kLeastRays = 16;
+
+/// Rare paths are brighter by more than this than all but a hundredth of those that arrive from anywhere.
+constexpr double kRare = 10;
+constexpr std::size_t kHundredth = 100;
+
+/// A path that carries the light of a lamp.
+struct LitPath {
+    double luminance;  ///< Where nothing hides the lamp.
+    CrtRay to_light;
+};
+
+/// What the places of a scene send on of the light that reaches them.
+class Places {
+public:
+    explicit Places(const CompiledScene& scene) : triangles_(nullptr) {
+        context_.blob = scene.data();
+        context_.scene = reinterpret_cast<const CrtScene*>(scene.data());
+        triangles_ = CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles);
+    }
+
+    /// Places that do not emit, by materials and then by the author's order.
+    std::vector<CrtHit> choose() const;
+
+    /// A path that arrives at `hit` from where it mirrors a lamp, and one that arrives from anywhere.
+    std::pair<std::optional<LitPath>, std::optional<LitPath>> light(const CrtHit& hit,
+                                                                    std::uint32_t number) const;
+
+    /// The brightest that no surface hides, but for `left_out` brighter ones; nothing where all that were
+    /// asked are hidden.
+    std::optional<double> brightest(std::vector<LitPath> paths, std::size_t left_out = 0) const;
+
+private:
+    CrtHit hitOf(std::uint32_t slot, std::uint32_t instance, std::uint32_t number) const;
+    void prepare(CrtSurface surface, std::uint32_t slot, vec3 wo, vec4 position, CrtBsdf& bsdf) const;
+    bool mirrors(const CrtBsdf& bsdf, CrtSampler& sampler) const;
+    vec4 mirrored(const CrtBsdf& bsdf, const CrtOffer& offer, CrtSampler& sampler) const;
+    std::optional<LitPath> carry(const CrtSurface& surface, const CrtBsdf& bsdf, const CrtOffer& offer,
+                                 vec4 share, const CrtWavelengths& wavelengths) const;
+    bool hides(const CrtRay& ray) const;
+
+    CrtContext context_{};
+    const CrtTriangle* triangles_;
+};
+
+/// A place within what the slot holds; which one, `number` decides.
+CrtHit Places::hitOf(std::uint32_t slot, std::uint32_t instance, std::uint32_t number) const {
+    CrtHit hit = crt_no_hit(0);
+    hit.slot = slot;
+    hit.id = triangles_[slot].id;
+    hit.instance = instance;
+    const CrtSeed seed = crt_seed(0, 1);
+    CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, seed, number, 0);
+    const CrtRandom2 u = crt_sample_2d(&sampler, 0);
+    if (triangles_[slot].shape == 0) {
+        const float root = std::sqrt(u.x);
+        hit.b1 = root * (1 - u.y);
+        hit.b2 = root * u.y;
+        return hit;
+    }
+    const CrtShape& shape = *crt_shape_of(&context_, triangles_[slot].shape - 1);
+    const float z = shape.from_z + u.y * (shape.to_z - shape.from_z);
+    const float turn = 4 * u.x - 2;
+    const vec3 around = crt_direction_of_turn(turn);
+    if (shape.kind == CRT_SHAPE_DISK) {
+        hit.b1 = around.x * shape.radius * std::sqrt(u.y);
+        hit.b2 = around.y * shape.radius * std::sqrt(u.y);
+    } else if (shape.kind == CRT_SHAPE_CYLINDER) {
+        hit.b1 = turn;
+        hit.b2 = z;
+    } else {
+        const float height = z / shape.radius, across = std::sqrt(std::max(0.0f, 1 - height * height));
+        const vec3 direction = crt_load3(shape.x) * (around.x * across) +
+                               crt_load3(shape.y) * (around.y * across) + crt_load3(shape.z) * height;
+        crt_direction_to_square(direction, &hit.b1, &hit.b2);
+    }
+    return hit;
+}
+
+std::vector<CrtHit> Places::choose() const {
+    const CrtScene& scene = *context_.scene;
+    const auto* primitives = CRT_ARRAY(CrtPrimitive, context_.blob, scene.primitives);
+    const auto* instances = CRT_ARRAY(CrtInstance, context_.blob, scene.instances);
+    // Primitives in the author's order, with their slots.
+    std::vector<std::uint32_t> slots(scene.primitives.count, CRT_NONE);
+    for (std::uint32_t slot = 0; slot < scene.triangles.count; ++slot)
+        if (triangles_[slot].shape < CRT_SLOT_INSTANCE && triangles_[slot].id < slots.size())
+            slots[triangles_[slot].id] = slot;
+    std::vector<std::vector<std::uint32_t>> of_materials(scene.materials.count);
+    for (std::uint32_t id = 0; id < slots.size(); ++id)
+        if (slots[id] != CRT_NONE && primitives[id].light == CRT_NONE)
+            of_materials[primitives[id].material].push_back(id);
+    const auto used = static_cast<std::size_t>(std::count_if(
+        of_materials.begin(), of_materials.end(), [](const auto& ids) { return !ids.empty(); }));
+    const std::size_t each = std::clamp<std::size_t>(kPlaces / std::max<std::size_t>(used, 1), 1,
+                                                     kMostOfMaterial);
+    std::map<std::uint32_t, std::vector<std::uint32_t>> instances_of;  // Meshes, by their first primitives.
+    for (std::uint32_t i = 0; i < scene.instances.count; ++i)
+        instances_of[instances[i].first_primitive].push_back(i);
+    std::vector<CrtHit> hits;
+    for (const std::vector<std::uint32_t>& ids : of_materials)
+        for (std::size_t k = 0; k < each && !ids.empty(); ++k) {
+            const std::uint32_t id = ids[k * ids.size() / each], slot = slots[id];
+            const auto number = static_cast<std::uint32_t>(hits.size());
+            std::uint32_t instance = 0;
+            if (slot >= scene.triangle_count) {
+                const auto& there = std::prev(instances_of.upper_bound(id))->second;
+                instance = there[crt_hash(number) % there.size()] + 1;
+            }
+            hits.push_back(hitOf(slot, instance, number));
+        }
+    return hits;
+}
+
+/// As crt_shade prepares it.
+void Places::prepare(CrtSurface surface, std::uint32_t slot, vec3 wo, vec4 position, CrtBsdf& bsdf) const {
+    bsdf.pane_cosine = crt_pane_cosine(&surface, -wo);
+    crt_map_normal(&context_, &surface, slot, &wo, &bsdf);
+    crt_layered_prepare(&context_, &bsdf, &surface, wo, position, splat4(1), 0);
+}
+
+/// True if part of what arrives goes on in a single direction.
+bool Places::mirrors(const CrtBsdf& bsdf, CrtSampler& sampler) const {
+    const vec4 kFirstIsHero = make_vec4(1, 0, 0, 0);
+    for (std::uint32_t k = 0; k < kSamplesOfBsdf; ++k) {
+        const std::uint32_t dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * (k + 1);
+        const CrtScatter scatter =
+            crt_surface_sample(&bsdf, crt_sample_2d(&sampler, dimension + CRT_DIM_BSDF),
+                               crt_sample_2d(&sampler, dimension + CRT_DIM_CHOICE), kFirstIsHero, 0);
+        if (scatter.valid && scatter.pdf == 0) return true;
+    }
+    return false;
+}
+
+/// Factor on the light's spectrum that crt_ask_light adds.
+vec4 scattered(const CrtBsdf& bsdf, const CrtOffer& offer) {
+    return crt_is_delta(&bsdf) ? splat4(0) : crt_surface_eval(&bsdf, offer.wi) * offer.irradiance;
+}
+
+/// The same in the direction that mirrors the light: at most the light itself where scattered rays find it
+/// as well. What is seen at a grazing angle is met as seldom as it is bright.
+vec4 Places::mirrored(const CrtBsdf& bsdf, const CrtOffer& offer, CrtSampler& sampler) const {
+    vec4 share = scattered(bsdf, offer);
+    if (offer.pdf > 0) {
+        const vec4 whole = splat4(offer.irradiance * offer.pdf);
+        const bool by_chance_alone = context_.scene->nee == CRT_NEE_NONE && max4(share) > 0;
+        share = by_chance_alone || mirrors(bsdf, sampler) ? whole : crt_min4(share, whole);
+    }
+    return share * crt_abs(dot3(bsdf.wo, bsdf.ns));
+}
+
+std::optional<LitPath> Places::carry(const CrtSurface& surface, const CrtBsdf& bsdf, const CrtOffer& offer,
+                                     vec4 share, const CrtWavelengths& wavelengths) const {
+    const auto* lights = CRT_ARRAY(CrtLight, context_.blob, context_.scene->lights);
+    const vec4 position = wavelengths.position,
+               light = offer.environment
+                           ? crt_environment_radiance(&context_, offer.place, position)
+                           : crt_value(&context_, lights[offer.light].radiance, nullptr, position);
+    const auto luminance = static_cast<double>(V4Y(crt_to_xyz(&context_, wavelengths, share * light)));
+    if (!(luminance > 0) || !std::isfinite(luminance)) return std::nullopt;
+    CrtRay ray;
+    const bool far = offer.distance == CRT_INFINITY;
+    ray.o = crt_offset_origin(surface.p, surface.clearance, crt_side(&bsdf), offer.wi);
+    ray.d = far ? offer.wi : offer.point - ray.o;
+    ray.reach = far ? CRT_INFINITY : offer.reach;
+    return LitPath{luminance, ray};
+}
+
+std::pair<std::optional<LitPath>, std::optional<LitPath>> Places::light(const CrtHit& hit,
+                                                                        std::uint32_t number) const {
+    CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, crt_seed(0, 2), number, 0);
+    const CrtWavelengths wavelengths =
+        crt_sample_wavelengths(&context_, crt_sample_1d(&sampler, CRT_DIM_WAVELENGTH));
+    CrtSurface surface = crt_surface(&context_, hit);
+    surface.medium = 0;
+    surface.touches = 0;
+    surface.material = crt_chosen_material(&context_, &surface, -surface.ns, &sampler,
+                                           CRT_DIM_VERTEX + CRT_DIM_MIX);
+    CrtBsdf bsdf;
+    const CrtRandom2 u = crt_sample_2d(&sampler, CRT_DIM_VERTEX + CRT_DIM_BSDF);
+    prepare(surface, hit.slot, crt_cosine_direction(surface.ns, u), wavelengths.position, bsdf);
+    const CrtOffer offer = crt_offer(&context_, &sampler, CRT_DIM_VERTEX, surface.p, &bsdf);
+    if (!(offer.irradiance > 0)) return {};
+    const std::optional<LitPath> from_anywhere =
+        carry(surface, bsdf, offer, scattered(bsdf, offer), wavelengths);
+    const vec3 side = dot3(offer.wi, bsdf.ns) < 0 ? -bsdf.ns : bsdf.ns;
+    prepare(surface, hit.slot, crt_reflect(offer.wi, side), wavelengths.position, bsdf);
+    return {carry(surface, bsdf, offer, mirrored(bsdf, offer, sampler), wavelengths), from_anywhere};
+}
+
+bool Places::hides(const CrtRay& ray) const {
+    if (!(ray.reach > 0)) return false;
+    const CrtShear shear = crt_shear(ray);
+    for (std::uint32_t slot = 0; slot < context_.scene->triangle_count; ++slot) {
+        if (triangles_[slot].shape >= CRT_SLOT_INSTANCE) continue;
+        CrtHit hit = crt_no_hit(ray.reach);
+        crt_test_slot(&context_, triangles_, slot, ray, shear, &hit);
+        if (hit.slot != CRT_NONE && !crt_may_pass(&context_, hit)) return true;
+    }
+    return false;
+}
+
+/// From the brightest on; where many of those are hidden, more and more of the next are passed over.
+std::optional<double> Places::brightest(std::vector<LitPath> paths, std::size_t left_out) const {
+    std::stable_sort(paths.begin(), paths.end(),
+                     [](const LitPath& a, const LitPath& b) { return a.luminance > b.luminance; });
+    const std::uint64_t rays =
+        std::max(kTests / std::max<std::uint64_t>(context_.scene->triangle_count, 1), kLeastRays);
+    std::size_t next = left_out;
+    for (std::uint64_t asked = 0; next < paths.size(); ++asked) {
+        if (asked == rays || !hides(paths[next].to_light)) return paths[next].luminance;
+        next += 1 + asked / 8;
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+BrightestPath brightestPathOf(const CompiledScene& scene) {
+    const auto& header = *reinterpret_cast<const CrtScene*>(scene.data());
+    if (header.view != CRT_VIEW_PATH || header.lights.count == 0) return {};
+    const Places places(scene);
+    std::vector<LitPath> mirrored, from_anywhere;
+    const std::vector<CrtHit> hits = places.choose();
+    for (std::size_t i = 0; i < hits.size(); ++i)
+        for (std::uint32_t k = 0; k < kLightsPerPlace; ++k) {
+            const auto [of_mirror, of_anywhere] =
+                places.light(hits[i], static_cast<std::uint32_t>(i) * kLightsPerPlace + k);
+            if (of_mirror) mirrored.push_back(*of_mirror);
+            if (of_anywhere) from_anywhere.push_back(*of_anywhere);
+        }
+    const std::optional<double> brightest = places.brightest(std::move(mirrored));
+    if (!brightest) return {};
+    const std::size_t hundredth = hits.size() * kLightsPerPlace / kHundredth;
+    const double ordinary = places.brightest(std::move(from_anywhere), hundredth).value_or(0);
+    return {*brightest, *brightest > kRare * ordinary};
+}
+
+}  // namespace crt
