@@ -52,6 +52,17 @@ std::string missingFolder(const std::string& directory) {
     throw Error(ErrorKind::Output, fmt::format("cannot write '{}': {}", path, why), {path});
 }
 
+/// True for a link of another user in a folder that everyone can write to, such as /tmp: its target is that
+/// user's choice. Linux refuses to follow such links (fs.protected_symlinks), but reading them by hand goes
+/// around that.
+bool isPlantedLink(const fs::path& link) {
+    struct stat own {}, folder {};
+    if (::lstat(link.c_str(), &own) != 0 || ::stat(directoryOf(link.string()).c_str(), &folder) != 0)
+        return false;
+    const bool everyones = (folder.st_mode & S_ISVTX) != 0 && (folder.st_mode & S_IWOTH) != 0;
+    return everyones && own.st_uid != ::geteuid() && own.st_uid != folder.st_uid;
+}
+
 /// Where a link leads in the end, also when nothing is there yet: std::filesystem takes such a link for a
 /// file that is to be made.
 std::string targetOf(const std::string& path) {
@@ -60,6 +71,9 @@ std::string targetOf(const std::string& path) {
     fs::path at = path;
     for (int i = 0; fs::is_symlink(at, ignored); ++i) {
         if (i == kMostLinks) refuse(path, "it is a link that leads to itself");
+        if (isPlantedLink(at))
+            refuse(path, fmt::format("'{}' is a link of another user in a folder that everyone can write to",
+                                     at.string()));
         const fs::path next = fs::read_symlink(at, ignored);
         if (ignored) refuse(path, fmt::format("it is a link that cannot be read: {}", ignored.message()));
         at = at.parent_path() / next;  // An absolute target replaces the folder.

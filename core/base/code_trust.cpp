@@ -136,6 +136,23 @@ std::string whyNot(const struct stat& status, const std::string& name) {
     return {};
 }
 
+namespace {
+
+/// Of a folder and those above it.
+std::string whyNotFrom(std::string folder) {
+    const std::string home = homeOfUser();
+    for (;; folder = folderOf(folder)) {
+        if (program().known && isAbove(folder, program().path)) return {};  // So are all further up.
+        struct stat status {};
+        if (::stat(folder.c_str(), &status) != 0)
+            return inQuotationMarks(folder) + " cannot be looked at: " + std::strerror(errno);
+        if (std::string why = whyNot(status, folder); !why.empty()) return why;
+        if (folder == "/" || folder == home) return {};
+    }
+}
+
+}  // namespace
+
 std::string whyNotByName(const std::string& path) {
     char real[PATH_MAX];
     if (::realpath(path.c_str(), real) == nullptr)
@@ -147,16 +164,15 @@ std::string whyNotByName(const std::string& path) {
     const bool known = ::fstat(descriptor, &status) == 0;
     ::close(descriptor);
     if (!known || !S_ISREG(status.st_mode)) return inQuotationMarks(path) + " is not a regular file";
-    std::string why = whyNot(status, path);
-    const std::string home = homeOfUser();
-    for (std::string folder = folderOf(real); why.empty(); folder = folderOf(folder)) {
-        if (program().known && isAbove(folder, program().path)) break;  // So are all further up.
-        if (::stat(folder.c_str(), &status) != 0)
-            return inQuotationMarks(folder) + " cannot be looked at: " + std::strerror(errno);
-        why = whyNot(status, folder);
-        if (folder == "/" || folder == home) break;
-    }
-    return why;
+    const std::string why = whyNot(status, path);
+    return why.empty() ? whyNotFrom(folderOf(real)) : why;
+}
+
+std::string whyNotFolder(const std::string& path) {
+    char real[PATH_MAX];
+    if (::realpath(path.c_str(), real) == nullptr)
+        return inQuotationMarks(path) + " cannot be opened: " + std::strerror(errno);
+    return whyNotFrom(real);
 }
 
 }  // namespace crt::trust

@@ -25,4 +25,7 @@ std::string whyNot(const struct stat& status, const std::string& name);
 /// thread]
 std::string whyNotByName(const std::string& path);
 
+/// The same for a folder that will hold code. [any thread]
+std::string whyNotFolder(const std::string& path);
+
 }  // namespace crt::trust

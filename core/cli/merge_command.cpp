@@ -35,6 +35,7 @@ int mergeFilms(const MergeArguments& arguments) {
     Scene scene;
     if (has_scene) scene = loadScene(arguments.scene);
     OutputPlan plan = planOutputs(arguments.outputs, scene);
+    if (arguments.outputs.empty()) refuseForeignPlaces(plan.images, scene.file, arguments.overwrite);
     std::vector<std::string> inputs = arguments.parts, images;
     inputs.insert(inputs.end(), scene.files_read.begin(), scene.files_read.end());
     for (const Output& image : plan.images) images.push_back(image.file);

@@ -44,6 +44,7 @@ std::vector<std::string> imageNames(const OutputPlan& plan) {
 Files planFiles(const Job& job, const Scene& scene) {
     Files files;
     files.outputs = planOutputs(job.outputs, scene);
+    if (job.outputs.empty()) refuseForeignPlaces(files.outputs.images, scene.file, job.overwrite);
     files.checkpoint = !job.checkpoint_file.empty() ? job.checkpoint_file
                        : !job.resume_file.empty()   ? job.resume_file
                                                   : besideOutput(files.outputs.first, kCheckpointExtension);

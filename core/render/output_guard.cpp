@@ -1,12 +1,16 @@
 #include "render/output_guard.h"
 
+#include "base/atomic_file.h"
 #include "base/error.h"
 #include "film/checkpoint.h"
+#include "image/image_io.h"
 
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <fstream>
 #include <limits>
+#include <string_view>
 #include <sys/stat.h>
 #include <system_error>
 
@@ -14,15 +18,44 @@ namespace crt {
 namespace fs = std::filesystem;
 namespace {
 
+fs::path wholeName(const fs::path& path) {
+    std::error_code unknown;
+    const fs::path absolute = fs::absolute(path, unknown);
+    const fs::path found = fs::weakly_canonical(absolute, unknown);
+    return unknown ? absolute.lexically_normal() : found;
+}
+
 /// The same for all names of one file: by device and number of the file that is there, or by the name that
 /// it will have.
 std::string identityOf(const std::string& path) {
     struct stat status {};
     if (::stat(path.c_str(), &status) == 0) return fmt::format("{}:{}", status.st_dev, status.st_ino);
-    std::error_code unknown;
-    const fs::path absolute = fs::absolute(path, unknown);
-    const fs::path canonical = fs::weakly_canonical(absolute, unknown);
-    return (unknown ? absolute.lexically_normal() : canonical).string();
+    return wholeName(path).string();
+}
+
+/// `path` from `folder` on; empty when it is not below.
+fs::path below(const fs::path& folder, const fs::path& path) {
+    const fs::path way = wholeName(path).lexically_relative(wholeName(folder));
+    return way.empty() || *way.begin() == ".." || way == "." ? fs::path() : way;
+}
+
+/// The first bytes of images that crt writes; those with metadata name it as well.
+bool isImageOfCrt(const std::string& path, OutputFormat format) {
+    constexpr std::size_t kMetadata = 65536;
+    std::ifstream file(path, std::ios::binary);
+    std::string head(kMetadata, '\0');
+    file.read(head.data(), static_cast<std::streamsize>(head.size()));
+    head.resize(static_cast<std::size_t>(file.gcount()));
+    const auto begins = [&](std::string_view with) { return head.rfind(with, 0) == 0; };
+    const std::size_t program = head.find("Software");
+    const bool named = program != std::string::npos && head.substr(program, 32).find("crt ") != std::string::npos;
+    switch (format) {
+        case OutputFormat::Exr: return begins("\x76\x2f\x31\x01") && named;
+        case OutputFormat::Png: return begins("\x89PNG") && named;
+        case OutputFormat::Ppm: return begins("P6");
+        case OutputFormat::Pfm: return begins("PF") || begins("Pf");
+    }
+    return false;
 }
 
 constexpr std::uint64_t kNoFilm =
@@ -53,6 +86,29 @@ void refuseOverInputs(const std::vector<std::string>& inputs, const std::vector<
     };
     for (const std::string& output : outputs) written.emplace(check(output), output);
     for (const std::string& film : films) check(film);
+}
+
+void refuseForeignPlaces(const std::vector<Output>& outputs, const std::string& scene_file, bool replace) {
+    const fs::path folder = fs::path(scene_file).parent_path();
+    for (const Output& output : outputs) {
+        if (isStandardOutput(output.file)) continue;
+        const auto refuse = [&](const std::string& why) {
+            throw Error(ErrorKind::Usage,
+                        fmt::format("the scene's output '{}' {}; -o names a file that may be anywhere",
+                                    output.file, why),
+                        {output.file});
+        };
+        fs::path way = below(".", output.file);
+        if (way.empty()) way = below(folder.empty() ? "." : folder, output.file);
+        if (way.empty())
+            refuse("lies outside of the folder where crt was started and of the scene's own");
+        for (const fs::path& part : way)
+            if (part.string().front() == '.') refuse("is a hidden file or lies in a hidden folder");
+        if (!formatOfFile(output.file)) refuse("does not end in .exr, .png, .ppm or .pfm");
+        std::error_code unreadable;
+        if (!replace && fs::exists(output.file, unreadable) && !isImageOfCrt(output.file, output.format))
+            refuse("would replace a file that is no image of crt's: add --overwrite to replace it");
+    }
 }
 
 void FilmGuard::look(const std::string& path, bool wanted, bool replace) {

@@ -2,6 +2,8 @@
 /// more samples.
 #pragma once
 
+#include "scene/scene.h"
+
 #include <cstdint>
 #include <map>
 #include <string>
@@ -14,6 +16,12 @@ namespace crt {
 /// them.
 void refuseOverInputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
                       const std::vector<std::string>& films = {});
+
+/// What a scene file names as its outputs, or what is called after it, may come from anybody. Throws
+/// crt::Error(Usage) when an output is neither below the folder where crt was started nor below the scene's
+/// own; when its name, or that of a folder on the way, begins with a dot or does not end as images do; and,
+/// unless `replace`, when a file is there that is no image of crt's.
+void refuseForeignPlaces(const std::vector<Output>& outputs, const std::string& scene_file, bool replace);
 
 /// Films that lie where films will be written. [one thread]
 class FilmGuard {

@@ -1,5 +1,7 @@
 #include "opencl_device.h"
 
+#include "opencl_caches.h"
+
 #include "backend/sdk/plugin_guard.h"
 
 #include <algorithm>
@@ -168,6 +170,7 @@ double Device::score() const {
 CrtDevice Device::describe() const { return plugin::makeDevice(index, name, driver, memory_bytes, score()); }
 
 std::vector<Device> listDevices() {
+    keepKernelsFromOthers();
     cl_uint platform_count = 0;
     const cl_int listed = clGetPlatformIDs(0, nullptr, &platform_count);
     if (listed != CL_SUCCESS && listed != kPlatformNotFound)

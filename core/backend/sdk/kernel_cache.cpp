@@ -95,6 +95,8 @@ std::string temporaryPath(const std::string& entry) {
 
 }  // namespace
 
+std::string whyNotFolder(const std::string& folder) { return trust::whyNotFolder(folder); }
+
 KernelCache::KernelCache(const char* directory, std::uint64_t max_bytes)
     : directory_(directory != nullptr ? directory : ""), max_bytes_(max_bytes) {}
 
