@@ -10,6 +10,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 namespace crt {
 namespace {
@@ -39,6 +40,24 @@ void setChannels(const Scene& scene, std::uint32_t aovs, kernel::CrtScene& heade
 #undef CRT_SET_CHANNEL
 }
 
+/// From the scene, whose coordinates are within ±1: beyond it rays meet nothing but rounding, and products of
+/// coordinates leave the range of single precision.
+constexpr double kFarthest = 1e15;
+
+/// Throws unless distances along rays from the camera are numbers, in scene units.
+void requireDepths(const Scene& scene, const kernel::CrtScene& header) {
+    if ((header.aovs & kAovDepth) == 0) return;
+    const kernel::CrtCamera& camera = header.camera;
+    double reach = 4;
+    for (const float x : camera.origin) reach += std::abs(static_cast<double>(x));
+    const double farthest = reach * static_cast<double>(header.depth_scale);
+    if (!(farthest < static_cast<double>(std::numeric_limits<float>::max())))
+        throw Error(ErrorKind::Scene,
+                    "the scene is too large for its distances in single precision: scale it down, or "
+                    "leave 'depth' out of 'aovs'",
+                    scene.camera.place);
+}
+
 /// Centred, and scaled by 2^scale_exponent.
 kernel::CrtCamera cameraOf(const Scene& scene, const Vec3d& centre, int scale_exponent) {
     const Camera& camera = scene.camera;
@@ -55,7 +74,8 @@ kernel::CrtCamera cameraOf(const Scene& scene, const Vec3d& centre, int scale_ex
         c.step_y[k] = static_cast<float>(-up[k] * 2 * camera.tan_half_height / scene.film.height);
         c.lens_x[k] = static_cast<float>(right[k]);
         c.lens_y[k] = static_cast<float>(up[k]);
-        if (!std::isfinite(c.origin[k] + c.corner[k] + c.step_x[k] + c.step_y[k]))
+        if (!std::isfinite(c.corner[k] + c.step_x[k] + c.step_y[k]) ||
+            !(std::abs(static_cast<double>(c.origin[k])) <= kFarthest))
             throw Error(ErrorKind::Scene, "the camera is too far from the scene for single precision",
                         camera.place);
     }
@@ -72,6 +92,12 @@ kernel::CrtCamera cameraOf(const Scene& scene, const Vec3d& centre, int scale_ex
     const Vec3d to_target = camera.target - camera.position;
     const double focus =
         camera.focus_distance > 0 ? camera.focus_distance : std::sqrt(dot(to_target, to_target));
+    if (!(camera.aperture_radius * scale <= kFarthest))
+        throw Error(ErrorKind::Scene, "the camera's aperture is too large for single precision",
+                    camera.place);
+    if (camera.aperture_radius > 0 && !(focus * scale <= kFarthest))
+        throw Error(ErrorKind::Scene, "the camera is focused too far off for single precision",
+                    camera.place);
     c.lens_radius = static_cast<float>(camera.aperture_radius * scale);
     c.focus_distance = static_cast<float>(focus * scale);
     return c;
@@ -117,6 +143,7 @@ kernel::CrtScene compileSettings(const Scene& scene, const FlatScene& flat, std:
     setChannels(scene, filmAovs(scene, aovs), header);
     header.depth_scale = static_cast<float>(std::ldexp(1.0, -flat.scale_exponent));
     compileView(scene, flat.centre, flat.scale_exponent, header);
+    requireDepths(scene, header);
     setIntegrator(scene, header);
     return header;
 }
