@@ -34,6 +34,7 @@ public:
 
 private:
     std::set<std::string> taken_{"from_mtl"};
+    std::map<std::string, std::size_t> next_;  ///< The number to try first behind a name.
 };
 
 /// What a file has and its scene has not, or not quite, each with how often; and what the scene has that the

@@ -18,6 +18,9 @@ Spectrum scaled(Spectrum spectrum, double factor) {
 
 namespace {
 
+/// How many spectra may each be the name of the next.
+constexpr std::size_t kDeepestSpectrum = 64;
+
 /// The wavelength where a spectrum is worst: first where it is not finite, else farthest outside `range`.
 std::optional<std::size_t> worstWavelength(const Spectrum& spectrum, const ValueRange& range) {
     std::optional<std::size_t> worst;
@@ -152,6 +155,12 @@ std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, con
     }
     const auto known = resolved_.find({name, use});
     if (known != resolved_.end()) return known->second;
+    if (open_.size() >= kDeepestSpectrum) {
+        out_.error(place, fmt::format("spectrum '{}' is the {}th in a chain of spectra, each of which names the "
+                                      "next: chains may have {}",
+                                      name, kDeepestSpectrum + 1, kDeepestSpectrum));
+        return std::nullopt;
+    }
     open_.insert(name);
     std::optional<Spectrum> spectrum =
         resolve(*entry->value, entry->place, fmt::format("spectrum '{}'", name), use);

@@ -42,6 +42,11 @@ public:
     /// Maps that the file leaves out are made; the check of the whole scene then finds keys that do not
     /// exist, with the place in the argument.
     void apply(YamlNodePtr& slot, const YamlNodePtr& value, std::size_t at = 0) {
+        if (++parts_ > kDeepestPath) {
+            out_.error(place(0, path_.size()),
+                       fmt::format("a path of more than {} parts leads nowhere in a scene", kDeepestPath));
+            return;
+        }
         slot = std::make_shared<YamlNode>(*slot);
         if (slot->kind == YamlKind::Null) slot->kind = YamlKind::Map;
         switch (slot->kind) {
@@ -58,6 +63,8 @@ public:
     }
 
 private:
+    static constexpr int kDeepestPath = 64;  // As deep as YAML may be.
+
     YamlPlace place(std::size_t at, std::size_t length) const {
         return {&source_, 1, static_cast<int>(at) + 1, static_cast<int>(std::max<std::size_t>(length, 1))};
     }
@@ -132,6 +139,7 @@ private:
     std::string path_;
     const YamlSource& source_;
     Diagnostics& out_;
+    int parts_ = 0;
 };
 
 void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrides,

@@ -335,6 +335,23 @@ YamlSource::YamlSource(std::string name_, std::string_view text, bool command_li
         if (end == std::string_view::npos) break;
         text.remove_prefix(end + 1);
     }
+    for (std::size_t row = 0; row < lines.size(); ++row) {
+        if (lines[row].size() <= kCounted) continue;
+        std::vector<std::size_t>& counts = counts_[row];
+        std::size_t before = 0;
+        for (std::size_t at = 0; at <= lines[row].size(); at += kCounted) {
+            counts.push_back(before);
+            before += characters(std::string_view(lines[row]).substr(at), kCounted);
+        }
+    }
+}
+
+std::size_t YamlSource::charactersBefore(std::size_t row, std::size_t bytes) const {
+    const std::string_view line = lines[row];
+    const auto counted = counts_.find(row);
+    if (counted == counts_.end()) return characters(line, bytes);
+    const std::size_t part = std::min(bytes / kCounted, counted->second.size() - 1);
+    return counted->second[part] + characters(line.substr(part * kCounted), bytes - part * kCounted);
 }
 
 SourcePlace YamlPlace::resolved() const {
@@ -343,7 +360,7 @@ SourcePlace YamlPlace::resolved() const {
     const auto row = static_cast<std::size_t>(line);
     if (row > source->lines.size()) return {source->name, line, column};
     return {source->name, line,
-            static_cast<int>(characters(source->lines[row - 1], static_cast<std::size_t>(column) - 1)) + 1};
+            static_cast<int>(source->charactersBefore(row - 1, static_cast<std::size_t>(column) - 1)) + 1};
 }
 
 const YamlEntry* YamlNode::find(std::string_view key) const {

@@ -11,6 +11,7 @@
 #include "base/error.h"
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,11 +25,19 @@ struct YamlSource {
     YamlSource(std::string name_, std::string_view text, bool command_line_ = false);
 
     std::string name;  ///< Path of the file, or "--set film.resolution".
+    /// In characters of UTF-8: those of the first `bytes` bytes of lines[row].
+    std::size_t charactersBefore(std::size_t row, std::size_t bytes) const;
+
     std::vector<std::string> lines;
     bool command_line = false;  ///< One line, so messages leave line and column out.
     bool included = false;      ///< By a scene, in which not all of it need be used.
     int rank = 0;               ///< Messages come in this order: the scene itself, then what it includes.
     std::string directory{};    ///< Where relative names in it are looked up; empty: beside the scene.
+
+private:
+    /// Of long lines, which programs write: characters before every kCounted-th byte.
+    static constexpr std::size_t kCounted = 4096;
+    std::map<std::size_t, std::vector<std::size_t>> counts_;
 };
 
 /// A stretch of a source. Counts from 1, columns in bytes; line 0 means the source as a whole.
