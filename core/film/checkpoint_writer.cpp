@@ -36,12 +36,18 @@ bool CheckpointWriter::idle() const {
 
 void CheckpointWriter::save(const Film& film, FilmIdentity identity) {
     finish();
-    copy_ = film;
-    writing_ = std::async(std::launch::async, [this, identity = std::move(identity),
-                                               listener = currentListener()] {
-        const ListenerScope scope(listener);
-        return tryTo(write_, *copy_, identity);
-    });
+    try {
+        copy_ = film;
+        writing_ = std::async(std::launch::async, [this, identity, listener = currentListener()] {
+            const ListenerScope scope(listener);
+            return tryTo(write_, *copy_, identity);
+        });
+    } catch (const std::exception&) {  // No memory for a copy, or no thread: the device waits instead.
+        copy_.reset();
+        std::promise<std::optional<Error>> written;
+        written.set_value(tryTo(write_, film, identity));
+        writing_ = written.get_future();
+    }
 }
 
 void CheckpointWriter::finish() {

@@ -102,16 +102,21 @@ public:
             write();
         } catch (const Error& error) {
             // The first is reported by whoever catches it in the end; the others have only this line.
-            if (first_) {
-                logMessage(LogLevel::Error, error.what());
-            } else {
-                first_ = error;
-            }
+            note(error);
+        } catch (const std::exception& error) {  // Out of memory, or no thread.
+            note(Error(ErrorKind::Output, fmt::format("cannot write an output: {}", error.what())));
         }
     }
     const std::optional<Error>& get() const { return first_; }
 
 private:
+    void note(const Error& error) {
+        if (first_)
+            logMessage(LogLevel::Error, error.what());
+        else
+            first_ = error;
+    }
+
     std::optional<Error> first_;
 };
 

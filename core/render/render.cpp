@@ -10,6 +10,7 @@
 #include "scene/missing_light.h"
 
 #include <limits>
+#include <new>
 #include <thread>
 #include <utility>
 
@@ -256,10 +257,14 @@ Rendered SceneOnDevices::rendered(const SamplingPlan& plan, std::optional<Earlie
 void judgeError(Rendered& run) {
     const PathFacts& paths = run.identity.record->paths;
     const auto estimate = [&](PixelSet pixels) { return estimateError(run.film, pixels, paths); };
-    run.facts.error = estimate(PixelSet::All);
-    if (run.facts.target_error > 0) {
-        run.facts.deciding = estimate(PixelSet::Even);
-        run.facts.judging = estimate(PixelSet::Odd);
+    try {
+        run.facts.error = estimate(PixelSet::All);
+        if (run.facts.target_error > 0) {
+            run.facts.deciding = estimate(PixelSet::Even);
+            run.facts.judging = estimate(PixelSet::Odd);
+        }
+    } catch (const std::bad_alloc&) {  // The film matters more than its error.
+        logWarning("out of memory on the host: the image's error is not known");
     }
 }
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <new>
+#include <system_error>
 #include <utility>
 
 namespace crt {
@@ -233,13 +235,20 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         return StopReason::Samples;
     };
 
+    const auto fail = [&](const Error& error) {
+        result.stop = StopReason::Failed;
+        result.failure = error;
+        result.rendered = film.samples.count() - resumed;  // What was rendered but not read is lost.
+    };
     try {
         result.stop = renderAll();
         if (!reader.current()) reader.copy();
     } catch (const Error& error) {
-        result.stop = StopReason::Failed;
-        result.failure = error;
-        result.rendered = film.samples.count() - resumed;  // What was rendered but not read is lost.
+        fail(error);
+    } catch (const std::bad_alloc&) {
+        fail(Error(ErrorKind::Device, "out of memory on the host: a smaller film needs less"));
+    } catch (const std::system_error& error) {  // A thread that cannot be started.
+        fail(Error(ErrorKind::Device, fmt::format("the host refuses what rendering needs: {}", error.what())));
     }
     result.seconds = secondsSince(start);
     return result;

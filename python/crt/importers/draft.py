@@ -38,6 +38,8 @@ class Draft:
         self.sampler = {}
         self.camera = {}
         self.materials = {}
+        self.material_names = {}
+        self.next_numbers = {}
         self.things = []
         self.lights = []
         self.environment = None
@@ -48,11 +50,16 @@ class Draft:
         base = re.sub(r"[^A-Za-z0-9_.-]+", "_", wanted or content["type"]).strip("_")
         if not base[:1].isalpha() or base.lower() in NO_NAMES:
             base = f"material_{base}".rstrip("_")
-        name, number = base, 2
-        while name in self.materials and self.materials[name] != content:
-            name, number = f"{base}_{number}", number + 1
-        self.materials[name] = content
-        return name
+        # The content as text finds in one step whether the material is there under another number.
+        key = (base, repr(content))
+        if key not in self.material_names:
+            name, number = base, self.next_numbers.get(base, 2)
+            while name in self.materials:
+                name, number = f"{base}_{number}", number + 1
+            self.next_numbers[base] = number
+            self.materials[name] = content
+            self.material_names[key] = name
+        return self.material_names[key]
 
     def look(self, place, matrix, image_right, tangent_scale=1):
         """The camera's keys of place and direction. `matrix` leads from the camera, y up and z forward, to
