@@ -12,7 +12,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
+#include <system_error>
 
 namespace crt {
 namespace {
@@ -60,12 +62,24 @@ std::string fault(const std::vector<float>& rgb, std::uint32_t width, double sca
     return {};
 }
 
+/// A small file may hold a large image: what it becomes is counted before it is read.
+void checkSize(const EnvironmentImage& image, const TexelsInfo& info) {
+    constexpr std::uint64_t kBytesPerPixel = 56;  // While it is made, at the peak.
+    std::error_code unknown;
+    const std::uint64_t bytes = std::filesystem::file_size(image.file, unknown);
+    const std::string why =
+        ExpansionLimit(unknown ? 0 : bytes)
+            .refusal(std::uint64_t{info.width} * info.height, "pixels of an environment", kBytesPerPixel);
+    if (!why.empty()) refuse(image.place, fmt::format("'{}': {}", image.file, why));
+}
+
 EnvironmentTexels texelsOf(const EnvironmentImage& image) {
     EnvironmentTexels out;
     std::vector<float> rgb;
     try {
         const TexelsInfo info = texelsInfo(image.file);
         checkShape(image, info);
+        checkSize(image, info);
         out.width = info.width;
         out.height = info.height;
         rgb = linearRgb(readTexels(image.file), TexelColor::Auto, image.file);

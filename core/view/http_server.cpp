@@ -9,9 +9,12 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 
+#include <stdexcept>
 #include <sys/random.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <string_view>
@@ -26,6 +29,9 @@ namespace http = beast::http;
 using asio::ip::tcp;
 
 constexpr std::size_t kMostConnections = 64;
+/// Of a connection: its socket, and what its context waits with.
+constexpr std::size_t kDescriptorsEach = 4;
+constexpr std::chrono::milliseconds kPause{50};
 constexpr std::uint64_t kMostBodyBytes = 65536;
 constexpr std::uint32_t kMostHeaderBytes = 16384;
 constexpr std::chrono::seconds kLongestRead{10}, kLongestWrite{30};
@@ -50,6 +56,14 @@ std::string decoded(std::string_view text) {
         i += 2;
     }
     return out;
+}
+
+/// So many that the program keeps half of the descriptors that it may have.
+std::size_t mostConnections() {
+    struct rlimit limit {};
+    if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kMostConnections;
+    const auto allowed = static_cast<std::size_t>(limit.rlim_cur) / 2 / kDescriptorsEach;
+    return std::clamp<std::size_t>(allowed, 2, kMostConnections);
 }
 
 HttpRequest requestOf(const http::request<http::string_body>& received) {
@@ -136,6 +150,8 @@ public:
     /// Ends what waits. [any thread]
     void interrupt() { ::shutdown(socket().native_handle(), SHUT_RDWR); }
 
+    bool has_token = false;  ///< It has sent a request with the right one. Under the server's mutex.
+
 private:
     asio::io_context context_;
     beast::tcp_stream stream_{context_};
@@ -152,7 +168,7 @@ HttpServer::HttpServer(std::uint16_t port, std::string token,
     if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
     if (error)
         throw Error(ErrorKind::Usage,
-                    fmt::format("port {} is not to be had: {}; without --port a free one is taken", port,
+                    fmt::format("port {} cannot be used: {}; without --port a free one is taken", port,
                                 error.message()));
     port_ = acceptor.local_endpoint().port();
     thread_ = std::thread([this, listener = currentListener()] {
@@ -176,26 +192,61 @@ HttpServer::~HttpServer() {
 
 void HttpServer::accept() {
     while (true) {
-        auto connection = std::make_unique<Connection>();
-        beast::error_code error;
-        listening_->acceptor.accept(connection->socket(), error);
+        try {
+            acceptOne();
+        } catch (const std::exception&) {  // Out of descriptors, threads or memory: others will end.
+            std::this_thread::sleep_for(kPause);
+        }
         const std::lock_guard lock(mutex_);
         if (stopping_) return;
-        if (error || open_.size() >= kMostConnections) {
-            if (error) std::this_thread::sleep_for(std::chrono::milliseconds(50));  // Out of descriptors.
-            continue;
-        }
-        open_.insert(connection.get());
+    }
+}
+
+void HttpServer::makeRoom(std::unique_lock<std::mutex>& lock) {
+    const std::size_t most = mostConnections();
+    if (open_.size() < most) return;
+    const auto silent = std::find_if(open_.begin(), open_.end(),
+                                     [](const Connection* connection) { return !connection->has_token; });
+    if (silent != open_.end()) (*silent)->interrupt();
+    closed_.wait_for(lock, kPause, [&] { return open_.size() < most || stopping_; });
+}
+
+void HttpServer::close(Connection* connection) {
+    open_.remove(connection);
+    closed_.notify_all();
+}
+
+void HttpServer::acceptOne() {
+    {
+        std::unique_lock lock(mutex_);
+        makeRoom(lock);
+        if (stopping_ || open_.size() >= mostConnections()) return;
+    }
+    auto connection = std::make_unique<Connection>();
+    beast::error_code error;
+    listening_->acceptor.accept(connection->socket(), error);
+    const std::lock_guard lock(mutex_);
+    if (stopping_) return;
+    if (error) throw std::runtime_error(error.message());
+    Connection* const raw = connection.get();
+    open_.push_back(raw);
+    try {
         std::thread([this, listener = currentListener(), own = std::move(connection)]() mutable {
             {
                 const ListenerScope scope(listener);
-                serve(*own);
+                try {
+                    serve(*own);
+                } catch (const std::exception&) {  // Out of memory: the browser asks again.
+                }
             }
             const std::lock_guard closing(mutex_);
-            open_.erase(own.get());
+            Connection* const ended = own.get();
             own.reset();
-            closed_.notify_all();
+            close(ended);
         }).detach();
+    } catch (...) {
+        close(raw);
+        throw;
     }
 }
 
@@ -204,7 +255,15 @@ void HttpServer::serve(Connection& connection) {
     http::request<http::string_body> received;
     if (!connection.read(received)) return;
     const auto header = [&](http::field field) { return std::string(received[field]); };
-    HttpReply reply = replyTo(requestOf(received), header(http::field::host), header(http::field::origin));
+    const HttpRequest request = requestOf(received);
+    const auto given = request.query.find("token");
+    const std::string why = refusal(port_, header(http::field::host), header(http::field::origin), token_,
+                                    given != request.query.end() ? given->second : "");
+    if (why.empty()) {
+        const std::lock_guard lock(mutex_);
+        connection.has_token = true;
+    }
+    HttpReply reply = why.empty() ? replyTo(request) : HttpReply{.status = 403, .body = why + "\n"};
     http::response<http::string_body> response{http::int_to_status(reply.status), received.version()};
     response.set(http::field::content_type, reply.type);
     response.set(http::field::cache_control, "no-store");
@@ -217,12 +276,7 @@ void HttpServer::serve(Connection& connection) {
     connection.write(response);
 }
 
-HttpReply HttpServer::replyTo(const HttpRequest& request, const std::string& host,
-                              const std::string& origin) {
-    const auto given = request.query.find("token");
-    const std::string why =
-        refusal(port_, host, origin, token_, given != request.query.end() ? given->second : "");
-    if (!why.empty()) return {.status = 403, .body = why + "\n"};
+HttpReply HttpServer::replyTo(const HttpRequest& request) {
     try {
         return answer_(request);
     } catch (const Error& error) {

@@ -5,10 +5,10 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string>
 #include <thread>
 
@@ -40,7 +40,7 @@ std::string refusal(std::uint16_t port, const std::string& host, const std::stri
 class HttpServer {
 public:
     /// `port` 0: any that is free. `answer` is called on many threads at once, and may take its time. Throws
-    /// crt::Error(Usage) for a port that is not to be had.
+    /// crt::Error(Usage) for a port that is taken.
     HttpServer(std::uint16_t port, std::string token, std::function<HttpReply(const HttpRequest&)> answer);
     /// Closes all connections and waits until every answer() has returned.
     ~HttpServer();
@@ -54,8 +54,14 @@ private:
     class Connection;
 
     void accept();
+    /// A connection from the acceptor onwards; waits for room first.
+    void acceptOne();
+    /// Interrupts the oldest connection that has shown no token, where there are too many, and waits a moment
+    /// until one is closed.
+    void makeRoom(std::unique_lock<std::mutex>& lock);
+    void close(Connection* connection);
     void serve(Connection& connection);
-    HttpReply replyTo(const HttpRequest& request, const std::string& host, const std::string& origin);
+    HttpReply replyTo(const HttpRequest& request);
 
     const std::string token_;
     const std::function<HttpReply(const HttpRequest&)> answer_;
@@ -63,7 +69,7 @@ private:
     std::uint16_t port_ = 0;
     std::mutex mutex_;
     std::condition_variable closed_;
-    std::set<Connection*> open_;
+    std::list<Connection*> open_;  ///< The oldest first.
     bool stopping_ = false;
     std::thread thread_;
 };
