@@ -2,6 +2,7 @@
 
 #include "base/log.h"
 #include "base/standard_output.h"
+#include "base/temporary_folder.h"
 #include "view/http_server.h"
 #include "view/pages.h"
 
@@ -15,6 +16,8 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -78,6 +81,22 @@ bool openInBrowser(const std::string& address, const sigset_t& signals) {
     return started;
 }
 
+/// A page that leads to `address`: the address has the token in it, and command lines are for all to read.
+std::string pageThatLeadsTo(const std::string& address) {
+    return fmt::format("<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\">"
+                       "<title>crt view</title><meta http-equiv=\"refresh\" content=\"0;url={0}\">"
+                       "<a href=\"{0}\">crt view</a>\n",
+                       address);
+}
+
+/// For files that are nobody else's: a folder of the session, or of temporary files.
+std::filesystem::path privateParent() {
+    const char* const runtime = std::getenv("XDG_RUNTIME_DIR");
+    std::error_code none;
+    if (runtime != nullptr && std::filesystem::is_directory(runtime, none)) return runtime;
+    return std::filesystem::temp_directory_path();
+}
+
 /// Reading a large scene cannot be cancelled, and there is nothing to save: who still works then is left.
 void leaveSoon() {
     std::thread([] {
@@ -98,7 +117,13 @@ void serveView(const ViewOptions& view, const ServeOptions& serve) {
     const std::string address = fmt::format("http://127.0.0.1:{}/?token={}", server.port(), token);
     printOut("{}\n", address);
     flushStandardOutput();
-    const bool opened = serve.open_browser && hasDesktop() && openInBrowser(address, signals.before());
+    std::optional<TemporaryFolder> folder;  // Which only this user can enter.
+    bool opened = false;
+    if (serve.open_browser && hasDesktop()) {
+        folder.emplace(privateParent());
+        opened = openInBrowser("file://" + folder->write("view.html", pageThatLeadsTo(address)),
+                               signals.before());
+    }
     logInfo("{}; Ctrl-C ends it",
             opened ? "the view is in the browser" : "open the address above in a browser");
     signals.wait();

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 
@@ -118,12 +119,28 @@ void Viewer::change(const ViewChange& change) {
     });
 }
 
+namespace {
+
+/// Throws for a camera so much nearer to its target, or farther from it, than the scene's own that its
+/// directions would be rounding.
+void requireReach(const CameraPose& pose, const Camera& camera) {
+    constexpr double kMost = 1e9;
+    const auto lengthOf = [](const Vec3d& v) { return std::sqrt(dot(v, v)); };
+    const double own = lengthOf(camera.target - camera.position), now = lengthOf(pose.target - pose.position),
+                 moved = lengthOf(pose.target - camera.target);
+    if (!(now <= kMost * own && now * kMost >= own && moved <= kMost * own))
+        throw Error(ErrorKind::Usage, "the camera goes no farther");
+}
+
+}  // namespace
+
 CameraPose Viewer::poseAfter(const ViewChange& change) const {
     CameraPose pose = change.reset_camera && scene_ ? poseOf(scene_->camera) : pose_;
     if (change.focus) pose.focus_distance = focusAt(*change.focus);
     if (change.orbit) orbit(pose, (*change.orbit)[0], (*change.orbit)[1]);
     if (change.pan) pan(pose, scene_->camera, (*change.pan)[0], (*change.pan)[1]);
     if (change.dolly) dolly(pose, *change.dolly);
+    if (scene_) requireReach(pose, scene_->camera);
     return pose;
 }
 
