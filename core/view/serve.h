@@ -15,7 +15,7 @@ struct ServeOptions {
 };
 
 /// Prints the address and serves it until SIGINT, SIGTERM or SIGHUP. Throws crt::Error(Usage) for a port
-/// that is not to be had.
+/// that is taken.
 void serveView(const ViewOptions& view, const ServeOptions& serve);
 
 }  // namespace crt

@@ -13,6 +13,7 @@ only.
 
 import json
 import os
+import resource
 import shutil
 import signal
 import struct
@@ -125,12 +126,13 @@ class CliTest(unittest.TestCase):
         with open(self.path(name), "w", encoding="utf-8") as file:
             file.write(text)
 
-    def crt(self, *arguments, expect=0, fault=None, **changes):
+    def crt(self, *arguments, expect=0, fault=None, folder="", **changes):
+        """Runs crt in a folder of the test's and asks for its exit code."""
         if fault:
             changes["CRT_FAKE_FAULT"] = fault
         run = subprocess.run(
             [CRT, *arguments],
-            cwd=self.directory,
+            cwd=self.path(folder),
             env=environment(**changes),
             stdin=subprocess.DEVNULL,
             capture_output=True,
@@ -140,9 +142,15 @@ class CliTest(unittest.TestCase):
         self.assertEqual(run.returncode, expect, f"crt {' '.join(arguments)}\n{run.stdout}{run.stderr}")
         return run
 
-    def start(self, *arguments, fault=None, **changes):
+    def start(self, *arguments, fault=None, most_descriptors=None, **changes):
         if fault:
             changes["CRT_FAKE_FAULT"] = fault
+
+        def begin():
+            default_signals()
+            if most_descriptors:
+                resource.setrlimit(resource.RLIMIT_NOFILE, (most_descriptors, most_descriptors))
+
         process = subprocess.Popen(
             [CRT, *arguments],
             cwd=self.directory,
@@ -151,7 +159,7 @@ class CliTest(unittest.TestCase):
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            preexec_fn=default_signals,
+            preexec_fn=begin,
         )
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.stderr.close)

@@ -581,6 +581,32 @@ def scene_cases():
         + "]}}]\n",
         0,
     )
+    for count in (65, 20000):
+        chain = "".join(f"  s{i}: s{i - 1}\n" for i in range(1, count))
+        for first, words in (("0.5", "in a chain of spectra"), (f"s{count - 1}", ("spectr",))):
+            scene(
+                f"a chain of {count} spectra that begins with {first}",
+                HEAD + f"spectra:\n  s0: {first}\n{chain}"
+                + f"materials: {{m: {{type: diffuse, reflectance: s{count - 1}}}}}\n"
+                + f"objects: [{{{TRIANGLE}, material: m}}]\n",
+                words=words,
+            )
+    for asked, change, words in (
+        ("a camera beyond single precision", "camera.position=[0,1,-4e37]", "too far"),
+        ("a camera far beyond it", "camera.position=[1e38,1e38,-1e38]", "too far"),
+        ("a lens beyond it", "camera.aperture_radius=1e38", "aperture"),
+        ("a focus beyond it", "camera={position: [0,0,4], aperture_radius: 0.1, focus_distance: 1e39}", "focus"),
+    ):
+        scene(asked, GOOD, words=words, arguments=["scene.yaml", "-b", "fake", "--set", change, "-o", "a.pfm"])
+    scene(
+        "depths beyond single precision",
+        GOOD.replace("[1,0,0],[0,1,0]", "[1e39,0,0],[0,1e39,0]")
+        + "camera: {position: [0, 0, 4e39]}\noutputs: [{file: a.exr, aovs: [depth]}]\n",
+        words="too large for its distances",
+        arguments=("scene.yaml", "-b", "fake"),
+    )
+    scene("a path of 50,000 parts", GOOD, words="64 parts",
+          arguments=["info", "scene.yaml", "--set", "a." * 50000 + "b=1"])
     scene(
         "20,000 outputs", HEAD + "outputs:\n" + "".join(f"- {{file: o{i}.pfm}}\n" for i in range(20000)), 0
     )

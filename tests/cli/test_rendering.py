@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import time
+import unittest
 
 import harness
 from harness import CliTest, LightTest, SCENE, read_pfm, read_bytes
@@ -50,6 +51,68 @@ class Rendering(CliTest):
         self.crt("with.yaml", "-b", "fake", "-o", "other.pfm", "--report", "none")
         self.assertTrue(os.path.exists(self.path("other.pfm")))
         self.assertFalse(os.path.exists(self.path("other.report.json")))
+
+    def test_outputs_of_the_scene_stay_in_its_folders_and_replace_images_of_crt_alone(self):
+        os.makedirs(self.path("work/sub"))
+        os.makedirs(self.path("home"))
+        os.symlink(self.path("home"), self.path("work/link"))
+        self.write("home/precious.ppm", "precious")
+        self.write("work/photo.ppm", "no image of crt's")
+        with open(self.path("work/photo.png"), "wb") as file:
+            file.write(b"\x89PNG\r\n\x1a\nof another program")
+
+        def named(name, **output):
+            keys = "".join(f", {key}: {value}" for key, value in output.items())
+            self.write("work/of.yaml", SCENE + f"outputs: [{{file: '{name}'{keys}}}]\n")
+            return self.path("work/of.yaml")
+
+        for name, words in (
+            (self.path("home/precious.ppm"), "outside"),
+            ("../home/precious.ppm", "outside"),
+            ("sub/../../home/precious.ppm", "outside"),
+            ("link/precious.ppm", "outside"),
+            (".hidden.ppm", "hidden"),
+            (".sub/a.ppm", "hidden"),
+            ("photo.ppm", "no image of crt's"),
+            ("photo.png", "no image of crt's"),
+        ):
+            with self.subTest(name=name):
+                scene = named(name)
+                self.assert_one_error(self.crt(scene, "-b", "fake", expect=2, folder="work"), words)
+        self.assert_one_error(
+            self.crt(named("a.sh", format="ppm"), "-b", "fake", expect=2, folder="work"), "does not end in"
+        )
+        self.assertEqual(read_bytes(self.path("home/precious.ppm")), b"precious")
+        # Names of the command line are the user's own, and so is --overwrite.
+        self.crt(named("photo.ppm"), "-b", "fake", "--overwrite", folder="work")
+        self.crt(named("photo.ppm"), "-b", "fake", folder="work")
+        self.crt(named("a.ppm"), "-b", "fake", "-o", self.path("home/precious.ppm"), "--report", "none",
+                 folder="work")
+        # Absolute names in the scene's own folder, from anywhere.
+        self.crt(named(self.path("work/sub/b.exr")), "-b", "fake", folder="home")
+        self.crt(named(self.path("work/sub/b.exr")), "-b", "fake", folder="home")
+        self.crt(named("sub/c.png"), "-b", "fake", folder="work")
+        self.crt(named("sub/c.png"), "-b", "fake", folder="work")
+
+    @unittest.skipUnless(os.getuid() == 0, "plays another user")
+    def test_links_of_others_in_folders_of_everyone_are_not_followed(self):
+        os.makedirs(self.path("tmp"))
+        os.chmod(self.path("tmp"), 0o1777)
+        self.write("precious", "precious")
+        for name in ("a.pfm", "a.report.json", "a.crtfilm"):
+            link = os.path.join(self.path("tmp"), name)
+            os.symlink(self.path("precious"), link)
+            os.chown(link, 12345, 12345, follow_symlinks=False)
+            self.assert_one_error(
+                self.crt("scene.yaml", "-b", "fake", "-o", "tmp/a.pfm", "-o", "tmp/a.crtfilm", "--overwrite",
+                         expect=6), "link of another user"
+            )
+            self.assertEqual(read_bytes(self.path("precious")), b"precious")
+            os.unlink(link)
+        # One's own are.
+        os.symlink(self.path("target.pfm"), os.path.join(self.path("tmp"), "a.pfm"))
+        self.crt("scene.yaml", "-b", "fake", "-o", "tmp/a.pfm", "--report", "none")
+        self.assertTrue(os.path.exists(self.path("target.pfm")))
 
     def test_how_it_is_cut_does_not_show(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm")

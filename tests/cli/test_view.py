@@ -274,6 +274,34 @@ class Access(CliTest):
         for connection in silent:
             connection.close()
 
+    def test_silent_connections_lock_nobody_out(self):
+        for limit in (None, 64):
+            view = View(self, "-b", "fake", most_descriptors=limit)
+            view.wait_until_done()
+            silent = []
+            for _ in range(300):
+                silent.append(socket.create_connection(("127.0.0.1", view.port), 30))
+            for _ in range(5):
+                view.sight()
+            for connection in silent:
+                connection.close()
+            view.sight()
+            self.assertIsNone(view.process.poll())
+            view.process.kill()
+
+    def test_a_camera_goes_no_farther_than_directions_are_exact(self):
+        view = View(self, "-b", "fake")
+        view.wait_until_done()
+        for factor in (0.01, 100):
+            with self.assertRaises(urllib.error.HTTPError) as refused:
+                for _ in range(200):
+                    view.change(dolly=factor)
+            with refused.exception as reply:
+                self.assertIn("no farther", reply.read().decode())
+            view.change(orbit=[1, 1])
+            self.assertNotIn(None, view.sight()[0]["camera"]["position"])
+            view.change(reset_camera=True)
+
     def test_a_port_that_is_taken_is_named(self):
         with socket.socket() as taken:
             taken.bind(("127.0.0.1", 0))
