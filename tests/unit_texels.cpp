@@ -93,6 +93,37 @@ TEST_CASE("texels of an HDR", "[texels]") {
     CHECK(rgb[5] == Approx(16).epsilon(0.01));
 }
 
+TEST_CASE("texels of an EXR lie where its data window lies in the picture", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string name = folder / "part.exr";
+    std::vector<float> rgb(18);
+    for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<float>(i + 1) / 32;  // Exact as halves.
+    Image image = imageOf(rgb);
+    image.whole_width = 5;
+    image.whole_height = 4;
+    // Within the picture, partly outside on either side, and wholly outside of it.
+    for (const auto& [left, top] : {std::pair{1, 1}, std::pair{-1, -1}, std::pair{4, 3}, std::pair{9, 0}}) {
+        image.left = left;
+        image.top = top;
+        writeImage(name, OutputFormat::Exr, image);
+        const Texels texels = readTexels(name);
+        REQUIRE(texels.info.width == 5);
+        REQUIRE(texels.info.height == 4);
+        REQUIRE(texels.bytes.size() == 5 * 4 * 3 * sizeof(float));
+        std::vector<float> found(5 * 4 * 3);
+        std::memcpy(found.data(), texels.bytes.data(), texels.bytes.size());
+        for (int y = 0; y < 4; ++y)
+            for (int x = 0; x < 5; ++x)
+                for (int c = 0; c < 3; ++c) {
+                    const int column = x - left, row = y - top;
+                    const bool inside = column >= 0 && column < 3 && row >= 0 && row < 2;
+                    INFO(left << " " << top << ": " << x << " " << y);
+                    CHECK(found[static_cast<std::size_t>((y * 5 + x) * 3 + c)] ==
+                          (inside ? rgb[static_cast<std::size_t>((row * 3 + column) * 3 + c)] : 0));
+                }
+    }
+}
+
 TEST_CASE("texels of a JPEG: colour, grey, progressive, without metadata", "[texels]") {
     const TemporaryFolder folder;
     const std::string path = folder.path() + "/a.jpg";

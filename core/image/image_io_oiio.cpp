@@ -417,6 +417,33 @@ std::uint32_t texelType(const ImageSpec& spec) {
 
 enum class Part { Color, Alpha };
 
+/// The picture of a file, of which an EXR may hold a part alone, or more than all (its data window).
+struct Placement {
+    explicit Placement(const ImageSpec& spec)
+        : width(spec.full_width > 0 ? spec.full_width : spec.width),
+          height(spec.full_height > 0 ? spec.full_height : spec.height),
+          left(spec.full_width > 0 ? spec.x - spec.full_x : 0),
+          top(spec.full_height > 0 ? spec.y - spec.full_y : 0),
+          is_whole(left == 0 && top == 0 && width == spec.width && height == spec.height) {}
+
+    /// Pixels of `bytes` bytes from rows of the file's into those of the picture, which are 0.
+    void place(const ImageSpec& spec, const unsigned char* from, unsigned char* to, std::size_t bytes) const {
+        const std::int64_t first = std::max<std::int64_t>(0, -left),
+                           end = std::min<std::int64_t>(spec.width, width - left);
+        for (std::int64_t row = 0; row < spec.height && first < end; ++row) {
+            const std::int64_t at = row + top;
+            if (at < 0 || at >= height) continue;
+            std::memcpy(to + static_cast<std::size_t>(at * width + left + first) * bytes,
+                        from + static_cast<std::size_t>(row * spec.width + first) * bytes,
+                        static_cast<std::size_t>(end - first) * bytes);
+        }
+    }
+
+    std::int64_t width, height;  ///< Of the picture (its display window).
+    std::int64_t left, top;      ///< Of the file's first pixel in it.
+    bool is_whole;
+};
+
 std::vector<int> channelsOf(const ImageSpec& spec, Part part) {
     if (part == Part::Color) return colorChannels(spec);
     return spec.alpha_channel >= 0 ? std::vector<int>{spec.alpha_channel} : std::vector<int>{};
@@ -453,9 +480,13 @@ std::int32_t readPart(Part part, const char* path, CrtTexelsInfo* info, void* bu
         crt::image::checkPixels(path, width, height,
                                 static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
         crt::image::checkRows(width, height, spec.pixel_bytes(true));
+        const Placement placement(spec);
+        crt::image::checkPixels(path, static_cast<std::uint64_t>(placement.width),
+                                static_cast<std::uint64_t>(placement.height),
+                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
         const std::vector<int> channels = channelsOf(spec, part);
-        info->width = static_cast<std::uint32_t>(width);
-        info->height = static_cast<std::uint32_t>(height);
+        info->width = static_cast<std::uint32_t>(placement.width);
+        info->height = static_cast<std::uint32_t>(placement.height);
         info->channels = static_cast<std::uint32_t>(channels.size());
         info->type = texelType(spec);
         info->has_chromaticities =
@@ -466,8 +497,11 @@ std::int32_t readPart(Part part, const char* path, CrtTexelsInfo* info, void* bu
                               : info->type == CRT_TEXELS_UINT16 ? TypeDesc(TypeDesc::UINT16)
                                                                 : TypeDesc(TypeDesc::FLOAT);
         const std::size_t pixel = channels.size() * type.size();
-        if (width * height * pixel != buffer_bytes) throw Failure{"it has changed while it was read"};
-        auto* const bytes = static_cast<unsigned char*>(buffer);
+        if (std::uint64_t{info->width} * info->height * pixel != buffer_bytes)
+            throw Failure{"it has changed while it was read"};
+        std::vector<unsigned char> own;  // The file's pixels, where the picture has others.
+        if (!placement.is_whole) own.resize(static_cast<std::size_t>(width * height) * pixel);
+        auto* const bytes = placement.is_whole ? static_cast<unsigned char*>(buffer) : own.data();
         if (part == Part::Color && std::strcmp(input->format_name(), "png") == 0 &&
             crt::image::readPng(path, *info, bytes, buffer_bytes))
             return;
@@ -479,6 +513,9 @@ std::int32_t readPart(Part part, const char* path, CrtTexelsInfo* info, void* bu
                 throw Failure{wordsOr(input->geterror(), "its pixels cannot be read")};
             c = end;
         }
+        if (placement.is_whole) return;
+        std::memset(buffer, 0, buffer_bytes);
+        placement.place(spec, bytes, static_cast<unsigned char*>(buffer), pixel);
     });
 }
 
