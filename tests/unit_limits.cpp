@@ -331,6 +331,37 @@ TEST_CASE("a polygon of forty thousand corners becomes triangles in a second", "
     }
 }
 
+TEST_CASE("a polygon is what its outline encloses, whatever goes out of it and back", "[limits]") {
+    const std::vector<Vec3d> square{{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}};
+    // Out and back: to a side, along an edge and beyond it, inwards, of several parts.
+    const std::vector<std::vector<Vec3d>> spikes{
+        {{4, 2, 0}, {9, 3, 0}, {4, 2, 0}},
+        {{4, 2, 0}, {4, 9, 0}},
+        {{4, 2, 0}, {1, 1, 0}, {4, 2, 0}},
+        {{4, 2, 0}, {6, 2, 0}, {9, 2, 0}, {6, 2, 0}, {4, 2, 0}},
+        {{4, 2, 0}, {6, 2, 0}, {6, 5, 0}, {6, 2, 0}, {4, 2, 0}},
+    };
+    for (std::size_t k = 0; k < spikes.size(); ++k)
+        for (std::size_t first = 0; first < square.size() + spikes[k].size(); ++first)
+            for (const bool clockwise : {false, true}) {
+                std::vector<Vec3d> polygon = square;
+                polygon.insert(polygon.begin() + 2, spikes[k].begin(), spikes[k].end());
+                std::rotate(polygon.begin(), polygon.begin() + static_cast<std::ptrdiff_t>(first),
+                            polygon.end());
+                if (clockwise) std::reverse(polygon.begin(), polygon.end());
+                Triangulator triangulator;
+                double area = 0, turned = 0;
+                for (const PolygonTriangle& t : triangulator.split(polygon)) {
+                    const Vec3d &a = polygon[t[0]], &b = polygon[t[1]], &c = polygon[t[2]];
+                    area += std::abs(cross(b - a, c - a)[2]) / 2;
+                    turned += cross(b - a, c - a)[2] / 2;
+                }
+                INFO("spike " << k << ", from corner " << first << (clockwise ? ", clockwise" : ""));
+                CHECK(area == Approx(16));
+                CHECK(turned == Approx(clockwise ? -16 : 16));
+            }
+}
+
 TEST_CASE("light beyond what floats carry is refused with its place", "[limits][radiance]") {
     const auto lit = [](const std::string& radiance, const std::string& environment = "") {
         return refusal([&] {

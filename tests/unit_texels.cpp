@@ -97,7 +97,8 @@ TEST_CASE("texels of an EXR lie where its data window lies in the picture", "[te
     const TemporaryFolder folder;
     const std::string name = folder / "part.exr";
     std::vector<float> rgb(18);
-    for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<float>(i + 1) / 32;  // Exact as halves.
+    // Exact as halves.
+    for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<float>(i + 1) / 32;
     Image image = imageOf(rgb);
     image.whole_width = 5;
     image.whole_height = 4;

@@ -19,8 +19,8 @@ constexpr double kLeastDegreesOfFreedom = 2;
 
 /// Rule of three: of what has not been met, no more than this is expected, with 95 % (Hanley and
 /// Lippman-Hand 1983, JAMA 249). The upper ends of intervals count so many more pixels that are as noisy as
-/// the noisiest, or paths as bright as the scene's brightest; their lower ends, where such paths are rare, as
-/// many fewer.
+/// the noisiest, or paths as bright as the scene's brightest; their lower ends, where such paths are rare,
+/// as many fewer.
 constexpr double kUnmet = 3;
 
 /// What the brightest pixel says of pixels as bright that no path has met yet: so many more squares like its

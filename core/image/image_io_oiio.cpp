@@ -427,7 +427,8 @@ struct Placement {
           is_whole(left == 0 && top == 0 && width == spec.width && height == spec.height) {}
 
     /// Pixels of `bytes` bytes from rows of the file's into those of the picture, which are 0.
-    void place(const ImageSpec& spec, const unsigned char* from, unsigned char* to, std::size_t bytes) const {
+    void place(const ImageSpec& spec, const unsigned char* from, unsigned char* to,
+               std::size_t bytes) const {
         const std::int64_t first = std::max<std::int64_t>(0, -left),
                            end = std::min<std::int64_t>(spec.width, width - left);
         for (std::int64_t row = 0; row < spec.height && first < end; ++row) {

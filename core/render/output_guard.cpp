@@ -48,7 +48,8 @@ bool isImageOfCrt(const std::string& path, OutputFormat format) {
     head.resize(static_cast<std::size_t>(file.gcount()));
     const auto begins = [&](std::string_view with) { return head.rfind(with, 0) == 0; };
     const std::size_t program = head.find("Software");
-    const bool named = program != std::string::npos && head.substr(program, 32).find("crt ") != std::string::npos;
+    const bool named =
+        program != std::string::npos && head.substr(program, 32).find("crt ") != std::string::npos;
     switch (format) {
         case OutputFormat::Exr: return begins("\x76\x2f\x31\x01") && named;
         case OutputFormat::Png: return begins("\x89PNG") && named;

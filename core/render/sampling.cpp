@@ -248,7 +248,8 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
     } catch (const std::bad_alloc&) {
         fail(Error(ErrorKind::Device, "out of memory on the host: a smaller film needs less"));
     } catch (const std::system_error& error) {  // A thread that cannot be started.
-        fail(Error(ErrorKind::Device, fmt::format("the host refuses what rendering needs: {}", error.what())));
+        fail(Error(ErrorKind::Device,
+                   fmt::format("the host refuses what rendering needs: {}", error.what())));
     }
     result.seconds = secondsSince(start);
     return result;

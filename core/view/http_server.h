@@ -56,8 +56,8 @@ private:
     void accept();
     /// A connection from the acceptor onwards; waits for room first.
     void acceptOne();
-    /// Interrupts the oldest connection that has shown no token, where there are too many, and waits a moment
-    /// until one is closed.
+    /// Interrupts the oldest connection that has shown no token, where there are too many, and waits a
+    /// moment until one is closed.
     void makeRoom(std::unique_lock<std::mutex>& lock);
     void close(Connection* connection);
     void serve(Connection& connection);

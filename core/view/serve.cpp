@@ -83,10 +83,11 @@ bool openInBrowser(const std::string& address, const sigset_t& signals) {
 
 /// A page that leads to `address`: the address has the token in it, and command lines are for all to read.
 std::string pageThatLeadsTo(const std::string& address) {
-    return fmt::format("<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\">"
-                       "<title>crt view</title><meta http-equiv=\"refresh\" content=\"0;url={0}\">"
-                       "<a href=\"{0}\">crt view</a>\n",
-                       address);
+    return fmt::format(
+        "<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\">"
+        "<title>crt view</title><meta http-equiv=\"refresh\" content=\"0;url={0}\">"
+        "<a href=\"{0}\">crt view</a>\n",
+        address);
 }
 
 /// For files that are nobody else's: a folder of the session, or of temporary files.

@@ -595,9 +595,11 @@ def scene_cases():
         ("a camera beyond single precision", "camera.position=[0,1,-4e37]", "too far"),
         ("a camera far beyond it", "camera.position=[1e38,1e38,-1e38]", "too far"),
         ("a lens beyond it", "camera.aperture_radius=1e38", "aperture"),
-        ("a focus beyond it", "camera={position: [0,0,4], aperture_radius: 0.1, focus_distance: 1e39}", "focus"),
+        ("a focus beyond it", "camera={position: [0,0,4], aperture_radius: 0.1, focus_distance: 1e39}",
+         "focus"),
     ):
-        scene(asked, GOOD, words=words, arguments=["scene.yaml", "-b", "fake", "--set", change, "-o", "a.pfm"])
+        scene(asked, GOOD, words=words,
+              arguments=["scene.yaml", "-b", "fake", "--set", change, "-o", "a.pfm"])
     scene(
         "depths beyond single precision",
         GOOD.replace("[1,0,0],[0,1,0]", "[1e39,0,0],[0,1e39,0]")

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """A render from outside: which files come out, what is said, and what goes wrong on the way.
 
+Over 450 lines: one command, whose ends differ in what they leave behind.
+
     test_rendering.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 """
 

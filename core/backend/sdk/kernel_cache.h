@@ -16,8 +16,8 @@
 
 namespace crt::plugin {
 
-/// Who else can write to a folder, or to one above it, whose contents will be run; empty: nobody who may not.
-/// For caches that libraries keep on their own. [any thread]
+/// Who else can write to a folder, or to one above it, whose contents will be run; empty: nobody who may
+/// not. For caches that libraries keep on their own. [any thread]
 std::string whyNotFolder(const std::string& folder);
 
 class KernelCache {

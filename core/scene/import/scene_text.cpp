@@ -57,8 +57,8 @@ std::string UniqueNames::take(const std::string& name, const std::string& fallba
     if (wanted.size() == 199 && static_cast<unsigned char>(wanted.back()) >= 0xc0) wanted.pop_back();
     if (looksLikeNumber(wanted)) wanted = "number " + wanted;
     std::string unique = wanted;
-    for (std::size_t& next = next_.try_emplace(wanted, 2).first->second; !taken_.insert(unique).second; ++next)
-        unique = fmt::format("{} ({})", wanted, next);
+    std::size_t& next = next_.try_emplace(wanted, 2).first->second;
+    for (; !taken_.insert(unique).second; ++next) unique = fmt::format("{} ({})", wanted, next);
     return unique;
 }
 

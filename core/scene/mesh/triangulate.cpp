@@ -115,7 +115,11 @@ const std::vector<PolygonTriangle>& Triangulator::split(std::span<const Vec3d> c
     }
     project(corners);
     bool convex = true;
-    for (std::uint32_t i = 0; i < n && convex; ++i) convex = turn(i, (i + 1) % n, (i + 2) % n) >= 0.0;
+    for (std::uint32_t i = 0; i < n && convex; ++i) {
+        const std::uint32_t b = (i + 1) % n, c = (i + 2) % n;
+        const double turned = turn(i, b, c);
+        convex = turned > 0.0 || (turned == 0.0 && !turnsBack(i, b, c));
+    }
 
     ring_.resize(n);
     for (std::uint32_t i = 0; i < n; ++i) ring_[i] = i;
@@ -157,6 +161,41 @@ bool Triangulator::isEar(std::uint32_t corner) const {
     return turn(a, corner, c) > 0.0 && !tree_.anyInside(a, corner, c);
 }
 
+/// True if the way from b to c leads back along that from a to b.
+bool Triangulator::turnsBack(std::uint32_t from, std::uint32_t corner, std::uint32_t to) const {
+    const PointTree::Point &a = points_[from], &b = points_[corner], &c = points_[to];
+    const double p = (a[0] - b[0]) * (c[1] - b[1]), q = (a[1] - b[1]) * (c[0] - b[0]);
+    const double along = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1]);
+    return along > 0 && std::abs(p - q) <= 1e-14 * (std::abs(p) + std::abs(q));
+}
+
+/// True where the outline goes out to a corner and back the same way, or stays where it is: nothing lies in
+/// between.
+bool Triangulator::isSpike(std::uint32_t corner) const {
+    return points_[corner] == points_[after_[corner]] ||
+           turnsBack(before_[corner], corner, after_[corner]);
+}
+
+/// Leaves out the tips of spikes, and returns a corner that is left. `left` counts those.
+std::uint32_t Triangulator::dropSpikes(std::uint32_t& left) {
+    std::uint32_t corner = 0;
+    for (std::uint32_t asked = 0; asked < left && left > 3;) {
+        if (!isSpike(corner)) {
+            corner = after_[corner];
+            ++asked;
+            continue;
+        }
+        const std::uint32_t a = before_[corner], c = after_[corner];
+        after_[a] = c;
+        before_[c] = a;
+        tree_.remove(corner);
+        --left;
+        corner = a;  // Without its tip a spike may have another; so its neighbours are asked again.
+        asked -= std::min(asked, 2u);
+    }
+    return corner;
+}
+
 /// Cuts off what can be cut off, and leaves the rest in ring_. To cut an ear makes no ears but of its two
 /// neighbours (Meisters 1975), so each corner is asked once and then again after a cut beside it.
 void Triangulator::cutEars() {
@@ -168,13 +207,14 @@ void Triangulator::cutEars() {
         after_[i] = (i + 1) % n;
     }
     tree_.build(points_);
+    std::uint32_t left = n, any = dropSpikes(left);
 
     // A neighbour of a cut goes to the end of the queue: ears are taken all around rather than one beside
     // the other, which would make slivers.
     std::vector<std::uint32_t> turn_of(n, 0);  // Only the newest entry of a corner counts.
     std::deque<std::pair<std::uint32_t, std::uint32_t>> waiting;
     const auto ask = [&](std::uint32_t corner) { waiting.emplace_back(corner, ++turn_of[corner]); };
-    std::uint32_t left = n, any = 0, cuts = 0;
+    std::uint32_t cuts = 0;
     // Where corners coincide or edges cross, one cut may free others; then all are asked anew.
     constexpr int kRounds = 16;
     for (int round = 0; round < kRounds && left > 3 && (round == 0 || cuts > 0); ++round) {

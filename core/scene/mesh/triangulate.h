@@ -47,8 +47,9 @@ private:
 /// unless they cross themselves. Keeps its memory from one polygon to the next.
 class Triangulator {
 public:
-    /// The n − 2 triangles of a polygon of n ≥ 3 corners; valid until the next call. A polygon that
-    /// crosses itself is fanned and counted.
+    /// The n − 2 triangles of a polygon of n ≥ 3 corners; valid until the next call. Of one that is not
+    /// convex, corners to which the outline goes and from which it comes back the same way have none. A
+    /// polygon that crosses itself is fanned and counted.
     const std::vector<PolygonTriangle>& split(std::span<const Vec3d> corners);
 
     std::uint64_t crossingPolygons() const { return crossing_; }
@@ -56,6 +57,9 @@ public:
 private:
     void project(std::span<const Vec3d> corners);
     double turn(std::uint32_t a, std::uint32_t b, std::uint32_t c) const;
+    bool turnsBack(std::uint32_t from, std::uint32_t corner, std::uint32_t to) const;
+    bool isSpike(std::uint32_t corner) const;
+    std::uint32_t dropSpikes(std::uint32_t& left);
     void cutEars();
     bool isEar(std::uint32_t corner) const;
 

@@ -156,8 +156,8 @@ std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, con
     const auto known = resolved_.find({name, use});
     if (known != resolved_.end()) return known->second;
     if (open_.size() >= kDeepestSpectrum) {
-        out_.error(place, fmt::format("spectrum '{}' is the {}th in a chain of spectra, each of which names the "
-                                      "next: chains may have {}",
+        out_.error(place, fmt::format("spectrum '{}' is the {}th in a chain of spectra, each of which names "
+                                      "the next: chains may have {}",
                                       name, kDeepestSpectrum + 1, kDeepestSpectrum));
         return std::nullopt;
     }
